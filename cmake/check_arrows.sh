@@ -9,6 +9,7 @@ readonly ARROWS='
 proto/parameters   |
 proto/text         |
 proto/tls          |
+proto/discovery    |
 server/model       | proto/parameters
 server/vulkan      |
 proto/codec        |
@@ -17,30 +18,33 @@ server/reference   | server/model
 server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
 server/meshes      | server/model
-server/messages    | server/model server/meshes proto/parameters proto/text clothstream
+server/messages    | server/model server/meshes server/telemetry proto/parameters proto/text clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
 server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
-server/hosting     | proto/text server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
-server/session     | server/hosting server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
+server/identity    | server/scene server/schedule server/messages clothstream
+server/saved_state | server/scene server/model server/messages server/telemetry clothstream
+server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
+server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls
+server/discovery   | proto/discovery
 server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/telemetry clothstream grpc/health
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/hosting server/recording server/step server/scene server/model
-server/main.cpp    | server/options server/tls server/endpoint server/monitoring server/hosting server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
+server/main.cpp    | server/options server/identity server/tls server/discovery server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
-clients/core/wire  | clients/core/core.h proto/codec proto/parameters
+clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
 clients/grpc       | clients/core proto/tls clothstream
 clients/library    | clients/core clients/grpc
 clients/files      | proto/codec clothstream
 clients/load       | clients/core clients/grpc proto/codec proto/tls clothstream
-clients/cli        | proto/text clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream
+clients/cli        | proto/text proto/discovery clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='
@@ -48,9 +52,12 @@ readonly OUTSIDE='
 <grpcpp/           | server/endpoint/grpc clients/grpc clients/load
 <boost/beast       | server/endpoint/web server/monitoring clients/load
 <prometheus/       | server/monitoring
-<openssl/          | proto/tls server/tls
+<openssl/          | proto/tls server/tls server/identity server/scene
+<jwt.h>            | server/identity
+<sqlite3           | server/saved_state
 <boost/asio/ssl    | server/tls server/endpoint/web clients/load
 <qrencode          | server/tls
+<avahi-            | server/discovery clients/cli
 <Eigen/            | server/model server/reference
 '
 

@@ -2,7 +2,7 @@
 # clothstream_protos_health gRPC's health service. Generated sources are in <build>/proto_generated.
 find_package(Protobuf REQUIRED)
 set(protoOut ${PROJECT_BINARY_DIR}/proto_generated)
-set(protoNames recording scene session)
+set(protoNames recording saved_state scene session)
 set(messageSources)
 foreach(name IN LISTS protoNames)
   set(source ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/${name}.proto)
@@ -10,7 +10,8 @@ foreach(name IN LISTS protoNames)
   add_custom_command(OUTPUT ${stem}.pb.cc ${stem}.pb.h
     COMMAND ${CMAKE_COMMAND} -E make_directory ${protoOut}
     COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto --cpp_out=${protoOut} ${source}
-    DEPENDS ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/scene.proto ${source} VERBATIM)
+    DEPENDS ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/scene.proto ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/session.proto
+      ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/recording.proto ${source} VERBATIM)
   list(APPEND messageSources ${stem}.pb.cc ${stem}.pb.h)
 endforeach()
 add_library(clothstream_protos STATIC ${messageSources})

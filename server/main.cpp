@@ -23,9 +23,12 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/discovery/announcement.h"
 #include "server/endpoint/grpc/grpc_endpoint.h"
 #include "server/endpoint/web/web_endpoint.h"
 #include "server/hosting/scene_server.h"
+#include "server/identity/authenticator.h"
+#include "server/identity/token.h"
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/model/material.h"
@@ -34,6 +37,7 @@
 #include "server/recording/playback.h"
 #include "server/recording/recordings.h"
 #include "server/recording/resimulate.h"
+#include "server/saved_state/saved_state.h"
 #include "server/simulation/software_threads.h"
 #include "server/step/step.h"
 #include "server/telemetry/log.h"
@@ -45,13 +49,13 @@
 namespace clothstream {
 namespace {
 
-// Blocks SIGINT, SIGTERM, SIGHUP and SIGUSR1 in every thread; wait() takes them. Must be created before any
-// other thread.
+// Blocks SIGINT, SIGTERM, SIGHUP, SIGUSR1 and SIGUSR2 in every thread; wait() takes them. Must be created
+// before any other thread.
 class Signals {
  public:
   Signals() {
     sigemptyset(&set_);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1}) sigaddset(&set_, signal);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2}) sigaddset(&set_, signal);
     pthread_sigmask(SIG_BLOCK, &set_, nullptr);
     std::signal(SIGPIPE, SIG_IGN);  // a closed peer is reported as an error of its socket
     std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is reported like a full disk
@@ -224,8 +228,44 @@ void reload(tls::ServerTls& tls) {
   }
 }
 
-// The first address of this machine that others in its network can reach; empty if there is none.
+void reload(identity::Authenticator& authenticator) {
+  try {
+    authenticator.reload();
+    spdlog::info("the keys of tokens are read again");
+  } catch (const std::exception& failure) {
+    spdlog::error("the old keys of tokens stay in use: {}", failure.what());
+  }
+}
+
+// Null if every peer may act as an owner, because only programs of this machine reach the server.
+std::shared_ptr<identity::Authenticator> makeAuthenticator(const ProgramOptions& options) {
+  const bool asks = options.pairing || !options.tokenKeys.empty();
+  if (!asks && isLoopback(options.host)) return nullptr;
+  if (!asks)
+    spdlog::warn("--insecure: everyone who reaches {} can join, with the role {} (docs/identity.md)",
+                 options.host, scene::nameOf(options.anonymousRole));
+  if (asks && !isLoopback(options.host) && !options.tlsSelf && options.tlsCertificate.empty())
+    spdlog::warn("tokens and pairing codes travel without encryption: add --tls self or --tls-certificate");
+  return std::make_shared<identity::Authenticator>(
+      identity::AuthenticatorOptions{.keyDirectory = options.tokenKeys,
+                                     .audience = options.tokenAudience,
+                                     .pairing = options.pairing,
+                                     .stateDirectory = options.stateDirectory,
+                                     .anonymousRole = options.anonymousRole});
+}
+
+// Makes a pairing code for an owner: a person who sees the output of the server controls it.
+void printPairingCode(identity::Authenticator& authenticator) {
+  const auto made = authenticator.makeCode(scene::Role::owner, schedule::Clock::now());
+  if (!made) return;
+  fmt::print("pair    {} makes an owner for {} minutes; SIGUSR2 shows a new code\n", made->code,
+             identity::PairingCodes::kValid.count());
+  std::fflush(stdout);
+}
+
+// The first address of this machine that others in its network can reach, or empty.
 std::string addressInNetwork(const ProgramOptions& options) {
+  if (isLoopback(options.host)) return {};
   if (options.host != "0.0.0.0" && options.host != "::") return options.host;
   for (const std::string& name : tls::namesOfThisMachine())
     if (name.find('.') != std::string::npos && name.find_first_not_of("0123456789.") == std::string::npos &&
@@ -238,22 +278,26 @@ std::string addressInNetwork(const ProgramOptions& options) {
 void printHomeAddresses(const ProgramOptions& options, std::uint16_t port, const std::string& fingerprint) {
   fmt::print("key     {}\n", fingerprint);
   const std::string host = addressInNetwork(options);
-  if (host.empty() || host == "127.0.0.1" || host == "::1" || host == "localhost") return;
+  if (host.empty()) return;
   const std::string address = fmt::format("https://{}/", localAddress(host, port));
   fmt::print("type    {}\n{}", address, tls::qrCode(address));
 }
 
-// Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP without TLS. Reloads the certificate on
-// SIGHUP, and prints the report on SIGUSR1.
+// Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP if there is nothing to reload. SIGHUP reloads
+// the certificate and the keys of tokens, SIGUSR1 prints the report, SIGUSR2 a pairing code. `tls` and
+// `authenticator` may be null.
 void waitForStop(const Signals& signals, const ProgramOptions& options, tls::ServerTls* tls,
-                 const std::function<std::string()>& report) {
+                 identity::Authenticator* authenticator, const std::function<std::string()>& report) {
   using Clock = std::chrono::steady_clock;
   std::optional<Clock::time_point> end;
   if (options.stopAfter) end = Clock::now() + *options.stopAfter;
   while (!end || Clock::now() < *end) {
     const int signal = end ? signals.wait(*end - Clock::now()) : signals.wait();
-    if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && tls == nullptr)) return;
-    if (signal == SIGHUP) reload(*tls);
+    const bool reloads = tls != nullptr || !options.tokenKeys.empty();
+    if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && !reloads)) return;
+    if (signal == SIGHUP && tls != nullptr) reload(*tls);
+    if (signal == SIGHUP && authenticator != nullptr) reload(*authenticator);
+    if (signal == SIGUSR2 && options.pairing) printPairingCode(*authenticator);
     if (signal != SIGUSR1) continue;
     fmt::print("{}", report());
     std::fflush(stdout);
@@ -296,9 +340,10 @@ class Monitored {
 };
 
 // Serves through both endpoints until a signal or --seconds ends it. `intro` is printed before the addresses.
-// `monitoring` may be null. Returns what limits the time until the process ends.
+// `authenticator` and `monitoring` may be null. Returns what limits the time until the process ends.
 [[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server,
                                                       const ProgramOptions& options, const Signals& signals,
+                                                      identity::Authenticator* authenticator,
                                                       monitoring::MonitoringEndpoint* monitoring,
                                                       const std::string& intro,
                                                       const std::function<std::string()>& report) {
@@ -308,8 +353,10 @@ class Monitored {
     const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
     if (page.empty())
       spdlog::warn("no page found next to the program: build the target clothstream_page, or use --page DIR");
-    const endpoint::ConnectionLimits limits{.connectionsPerAddress = options.maxConnectionsPerAddress,
-                                            .connectionsPerSecond = options.connectionsPerSecond};
+    const endpoint::ConnectionLimits limits{
+        .connectionsPerAddress = options.maxConnectionsPerAddress,
+        .connectionsPerSecond = options.connectionsPerSecond,
+        .connectionsPerSecondOfAddress = options.connectionsPerSecondPerAddress};
     const endpoint::WebEndpoint web(server, {.host = options.host,
                                              .port = options.port,
                                              .pageDirectory = page,
@@ -317,6 +364,8 @@ class Monitored {
                                              .connections = limits,
                                              .publicNames = options.publicNames,
                                              .tls = tls,
+                                             .hostInNetwork = addressInNetwork(options),
+                                             .showsFingerprint = options.tlsSelf,
                                              .allowedOrigins = options.allowedOrigins});
     const endpoint::GrpcEndpoint rpc(server, {.host = options.host,
                                               .port = options.grpcPort,
@@ -329,10 +378,20 @@ class Monitored {
                localAddress(options.host, rpc.port()));
     if (options.tlsSelf) printHomeAddresses(options, web.port(), tls->fingerprint());
     std::fflush(stdout);
+    if (options.pairing) printPairingCode(*authenticator);
     const Monitored monitored(monitoring, server);
-    waitForStop(signals, options, tls.get(), report);
+    std::optional<discovery::Announcement> announcement;
+    if (options.announces)
+      announcement.emplace(
+          discovery::AnnouncedServer{.pagePort = web.port(),
+                                     .grpcPort = rpc.port(),
+                                     .encrypted = tls != nullptr,
+                                     .fingerprint = options.tlsSelf ? tls->fingerprint() : "",
+                                     .version = kServerName});
+    waitForStop(signals, options, tls.get(), authenticator, report);
     spdlog::info("stopping");
     guard = std::make_unique<EndGuard>(signals, options.drain);
+    announcement.reset();
     monitored.stopping();
     server.stop();
   }
@@ -353,9 +412,12 @@ int play(const ProgramOptions& options, const Signals& signals) {
   const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
                                         recording->length(), scene, recording->device());
   std::unique_ptr<EndGuard> guard;  // outlives the server
+  hosting::ServerOptions serverOptions = options.server;
+  serverOptions.authenticator = makeAuthenticator(options);
   hosting::SceneServer server(
-      scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), options.server);
-  guard = openEndpoints(server, options, signals, monitoring.get(), intro, [&] { return server.report(); });
+      scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), serverOptions);
+  guard = openEndpoints(server, options, signals, serverOptions.authenticator.get(), monitoring.get(), intro,
+                        [&] { return server.report(); });
   return 0;
 }
 
@@ -374,6 +436,12 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   std::unique_ptr<EndGuard> guard;  // outlives everything that may not end
   // Outlives the scenes, because it waits for their last records.
   std::optional<recording::Recordings> recordings;
+  std::shared_ptr<saved_state::SavedState> savedState;
+  if (options.keepsScenes)
+    savedState = std::make_shared<saved_state::SavedState>(
+        saved_state::SavedStateOptions{.directory = options.stateDirectory,
+                                       .maxBytes = bytesOf(options.stateLimitMb),
+                                       .minFreeBytes = bytesOf(options.keepFreeMb)});
   if (!options.recordDirectory.empty())
     recordings.emplace(
         recording::RecorderOptions{
@@ -388,12 +456,15 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
   hosting::ServerOptions serverOptions = options.server;
   serverOptions.device = deviceOptions(options, nodes);
+  const std::shared_ptr<identity::Authenticator> authenticator = makeAuthenticator(options);
+  serverOptions.authenticator = authenticator;
   serverOptions.journals = [&](const model::Scene& scene) {
     return recordings ? recordings->add(scene.name) : nullptr;
   };
+  serverOptions.store = savedState;
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  guard = openEndpoints(server, options, signals, monitoring.get(),
+  guard = openEndpoints(server, options, signals, authenticator.get(), monitoring.get(),
                         fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList),
                         report);
   return 0;
@@ -453,6 +524,30 @@ int printScene(const ProgramOptions& options) {
   return 0;
 }
 
+int runToken(const ProgramOptions& options) {
+  const TokenOptions& token = options.token;
+  if (!token.newKey.empty()) {
+    identity::makeTokenKey(token.newKey);
+    return 0;
+  }
+  const identity::Claims claims{.role = token.role,
+                                .scene = token.scene,
+                                .name = token.name,
+                                .subject = token.subject,
+                                .tenant = token.tenant,
+                                .audience = options.tokenAudience,
+                                .expires = identity::WallClock::now() + token.valid,
+                                .notBefore = {}};
+  const identity::TokenKey key = identity::readTokenKey(token.key);
+  const std::string text = identity::sign(key, claims);
+  // A server would refuse names that are too long, for example.
+  const auto checked =
+      identity::check(text, {{key.id, key}}, options.tokenAudience, identity::WallClock::now());
+  if (!checked) throw std::runtime_error(checked.error().text);
+  fmt::print("{}\n", text);
+  return 0;
+}
+
 int run(const ProgramOptions& options, const Signals& signals) {
   switch (options.command) {
     case Command::serve:
@@ -465,6 +560,8 @@ int run(const ProgramOptions& options, const Signals& signals) {
       return runSteps(options, signals);
     case Command::printScene:
       return printScene(options);
+    case Command::token:
+      return runToken(options);
     case Command::listDevices:
       return listDevices();
     case Command::listMaterials:
@@ -483,8 +580,9 @@ int main(int argc, char** argv) {
     if (const int* code = std::get_if<int>(&parsed)) return *code;
     const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const Signals signals;
-    telemetry::setUpLog(options.logLevel, options.logFormat == "json" ? telemetry::LogFormat::json
-                                                                      : telemetry::LogFormat::text);
+    telemetry::setUpLog(options.logLevel,
+                        options.logFormat == "json" ? telemetry::LogFormat::json : telemetry::LogFormat::text,
+                        options.logRate);
     for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
     return run(options, signals);
   } catch (const std::exception& error) {

@@ -123,6 +123,7 @@ ExitCode join(const JoinOptions& options) {
   clientOptions.role = options.role;
   clientOptions.quality = options.quality;
   clientOptions.temporalLayers = options.temporalLayers;
+  clientOptions.maxVertices = options.maxVertices;
   if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };
   auto joined = GrpcClient::join(options.address, clientOptions, Listener(line, options.report));

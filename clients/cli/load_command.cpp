@@ -213,7 +213,9 @@ ExitCode LoadCommand::run(const ServerAddress& address) const {
       std::fflush(stdout);
     };
   }
-  load::LoadReport report = load::runLoad(*links, options_, progress);
+  load::LoadOptions options = options_;
+  options.token = address.token;
+  load::LoadReport report = load::runLoad(*links, options, progress);
   if (shows) fmt::print("\r\033[K");
   std::optional<double> serverCpu;
   if (before && after) serverCpu = *after - *before;

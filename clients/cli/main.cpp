@@ -4,23 +4,34 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
+#include <iostream>
+#include <string>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include "clients/cli/discover.h"
+#include "clients/cli/error.h"
 #include "clients/cli/exit_code.h"
+#include "clients/cli/identity_commands.h"
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
 #include "clients/cli/load_command.h"
 #include "clients/cli/motion_commands.h"
 #include "clients/cli/presence.h"
 #include "clients/cli/recording_commands.h"
+#include "clients/cli/saved_token.h"
 #include "clients/cli/scene.h"
 #include "clients/cli/set.h"
 #include "clients/cli/set_options.h"
 #include "clients/cli/signals.h"
 #include "clients/core/core.h"
 #include "clients/grpc/address.h"
+#include "clients/grpc/channel.h"
+#include "clients/grpc/identity.h"
 #include "proto/tls/fingerprint.h"
 
 namespace {
@@ -76,7 +87,77 @@ struct TrustOptions {
     }
     if (!server.isEncrypted() && !(caFile.empty() && fingerprint.empty()))
       throw CLI::ValidationError("ADDRESS", "must begin with https:// for --ca and --fingerprint");
+    if (server.isEncrypted() && caFile.empty() && fingerprint.empty()) {
+      const auto kept = keptFingerprint(server);
+      if (!kept) throw CLI::ValidationError("ADDRESS", kept.error());
+      server.fingerprint = *kept;
+    }
     return server;
+  }
+
+  // Before the first pairing with a server whose key is not known: shows the key that the server has, and
+  // asks whether it is right. Leaves the address as it is if an authority has signed the key.
+  static tl::expected<void, Failure> learnKey(ServerAddress& server) {
+    if (!server.isEncrypted() || !server.caFile.empty() || !server.fingerprint.empty()) return {};
+    const auto shown = unknownKeyOf(server);
+    if (!shown) return tl::unexpected(shown.error());
+    if (shown->empty()) return {};
+    const auto refused = [&](const char* what) {
+      return tl::unexpected(Failure{Failure::Kind::refused, fmt::format("The server at {} has the key {}. {}",
+                                                                        server.address, *shown, what)});
+    };
+    if (isatty(STDIN_FILENO) == 0)
+      return refused("If the server prints the same, use it with --fingerprint.");
+    fmt::print(stderr, "The server at {} has the key\n  {}\nDoes the server print the same key? [y/N] ",
+               server.address, *shown);
+    std::string answer;
+    std::getline(std::cin, answer);
+    if (answer != "y" && answer != "Y" && answer != "yes") return refused("It is not trusted.");
+    server.fingerprint = *shown;
+    return {};
+  }
+};
+
+// How this client proves who it is, for all commands that connect.
+struct ProofOptions {
+  std::string tokenFile, code;
+
+  void add(CLI::App& app) {
+    CLI::Option* const token =
+        app.add_option("--token", tokenFile,
+                       "File with the token for the server; - reads standard input. Default: the one that "
+                       "--pair has kept for this server");
+    app.add_option(
+           "--pair", code,
+           "Six digits that the server or an owner shows. The client gets a token for them and keeps it")
+        ->excludes(token);
+  }
+
+  // Sets the token for this server, if there is one, and with --pair also its key. Both are kept after
+  // pairing.
+  tl::expected<void, Failure> prove(ServerAddress& server) const {
+    const auto wrong = [](const std::string& text) {
+      return tl::unexpected(Failure{Failure::Kind::refused, text});
+    };
+    const std::filesystem::path kept = tokenFileOf(server);
+    if (!code.empty()) {
+      if (kept.empty()) return wrong("--pair needs a directory for the token: set HOME or XDG_STATE_HOME");
+      if (auto learnt = TrustOptions::learnKey(server); !learnt) return learnt;
+      const auto token = pair(server, code);
+      if (!token) return tl::unexpected(token.error());
+      if (const auto saved = saveLine(kept, *token); !saved) return wrong(saved.error());
+      if (!server.fingerprint.empty())
+        if (const auto saved = saveLine(fingerprintFileOf(server), server.fingerprint); !saved)
+          return wrong(saved.error());
+      server.token = *token;
+      return {};
+    }
+    std::error_code none;
+    if (tokenFile.empty() && !std::filesystem::exists(kept, none)) return {};
+    const auto token = readToken(tokenFile.empty() ? kept : std::filesystem::path(tokenFile));
+    if (!token) return wrong(token.error());
+    server.token = *token;
+    return {};
   }
 };
 
@@ -87,6 +168,8 @@ int run(int argc, char** argv) {
 
   TrustOptions trust;
   trust.add(app);
+  ProofOptions proof;
+  proof.add(app);
   std::string address(kDefaultAddress);
   JoinOptions joinOptions;
   std::vector<std::string> colliders;
@@ -109,6 +192,10 @@ int run(int argc, char** argv) {
       .add_option("--layers", joinOptions.temporalLayers,
                   "Most temporal layers to receive; fewer layers mean fewer frames a second. Default: all")
       ->check(CLI::Range(1, 3));
+  joinCommand
+      .add_option("--max-vertices", joinOptions.maxVertices,
+                  "Most vertices to accept from the server; twice as many triangles. Default: 4194304")
+      ->check(CLI::Range(1, 67'108'864));
   joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
                        "End when the connection is lost. Default: try to reconnect for a minute");
   joinCommand
@@ -142,8 +229,14 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   listCommand.add_flag("--json", listOptions.json, "Print a JSON array");
 
+  DiscoverCommand discoverCommand;
+  discoverCommand.add(app);
+
   SceneCommands sceneCommands;
   sceneCommands.add(app, address);
+
+  IdentityCommands identityCommands;
+  identityCommands.add(app, address);
 
   MotionCommands motionCommands;
   motionCommands.add(app);
@@ -173,7 +266,14 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? kOk : kUsage;
   }
   blockEndingSignals();
+  if (discoverCommand.parsed()) return discoverCommand.run();
   if (motionCommands.parsed()) return motionCommands.run();
+  if (!recordingCommands.parsed() || recordingCommands.connects()) {
+    const auto proved = proof.prove(joinOptions.address);
+    if (!proved) return printError(exitCodeOf(proved.error().kind), proved.error().text);
+    listOptions.address = setOptions.address = joinOptions.address;
+  }
+  if (identityCommands.parsed()) return identityCommands.run(joinOptions.address);
   if (recordingCommands.parsed()) return recordingCommands.run(joinOptions.address, CLOTHSTREAM_VERSION);
   if (loadCommand.parsed()) return loadCommand.run(joinOptions.address);
   if (sceneCommands.parsed()) return sceneCommands.run(joinOptions.address);

@@ -181,6 +181,7 @@ ExitCode record(const RecordOptions& options) {
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream record";
   clientOptions.role = CS_ROLE_VIEWER;
+  clientOptions.maxVertices = options.maxVertices;
   clientOptions.cancelled = [] { return interrupted(); };
   clientOptions.onMessage = [&](std::span<const std::byte> bytes) { file.receive(bytes); };
   const auto onEvents = [&](cs_client* core, std::uint32_t events) {

@@ -2,6 +2,7 @@
 // `clothstream record`: writes a live stream to a file.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -14,6 +15,7 @@ struct RecordOptions {
   ServerAddress address = std::string(kDefaultAddress);
   std::string scene;  // empty: the server's default scene
   std::string output;
+  std::uint32_t maxVertices = 0;  // 0: the default of cs_limits
   std::optional<double> seconds;  // not set: until a signal
   std::string program;            // name and version of this program
 };

@@ -15,6 +15,10 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
       ->add_option("--seconds", recordOptions_.seconds,
                    "Stop after this time; default: at an interrupt (Ctrl-C)")
       ->check(CLI::PositiveNumber);
+  record_
+      ->add_option("--max-vertices", recordOptions_.maxVertices,
+                   "Most vertices to accept from the server; twice as many triangles. Default: 4194304")
+      ->check(CLI::Range(1, 67'108'864));
   record_->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
       ->capture_default_str();
 

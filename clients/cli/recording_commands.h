@@ -20,6 +20,8 @@ class RecordingCommands {
   // The parser stores the server's address in `address`.
   void add(CLI::App& app, std::string& address);
   bool parsed() const;
+  // Returns whether the chosen command connects to a server.
+  bool connects() const { return record_->parsed(); }
   ExitCode run(const ServerAddress& address, const std::string& program);
 
  private:

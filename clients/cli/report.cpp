@@ -48,6 +48,7 @@ Report Report::of(const cs_client* client, std::uint64_t nowUs) {
   report.device = cs_device_name(client);
   report.vertices = cs_vertex_count(client);
   report.streamRate = cs_stream_rate(client);
+  report.frameDivisor = cs_frame_divisor(client);
   report.seconds = cs_stream_seconds(client);
   cs_get_statistics(client, nowUs, &report.statistics);
   cs_get_operating_point(client, &report.quality, &report.temporalLayers);
@@ -132,8 +133,11 @@ std::string Report::text(bool hash) const {
 void StatusLine::show(const Report& report) const {
   if (!shown_) return;
   const cs_statistics& now = report.statistics;
-  fmt::print("\r\033[K{}  tick {}  {:.0f} fps  {:.0f} kbit/s  {:.1f} ms round trip  {} dropped", report.scene,
-             now.tick, now.frames_per_second, now.kbit_per_second, now.round_trip_ms, now.dropped);
+  fmt::print(
+      "\r\033[K{}  tick {}  {:.0f} fps{}  {:.0f} kbit/s  {:.1f} ms round trip  {} dropped", report.scene,
+      now.tick, now.frames_per_second,
+      report.frameDivisor > 1 ? fmt::format(" of {}: the server is overloaded", report.streamRate) : "",
+      now.kbit_per_second, now.round_trip_ms, now.dropped);
   std::fflush(stdout);
 }
 

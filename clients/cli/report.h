@@ -24,7 +24,7 @@ std::string solverName(std::uint32_t solver);
 
 struct Report {
   std::string scene, server, device;
-  std::uint32_t vertices = 0, streamRate = 0;
+  std::uint32_t vertices = 0, streamRate = 0, frameDivisor = 1;
   double seconds = 0;  // from the first frame to the newest
   cs_statistics statistics{};
   std::uint32_t quality = 0, temporalLayers = 0;  // as currently sent

@@ -16,8 +16,17 @@ Client::Client(Hello hello) : hello_(std::move(hello)) {
 
 void Client::sendHello() {
   std::string hello;
+  std::string proof;
+  if (!proof_.token.empty() || !proof_.pairingCode.empty())
+    writeAuthenticate(proof, ++lastRequestId_, proof_);
+  outbox_.setProof(std::move(proof));
   writeHello(hello, ++lastRequestId_, hello_);
   outbox_.setHello(std::move(hello));
+}
+
+void Client::prove(Proof proof) {
+  proof_ = std::move(proof);
+  if (outbox_.helloWaits()) sendHello();
 }
 
 void Client::want(const OperatingPoint& atMost) {
@@ -81,6 +90,10 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
       return playbackReceived(message->body, nowUs);
     case Body::operatingPoint:
       return operatingPointReceived(message->body);
+    case Body::authenticate:
+      return tokenReceived(message->body);
+    case Body::createPairingCode:
+      return pairingCodeReceived(message->body);
     case Body::none:
       return 0;
   }
@@ -101,8 +114,11 @@ void Client::update(std::uint64_t nowUs) {
 }
 
 std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
-  std::optional<Welcome> welcome = readWelcome(body);
+  std::optional<Welcome> welcome = readWelcome(body, limits_);
   if (!welcome) return failMalformed("Welcome");
+  if (welcome->participants.size() > limits_.participants)
+    return fail("The scene has more than " + std::to_string(limits_.participants) +
+                " participants, the limit of this client (cs_limits.max_participants).");
   if (welcomed_) return fail("The server sent Welcome twice.");
   if (welcome->protocolVersion != CS_PROTOCOL_VERSION)
     return fail("The server uses protocol version " + std::to_string(welcome->protocolVersion) +
@@ -124,6 +140,7 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   hello_.contentId = known ? welcome_.contentId : 0;
   reconnection_.joined(nowUs);
   point_ = formerPoint_ = {};
+  frameDivisor_ = 1;
   acknowledgement_ = {};
   if (returned && !resumed_) clock_ = {};
   if (returned && posed_) sendPoses(nowUs);
@@ -144,7 +161,7 @@ std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
     if (known != participants_.end()) participants_.erase(known);
   } else if (known != participants_.end()) {
     *known = who;
-  } else if (participants_.size() < kMaxParticipants) {
+  } else if (participants_.size() < limits_.participants) {
     participants_.push_back(who);
   }
   if (who.id == welcome_.participantId && who.role != welcome_.role) {
@@ -158,14 +175,14 @@ std::uint32_t Client::chunkReceived(Bytes body) {
   const std::optional<Chunk> chunk = readChunk(body);
   if (!chunk) return failMalformed("Chunk");
   if (!welcomed_) return fail("The server sent a description before its Welcome.");
-  auto content = assembly_.add(*chunk);
+  auto content = assembly_.add(*chunk, limits_.contentBytes);
   if (!content) return fail("The server sent a wrong description: " + content.error() + ".");
   if (!*content) return 0;
   return described(**content);
 }
 
 std::uint32_t Client::described(Bytes content) {
-  auto description = readDescription(content);
+  auto description = readDescription(content, limits_);
   if (!description)
     return fail("The server's description of the scene is wrong: " + description.error() + ".");
   auto decoder = codec::Decoder::make(description->layout);
@@ -200,11 +217,14 @@ std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs) {
 std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
   const auto packet = std::as_bytes(std::span(frame_.packet.data(), frame_.packet.size()));
   const auto parsed = codec::parsePacket(packet);
-  // Frames that the server omits are not lost. At a change of layers, the larger distance between frames
-  // counts.
-  statistics_.arrived(parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
-                      std::max(ticksPerFrame(point_), ticksPerFrame(formerPoint_)), nowUs);
+  // Frames that the server omits are not lost. At a change of layers or of the divisor, the larger distance
+  // between frames counts.
+  statistics_.arrived(
+      parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
+      std::max(ticksPerFrame(point_), ticksPerFrame(formerPoint_)) * std::max(frameDivisor_, frame_.divisor),
+      nowUs);
   formerPoint_ = point_;
+  frameDivisor_ = frame_.divisor;
   switch (decode(packet)) {
     case codec::DecodeResult::ok:
       break;
@@ -323,6 +343,22 @@ std::uint32_t Client::scenesReceived(Bytes body) {
   if (!scenes) return failMalformed("ListScenesResponse");
   scenes_ = std::move(*scenes);
   return CS_EVENT_SCENES;
+}
+
+std::uint32_t Client::tokenReceived(Bytes body) {
+  std::optional<std::string> token = readToken(body);
+  if (!token) return failMalformed("AuthenticateResponse");
+  if (token->empty()) return 0;
+  // The code has been used; the next connection needs the token.
+  proof_ = {.token = std::move(*token), .pairingCode = {}};
+  return CS_EVENT_TOKEN;
+}
+
+std::uint32_t Client::pairingCodeReceived(Bytes body) {
+  std::optional<PairingCode> made = readPairingCode(body);
+  if (!made) return failMalformed("CreatePairingCodeResponse");
+  pairingCode_ = std::move(*made);
+  return CS_EVENT_PAIRING_CODE;
 }
 
 std::uint32_t Client::operatingPointReceived(Bytes body) {

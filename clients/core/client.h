@@ -19,6 +19,7 @@
 #include "clients/core/stream/server_clock.h"
 #include "clients/core/wire/client_message.h"
 #include "clients/core/wire/description.h"
+#include "clients/core/wire/limits.h"
 #include "clients/core/wire/server_message.h"
 #include "proto/codec/decoder.h"
 
@@ -36,9 +37,13 @@ class Client {
   std::uint64_t connectAtUs() const;
   const std::string* nextOutgoing();
 
+  // Used from the next connection on; also for the current one while its Hello waits. A token replaces a
+  // pairing code.
+  void prove(Proof proof);
   // Has no effect on the current connection if its Hello is sent already.
   void want(const OperatingPoint& atMost);
 
+  void setLimits(const Limits& limits) { limits_ = limits; }
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
   void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
   // Four numbers per joint: {x, y, z, radius}. Empty removes the hand.
@@ -50,7 +55,8 @@ class Client {
   void change(const ColliderChange& change);
   void listScenes();
   void setRole(std::uint64_t participant, std::uint32_t role);
-  void remove(std::uint64_t participant);
+  void remove(std::uint64_t participant, bool ban);
+  void createPairingCode(std::uint32_t role);
   void control(const SceneControl& control);
   void requestEarlyKeyFrame(std::uint64_t nowUs);
   // nullptr turns play-out off. Returns false if the options are not allowed.
@@ -62,6 +68,9 @@ class Client {
   const std::string& errorText() const { return errorText_; }
   std::uint32_t errorCode() const { return errorCode_; }
   const Notice& notice() const { return notice_; }
+  // Token given, or received after pairing.
+  const std::string& token() const { return proof_.token; }
+  const PairingCode& pairingCode() const { return pairingCode_; }
   bool resumed() const { return resumed_; }
   const std::vector<Participant>& participants() const { return participants_; }
   // The newest change of participants; kind 0 before the first.
@@ -74,6 +83,8 @@ class Client {
   const ServerClock& clock() const { return clock_; }
   // Quality and layers that the server sends now; no layers before the description.
   OperatingPoint operatingPoint() const;
+  // Of the newest frame; 1 before the first.
+  std::uint32_t frameDivisor() const { return frameDivisor_; }
   // State of the recording at this time.
   std::optional<cs_playback> playback(std::uint64_t nowUs) const;
   double decodeMs() const { return decodeMs_; }
@@ -116,6 +127,8 @@ class Client {
   std::uint32_t parametersReceived(Bytes body);
   std::uint32_t errorReceived(Bytes body);
   std::uint32_t scenesReceived(Bytes body);
+  std::uint32_t tokenReceived(Bytes body);
+  std::uint32_t pairingCodeReceived(Bytes body);
   std::uint32_t operatingPointReceived(Bytes body);
   // Ticks from one frame to the next at this operating point.
   std::uint32_t ticksPerFrame(const OperatingPoint& point) const;
@@ -131,18 +144,22 @@ class Client {
   std::uint32_t errorCode_ = 0;
   std::string errorText_;
   Notice notice_;
-  Hello hello_;  // the token is set after the first Welcome
+  Proof proof_;
+  PairingCode pairingCode_;  // newest; no code before the first
+  Hello hello_;              // the token is set after the first Welcome
   Welcome welcome_;
   std::vector<Participant> participants_;
   Presence presence_;
   Reconnection reconnection_;
   std::uint64_t connectAtUs_ = Reconnection::kNever;  // used while not welcomed
   std::uint64_t lastHeardUs_ = 0, updatedUs_ = 0;
+  Limits limits_;
   ContentAssembly assembly_;
   Description description_;
   std::unique_ptr<codec::Decoder> decoder_;
   Frame frame_;
   OperatingPoint point_, formerPoint_;  // current one, and that of the newest frame
+  std::uint32_t frameDivisor_ = 1;      // of the newest frame
   Acknowledgement acknowledgement_;
   KeyFrameRequest keyFrameRequest_;
   FrameStatistics statistics_;

@@ -103,9 +103,15 @@ void Client::setRole(std::uint64_t participant, std::uint32_t role) {
   send(std::move(message));
 }
 
-void Client::remove(std::uint64_t participant) {
+void Client::remove(std::uint64_t participant, bool ban) {
   std::string message;
-  writeRemoveParticipant(message, ++lastRequestId_, participant);
+  writeRemoveParticipant(message, ++lastRequestId_, participant, ban);
+  send(std::move(message));
+}
+
+void Client::createPairingCode(std::uint32_t role) {
+  std::string message;
+  writeCreatePairingCode(message, ++lastRequestId_, role);
   send(std::move(message));
 }
 

@@ -11,9 +11,9 @@
  *
  * Threads: a client is not thread-safe. Call its functions from one thread at a time.
  *
- * Errors: no function throws or aborts because of the bytes it receives. Memory is bounded: at most 256 MiB
- * for a description that is arriving, and geometry in proportion to the description that arrived. If memory
- * runs out, the native library ends the program and WebAssembly traps.
+ * Errors: no function throws or aborts because of the bytes it receives. Memory is bounded by cs_limits: a
+ * description that is arriving, and geometry in proportion to its vertices and triangles. If memory runs out,
+ * the native library ends the program and WebAssembly traps.
  *
  * Pointers and strings that a function returns belong to the client. They stay valid until the next
  * cs_receive on the same client unless the function says otherwise. Strings are UTF-8 and never NULL.
@@ -65,19 +65,27 @@ typedef enum cs_state {
 
 /* Bits that cs_receive returns: what changed. */
 enum {
-  CS_EVENT_FRAME = 1,          /* new positions */
-  CS_EVENT_DESCRIPTION = 2,    /* new cloths, vertex counts and triangles */
-  CS_EVENT_NOTICE = 4,         /* cs_notice_text */
-  CS_EVENT_ERROR = 8,          /* cs_error_text; fatal if the state is CS_STATE_FAILED */
-  CS_EVENT_PARAMETERS = 16,    /* a parameter changed */
-  CS_EVENT_SCENES = 32,        /* the answer to cs_list_scenes */
-  CS_EVENT_REPORT = 64,        /* cs_get_cloth_report */
-  CS_EVENT_GRABS = 128,        /* cs_grab_event_count */
-  CS_EVENT_CONTACTS = 256,     /* cs_contact_event_count */
-  CS_EVENT_PARTICIPANTS = 512, /* cs_participant_count */
-  CS_EVENT_PRESENCE = 1024,    /* cs_get_presence: why the participants changed */
-  CS_EVENT_RETURNED = 2048,    /* joined again after a lost connection; see cs_resumed */
-  CS_EVENT_PLAYBACK = 4096     /* cs_get_playback */
+  CS_EVENT_FRAME = 1,           /* new positions */
+  CS_EVENT_DESCRIPTION = 2,     /* new cloths, vertex counts and triangles */
+  CS_EVENT_NOTICE = 4,          /* cs_notice_text */
+  CS_EVENT_ERROR = 8,           /* cs_error_text; fatal if the state is CS_STATE_FAILED */
+  CS_EVENT_PARAMETERS = 16,     /* a parameter changed */
+  CS_EVENT_SCENES = 32,         /* the answer to cs_list_scenes */
+  CS_EVENT_REPORT = 64,         /* cs_get_cloth_report */
+  CS_EVENT_GRABS = 128,         /* cs_grab_event_count */
+  CS_EVENT_CONTACTS = 256,      /* cs_contact_event_count */
+  CS_EVENT_PARTICIPANTS = 512,  /* cs_participant_count */
+  CS_EVENT_PRESENCE = 1024,     /* cs_get_presence: why the participants changed */
+  CS_EVENT_RETURNED = 2048,     /* joined again after a lost connection; see cs_resumed */
+  CS_EVENT_PLAYBACK = 4096,     /* cs_get_playback */
+  CS_EVENT_TOKEN = 8192,        /* pairing has given a token: keep cs_token */
+  CS_EVENT_PAIRING_CODE = 16384 /* cs_get_pairing_code */
+};
+
+/* Values of cs_error_code after which the program asks its user for a token or a pairing code. */
+enum {
+  CS_ERROR_UNAUTHENTICATED = 60,   /* the server requires a token, and has got none that is valid */
+  CS_ERROR_WRONG_PAIRING_CODE = 61 /* the code is wrong, or the address has sent too many wrong ones */
 };
 
 /* Role of session.proto. */
@@ -100,9 +108,35 @@ void cs_destroy(cs_client* client) CS_NOEXCEPT;
  * current connection; it takes effect at the next one. quality: best quality level, 0 to 3; 0 is the finest
  * and the default. temporal_layers: 1 to 3; 0 means all and is the default. */
 void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) CS_NOEXCEPT;
+/* Proof of identity for a server that requires one (docs/identity.md): a token, or a pairing code of six
+ * digits. "" means none. The newer call replaces the older one. Call before the first cs_next_outgoing; a
+ * later call takes effect at the next connection. After pairing, CS_EVENT_TOKEN reports the server's token,
+ * with which the client reconnects. Keep it secret. */
+void cs_set_token(cs_client* client, const char* token) CS_NOEXCEPT;
+void cs_set_pairing_code(cs_client* client, const char* code) CS_NOEXCEPT;
+/* Returns the token that is in use; "" without one. */
+const char* cs_token(const cs_client* client) CS_NOEXCEPT;
 /* Sets a monotonic clock in microseconds for measuring decode_ms. NULL disables the measurement. The
  * WebAssembly module does not export this function. */
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) CS_NOEXCEPT;
+
+#define CS_LIMITS_VERSION 1u
+/* Limits of what the client accepts from a server. A description that exceeds a limit leads to
+ * CS_STATE_FAILED before its geometry is allocated; cs_error_text names the limit. A vertex takes about 250
+ * bytes, a triangle about 30. */
+typedef struct cs_limits {
+  uint32_t version;           /* CS_LIMITS_VERSION */
+  uint32_t max_vertices;      /* of all cloths. 1 to 67108864. Default 4194304 */
+  uint32_t max_triangles;     /* of all cloths. 1 to 134217728. Default 8388608 */
+  uint32_t max_cloths;        /* 1 to 256. Default 256 */
+  uint32_t max_participants;  /* 1 to 65536; a Welcome with more fails. Default 4096 */
+  uint64_t max_content_bytes; /* of descriptions that are arriving. 1 to 268435456. Default 268435456 */
+} cs_limits;
+/* Fills in the version and the defaults. */
+void cs_default_limits(cs_limits* out) CS_NOEXCEPT;
+/* Replaces the limits for everything that arrives later. Fails, and changes nothing, if the version or a
+ * number is not allowed. */
+int cs_set_limits(cs_client* client, const cs_limits* limits) CS_NOEXCEPT;
 
 /* Processes one ServerMessage and returns a set of CS_EVENT bits. A malformed message leads to
  * CS_STATE_FAILED. */
@@ -185,6 +219,9 @@ typedef struct cs_collider {
 /* Frames per second of the stream, and ticks per second of the simulation; 0 before the description. */
 uint32_t cs_stream_rate(const cs_client* client) CS_NOEXCEPT;
 uint32_t cs_simulation_rate(const cs_client* client) CS_NOEXCEPT;
+/* Returns n if the newest frame says that the server sends only each n-th frame of this rate, because its
+ * device is overloaded: 1 to 1000. 1 means all frames, and is the value before the first frame. */
+uint32_t cs_frame_divisor(const cs_client* client) CS_NOEXCEPT;
 
 /* Number of vertices of all cloths; 0 before the description. */
 uint32_t cs_vertex_count(const cs_client* client) CS_NOEXCEPT;
@@ -512,6 +549,22 @@ int cs_get_presence(const cs_client* client, cs_presence* out) CS_NOEXCEPT;
  * CS_EVENT_PRESENCE; on failure this client gets CS_EVENT_ERROR. */
 void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role) CS_NOEXCEPT;
 void cs_remove_participant(cs_client* client, uint64_t participant_id) CS_NOEXCEPT;
+/* Like cs_remove_participant. The subject of the participant's token also stays out of the scene, until the
+ * scene is deleted or an owner lifts the ban. Without a token only its resume token is refused. */
+void cs_ban_participant(cs_client* client, uint64_t participant_id) CS_NOEXCEPT;
+
+/* Code by which others pair with the server. */
+typedef struct cs_pairing_code {
+  const char* code; /* six digits */
+  uint32_t role;    /* cs_role of those who use it */
+  uint32_t valid_s; /* seconds, counted from the event */
+} cs_pairing_code;
+
+/* Requests a code; only for clients whose token has the role owner. role: CS_ROLE_UNSPECIFIED means
+ * participant. CS_EVENT_PAIRING_CODE or CS_EVENT_ERROR follows. */
+void cs_create_pairing_code(cs_client* client, uint32_t role) CS_NOEXCEPT;
+/* The newest code. Fails before the first. */
+int cs_get_pairing_code(const cs_client* client, cs_pairing_code* out) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
  * Recording: control the clock of the scene, play recordings, and write the stream to a file.

@@ -18,6 +18,10 @@ uint32_t cs_simulation_rate(const cs_client* client) noexcept {
   return client->client.description().simulationRate;
 }
 
+uint32_t cs_frame_divisor(const cs_client* client) noexcept {
+  return client->client.frameDivisor();
+}
+
 uint32_t cs_vertex_count(const cs_client* client) noexcept {
   return client->client.description().layout.vertexCount();
 }

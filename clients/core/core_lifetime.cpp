@@ -2,6 +2,7 @@
 // C interface: creating a client, its connection, messages and state.
 #include <cassert>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "clients/core/core.h"
@@ -34,8 +35,31 @@ void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) noex
   client->client.want({quality, temporal_layers});
 }
 
+void cs_set_token(cs_client* client, const char* token) noexcept {
+  client->client.prove({.token = token, .pairingCode = {}});
+}
+
+void cs_set_pairing_code(cs_client* client, const char* code) noexcept {
+  client->client.prove({.token = {}, .pairingCode = code});
+}
+
+const char* cs_token(const cs_client* client) noexcept {
+  return client->client.token().c_str();
+}
+
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) noexcept {
   client->client.setClock(now_us);
+}
+
+void cs_default_limits(cs_limits* out) noexcept {
+  *out = Limits{}.toC();
+}
+
+int cs_set_limits(cs_client* client, const cs_limits* limits) noexcept {
+  const std::optional<Limits> allowed = Limits::from(*limits);
+  if (!allowed) return 0;
+  client->client.setLimits(*allowed);
+  return 1;
 }
 
 uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) noexcept {

@@ -53,5 +53,20 @@ void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role) noex
 }
 
 void cs_remove_participant(cs_client* client, uint64_t participant_id) noexcept {
-  client->client.remove(participant_id);
+  client->client.remove(participant_id, false);
+}
+
+void cs_ban_participant(cs_client* client, uint64_t participant_id) noexcept {
+  client->client.remove(participant_id, true);
+}
+
+void cs_create_pairing_code(cs_client* client, uint32_t role) noexcept {
+  client->client.createPairingCode(role);
+}
+
+int cs_get_pairing_code(const cs_client* client, cs_pairing_code* out) noexcept {
+  const PairingCode& made = client->client.pairingCode();
+  if (made.code.empty()) return 0;
+  *out = {.code = made.code.c_str(), .role = made.role, .valid_s = made.validSeconds};
+  return 1;
 }

@@ -32,6 +32,8 @@ struct ServerAddress {
   // authorities of the system. With a fingerprint (fingerprintOf), the server must have this key instead,
   // whatever its name.
   std::string caFile{}, fingerprint{};
+  // Token that proves who the client is; empty: none. Do not print it.
+  std::string token{};
 };
 
 }  // namespace clothstream

@@ -2,8 +2,10 @@
 // Channel arguments and texts of failures.
 #include "clients/grpc/channel.h"
 
+#include <chrono>
 #include <fstream>
 #include <functional>
+#include <mutex>
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
@@ -39,15 +41,30 @@ std::string inBrackets(const std::string& text) {
   return text.empty() ? text : fmt::format(" ({})", text);
 }
 
+// Longest time of a handshake without a call.
+constexpr std::chrono::seconds kHandshakePatience{10};
+
+// Fingerprint that a verifier has seen. gRPC's threads write it.
+struct SeenFingerprint {
+  std::mutex mutex;
+  std::string text;
+};
+
 // Accepts only the server with this key. Names and dates of its certificate do not matter.
 class FingerprintVerifier final : public grpc::experimental::ExternalCertificateVerifier {
  public:
-  explicit FingerprintVerifier(std::string fingerprint) : fingerprint_(std::move(fingerprint)) {}
+  // `seen` may be null.
+  explicit FingerprintVerifier(std::string fingerprint, std::shared_ptr<SeenFingerprint> seen = nullptr)
+      : fingerprint_(std::move(fingerprint)), seen_(std::move(seen)) {}
 
   bool Verify(grpc::experimental::TlsCustomVerificationCheckRequest* request,
               std::function<void(grpc::Status)>, grpc::Status* status) override {
     const grpc::string_ref certificate = request->peer_cert();
     const auto shown = fingerprintOf({certificate.data(), certificate.size()});
+    if (seen_ && shown) {
+      const std::lock_guard lock(seen_->mutex);
+      seen_->text = *shown;
+    }
     *status = shown == fingerprint_
                   ? grpc::Status::OK
                   : grpc::Status(grpc::StatusCode::UNAUTHENTICATED,
@@ -58,18 +75,34 @@ class FingerprintVerifier final : public grpc::experimental::ExternalCertificate
 
  private:
   const std::string fingerprint_;
+  const std::shared_ptr<SeenFingerprint> seen_;
 };
+
+std::shared_ptr<grpc::ChannelCredentials> trustOnly(const std::string& fingerprint,
+                                                    std::shared_ptr<SeenFingerprint> seen = nullptr) {
+  grpc::experimental::TlsChannelCredentialsOptions options;
+  options.set_verify_server_certs(false);
+  options.set_check_call_host(false);
+  options.set_certificate_verifier(
+      grpc::experimental::ExternalCertificateVerifier::Create<FingerprintVerifier>(fingerprint,
+                                                                                   std::move(seen)));
+  return grpc::experimental::TlsCredentials(options);
+}
+
+// Returns whether the handshake succeeds.
+bool canConnect(grpc::Channel& channel) {
+  const auto end = std::chrono::system_clock::now() + kHandshakePatience;
+  for (;;) {
+    const grpc_connectivity_state state = channel.GetState(true);
+    if (state == GRPC_CHANNEL_READY) return true;
+    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE || state == GRPC_CHANNEL_SHUTDOWN) return false;
+    if (!channel.WaitForStateChange(state, end)) return false;
+  }
+}
 
 std::shared_ptr<grpc::ChannelCredentials> credentialsOf(const ServerAddress& server) {
   if (!server.isEncrypted()) return grpc::InsecureChannelCredentials();
-  if (!server.fingerprint.empty()) {
-    grpc::experimental::TlsChannelCredentialsOptions options;
-    options.set_verify_server_certs(false);
-    options.set_check_call_host(false);
-    options.set_certificate_verifier(
-        grpc::experimental::ExternalCertificateVerifier::Create<FingerprintVerifier>(server.fingerprint));
-    return grpc::experimental::TlsCredentials(options);
-  }
+  if (!server.fingerprint.empty()) return trustOnly(server.fingerprint);
   grpc::SslCredentialsOptions options;
   if (!server.caFile.empty()) {
     std::ifstream file(server.caFile, std::ios::binary);
@@ -91,6 +124,23 @@ std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server) {
   return grpc::CreateCustomChannel(server.hostAndPort(), credentialsOf(server), arguments);
 }
 
+tl::expected<std::string, Failure> unknownKeyOf(const ServerAddress& server) {
+  if (canConnect(*makeChannel(server))) return std::string();
+  const auto seen = std::make_shared<SeenFingerprint>();
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  // No key is accepted, so the connection ends with the handshake.
+  canConnect(*grpc::CreateCustomChannel(server.hostAndPort(), trustOnly({}, seen), arguments));
+  const std::lock_guard lock(seen->mutex);
+  if (seen->text.empty())
+    return tl::unexpected(notJoined(server, {grpc::StatusCode::DEADLINE_EXCEEDED, "no TLS handshake"}));
+  return seen->text;
+}
+
+void authorize(grpc::ClientContext& call, const ServerAddress& server) {
+  if (!server.token.empty()) call.AddMetadata("authorization", "Bearer " + server.token);
+}
+
 Failure notJoined(const ServerAddress& server, const grpc::Status& status) {
   using Kind = Failure::Kind;
   switch (status.error_code()) {
@@ -109,6 +159,9 @@ Failure notJoined(const ServerAddress& server, const grpc::Status& status) {
     case grpc::StatusCode::UNIMPLEMENTED:
       return {Kind::refused, fmt::format("The server at {} is not a clothstream-server of this release{}.",
                                          server.address, inBrackets(status.error_message()))};
+    case grpc::StatusCode::UNAUTHENTICATED:
+      return {Kind::refused, fmt::format("The server at {} refuses: {}. Use --token FILE, or --pair CODE.",
+                                         server.address, status.error_message())};
     default:
       return {Kind::refused,
               fmt::format("The server at {} refuses: {}", server.address, status.error_message())};

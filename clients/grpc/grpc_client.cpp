@@ -58,8 +58,16 @@ class GrpcClient::Stream {
         core_(cs_create_as(options.scene.c_str(), options.clientName.c_str(), options.displayName.c_str(),
                            options.role),
               &cs_destroy) {
+    cs_set_token(core_.get(), address_.token.c_str());
     cs_want(core_.get(), options.quality, options.temporalLayers);
     cs_set_clock(core_.get(), &GrpcClient::nowUs);
+    if (options.maxVertices > 0) {
+      cs_limits limits;
+      cs_default_limits(&limits);
+      limits.max_vertices = options.maxVertices;
+      limits.max_triangles = 2 * options.maxVertices;
+      cs_set_limits(core_.get(), &limits);
+    }
     thread_ = std::thread([this] { run(); });
   }
 
@@ -296,7 +304,12 @@ class GrpcClient::Stream {
 
   Failure reason() const {
     if (cs_get_state(core_.get()) == CS_STATE_FAILED) {
-      const bool saidByServer = cs_error_code(core_.get()) != 0;
+      const std::uint32_t code = cs_error_code(core_.get());
+      const bool saidByServer = code != 0;
+      if (code == CS_ERROR_UNAUTHENTICATED)
+        return {Failure::Kind::refused,
+                fmt::format("The server at {} refuses: {}. Use --token FILE, or --pair CODE.",
+                            address_.address, cs_error_text(core_.get()))};
       const char* text = cs_error_text(core_.get());
       return {Failure::Kind::refused,
               saidByServer ? fmt::format("The server at {} refuses: {}", address_.address, text) : text};

@@ -26,6 +26,9 @@ struct GrpcClientOptions {
   cs_role role = CS_ROLE_UNSPECIFIED;
   // Finest quality and most temporal layers that the client requests, as in cs_want.
   std::uint32_t quality = 0, temporalLayers = 0;
+  // Vertices that the client accepts from the server; twice as many triangles (cs_set_limits). 0 means the
+  // defaults of cs_limits. At most 67,108,864.
+  std::uint32_t maxVertices = 0;
   // Longest time from the call of join() to the complete description.
   std::chrono::milliseconds joinTimeout{10'000};
   // Called ten times a second while joining; true cancels. May be empty.

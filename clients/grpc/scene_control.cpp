@@ -39,6 +39,7 @@ tl::expected<Response, Failure> call(const ServerAddress& address, const Request
                                      const Call& method) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
+  authorize(context, address);
   context.set_deadline(std::chrono::system_clock::now() + kTimeout);
   Response response;
   const grpc::Status status = (*stub.*method)(&context, request, &response);
@@ -57,6 +58,7 @@ tl::expected<std::string, Failure> createScene(const ServerAddress& address,
                                                const CreateSceneOptions& options) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
+  authorize(context, address);
   context.set_deadline(std::chrono::system_clock::now() + options.timeout);
   const std::unique_ptr<Stream> stream = stub->Join(&context);
   v1::ClientMessage message;

@@ -11,6 +11,7 @@ tl::expected<std::vector<SceneSummary>, Failure> listScenes(const ServerAddress&
                                                             std::chrono::milliseconds timeout) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
+  authorize(context, address);
   context.set_deadline(std::chrono::system_clock::now() + timeout);
   v1::ListScenesResponse response;
   const grpc::Status status = stub->ListScenes(&context, {}, &response);

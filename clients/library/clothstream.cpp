@@ -3,6 +3,7 @@
 #include "clients/library/clothstream.h"
 
 #include <chrono>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <new>
@@ -12,6 +13,7 @@
 
 #include "clients/grpc/address.h"
 #include "clients/grpc/grpc_client.h"
+#include "clients/grpc/identity.h"
 
 using namespace clothstream;
 
@@ -90,9 +92,16 @@ void clothstream_default_options(clothstream_options* out) noexcept {
 
 clothstream_result clothstream_open(const char* address, const clothstream_options* options,
                                     clothstream_stream** out) noexcept {
+  return clothstream_open_with_token(address, "", options, out);
+}
+
+clothstream_result clothstream_open_with_token(const char* address, const char* token,
+                                               const clothstream_options* options,
+                                               clothstream_stream** out) noexcept {
   return guarded([&] {
     *out = nullptr;
     if (!address) return fail(CLOTHSTREAM_INVALID, "The address is NULL.");
+    if (!token) return fail(CLOTHSTREAM_INVALID, "The token is NULL; \"\" is allowed.");
     const auto completed = completeAddress(address);
     if (!completed) return fail(CLOTHSTREAM_INVALID, completed.error());
     clothstream_options wanted;
@@ -111,9 +120,28 @@ clothstream_result clothstream_open(const char* address, const clothstream_optio
     clientOptions.temporalLayers = wanted.temporal_layers;
     clientOptions.joinTimeout = std::chrono::milliseconds(wanted.join_timeout_ms);
     clientOptions.reconnectFor = std::chrono::milliseconds(wanted.reconnect_for_ms);
-    auto joined = GrpcClient::join(*completed, clientOptions, [](cs_client*, std::uint32_t) {});
+    ServerAddress server(*completed);
+    server.token = token;
+    auto joined = GrpcClient::join(server, clientOptions, [](cs_client*, std::uint32_t) {});
     if (!joined) return fail(joined.error());
     *out = std::make_unique<clothstream_stream>(clothstream_stream{std::move(*joined)}).release();
+    return CLOTHSTREAM_OK;
+  });
+}
+
+clothstream_result clothstream_pair(const char* address, const char* code, char* token,
+                                    size_t token_bytes) noexcept {
+  return guarded([&] {
+    if (!address || !code || !token) return fail(CLOTHSTREAM_INVALID, "An argument is NULL.");
+    if (token_bytes < CLOTHSTREAM_TOKEN_BYTES)
+      return fail(CLOTHSTREAM_INVALID, "token_bytes is too small; use CLOTHSTREAM_TOKEN_BYTES.");
+    *token = '\0';
+    const auto completed = completeAddress(address);
+    if (!completed) return fail(CLOTHSTREAM_INVALID, completed.error());
+    const auto given = pair(*completed, code);
+    if (!given) return fail(given.error());
+    if (given->size() >= token_bytes) return fail(CLOTHSTREAM_REFUSED, "The server's token is too large.");
+    std::memcpy(token, given->c_str(), given->size() + 1);
     return CLOTHSTREAM_OK;
   });
 }

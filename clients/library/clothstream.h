@@ -29,6 +29,8 @@ extern "C" {
 /* NOLINTBEGIN(modernize-use-using): C has no using. */
 typedef struct clothstream_stream clothstream_stream;
 
+#define CLOTHSTREAM_TOKEN_BYTES 4097u /* buffer of clothstream_pair */
+
 typedef enum clothstream_result {
   CLOTHSTREAM_OK = 0,
   CLOTHSTREAM_INVALID = 1,     /* an argument is not allowed */
@@ -63,6 +65,15 @@ void clothstream_default_options(clothstream_options* out) CS_NOEXCEPT;
  * *out: the stream; NULL unless the result is CLOTHSTREAM_OK. Free it with clothstream_close. */
 clothstream_result clothstream_open(const char* address, const clothstream_options* options,
                                     clothstream_stream** out) CS_NOEXCEPT;
+/* Like clothstream_open, for a server that requires a token (docs/identity.md). token: "" means none. */
+clothstream_result clothstream_open_with_token(const char* address, const char* token,
+                                               const clothstream_options* options,
+                                               clothstream_stream** out) CS_NOEXCEPT;
+/* Exchanges a pairing code, six digits that a server or an owner shows, for a token.
+ * address: as above. token: buffer of token_bytes, at least CLOTHSTREAM_TOKEN_BYTES; it gets the token with a
+ * zero at its end, or "". Keep the token secret. */
+clothstream_result clothstream_pair(const char* address, const char* code, char* token,
+                                    size_t token_bytes) CS_NOEXCEPT;
 /* Leaves the scene and frees the stream. Takes at most half a second. NULL is allowed. */
 void clothstream_close(clothstream_stream* stream) CS_NOEXCEPT;
 

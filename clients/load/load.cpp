@@ -66,6 +66,7 @@ class Load {
         links_, ParticipantOptions{
                     .scene = options_.scene,
                     .name = "load " + std::to_string(++names_),
+                    .token = options_.token,
                     .decodes = number < options_.decoders,
                     .moves = number + options_.viewers < options_.participants,
                     .phase = number * std::numbers::phi,

@@ -40,6 +40,7 @@ Participant::Participant(Links& links, const ParticipantOptions& options)
       core_(cs_create_as(options.scene.c_str(), "clothstream load", options.name.c_str(),
                          options.moves ? CS_ROLE_PARTICIPANT : CS_ROLE_VIEWER),
             &cs_destroy) {
+  cs_set_token(core_.get(), options.token.c_str());
   cs_set_clock(core_.get(), &nowUs);
   if (timesPoses()) {
     cs_play_out_options playOut;
@@ -137,7 +138,7 @@ void Participant::frameReceived(const v1::Frame& frame, std::uint64_t nowUs) {
     if (!options_.decodes) ++figures_.decodeErrors;
     return;
   }
-  count(packet->header);
+  count(packet->header, std::max(frame.frame_divisor(), 1u));
   figures_.bytes += frame.packet().size();
   cs_statistics statistics;
   cs_get_statistics(core_.get(), nowUs, &statistics);
@@ -180,9 +181,12 @@ void Participant::frameDecoded(const v1::Frame& frame) {
     if (collider.participant_id() == me) poseTiming_.shown(collider.sphere().radius(), times, out);
 }
 
-void Participant::count(const codec::PacketHeader& header) {
+void Participant::count(const codec::PacketHeader& header, std::uint32_t frameDivisor) {
   const std::uint64_t perFrame =
-      std::max(cs_simulation_rate(core_.get()) / std::max(cs_stream_rate(core_.get()), 1u), 1u);
+      std::uint64_t{
+          std::max(cs_simulation_rate(core_.get()) / std::max(cs_stream_rate(core_.get()), 1u), 1u)} *
+      std::max(frameDivisor_, frameDivisor);
+  frameDivisor_ = frameDivisor;
   if (frames_ > 0) {
     const std::uint64_t before = ticks_[(frames_ - 1) % ticks_.size()];
     if (header.tick > before)

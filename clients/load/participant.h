@@ -25,6 +25,7 @@ using Clock = std::chrono::steady_clock;
 
 struct ParticipantOptions {
   std::string scene, name;
+  std::string token;    // empty: none
   bool decodes = true;  // otherwise it reads only the packet headers
   bool moves = true;    // whether it moves a sphere on an orbit
   double phase = 0;     // start of the orbit, revolutions
@@ -71,7 +72,7 @@ class Participant final : private LinkListener {
   void frameReceived(const v1::Frame& frame, std::uint64_t nowUs);
   // Measures poses after the core has decoded the frame.
   void frameDecoded(const v1::Frame& frame);
-  void count(const codec::PacketHeader& header);
+  void count(const codec::PacketHeader& header, std::uint32_t frameDivisor);
   void move(std::uint64_t nowUs);
   void flush();
 
@@ -87,6 +88,7 @@ class Participant final : private LinkListener {
   // Newest ticks, a ring indexed by frame number. Frames can only refer to these.
   std::array<std::uint64_t, 64> ticks_{};
   std::uint64_t frames_ = 0;
+  std::uint32_t frameDivisor_ = 1;  // of the newest frame
   Clock::time_point readsAgainAt_{};
   bool readLater_ = false;
   std::optional<Failure> ended_;

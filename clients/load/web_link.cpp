@@ -27,6 +27,9 @@
 namespace clothstream::load {
 namespace {
 
+// Largest message that is read, as with gRPC.
+constexpr std::size_t kMaxMessageBytes = std::size_t{256} << 20;
+
 namespace net = boost::asio;
 namespace ssl = net::ssl;
 namespace beast = boost::beast;
@@ -158,7 +161,7 @@ class WebLink final : public Link {
   }
   void upgrade() {
     stream_.binary(true);
-    stream_.read_message_max(0);
+    stream_.read_message_max(kMaxMessageBytes);
     stream_.async_handshake(address_.host + ":" + address_.port, "/stream", tracked([this] {
                               open_ = true;
                               readNext();

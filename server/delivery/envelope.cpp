@@ -87,8 +87,7 @@ SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_
 
 SharedBytes tooSlow() {
   return error(v1::ERROR_CODE_CUT_OFF,
-               "the client is too slow: read what the server sends, or send fewer requests and changes",
-               true);
+               "the client is too slow: read the answers of the server, or send fewer requests", true);
 }
 
 }  // namespace clothstream::delivery

@@ -73,7 +73,11 @@ void FramePublisher::run() {
       changed_.notify_all();
     }
     if (Clock::now() >= nextCall) {
-      everySecond_();
+      try {
+        everySecond_();
+      } catch (const std::exception& failure) {
+        spdlog::error("the check of every second failed: {}", failure.what());
+      }
       nextCall = Clock::now() + std::chrono::seconds(1);
     }
   }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/delivery/merged_announcements.h"
 
 namespace clothstream::delivery {
 namespace {
@@ -48,16 +49,24 @@ bool Mailbox::reply(SharedBytes message) {
   return true;
 }
 
-bool Mailbox::announce(SharedBytes message) {
-  bool ready = false;
+void Mailbox::announce(SharedBytes message) {
   {
     const std::lock_guard lock(mutex_);
-    if (!push(announcements_, std::move(message))) return false;
-    ready = streaming_;
-    if (ready) endpointWaits_ = false;
+    if (closed_) return;
+    announcements_.bytes += costOf(*message);
+    announcements_.messages.push_back(std::move(message));
+    if (announcements_.bytes > mergeBeyond_) mergeAnnouncements();
+    if (!streaming_) return;
+    endpointWaits_ = false;
   }
-  if (ready) wake();
-  return true;
+  wake();
+}
+
+void Mailbox::mergeAnnouncements() {
+  announcements_.messages = merged(announcements_.messages);
+  announcements_.bytes = 0;
+  for (const SharedBytes& message : announcements_.messages) announcements_.bytes += costOf(*message);
+  mergeBeyond_ = std::max(kMaxControlBytes, announcements_.bytes + kMinMergeBytes);
 }
 
 void Mailbox::subscribe(std::shared_ptr<const DescriptionChunks> description, const StreamShape& shape,

@@ -26,6 +26,9 @@ namespace clothstream::delivery {
 // kMaxHeld frames of at most kMaxHeldBytes in all (or one larger frame), and one description. Frames and
 // description are shared with the other subscribers.
 //
+// Announcements come from other peers, so they never close a mailbox. Beyond kMaxControlBytes the waiting
+// ones are merged (merged_announcements.h): the subscriber then gets the newest state instead of every step.
+//
 // Room for frames: at most window() frames are sent and not acknowledged. The window is 2, plus 1 for a peer
 // that acknowledges several frames at once, plus the frames sent in one round-trip time. The round-trip time
 // is the recent minimum of the time from sending a frame to its acknowledgement. A minimum is used because a
@@ -45,6 +48,8 @@ class Mailbox {
   static constexpr std::size_t kMaxControlBytes = 256 * 1024;
   // Bytes counted for each control message in addition to its size.
   static constexpr std::size_t kMessageOverhead = 128;
+  // If merged announcements are large, the next merge happens when this many bytes more wait.
+  static constexpr std::size_t kMinMergeBytes = 64 * 1024;
   static constexpr std::size_t kMaxHeld = 3;
   static constexpr std::size_t kMaxHeldBytes = 1024 * 1024;
   static constexpr std::size_t kMinWindow = 2;
@@ -57,9 +62,8 @@ class Mailbox {
   // Queues an answer to this peer. Returns false if there is no room: the peer sends requests and does not
   // read the answers.
   [[nodiscard]] bool reply(SharedBytes message);
-  // Queues a message that all subscribers of the scene get; it is sent after the description. Returns false
-  // if there is no room.
-  [[nodiscard]] bool announce(SharedBytes message);
+  // Queues a message that all subscribers of the scene get; it is sent after the description.
+  void announce(SharedBytes message);
 
   // Starts sending frames: the description first, unless it is null because the peer has it already. `wanted`
   // is limited to what the stream has. `metrics` must outlive the mailbox.
@@ -107,6 +111,7 @@ class Mailbox {
   std::optional<SharedBytes> take(Clock::time_point now);
   bool push(Control& control, SharedBytes message);
   static SharedBytes pop(Control& control);
+  void mergeAnnouncements();
   bool hasRoom() const { return sent_.size() < window(); }
   std::size_t window() const;
   // Quality that the adaptation chose; the present one if the stream has a single quality.
@@ -125,6 +130,7 @@ class Mailbox {
   bool closed_ = false;
   bool endpointWaits_ = false;  // next() returned nothing, and nothing has arrived since
   Control replies_, announcements_;
+  std::size_t mergeBeyond_ = kMaxControlBytes;  // bytes of announcements
 
   std::shared_ptr<const DescriptionChunks> description_;
   std::size_t nextChunk_ = 0;

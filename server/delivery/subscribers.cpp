@@ -52,8 +52,7 @@ void Subscribers::announce(const SharedBytes& message) {
     const std::lock_guard lock(mutex_);
     receivers = subscribers_;
   }
-  for (const Subscriber& receiver : receivers)
-    if (!receiver.mailbox->announce(message)) receiver.mailbox->close(tooSlow());
+  for (const Subscriber& receiver : receivers) receiver.mailbox->announce(message);
 }
 
 void Subscribers::closeAll(const SharedBytes& last) {

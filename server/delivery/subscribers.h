@@ -33,7 +33,7 @@ class Subscribers {
   std::shared_ptr<Mailbox> find(std::uint64_t participant) const;
 
   void publish(const PublishedFrame& frame);
-  // Closes the mailbox of every subscriber that has no room for the message.
+  // Sends the message to every subscriber. A subscriber that does not read gets it merged with others.
   void announce(const SharedBytes& message);
   // Closes every mailbox with this last message, and removes them all.
   void closeAll(const SharedBytes& last);

@@ -24,13 +24,14 @@ constexpr std::chrono::milliseconds kPausedFramePeriod{50};
 DeviceThread::DeviceThread(const vulkan::DeviceOptions& device,
                            const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
                            delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics,
-                           scene::Budget& budget, bool runAlways, double reportRate)
+                           scene::Budget& budget, bool runAlways, double reportRate, bool adaptsToLoad)
     : options_(device),
       publisher_(publisher),
       metrics_(metrics),
       budget_(budget),
       runAlways_(runAlways),
       reportRate_(reportRate),
+      adaptsToLoad_(adaptsToLoad),
       loader_(publisher.workers(), [this] { wake(); }) {
   std::promise<void> ready;
   std::future<void> isReady = ready.get_future();
@@ -95,6 +96,12 @@ std::future<void> DeviceThread::add(std::shared_ptr<scene::LiveScene> scene) {
   return whenAdded;
 }
 
+void DeviceThread::adopt(std::shared_ptr<scene::LiveScene> scene) {
+  post(std::packaged_task<void()>([this, scene = std::move(scene)]() mutable {
+    runs_.push_back(std::make_unique<Run>(std::move(scene)));
+  }));
+}
+
 std::future<void> DeviceThread::remove(std::shared_ptr<scene::LiveScene> scene) {
   return post(std::packaged_task<void()>([this, scene = std::move(scene)] {
     // Waiting frames refer to the scene.
@@ -132,8 +139,9 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
   }
   ready.set_value();
 
-  while (waitForWork()) {
+  for (;;) {
     try {
+      if (!waitForWork()) break;
       runTasks();
       takeLoadedScenes();
       startAndStopScenes();
@@ -141,14 +149,41 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       runDueTicks();
       runSlice();
     } catch (const std::exception& failure) {
-      rebuildDevice(failure.what());
+      // A lack of memory may also end the attempt.
+      for (bool tried = false; !tried;) try {
+          rebuildDevice(failure.what());
+          tried = true;
+        } catch (const std::exception& again) {
+          spdlog::error("device: {}; trying again", again.what());
+        }
     }
   }
-  publisher_.drain();
   loader_.abandon();
+  saveLast();
+  publisher_.drain();
   runs_.clear();
   meter_.reset();
   device_.reset();
+}
+
+void DeviceThread::saveLast() {
+  // Ticks in slices get this time to end. Longer ones are dropped, and an earlier state stays saved.
+  const Clock::time_point end = Clock::now() + std::chrono::seconds(1);
+  try {
+    for (const auto& run : runs_) {
+      if (!run->host || !run->host->isReady() || !run->scene->keeper) continue;
+      scene::SceneHost& host = *run->host;
+      while (run->begun && host.hasSlices() && Clock::now() < end) {
+        host.submitSlice();
+        host.waitForSlice();
+      }
+      if (run->begun && host.hasSlices()) continue;
+      if (std::exchange(run->begun, false)) host.finish();
+      host.saveLast();
+    }
+  } catch (const std::exception& failure) {
+    spdlog::warn("the last states of scenes are not saved, but earlier ones may be: {}", failure.what());
+  }
 }
 
 bool DeviceThread::waitForWork() {
@@ -165,6 +200,7 @@ bool DeviceThread::waitForWork() {
     changed_.wait_until(lock, due, something);
   else
     changed_.wait(lock, something);
+  idle_ += Clock::now() - lastAnswer_.load();
   woken_ = false;
   return !stopping_;
 }
@@ -179,9 +215,10 @@ void DeviceThread::takeLoadedScenes() {
 void DeviceThread::take(Run& run) {
   try {
     if (run.host)
-      run.host->rebuild(run.loading.get(), "a tick failed");
+      run.host->rebuild(run.loading.get(), run.rebuiltAfter);
     else
       run.host = std::make_unique<scene::SceneHost>(run.loading.get(), *run.scene, publisher_, reportRate_);
+    run.host->setWork(run.overload.level());
     if (run.whenAdded) run.whenAdded->set_value();
     run.whenAdded.reset();
   } catch (const vulkan::DeviceLost&) {
@@ -216,9 +253,25 @@ void DeviceThread::measureSpeed() {
   budget_.setSpeed(speed_);
 }
 
+void DeviceThread::adaptToLoad(Run& run, Clock::time_point now) {
+  if (!adaptsToLoad_) return;
+  const double own = run.host->ownSeconds().value_or(schedule::seconds(run.used));
+  const std::uint32_t leastSubsteps = run.host->leastSubsteps();
+  const bool changed = run.overload.note(
+      {.now = now,
+       .slippedTicks = run.slippedBefore,
+       .own = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(own)),
+       .share = schedule::shareOf(run, schedules()),
+       .idle = idle_,
+       .disturbed = std::ranges::any_of(runs_, [](const auto& other) { return other->loading.valid(); })},
+      leastSubsteps);
+  if (changed) run.host->setWork(run.overload.level());
+}
+
+// Waiting for other work, such as the kernels of a scene that is loaded, does not count.
 void DeviceThread::checkPrice(Run& run) {
   const double price = run.scene->tickWork(run.host->colliders()).seconds(budget_.speed());
-  const double seconds = schedule::seconds(run.used);
+  const double seconds = run.host->deviceSeconds().value_or(schedule::seconds(run.used));
   if (!run.price.note(seconds, price)) return;
   const model::DeviceSpeed now = meter_->measure();
   const double slowdown =
@@ -254,6 +307,7 @@ void DeviceThread::startAndStopScenes() {
     if (wanted && !run->running) {
       run->pacer.start(Clock::now());
       run->slow.restart();
+      run->overload.restart();
     }
     const bool paused = ready && inUse && !wanted;
     if (ready && !wanted && (run->running || (run->paused && !paused))) run->host->releaseCoarseEncoders();
@@ -320,7 +374,9 @@ void DeviceThread::endSlice(Run& run, Clock::time_point before) {
   scheduler_.used(run, time);
   if (run.host->hasSlices() || !survives(run, [&] { run.host->finish(); })) return;
   run.begun = false;
-  run.tickEnded(run.used, Clock::now());
+  const Clock::time_point ended = Clock::now();
+  run.tickEnded(run.used, ended);
+  adaptToLoad(run, ended);
   checkPrice(run);
 }
 
@@ -348,6 +404,7 @@ void DeviceThread::rebuildScene(Run& run, const std::string& reason) {
   run.failed = ticks;
   run.rebuildFailed = false;
   run.begun = false;
+  run.rebuiltAfter = "a tick failed";
   run.host->release();
   wake();
 }
@@ -358,10 +415,11 @@ void DeviceThread::begin(Run& run, Clock::time_point now) {
   scene.metrics.lateness.record(schedule::seconds(start.lateness));
   if (start.late) scene.metrics.lateTicks.add();
   scene.metrics.slippedTicks.add(run.wholeSlippedTicks(start.slippedTicks));
+  run.slippedBefore = start.slippedTicks;
   if (const std::optional<double> speed = run.slow.note(now, start.slippedTicks)) {
     const std::string text = fmt::format(
         "simulated time runs at {:.0f} % of real time: the device cannot keep {} ticks/s with {} substeps",
-        *speed * 100, scene.start().simulationRate, scene.start().substeps);
+        *speed * 100, scene.start().simulationRate, scene.work.load().substeps);
     telemetry::log({scene.name()}, spdlog::level::warn, "{}", text);
     scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host->tick()));
   }
@@ -395,21 +453,33 @@ bool DeviceThread::tryRebuildDevice() {
   try {
     device_ = std::make_unique<vulkan::Device>(options_);
     measureSpeed();
-    for (const auto& run : runs_)
-      if (run->host)
-        run->host->rebuild(
-            std::make_unique<scene::SceneOnDevice>(*device_, run->scene->start(), publisher_.workers()),
-            "the device was lost");
   } catch (const std::exception& failure) {
     spdlog::error("device: {}; trying again", failure.what());
     return false;
   }
   metrics_.deviceRebuilds.add();
-  for (const auto& run : runs_) run->pacer.start(Clock::now());
-  spdlog::info("device: {} runs {} scenes again", device_->info().name, runs_.size());
+  reloadScenes();
+  spdlog::info("device: {} runs; its scenes are being loaded again", device_->info().name);
+  wake();
   const std::lock_guard lock(mutex_);
   info_ = device_->info();
   return true;
+}
+
+void DeviceThread::reloadScenes() {
+  std::vector<Run*> lost;
+  for (const auto& run : runs_) {
+    run->overload.restart();
+    if (!run->host) continue;
+    run->rebuiltAfter = "the device was lost";
+    run->rebuildFailed = false;
+    lost.push_back(run.get());
+  }
+  // runs_ begins with the default scene.
+  std::ranges::stable_sort(lost, std::ranges::greater{}, [&](const Run* run) {
+    return std::pair(run == runs_.front().get(), run->scene->subscribers.size());
+  });
+  for (Run* run : lost) run->loading = loader_.load(*device_, run->scene->start());
 }
 
 }  // namespace clothstream::hosting

@@ -21,6 +21,7 @@
 #include "server/scene/live_scene.h"
 #include "server/scene/scene_host.h"
 #include "server/scene/scene_loader.h"
+#include "server/schedule/overload_policy.h"
 #include "server/schedule/price_watch.h"
 #include "server/schedule/slow_watch.h"
 #include "server/schedule/tick_scheduler.h"
@@ -39,10 +40,15 @@ using schedule::Clock;
 // onto the device when it is first joined, on another thread while other scenes run. A scene without
 // subscribers sleeps.
 //
-// Device loss: a new device is created, and every scene continues from its newest snapshot on the CPU. This
-// is tried once a second until it succeeds. If a tick fails in another way, only its scene is rebuilt like
-// this. A scene is given up if a tick fails again within a simulated second, or if rebuilding it fails twice:
-// all participants are dismissed, and the next join starts it from the beginning.
+// Device loss: a new device is created. This is tried once a second until it succeeds. The scenes are then
+// loaded again one by one, the default scene first, then those with the most subscribers. Each continues from
+// its newest snapshot on the CPU as soon as it is loaded, while others are still being loaded. If a tick
+// fails in another way, only its scene is rebuilt like this. A scene is given up if a tick fails again within
+// a simulated second, or if rebuilding it fails twice: all participants are dismissed, and the next join
+// starts it from the beginning.
+//
+// With `adaptsToLoad`, a scene whose ticks do not fit its share of the device does less work
+// (schedule::OverloadPolicy).
 //
 // A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), or if the device
 // is lost twice within kLossWindow while the thread runs this scene.
@@ -56,7 +62,7 @@ class DeviceThread {
   DeviceThread(const vulkan::DeviceOptions& device,
                const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
                delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics, scene::Budget& budget,
-               bool runAlways, double reportRate);
+               bool runAlways, double reportRate, bool adaptsToLoad = true);
   // Ends after the ticks in flight.
   ~DeviceThread();
   DeviceThread(const DeviceThread&) = delete;
@@ -68,6 +74,8 @@ class DeviceThread {
   // Loads a scene and adds it. The future is ready when the scene is. It throws what the device or the scene
   // throws, or std::future_error if the thread ends first; then nothing has changed.
   std::future<void> add(std::shared_ptr<scene::LiveScene> scene);
+  // Adds a scene that is loaded when it is first joined.
+  void adopt(std::shared_ptr<scene::LiveScene> scene);
   // The future is ready when the scene is no longer used.
   std::future<void> remove(std::shared_ptr<scene::LiveScene> scene);
 
@@ -84,7 +92,9 @@ class DeviceThread {
  private:
   struct Run : schedule::TickSchedule {
     explicit Run(std::shared_ptr<scene::LiveScene> live)
-        : TickSchedule(live->start().simulationRate, live->created), scene(std::move(live)) {}
+        : TickSchedule(live->start().simulationRate, live->created),
+          scene(std::move(live)),
+          overload(scene->start().streamRate, scene->start().substeps) {}
     // Adds slipped ticks, and returns the whole ticks that are not counted yet.
     std::uint64_t wholeSlippedTicks(double ticks) {
       slipped += ticks;
@@ -110,13 +120,16 @@ class DeviceThread {
     Clock::time_point served{};                   // end of the newest slice
     bool paused = false;                          // while it has subscribers
     Clock::time_point nextPausedFrame{};          // next check for subscribers that need a key frame
+    const char* rebuiltAfter = "";                // event after which the host is rebuilt
     std::optional<std::uint64_t> failed;          // tick count at the newest failure
     bool rebuildFailed = false;                   // since the newest failure
     std::optional<Clock::time_point> lostDevice;  // newest loss while the thread ran this scene
     bool lostDeviceTwice = false;                 // within kLossWindow
     schedule::SlowWatch slow;
     schedule::PriceWatch price;
-    double slipped = 0;  // ticks that are not counted yet, below 1
+    schedule::OverloadPolicy overload;
+    double slippedBefore = 0;  // ticks by which simulated time fell behind before the current tick
+    double slipped = 0;        // ticks that are not counted yet, below 1
   };
 
   void run(const std::vector<std::shared_ptr<scene::LiveScene>>& scenes, std::promise<void>& ready);
@@ -129,8 +142,12 @@ class DeviceThread {
   void takeLoadedScenes();
   // Throws vulkan::DeviceLost.
   void take(Run& run);
+  // Gives the states of all scenes to their keepers, because the thread ends. Ends short ticks first.
+  void saveLast();
   // Gives the speed of a new device to the budget.
   void measureSpeed();
+  // Lets the scene do less work if it overloads the device, and more if there is room again.
+  void adaptToLoad(Run& run, Clock::time_point now);
   // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
   void checkPrice(Run& run);
   void quarantine(Run& run, const std::string& why);
@@ -152,6 +169,8 @@ class DeviceThread {
   void begin(Run& run, Clock::time_point now);
   void rebuildDevice(const std::string& reason);
   bool tryRebuildDevice();
+  // Starts to load all scenes that were on the former device.
+  void reloadScenes();
 
   const vulkan::DeviceOptions options_;
   delivery::FramePublisher& publisher_;
@@ -159,6 +178,7 @@ class DeviceThread {
   scene::Budget& budget_;
   const bool runAlways_;
   const double reportRate_;
+  const bool adaptsToLoad_;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
@@ -179,6 +199,7 @@ class DeviceThread {
   schedule::TickScheduler scheduler_{scene::SceneHost::kSliceTime};
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
   scene::SceneLoader loader_;                                // for device_
+  Clock::duration idle_{};                                   // time without work for the device
   Clock::time_point nextRebuild_{};                          // earliest time of the next rebuild
 
   std::thread thread_;

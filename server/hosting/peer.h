@@ -12,7 +12,8 @@ class Peer {
  public:
   virtual ~Peer() = default;
 
-  // Closes the connection with this last message. The peer leaves its scene for good.
+  // Closes the connection with this last message, because the server stops. The participant counts as
+  // disconnected: it may come back to the next run of the server.
   virtual void close(delivery::SharedBytes last) = 0;
   // Disconnects the peer if it has been silent for too long. Called about once a second.
   virtual void checkSilence(schedule::Clock::time_point now) = 0;

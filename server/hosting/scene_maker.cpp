@@ -30,11 +30,6 @@ tl::unexpected<v1::Error> refused(v1::ErrorCode code, std::string text) {
   return tl::unexpected(std::move(error));
 }
 
-tl::expected<model::Scene, v1::Error> checked(messages::Result<model::Scene> scene) {
-  if (!scene) return refused(scene.error().code, "createScene.scene: " + scene.error().text);
-  return std::move(*scene);
-}
-
 // Returns the result of `work`. An exception, such as for a mesh that is too large for the memory, becomes an
 // error for the peer that asked.
 template <class Work>
@@ -48,14 +43,28 @@ auto attempt(const char* call, const Work& work) -> decltype(work()) {
   }
 }
 
+// Runs `work` on the maker's thread. An exception, such as for a lack of memory while the answer is given,
+// ends this request and not the thread.
+template <class Work>
+void postTo(boost::asio::thread_pool& thread, Work work) {
+  boost::asio::post(thread, [work = std::move(work)]() mutable {
+    try {
+      work();
+    } catch (const std::exception& failure) {
+      spdlog::error("a request about a scene failed: {}", failure.what());
+    }
+  });
+}
+
 }  // namespace
 
 SceneMaker::SceneMaker(SceneServer::State& server) : server_(server) {
-  boost::asio::post(thread_, [this] { expireLater(); });
+  postTo(thread_, [this] { expireLater(); });
 }
 
 SceneMaker::~SceneMaker() {
-  boost::asio::post(thread_, [this] {
+  stop();
+  postTo(thread_, [this] {
     ended_ = true;
     expiry_.cancel();
   });
@@ -69,30 +78,56 @@ void SceneMaker::expireLater() {
   expiry_.expires_after(std::min(lifetime, kInterval));
   expiry_.async_wait([this, lifetime](const boost::system::error_code& cancelled) {
     if (cancelled) return;
-    for (const auto& scene : server_.scenesNow()) {
-      if (!scene->created || !scene->hasBeenEmptyFor(lifetime, Clock::now())) continue;
-      v1::DeleteSceneRequest request;
-      request.set_name(scene->name());
-      spdlog::info("{}: nobody has used it for {} s", scene->name(), schedule::seconds(lifetime));
-      attempt("deleteScene", [&] { return removeNow(request); });
+    try {
+      deleteUnused(lifetime);
+    } catch (const std::exception& failure) {
+      spdlog::error("unused scenes are not deleted: {}", failure.what());
     }
     expireLater();
   });
 }
 
+void SceneMaker::deleteUnused(std::chrono::milliseconds lifetime) {
+  for (const auto& scene : server_.scenesNow()) {
+    if (!scene->created || !scene->hasBeenEmptyFor(lifetime, Clock::now())) continue;
+    v1::DeleteSceneRequest request;
+    request.set_name(scene->name());
+    spdlog::info("{}: nobody has used it for {} s", scene->name(), schedule::seconds(lifetime));
+    attempt("deleteScene", [&] { return removeNow(request); });
+  }
+}
+
 tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
-                                                 std::optional<UploadedContent> uploaded, CreateDone done) {
+                                                 std::optional<UploadedContent> uploaded, std::string tenant,
+                                                 Wanted wanted, CreateDone done) {
   if (++waiting_ > kMaxWaiting) {
     --waiting_;
+    server_.metrics.refuse(telemetry::Refusal::waitingScenes);
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("createScene: {} scenes wait to be created; try again later", kMaxWaiting));
   }
-  boost::asio::post(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
-                              done = std::move(done)]() mutable {
+  postTo(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
+                   tenant = std::move(tenant), wanted = std::move(wanted), done = std::move(done)]() mutable {
     --waiting_;
     static const std::string nothing;
-    auto made =
-        attempt("createScene", [&] { return createNow(request, uploaded ? uploaded->bytes : nothing); });
+    const auto end = Clock::now() + server_.options.maxCreationTime;
+    const model::Cancellation cancellation(
+        [&] { return stopping_ || (wanted && !wanted()) || Clock::now() > end; });
+    auto made = attempt("createScene", [&]() -> tl::expected<v1::CreateSceneResponse, v1::Error> {
+      try {
+        cancellation.check();
+        return createNow(request, uploaded ? uploaded->bytes : nothing, tenant, cancellation);
+      } catch (const model::Cancelled&) {
+        const bool late = Clock::now() > end;
+        if (late) server_.metrics.refuse(telemetry::Refusal::creationTime);
+        return refused(
+            v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+            late ? fmt::format("createScene: takes longer than {} s (--max-creation-time); make the "
+                               "scene smaller",
+                               schedule::seconds(server_.options.maxCreationTime))
+                 : std::string("createScene: cancelled"));
+      }
+    });
     uploaded.reset();  // before the answer, so that the peer may upload again at once
     done(std::move(made));
   });
@@ -100,7 +135,7 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
 }
 
 void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
-  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+  postTo(thread_, [this, request = std::move(request), done = std::move(done)] {
     done(attempt("deleteScene", [&] { return removeNow(request); }));
   });
 }
@@ -120,13 +155,13 @@ tl::expected<std::shared_ptr<scene::Journal>, v1::Error> SceneMaker::journalOf(
 }
 
 void SceneMaker::startRecording(v1::StartRecordingRequest request, StartRecordingDone done) {
-  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+  postTo(thread_, [this, request = std::move(request), done = std::move(done)] {
     done(attempt("startRecording", [&] { return startNow(request); }));
   });
 }
 
 void SceneMaker::stopRecording(v1::StopRecordingRequest request, StopRecordingDone done) {
-  boost::asio::post(thread_, [this, request = std::move(request), done = std::move(done)] {
+  postTo(thread_, [this, request = std::move(request), done = std::move(done)] {
     done(attempt("stopRecording", [&] { return stopNow(request); }));
   });
 }
@@ -136,6 +171,7 @@ tl::expected<v1::StartRecordingResponse, v1::Error> SceneMaker::startNow(
   const auto journal = journalOf("startRecording", request.scene());
   if (!journal) return tl::unexpected(journal.error());
   auto file = (*journal)->start(request.name());
+  if (!file && file.error().limit) server_.metrics.refuse(*file.error().limit);
   if (!file) return refused(file.error().code, std::move(file.error().text));
   v1::StartRecordingResponse response;
   response.set_file(std::move(*file));
@@ -151,11 +187,22 @@ tl::expected<v1::StopRecordingResponse, v1::Error> SceneMaker::stopNow(
   return std::move(*stopped);
 }
 
+tl::expected<model::Scene, v1::Error> SceneMaker::checked(messages::Result<model::Scene> scene) {
+  if (scene) return std::move(*scene);
+  if (scene.error().limit) server_.metrics.refuse(*scene.error().limit);
+  return refused(scene.error().code, "createScene.scene: " + scene.error().text);
+}
+
 tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
-                                                               const std::string& uploaded) const {
+                                                               const std::string& uploaded,
+                                                               const model::Cancellation& cancellation) {
+  const messages::SceneLimits limits{.nodes = server_.options.maxSceneNodes,
+                                     .springs = server_.options.maxSceneSprings,
+                                     .attachments = server_.options.maxSceneAttachments,
+                                     .cancellation = cancellation};
   switch (request.source_case()) {
     case v1::CreateSceneRequest::kScene:
-      return checked(messages::toScene(request.scene(), {}, server_.options.maxSceneNodes));
+      return checked(messages::toScene(request.scene(), {}, limits));
     case v1::CreateSceneRequest::kUploadedContentId: {
       v1::Scene message;
       if (!messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)),
@@ -165,10 +212,12 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
             fmt::format("createScene: the uploaded content is not a Scene message, or would need more than "
                         "{} bytes of memory: send fewer elements",
                         messages::limits::kMaxParsedBytes));
+      cancellation.check();
       if (!message.ParseFromString(uploaded))
         return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
                        "createScene: the uploaded content is not a Scene message");
-      return checked(messages::toScene(message, {}, server_.options.maxSceneNodes));
+      cancellation.check();
+      return checked(messages::toScene(message, {}, limits));
     }
     case v1::CreateSceneRequest::kNamed:
       if (const std::shared_ptr<scene::LiveScene> live = server_.find(request.named())) return live->start();
@@ -181,9 +230,10 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
   }
 }
 
-tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1::CreateSceneRequest& request,
-                                                                       const std::string& uploaded) {
-  auto definition = definitionOf(request, uploaded);
+tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
+    const v1::CreateSceneRequest& request, const std::string& uploaded, const std::string& tenant,
+    const model::Cancellation& cancellation) {
+  auto definition = definitionOf(request, uploaded, cancellation);
   if (!definition) return tl::unexpected(std::move(definition).error());
   if (!request.name().empty()) {
     messages::Checks checks;
@@ -204,6 +254,15 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("the server has {} created scenes, its maximum: delete one first", created));
   }
+  const auto ofTenant = static_cast<std::uint32_t>(std::ranges::count_if(
+      scenes, [&](const auto& scene) { return scene->created && scene->tenant == tenant; }));
+  if (ofTenant >= server_.options.maxScenesPerTenant) {
+    server_.metrics.refuse(telemetry::Refusal::scenesOfTenant);
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("your tenant has {} created scenes, its maximum (--max-scenes-per-tenant): "
+                               "delete one first",
+                               ofTenant));
+  }
   if (std::ranges::any_of(scenes, [&](const auto& scene) { return scene->name() == definition->name; }))
     return refused(
         v1::ERROR_CODE_INVALID_ARGUMENT,
@@ -213,17 +272,28 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(const v1:
   const auto scene = std::make_shared<scene::LiveScene>(
       std::move(*definition), true, std::move(journal),
       request.max_participants() > 0 ? request.max_participants() : most, server_.budget);
+  scene->tenant = tenant;
+  cancellation.check();
   if (auto charged = scene->charge(); !charged) {
     server_.metrics.refuse(telemetry::Refusal::budget);
     return refused(charged.error().code, std::move(charged.error().text));
   }
+  server_.keep(scene);
   try {
     server_.device.add(scene).get();
   } catch (const std::exception& failure) {
+    server_.forget(*scene);
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("createScene: the device cannot run it: {}", failure.what()));
   }
+  try {
+    cancellation.check();
+  } catch (const model::Cancelled&) {
+    server_.device.remove(scene).wait();
+    throw;
+  }
   server_.insert(scene);
+  server_.flushStore(*scene);
   telemetry::log({scene->name()}, spdlog::level::info, "created, {} vertices", scene->start().nodeCount());
   v1::CreateSceneResponse response;
   *response.mutable_scene() = summaryOf(*scene);
@@ -247,6 +317,8 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
                                        scene->tick.load()));
   server_.device.remove(scene).wait();
   scene->discharge();
+  server_.forget(*scene);
+  server_.flushStore(*scene);
   telemetry::log({scene->name()}, spdlog::level::info, "deleted");
   return v1::DeleteSceneResponse();
 }

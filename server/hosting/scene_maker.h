@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -15,6 +16,8 @@
 
 #include "server/hosting/scene_server.h"
 #include "server/hosting/upload_budget.h"
+#include "server/messages/field_error.h"
+#include "server/model/cancellation.h"
 
 namespace clothstream::hosting {
 
@@ -23,19 +26,24 @@ namespace clothstream::hosting {
 class SceneMaker {
  public:
   explicit SceneMaker(SceneServer::State& server);
-  // Finishes the requests that wait.
+  // Cancels the scene that is being created, and refuses those that wait. Finishes all other requests.
   ~SceneMaker();
   SceneMaker(const SceneMaker&) = delete;
   SceneMaker& operator=(const SceneMaker&) = delete;
+
+  // Cancels the scene that is being created, and refuses those that wait and come.
+  void stop() { stopping_ = true; }
 
   // Maximum number of scenes that wait to be created.
   static constexpr std::uint32_t kMaxWaiting = 64;
 
   // `uploaded` is the content that `request` names, if it names one. Its reservation ends before the answer.
-  // While kMaxWaiting scenes wait it returns an error, and `done` is not called.
+  // `tenant` is that of the peer; empty if it has none.
+  // While kMaxWaiting scenes wait it returns an error, and `done` is not called. Creating a scene ends early
+  // when the peer does not want it any more, after ServerOptions::maxCreationTime, and when the server stops.
   [[nodiscard]] tl::expected<void, v1::Error> create(v1::CreateSceneRequest request,
                                                      std::optional<UploadedContent> uploaded,
-                                                     CreateDone done);
+                                                     std::string tenant, Wanted wanted, CreateDone done);
   void remove(v1::DeleteSceneRequest request, DeleteDone done);
   // Both block the worker thread on the disk.
   void startRecording(v1::StartRecordingRequest request, StartRecordingDone done);
@@ -43,9 +51,13 @@ class SceneMaker {
 
  private:
   tl::expected<v1::CreateSceneResponse, v1::Error> createNow(const v1::CreateSceneRequest& request,
-                                                             const std::string& uploaded);
+                                                             const std::string& uploaded,
+                                                             const std::string& tenant,
+                                                             const model::Cancellation& cancellation);
   tl::expected<model::Scene, v1::Error> definitionOf(const v1::CreateSceneRequest& request,
-                                                     const std::string& uploaded) const;
+                                                     const std::string& uploaded,
+                                                     const model::Cancellation& cancellation);
+  tl::expected<model::Scene, v1::Error> checked(messages::Result<model::Scene> scene);
   tl::expected<std::shared_ptr<scene::Journal>, v1::Error> journalOf(const std::string& call,
                                                                      const std::string& scene) const;
   tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
@@ -55,8 +67,10 @@ class SceneMaker {
 
   // Deletes created scenes that nobody uses, from time to time.
   void expireLater();
+  void deleteUnused(std::chrono::milliseconds lifetime);
 
   SceneServer::State& server_;
+  std::atomic<bool> stopping_ = false;
   std::atomic<std::uint32_t> waiting_ = 0;  // scenes to be created
   boost::asio::thread_pool thread_{1};
   boost::asio::steady_timer expiry_{thread_};

@@ -42,47 +42,53 @@ SceneServer::~SceneServer() {
   stop();
 }
 
-v1::ListScenesResponse SceneServer::listScenes() const {
-  return state_->listScenes();
+v1::ListScenesResponse SceneServer::listScenes(const Identity& by) const {
+  return state_->listScenes(by);
 }
 
-tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::getScene(
-    const v1::GetSceneRequest& request) const {
+tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::getScene(const v1::GetSceneRequest& request,
+                                                                    const Identity& by) const {
+  if (const auto may = state_->mayUse(by, request.name()); !may)
+    return tl::unexpected(toMessage(may.error()));
   return state_->getScene(request);
 }
 
-void SceneServer::createScene(const v1::CreateSceneRequest& request, const CreateDone& done) {
+void SceneServer::createScene(const v1::CreateSceneRequest& request, const CreateDone& done,
+                              const Identity& by, Wanted wanted) {
+  if (const auto may = state_->mayCreate(by); !may) return done(tl::unexpected(toMessage(may.error())));
   if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
     v1::Error error;
     error.set_code(v1::ERROR_CODE_NOT_FOUND);
     error.set_text("createScene.uploadedContentId: upload the scene and create it in the same stream");
     return done(tl::unexpected(std::move(error)));
   }
-  if (auto accepted = state_->maker.create(request, {}, done); !accepted)
+  if (auto accepted = state_->maker.create(request, {}, by.tenant, std::move(wanted), done); !accepted)
     done(tl::unexpected(std::move(accepted.error())));
 }
 
-void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done) {
-  if (const auto may = state_->mayFromOutside(request.name(), scene::Action::deleteScene); !may)
+void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done, const Identity& by) {
+  if (const auto may = state_->mayFromOutside(by, request.name(), scene::Action::deleteScene); !may)
     return done(tl::unexpected(toMessage(may.error())));
   state_->maker.remove(request, std::move(done));
 }
 
-void SceneServer::startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done) {
-  if (const auto may = state_->mayFromOutside(request.scene(), scene::Action::recordScene); !may)
+void SceneServer::startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done,
+                                 const Identity& by) {
+  if (const auto may = state_->mayFromOutside(by, request.scene(), scene::Action::recordScene); !may)
     return done(tl::unexpected(toMessage(may.error())));
   state_->maker.startRecording(request, std::move(done));
 }
 
-void SceneServer::stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done) {
-  if (const auto may = state_->mayFromOutside(request.scene(), scene::Action::recordScene); !may)
+void SceneServer::stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done,
+                                const Identity& by) {
+  if (const auto may = state_->mayFromOutside(by, request.scene(), scene::Action::recordScene); !may)
     return done(tl::unexpected(toMessage(may.error())));
   state_->maker.stopRecording(request, std::move(done));
 }
 
 tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::controlScene(
-    const v1::ControlSceneRequest& request) {
-  if (const auto may = state_->mayFromOutside(request.name(), scene::Action::controlScene); !may)
+    const v1::ControlSceneRequest& request, const Identity& by) {
+  if (const auto may = state_->mayFromOutside(by, request.name(), scene::Action::controlScene); !may)
     return tl::unexpected(toMessage(may.error()));
   return state_->controlScene(request, 0);
 }

@@ -13,6 +13,7 @@
 #include <tl/expected.hpp>
 
 #include "server/delivery/wire_types.h"
+#include "server/identity/identity.h"
 #include "server/messages/limits.h"
 #include "server/model/scene.h"
 #include "server/scene/budget.h"
@@ -25,14 +26,24 @@
 namespace clothstream::scene {
 class FrameSource;
 class Journal;
+class SceneStore;
 }  // namespace clothstream::scene
 
+namespace clothstream::identity {
+class Authenticator;
+}
+
 namespace clothstream::hosting {
+
+using identity::Identity;
 
 // Participants of a scene whose colliders the simulation has room for.
 inline constexpr std::uint32_t kMaxParticipants =
     (simulation::kMaxColliders - messages::limits::kMaxColliders) /
     messages::limits::kMaxParticipantColliders;
+
+// Time of an upload that minUploadRate does not concern.
+inline constexpr std::chrono::seconds kUploadPatience{5};
 
 struct ServerOptions {
   vulkan::DeviceOptions device;
@@ -44,35 +55,58 @@ struct ServerOptions {
   bool runAlways = false;
   // Frames per second of each scene that carry a simulation report; 0 for none.
   double reportRate = scene::kDefaultReportRate;
+  // A scene that the device cannot keep up with sends fewer frames and computes fewer substeps. Otherwise
+  // only its simulated time becomes slower.
+  bool adaptsToLoad = true;
   std::uint32_t maxConnections = 1024;
   // Limit for each scene, disconnected participants included. At most kMaxParticipants. A peer that creates
   // a scene may set a lower limit.
   std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
   // Scenes that peers may create, in addition to those that the server starts with.
   std::uint32_t maxCreatedScenes = 16;
-  // Nodes of a scene that a peer creates.
-  std::uint64_t maxSceneNodes = 262'144;
+  // Nodes, springs and attachments of a scene that a peer creates.
+  std::uint64_t maxSceneNodes = 262'144, maxSceneSprings = 4'194'304;
+  std::uint32_t maxSceneAttachments = messages::limits::kMaxAttachments;
+  // Creating a scene ends with an error after this time.
+  std::chrono::milliseconds maxCreationTime{60'000};
   // A created scene is deleted when it has had no participant for this long; 0: never.
   std::chrono::milliseconds sceneLifetime{3'600'000};
   // Limits what participants add by creating scenes and changing parameters.
   scene::BudgetLimits budget{};
   // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).
   std::uint32_t encoderThreads = 0;
-  // Limit of the uploads of all peers together, in bytes.
-  std::size_t maxUploadBytes = std::size_t{64} << 20;
+  // Limits of the uploads of all peers together, and of the peers of one address, in bytes.
+  std::size_t maxUploadBytes = std::size_t{64} << 20, maxUploadBytesOfAddress = std::size_t{32} << 20;
+  // An upload is dropped after this time, complete or not, unless a scene was created from it. Slower ones
+  // are dropped earlier: an upload must have this mean rate in kilobytes per second, after kUploadPatience.
+  std::chrono::milliseconds maxUploadTime{60'000};
+  double minUploadRate = 16;
+  // Megabytes per second that are read from one peer, with a burst of as many. A faster peer waits.
+  double maxReadRate = 16;
   // Returns the journal of a scene, or null for none. May be empty.
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};
+  // Keeps scenes beyond the end of the server; null: nothing is kept.
+  std::shared_ptr<scene::SceneStore> store{};
   // A peer that sends nothing for this long is disconnected.
   std::chrono::milliseconds silence{30'000};
-  // The same before it has joined a scene; at most `silence`.
+  // A peer that has not joined a scene by then is disconnected, even if it sends messages. The time of an
+  // upload, at most maxUploadTime, and of creating a scene are added.
   std::chrono::milliseconds helloTimeout{10'000};
   scene::ReconnectGrace reconnectGrace{};
   scene::Permissions participantsMay{};
   // True: peers outside a scene may always pause, reset, record and delete it. False: only while it has no
   // owner.
   bool outsideControl = true;
+  // Decides who peers are. Null: nobody is asked, and every peer is like identity::local().
+  std::shared_ptr<identity::Authenticator> authenticator{};
+  // Open connections with tokens of one subject.
+  std::uint32_t maxConnectionsPerToken = 16;
+  // Created scenes of one tenant. Peers without a tenant share one number.
+  std::uint32_t maxScenesPerTenant = 16;
 };
 
+// Returns whether the peer still waits for the answer. Called on any thread; must not block.
+using Wanted = std::function<bool()>;
 // Called once, on any thread. Must not block.
 using CreateDone = std::function<void(tl::expected<v1::CreateSceneResponse, v1::Error>)>;
 using StartRecordingDone = std::function<void(tl::expected<v1::StartRecordingResponse, v1::Error>)>;
@@ -95,15 +129,21 @@ class SceneServer {
   SceneServer(const SceneServer&) = delete;
   SceneServer& operator=(const SceneServer&) = delete;
 
-  // Unary calls of peers that are not in a stream.
-  v1::ListScenesResponse listScenes() const;
-  tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request) const;
+  // Unary calls of a peer that is not in a stream. By default the program itself calls.
+  v1::ListScenesResponse listScenes(const Identity& by = identity::local()) const;
+  tl::expected<v1::GetSceneResponse, v1::Error> getScene(const v1::GetSceneRequest& request,
+                                                         const Identity& by = identity::local()) const;
   // Refuses a request for uploaded content, because uploads need a stream.
-  void createScene(const v1::CreateSceneRequest& request, const CreateDone& done);
-  void deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done);
-  void startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done);
-  void stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done);
-  tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request);
+  void createScene(const v1::CreateSceneRequest& request, const CreateDone& done,
+                   const Identity& by = identity::local(), Wanted wanted = {});
+  void deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done,
+                   const Identity& by = identity::local());
+  void startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done,
+                      const Identity& by = identity::local());
+  void stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done,
+                     const Identity& by = identity::local());
+  tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request,
+                                                                 const Identity& by = identity::local());
 
   // Announces that the server stops, and closes every session, present and future.
   void stop();

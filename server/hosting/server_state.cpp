@@ -11,6 +11,8 @@
 #include "proto/text/printable.h"
 #include "server/messages/description.h"
 #include "server/messages/scene_message.h"
+#include "server/scene/scene_store.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -26,6 +28,14 @@ std::vector<std::shared_ptr<scene::LiveScene>> liveScenes(std::vector<model::Sce
                                                         options.maxParticipants, budget));
   }
   return scenes;
+}
+
+// Longest wait for the disk before an answer, which is then given without it.
+constexpr std::chrono::seconds kStorePatience{2};
+
+void raise(std::atomic<std::uint64_t>& newest, const scene::SavedScene& saved) {
+  for (const scene::SavedParticipant& known : saved.roster.participants)
+    newest = std::max(newest.load(), known.participant.id);
 }
 
 // Viewers of a recording have numbers above this one, so that they differ from the participants in it.
@@ -79,7 +89,7 @@ v1::SceneSummary summaryOf(const scene::LiveScene& scene) {
 
 SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions options_)
     : options(std::move(options_)),
-      uploads(options.maxUploadBytes),
+      uploads(options.maxUploadBytes, options.maxUploadBytesOfAddress),
       budget(std::make_shared<scene::Budget>(options.budget)),
       scenes(liveScenes(std::move(definitions), options, budget)),
       publisher(
@@ -90,14 +100,81 @@ SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions o
           },
           options.encoderThreads > 0 ? options.encoderThreads
                                      : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),
-      device(options.device, scenes, publisher, metrics, *budget, options.runAlways, options.reportRate),
-      maker(*this) {}
+      device(options.device, restored(), publisher, metrics, *budget, options.runAlways, options.reportRate,
+             options.adaptsToLoad),
+      maker(*this) {
+  restoreCreated();
+}
 
 SceneServer::State::State(std::shared_ptr<scene::LiveScene> played, ServerOptions options_)
     : State(std::vector<model::Scene>{}, std::move(options_)) {
   participants = kFirstViewer;
   played->source->begin(*played);
   insert(std::move(played));
+}
+
+const std::vector<std::shared_ptr<scene::LiveScene>>& SceneServer::State::restored() {
+  if (!options.store) return scenes;
+  for (const auto& scene : scenes) {
+    if (auto saved = options.store->take(scene->start())) {
+      raise(participants, *saved);
+      scene->restore(std::move(*saved), options.reconnectGrace, Clock::now());
+    }
+    scene->keeper = options.store->keep(scene);
+  }
+  return scenes;
+}
+
+void SceneServer::State::restoreCreated() {
+  if (!options.store) return;
+  std::uint32_t created = 0;
+  for (scene::SavedScene& saved : options.store->takeCreated()) {
+    const std::string name = saved.start.name;
+    if (find(name)) {
+      telemetry::log({name}, spdlog::level::warn,
+                     "a saved scene is not restored, because the server starts with a scene of this name");
+      continue;
+    }
+    raise(participants, saved);
+    auto scene = std::make_shared<scene::LiveScene>(
+        saved.start, true, options.journals ? options.journals(saved.start) : nullptr,
+        std::min(saved.maxParticipants, options.maxParticipants), budget);
+    scene->tenant = saved.tenant;
+    scene->restore(std::move(saved), options.reconnectGrace, Clock::now());
+    messages::Result<void> charged = scene->charge("it");
+    if (created++ >= options.maxCreatedScenes)
+      charged = tl::unexpected(
+          messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                               fmt::format("the server may have {} created scenes (--max-created-scenes)",
+                                           options.maxCreatedScenes)});
+    if (!charged) {
+      metrics.refuse(telemetry::Refusal::budget);
+      const std::string why = fmt::format(
+          "the scene '{}' is kept from before a restart, but does not run: {}", name, charged.error().text);
+      telemetry::log({name}, spdlog::level::warn, "{}", why);
+      scene->discharge();
+      scene->quarantine(why);
+    } else {
+      scene->keeper = options.store->keep(scene);
+      device.adopt(scene);
+    }
+    insert(std::move(scene));
+  }
+}
+
+void SceneServer::State::keep(const std::shared_ptr<scene::LiveScene>& scene) const {
+  if (options.store) scene->keeper = options.store->keep(scene);
+}
+
+void SceneServer::State::forget(const scene::LiveScene& scene) const {
+  if (options.store) options.store->remove(scene.name());
+}
+
+void SceneServer::State::flushStore(const scene::LiveScene& scene) const {
+  if (options.store && !options.store->flush(kStorePatience))
+    telemetry::log(
+        {scene.name()}, spdlog::level::warn,
+        "the disk is slow or full: what was just created or deleted may not survive the server's end");
 }
 
 std::string SceneServer::State::deviceNameOf(const scene::LiveScene& scene) const {
@@ -172,12 +249,15 @@ void SceneServer::State::stop() {
     const std::lock_guard lock(mutex);
     stopping = true;
   }
+  maker.stop();
   for (const auto& peer : peersNow()) peer->close(stoppingNotice());
+  if (options.store) options.store->flush(kStorePatience);
 }
 
-v1::ListScenesResponse SceneServer::State::listScenes() const {
+v1::ListScenesResponse SceneServer::State::listScenes(const Identity& by) const {
   v1::ListScenesResponse response;
-  for (const auto& scene : scenesNow()) *response.add_scenes() = summaryOf(*scene);
+  for (const auto& scene : scenesNow())
+    if (by.reaches(scene->name())) *response.add_scenes() = summaryOf(*scene);
   return response;
 }
 
@@ -202,16 +282,6 @@ tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::State::getScene(const
       scene->source ? scene->source->description().definition() : messages::toMessage(scene->definition());
   if (const std::size_t bytes = response.ByteSizeLong(); bytes > maxBytes) return tooLarge("", bytes);
   return response;
-}
-
-messages::Result<void> SceneServer::State::mayFromOutside(const std::string& name,
-                                                          scene::Action action) const {
-  const std::shared_ptr<scene::LiveScene> scene = find(name);
-  if (options.outsideControl || !scene || !scene->roster.owned()) return {};
-  messages::Result<void> permitted = scene::permit(scene::Role::none, action, options.participantsMay);
-  if (!permitted)
-    permitted.error().text += fmt::format(", because you are not in the scene '{}'", scene->name());
-  return permitted;
 }
 
 tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlScene(

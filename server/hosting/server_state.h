@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -48,7 +49,8 @@ struct SceneServer::State {
   std::string deviceNameOf(const scene::LiveScene& scene) const;
   // Wakes the thread that makes the scene's frames, after a change of its subscribers or its clock.
   void wake(const scene::LiveScene& scene);
-  v1::ListScenesResponse listScenes() const;
+  // Only scenes that this peer may use.
+  v1::ListScenesResponse listScenes(const Identity& by) const;
   // Refuses a definition of more than `maxBytes`. If its meshes are larger, that takes no time.
   tl::expected<v1::GetSceneResponse, v1::Error> getScene(
       const v1::GetSceneRequest& request,
@@ -57,8 +59,31 @@ struct SceneServer::State {
   // caller has checked that the peer may do so.
   tl::expected<v1::ControlSceneResponse, v1::Error> controlScene(const v1::ControlSceneRequest& request,
                                                                  std::uint64_t participant);
-  // Returns an error if peers outside the scene of this name may not do this.
-  messages::Result<void> mayFromOutside(const std::string& name, scene::Action action) const;
+  // Identity of a peer that has sent this token; empty for none. UNAUTHENTICATED if that is not enough.
+  messages::Result<Identity> identify(const std::string& token, bool isLoopback);
+  // Pairs a peer, or checks its token. `address` groups the attempts of one peer; empty for loopback.
+  // `response` gets what the peer learns about its identity.
+  messages::Result<Identity> authenticate(const v1::AuthenticateRequest& request, const std::string& address,
+                                          Clock::time_point now, v1::AuthenticateResponse& response);
+  // Counts a connection of a subject while the result lives. Null if it has too many; identities that are not
+  // verified are not counted. The result must not outlive this.
+  std::shared_ptr<const void> countConnection(const Identity& identity);
+  // Each of the following returns PERMISSION_DENIED, with the reason, if the peer may not do this.
+  messages::Result<void> mayUse(const Identity& by, const std::string& scene) const;
+  messages::Result<void> mayCreate(const Identity& by) const;
+  // For peers outside the scene of this name.
+  messages::Result<void> mayFromOutside(const Identity& by, const std::string& scene,
+                                        scene::Action action) const;
+  messages::Result<v1::CreatePairingCodeResponse> createPairingCode(
+      const Identity& by, const v1::CreatePairingCodeRequest& request, Clock::time_point now);
+  // The caller has checked that the peer may do so.
+  messages::Result<v1::ListBansResponse> listBans(const v1::ListBansRequest& request) const;
+  messages::Result<v1::LiftBanResponse> liftBan(const v1::LiftBanRequest& request);
+  // Keeps a scene that is created, before it runs; forgets one that was deleted; waits for a moment until
+  // either is on the disk. All do nothing without a store.
+  void keep(const std::shared_ptr<scene::LiveScene>& scene) const;
+  void forget(const scene::LiveScene& scene) const;
+  void flushStore(const scene::LiveScene& scene) const;
   void stop();
 
   const ServerOptions options;
@@ -67,14 +92,22 @@ struct SceneServer::State {
   const std::shared_ptr<scene::Budget> budget;
   std::atomic<std::uint64_t> participants{0};  // newest participant number
 
-  mutable std::mutex mutex;  // protects the next three
+  mutable std::mutex mutex;  // protects the next four
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;
   std::vector<std::weak_ptr<Peer>> peers;
   bool stopping = false;
+  std::map<std::string, std::uint32_t> connectionsOfSubjects;  // without zeros
 
   delivery::FramePublisher publisher;
   DeviceThread device;
   SceneMaker maker;
+
+ private:
+  // Continues the scenes that the server starts with, and returns them.
+  const std::vector<std::shared_ptr<scene::LiveScene>>& restored();
+  // Continues the scenes of an earlier run that peers created. One that exceeds the budget or the number of
+  // scenes is listed, but does not run; it stays kept.
+  void restoreCreated();
 };
 
 }  // namespace clothstream::hosting

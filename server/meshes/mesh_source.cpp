@@ -344,7 +344,9 @@ tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source, const M
   if (Problem problem = checkSizes(source, limits)) return tl::unexpected(std::move(*problem));
   if (Problem problem = checkNumbers(source)) return tl::unexpected(std::move(*problem));
   if (Problem problem = place(source, options, limits, placed)) return tl::unexpected(std::move(*problem));
+  limits.cancellation.check();
   Numbering numbering = numberNodes(source, placed, options.weldDistance);
+  limits.cancellation.check();
 
   model::MeshShape shape;
   shape.positions.reserve(numbering.vertexOfNode.size());
@@ -356,11 +358,13 @@ tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source, const M
     if (!problem) problem = appendFace(source, f, numbering, shape, faceOfTriangle);
     if (problem) return tl::unexpected(std::move(*problem));
   }
+  limits.cancellation.check();
   if (Problem problem = addQuads(source, faceOfTriangle, shape)) return tl::unexpected(std::move(*problem));
   if (Problem problem = checkEdges(shape, faceOfTriangle, numbering.vertexOfNode))
     return tl::unexpected(std::move(*problem));
+  limits.cancellation.check();
   shape.submeshes = submeshes(source, faceOfTriangle);
-  BuiltMesh built{model::makeMesh(std::move(shape)), std::move(numbering.nodeOfVertex)};
+  BuiltMesh built{model::makeMesh(std::move(shape), limits.cancellation), std::move(numbering.nodeOfVertex)};
   if (Problem problem = checkSprings(built.mesh, numbering.vertexOfNode, limits.maxNodeSprings))
     return tl::unexpected(std::move(*problem));
   return built;

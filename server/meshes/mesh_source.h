@@ -39,6 +39,7 @@ struct MeshLimits {
   float maxCoordinate = 0;        // m, on each axis
   float minEdge = 0;              // m
   std::uint32_t maxNodeSprings = 0;
+  model::Cancellation cancellation = {};
 };
 
 struct MeshOptions {
@@ -57,7 +58,7 @@ inline constexpr std::uint32_t kNoNode = ~0u;
 // Scales, places and welds the vertices, splits quads along their shorter diagonal, and checks the
 // requirements of MeshShape. Nodes are ordered along a space-filling curve, so that neighbours on the cloth
 // are neighbours in memory. A mesh that is already in this order keeps it. Vertices without a face are left
-// out. Errors use the indices of the source, counted from 0, and say what to do.
+// out. Errors use the indices of the source, counted from 0, and say what to do. Throws model::Cancelled.
 [[nodiscard]] tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source,
                                                              const MeshOptions& options,
                                                              const MeshLimits& limits);

@@ -20,6 +20,18 @@ class TextBuffer : public std::streambuf {
   }
 };
 
+// Whether the text contains an exponent that the loader cannot hold in an int.
+bool hasLongExponent(std::string_view text) {
+  constexpr std::size_t kMaxDigits = 8;
+  for (std::size_t at = text.find_first_of("eE"); at != text.npos; at = text.find_first_of("eE", at + 1)) {
+    std::size_t first = at + 1;
+    if (first < text.size() && (text[first] == '+' || text[first] == '-')) ++first;
+    const std::size_t end = std::min(text.find_first_not_of("0123456789", first), text.size());
+    if (first < end && end - first > kMaxDigits) return true;
+  }
+  return false;
+}
+
 // The loader silently reads text that is not a number as 0.
 tl::expected<void, std::string> checkVertexLines(std::string_view text) {
   std::size_t line = 1;
@@ -31,6 +43,10 @@ tl::expected<void, std::string> checkVertexLines(std::string_view text) {
     if (isVertex && content.find_first_not_of("0123456789+-.eE \t\r", word + 2) != content.npos)
       return tl::unexpected(fmt::format("line {} is \"{}\": a vertex's coordinates must be finite numbers",
                                         line, content.substr(0, 60)));
+    const bool hasNumbers = content.substr(word, 1) == "v";  // v, vt, vn
+    if (hasNumbers && hasLongExponent(content))
+      return tl::unexpected(fmt::format("line {} is \"{}\": an exponent must have at most eight digits", line,
+                                        content.substr(0, 60)));
     start = end + 1;
   }
   return {};

@@ -73,14 +73,17 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
   checks.count(poses / "attachments", static_cast<std::size_t>(message.attachments_size()), 0,
                limits::kMaxAttachments);
   if (message.attachments_size() == 0 || checks.failed()) return;
-  std::vector<model::Attachment> known;
+  std::vector<const model::Attachment*> known;
   for (const model::Cloth& cloth : scene.cloths)
-    known.insert(known.end(), cloth.attachments.begin(), cloth.attachments.end());
+    for (const model::Attachment& attachment : cloth.attachments) known.push_back(&attachment);
+  const auto nameOf = [](const model::Attachment* attachment) -> const std::string& {
+    return attachment->name;
+  };
   for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i) {
     const v1::AttachmentPose& from = message.attachments(i);
     const Path path = poses.at("attachments", i);
-    checkKnown(checks, path / "name", from.name(), known);
-    const auto found = std::ranges::find(known, from.name(), &model::Attachment::name);
+    checkKnown(checks, path / "name", from.name(), known, v1::ERROR_CODE_NOT_FOUND, nameOf);
+    const auto found = std::ranges::find(known, from.name(), nameOf);
     to.attachments.push_back(
         {static_cast<std::size_t>(found - known.begin()), toPose(checks, path / "pose", from.pose())});
   }
@@ -90,9 +93,10 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
 
 Result<v1::ClientMessage> parseClientMessage(std::span<const std::byte> bytes) {
   if (bytes.size() > limits::kMaxClientMessageBytes)
-    return refuse(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                  fmt::format("a message of {} bytes is too large: must have at most {}", bytes.size(),
-                              limits::kMaxClientMessageBytes));
+    return tl::unexpected(FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                                     fmt::format("a message of {} bytes is too large: must have at most {}",
+                                                 bytes.size(), limits::kMaxClientMessageBytes),
+                                     telemetry::Refusal::messageSize});
   v1::ClientMessage message;
   if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
     return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE,

@@ -2,11 +2,13 @@
 // Error about a refused value from outside.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <tl/expected.hpp>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/telemetry/refusal.h"
 
 namespace clothstream::messages {
 
@@ -15,6 +17,7 @@ namespace clothstream::messages {
 struct FieldError {
   v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT;
   std::string text;
+  std::optional<telemetry::Refusal> limit = {};  // that was reached, if any; for metrics
 };
 
 template <typename T>

@@ -12,10 +12,13 @@
 namespace clothstream::messages {
 namespace {
 
-constexpr meshes::MeshLimits kMeshLimits{.maxVertices = limits::kMaxNodes,
-                                         .maxCoordinate = static_cast<float>(limits::kPosition.max),
-                                         .minEdge = static_cast<float>(limits::kMinSpacing),
-                                         .maxNodeSprings = limits::kMaxNodeSprings};
+meshes::MeshLimits meshLimits(const model::Cancellation& cancellation) {
+  return {.maxVertices = limits::kMaxNodes,
+          .maxCoordinate = static_cast<float>(limits::kPosition.max),
+          .minEdge = static_cast<float>(limits::kMinSpacing),
+          .maxNodeSprings = limits::kMaxNodeSprings,
+          .cancellation = cancellation};
+}
 
 void checkWhole(Checks& checks, const Path& path, int size, int each) {
   if (size % each != 0)
@@ -92,7 +95,8 @@ meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& 
 }  // namespace
 
 std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                                       const MeshReader& readMesh, model::Cloth& cloth) {
+                                       const MeshReader& readMesh, const model::Cancellation& cancellation,
+                                       model::Cloth& cloth) {
   const v1::Mesh& mesh = message.mesh();
   const Path at = path / "mesh";
   meshes::MeshOptions options{.pose = toPose(checks, at / "pose", mesh.pose()),
@@ -105,7 +109,7 @@ std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v
   const meshes::MeshSource source =
       mesh.file().empty() ? toSource(checks, at, mesh) : readSource(checks, at, mesh, readMesh);
   if (checks.failed()) return {};
-  auto built = meshes::buildMesh(source, options, kMeshLimits);
+  auto built = meshes::buildMesh(source, options, meshLimits(cancellation));
   if (!built) {
     checks.fail(at, mesh.file().empty() ? "" : '"' + mesh.file() + '"', built.error());
     return {};

@@ -20,9 +20,10 @@ namespace clothstream::messages {
 using MeshReader = std::function<tl::expected<meshes::MeshSource, std::string>(const std::string& file)>;
 
 // Sets the mesh of the cloth. Returns the node of each vertex of the message, or meshes::kNoNode. Refuses a
-// file name if there is no reader.
+// file name if there is no reader. Throws model::Cancelled.
 std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                                       const MeshReader& readMesh, model::Cloth& cloth);
+                                       const MeshReader& readMesh, const model::Cancellation& cancellation,
+                                       model::Cloth& cloth);
 
 // Writes the mesh itself, not the name of its file: in world space, welded, in the order of its nodes.
 void write(const model::Mesh& mesh, v1::Mesh& message);

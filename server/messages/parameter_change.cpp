@@ -100,6 +100,23 @@ void overwrite(const google::protobuf::Message& with, google::protobuf::Message&
   all.MergeFrom(with);
 }
 
+void overwriteEnvironment(const v1::ParameterChange& with, v1::ParameterChange& all) {
+  v1::ParameterChange environment = with;
+  environment.clear_cloths();
+  environment.clear_colliders();
+  overwrite(environment, all);
+}
+
+// Overwrites the element with the same name, or adds one.
+template <typename Element>
+void overwriteNamed(const Element& with, google::protobuf::RepeatedPtrField<Element>& all) {
+  const auto known = std::ranges::find(all, with.name(), [](const Element& each) { return each.name(); });
+  if (known == all.end())
+    *all.Add() = with;
+  else
+    overwrite(with, *known);
+}
+
 }  // namespace
 
 Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& message,
@@ -137,10 +154,7 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
 }
 
 void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all) {
-  v1::ParameterChange environment = change;
-  environment.clear_cloths();
-  environment.clear_colliders();
-  overwrite(environment, all);
+  overwriteEnvironment(change, all);
   for (const v1::ClothChange& clothChange : change.cloths())
     for (v1::ClothChange& cloth : *all.mutable_cloths())
       if (parameters::isFor(clothChange.name(), cloth.name())) {
@@ -148,6 +162,28 @@ void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all) {
         overwrite(clothChange, cloth);
         cloth.set_name(name);
       }
+}
+
+void mergeChange(const v1::ParameterChange& next, v1::ParameterChange& earlier) {
+  overwriteEnvironment(next, earlier);
+  for (const v1::ClothChange& cloth : next.cloths()) {
+    // A change of every cloth also overrules the earlier changes of single ones. It stands before them, so
+    // that the later changes of single cloths overrule it.
+    if (cloth.name().empty()) {
+      for (v1::ClothChange& known : *earlier.mutable_cloths()) {
+        const std::string name = known.name();
+        overwrite(cloth, known);
+        known.set_name(name);
+      }
+      if (earlier.cloths_size() > 0 && earlier.cloths(0).name().empty()) continue;
+      *earlier.add_cloths() = cloth;
+      for (int i = earlier.cloths_size() - 1; i > 0; --i) earlier.mutable_cloths()->SwapElements(i, i - 1);
+    } else {
+      overwriteNamed(cloth, *earlier.mutable_cloths());
+    }
+  }
+  for (const v1::ColliderChange& collider : next.colliders())
+    overwriteNamed(collider, *earlier.mutable_colliders());
 }
 
 }  // namespace clothstream::messages

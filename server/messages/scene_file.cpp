@@ -36,7 +36,8 @@ std::optional<std::string> syntaxError(std::string_view json) {
 
 }  // namespace
 
-Result<model::Scene> parseScene(std::string_view json, std::string_view source, const MeshReader& readMesh) {
+Result<model::Scene> parseScene(std::string_view json, std::string_view source, const MeshReader& readMesh,
+                                std::uint64_t maxNodes) {
   if (const auto error = syntaxError(json)) return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source, *error);
   v1::Scene message;
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &message);
@@ -44,7 +45,7 @@ Result<model::Scene> parseScene(std::string_view json, std::string_view source, 
     return refuse(
         v1::ERROR_CODE_MALFORMED_MESSAGE, source,
         fmt::format("not a scene: {}", std::string_view(status.message().data(), status.message().size())));
-  return toScene(message, readMesh).map_error([&](const FieldError& error) {
+  return toScene(message, readMesh, {.nodes = maxNodes}).map_error([&](const FieldError& error) {
     return FieldError{error.code, fmt::format("{}: {}", source, error.text)};
   });
 }

@@ -2,21 +2,24 @@
 // Scenes in files and by name. A scene file is the Scene message in the JSON form of protobuf.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "server/messages/field_error.h"
+#include "server/messages/limits.h"
 #include "server/messages/mesh_message.h"
 #include "server/model/scene.h"
 
 namespace clothstream::messages {
 
 // Error texts start with `source`, such as a file name. Unknown fields are errors. Mesh files are refused if
-// there is no reader.
+// there is no reader. `maxNodes` as for toScene().
 [[nodiscard]] Result<model::Scene> parseScene(std::string_view json, std::string_view source,
-                                              const MeshReader& readMesh = {});
+                                              const MeshReader& readMesh = {},
+                                              std::uint64_t maxNodes = limits::kMaxNodes);
 
 // Reads a file of at most limits::kMaxSceneFileBytes. Paths of meshes are relative to the file.
 [[nodiscard]] Result<model::Scene> readSceneFile(const std::filesystem::path& path);

@@ -139,13 +139,14 @@ void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver
 
 // Returns the result of toMeshCloth(); empty for a grid.
 std::vector<std::uint32_t> toShape(Checks& checks, const Path& path, const v1::Cloth& message,
-                                   const MeshReader& readMesh, model::Cloth& cloth) {
+                                   const MeshReader& readMesh, const model::Cancellation& cancellation,
+                                   model::Cloth& cloth) {
   switch (message.shape_case()) {
     case v1::Cloth::kGrid:
       cloth.grid = toGrid(checks, path / "grid", message.grid());
       break;
     case v1::Cloth::kMesh:
-      return toMeshCloth(checks, path, message, readMesh, cloth);
+      return toMeshCloth(checks, path, message, readMesh, cancellation, cloth);
     case v1::Cloth::SHAPE_NOT_SET:
       checks.fail(path, "", "has no shape; must have \"grid\" or \"mesh\"");
   }
@@ -259,10 +260,12 @@ void readMass(Checks& checks, const Path& path, const v1::Cloth& message, model:
         model::areaOf(cloth));
 }
 
-model::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh) {
+model::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
+                     const model::Cancellation& cancellation) {
   model::Cloth cloth;
   cloth.name = checks.name(path / "name", message.name());
-  const std::vector<std::uint32_t> nodeOfVertex = toShape(checks, path, message, readMesh, cloth);
+  const std::vector<std::uint32_t> nodeOfVertex =
+      toShape(checks, path, message, readMesh, cancellation, cloth);
   if (checks.failed()) return cloth;
   readPins(checks, path, message, nodeOfVertex, cloth);
   readAttachments(checks, path, message, nodeOfVertex, cloth);
@@ -399,10 +402,28 @@ std::uint64_t statedNodes(const v1::Scene& message) {
   return nodes;
 }
 
-void checkSize(Checks& checks, const model::Scene& scene) {
-  std::uint64_t nodes = 0;
-  for (const model::Cloth& cloth : scene.cloths) nodes += cloth.nodeCount();
-  if (nodes > limits::kMaxNodes) checks.fail(Path("cloths"), "", tooManyNodes(nodes, limits::kMaxNodes));
+// Refuses what the message states to be too large before anything is made of it.
+void checkStatedSize(Checks& checks, const v1::Scene& message, const SceneLimits& most) {
+  if (const std::uint64_t nodes = statedNodes(message); nodes > most.nodes)
+    checks.failSize(Path("cloths"), tooManyNodes(nodes, most.nodes));
+  std::size_t attachments = 0;
+  for (const v1::Cloth& cloth : message.cloths())
+    attachments += static_cast<std::size_t>(cloth.attachments_size());
+  if (attachments > most.attachments)
+    checks.failSize(Path("cloths"), fmt::format("have {} attachments in all; must have at most {}",
+                                                attachments, most.attachments));
+}
+
+void checkSize(Checks& checks, const model::Scene& scene, const SceneLimits& most) {
+  std::uint64_t nodes = 0, springs = 0;
+  for (const model::Cloth& cloth : scene.cloths) {
+    nodes += cloth.nodeCount();
+    springs += model::springCount(cloth);
+  }
+  if (nodes > limits::kMaxNodes) checks.failSize(Path("cloths"), tooManyNodes(nodes, limits::kMaxNodes));
+  if (springs > most.springs)
+    checks.failSize(Path("cloths"),
+                    fmt::format("have {} springs in all; must have at most {}", springs, most.springs));
   std::size_t bytes = 0;
   for (const model::Cloth& cloth : scene.cloths) bytes += geometryBytes(cloth);
   if (bytes > limits::kMaxGeometryBytes)
@@ -523,12 +544,11 @@ std::optional<std::string> instability(const model::Scene& scene, const model::S
       limits::kMaxSubsteps);
 }
 
-Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh, std::uint64_t maxNodes) {
+Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh, const SceneLimits& most) {
   Checks checks;
   const Path root;
   model::Scene scene;
-  if (const std::uint64_t nodes = statedNodes(message); nodes > maxNodes)
-    checks.fail(root / "cloths", "", tooManyNodes(nodes, maxNodes));
+  checkStatedSize(checks, message, most);
   scene.name = checks.name(root / "name", message.name());
   scene.description = checks.text(root / "description", message.description());
   if (message.has_simulation_rate()) scene.simulationRate = message.simulation_rate();
@@ -543,24 +563,28 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
                limits::kMaxColliders);
   for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i)
-    scene.cloths.push_back(toCloth(checks, root.at("cloths", i), message.cloths(i), readMesh));
+    scene.cloths.push_back(
+        toCloth(checks, root.at("cloths", i), message.cloths(i), readMesh, most.cancellation));
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
     scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());
   // Sizes first: the other checks take time in proportion to them.
-  checkSize(checks, scene);
+  checkSize(checks, scene, most);
+  most.cancellation.check();
   if (!checks.failed()) checkSelections(checks, scene);
   for (std::size_t i = 0; i < scene.cloths.size() && !checks.failed(); ++i)
     if (!scene.cloths[i].attachments.empty())
       checkAttached(checks, root.at("cloths", static_cast<int>(i)), scene.cloths[i]);
   if (!message.stream().has_max_error() && !checks.failed())
     scene.stream.maxError = model::suitedMaxError(scene);
+  most.cancellation.check();
   checkUnique(checks, "cloths", scene.cloths);
   checkUnique(checks, "colliders", scene.colliders);
   checkAttachments(checks, scene);
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);
   if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
+  most.cancellation.check();
   if (!checks.failed())
     if (const auto error = instability(scene, model::StabilityBound(scene)))
       checks.fail(root / "substeps", fmt::format("{}", scene.substeps), *error);

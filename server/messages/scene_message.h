@@ -2,7 +2,9 @@
 // Converts scenes between their message and the model.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,18 +15,27 @@
 #include "server/messages/limits.h"
 #include "server/messages/mesh_message.h"
 #include "server/messages/validation.h"
+#include "server/model/cancellation.h"
 #include "server/model/material.h"
 #include "server/model/scene.h"
 #include "server/model/stability.h"
 
 namespace clothstream::messages {
 
+// Limits of a scene, in addition to those of limits.h.
+struct SceneLimits {
+  std::uint64_t nodes = limits::kMaxNodes;
+  std::uint64_t springs = std::numeric_limits<std::uint64_t>::max();
+  std::size_t attachments = std::numeric_limits<std::size_t>::max();
+  model::Cancellation cancellation = {};
+};
+
 // Applies the defaults of scene.proto and checks everything: ranges, unique names, pins inside their grid,
 // meshes, rates, the number of nodes, and that the integrator is stable with these substeps. Refuses mesh
-// files if there is no reader. Refuses more than `maxNodes` nodes, or vertices of meshes before they are
-// welded, at once; everything else takes time and memory in proportion to them.
+// files if there is no reader. Refuses more nodes than the limit, or vertices of meshes before they are
+// welded, at once; everything else takes time and memory in proportion to them. Throws model::Cancelled.
 [[nodiscard]] Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh = {},
-                                           std::uint64_t maxNodes = limits::kMaxNodes);
+                                           const SceneLimits& most = {});
 
 // Sets every field, defaults included, and writes whole meshes. toScene() of the result returns the same
 // scene.
@@ -39,6 +50,9 @@ v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double
 // any messages: fields that this release does not know are kept, and changes of unknown cloths and of
 // colliders are ignored.
 void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all);
+// Merges `next` into `earlier`: one change with the same effect as the two, one after the other. The result
+// names each cloth and collider once. Safe for any messages; fields that this release does not know are kept.
+void mergeChange(const v1::ParameterChange& next, v1::ParameterChange& earlier);
 
 // Solver of a cloth. unfitSolver() checks whether it suits the cloth.
 model::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message);

@@ -78,6 +78,12 @@ void Checks::failNamed(const Path& path, std::string_view name, std::string_view
   fail(path, inQuotes(name), allowed, code);
 }
 
+void Checks::failSize(const Path& path, std::string_view allowed) {
+  if (error_) return;
+  fail(path, "", allowed);
+  error_->limit = telemetry::Refusal::sceneSize;
+}
+
 void Checks::fail(const Path& path, std::string_view value, std::string_view allowed, v1::ErrorCode code) {
   if (error_) return;
   std::string where = path.text();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -55,6 +56,8 @@ class Checks {
   // An empty `value` is not shown.
   void fail(const Path& path, std::string_view value, std::string_view allowed,
             v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT);
+  // Fails because the server's limit of the size of scenes is exceeded.
+  void failSize(const Path& path, std::string_view allowed);
 
   // Fails with a text from outside as the value. The text is quoted and truncated.
   void failNamed(const Path& path, std::string_view name, std::string_view allowed,
@@ -71,14 +74,20 @@ class Checks {
   std::optional<FieldError> error_;
 };
 
-// Fails unless one of the elements has this name.
+// Fails unless one of the elements has this name. nameOf(element) returns its name.
+template <typename Named, typename NameOf>
+void checkKnown(Checks& checks, const Path& path, const std::string& name, const std::vector<Named>& elements,
+                v1::ErrorCode code, const NameOf& nameOf) {
+  if (std::ranges::find(elements, name, nameOf) != elements.end()) return;
+  std::string known;
+  for (const Named& element : elements) known += (known.empty() ? "" : ", ") + std::invoke(nameOf, element);
+  checks.fail(path, '"' + name + '"', known.empty() ? "the scene has none" : "must be one of " + known, code);
+}
+
 template <typename Named>
 void checkKnown(Checks& checks, const Path& path, const std::string& name, const std::vector<Named>& elements,
                 v1::ErrorCode code = v1::ERROR_CODE_NOT_FOUND) {
-  if (std::ranges::find(elements, name, &Named::name) != elements.end()) return;
-  std::string known;
-  for (const Named& element : elements) known += (known.empty() ? "" : ", ") + element.name;
-  checks.fail(path, '"' + name + '"', known.empty() ? "the scene has none" : "must be one of " + known, code);
+  checkKnown(checks, path, name, elements, code, &Named::name);
 }
 
 }  // namespace clothstream::messages

@@ -48,8 +48,9 @@ class LinkFinder {
     }
   }
 
-  std::vector<SpringLink> find() {
+  std::vector<SpringLink> find(const Cancellation& cancellation) {
     const std::vector<Side> sides = sidesOf(shape_.triangles);
+    cancellation.check();
     forEachEdge(sides, [&](const Side& first, const Side* second) {
       if (second != nullptr && partner_[first.triangle] == second->triangle) addDiagonals(first, *second);
     });
@@ -60,6 +61,7 @@ class LinkFinder {
       add(across(first, first.low), across(*second, first.low), SpringKind::bend);
       add(across(first, first.high), across(*second, first.high), SpringKind::bend);
     });
+    cancellation.check();
     return ordered();
   }
 
@@ -126,17 +128,14 @@ std::vector<double> lumpedAreas(const MeshShape& shape) {
 
 }  // namespace
 
-double Mesh::area() const {
-  return std::accumulate(areas.begin(), areas.end(), 0.0);
-}
-
-Mesh makeMesh(MeshShape shape) {
+Mesh makeMesh(MeshShape shape, const Cancellation& cancellation) {
   Mesh mesh;
   mesh.shape = std::move(shape);
   mesh.areas = lumpedAreas(mesh.shape);
-  mesh.links = LinkFinder(mesh.shape).find();
-  const double whole = mesh.area();
-  for (const double area : mesh.areas) mesh.shares.push_back(area / whole);
+  mesh.area = std::accumulate(mesh.areas.begin(), mesh.areas.end(), 0.0);
+  cancellation.check();
+  mesh.links = LinkFinder(mesh.shape).find(cancellation);
+  for (const double area : mesh.areas) mesh.shares.push_back(area / mesh.area);
   return mesh;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/model/cancellation.h"
 #include "server/model/springs.h"
 
 namespace clothstream::model {
@@ -39,18 +40,19 @@ struct MeshShape {
 struct Mesh {
   MeshShape shape;
   std::vector<double> areas;      // m^2 per node: a third of each of its triangles
+  double area = 0;                // m^2
   std::vector<double> shares;     // fraction of the cloth's mass per node, proportional to its area
   std::vector<SpringLink> links;  // ordered as springLinks() says
 
   std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(shape.positions.size()); }
-  double area() const;  // m^2
 };
 
 // Makes a mesh and its springs. Structural springs follow the edges of triangles and quads. Shear springs
 // follow both diagonals of a quad. Bend springs cross an edge between two faces. They join the third corner
 // of a triangle, or the two corners of a quad that are not on the edge. The quads of a grid thus get the
 // springs of a grid. Two nodes get at most one spring: the first in the order structural, shear, bend.
-Mesh makeMesh(MeshShape shape);
+// Throws Cancelled.
+Mesh makeMesh(MeshShape shape, const Cancellation& cancellation = {});
 
 // Triangles of a grid or mesh, in the order in which forces and normals are accumulated. A grid's quad with
 // corners a b above e f is (a, e, b), (b, e, f).

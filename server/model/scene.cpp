@@ -47,7 +47,7 @@ std::uint32_t Cloth::nodeCount() const {
 }
 
 double areaOf(const Cloth& cloth) {
-  return cloth.mesh ? cloth.mesh->area() : double{cloth.grid.width} * double{cloth.grid.height};
+  return cloth.mesh ? cloth.mesh->area : double{cloth.grid.width} * double{cloth.grid.height};
 }
 
 std::vector<Vec3> restPositions(const Grid& grid) {

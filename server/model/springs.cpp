@@ -29,6 +29,16 @@ std::vector<SpringLink> springLinks(const Cloth& cloth) {
   return links;
 }
 
+std::uint64_t springCount(const Cloth& cloth) {
+  if (cloth.mesh) return cloth.mesh->links.size();
+  const std::uint64_t rows = cloth.grid.rows, columns = cloth.grid.columns;
+  const std::uint64_t structural = rows * (columns - 1) + columns * (rows - 1);
+  const std::uint64_t shear = 2 * (rows - 1) * (columns - 1);
+  const std::uint64_t bend = rows * (columns - std::min<std::uint64_t>(columns, 2)) +
+                             columns * (rows - std::min<std::uint64_t>(rows, 2));
+  return structural + shear + bend;
+}
+
 float shortestSpring(const Cloth& cloth) {
   if (!cloth.mesh) return std::min(spacing(cloth.grid).column, spacing(cloth.grid).row);
   float shortest = std::numeric_limits<float>::infinity();

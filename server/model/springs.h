@@ -24,6 +24,9 @@ struct SpringLink {
 // of a mesh.
 std::vector<SpringLink> springLinks(const Cloth& cloth);
 
+// Number of springLinks(), in constant time.
+std::uint64_t springCount(const Cloth& cloth);
+
 // Rest length of the shortest structural spring, m.
 float shortestSpring(const Cloth& cloth);
 

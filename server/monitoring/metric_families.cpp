@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "server/monitoring/metric_families.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <string_view>
 #include <utility>
 
 #include "server/hosting/server_state.h"
 #include "server/monitoring/process_usage.h"
+#include "server/scene/scene_store.h"
 #include "server/telemetry/histogram.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::monitoring {
 namespace {
@@ -79,6 +82,10 @@ constexpr CounterRow kSceneCounters[] = {
      &Metrics::framesThinned},
     {"steps_down_total", "Subscribers moved to fewer layers or a coarser quality.", &Metrics::stepsDown},
     {"steps_up_total", "Subscribers moved to more layers or a finer quality.", &Metrics::stepsUp},
+    {"overload_steps_down_total", "Reductions of frames or substeps because the device was overloaded.",
+     &Metrics::overloadStepsDown},
+    {"overload_steps_up_total", "Increases of frames or substeps after an overload.",
+     &Metrics::overloadStepsUp},
     {"rollbacks_total", "Returns to the last good state.", &Metrics::rollbacks},
     {"resets_total", "Returns to the initial state.", &Metrics::resets},
     {"crowded_balls_total", "Full neighbour lists, and balls with too many contacts, in self-collision.",
@@ -104,11 +111,25 @@ constexpr GaugeRow kSceneGauges[] = {
      [](const LiveScene& scene) { return std::size_t{scene.running}; }},
     {"paused", "1 while the scene is paused, else 0.",
      [](const LiveScene& scene) { return std::size_t{scene.paused}; }},
+    {"frame_divisor", "Distance of the frames that the scene sends, in frames of its stream rate.",
+     [](const LiveScene& scene) { return std::size_t{scene.work.load().frameDivisor}; }},
+    {"substeps", "Substeps of a tick.",
+     [](const LiveScene& scene) { return std::size_t{scene.work.load().substeps}; }},
     {"waiting_changes", "Parameter changes that wait for the next tick.",
      [](const LiveScene& scene) { return scene.inbox.depth().changes; }},
     {"waiting_poses", "Participants whose poses wait for the next tick.",
      [](const LiveScene& scene) { return scene.inbox.depth().poses; }},
 };
+
+// Largest age of the newest checkpoint of a running scene, in seconds; 0 without any.
+double oldestState(const std::vector<std::shared_ptr<LiveScene>>& scenes) {
+  double oldest = 0;
+  for (const auto& scene : scenes) {
+    const auto savedAt = scene->running && scene->keeper ? scene->keeper->savedAt() : std::nullopt;
+    if (savedAt) oldest = std::max(oldest, schedule::seconds(schedule::Clock::now() - *savedAt));
+  }
+  return oldest;
+}
 
 }  // namespace
 
@@ -142,7 +163,7 @@ Families serverFamilies(hosting::SceneServer& server) {
   gauge("clothstream_open_connections", "Open connections.", static_cast<double>(state.peersNow().size()));
   counter("clothstream_connections_total", "Connections admitted.", metrics.connections);
   MetricFamily& refusals = add(families, MetricType::Counter, "clothstream_refusals_total",
-                               "Connections, calls and scenes refused, by reason.");
+                               "Connections, calls, messages and scenes refused, by reason.");
   for (std::size_t i = 0; i < telemetry::kRefusalNames.size(); ++i)
     addSample(refusals, static_cast<double>(metrics.refusals[i].value()),
               {{"reason", std::string(telemetry::kRefusalNames[i])}});
@@ -153,12 +174,28 @@ Families serverFamilies(hosting::SceneServer& server) {
   counter("clothstream_device_rebuilds_total", "New devices after the device was lost.",
           metrics.deviceRebuilds);
   counter("clothstream_quarantines_total", "Scenes stopped because they harmed others.", metrics.quarantines);
+  addSample(add(families, MetricType::Counter, "clothstream_log_lines_omitted_total",
+                "Lines of the log that were left out (--log-rate)."),
+            static_cast<double>(telemetry::omittedLogLines()));
   gauge("clothstream_device_memory_bytes", "Memory of all buffers on the device.",
         static_cast<double>(state.device.deviceMemory()));
   gauge("clothstream_device_silence_seconds", "Time since the last answer of the device thread.",
         schedule::seconds(schedule::Clock::now() - state.device.lastAnswer()));
   gauge("clothstream_publisher_waiting_frames", "Frames that wait for the encoder thread.",
         static_cast<double>(state.publisher.waiting()));
+  const scene::StoreStatus store = state.options.store ? state.options.store->status() : scene::StoreStatus();
+  gauge("clothstream_state_bytes", "Size of the kept scenes on the disk.", static_cast<double>(store.bytes));
+  gauge("clothstream_state_waiting", "Scenes with a state or a removal that is not on the disk yet.",
+        static_cast<double>(store.waiting));
+  gauge("clothstream_state_left_out", "Scenes whose states have no room (--state-limit).",
+        static_cast<double>(store.leftOut));
+  gauge("clothstream_state_age_seconds", "Largest age of the newest state on the disk of a running scene.",
+        oldestState(state.scenesNow()));
+  const auto total = [&](const char* name, const char* help, std::uint64_t value) {
+    addSample(add(families, MetricType::Counter, name, help), static_cast<double>(value));
+  };
+  total("clothstream_state_writes_total", "Writes to the database of kept scenes.", store.writes);
+  total("clothstream_state_failed_writes_total", "Writes to it that failed.", store.failedWrites);
   return families;
 }
 

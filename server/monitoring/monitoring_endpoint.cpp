@@ -2,6 +2,7 @@
 #include "server/monitoring/monitoring_endpoint.h"
 
 #include <cstddef>
+#include <exception>
 #include <iterator>
 #include <mutex>
 #include <string_view>
@@ -13,6 +14,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <fmt/format.h>
 #include <prometheus/text_serializer.h>
+#include <spdlog/spdlog.h>
 
 #include "server/endpoint/listen/listen.h"
 #include "server/hosting/server_state.h"
@@ -63,12 +65,22 @@ struct MonitoringEndpoint::State {
         port(acceptor.local_endpoint().port()) {
     accept();
     probe();
-    thread = std::thread([this] { io.run(); });
+    thread = std::thread([this] { run(); });
   }
 
   ~State() {
     io.stop();
     thread.join();
+  }
+
+  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint.
+  void run() {
+    for (;;) try {
+        io.run();
+        return;
+      } catch (const std::exception& failure) {
+        spdlog::error("metrics: {}", failure.what());
+      }
   }
 
   void accept() {
@@ -78,9 +90,9 @@ struct MonitoringEndpoint::State {
         acceptTimer.async_wait([this](boost::system::error_code) { accept(); });
         return;
       }
+      accept();  // first, so that it goes on if the connection fails
       if (context.connections < HttpContext::kMaxConnections)
         std::make_shared<HttpConnection>(std::move(socket), context)->read();
-      accept();
     });
   }
 

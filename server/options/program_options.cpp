@@ -3,9 +3,12 @@
 #include "server/options/program_options.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <unistd.h>
 
 #include "server/hosting/scene_server.h"
@@ -33,9 +36,12 @@ std::filesystem::path userDirectory(const char* variable, const char* inHome) {
 // Values that need a conversion after parsing, and flags that name a command.
 struct Parsed {
   ProgramOptions options;
-  std::vector<std::string> changeable;
-  std::string record, recordings, config, tls = "off";
+  std::vector<std::string> changeable, allowed;
+  std::string record, recordings, config, tls = "off", announce = "auto", overload = "adapt",
+                                          tokenValid = "8h";
+  std::optional<scene::Role> anonymousRole, tokenRole;
   bool ownersAlone = false;
+  CLI::Option* stateDirectory = nullptr;
   bool listDevices = false, listMaterials = false, printConfig = false, printMarkdown = false;
 };
 
@@ -78,6 +84,11 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
   table.flag(
       "--always-run", options.server.runAlways,
       "Keep simulating without clients: --scene from the start, other scenes after their first client");
+  table.text(
+      "--overload", parsed.overload, "POLICY",
+      "What a scene reduces if the device cannot keep up with it: adapt (frames, then substeps, then the "
+      "speed of simulated time) or keep (only the speed)",
+      checkChoice({"adapt", "keep"}));
   table.number("--reports", options.server.reportRate, {.min = 0, .max = 1000},
                "Simulation reports per second (strain, energy, ...). 0 sends none");
   CLI::Option* record = table.text("--record", parsed.record, "DIR",
@@ -90,11 +101,19 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
       "--recordings-limit", options.recordingsLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
       "Stop recording when all recordings in the directory take this many megabytes. 0 means no limit");
   table.number("--keep-free", options.keepFreeMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
-               "Stop recording when the disk has this many megabytes left");
+               "Stop recording, and saving states of scenes, when the disk has this many megabytes left");
   table.number("--max-created-scenes", options.server.maxCreatedScenes, {.min = 0, .max = 1000},
                "Scenes that clients may create in addition. 0 allows none");
   table.number("--max-scene-nodes", options.server.maxSceneNodes, {.min = 4, .max = 16'777'216},
                "Nodes of a scene that clients create");
+  table.number("--max-scene-springs", options.server.maxSceneSprings, {.min = 1, .max = 1e9},
+               "Springs of a scene that clients create");
+  table.number("--max-scene-attachments", options.server.maxSceneAttachments,
+               {.min = 0, .max = messages::limits::kMaxAttachments},
+               "Attachments of a scene that clients create");
+  table.number("--max-creation-time", options.server.maxCreationTime,
+               {.min = 0.1, .max = 3600, .type = "SECONDS"},
+               "Seconds after which creating a scene ends with an error");
   table.number(
       "--scene-lifetime", options.server.sceneLifetime, {.min = 0, .max = 1e6, .type = "SECONDS"},
       "Seconds without participants after which a scene that a client created is deleted. 0 keeps it");
@@ -133,11 +152,55 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
       ->default_str(changeableByDefault);
   table.showDefault(changeable, changeableByDefault.c_str());
+  CLI::Option* allowed = table.list(
+      "--participants-may", parsed.allowed, "LIST",
+      "What the role participant may do without being an owner: a comma-separated list of create, delete, "
+      "control (pause, reset, seek), record, and own (become the owner of a scene that has none), or none",
+      checkChoice({"create", "delete", "control", "record", "own", "none"}));
+  allowed->delimiter(',')->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)->default_str("none");
+  table.showDefault(allowed, "none");
   table.flag("--owners-alone", parsed.ownersAlone,
              "Only its owners may pause, reset, record and delete a scene that has an owner");
 }
 
-void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
+const std::map<std::string, scene::Role> kRoles{{"viewer", scene::Role::viewer},
+                                                {"participant", scene::Role::participant},
+                                                {"owner", scene::Role::owner}};
+
+void addIdentityOptions(OptionTable& table, Parsed& parsed) {
+  ProgramOptions& options = parsed.options;
+  table.group("Identity");
+  table.text("--token-keys", options.tokenKeys, "DIR",
+             "Require a token of every client, signed by a key in this directory: NAME.pem for ES256, "
+             "NAME.secret for HS256. SIGHUP reads them again");
+  table.text("--token-audience", options.tokenAudience, "NAME", "Audience (aud) that tokens must have");
+  table.flag("--pairing", options.pairing,
+             "Require a token, or a six-digit code that the server shows at its start and after SIGUSR2");
+  table.flag("--insecure", options.insecure,
+             "Let in everyone who reaches the server, although --host is not a loopback address");
+  CLI::Option* role = table.choice("--anonymous-role", parsed.anonymousRole, kRoles,
+                                   "Role of clients on other machines with --insecure");
+  table.showDefault(role, "participant");
+  table.number("--max-connections-per-token", options.server.maxConnectionsPerToken,
+               {.min = 1, .max = 100'000}, "Open connections with tokens of one subject");
+  table.number("--max-scenes-per-tenant", options.server.maxScenesPerTenant, {.min = 0, .max = 1000},
+               "Created scenes of one tenant. Clients without a tenant share one number");
+}
+
+// Checks the options together.
+void checkIdentity(const ProgramOptions& options) {
+  const bool asks = options.pairing || !options.tokenKeys.empty();
+  if (options.insecure && asks)
+    throw OptionError("--insecure excludes --token-keys and --pairing: remove it, or both of them");
+  if (!asks && !options.insecure && !isLoopback(options.host))
+    throw OptionError(fmt::format(
+        "--host: {} is reachable from other machines, and no client would have to prove who it is; add "
+        "--pairing or --token-keys DIR, or --insecure to let everyone in (docs/identity.md)",
+        options.host));
+}
+
+void addNetworkOptions(OptionTable& table, Parsed& parsed) {
+  ProgramOptions& options = parsed.options;
   table.group("Network");
   table.text("--host", options.host, "ADDRESS", "Address to listen on; 0.0.0.0 means all addresses");
   table.number("--port", options.port, kPort, "Port of the page and the WebSocket. 0 picks a free port");
@@ -149,6 +212,11 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
       "localhost and the name of the machine are always allowed");
   table.list("--allow-origin", options.allowedOrigins, "ORIGIN",
              "Origin of another page that may connect, such as https://example.org; may be repeated");
+  table.text(
+      "--announce", parsed.announce, "WHEN",
+      "Announce the server by mDNS to this network, where `clothstream discover` finds it: on, off, or "
+      "auto: with --tls self and a --host that others reach",
+      checkChoice({"auto", "on", "off"}));
   table.number("--max-connections", options.maxConnections, {.min = 1, .max = 100'000},
                "Connections to each port at a time");
   table.number(
@@ -156,8 +224,24 @@ void addNetworkOptions(OptionTable& table, ProgramOptions& options) {
       "Connections of one address to each port at a time. Programs on this machine have no such limit");
   table.number("--connections-per-second", options.connectionsPerSecond, {.min = 1, .max = 1e6},
                "New connections to each port per second, with a burst of as many");
+  table.number(
+      "--connections-per-second-per-address", options.connectionsPerSecondPerAddress, {.min = 1, .max = 1e6},
+      "The same of one address, TLS handshakes included. Programs on this machine have no such limit");
   table.number("--hello-timeout", options.server.helloTimeout, {.min = 1, .max = 30, .type = "SECONDS"},
-               "Seconds of silence after which a connection that has not joined a scene is closed");
+               "Seconds after which a connection that has not joined a scene is closed, even if it sends "
+               "messages. The time "
+               "of an upload is added");
+  table.number("--max-read-rate", options.server.maxReadRate, {.min = 0.1, .max = 1e6, .type = "MEGABYTES"},
+               "Megabytes per second that are read from one connection in a stream. A faster client waits");
+  table.number("--max-upload-time", options.server.maxUploadTime, {.min = 1, .max = 3600, .type = "SECONDS"},
+               "Seconds after which an upload is dropped, unless a scene was created from it");
+  table.number("--min-upload-rate", options.server.minUploadRate, {.min = 0, .max = 1e6, .type = "KILOBYTES"},
+               "Kilobytes per second that an upload must have from its fifth second on. 0 allows any");
+  table.number("--max-upload-memory", options.maxUploadMb, {.min = 0, .max = 1e6, .type = "MEGABYTES"},
+               "Memory of all uploads together, in megabytes");
+  table.number("--max-upload-memory-per-address", options.maxUploadMbPerAddress,
+               {.min = 0, .max = 1e6, .type = "MEGABYTES"},
+               "The same of one address. Programs on this machine have no such limit");
   table.number("--metrics-port", options.metricsPort, kPort,
                "Port of /metrics, /healthz and /readyz for operators. 0 picks a free port. By default there "
                "is none");
@@ -206,16 +290,24 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
              checkChoice({"trace", "debug", "info", "warning", "error", "off"}, {"warn", "err", "critical"}));
   table.text("--log-format", parsed.options.logFormat, "FORMAT",
              "text, or json: one JSON object per line of the log", checkChoice({"text", "json"}));
+  table.number(
+      "--log-rate", parsed.options.logRate, {.min = 0, .max = 1e6, .type = "LINES"},
+      "Lines of each level that are logged per second. A line says how many were left out. 0 means no limit");
   table.number("--seconds", parsed.options.stopAfter,
                {.min = 0, .max = 1e9, .type = "SECONDS", .aboveMin = true}, "Stop after this time");
   table.number(
       "--drain", parsed.options.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
       "Seconds after SIGINT or SIGTERM within which the server ends, even if the device or the disk does "
       "not answer. A second signal ends it at once");
-  table.showDefault(
-      table.text("--state-dir", parsed.options.stateDirectory, "DIR",
-                 "Directory of what the server keeps for its next start: the key of --tls self"),
-      "$XDG_STATE_HOME/clothstream or $HOME/.local/state/clothstream");
+  parsed.stateDirectory = table.text(
+      "--state-dir", parsed.options.stateDirectory, "DIR",
+      "Directory of what the server keeps for its next start: the key of --tls self and, if this option is "
+      "given, scenes with their states and participants");
+  table.showDefault(parsed.stateDirectory, "$XDG_STATE_HOME/clothstream or $HOME/.local/state/clothstream");
+  table.number(
+      "--state-limit", parsed.options.stateLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
+      "Megabytes of the kept scenes. Beyond it the states of the largest scenes are left out. 0 means no "
+      "limit");
   table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
   table.action("--print-config", parsed.printConfig, "Print the effective options as a TOML file, and exit");
   table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");
@@ -281,6 +373,43 @@ CLI::App& addPlayCommand(OptionTable& table, ProgramOptions& options) {
   return command;
 }
 
+// Seconds in a text such as 90s, 30m, 8h and 7d; nothing for others.
+std::optional<std::chrono::seconds> parseTime(const std::string& text) {
+  constexpr std::chrono::seconds kMost = std::chrono::hours(24 * 3650);
+  std::int64_t number = 0;
+  const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const std::string_view unit(rest, static_cast<std::size_t>(text.data() + text.size() - rest));
+  const std::map<std::string_view, std::int64_t> units{{"s", 1}, {"m", 60}, {"h", 3600}, {"d", 86'400}};
+  const auto known = units.find(unit);
+  if (error != std::errc() || known == units.end() || number < 1 || number > kMost.count() / known->second)
+    return std::nullopt;
+  return std::chrono::seconds(number * known->second);
+}
+
+CLI::App& addTokenCommand(OptionTable& table, Parsed& parsed) {
+  TokenOptions& token = parsed.options.token;
+  CLI::App& command = table.command("token", "Print a token for a client, or make a key that signs tokens");
+  CLI::Option* key = table.text("--key", token.key, "FILE",
+                                "Private key NAME.pem, or secret NAME.secret, of --token-keys that signs it");
+  table.exclude(key, table.text("--new-key", token.newKey, "FILE",
+                                "Make this key instead: NAME.pem for ES256, NAME.secret for HS256"));
+  table.text("--scene", token.scene, "NAME", "Only scene that the client may use. By default all scenes");
+  table.showDefault(
+      table.choice("--role", parsed.tokenRole, kRoles, "Highest role: viewer, participant or owner"),
+      "participant");
+  table.text("--name", token.name, "NAME", "Name that other participants see");
+  table.text("--subject", token.subject, "ID",
+             "Person or program; bans and limits of connections hold for it");
+  table.text("--tenant", token.tenant, "ID", "Group whose created scenes are counted together");
+  table.text("--valid", parsed.tokenValid, "TIME", "Time from now, such as 90s, 30m, 8h or 7d; at most 3650d",
+             [](const std::string& text) {
+               return parseTime(text) ? std::string()
+                                      : fmt::format("'{}' is not a time; use 90s, 30m, 8h or 7d", text);
+             });
+  table.text("--token-audience", parsed.options.tokenAudience, "NAME", "Audience (aud), as for the server");
+  return command;
+}
+
 std::string configFile(const Parsed& parsed) {
   const char* fromEnvironment = std::getenv("CLOTHSTREAM_CONFIG");
   return parsed.config.empty() && fromEnvironment != nullptr ? fromEnvironment : parsed.config;
@@ -291,6 +420,18 @@ scene::Permissions toPermissions(const std::vector<std::string>& changeable) {
   if (has("none") && changeable.size() > 1)
     throw OptionError("--participants-change: 'none' excludes the other values; use it alone");
   return {has("environment"), has("cloths"), has("colliders")};
+}
+
+// Adds what --participants-may allows.
+void allow(const std::vector<std::string>& allowed, scene::Permissions& permissions) {
+  const auto has = [&](const char* what) { return std::ranges::find(allowed, what) != allowed.end(); };
+  if (has("none") && allowed.size() > 1)
+    throw OptionError("--participants-may: 'none' excludes the other values; use it alone");
+  permissions.create = has("create");
+  permissions.remove = has("delete");
+  permissions.control = has("control");
+  permissions.record = has("record");
+  permissions.own = has("own");
 }
 
 void printMarkdown(const OptionTable& table) {
@@ -317,6 +458,15 @@ void printMarkdown(const OptionTable& table) {
 
 }  // namespace
 
+bool isLoopback(const std::string& host) {
+  in_addr v4{};
+  in6_addr v6{};
+  constexpr std::uint32_t kLoopbackNet = 127;
+  if (::inet_pton(AF_INET, host.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == kLoopbackNet;
+  if (::inet_pton(AF_INET6, host.c_str(), &v6) == 1) return IN6_IS_ADDR_LOOPBACK(&v6) != 0;
+  return host == "localhost";
+}
+
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
   Parsed parsed;
   ProgramOptions& options = parsed.options;
@@ -335,7 +485,8 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   OptionTable table(app);
   addSceneOptions(table, parsed);
   addParticipantOptions(table, parsed);
-  addNetworkOptions(table, options);
+  addIdentityOptions(table, parsed);
+  addNetworkOptions(table, parsed);
   addTlsOptions(table, parsed);
   table.group("Device");
   addDeviceOptions(table, options);
@@ -345,14 +496,30 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   const CLI::App& step = addStepCommand(table, options);
   const CLI::App& resimulate = addResimulateCommand(table, options);
   const CLI::App& play = addPlayCommand(table, options);
+  const CLI::App& token = addTokenCommand(table, parsed);
 
   try {
     app.parse(argc, argv);
     options.warnings = table.applySources(environ, configFile(parsed));
     if (!parsed.changeable.empty()) options.server.participantsMay = toPermissions(parsed.changeable);
     options.tlsSelf = parsed.tls == "self";
+    options.keepsScenes = parsed.stateDirectory->count() > 0 && !options.stateDirectory.empty();
     checkTls(options);
+    options.announces = parsed.announce == "on" ||
+                        (parsed.announce == "auto" && options.tlsSelf && !isLoopback(options.host));
+    options.server.maxUploadBytes = static_cast<std::size_t>(options.maxUploadMb * 1e6);
+    options.server.maxUploadBytesOfAddress = static_cast<std::size_t>(options.maxUploadMbPerAddress * 1e6);
     if (parsed.ownersAlone) options.server.outsideControl = false;
+    allow(parsed.allowed, options.server.participantsMay);
+    options.anonymousRole = parsed.anonymousRole.value_or(options.anonymousRole);
+    options.token.role = parsed.tokenRole.value_or(options.token.role);
+    options.token.valid = parseTime(parsed.tokenValid).value_or(std::chrono::hours(8));
+    const bool serves = app.get_subcommands().empty() || play.parsed();
+    if (serves && !parsed.printConfig && !parsed.printMarkdown && !parsed.listDevices &&
+        !parsed.listMaterials)
+      checkIdentity(options);
+    if (token.parsed() && options.token.key.empty() && options.token.newKey.empty())
+      throw OptionError("token: give --key FILE to print a token, or --new-key FILE to make a key");
   } catch (const CLI::ExtrasError&) {
     fmt::print(stderr, "{}\nRun with --help for more information.\n",
                table.unexpected(app.remaining(true).front()));
@@ -368,12 +535,14 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
 
   options.logLevel = CLI::detail::to_lower(options.logLevel);
   options.logFormat = CLI::detail::to_lower(options.logFormat);
+  options.server.adaptsToLoad = CLI::detail::to_lower(parsed.overload) == "adapt";
   options.recordsOnRequest = !parsed.recordings.empty();
   options.recordDirectory = options.recordsOnRequest ? parsed.recordings : parsed.record;
   options.command = step.parsed()          ? Command::step
                     : play.parsed()        ? Command::play
                     : resimulate.parsed()  ? Command::resimulate
                     : printScene.parsed()  ? Command::printScene
+                    : token.parsed()       ? Command::token
                     : parsed.listDevices   ? Command::listDevices
                     : parsed.listMaterials ? Command::listMaterials
                                            : Command::serve;

@@ -13,6 +13,7 @@
 #include "server/hosting/scene_server.h"
 #include "server/model/scene.h"
 #include "server/recording/playback.h"
+#include "server/scene/roles.h"
 #include "server/step/step.h"
 
 namespace clothstream {
@@ -22,7 +23,16 @@ inline constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VER
 // Exit code after SIGINT or SIGTERM, as shells use it.
 inline constexpr int kInterrupted = 130;
 
-enum class Command { serve, play, resimulate, step, printScene, listDevices, listMaterials };
+enum class Command { serve, play, resimulate, step, printScene, token, listDevices, listMaterials };
+
+// Options of the command `token`.
+struct TokenOptions {
+  std::filesystem::path key;     // signs the token
+  std::filesystem::path newKey;  // a key is made here instead
+  std::string scene, name, subject, tenant;
+  scene::Role role = scene::Role::participant;
+  std::chrono::seconds valid{0};
+};
 
 struct ProgramOptions {
   Command command = Command::serve;
@@ -41,7 +51,7 @@ struct ProgramOptions {
   bool recordsOnRequest = false;          // record only scenes that clients ask for
   double recordLimitMb = 0;               // megabytes per file; 0 means no limit
   double recordingsLimitMb = 10'000;      // megabytes of all recordings in the directory; 0 means no limit
-  double keepFreeMb = 1000;               // megabytes of the disk that recordings leave free
+  double keepFreeMb = 1000;               // megabytes of the disk that recordings and saved states leave free
 
   // Network.
   std::string host = "127.0.0.1";
@@ -50,17 +60,28 @@ struct ProgramOptions {
   std::vector<std::string> publicNames, allowedOrigins;
   // These limits hold for each endpoint.
   std::uint32_t maxConnections = 256, maxConnectionsPerAddress = 64;
-  double connectionsPerSecond = 200;
+  double connectionsPerSecond = 200, connectionsPerSecondPerAddress = 20;
+  double maxUploadMb = 64, maxUploadMbPerAddress = 32;  // megabytes of uploads
   std::string metricsHost = "127.0.0.1";
   std::optional<std::uint16_t> metricsPort;  // unset: no monitoring
+  bool announces = false;                    // by mDNS
   // TLS for both endpoints: with a certificate of its own, or with that in the files.
   bool tlsSelf = false;
   std::filesystem::path tlsCertificate, tlsKey, tlsClientCa;  // empty: none
 
+  // Identity of peers.
+  std::filesystem::path tokenKeys;  // directory; empty: none
+  std::string tokenAudience = "clothstream";
+  bool pairing = false, insecure = false;
+  scene::Role anonymousRole = scene::Role::participant;  // with insecure
+
   // Program.
   std::string logLevel = "info", logFormat = "text";
+  double logRate = 100;  // lines per second of each level; 0 means no limit
   std::optional<std::chrono::nanoseconds> stopAfter;
   std::filesystem::path stateDirectory;     // what the server keeps for its next start
+  bool keepsScenes = false;                 // the directory was named: scenes are kept there too
+  double stateLimitMb = 1000;               // megabytes of kept scenes; 0 means no limit
   std::chrono::milliseconds drain{10'000};  // after a signal, until the process ends
   std::vector<std::string> warnings;        // about environment variables, for the log
 
@@ -69,7 +90,11 @@ struct ProgramOptions {
   recording::PlaybackOptions playback;
   std::string recording;   // file of `play` and `resimulate`
   std::string printScene;  // name or file
+  TokenOptions token;
 };
+
+// Returns whether only programs on this machine reach a server that listens on `host`.
+bool isLoopback(const std::string& host);
 
 // Returns the options, or the exit code if the program must end: after --help, --version, --print-config or a
 // wrong option. The output or the error has then been printed.

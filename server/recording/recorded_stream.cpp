@@ -25,7 +25,7 @@ bool isName(const std::string& text) {
 bool isOfScene(v1::NoticeKind kind) {
   return kind == v1::NOTICE_KIND_ROLLED_BACK || kind == v1::NOTICE_KIND_DEVICE_REBUILT ||
          kind == v1::NOTICE_KIND_RUNNING_SLOW || kind == v1::NOTICE_KIND_CHANGE_UNDONE ||
-         kind == v1::NOTICE_KIND_SCENE_RESET;
+         kind == v1::NOTICE_KIND_SCENE_RESET || kind == v1::NOTICE_KIND_LOAD_CHANGED;
 }
 
 template <typename MessageType>

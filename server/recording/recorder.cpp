@@ -15,6 +15,7 @@
 #include "server/messages/scene_message.h"
 #include "server/recording/metadata.h"
 #include "server/recording/tick_message.h"
+#include "server/scene/snapshot_message.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::recording {
@@ -108,8 +109,8 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const model::Scene& scene
   v1::RecordedScene recorded;
   *recorded.mutable_scene() = messages::toMessage(scene);
   put(Topic::scene, recorded);
-  saved(state, false);
-  if (&start != &state) put(start, false, true);
+  saved(state);
+  if (&start != &state) put(start, true);
   thread_ = std::thread(
       [this, name = scene.name, metadata = metadataOf(options_.serverName, device, scene, description)] {
         try {
@@ -128,24 +129,22 @@ void Recorder::ticked(const scene::AppliedTick& tick) {
   put(Topic::ticks, tick_);
 }
 
-void Recorder::saved(const simulation::StateSnapshot& state, bool grabsHold) {
-  put(state, grabsHold, false);
+void Recorder::saved(const simulation::StateSnapshot& state) {
+  put(state, false);
   describeCloths_ = true;
 }
 
-void Recorder::put(const simulation::StateSnapshot& state, bool grabsHold, bool start) {
+void Recorder::put(const simulation::StateSnapshot& state, bool start) {
   v1::Checkpoint checkpoint;
+  scene::write(state, checkpoint);
   checkpoint.set_start(start);
-  checkpoint.set_tick(state.tick);
-  checkpoint.set_state(state.bytes.data(), state.bytes.size());
-  checkpoint.set_grips_hold(grabsHold);
   put(Topic::checkpoints, checkpoint);
 }
 
 void Recorder::restored(std::uint64_t tick, const simulation::StateSnapshot& state) {
   v1::Checkpoint checkpoint;
+  scene::write(state, checkpoint);
   checkpoint.set_tick(tick);
-  checkpoint.set_state(state.bytes.data(), state.bytes.size());
   checkpoint.set_restored(true);
   put(Topic::checkpoints, checkpoint);
 }

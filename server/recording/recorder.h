@@ -26,8 +26,7 @@ namespace clothstream::recording {
 struct RecorderOptions {
   std::filesystem::path directory;  // must exist
   std::string serverName;
-  // File size after which the recording continues in another file; 0: never. While grabs hold cloth the
-  // switch is delayed, up to an eighth of this size.
+  // File size after which the recording continues in another file; 0: never.
   std::uint64_t maxBytes = 0;
   // Checked before a file is created and while it is written; null: no limit.
   std::shared_ptr<DiskShare> disk = nullptr;
@@ -64,7 +63,7 @@ class Recorder final : public scene::Journal {
              const v1::StreamDescription& description, const simulation::StateSnapshot& state,
              const simulation::StateSnapshot& start) override;
   void ticked(const scene::AppliedTick& tick) override;
-  void saved(const simulation::StateSnapshot& state, bool grabsHold) override;
+  void saved(const simulation::StateSnapshot& state) override;
   void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
   void end() override;
   void sent(const delivery::SharedBytes& message) override;
@@ -86,7 +85,8 @@ class Recorder final : public scene::Journal {
   void push(std::variant<Own, delivery::SharedBytes> what, std::size_t bytes);
   void writeParticipant(std::uint64_t participant, v1::ParticipantEventKind kind,
                         const std::string& clientName, const std::string& displayName);
-  void put(const simulation::StateSnapshot& state, bool grabsHold, bool start);
+  // `start`: a reset returns to this state.
+  void put(const simulation::StateSnapshot& state, bool start);
   void run(const std::string& sceneName, const Metadata& metadata);
   // Writes until the recording ends, or until an error, which it returns.
   [[nodiscard]] Written writeAll(RecordingWriter& writer);

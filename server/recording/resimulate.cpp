@@ -12,6 +12,7 @@
 #include "proto/recording/recording_reader.h"
 #include "server/messages/scene_message.h"
 #include "server/recording/tick_message.h"
+#include "server/scene/snapshot_message.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/vulkan/recorder.h"
 
@@ -53,8 +54,8 @@ class Replay {
   Done take(const v1::RecordedScene& message);
   Done take(v1::Checkpoint& message);
   Done take(const v1::RecordedTick& message);
-  // Reports that a message cannot be read. The replay continues from the next state in which no grab holds
-  // cloth, because a state does not contain the grabbed nodes.
+  // Reports that a message cannot be read. The replay continues from the next state. States of releases
+  // before 0.3 do not contain the nodes that grabs hold, so that those with grabs are passed over.
   void lose(std::string reason);
 
  private:
@@ -73,8 +74,9 @@ class Replay {
   model::Scene scene_;
   simulation::StateSnapshot start_;
   std::uint64_t tick_ = 0;
-  bool lost_ = false;   // waits for a state from which it can continue
-  bool keeps_ = false;  // the device has a state for a rollback
+  std::uint32_t substeps_ = 0;  // of simulation_
+  bool lost_ = false;           // waits for a state from which it can continue
+  bool keeps_ = false;          // the device has a state for a rollback
   std::unique_ptr<vulkan::Device> device_;
   std::unique_ptr<vulkan::Recorder> recorder_;
   std::unique_ptr<simulation::ClothSimulation> simulation_;
@@ -95,12 +97,9 @@ Done Replay::take(const v1::RecordedScene& message) {
 
 Done Replay::take(v1::Checkpoint& message) {
   if (scene_.cloths.empty()) return broken("it has a state before its scene");
-  const std::size_t bytes = std::size_t{scene_.nodeCount()} * simulation::kSnapshotBytesPerNode;
-  if (message.state().size() != bytes)
-    return broken("its state after tick {} does not fit the {} nodes of its scene", message.tick(),
-                  scene_.nodeCount());
-  const auto state = std::as_bytes(std::span(message.state()));
-  simulation::StateSnapshot snapshot{message.tick(), {state.begin(), state.end()}};
+  const auto read = scene::toSnapshot(message, scene_.nodeCount());
+  if (!read) return broken("its state after tick {} {}", message.tick(), read.error());
+  const simulation::StateSnapshot& snapshot = *read;
   if (message.start()) {
     start_ = snapshot;
   } else if (!started()) {
@@ -112,7 +111,7 @@ Done Replay::take(v1::Checkpoint& message) {
     result_.device = fmt::format("{} ({})", device_->info().name, device_->info().driver);
     makeSimulation(snapshot);
     keeps_ = tick_ == 0;
-  } else if (lost_ && !message.grips_hold()) {
+  } else if (lost_ && (!message.grips_hold() || message.has_held())) {
     lost_ = false;
     tick_ = message.tick();
     result_.missing.back().until = tick_;
@@ -134,7 +133,11 @@ void Replay::makeSimulation(const simulation::StateSnapshot& state) {
   keeps_ = true;
   simulation_.reset();
   simulation_ = std::make_unique<simulation::ClothSimulation>(*device_, scene_);
-  submit([&] { simulation_->recordRestoreState(*recorder_, state); });
+  substeps_ = scene_.substeps;
+  submit([&] {
+    simulation_->recordRestoreState(*recorder_, state);
+    simulation_->recordRestoreGrabs(*recorder_, state.held);
+  });
 }
 
 Done Replay::take(const v1::RecordedTick& message) {
@@ -157,6 +160,9 @@ Done Replay::take(const v1::RecordedTick& message) {
     scene_.cloths = std::move(*cloths);
     simulation_->setCloths(scene_.cloths);
   }
+  if (const std::uint32_t substeps = message.substeps() == 0 ? scene_.substeps : message.substeps();
+      substeps != substeps_)
+    simulation_->setSubsteps(substeps_ = substeps, scene_.cloths);
   submit([&] {
     if (message.recovery() == v1::RECOVERY_ROLLBACK) simulation_->recordRollback(*recorder_);
     if (message.recovery() == v1::RECOVERY_RESET) simulation_->recordRestoreState(*recorder_, start_);

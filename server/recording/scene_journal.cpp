@@ -90,7 +90,10 @@ messages::Result<std::string> SceneJournal::start(const std::string& name) {
   // The device thread takes the lock and must not wait for a disk, so the file is created without it. If
   // another request was faster, the file is deleted.
   auto recorder = Recorder::create(options_, scene_, name);
-  if (!recorder) return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "startRecording: " + recorder.error());
+  if (!recorder)
+    return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                                               "startRecording: " + recorder.error(),
+                                               telemetry::Refusal::diskShare});
   const std::lock_guard lock(mutex_);
   if (auto free = requireNoRecording(); !free) return tl::unexpected(std::move(free).error());
   std::string file = fileOf(**recorder);
@@ -150,10 +153,7 @@ void SceneJournal::ticked(const scene::AppliedTick& tick) {
   const auto recorder = current();
   if (!recorder) return;
   recorder->ticked(tick);
-  if (options_.maxBytes == 0 || !recorder->active()) return;
-  // Grabs start again at the start of a file, so the switch is delayed while they hold cloth, up to a limit.
-  const std::uint64_t most = options_.maxBytes + (tick.inputs.grabs.empty() ? 0 : options_.maxBytes / 8);
-  if (recorder->bytes() < most) return;
+  if (options_.maxBytes == 0 || !recorder->active() || recorder->bytes() < options_.maxBytes) return;
   // The next file starts with the next tick.
   const std::lock_guard lock(mutex_);
   if (current_ != recorder) return;
@@ -161,8 +161,8 @@ void SceneJournal::ticked(const scene::AppliedTick& tick) {
   replace(std::make_shared<Recorder>(options_), true);
 }
 
-void SceneJournal::saved(const simulation::StateSnapshot& state, bool grabsHold) {
-  if (const auto recorder = current()) recorder->saved(state, grabsHold);
+void SceneJournal::saved(const simulation::StateSnapshot& state) {
+  if (const auto recorder = current()) recorder->saved(state);
 }
 
 void SceneJournal::restored(std::uint64_t tick, const simulation::StateSnapshot& state) {

@@ -44,7 +44,7 @@ class SceneJournal : public scene::Journal {
              const v1::StreamDescription& description, const simulation::StateSnapshot& state,
              const simulation::StateSnapshot& start) override;
   void ticked(const scene::AppliedTick& tick) override;
-  void saved(const simulation::StateSnapshot& state, bool grabsHold) override;
+  void saved(const simulation::StateSnapshot& state) override;
   void restored(std::uint64_t tick, const simulation::StateSnapshot& state) override;
   void end() override;
   void sent(const delivery::SharedBytes& message) override;

@@ -157,6 +157,7 @@ void write(const scene::AppliedTick& tick, v1::RecordedTick& message) {
   message.set_recovery(toMessage(tick.recovery));
   message.set_keeps_state(tick.keepsState);
   if (tick.clothsChanged) writeCloths(tick.scene, message);
+  if (tick.substeps != tick.scene.substeps) message.set_substeps(tick.substeps);
   messages::write(tick.inputs.environment.gravity, *message.mutable_gravity());
   messages::write(tick.inputs.environment.wind, *message.mutable_wind());
   message.set_air_density(tick.inputs.environment.airDensity);
@@ -177,6 +178,7 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
   if (static_cast<std::size_t>(message.colliders_size()) > simulation::kMaxColliders ||
       static_cast<std::size_t>(message.grips_size()) > simulation::kMaxGrabs)
     return wrong("it has too many colliders or grabs");
+  if (message.substeps() > scene.substeps) return wrong("it has more substeps than the scene");
   Numbers numbers;
   simulation::TickInputs inputs;
   inputs.environment.gravity = numbers.vec3(message.gravity());

@@ -82,7 +82,9 @@ void Charge::release() {
 }
 
 Charge::Amount Charge::priceOf(const model::Scene& scene) const {
-  const double seconds = model_.work(scene).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
+  const double seconds =
+      model_.work(scene, scene.colliders.size() + participantColliders_).seconds(budget_->speed_) -
+      freeWork_.seconds(budget_->speed_);
   return {.load = std::max(0.0, seconds) * scene.simulationRate,
           .megabytes = std::max(0.0, model_.bytes(scene) / kMegabyte - freeMegabytes_)};
 }
@@ -103,8 +105,8 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   const BudgetLimits& limits = budget_->limits_;
   const Amount price = priceOf(scene);
   const auto refuse = [&](std::string text) {
-    return tl::unexpected(
-        messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, path + ": " + std::move(text)});
+    return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                                               path + ": " + std::move(text), telemetry::Refusal::budget});
   };
   // A price that is no higher than before is always allowed.
   const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
@@ -129,6 +131,33 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   replace(price);
   made_ = true;
   return {};
+}
+
+messages::Result<void> Charge::chargeColliders(const std::string& path, const model::Scene& scene,
+                                               std::size_t count) {
+  const std::lock_guard lock(budget_->mutex_);
+  const BudgetLimits& limits = budget_->limits_;
+  const std::size_t before = std::exchange(participantColliders_, count);
+  const Amount price = priceOf(scene);
+  const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
+  const double room = std::min(limits.sceneLoad, freeLoad);
+  if (count <= before || price.load <= charged_.load || price.load <= room) {
+    replace(price);
+    return {};
+  }
+  const std::uint32_t fit = largest(static_cast<std::uint32_t>(count - 1), [&](std::uint32_t fewer) {
+    participantColliders_ = fewer;
+    return priceOf(scene).load <= room;
+  });
+  participantColliders_ = before;
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+      fmt::format(
+          "{}: {} colliders of participants would take {:.2f} s of the device's time a second, by estimate; "
+          "one scene may take {:.2f} s (--max-scene-load), and {:.2f} s of {:.2f} s (--max-load) are free: "
+          "{} would fit",
+          path, count, price.load, limits.sceneLoad, freeLoad, limits.load, fit),
+      telemetry::Refusal::colliders});
 }
 
 }  // namespace clothstream::scene

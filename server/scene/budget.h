@@ -52,6 +52,10 @@ class Charge {
   // Charges the scene as it will be. If that exceeds the budget, changes nothing and returns an error that
   // names price, budget and what would fit. `path` begins its text.
   messages::Result<void> charge(const std::string& path, const model::Scene& scene);
+  // Charges the scene with this number of colliders of its participants, like charge(). Fewer than before are
+  // always allowed.
+  messages::Result<void> chargeColliders(const std::string& path, const model::Scene& scene,
+                                         std::size_t count);
   // Charges the scene with parameters that it had before, also beyond the budget.
   void restore(const model::Scene& scene);
   // Gives the charge back.
@@ -71,6 +75,7 @@ class Charge {
 
   const std::shared_ptr<Budget> budget_;
   const model::PriceModel model_;
+  std::size_t participantColliders_ = 0;
   model::Work freeWork_;
   double freeMegabytes_ = 0;
   Amount charged_;

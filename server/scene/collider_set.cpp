@@ -2,8 +2,10 @@
 #include "server/scene/collider_set.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/description.h"
@@ -23,21 +25,23 @@ model::Pose startOf(const model::Pose& before, const model::Pose& now, double ti
 }  // namespace
 
 ColliderSet::ColliderSet(const model::Scene& scene) {
-  for (const model::Collider& collider : scene.colliders) scenePoses_.push_back(model::poseAt(collider, 0));
+  for (const model::Collider& collider : scene.colliders)
+    state_.scenePoses.push_back(model::poseAt(collider, 0));
 }
 
 void ColliderSet::place(std::uint64_t participant, std::span<const model::ParticipantCollider> colliders) {
-  std::erase_if(colliders_, [&](const Placed& placed) {
+  std::erase_if(state_.colliders, [&](const Placed& placed) {
     return placed.participant == participant &&
            std::ranges::find(colliders, placed.now.id, &model::ParticipantCollider::id) == colliders.end();
   });
   for (const model::ParticipantCollider& collider : colliders) {
     const auto key = [](const Placed& placed) { return std::tuple(placed.participant, placed.now.id); };
-    const auto place = std::ranges::lower_bound(colliders_, std::tuple(participant, collider.id), {}, key);
-    if (place != colliders_.end() && key(*place) == std::tuple(participant, collider.id))
+    const auto place =
+        std::ranges::lower_bound(state_.colliders, std::tuple(participant, collider.id), {}, key);
+    if (place != state_.colliders.end() && key(*place) == std::tuple(participant, collider.id))
       place->now = collider;
     else
-      colliders_.insert(place, {participant, collider, collider.pose});
+      state_.colliders.insert(place, {participant, collider, collider.pose});
   }
 }
 
@@ -48,21 +52,27 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
     const model::Collider& collider = scene.colliders[i];
     const model::Pose end = model::poseAt(collider, endSeconds);
     const bool byItself = !collider.motion.keys.empty();
-    colliders.push_back({collider.shape,
-                         byItself ? scenePoses_[i] : startOf(scenePoses_[i], end, scene.tickSeconds()), end,
-                         collider.friction});
-    scenePoses_[i] = end;
+    colliders.push_back(
+        {collider.shape,
+         byItself ? state_.scenePoses[i] : startOf(state_.scenePoses[i], end, scene.tickSeconds()), end,
+         collider.friction});
+    state_.scenePoses[i] = end;
   }
-  for (Placed& collider : colliders_) {
+  for (Placed& collider : state_.colliders) {
     const model::Pose& end = collider.now.pose;
     colliders.push_back({collider.now.shape, startOf(collider.before, end, scene.tickSeconds()), end, 1});
     collider.before = end;
   }
 }
 
+void ColliderSet::restore(State state) {
+  assert(state.scenePoses.size() == state_.scenePoses.size());
+  state_ = std::move(state);
+}
+
 ColliderSet::Identity ColliderSet::identity(std::size_t index) const {
-  if (index < scenePoses_.size()) return {0, static_cast<std::uint32_t>(index)};
-  const Placed& placed = colliders_[index - scenePoses_.size()];
+  if (index < state_.scenePoses.size()) return {0, static_cast<std::uint32_t>(index)};
+  const Placed& placed = state_.colliders[index - state_.scenePoses.size()];
   return {placed.participant, placed.now.id};
 }
 
@@ -70,8 +80,8 @@ void ColliderSet::write(const model::Scene& scene, v1::Frame& frame) const {
   auto& states = *frame.mutable_colliders();
   states.Clear();
   for (std::size_t i = 0; i < scene.colliders.size(); ++i)
-    messages::write(scene.colliders[i], scenePoses_[i], *states.Add());
-  for (const Placed& collider : colliders_)
+    messages::write(scene.colliders[i], state_.scenePoses[i], *states.Add());
+  for (const Placed& collider : state_.colliders)
     messages::write(collider.now, collider.participant, *states.Add());
 }
 

@@ -50,15 +50,22 @@ class ColliderSet {
   // Replaces the colliders of `frame` by the present ones. `scene` must be that of the newest advance().
   void write(const model::Scene& scene, v1::Frame& frame) const;
 
- private:
   struct Placed {
     std::uint64_t participant;
     model::ParticipantCollider now;
     model::Pose before;
   };
+  // Everything that a later tick depends on, after a complete tick.
+  struct State {
+    std::vector<model::Pose> scenePoses;  // at the tick's end
+    std::vector<Placed> colliders;        // of participants, in their order
+  };
+  const State& state() const { return state_; }
+  // Continues from a state of this scene.
+  void restore(State state);
 
-  std::vector<model::Pose> scenePoses_;
-  std::vector<Placed> colliders_;
+ private:
+  State state_;
 };
 
 }  // namespace clothstream::scene

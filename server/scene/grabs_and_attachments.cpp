@@ -2,6 +2,7 @@
 #include "server/scene/grabs_and_attachments.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "clothstream/v1/session.pb.h"
 
@@ -10,21 +11,21 @@ namespace clothstream::scene {
 GrabsAndAttachments::GrabsAndAttachments(const model::Scene& scene) {
   std::size_t attachments = 0;
   for (const model::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
-  moved_.resize(attachments);
+  state_.moved.resize(attachments);
 }
 
 GrabsAndAttachments::Slot* GrabsAndAttachments::find(std::uint64_t participant, std::uint32_t id) {
-  const auto found = std::ranges::find_if(slots_, [&](const Slot& slot) {
+  const auto found = std::ranges::find_if(state_.slots, [&](const Slot& slot) {
     const bool held = slot.phase == Slot::Phase::takes || slot.phase == Slot::Phase::holds;
     return held && slot.participant == participant && slot.now.id == id;
   });
-  return found == slots_.end() ? nullptr : &*found;
+  return found == state_.slots.end() ? nullptr : &*found;
 }
 
 void GrabsAndAttachments::place(std::uint64_t participant, std::span<const model::Grab> grabs,
                                 std::span<const model::AttachmentPose> attachments) {
-  for (const model::AttachmentPose& put : attachments) moved_[put.attachment] = put.pose;
-  for (Slot& slot : slots_) {
+  for (const model::AttachmentPose& put : attachments) state_.moved[put.attachment] = put.pose;
+  for (Slot& slot : state_.slots) {
     const bool wanted = std::ranges::find(grabs, slot.now.id, &model::Grab::id) != grabs.end();
     if (slot.phase == Slot::Phase::empty || slot.participant != participant || wanted) continue;
     // The device does not know a grab that has not begun.
@@ -35,12 +36,12 @@ void GrabsAndAttachments::place(std::uint64_t participant, std::span<const model
       known->now = grab;
       continue;
     }
-    auto place = std::ranges::find(slots_, Slot::Phase::empty, &Slot::phase);
-    if (place == slots_.end()) {
-      if (slots_.size() == simulation::kMaxGrabs) return;
-      place = slots_.emplace(place);
+    auto place = std::ranges::find(state_.slots, Slot::Phase::empty, &Slot::phase);
+    if (place == state_.slots.end()) {
+      if (state_.slots.size() == simulation::kMaxGrabs) return;
+      place = state_.slots.emplace(place);
     }
-    *place = {participant, grab, grab.pose, Slot::Phase::takes};
+    *place = {participant, grab, grab.pose, Slot::Phase::takes, ++newest_};
   }
 }
 
@@ -49,13 +50,13 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
   inputs.attachments.clear();
   for (const model::Cloth& cloth : scene.cloths)
     for (const model::Attachment& attachment : cloth.attachments) {
-      const std::optional<model::Pose>& moved = moved_[inputs.attachments.size()];
+      const std::optional<model::Pose>& moved = state_.moved[inputs.attachments.size()];
       inputs.attachments.push_back(moved ? *moved : model::frameAt(scene, attachment, endSeconds));
     }
-  while (!slots_.empty() && slots_.back().phase == Slot::Phase::empty) slots_.pop_back();
+  while (!state_.slots.empty() && state_.slots.back().phase == Slot::Phase::empty) state_.slots.pop_back();
   inputs.grabs.clear();
   released_.clear();
-  for (Slot& slot : slots_) {
+  for (Slot& slot : state_.slots) {
     simulation::Grab& grab = inputs.grabs.emplace_back();
     if (slot.phase == Slot::Phase::ends) released_.emplace_back(slot.participant, slot.now.id);
     if (slot.phase == Slot::Phase::empty || slot.phase == Slot::Phase::ends) {
@@ -86,7 +87,7 @@ void GrabsAndAttachments::addEvents(std::span<const simulation::GrabStatus> grab
   };
   for (const auto& [participant, id] : released_) add(participant, id, v1::GRAB_EVENT_KIND_RELEASED, 0);
   for (std::size_t i = 0; i < grabs.size(); ++i) {
-    Slot& slot = slots_[i];
+    Slot& slot = state_.slots[i];
     if (slot.phase != Slot::Phase::holds) continue;
     const std::uint32_t vertices = grabs[i].taken - grabs[i].slipped;
     if (slot.vertices == vertices) continue;
@@ -96,16 +97,28 @@ void GrabsAndAttachments::addEvents(std::span<const simulation::GrabStatus> grab
   }
 }
 
-bool GrabsAndAttachments::anyGrabHolds() const {
-  return std::ranges::find(slots_, Slot::Phase::holds, &Slot::phase) != slots_.end();
+void GrabsAndAttachments::restore(State state) {
+  state.moved.resize(state_.moved.size());
+  state_ = std::move(state);
+  for (const Slot& slot : state_.slots) newest_ = std::max(newest_, slot.number);
 }
 
-void GrabsAndAttachments::restartGrabs() {
-  for (Slot& slot : slots_)
-    if (slot.phase == Slot::Phase::holds) {
+void GrabsAndAttachments::goBack(std::span<const Slot> then, simulation::HeldNodes& held) {
+  std::vector<bool> kept(held.grabs.size(), false);
+  for (std::size_t i = 0; i < state_.slots.size(); ++i) {
+    Slot& slot = state_.slots[i];
+    if (slot.phase != Slot::Phase::holds && slot.phase != Slot::Phase::ends) continue;
+    const bool same = i < kept.size() && i < then.size() && then[i].phase == Slot::Phase::holds &&
+                      then[i].number == slot.number;
+    if (same) {
+      kept[i] = true;
+      if (slot.vertices != then[i].vertices) slot.vertices.reset();
+    } else if (slot.phase == Slot::Phase::holds) {
       slot.phase = Slot::Phase::takes;
       slot.vertices.reset();
     }
+  }
+  std::erase_if(held.nodes, [&](const simulation::HeldNode& node) { return !kept[node.grab]; });
 }
 
 }  // namespace clothstream::scene

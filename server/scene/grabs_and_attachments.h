@@ -32,27 +32,34 @@ class GrabsAndAttachments {
   // Adds events for the grabs of the newest tick, which is complete. `grabs` is the simulation's result.
   void addEvents(std::span<const simulation::GrabStatus> grabs, v1::TickEvents& events);
 
-  // Returns whether a grab holds cloth.
-  bool anyGrabHolds() const;
-
-  // Restarts every grab, because the device has lost the vertices that it held.
-  void restartGrabs();
-
- private:
   // Entry at the index of TickInputs::grabs.
   struct Slot {
     std::uint64_t participant = 0;
     model::Grab now;
     model::Pose before;
     enum class Phase : std::uint8_t { empty, takes, holds, ends } phase = Phase::empty;
+    std::uint64_t number = 0;  // of the grab, counted from 1; no two grabs have the same
     // Vertices held after the newest tick; nothing before the grab's first tick.
     std::optional<std::uint32_t> vertices = {};
   };
+  // Everything that a later tick depends on, after a complete tick.
+  struct State {
+    std::vector<std::optional<model::Pose>> moved;  // poses of attachments that were moved by a message
+    std::vector<Slot> slots;
+  };
+  const State& state() const { return state_; }
+  // Continues from a state of this scene. The device must hold what its grabs hold.
+  void restore(State state);
 
+  // The device goes back to a snapshot, when the slots were `then`. Grabs that held cloth then and still do
+  // keep what they held. Younger ones start again. Removes from `held` what ended since.
+  void goBack(std::span<const Slot> then, simulation::HeldNodes& held);
+
+ private:
   Slot* find(std::uint64_t participant, std::uint32_t id);
 
-  std::vector<std::optional<model::Pose>> moved_;  // poses of the attachments that were moved by a message
-  std::vector<Slot> slots_;
+  State state_;
+  std::uint64_t newest_ = 0;                                       // number of the newest grab
   std::vector<std::pair<std::uint64_t, std::uint32_t>> released_;  // in the current tick: participant, id
 };
 

@@ -25,6 +25,7 @@ struct AppliedTick {
   Recovery recovery = Recovery::none;
   bool keepsState = false;     // the device kept a checkpoint of the state before the tick
   bool clothsChanged = false;  // a parameter of a cloth differs from the tick before
+  std::uint32_t substeps = 0;  // of this tick; fewer than those of the scene if the device is overloaded
   const model::Scene& scene;   // with this tick's parameters
   const simulation::TickInputs& inputs;
   const ColliderSet& colliders;  // identities of the colliders in `inputs`
@@ -52,8 +53,8 @@ class Journal {
                      const v1::StreamDescription& description, const simulation::StateSnapshot& state,
                      const simulation::StateSnapshot& start) = 0;
   virtual void ticked(const AppliedTick& tick) = 0;
-  // State after the newest ticked(). `grabsHold`: a grab holds cloth. Only the device knows which vertices.
-  virtual void saved(const simulation::StateSnapshot& state, bool grabsHold) = 0;
+  // State after the newest ticked().
+  virtual void saved(const simulation::StateSnapshot& state) = 0;
   // The simulation was replaced: it continues after `tick` from this state.
   virtual void restored(std::uint64_t tick, const simulation::StateSnapshot& state) = 0;
   // The simulation ended. Another one may begin at the scene's start.

@@ -2,8 +2,11 @@
 #include "server/scene/live_scene.h"
 
 #include <algorithm>
+#include <random>
 #include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
 #include "server/delivery/envelope.h"
@@ -53,7 +56,8 @@ LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<J
       maxParticipants(most),
       journal(std::move(kept)),
       subscribers(tapOf(journal)),
-      roster(subscribers, inbox, journal.get()),
+      roster(subscribers, inbox, journal.get(), [this](std::size_t count) { return chargeColliders(count); }),
+      work(schedule::WorkLevel{1, definition.substeps}),
       start_(std::move(definition)),
       stability_(start_),
       cloths_(std::make_shared<const std::string>(messages::clothsOfDescription(start_).SerializeAsString())),
@@ -65,6 +69,7 @@ LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::u
       maxParticipants(most),
       source(std::move(from)),
       roster(subscribers, inbox, nullptr),
+      work(schedule::WorkLevel{}),
       start_(nameAndRates(std::move(name), source->description())),
       stability_(start_),
       cloths_(clothsOf(source->description())),
@@ -80,9 +85,50 @@ model::Scene LiveScene::definition() const {
   return definition_;
 }
 
-messages::Result<void> LiveScene::charge() {
+std::uint32_t LiveScene::leastSubsteps(const model::Scene& scene) const {
+  const std::uint32_t stable = stability_.substeps(scene);
+  return stable == 0 ? start_.substeps : std::min(stable, start_.substeps);
+}
+
+void LiveScene::restore(SavedScene saved, const ReconnectGrace& grace, Clock::time_point now) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (saved.accepted)
+      definition_ = *saved.accepted;
+    else if (saved.checkpoint)
+      definition_ = saved.checkpoint->scene;
+    // The correction fraction of an eased change of solver is the host's.
+    for (model::Cloth& cloth : definition_.cloths) cloth.solver.correctionFraction.reset();
+    if (saved.checkpoint) tick = saved.checkpoint->state.tick;
+    if (!created) charge_.restore(definition_);
+    restored_ = {std::move(saved.checkpoint), std::move(saved.accepted)};
+    // A participant may hold a description of the earlier run. Its number must not be given again.
+    std::random_device random;
+    contents_ = (std::uint64_t{random()} << 30) | (std::uint64_t{1} << 62);
+    definitionChanged();
+  }
+  paused = saved.paused;
+  roster.restore(saved.roster, grace, now);
+}
+
+LiveScene::Restored LiveScene::takeRestored() {
   const std::lock_guard lock(mutex_);
-  return charge_.charge("createScene.scene", definition_);
+  return std::exchange(restored_, {});
+}
+
+std::uint64_t LiveScene::version() const {
+  const std::lock_guard lock(mutex_);
+  return version_;
+}
+
+messages::Result<void> LiveScene::charge(const std::string& path) {
+  const std::lock_guard lock(mutex_);
+  return charge_.charge(path, definition_);
+}
+
+messages::Result<void> LiveScene::chargeColliders(std::size_t count) {
+  const std::lock_guard lock(mutex_);
+  return charge_.chargeColliders("colliderPoses", definition_, count);
 }
 
 void LiveScene::discharge() {
@@ -118,7 +164,8 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   if (!changes_.take(Clock::now()))
     return tl::unexpected(messages::FieldError{
         v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-        "parameterChange: too many changes of '" + name() + "' in one second; send it again later"});
+        "parameterChange: too many changes of '" + name() + "' in one second; send it again later",
+        telemetry::Refusal::parameterChanges});
   messages::Result<model::ParameterChange> change =
       messages::toParameterChange(message, definition_, stability_);
   if (!change) return tl::unexpected(std::move(change).error());
@@ -134,10 +181,11 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
     charge_.restore(definition_);
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                             "parameterChange: too many changes for one tick; send it again later"});
+                             "parameterChange: too many changes for one tick; send it again later",
+                             telemetry::Refusal::parameterChanges});
   }
   definition_ = std::move(changed);
-  description_.reset();
+  definitionChanged();
   return {};
 }
 
@@ -160,7 +208,7 @@ v1::ParameterChange LiveScene::resetParameters() {
   definition_.environment = start_.environment;
   definition_.cloths = start_.cloths;
   charge_.restore(definition_);
-  description_.reset();
+  definitionChanged();
   return allParameters(start_);
 }
 
@@ -169,7 +217,7 @@ v1::ParameterChange LiveScene::restart() {
   inbox.dropChanges();
   definition_ = start_;
   charge_.restore(definition_);
-  description_.reset();
+  definitionChanged();
   tick = 0;
   resetRequested = false;
   return allParameters(start_);
@@ -180,7 +228,7 @@ v1::ParameterChange LiveScene::revertTo(const model::Scene& applied) {
   definition_ = applied;
   inbox.forEachChange([&](const model::ParameterChange& change) { model::applyChange(definition_, change); });
   charge_.restore(definition_);
-  description_.reset();
+  definitionChanged();
   return allParameters(applied);
 }
 
@@ -204,6 +252,22 @@ bool LiveScene::hasBeenEmptyFor(std::chrono::milliseconds time, Clock::time_poin
   }
   if (!emptySince_) emptySince_ = now;
   return now - *emptySince_ >= time;
+}
+
+delivery::SharedBytes workNotice(const LiveScene& scene, std::uint64_t tick) {
+  const schedule::WorkLevel work = scene.work;
+  const schedule::WorkLevel all = scene.allWork();
+  if (work == all)
+    return delivery::notice(v1::NOTICE_KIND_LOAD_CHANGED,
+                            "the device is no longer overloaded: the scene has all frames and substeps again",
+                            tick);
+  return delivery::notice(
+      v1::NOTICE_KIND_LOAD_CHANGED,
+      fmt::format(
+          "the device is overloaded: the scene sends {} of {} frames/s and computes {} of {} substeps",
+          scene.start().streamRate / work.frameDivisor, scene.start().streamRate, work.substeps,
+          all.substeps),
+      tick);
 }
 
 delivery::SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {

@@ -17,11 +17,14 @@
 #include "server/model/scene.h"
 #include "server/model/stability.h"
 #include "server/scene/budget.h"
+#include "server/scene/checkpoint.h"
 #include "server/scene/defaults.h"
 #include "server/scene/frame_source.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/roster.h"
+#include "server/scene/scene_store.h"
+#include "server/schedule/overload_policy.h"
 #include "server/schedule/token_bucket.h"
 #include "server/telemetry/metrics.h"
 
@@ -53,12 +56,34 @@ class LiveScene {
   // Definition with all accepted changes, those of the next tick included.
   model::Scene definition() const;
 
-  // Charges a created scene before it first runs, or returns why it exceeds the budget.
-  messages::Result<void> charge();
+  // Continues a scene of an earlier run of the server; `saved` has this scene's start. Its participants are
+  // disconnected since `now`. Must be called before the scene runs.
+  void restore(SavedScene saved, const ReconnectGrace& grace, Clock::time_point now);
+  // State from which the first host of a restored scene continues.
+  struct Restored {
+    std::optional<Checkpoint> checkpoint;
+    std::optional<model::Scene> accepted;  // as in SavedScene
+  };
+  Restored takeRestored();
+
+  // Number of changes of definition(). Differs from that of an earlier definition.
+  std::uint64_t version() const;
+
+  // Charges a created scene before it first runs, or returns why it exceeds the budget. `path` begins the
+  // text.
+  messages::Result<void> charge(const std::string& path = "createScene.scene");
+  // Charges the colliders that all participants have together, or returns why they exceed the budget.
+  messages::Result<void> chargeColliders(std::size_t count);
   // Gives the charge back, because the scene has been deleted. Others may hold the object for longer.
   void discharge();
   // Price of a tick with the accepted changes and this number of colliders.
   model::Work tickWork(std::size_t colliders) const;
+
+  // Minimum number of substeps with which `scene` is stable, at most start().substeps. `scene` is start()
+  // with other parameters.
+  std::uint32_t leastSubsteps(const model::Scene& scene) const;
+  // Work of the scene if no overload reduces it.
+  schedule::WorkLevel allWork() const { return {1, start_.substeps}; }
 
   // Ends the scene for good because it harms others: `why` is the last message to its participants, and every
   // later join is refused with it.
@@ -90,11 +115,15 @@ class LiveScene {
   static constexpr std::uint32_t kEpoch = 1;
 
   const bool created;
+  // Tenant of the peer that created it; empty if it has none. Set before other threads know the scene.
+  std::string tenant;
   const std::uint32_t maxParticipants;
   const std::shared_ptr<Journal> journal;     // null: the scene has none
   const std::shared_ptr<FrameSource> source;  // null: the scene is simulated
-  std::atomic<bool> paused{false};            // no ticks, except for the first frame after a reset
-  std::atomic<bool> resetRequested{false};    // taken at the next tick
+  // Takes checkpoints; null: the scene does not survive the end of the server. Set before the scene runs.
+  std::shared_ptr<SceneKeeper> keeper;
+  std::atomic<bool> paused{false};          // no ticks, except for the first frame after a reset
+  std::atomic<bool> resetRequested{false};  // taken at the next tick
 
   Inbox inbox;
   delivery::Subscribers subscribers;
@@ -107,14 +136,24 @@ class LiveScene {
   // Written by the device's thread, or by the source.
   std::atomic<bool> running{false};
   std::atomic<std::uint64_t> tick{0};  // newest complete one
+  std::atomic<schedule::WorkLevel>
+      work;  // of the newest tick; less than allWork() while the device is overloaded
 
  private:
+  // The definition has changed. The caller holds the lock.
+  void definitionChanged() {
+    description_.reset();
+    ++version_;
+  }
+
   const model::Scene start_;
   const model::StabilityBound stability_;            // of start_
   const std::shared_ptr<const std::string> cloths_;  // part of all descriptions
 
   mutable std::mutex mutex_;
   model::Scene definition_;
+  std::uint64_t version_ = 0;  // of definition_
+  Restored restored_;
   Charge charge_;  // of definition_
   std::string quarantined_;
   schedule::TokenBucket changes_{kChangesPerSecond, kChangesPerSecond};
@@ -125,5 +164,8 @@ class LiveScene {
 
 // Notice that a scene is paused; `participant` as for delivery::notice().
 delivery::SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant = 0);
+
+// Notice of the work that a scene does, of a change at `tick` or to a peer that joins.
+delivery::SharedBytes workNotice(const LiveScene& scene, std::uint64_t tick);
 
 }  // namespace clothstream::scene

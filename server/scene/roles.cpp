@@ -33,6 +33,10 @@ const char* nameOf(Action action) {
       return "setRole";
     case Action::removeParticipant:
       return "removeParticipant";
+    case Action::createScene:
+      return "createScene";
+    case Action::manageBans:
+      return "listBans, liftBan";
   }
   return "";
 }
@@ -40,23 +44,29 @@ const char* nameOf(Action action) {
 }  // namespace
 
 Role roleFor(Action action, const Permissions& participants) {
-  const auto changed = [](bool byParticipants) { return byParticipants ? Role::participant : Role::owner; };
+  const auto lowest = [](bool byParticipants) { return byParticipants ? Role::participant : Role::owner; };
   switch (action) {
     case Action::collide:
     case Action::grab:
     case Action::moveAttachments:
       return Role::participant;
     case Action::changeEnvironment:
-      return changed(participants.environment);
+      return lowest(participants.environment);
     case Action::changeCloths:
-      return changed(participants.cloths);
+      return lowest(participants.cloths);
     case Action::changeColliders:
-      return changed(participants.colliders);
+      return lowest(participants.colliders);
     case Action::controlScene:
+      return lowest(participants.control);
     case Action::deleteScene:
+      return lowest(participants.remove);
     case Action::recordScene:
+      return lowest(participants.record);
+    case Action::createScene:
+      return lowest(participants.create);
     case Action::setRole:
     case Action::removeParticipant:
+    case Action::manageBans:
       return Role::owner;
   }
   return Role::owner;

@@ -24,11 +24,16 @@ enum class Action : std::uint8_t {
   recordScene,
   setRole,
   removeParticipant,
+  createScene,
+  manageBans,
 };
 
-// Parameters that participants may change. Owners may change all of them.
+// What the role participant may do in addition to colliders, grabs and attachments. Owners may do all of it.
 struct Permissions {
-  bool environment = true, cloths = true, colliders = true;
+  bool environment = true, cloths = true, colliders = true;  // parameters that they may change
+  bool create = false, remove = false;                       // scenes
+  bool control = false, record = false;
+  bool own = false;  // become the owner of a scene that has none, by joining first
 };
 
 // Lowest role that may do this.

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <chrono>
 #include <random>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/scene/token_hash.h"
 
 namespace clothstream::scene {
 namespace {
@@ -28,7 +30,7 @@ std::string makeToken() {
 }
 
 // Constant-time comparison.
-bool sameToken(const std::string& one, const std::string& other) {
+bool isSame(const std::string& one, const std::string& other) {
   if (one.size() != other.size()) return false;
   unsigned different = 0;
   for (std::size_t i = 0; i < one.size(); ++i)
@@ -77,9 +79,19 @@ Roster::Entries::iterator Roster::find(const Mailbox& mailbox) {
 
 Roster::Entries::iterator Roster::find(const std::string& token) {
   auto found = entries_.end();
+  if (token.size() != kTokenBytes) return found;
+  const std::string hash = hashOfToken(token);
   for (auto entry = entries_.begin(); entry != entries_.end(); ++entry)
-    if (sameToken(entry->token, token)) found = entry;
+    if (isSame(entry->tokenHash, hash)) found = entry;
   return found;
+}
+
+bool Roster::isRefused(const std::string& token) const {
+  if (token.size() != kTokenBytes) return false;
+  const std::string hash = hashOfToken(token);
+  bool refused = false;
+  for (const std::string& known : refusedTokens_) refused |= isSame(known, hash);
+  return refused;
 }
 
 Role Roster::roleOf(const Mailbox& mailbox) const {
@@ -96,36 +108,44 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
                                                               std::size_t limit, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (closed_) return tl::unexpected(Refusal::closed);
+  if (bans_.contains(request.subject) || isRefused(request.token)) return tl::unexpected(Refusal::removed);
   // A participant whose grace period is over has lost its place, even if expire() was not called since.
   const auto known = find(request.token);
-  if (known != entries_.end() && (!known->participant.away || now < known->placeExpires)) {
+  if (known != entries_.end() && known->subject == request.subject &&
+      (!known->participant.away || now < known->placeExpires)) {
     if (request.attempt < known->attempt) return tl::unexpected(Refusal::late);
     known->attempt = request.attempt;
-    return resume(*known, mailbox, now);
+    known->ownership = request.ownership;
+    return resume(*known, request.token, mailbox, now);
   }
   if (entries_.size() >= limit && !makeRoom(now)) return tl::unexpected(Refusal::full);
 
   const bool isOwned =
       std::ranges::any_of(entries_, [](const Entry& entry) { return entry.participant.role == Role::owner; });
+  const bool owns =
+      request.ownership == Ownership::always || (request.ownership == Ownership::ifNone && !isOwned);
   Entry entry;
-  entry.token = makeToken();
+  std::string token = makeToken();
+  entry.tokenHash = hashOfToken(token);
+  entry.subject = request.subject;
+  entry.ownership = request.ownership;
   entry.attempt = request.attempt;
   entry.participant = {.id = ++ids,
                        .displayName = request.displayName,
                        .clientName = request.clientName,
                        .role = request.role == Role::viewer ? Role::viewer
-                               : isOwned                    ? Role::participant
-                                                            : Role::owner};
+                               : owns                       ? Role::owner
+                                                            : Role::participant};
   if (journal_) journal_->joined(entry.participant.id, request.clientName, request.displayName);
   // Announced before the new participant subscribes, because its Welcome already contains itself.
   announce(Presence::joined, entry.participant);
   subscribers_.add(mailbox, entry.participant.id);
   entries_.push_back(std::move(entry));
-  return admissionOf(entries_.back(), false);
+  return admissionOf(entries_.back(), std::move(token), false);
 }
 
-Roster::Admission Roster::resume(Entry& entry, const std::shared_ptr<Mailbox>& mailbox,
-                                 Clock::time_point now) {
+Roster::Admission Roster::resume(Entry& entry, const std::string& token,
+                                 const std::shared_ptr<Mailbox>& mailbox, Clock::time_point now) {
   if (const std::shared_ptr<Mailbox> former = subscribers_.find(entry.participant.id)) {
     subscribers_.remove(*former);
     former->close(delivery::error(v1::ERROR_CODE_TAKEN_OVER,
@@ -134,17 +154,18 @@ Roster::Admission Roster::resume(Entry& entry, const std::shared_ptr<Mailbox>& m
   const bool wasAway = std::exchange(entry.participant.away, false);
   if (wasAway) announce(Presence::returned, entry.participant);
   subscribers_.add(mailbox, entry.participant.id);
-  if (!entry.posed && !(entry.poses.colliders.empty() && entry.poses.grabs.empty())) {
+  if (!entry.posed && !(entry.poses.colliders.empty() && entry.poses.grabs.empty()) &&
+      charge(entry, entry.poses.colliders.size())) {
     inbox_.postPoses(entry.participant.id, entry.poses, now);
     entry.posed = true;
   }
-  return admissionOf(entry, true);
+  return admissionOf(entry, token, true);
 }
 
-Roster::Admission Roster::admissionOf(const Entry& entry, bool resumed) const {
+Roster::Admission Roster::admissionOf(const Entry& entry, std::string token, bool resumed) const {
   Admission admission{.id = entry.participant.id,
                       .role = entry.participant.role,
-                      .token = entry.token,
+                      .token = std::move(token),
                       .resumed = resumed,
                       .participants = {}};
   for (const Entry& other : entries_) admission.participants.push_back(other.participant);
@@ -184,8 +205,17 @@ void Roster::expire(Clock::time_point now) {
 }
 
 void Roster::removePoses(Entry& entry, Clock::time_point now) {
-  if (entry.posed) inbox_.postPoses(entry.participant.id, {}, now);
+  if (!entry.posed) return;
+  inbox_.postPoses(entry.participant.id, {}, now);
   entry.posed = false;
+  std::ignore = charge(entry, 0);  // fewer colliders are always allowed
+}
+
+messages::Result<void> Roster::charge(const Entry& entry, std::size_t count) {
+  if (!charge_) return {};
+  for (const Entry& other : entries_)
+    if (other.posed && other.participant.id != entry.participant.id) count += other.poses.colliders.size();
+  return charge_(count);
 }
 
 bool Roster::makeRoom(Clock::time_point now) {
@@ -211,15 +241,15 @@ Roster::Entries::iterator Roster::erase(Entries::iterator entry, LeaveReason rea
 }
 
 void Roster::ensureOwner(Clock::time_point now) {
-  const auto has = [](Role role) {
-    return [role](const Entry& entry) { return entry.participant.role == role; };
+  if (std::ranges::any_of(entries_, [](const Entry& entry) { return entry.participant.role == Role::owner; }))
+    return;
+  const auto mayOwn = [](const Entry& entry) {
+    return entry.participant.role == Role::participant && entry.ownership != Ownership::never;
   };
-  if (std::ranges::any_of(entries_, has(Role::owner))) return;
   // Connected participants come before those who are away.
-  auto heir = std::ranges::find_if(entries_, [](const Entry& entry) {
-    return !entry.participant.away && entry.participant.role == Role::participant;
-  });
-  if (heir == entries_.end()) heir = std::ranges::find_if(entries_, has(Role::participant));
+  auto heir = std::ranges::find_if(
+      entries_, [&](const Entry& entry) { return !entry.participant.away && mayOwn(entry); });
+  if (heir == entries_.end()) heir = std::ranges::find_if(entries_, mayOwn);
   if (heir != entries_.end()) changeRole(*heir, Role::owner, 0, now);
 }
 
@@ -237,6 +267,7 @@ void Roster::clear() {
     for (const Entry& entry : entries_) journal_->left(entry.participant.id);
   entries_.clear();
   inbox_.dropPoses();
+  if (charge_) std::ignore = charge_(0);
 }
 
 void Roster::dismiss(const SharedBytes& last) {
@@ -250,6 +281,39 @@ void Roster::close(const SharedBytes& last) {
   closed_ = true;
   subscribers_.closeAll(last);
   clear();
+}
+
+SavedRoster Roster::saved() const {
+  const std::lock_guard lock(mutex_);
+  SavedRoster saved{.participants = {},
+                    .bans = bans_.get(),
+                    .refusedTokenHashes = {refusedTokens_.begin(), refusedTokens_.end()}};
+  for (const Entry& entry : entries_) {
+    saved.participants.push_back({entry.participant, entry.tokenHash, entry.subject, entry.attempt});
+    // Whether a participant is connected does not outlive the server.
+    saved.participants.back().participant.away = true;
+  }
+  return saved;
+}
+
+void Roster::restore(const SavedRoster& from, const ReconnectGrace& grace, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  bans_.set(from.bans);
+  refusedTokens_.assign(from.refusedTokenHashes.begin(), from.refusedTokenHashes.end());
+  for (const SavedParticipant& saved : from.participants) {
+    Entry& entry = entries_.emplace_back();
+    entry.participant = saved.participant;
+    entry.participant.away = true;
+    entry.tokenHash = saved.tokenHash;
+    entry.subject = saved.subject;
+    entry.attempt = saved.attempt;
+    // The scene may have colliders and grabs of it from a checkpoint.
+    entry.posed = true;
+    entry.posesExpire = now + std::min(grace.poses, grace.place);
+    entry.placeExpires = now + grace.place;
+    if (journal_)
+      journal_->joined(saved.participant.id, saved.participant.clientName, saved.participant.displayName);
+  }
 }
 
 std::size_t Roster::size() const {
@@ -276,6 +340,9 @@ messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPo
   const auto entry = find(mailbox);
   if (entry == entries_.end()) return {};
   if (auto permitted = permit(entry->participant.role, message, permissions); !permitted) return permitted;
+  const std::size_t before = entry->posed ? entry->poses.colliders.size() : 0;
+  if (poses.colliders.size() != before)
+    if (auto charged = charge(*entry, poses.colliders.size()); !charged) return charged;
   entry->posed = true;
   entry->poses = {.colliders = poses.colliders, .grabs = poses.grabs, .wantsContacts = poses.wantsContacts};
   inbox_.postPoses(entry->participant.id, std::move(poses), arrival, poseTime(message, arrival));
@@ -324,11 +391,53 @@ messages::Result<void> Roster::remove(const Mailbox& by, const v1::RemovePartici
     return permitted;
   const auto entry = target("removeParticipant", message.participant_id());
   if (!entry) return tl::unexpected(entry.error());
-  if (const std::shared_ptr<Mailbox> mailbox = subscribers_.find((*entry)->participant.id))
-    mailbox->close(
-        delivery::error(v1::ERROR_CODE_REMOVED, "an owner removed this participant from the scene", true));
-  erase(*entry, LeaveReason::removed, owner->participant.id, now);
+  const std::uint64_t remover = owner->participant.id;
+  if (!message.ban() || (*entry)->subject.empty()) {
+    expel(*entry, "an owner removed this participant from the scene", remover, now);
+    return {};
+  }
+  const std::string subject = (*entry)->subject;
+  if (subject == owner->subject)
+    return tl::unexpected(messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
+                                               "removeParticipant.ban: you cannot ban your own subject"});
+  if (!bans_.add({.subject = subject, .displayName = (*entry)->participant.displayName}))
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        fmt::format("removeParticipant.ban: the scene has {} bans, its maximum; lift one first (liftBan)",
+                    BanList::kMax)});
+  for (auto other = entries_.begin(); other != entries_.end();)
+    other = other->subject == subject ? expel(other, "an owner banned you from the scene", remover, now)
+                                      : other + 1;
   return {};
+}
+
+Roster::Entries::iterator Roster::expel(Entries::iterator entry, const char* why, std::uint64_t by,
+                                        Clock::time_point now) {
+  if (const std::shared_ptr<Mailbox> mailbox = subscribers_.find(entry->participant.id))
+    mailbox->close(delivery::error(v1::ERROR_CODE_REMOVED, why, true));
+  refusedTokens_.push_back(entry->tokenHash);
+  if (refusedTokens_.size() > kMaxRefusedTokens) refusedTokens_.pop_front();
+  return erase(entry, LeaveReason::removed, by, now);
+}
+
+std::vector<Ban> Roster::bans() const {
+  const std::lock_guard lock(mutex_);
+  return bans_.get();
+}
+
+void Roster::setBans(std::vector<Ban> bans) {
+  const std::lock_guard lock(mutex_);
+  bans_.set(std::move(bans));
+}
+
+bool Roster::isBanned(const std::string& subject) const {
+  const std::lock_guard lock(mutex_);
+  return bans_.contains(subject);
+}
+
+bool Roster::liftBan(const std::string& subject) {
+  const std::lock_guard lock(mutex_);
+  return bans_.lift(subject);
 }
 
 void Roster::announce(Presence presence, const Participant& participant, std::uint64_t by) {

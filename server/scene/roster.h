@@ -5,9 +5,12 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <tl/expected.hpp>
@@ -15,6 +18,7 @@
 #include "server/delivery/subscribers.h"
 #include "server/messages/field_error.h"
 #include "server/model/input.h"
+#include "server/scene/ban_list.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/roles.h"
@@ -37,28 +41,58 @@ struct Participant {
 };
 void write(const Participant& participant, v1::Participant& message);
 
+// Whether a participant becomes an owner without another owner's help.
+enum class Ownership : std::uint8_t {
+  never,
+  ifNone,  // while the scene has no owner
+  always,
+};
+
+// A participant as it is kept beyond the end of the server.
+struct SavedParticipant {
+  Participant participant;
+  std::string tokenHash;      // hashOfToken() of its resume token
+  std::string subject;        // of its identity; empty without one
+  std::uint32_t attempt = 0;  // of its newest session
+};
+
+// What is kept of a roster beyond the end of the server.
+struct SavedRoster {
+  std::vector<SavedParticipant> participants;  // in the order in which they joined
+  std::vector<Ban> bans;
+  std::vector<std::string> refusedTokenHashes;  // of removed participants, newest last
+};
+
 enum class LeaveReason : std::uint8_t { left, timedOut, removed };
 
 // Thread-safe. The subscribers hold the mailboxes of all connected participants; a participant that is away
 // has none. A session is identified by its mailbox. If its participant is gone, or was taken over by another
 // session, calls for that mailbox have no effect.
 //
-// A scene with participants other than viewers has an owner: the first to join. When the last owner leaves,
-// the participant that has been there longest becomes the owner.
+// If the scene has no owner, the first participant to join that may own it becomes one. When the last owner
+// leaves, it is the one of these that has been there longest. Viewers own nothing.
 class Roster {
  public:
   static constexpr std::size_t kTokenBytes = 16;
+  // Resume tokens of removed participants that are refused; the oldest are forgotten.
+  static constexpr std::size_t kMaxRefusedTokens = 256;
   // Accepted range of pose times. Later times count as unknown, earlier ones as kMaxBehind.
   static constexpr std::chrono::milliseconds kMaxAhead{100}, kMaxBehind{10'000};
 
-  // All must outlive the roster. `journal` may be null.
-  Roster(delivery::Subscribers& subscribers, Inbox& inbox, Journal* journal)
-      : subscribers_(subscribers), inbox_(inbox), journal_(journal) {}
+  // Charges this number of colliders, of all participants together, or returns why there are too many. Fewer
+  // than before are always allowed.
+  using ChargeColliders = std::function<messages::Result<void>(std::size_t colliders)>;
+
+  // All must outlive the roster. `journal` and `charge` may be null.
+  Roster(delivery::Subscribers& subscribers, Inbox& inbox, Journal* journal, ChargeColliders charge = {})
+      : subscribers_(subscribers), inbox_(inbox), journal_(journal), charge_(std::move(charge)) {}
 
   struct JoinRequest {
     std::string clientName, displayName;
-    Role role = Role::none;     // requested
-    std::string token;          // of a participant that reconnects; else empty
+    Role role = Role::none;  // requested
+    std::string token;       // of a participant that reconnects; else empty
+    std::string subject;     // of the peer's identity; empty without one
+    Ownership ownership = Ownership::ifNone;
     std::uint32_t attempt = 0;  // grows with each connection of the participant
   };
   struct Admission {
@@ -68,10 +102,11 @@ class Roster {
     bool resumed = false;
     std::vector<Participant> participants;  // all, in the order in which they joined
   };
-  enum class Refusal : std::uint8_t { full, closed, late };
+  enum class Refusal : std::uint8_t { full, closed, late, removed };
 
   // Adds the mailbox to the subscribers. A request with the token of a participant resumes that participant
-  // and closes its former session; it is refused as late if that session has a higher attempt number.
+  // and closes its former session; it is refused as late if that session has a higher attempt number. The
+  // subject must be the same. A banned subject, or the token of a removed participant, is refused as removed.
   // Other requests get the next number of `ids`. If there are `limit` participants, the one that has been
   // away longest is evicted; if none is away, the request is refused as full.
   [[nodiscard]] tl::expected<Admission, Refusal> join(const JoinRequest& request,
@@ -89,6 +124,11 @@ class Roster {
   // Same as dismiss(), and refuses every later join().
   void close(const delivery::SharedBytes& last);
 
+  SavedRoster saved() const;
+  // Adds participants of an earlier run as if they were disconnected now, bans and refused tokens. The roster
+  // must be empty.
+  void restore(const SavedRoster& saved, const ReconnectGrace& grace, Clock::time_point now);
+
   // Number of all participants, and of those that are away.
   std::size_t size() const;
   std::size_t away() const;
@@ -96,7 +136,7 @@ class Roster {
   bool owned() const;
 
   // Puts the participant's poses into the inbox. `poses` is the content of `message`. Returns an error if the
-  // role is too low.
+  // role is too low, or if there are more colliders than before and they exceed the budget.
   [[nodiscard]] messages::Result<void> post(const delivery::Mailbox& mailbox,
                                             const v1::ColliderPoses& message, model::ParticipantPoses poses,
                                             const Permissions& permissions, Clock::time_point arrival);
@@ -107,7 +147,15 @@ class Roster {
     return permit(roleOf(mailbox), what, permissions);
   }
 
-  // Requests of an owner. They return NOT_FOUND if there is no such participant.
+  // Bans of the scene. They are lifted by LiftBan, or end with the scene.
+  std::vector<Ban> bans() const;
+  void setBans(std::vector<Ban> bans);
+  bool isBanned(const std::string& subject) const;
+  // Returns whether there was such a ban.
+  bool liftBan(const std::string& subject);
+
+  // Requests of an owner. They return NOT_FOUND if there is no such participant. remove() with a ban also
+  // removes other participants of the same subject.
   [[nodiscard]] messages::Result<void> setRole(const delivery::Mailbox& by, const v1::SetRole& message,
                                                Clock::time_point now);
   [[nodiscard]] messages::Result<void> remove(const delivery::Mailbox& by,
@@ -116,7 +164,8 @@ class Roster {
  private:
   struct Entry {
     Participant participant;
-    std::string token;
+    std::string tokenHash, subject;  // hashOfToken() of the resume token
+    Ownership ownership = Ownership::ifNone;
     std::uint32_t attempt = 0;                        // of the newest session
     model::ParticipantPoses poses;                    // the newest, without attachments
     bool posed = false;                               // the scene may have colliders or grabs of it
@@ -128,20 +177,26 @@ class Roster {
   // Both return end() if nothing is found.
   Entries::iterator find(const delivery::Mailbox& mailbox);
   Entries::iterator find(const std::string& token);
+  bool isRefused(const std::string& token) const;
+  // Ends the participant's session and refuses its resume token from now on. Returns the next entry.
+  Entries::iterator expel(Entries::iterator entry, const char* why, std::uint64_t by, Clock::time_point now);
   Role roleOf(const delivery::Mailbox& mailbox) const;
   // Participant that an owner's request names in `field`.
   messages::Result<Entries::iterator> target(const char* field, std::uint64_t id);
-  Admission resume(Entry& entry, const std::shared_ptr<delivery::Mailbox>& mailbox, Clock::time_point now);
+  Admission resume(Entry& entry, const std::string& token, const std::shared_ptr<delivery::Mailbox>& mailbox,
+                   Clock::time_point now);
   // Evicts the participant that has been away longest. Returns false if all are connected.
   bool makeRoom(Clock::time_point now);
   // Returns the next entry. `by` is the participant that caused it, or 0.
   Entries::iterator erase(Entries::iterator entry, LeaveReason reason, std::uint64_t by,
                           Clock::time_point now);
   void removePoses(Entry& entry, Clock::time_point now);
+  // Charges the colliders of all participants, with `count` for this one.
+  messages::Result<void> charge(const Entry& entry, std::size_t count);
   void changeRole(Entry& entry, Role role, std::uint64_t by, Clock::time_point now);
   // Gives the scene an owner if it has none.
   void ensureOwner(Clock::time_point now);
-  Admission admissionOf(const Entry& entry, bool resumed) const;
+  Admission admissionOf(const Entry& entry, std::string token, bool resumed) const;
   void clear();
   void announce(Presence presence, const Participant& participant, std::uint64_t by = 0);
   void announceLeft(const Participant& participant, LeaveReason reason, std::uint64_t by);
@@ -149,9 +204,12 @@ class Roster {
   delivery::Subscribers& subscribers_;
   Inbox& inbox_;
   Journal* const journal_;
+  const ChargeColliders charge_;
 
   mutable std::mutex mutex_;  // held during announcements, so that all subscribers get them in the same order
   Entries entries_;           // in the order in which they joined
+  BanList bans_;
+  std::deque<std::string> refusedTokens_;  // hashes of those of removed participants, newest last
   bool closed_ = false;
 };
 

@@ -40,12 +40,67 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
       colliders_(scene_),
       grabs_(scene_),
       easeUntil_(scene_.cloths.size(), 0),
+      wantedWork_(scene.allWork()),
+      work_(wantedWork_),
+      leastSubsteps_(scene.leastSubsteps(scene_)),
       onDevice_(std::move(loaded)) {
+  live_.work = work_;
   newestState_ = onDevice_->start;
+  continueFrom(live_.takeRestored());
+  const bool atStart = tick_ == 0;
+  const double seconds = static_cast<double>(tick_) * scene_.tickSeconds();
   if (live_.journal && live_.journal->due())
     live_.journal->begin(onDevice_->device.info(), scene_,
-                         messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), 0),
-                         onDevice_->start, onDevice_->start);
+                         messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), seconds),
+                         atStart ? onDevice_->start : newestState_, onDevice_->start);
+}
+
+void SceneHost::continueFrom(LiveScene::Restored restored) {
+  SceneOnDevice& on = *onDevice_;
+  if (restored.checkpoint) {
+    Checkpoint& from = *restored.checkpoint;
+    tick_ = from.state.tick;
+    scene_ = std::move(from.scene);
+    easeUntil_ = std::move(from.easeUntil);
+    colliders_.restore(std::move(from.colliders));
+    grabs_.restore(std::move(from.grabs));
+    lastRecovery_ = from.lastRecovery;
+    newestState_ = std::move(from.state);
+    grabsThen_ = grabs_.state().slots;
+    on.simulation.setCloths(scene_.cloths);
+    on.recorder.begin();
+    on.simulation.recordRestoreState(on.recorder, newestState_);
+    on.simulation.recordRestoreGrabs(on.recorder, newestState_.held);
+    on.device.wait(on.device.submit(on.recorder));
+    telemetry::log({live_.name()}, spdlog::level::info, "goes on after tick {}", tick_);
+  }
+  if (restored.accepted) {
+    model::Scene changed = std::move(*restored.accepted);
+    easeSolverChanges(changed);
+    setCloths(changed.cloths);
+    scene_ = std::move(changed);
+  }
+  parametersChanged_ = true;
+}
+
+Checkpoint SceneHost::checkpoint() const {
+  return {.state = newestState_,
+          .scene = scene_,
+          .easeUntil = easeUntil_,
+          .colliders = colliders_.state(),
+          .grabs = grabs_.state(),
+          .lastRecovery = lastRecovery_};
+}
+
+void SceneHost::saveLast() {
+  // A state that a rollback or a reset will replace is not worth keeping; neither is the start.
+  if (!live_.keeper || recovery_ != Recovery::none || tick_ == 0) return;
+  SceneOnDevice& on = *onDevice_;
+  on.recorder.begin();
+  on.simulation.recordSaveState(on.recorder);
+  on.device.wait(on.device.submit(on.recorder));
+  newestState_ = on.simulation.collectState(tick_);
+  live_.keeper->save(checkpoint());
 }
 
 SceneHost::~SceneHost() {
@@ -53,11 +108,13 @@ SceneHost::~SceneHost() {
 }
 
 void SceneHost::begin(Clock::time_point now) {
+  const Clock::time_point began = Clock::now();
   tickStart_ = now;
   beginJournal();
   if (live_.resetRequested.exchange(false)) reset();
   endEasing();
   applyInputs();
+  applyWork();
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
   grabs_.advance(scene_, endSeconds, tickInputs_);
@@ -71,16 +128,34 @@ void SceneHost::begin(Clock::time_point now) {
   keepsState_ = sinceHealthy_ > 0 && (journalBegan_ || every(kCheckpointSeconds));
   if (keepsState_) on.simulation.recordCheckpoint(on.recorder);
   on.simulation.recordTick(on.recorder, tickInputs_);
-  hasFrame_ = (tick_ + 1) % ticksPerFrame_ == 0;
+  hasFrame_ = (tick_ + 1) % (std::uint64_t{ticksPerFrame_} * work_.frameDivisor) == 0;
   if (hasFrame_) {
     owesFrame_ = false;
     recordFrame(now);
   }
-  savesState_ = sinceHealthy_ > 0 && every(kSnapshotSeconds);
+  recordsState_ = sinceHealthy_ > 0 && every(kSnapshotSeconds);
+  const bool keeps = live_.keeper && live_.keeper->due(now);
+  savesState_ = recordsState_ || keeps;
   if (savesState_) on.simulation.recordSaveState(on.recorder);
   nextSlice_ = 0;
   longestSlice_ = {};
+  beginTime_ = Clock::now() - began;
   submitSlice();
+}
+
+void SceneHost::applyWork() {
+  if (std::exchange(parametersChanged_, false)) leastSubsteps_ = live_.leastSubsteps(scene_);
+  schedule::WorkLevel work = wantedWork_;
+  work.substeps = std::clamp(leastSubsteps_, work.substeps, scene_.substeps);
+  if (work == work_) return;
+  if (work.substeps != work_.substeps) onDevice_->simulation.setSubsteps(work.substeps, scene_.cloths);
+  const bool more = work.frameDivisor < work_.frameDivisor || work.substeps > work_.substeps;
+  (more ? live_.metrics.overloadStepsUp : live_.metrics.overloadStepsDown).add();
+  work_ = work;
+  live_.work = work;
+  telemetry::log({live_.name()}, spdlog::level::info, "tick {}: every {}. frame, {} of {} substeps",
+                 tick_ + 1, work.frameDivisor, work.substeps, scene_.substeps);
+  live_.subscribers.announce(workNotice(live_, tick_ + 1));
 }
 
 void SceneHost::submitSlice() {
@@ -111,8 +186,6 @@ void SceneHost::beginJournal() {
   on.device.wait(on.device.submit(on.recorder));
   // Frames of earlier ticks must not become part of the recording.
   publisher_.drain();
-  // The state does not contain the vertices that grabs hold.
-  if (grabs_.anyGrabHolds()) grabs_.restartGrabs();
   const double seconds = static_cast<double>(tick_) * scene_.tickSeconds();
   live_.journal->begin(on.device.info(), scene_,
                        messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), seconds),
@@ -135,6 +208,7 @@ void SceneHost::reset() {
   sinceHealthy_ = 0;
   newestState_ = onDevice_->start;
   newestState_.tick = tick_;
+  grabsThen_.clear();
 }
 
 void SceneHost::applyInputs() {
@@ -174,6 +248,7 @@ bool SceneHost::apply(const model::ParameterChange& change, std::string& problem
     }
   }
   scene_ = std::move(changed);
+  parametersChanged_ = true;
   return true;
 }
 
@@ -276,6 +351,7 @@ void SceneHost::describeFrame(Clock::time_point start) {
   frame_.subscribers = &live_.subscribers;
   frame_.metrics = &live_.metrics;
   frame_.repeated = false;
+  frame_.fields->set_frame_divisor(work_.frameDivisor > 1 ? work_.frameDivisor : 0);
   frame_.fields->set_tick_time_us(schedule::microseconds(start));
   colliders_.write(scene_, *frame_.fields);
 }
@@ -328,6 +404,7 @@ void SceneHost::finish() {
                            .recovery = recovered_,
                            .keepsState = keepsState_,
                            .clothsChanged = clothsChanged_,
+                           .substeps = work_.substeps,
                            .scene = scene_,
                            .inputs = tickInputs_,
                            .colliders = colliders_});
@@ -335,8 +412,12 @@ void SceneHost::finish() {
   if (status_.healthy) {
     ++sinceHealthy_;
     live_.tick = tick_;
-    if (savesState_) newestState_ = on.simulation.collectState(tick_);
-    if (savesState_ && live_.journal) live_.journal->saved(newestState_, grabs_.anyGrabHolds());
+    if (savesState_) {
+      newestState_ = on.simulation.collectState(tick_);
+      grabsThen_ = grabs_.state().slots;
+      if (recordsState_ && live_.journal) live_.journal->saved(newestState_);
+      if (live_.keeper) live_.keeper->save(checkpoint());
+    }
   }
   telemetry::SceneMetrics& metrics = live_.metrics;
   double total = 0, report = 0;
@@ -363,6 +444,9 @@ void SceneHost::finish() {
   metrics.crowdedBalls.add(status_.crowded);
   metrics.tick.record(schedule::seconds(done - tickStart_));
   metrics.deviceTotal.record(total);
+  deviceSeconds_ = total > 0 ? std::optional(total) : std::nullopt;
+  ownSeconds_ =
+      total > 0 ? std::optional(total + schedule::seconds(beginTime_ + (Clock::now() - done))) : std::nullopt;
 }
 
 void SceneHost::writeReport(double deviceSeconds) {
@@ -409,6 +493,7 @@ void SceneHost::recover() {
     scene_.environment = live_.start().environment;
     scene_.cloths = live_.start().cloths;
     setCloths(scene_.cloths);
+    parametersChanged_ = true;
     live_.subscribers.announce(delivery::parametersChanged(start, tick_ + 1));
   } else {
     recovery_ = Recovery::rollback;
@@ -432,11 +517,13 @@ void SceneHost::release() {
 void SceneHost::rebuild(std::unique_ptr<SceneOnDevice> loaded, std::string_view why) {
   SceneOnDevice& fresh = *loaded;
   fresh.simulation.setCloths(scene_.cloths);
+  fresh.simulation.setSubsteps(work_.substeps, scene_.cloths);
+  grabs_.goBack(grabsThen_, newestState_.held);
   fresh.recorder.begin();
   fresh.simulation.recordRestoreState(fresh.recorder, newestState_);
+  fresh.simulation.recordRestoreGrabs(fresh.recorder, newestState_.held);
   fresh.device.wait(fresh.device.submit(fresh.recorder));
   onDevice_ = std::move(loaded);
-  grabs_.restartGrabs();
   recovery_ = Recovery::none;
   sinceHealthy_ = 0;
   if (live_.journal) live_.journal->restored(tick_, newestState_);

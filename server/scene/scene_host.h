@@ -32,6 +32,9 @@ namespace clothstream::scene {
 // scenes can run in between, and so that it can be dropped: begin() submits the first slice, waitForSlice()
 // waits for it, and submitSlice() submits the next one as long as hasSlices().
 //
+// The first host of a restored scene continues from its checkpoint, and every host gives checkpoints to the
+// scene's keeper, if it has one.
+//
 // Recovery bounds the loss. Every second of healthy ticks a checkpoint is kept on the device; an unhealthy
 // state goes back to it. Every five seconds a snapshot is kept on the CPU; after a device loss the scene
 // continues from it. A state that becomes unhealthy twice within a second goes back to the scene's start,
@@ -54,6 +57,11 @@ class SceneHost {
   SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene, delivery::FramePublisher& publisher,
             double reportRate);
   ~SceneHost();
+
+  // Sets the work from the next tick on. Substeps are raised to leastSubsteps(). A change is announced.
+  void setWork(const schedule::WorkLevel& work) { wantedWork_ = work; }
+  // Minimum number of substeps with which the scene is stable with its present parameters.
+  std::uint32_t leastSubsteps() const { return leastSubsteps_; }
 
   // Drains the inbox, records the next tick and submits its first slice. Throws vulkan::DeviceLost.
   void begin(Clock::time_point now);
@@ -81,6 +89,16 @@ class SceneHost {
   // subscribers, such as "the device was lost".
   void rebuild(std::unique_ptr<SceneOnDevice> loaded, std::string_view why);
 
+  // Time that the newest complete tick needed, in seconds: on the device without waiting for other work, and
+  // on this thread. Nothing if the device has no timer.
+  std::optional<double> ownSeconds() const { return ownSeconds_; }
+  // The part of it on the device.
+  std::optional<double> deviceSeconds() const { return deviceSeconds_; }
+
+  // Gives the state after the newest complete tick to the keeper, because the server ends. No tick may have
+  // begun. Throws vulkan::DeviceLost.
+  void saveLast();
+
   // Newest complete tick, and its status.
   std::uint64_t tick() const { return tick_; }
   simulation::TickStatus status() const { return status_; }
@@ -90,6 +108,10 @@ class SceneHost {
   bool owesFrame() const { return owesFrame_; }
 
  private:
+  // Continues a restored scene.
+  void continueFrom(LiveScene::Restored restored);
+  // The state after the newest complete tick, which `newestState_` holds.
+  Checkpoint checkpoint() const;
   // The next tick starts from the scene's start.
   void reset();
   // If a journal is due and the state can be recorded, gives it the state before the next tick. Throws
@@ -100,6 +122,8 @@ class SceneHost {
   void applyInputs();
   // Returns false and changes nothing if the device has no room for the change; `problem` says why.
   bool apply(const model::ParameterChange& change, std::string& problem);
+  // Begins the work that setWork() asks for.
+  void applyWork();
   // Announces that changes were undone.
   void revertChanges(const std::string& reason);
   // Limits the correction of cloths whose solver changed: springs that are too long shrink over kEaseSeconds.
@@ -122,7 +146,7 @@ class SceneHost {
   LiveScene& live_;
   delivery::FramePublisher& publisher_;
   const std::uint32_t rate_;            // ticks/s
-  const std::uint32_t ticksPerFrame_;   // simulation rate / stream rate
+  const std::uint32_t ticksPerFrame_;   // simulation rate / stream rate; of all frames
   const std::uint64_t ticksPerReport_;  // minimum; 0: no reports
 
   model::Scene scene_;  // with the current tick's parameters
@@ -136,8 +160,14 @@ class SceneHost {
 
   std::vector<std::uint64_t> easeUntil_;  // tick, for each cloth
 
+  schedule::WorkLevel wantedWork_, work_;
+  std::uint32_t leastSubsteps_;
+  bool parametersChanged_ = false;  // since leastSubsteps_ was computed
+
   std::uint64_t tick_ = 0;
   simulation::TickStatus status_;
+  std::optional<double> ownSeconds_, deviceSeconds_;
+  Clock::duration beginTime_{};                // of recording the current tick
   Recovery recovery_ = Recovery::none;         // before the next tick
   Recovery recovered_ = Recovery::none;        // before the current tick
   bool keepsState_ = false;                    // the current tick keeps a checkpoint
@@ -149,7 +179,9 @@ class SceneHost {
   schedule::TokenBucket recoveryNotices_{1, 5};
 
   simulation::StateSnapshot newestState_;
-  bool savesState_ = false;  // the current tick saves a snapshot
+  std::vector<GrabsAndAttachments::Slot> grabsThen_;  // at newestState_
+  bool savesState_ = false;                           // the current tick saves a snapshot
+  bool recordsState_ = false;                         // which is also for the journal
 
   Clock::time_point tickStart_{};
   std::array<Clock::time_point, codec::kMaxQualities> lastKeyFrame_{};

@@ -68,6 +68,14 @@ void TickSchedule::tickEnded(Clock::duration time, Clock::time_point now) {
   ended = now;
 }
 
+Clock::duration shareOf(const TickSchedule& schedule, std::span<const TickSchedule* const> schedules) {
+  std::int64_t own = 0, guests = 0;
+  for (const TickSchedule* other : schedules)
+    if (other->running) ++(other->guest ? guests : own);
+  const std::int64_t shares = std::max<std::int64_t>(own + (guests > 0 ? 1 : 0), 1);
+  return schedule.pacer.period() / (schedule.guest ? shares * std::max<std::int64_t>(guests, 1) : shares);
+}
+
 void TickScheduler::choose(std::span<TickSchedule* const> schedules, Clock::time_point now,
                            std::vector<TickSchedule*>& chosen) {
   chosen.clear();

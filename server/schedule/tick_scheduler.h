@@ -29,6 +29,10 @@ struct TickSchedule {
   Clock::duration catchUp{};  // for Pacer::begin(), set by TickScheduler::choose()
 };
 
+// Share of the device for one tick of a running scene: its part of the tick's period if every running scene
+// needed the device all the time. `schedules` has all scenes.
+Clock::duration shareOf(const TickSchedule& schedule, std::span<const TickSchedule* const> schedules);
+
 // Longest lateness, in addition to one period, that other scenes may cause and that a scene catches up.
 inline constexpr std::chrono::milliseconds kMaxCatchUp{250};
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 
 #include "server/schedule/clock.h"
 
@@ -15,17 +16,27 @@ class TokenBucket {
 
   // Takes `cost` tokens. Returns false, and takes nothing, if there are fewer.
   bool take(Clock::time_point now, double cost = 1) {
-    if (now > last_) {
-      if (last_ != Clock::time_point{})
-        tokens_ = std::min(burst_, tokens_ + seconds(now - last_) * perSecond_);
-      last_ = now;
-    }
+    refill(now);
     if (tokens_ < cost) return false;
     tokens_ -= cost;
     return true;
   }
 
+  // Takes `cost` tokens, also if there are fewer. Returns the time until the missing ones are there, else 0.
+  Clock::duration pay(Clock::time_point now, double cost) {
+    refill(now);
+    tokens_ -= cost;
+    if (tokens_ >= 0) return {};
+    return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(-tokens_ / perSecond_));
+  }
+
  private:
+  void refill(Clock::time_point now) {
+    if (now <= last_) return;
+    if (last_ != Clock::time_point{}) tokens_ = std::min(burst_, tokens_ + seconds(now - last_) * perSecond_);
+    last_ = now;
+  }
+
   double perSecond_, burst_, tokens_;
   Clock::time_point last_{};
 };

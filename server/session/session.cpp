@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@
 #include "proto/codec/packet_header.h"
 #include "server/delivery/mailbox.h"
 #include "server/hosting/server_state.h"
+#include "server/identity/authenticator.h"
 #include "server/messages/client_message.h"
 #include "server/telemetry/log.h"
 
@@ -23,29 +25,90 @@ using delivery::SharedBytes;
 using scene::Action;
 
 constexpr double kMalformedCost = 60;
+constexpr const char* kExpired = "your token has expired: connect again with a new one";
+constexpr double kMegabyte = 1e6, kKilobyte = 1e3;
 // Largest answer in a stream; it bounds the memory that a peer costs. Scenes with large meshes need the unary
 // call.
 constexpr std::size_t kMaxAnswerBytes = 1024 * 1024;
 
 }  // namespace
 
-Session::Session(hosting::SceneServer::State& server, std::string peer, std::function<void()> wake)
+Session::Session(hosting::SceneServer::State& server, Arrival arrival, std::function<void()> wake)
     : server_(server),
-      peer_(std::move(peer)),
+      peer_(std::move(arrival.peer)),
+      address_(std::move(arrival.address)),
       mailbox_(std::make_shared<Mailbox>(std::move(wake))),
-      lastHeard_(Clock::now()),
-      upload_(server.uploads) {}
+      opened_(Clock::now()),
+      lastHeard_(opened_),
+      upload_(server.uploads, address_),
+      readRate_(server.options.maxReadRate * kMegabyte, server.options.maxReadRate * kMegabyte) {}
 
-std::shared_ptr<Session> Session::open(hosting::SceneServer& server, std::string peer,
+std::shared_ptr<Session> Session::open(hosting::SceneServer& server, Arrival arrival,
                                        std::function<void()> wake) {
-  std::shared_ptr<Session> session(new Session(server.state(), std::move(peer), std::move(wake)));
-  if (SharedBytes refusal = server.state().admit(session)) session->close(std::move(refusal));
+  const std::string token = std::move(arrival.token);
+  std::shared_ptr<Session> session(new Session(server.state(), std::move(arrival), std::move(wake)));
+  if (SharedBytes refusal = server.state().admit(session))
+    session->close(std::move(refusal));
+  else
+    session->identify(token);
   // The server and pending answers may keep the session alive for a moment. Only the endpoint's pointer ends
   // it.
   return {session.get(), [session](Session*) mutable {
             session->end();
             session.reset();
           }};
+}
+
+void Session::identify(const std::string& token) {
+  const std::lock_guard lock(mutex_);
+  if (mailbox_->closed()) return;
+  now_ = Clock::now();
+  messages::Result<identity::Identity> identity = server_.identify(token, address_.empty());
+  if (identity)
+    become(std::move(*identity));
+  else if (token.empty())
+    whyUnknown_ = identity.error().text;
+  else
+    fail(identity.error().code, identity.error().text);
+}
+
+bool Session::become(identity::Identity identity) {
+  // A new token of the same subject replaces the former one.
+  const bool same = identity_ && identity_->verified && identity_->subject == identity.subject &&
+                    identity_->tenant == identity.tenant;
+  if (!same) {
+    counted_.reset();
+    counted_ = server_.countConnection(identity);
+  }
+  if (!counted_) {
+    fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+         fmt::format("your token has {} open connections, its maximum (--max-connections-per-token)",
+                     server_.options.maxConnectionsPerToken));
+    return false;
+  }
+  identity_ = std::move(identity);
+  expires_ = identity_->expires.value_or(identity::WallClock::time_point::max());
+  return true;
+}
+
+void Session::authenticate(const v1::AuthenticateRequest& request) {
+  v1::ServerMessage reply;
+  messages::Result<identity::Identity> identity =
+      server_.authenticate(request, address_, now_, *reply.mutable_authenticate());
+  if (!identity) return fail(identity.error().code, identity.error().text);
+  if (scene_ != nullptr && identity->verified &&
+      (identity->subject != identity_->subject || identity->tenant != identity_->tenant ||
+       !identity->reaches(scene_->name())))
+    return refuse({v1::ERROR_CODE_OUT_OF_ORDER,
+                   "authenticate: a stream in a scene accepts only tokens of the same subject and tenant "
+                   "that are valid for this scene"});
+  if (become(std::move(*identity))) answer(reply);
+}
+
+bool Session::isExpired(std::chrono::seconds grace) const {
+  const identity::WallClock::time_point expires = expires_;
+  if (expires == identity::WallClock::time_point::max()) return false;
+  return server_.options.authenticator->now() - grace >= expires;
 }
 
 std::optional<SharedBytes> Session::next() {
@@ -63,6 +126,7 @@ void Session::receive(std::span<const std::byte> bytes) {
   if (mailbox_->closed()) return;
   now_ = now;
   requestId_ = 0;
+  readPause_ = readRate_.pay(now, static_cast<double>(bytes.size()));
   if (!allowed(messageRate_, "messages")) return;
   try {
     const messages::Result<v1::ClientMessage> message = messages::parseClientMessage(bytes);
@@ -79,10 +143,12 @@ void Session::receive(std::span<const std::byte> bytes) {
 template <typename Response>
 std::function<void(tl::expected<Response, v1::Error>)> Session::answering(
     Response* (v1::ServerMessage::*body)()) {
+  ++asked_;
   return [weak = weak_from_this(), requestId = requestId_, body](tl::expected<Response, v1::Error> response) {
     const std::shared_ptr<Session> session = weak.lock();
     if (!session) return;
     const std::lock_guard lock(session->mutex_);
+    --session->asked_;
     if (session->mailbox_->closed()) return;
     session->now_ = Clock::now();
     session->requestId_ = requestId;
@@ -95,6 +161,12 @@ std::function<void(tl::expected<Response, v1::Error>)> Session::answering(
 
 void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) {
   using Body = v1::ClientMessage;
+  const bool needsIdentity = message.body_case() != Body::kAuthenticate && message.body_case() != Body::kPing;
+  if (needsIdentity && !identity_) {
+    server_.metrics.refuse(telemetry::Refusal::token);
+    return fail(v1::ERROR_CODE_UNAUTHENTICATED, whyUnknown_);
+  }
+  if (manage(message)) return;
   switch (message.body_case()) {
     case Body::kHello:
       return hello(message.hello());
@@ -108,19 +180,25 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
     case Body::kListScenes: {
       if (!allowed(queryRate_, "questions")) return;
       v1::ServerMessage list;
-      *list.mutable_list_scenes() = server_.listScenes();
+      *list.mutable_list_scenes() = server_.listScenes(*identity_);
       return answer(list);
     }
     case Body::kGetScene: {
       if (!allowed(queryRate_, "questions")) return;
+      if (const auto may = server_.mayUse(*identity_, message.get_scene().name()); !may)
+        return refuse(may.error());
       auto found = server_.getScene(message.get_scene(), kMaxAnswerBytes);
+      if (!found && found.error().code() == v1::ERROR_CODE_RESOURCE_EXHAUSTED)
+        server_.metrics.refuse(telemetry::Refusal::answerSize);
       if (!found) return refuse({found.error().code(), found.error().text()});
       v1::ServerMessage scene;
       *scene.mutable_get_scene() = std::move(*found);
       return answer(scene);
     }
     case Body::kUpload:
-      return refuseUnless(upload_.add(message.upload()));
+      if (const auto may = server_.mayCreate(*identity_); !may) return refuse(may.error());
+      uploads_ = true;
+      return refuseUnless(upload_.add(message.upload(), now));
     case Body::kCreateScene:
       return create(message.create_scene());
     case Body::kDeleteScene:
@@ -186,12 +264,58 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
   }
 }
 
+bool Session::manage(const v1::ClientMessage& message) {
+  using Body = v1::ClientMessage;
+  const auto reply = [this](auto&& result, auto* (v1::ServerMessage::*body)()) {
+    if (!result) return refuse(result.error());
+    v1::ServerMessage answered;
+    *(answered.*body)() = std::move(*result);
+    answer(answered);
+  };
+  switch (message.body_case()) {
+    case Body::kAuthenticate:
+      if (allowed(controlRate_, "tokens")) authenticate(message.authenticate());
+      return true;
+    case Body::kCreatePairingCode:
+      if (allowed(controlRate_, "requests about pairing"))
+        reply(server_.createPairingCode(*identity_, message.create_pairing_code(), now_),
+              &v1::ServerMessage::mutable_create_pairing_code);
+      return true;
+    case Body::kListBans:
+      if (allowed(controlRate_, "requests about bans") &&
+          actor(message.list_bans().scene(), Action::manageBans))
+        reply(server_.listBans(message.list_bans()), &v1::ServerMessage::mutable_list_bans);
+      return true;
+    case Body::kLiftBan:
+      if (allowed(controlRate_, "requests about bans") &&
+          actor(message.lift_ban().scene(), Action::manageBans))
+        reply(server_.liftBan(message.lift_ban()), &v1::ServerMessage::mutable_lift_ban);
+      return true;
+    default:
+      return false;
+  }
+}
+
+scene::Ownership Session::ownership() const {
+  if (identity_->isVerifiedOwner()) return scene::Ownership::always;
+  const bool mayOwn = identity_->role == scene::Role::owner || server_.options.participantsMay.own;
+  return mayOwn ? scene::Ownership::ifNone : scene::Ownership::never;
+}
+
 void Session::hello(const v1::Hello& message) {
   if (scene_ != nullptr)
     return fail(v1::ERROR_CODE_OUT_OF_ORDER,
                 fmt::format("this stream has joined '{}' already: open another one", scene_->name()));
-  const messages::Result<messages::Joining> joining = messages::toJoining(message, codec::kCodecs);
+  v1::Hello request = message;
+  if (!identity_->displayName.empty()) request.set_display_name(identity_->displayName);
+  messages::Result<messages::Joining> joining = messages::toJoining(request, codec::kCodecs);
   if (!joining) return fail(joining.error().code, joining.error().text);
+  if (joining->scene.empty()) joining->scene = identity_->scene;
+  if (const auto may = server_.mayUse(*identity_, joining->scene); !may)
+    return fail(server_.find(joining->scene) && identity_->reaches(joining->scene)
+                    ? v1::ERROR_CODE_REMOVED
+                    : v1::ERROR_CODE_PERMISSION_DENIED,
+                may.error().text);
   const std::shared_ptr<scene::LiveScene> scene = server_.find(joining->scene);
   if (!scene) {
     const v1::Error error = server_.noSuchScene(joining->scene);
@@ -204,16 +328,23 @@ void Session::hello(const v1::Hello& message) {
     return fail(
         v1::ERROR_CODE_UNSUPPORTED_CODEC,
         fmt::format("hello.codecs: must contain {}, the codec of '{}'", scene->codec(), scene->name()));
-  auto admission = scene->roster.join({.clientName = joining->clientName,
-                                       .displayName = joining->displayName,
-                                       .role = scene::fromMessage(joining->role),
-                                       .token = message.resume_token(),
-                                       .attempt = message.attempt()},
-                                      mailbox_, server_.participants, scene->maxParticipants, now_);
+  auto admission =
+      scene->roster.join({.clientName = joining->clientName,
+                          .displayName = joining->displayName,
+                          .role = identity_->role == scene::Role::viewer ? scene::Role::viewer
+                                                                         : scene::fromMessage(joining->role),
+                          .token = message.resume_token(),
+                          .subject = identity_->subject,
+                          .ownership = ownership(),
+                          .attempt = message.attempt()},
+                         mailbox_, server_.participants, scene->maxParticipants, now_);
   if (!admission && admission.error() == scene::Roster::Refusal::closed)
     return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just closed", scene->name()));
+  if (!admission && admission.error() == scene::Roster::Refusal::removed)
+    return fail(v1::ERROR_CODE_REMOVED, fmt::format("an owner removed you from '{}'", scene->name()));
   if (!admission && admission.error() == scene::Roster::Refusal::late)
     return fail(v1::ERROR_CODE_TAKEN_OVER, "this participant has a newer connection");
+  if (!admission) server_.metrics.refuse(telemetry::Refusal::participants);
   if (!admission)
     return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                 fmt::format("'{}' has {} participants, its maximum; try again later", scene->name(),
@@ -243,16 +374,15 @@ void Session::hello(const v1::Hello& message) {
   answer(reply);
   mailbox_->subscribe(known ? nullptr : description, scene->shape(), scene->metrics,
                       {joining->quality, joining->temporalLayers});
-  if (scene->paused && !mailbox_->announce(scene::pausedNotice(*scene)))
-    return closeLocked(delivery::tooSlow(), DisconnectReason::lost);
+  if (scene->paused) mailbox_->announce(scene::pausedNotice(*scene));
+  if (!scene->source && scene->work.load() != scene->allWork())
+    mailbox_->announce(scene::workNotice(*scene, scene->tick));
   if (scene->source) {
-    const SharedBytes parameters = scene::parametersMessage(*scene->source, scene->tick);
-    if (!mailbox_->announce(scene::playbackMessage(*scene->source)) ||
-        (parameters && !mailbox_->announce(parameters)))
-      return closeLocked(delivery::tooSlow(), DisconnectReason::lost);
+    mailbox_->announce(scene::playbackMessage(*scene->source));
+    if (SharedBytes parameters = scene::parametersMessage(*scene->source, scene->tick))
+      mailbox_->announce(std::move(parameters));
   }
-  if (scene->journal && scene->journal->active() && !mailbox_->announce(scene::recordingNotice(scene->tick)))
-    return closeLocked(delivery::tooSlow(), DisconnectReason::lost);
+  if (scene->journal && scene->journal->active()) mailbox_->announce(scene::recordingNotice(scene->tick));
   server_.wake(*scene);
   telemetry::log(
       {scene->name(), participant_}, spdlog::level::info, "{} {} as participant {}, {} ({}); {} in it", peer_,
@@ -262,16 +392,23 @@ void Session::hello(const v1::Hello& message) {
 
 void Session::create(const v1::CreateSceneRequest& request) {
   if (!allowed(controlRate_, "requests about scenes")) return;
+  if (const auto may = server_.mayCreate(*identity_); !may) return refuse(may.error());
   std::optional<hosting::UploadedContent> uploaded;
   if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
     messages::Result<hosting::UploadedContent> taken = upload_.take(request.uploaded_content_id());
     if (!taken) return refuse(taken.error());
     uploaded = std::move(*taken);
   }
+  const auto wanted = [weak = weak_from_this()] {
+    const std::shared_ptr<Session> session = weak.lock();
+    return session && !session->mailbox_->closed();
+  };
   const auto accepted =
-      server_.maker.create(request, std::move(uploaded),
+      server_.maker.create(request, std::move(uploaded), identity_->tenant, wanted,
                            answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene));
-  if (!accepted) refuse({accepted.error().code(), accepted.error().text()});
+  if (accepted) return;
+  --asked_;
+  refuse({accepted.error().code(), accepted.error().text()});
 }
 
 void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
@@ -286,7 +423,7 @@ std::optional<std::uint64_t> Session::actor(const std::string& name, Action acti
   const bool inside = scene_ != nullptr && server_.find(name) == scene_;
   const messages::Result<void> may =
       inside ? scene_->roster.permits(*mailbox_, action, server_.options.participantsMay)
-             : server_.mayFromOutside(name, action);
+             : server_.mayFromOutside(*identity_, name, action);
   if (may) return inside ? participant_ : 0;
   refuse(may.error());
   return std::nullopt;
@@ -296,6 +433,7 @@ void Session::answer(v1::ServerMessage& message) {
   message.set_request_id(requestId_);
   if (mailbox_->reply(delivery::serialise(message))) return;
   server_.metrics.droppedConnections.add();
+  server_.metrics.refuse(telemetry::Refusal::unreadAnswers);
   spdlog::warn("{}: does not read its answers; disconnected", peer_);
   closeLocked(delivery::tooSlow(), DisconnectReason::lost);
 }
@@ -306,6 +444,7 @@ void Session::refuseUnless(const messages::Result<void>& done) {
 
 void Session::refuse(const messages::FieldError& reason, double cost) {
   (scene_ != nullptr ? scene_->metrics.rejectedMessages : server_.metrics.rejectedMessages).add();
+  if (reason.limit) server_.metrics.refuse(*reason.limit);
   spdlog::debug("{}: refused: {}", peer_, reason.text);
   if (!offences_.take(now_, cost)) {
     server_.metrics.droppedConnections.add();
@@ -325,14 +464,15 @@ void Session::fail(v1::ErrorCode code, std::string text) {
 
 bool Session::allowed(schedule::TokenBucket& bucket, const char* what) {
   if (bucket.take(now_)) return true;
-  refuse({v1::ERROR_CODE_RATE_LIMITED, fmt::format("too many {}: this one was ignored", what)});
+  refuse({v1::ERROR_CODE_RATE_LIMITED, fmt::format("too many {}: this one was ignored", what),
+          telemetry::Refusal::messageRate});
   return false;
 }
 
 void Session::close(SharedBytes last) {
   const std::lock_guard lock(mutex_);
   now_ = Clock::now();
-  closeLocked(std::move(last), DisconnectReason::left);
+  closeLocked(std::move(last), DisconnectReason::lost);
 }
 
 void Session::closeLocked(SharedBytes last, DisconnectReason reason) {
@@ -341,35 +481,64 @@ void Session::closeLocked(SharedBytes last, DisconnectReason reason) {
 }
 
 void Session::leave() {
-  close(nullptr);
+  const std::lock_guard lock(mutex_);
+  now_ = Clock::now();
+  closeLocked(nullptr, DisconnectReason::left);
 }
 
 void Session::checkSilence(Clock::time_point now) {
-  // A mailbox without room, which the scene's subscribers closed, is noticed here too.
   const hosting::ServerOptions& options = server_.options;
-  const std::chrono::milliseconds beforeHello = std::min(options.helloTimeout, options.silence);
-  const Clock::duration silence = now - lastHeard_.load();
-  if (silence <= beforeHello && !mailbox_->closed()) return;
   const std::lock_guard lock(mutex_);
-  const std::chrono::milliseconds allowed = scene_ ? options.silence : beforeHello;
-  if (silence <= allowed && !mailbox_->closed()) return;
-  now_ = now;
-  if (!mailbox_->closed()) {
-    server_.metrics.droppedConnections.add();
-    const std::string text =
-        fmt::format("the client was silent for {} s: {}", schedule::seconds(allowed),
-                    scene_ ? "acknowledge frames, or send pings" : "send hello soon after connecting");
-    spdlog::info("{}: disconnected: {}", peer_, text);
-    mailbox_->close(delivery::error(v1::ERROR_CODE_CUT_OFF, text, true));
+  // A mailbox that others closed, such as the scene's roster, is noticed here too.
+  if (mailbox_->closed()) {
+    now_ = now;
+    return disconnect(DisconnectReason::lost);
   }
-  disconnect(DisconnectReason::lost);
+  // A stream in a scene has some time to send a new token.
+  if (isExpired(scene_ ? identity::Authenticator::kExpiryGrace : std::chrono::seconds(0))) {
+    now_ = now;
+    spdlog::info("{}: disconnected: its token has expired", peer_);
+    return closeLocked(delivery::error(v1::ERROR_CODE_UNAUTHENTICATED, kExpired, true),
+                       DisconnectReason::lost);
+  }
+  requestId_ = 0;
+  now_ = now;
+  refuseUnless(upload_.checkPace({options.maxUploadTime, options.minUploadRate * kKilobyte}, now));
+  if (now - lastHeard_.load() > options.silence)
+    return cutOff(telemetry::Refusal::silence,
+                  fmt::format("the client was silent for {} s: acknowledge frames, or send pings",
+                              schedule::seconds(options.silence)));
+  if (scene_ || asked_ > 0) return;
+  const std::chrono::milliseconds time =
+      options.helloTimeout + (uploads_ ? options.maxUploadTime : std::chrono::milliseconds(0));
+  if (now - opened_ > time)
+    cutOff(telemetry::Refusal::helloTimeout,
+           fmt::format(
+               "the client joined no scene within {} s: send hello soon after connecting (--hello-timeout)",
+               schedule::seconds(time)));
+}
+
+void Session::cutOff(telemetry::Refusal reason, const std::string& text) {
+  server_.metrics.droppedConnections.add();
+  server_.metrics.refuse(reason);
+  spdlog::info("{}: disconnected: {}", peer_, text);
+  closeLocked(delivery::error(v1::ERROR_CODE_CUT_OFF, text, true), DisconnectReason::lost);
 }
 
 void Session::end() {
   mailbox_->silence();
   const std::lock_guard lock(mutex_);
   now_ = Clock::now();
-  closeLocked(nullptr, DisconnectReason::lost);
+  // The owner's destructor calls this, so nothing may leave it. A lack of memory leaves the participant in
+  // its scene until the next attempt.
+  for (bool tried = false; !tried;) try {
+      closeLocked(nullptr, DisconnectReason::lost);
+      tried = true;
+    } catch (const std::exception& failure) {
+      spdlog::error("{}: {}; trying again", peer_, failure.what());
+      std::this_thread::yield();
+    }
+  counted_.reset();
 }
 
 void Session::disconnect(DisconnectReason reason) {

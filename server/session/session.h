@@ -17,6 +17,7 @@
 #include "server/delivery/envelope.h"
 #include "server/hosting/peer.h"
 #include "server/hosting/scene_server.h"
+#include "server/identity/identity.h"
 #include "server/messages/field_error.h"
 #include "server/messages/limits.h"
 #include "server/scene/roles.h"
@@ -39,6 +40,13 @@ using schedule::TokenBucket;
 // Largest serialised ClientMessage. Endpoints refuse larger ones before they allocate memory for them.
 inline constexpr std::size_t kMaxClientMessageBytes = messages::limits::kMaxClientMessageBytes;
 
+// What an endpoint knows about a new peer.
+struct Arrival {
+  std::string peer;     // name for logs
+  std::string address;  // groups the peers of one machine; empty for programs of this machine
+  std::string token;    // sent with the connection; empty: none
+};
+
 // Thread-safe. An endpoint opens one for each peer, feeds it what arrives, and writes what next() returns,
 // one write in flight. When the write is done it calls next() again. If there is nothing it waits for `wake`.
 //
@@ -48,17 +56,20 @@ inline constexpr std::size_t kMaxClientMessageBytes = messages::limits::kMaxClie
 class Session final : public hosting::Peer, public std::enable_shared_from_this<Session> {
  public:
   // Admits the peer to the server, or refuses it with a last message. `wake` is called, from any thread, when
-  // next() may have something or finished() became true; it must not block. `peer` names the peer in logs.
-  // The server must outlive the session.
+  // next() may have something or finished() became true; it must not block. The server must outlive the
+  // session.
   //
   // The session ends when the returned pointer is released. A peer that has not left is then disconnected:
   // its participant stays for the grace period. The release waits for a running `wake`, so the releasing
   // thread must hold no lock that `wake` takes. `wake` is not called after it.
-  static std::shared_ptr<Session> open(hosting::SceneServer& server, std::string peer,
+  static std::shared_ptr<Session> open(hosting::SceneServer& server, Arrival arrival,
                                        std::function<void()> wake);
 
   // Handles one serialised ClientMessage.
   void receive(std::span<const std::byte> message);
+  // Time that the endpoint must wait before it reads the next message, because this peer sends more bytes a
+  // second than ServerOptions::maxReadRate. Usually 0.
+  Clock::duration readPause() const { return readPause_.load(); }
 
   // The peer has said goodbye: it leaves the scene for good.
   void leave();
@@ -77,11 +88,21 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void checkSilence(Clock::time_point now) override;
 
  private:
-  Session(hosting::SceneServer::State& server, std::string peer, std::function<void()> wake);
+  Session(hosting::SceneServer::State& server, Arrival arrival, std::function<void()> wake);
   void end();
+  // Decides on the identity of a peer that has sent none in a message.
+  void identify(const std::string& token);
 
   // All following functions need the lock.
   void dispatch(const v1::ClientMessage& message, Clock::time_point now);
+  void authenticate(const v1::AuthenticateRequest& request);
+  // Sets the identity and counts the connection. Returns false, and ends the session, if there are too many.
+  bool become(identity::Identity identity);
+  // Returns whether the token has expired `grace` ago.
+  bool isExpired(std::chrono::seconds grace) const;
+  // Handles requests about identities and bans. Returns false if the message is none of these.
+  bool manage(const v1::ClientMessage& message);
+  scene::Ownership ownership() const;
   void hello(const v1::Hello& message);
   void poses(const v1::ColliderPoses& message, Clock::time_point now);
   void create(const v1::CreateSceneRequest& request);
@@ -99,17 +120,28 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   std::optional<std::uint64_t> actor(const std::string& scene, scene::Action action);
   enum class DisconnectReason : std::uint8_t { left, removed, lost };
   void disconnect(DisconnectReason reason);
+  // Ends a connection that was too slow or silent.
+  void cutOff(telemetry::Refusal reason, const std::string& text);
   void closeLocked(delivery::SharedBytes last, DisconnectReason reason);
 
   hosting::SceneServer::State& server_;
-  const std::string peer_;
+  const std::string peer_, address_;
   const std::shared_ptr<delivery::Mailbox> mailbox_;
+  const Clock::time_point opened_;
   std::atomic<Clock::time_point> lastHeard_;
+  // Of the token. The largest value without one.
+  std::atomic<identity::WallClock::time_point> expires_{identity::WallClock::time_point::max()};
+  std::atomic<Clock::duration> readPause_{};
 
   std::mutex mutex_;  // protects all below
   std::shared_ptr<scene::LiveScene> scene_;
   std::uint64_t participant_ = 0;
+  std::optional<identity::Identity> identity_;  // none until the peer has proved what the server requires
+  std::string whyUnknown_;                      // error for a peer without identity
+  std::shared_ptr<const void> counted_;         // while the connection counts for its token
   Upload upload_;
+  bool uploads_ = false;     // has begun an upload
+  std::uint32_t asked_ = 0;  // requests whose answers another thread makes
   // Request id and arrival of the current message.
   std::uint64_t requestId_ = 0;
   Clock::time_point now_{};
@@ -122,6 +154,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   TokenBucket controlRate_{10, 10};
   TokenBucket messageRate_{1000, 500};  // messages of all kinds
   TokenBucket offences_{100, 500};
+  TokenBucket readRate_;           // bytes
   TokenBucket errorRate_{50, 50};  // Error messages; further refusals are only counted
 };
 

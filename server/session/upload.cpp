@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/hosting/scene_server.h"
 #include "server/messages/limits.h"
 
 namespace clothstream::session {
@@ -37,23 +38,50 @@ messages::Result<void> Upload::check(const v1::Chunk& chunk) const {
   return {};
 }
 
-messages::Result<void> Upload::add(const v1::Chunk& chunk) {
-  if (chunk.index() == 0) drop();
+messages::Result<void> Upload::add(const v1::Chunk& chunk, schedule::Clock::time_point now) {
+  if (chunk.index() == 0) {
+    drop();
+    begun_ = now;
+  }
   if (auto checked = check(chunk); !checked) {
     drop();
     return checked;
   }
   if (!reservation_.grow(chunk.data().size())) {
     drop();
-    return tl::unexpected(
-        messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                             "upload: the server has no memory left for uploads; try again later"});
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        "upload: the server has no memory left for uploads (--max-upload-memory), or none for "
+        "this address (--max-upload-memory-per-address); try again later",
+        telemetry::Refusal::uploads});
   }
   contentId_ = chunk.content_id();
   totalBytes_ = chunk.total_bytes();
   count_ = chunk.count();
   ++next_;
   bytes_ += chunk.data();
+  return {};
+}
+
+messages::Result<void> Upload::checkPace(const UploadPace& pace, schedule::Clock::time_point now) {
+  if (next_ == 0) return {};
+  const schedule::Clock::duration time = now - begun_;
+  const auto refuse = [&](std::string text) {
+    drop();
+    return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, std::move(text),
+                                               telemetry::Refusal::uploadTime});
+  };
+  if (time > pace.maxTime)
+    return refuse(
+        fmt::format("upload: no scene was created from it within {} s (--max-upload-time), so it was "
+                    "dropped; start again",
+                    schedule::seconds(pace.maxTime)));
+  const double least = pace.minBytesPerSecond * schedule::seconds(time - hosting::kUploadPatience);
+  if (next_ < count_ && static_cast<double>(bytes_.size()) < least)
+    return refuse(
+        fmt::format("upload: {} bytes in {:.1f} s are slower than {:.0f} bytes a second (--min-upload-rate), "
+                    "so it was dropped",
+                    bytes_.size(), schedule::seconds(time), pace.minBytesPerSecond));
   return {};
 }
 

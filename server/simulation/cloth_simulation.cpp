@@ -152,6 +152,7 @@ struct ClothSimulation::Pipeline {
   model::Integrator integrator;
   std::uint32_t substeps;
   double substepSeconds;
+  std::uint32_t simulationRate;  // ticks/s
   float tickRate;
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
@@ -191,6 +192,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       integrator(scene.integrator),
       substeps(scene.substeps),
       substepSeconds(scene.substepSeconds()),
+      simulationRate(scene.simulationRate),
       tickRate(static_cast<float>(scene.simulationRate)),
       offsets(simulation::clothOffsets(scene.cloths)),
       nodes(offsets.back()),
@@ -448,6 +450,14 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
   pipeline_->records = std::move(records);
 }
 
+void ClothSimulation::setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths) {
+  Pipeline& on = *pipeline_;
+  on.substeps = substeps;
+  on.substepSeconds = 1.0 / on.simulationRate / substeps;
+  on.records = clothRecords(cloths, on.substepSeconds);
+  if (on.selfCollision) on.selfCollision->setSubsteps(substeps, on.substepSeconds);
+}
+
 void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inputs) {
   assert(inputs.colliders.size() <= kMaxColliders);
   pipeline_->start(recorder);
@@ -530,10 +540,13 @@ void ClothSimulation::recordSaveState(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
   recorder.beginStage("state");
   pipeline_->buffers.state.recordSave(recorder, pipeline_->present);
+  if (pipeline_->attachments) pipeline_->attachments->recordSave(recorder);
 }
 
 StateSnapshot ClothSimulation::collectState(std::uint64_t tick) const {
-  return pack(pipeline_->buffers.state.collect(), tick);
+  StateSnapshot snapshot = pack(pipeline_->buffers.state.collect(), tick);
+  if (pipeline_->attachments) snapshot.held = pipeline_->attachments->collect();
+  return snapshot;
 }
 
 void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const StateSnapshot& snapshot) {
@@ -546,6 +559,20 @@ void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const State
   pipeline_->buffers.state.write(unpack(snapshot), pipeline_->masses);
   recorder.beginStage("state");
   pipeline_->buffers.state.recordUpload(recorder, pipeline_->present);
+}
+
+void ClothSimulation::recordRestoreGrabs(vulkan::Recorder& recorder, const HeldNodes& held) {
+  Pipeline& on = *pipeline_;
+  const bool fits =
+      held.grabs.size() <= kMaxGrabs && std::ranges::all_of(held.nodes, [&](const HeldNode& node) {
+        return node.node < on.nodes && node.grab < held.grabs.size();
+      });
+  if (!fits) throw std::invalid_argument("a snapshot holds nodes or grabs that its scene does not have");
+  on.start(recorder);
+  if (!on.attachments && held.grabs.empty()) return;
+  if (!on.attachments) on.makeAttachments({});
+  recorder.beginStage("state");
+  on.attachments->recordRestore(recorder, held);
 }
 
 std::vector<shared::SolveRecord> ClothSimulation::solves() const {

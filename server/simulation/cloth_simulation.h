@@ -75,6 +75,11 @@ class ClothSimulation {
   // Kernels are created when a cloth first needs them and are kept.
   void setCloths(std::span<const model::Cloth> cloths);
 
+  // Sets the number of substeps from the next recorded tick on, at least 1; it is initially that of the
+  // scene. `cloths` are the present ones. The motion has the same bits as that of a simulation that was
+  // constructed with this number. No tick may be in flight.
+  void setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths);
+
   // Records all substeps of one tick, and its status. At most one tick may be in flight at the call. Stages:
   // "inputs", "attachments" (if cloth is attached or grabbed), "near" (if there are colliders), "advance",
   // "hash".
@@ -107,13 +112,18 @@ class ClothSimulation {
   void recordCheckpoint(vulkan::Recorder& recorder);
   void recordRollback(vulkan::Recorder& recorder);
 
-  // Copies the state to the CPU: record, submit and wait, collect. Stage "state".
+  // Copies the state to the CPU, with the nodes that grabs hold: record, submit and wait, collect. Stage
+  // "state".
   void recordSaveState(vulkan::Recorder& recorder);
   StateSnapshot collectState(std::uint64_t tick) const;
-  // Sets the state from the CPU; it also becomes the checkpoint. An earlier restore, and the first recording
-  // of all, must be complete. Throws std::invalid_argument if the snapshot has the size of another scene.
-  // Stage "state".
+  // Sets positions and velocities from the CPU; they also become the checkpoint. Grabs keep the nodes that
+  // they hold. An earlier restore, and the first recording of all, must be complete. Throws
+  // std::invalid_argument if the snapshot has the size of another scene. Stage "state".
   void recordRestoreState(vulkan::Recorder& recorder, const StateSnapshot& snapshot);
+  // Sets the nodes that grabs hold. The next tick must have these grabs in the state `holds`. No earlier
+  // recording may be in flight. Throws std::invalid_argument if a node or a grab does not exist, and
+  // std::runtime_error if the device has too little memory. Stage "state".
+  void recordRestoreGrabs(vulkan::Recorder& recorder, const HeldNodes& held);
 
   std::uint32_t nodeCount() const;
   // First node of each cloth, then nodeCount(): clothCount + 1 numbers.

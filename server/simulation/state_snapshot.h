@@ -7,14 +7,31 @@
 #include <vector>
 
 #include "server/model/scene.h"
+#include "server/simulation/attachment/grab.h"
 
 namespace clothstream::simulation {
 
-// Positions and velocities of all nodes. Usable for another ClothSimulation of the same scene on any device.
-// `bytes` has six little-endian floats per node, in order: position, velocity.
+// A node that a grab holds.
+struct HeldNode {
+  std::uint32_t node = 0;      // in the scene
+  std::uint32_t grab = 0;      // index into TickInputs::grabs
+  model::Vec3 place{0, 0, 0};  // in the grab, m
+  bool operator==(const HeldNode&) const = default;
+};
+
+// Nodes that the grabs of a tick hold. Both are empty if the tick had no grabs.
+struct HeldNodes {
+  std::vector<HeldNode> nodes = {};    // ascending by node
+  std::vector<GrabStatus> grabs = {};  // by index into TickInputs::grabs
+};
+
+// Everything on the device that a later tick depends on: positions and velocities of all nodes, and what
+// grabs hold. Usable for another ClothSimulation of the same scene on any device. `bytes` has six
+// little-endian floats per node, in order: position, velocity.
 struct StateSnapshot {
   std::uint64_t tick = 0;  // chosen by the caller
   std::vector<std::byte> bytes;
+  HeldNodes held = {};
 };
 inline constexpr std::size_t kSnapshotBytesPerNode = 24;
 

@@ -2,8 +2,11 @@
 // Creates the default logger.
 #include "server/telemetry/log.h"
 
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -67,9 +70,67 @@ class JsonLine final : public spdlog::formatter {
   }
 };
 
+std::atomic<std::uint64_t> omittedLines{0};
+
+// Writes a limited number of lines of each level in each second. A flood of one level hides no other.
+class LimitedSink final : public spdlog::sinks::sink {
+ public:
+  LimitedSink(std::shared_ptr<spdlog::sinks::sink> to, double linesPerSecond)
+      : to_(std::move(to)), limit_(linesPerSecond) {}
+
+  void log(const spdlog::details::log_msg& message) override {
+    std::uint64_t omitted = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      Level& level = levels_.at(static_cast<std::size_t>(message.level));
+      const auto second = std::chrono::floor<std::chrono::seconds>(message.time);
+      if (second != level.second) {
+        level.second = second;
+        level.lines = 0;
+      }
+      if (limit_ > 0 && ++level.lines > limit_) {
+        ++level.omitted;
+        ++omittedLines;
+        return;
+      }
+      omitted = std::exchange(level.omitted, 0);
+    }
+    if (omitted > 0) sayOmitted(message, omitted);
+    to_->log(message);
+  }
+  void flush() override { to_->flush(); }
+  void set_pattern(const std::string& pattern) override { to_->set_pattern(pattern); }
+  void set_formatter(std::unique_ptr<spdlog::formatter> formatter) override {
+    to_->set_formatter(std::move(formatter));
+  }
+
+ private:
+  struct Level {
+    std::chrono::sys_seconds second{};
+    double lines = 0;  // in this second, omitted ones included
+    std::uint64_t omitted = 0;
+  };
+
+  void sayOmitted(const spdlog::details::log_msg& before, std::uint64_t lines) {
+    const LogSubject subject = std::exchange(subjectOfThread, {});
+    const std::string text = fmt::format("{} lines were left out here (--log-rate)", lines);
+    to_->log(spdlog::details::log_msg(before.time, {}, before.logger_name, before.level, text));
+    subjectOfThread = subject;
+  }
+
+  const std::shared_ptr<spdlog::sinks::sink> to_;
+  const double limit_;
+  std::mutex mutex_;
+  std::array<Level, spdlog::level::n_levels> levels_;
+};
+
 }  // namespace
 
-void setUpLog(const std::string& level, LogFormat format) {
+std::uint64_t omittedLogLines() {
+  return omittedLines;
+}
+
+void setUpLog(const std::string& level, LogFormat format, double linesPerSecond) {
   const spdlog::level::level_enum parsed = spdlog::level::from_str(level);
   // from_str() returns `off` for unknown names.
   if (parsed == spdlog::level::off && level != "off")
@@ -77,7 +138,9 @@ void setUpLog(const std::string& level, LogFormat format) {
                                 "' is not a log level; use trace, debug, info, warning, error or off");
 
   // A new logger, instead of a new sink, allows repeated calls in tests.
-  auto logger = std::make_shared<spdlog::logger>("", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
+  auto logger = std::make_shared<spdlog::logger>(
+      "",
+      std::make_shared<LimitedSink>(std::make_shared<spdlog::sinks::stderr_color_sink_mt>(), linesPerSecond));
   logger->set_level(parsed);
   if (format == LogFormat::json) {
     logger->set_formatter(std::make_unique<JsonLine>());

@@ -17,9 +17,15 @@ namespace clothstream::telemetry {
 // participant if the line is about one. It has only ASCII characters.
 enum class LogFormat : std::uint8_t { text, json };
 
+// At most `linesPerSecond` lines of each level are written in each second; 0 means no limit. The first line
+// after a gap is preceded by one that says how many were left out.
+//
 // `level` is trace, debug, info, warning, error or off; otherwise throws std::invalid_argument. Lines of text
 // are coloured if standard error is a terminal. Every warning and error is flushed at once.
-void setUpLog(const std::string& level, LogFormat format = LogFormat::text);
+void setUpLog(const std::string& level, LogFormat format = LogFormat::text, double linesPerSecond = 0);
+
+// Lines that were left out since the start of the process.
+std::uint64_t omittedLogLines();
 
 // A line of text begins with the name of the scene. Both are fields of a JSON line.
 struct LogSubject {

@@ -52,6 +52,9 @@ std::string table(const std::string& scene, const SceneMetrics& m) {
                      {"dropped", m.framesDropped.value()},
                      {"thinned", m.framesThinned.value()}});
   addCounters(text, {{"steps down", m.stepsDown.value()}, {"steps up", m.stepsUp.value()}});
+  if (m.overloadStepsDown.value() > 0)
+    addCounters(text, {{"overload steps down", m.overloadStepsDown.value()},
+                       {"overload steps up", m.overloadStepsUp.value()}});
   addCounters(text, {{"joins", m.joins.value()}, {"rejected messages", m.rejectedMessages.value()}});
   return text;
 }

@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <string_view>
 
 #include "server/telemetry/histogram.h"
+#include "server/telemetry/refusal.h"
 
 namespace clothstream::telemetry {
 
@@ -35,43 +35,25 @@ struct SceneMetrics {
   Histogram inputToPacket;  // from the arrival of a pose to the packet that shows its effect
 
   Counter ticks;
-  Counter lateTicks;         // ticks that started more than a quarter of a period late
-  Counter slippedTicks;      // ticks by which simulated time fell behind real time
-  Counter frames;            // packets encoded
-  Counter keyFrames;         // packets that are key frames
-  Counter packetBytes;       // bytes of all packets, each counted once for all subscribers
-  Counter skippedFrames;     // frames not encoded because the encoder was behind, per quality
-  Counter framesTaken;       // frames taken by endpoints, per subscriber
-  Counter framesDropped;     // frames not sent because the subscriber was behind, per subscriber
-  Counter framesThinned;     // frames of temporal layers that the subscriber skips, per subscriber
-  Counter stepsDown;         // subscribers moved to fewer layers or a coarser quality
-  Counter stepsUp;           // subscribers moved to more layers or a finer quality
-  Counter rollbacks;         // returns to the last good state
-  Counter resets;            // returns to the initial state
-  Counter crowdedBalls;      // self-collision: full neighbour lists, and balls with too many contacts
-  Counter rejectedMessages;  // messages answered by an Error
+  Counter lateTicks;          // ticks that started more than a quarter of a period late
+  Counter slippedTicks;       // ticks by which simulated time fell behind real time
+  Counter frames;             // packets encoded
+  Counter keyFrames;          // packets that are key frames
+  Counter packetBytes;        // bytes of all packets, each counted once for all subscribers
+  Counter skippedFrames;      // frames not encoded because the encoder was behind, per quality
+  Counter framesTaken;        // frames taken by endpoints, per subscriber
+  Counter framesDropped;      // frames not sent because the subscriber was behind, per subscriber
+  Counter framesThinned;      // frames of temporal layers that the subscriber skips, per subscriber
+  Counter stepsDown;          // subscribers moved to fewer layers or a coarser quality
+  Counter stepsUp;            // subscribers moved to more layers or a finer quality
+  Counter overloadStepsDown;  // reductions of frames or substeps because the device was overloaded
+  Counter overloadStepsUp;    // the opposite
+  Counter rollbacks;          // returns to the last good state
+  Counter resets;             // returns to the initial state
+  Counter crowdedBalls;       // self-collision: full neighbour lists, and balls with too many contacts
+  Counter rejectedMessages;   // messages answered by an Error
   Counter joins;
 };
-
-// Why a connection or a request was refused.
-enum class Refusal : std::uint8_t {
-  connections,           // too many are open
-  connectionsOfAddress,  // too many of this address are open
-  connectionRate,        // too many new ones per second
-  connectionRateOfAddress,
-  stopping,       // the server stops
-  handshake,      // TLS was not agreed on
-  callRate,       // too many calls per second from one address
-  createdScenes,  // too many scenes exist
-  budget,         // the price of a scene exceeds what is left
-};
-// Names for metrics and reports, in the order of Refusal.
-inline constexpr std::array<std::string_view, 9> kRefusalNames{
-    "connections",     "connections of address",
-    "connection rate", "connection rate of address",
-    "stopping",        "handshake",
-    "call rate",       "created scenes",
-    "budget"};
 
 struct ServerMetrics {
   void refuse(Refusal reason) { refusals[static_cast<std::size_t>(reason)].add(); }

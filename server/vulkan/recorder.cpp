@@ -17,6 +17,11 @@ using Stage = vk::PipelineStageFlagBits;
 
 constexpr vk::PipelineStageFlags kWork = Stage::eComputeShader | Stage::eTransfer;
 constexpr vk::AccessFlags kWrites = Access::eShaderWrite | Access::eTransferWrite;
+// Timestamps of a recording: one before each stage and one at the end, and two between slices.
+constexpr std::uint32_t kMaxTimestamps = Recorder::kMaxMarks + 1 + 2 * Recorder::kMaxTimedSlices;
+// Stage of the time between two slices, in which other work may run.
+constexpr std::string_view kBetweenSlices;
+
 constexpr vk::AccessFlags kUses = Access::eShaderRead | Access::eShaderWrite | Access::eTransferRead |
                                   Access::eTransferWrite | Access::eIndirectCommandRead;
 
@@ -34,10 +39,11 @@ Recorder::Recorder(const Device& device) : device_(&device), handles_(std::make_
       device.handles().physical.getQueueFamilyProperties()[device.handles().queueFamily].timestampValidBits;
   if (bits > 0)
     handles_->timestamps = vk::raii::QueryPool(
-        vulkan, vk::QueryPoolCreateInfo{.queryType = vk::QueryType::eTimestamp, .queryCount = kMaxMarks + 1});
+        vulkan,
+        vk::QueryPoolCreateInfo{.queryType = vk::QueryType::eTimestamp, .queryCount = kMaxTimestamps});
   timestampMask_ = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-  marks_.reserve(kMaxMarks);
-  ticks_.resize(kMaxMarks + 1);
+  marks_.reserve(kMaxTimestamps);
+  ticks_.resize(kMaxTimestamps);
   times_.reserve(kMaxStages);
 }
 
@@ -49,8 +55,9 @@ void Recorder::begin() {
   handles_->pool.reset();
   handles_->used = 0;
   beginSlice();
-  if (*handles_->timestamps) handles_->current().resetQueryPool(*handles_->timestamps, 0, kMaxMarks + 1);
+  if (*handles_->timestamps) handles_->current().resetQueryPool(*handles_->timestamps, 0, kMaxTimestamps);
   marks_.clear();
+  timedSlices_ = 0;
   open_ = true;
   rehearses_ = false;
 }
@@ -77,8 +84,17 @@ void Recorder::endSlice() {
 
 void Recorder::count(std::uint64_t invocations) {
   if (invocations_ > 0 && invocations_ + invocations > sliceInvocations_) {
-    endSlice();
-    beginSlice();
+    if (marks_.empty() || timedSlices_ == kMaxTimedSlices) {
+      endSlice();
+      beginSlice();
+    } else {
+      const std::string_view stage = marks_.back();
+      beginStage(kBetweenSlices);
+      endSlice();
+      beginSlice();
+      beginStage(stage);
+      ++timedSlices_;
+    }
   }
   invocations_ += invocations;
 }
@@ -95,7 +111,7 @@ void Recorder::note(const Bindings& bindings) {
 }
 
 void Recorder::beginStage(std::string_view stage) {
-  assert(open_ && marks_.size() < kMaxMarks);
+  assert(open_ && marks_.size() + 1 < kMaxTimestamps);
   mark();
   marks_.push_back(stage);
 }
@@ -187,6 +203,7 @@ std::span<const StageTime> Recorder::stageTimes() {
       ticks_.data(), sizeof(std::uint64_t), VK_QUERY_RESULT_64_BIT);
   if (result != VK_SUCCESS) return times_;
   for (std::size_t i = 0; i < marks_.size(); ++i) {
+    if (marks_[i] == kBetweenSlices) continue;
     const double seconds = static_cast<double>((ticks_[i + 1] - ticks_[i]) & timestampMask_) *
                            static_cast<double>(device_->limits().timestampPeriod) * 1e-9;
     const auto known = std::find_if(times_.begin(), times_.end(),

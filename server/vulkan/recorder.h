@@ -51,6 +51,8 @@ class Recorder {
   // on lavapipe inline and 30 us with two threads, so that a stage should cover all substeps.
   static constexpr std::uint32_t kMaxStages = 32;
   static constexpr std::uint32_t kMaxMarks = 1024;
+  // The time between two slices belongs to no stage in the first kMaxTimedSlices slices of a recording.
+  static constexpr std::uint32_t kMaxTimedSlices = 512;
   void beginStage(std::string_view stage);
 
   // Runs the kernel on at least `threads` invocations in x, in whole workgroups; the kernel guards its
@@ -113,6 +115,7 @@ class Recorder {
   std::vector<StageTime> times_;
   std::vector<const Bindings*> rehearsed_;
   std::uint64_t sliceInvocations_ = ~std::uint64_t{0}, invocations_ = 0;  // limit, and of the current slice
+  std::uint32_t timedSlices_ = 0;                                         // slices whose start was marked
   bool open_ = false, rehearses_ = false;
 };
 

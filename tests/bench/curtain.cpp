@@ -34,7 +34,7 @@ constexpr std::chrono::microseconds kPoseInterval{1'000'000 / 90};
 class Viewer {
  public:
   explicit Viewer(hosting::SceneServer& server)
-      : session_(session::Session::open(server, "bench", [this] {
+      : session_(session::Session::open(server, {.peer = "bench", .address = {}, .token = {}}, [this] {
           const std::lock_guard lock(mutex_);
           awake_ = true;
           woken_.notify_one();

@@ -340,5 +340,35 @@ TEST(Statistics, DecodeTimeNeedsAClock) {
   EXPECT_DOUBLE_EQ(joined.client.statistics().decode_ms, 0.5);
 }
 
+// At a change of the divisor, the larger distance between frames counts.
+TEST(Frames, FramesThatAnOverloadedServerOmitsAreNotDropped) {
+  Joined joined;
+  EXPECT_EQ(cs_frame_divisor(joined.client.get()), 1u);
+  std::uint64_t tick = 0;
+  const auto receive = [&](std::uint64_t ticks, std::uint32_t divisor) {
+    tick += ticks;
+    v1::Frame frame = joined.server.frameMessage(
+        tick, tick == ticks ? codec::PacketKind::key : codec::PacketKind::predicted);
+    frame.set_frame_divisor(divisor);
+    EXPECT_EQ(joined.client.receive(ScriptedServer::serialise(frame), tick * 14 * kMs), kFrame);
+  };
+  for (int i = 0; i < 3; ++i) receive(1, 0);
+  for (int i = 0; i < 3; ++i) receive(4, 4);
+  EXPECT_EQ(cs_frame_divisor(joined.client.get()), 4u);
+  for (int i = 0; i < 3; ++i) receive(1, 0);
+  receive(4, 4);
+  EXPECT_EQ(joined.client.statistics().dropped, 0u);
+  receive(8, 4);
+  EXPECT_EQ(joined.client.statistics().dropped, 1u);
+}
+
+TEST(Frames, RefusesAnImpossibleDivisor) {
+  Joined joined;
+  v1::Frame frame = joined.server.frameMessage(2, codec::PacketKind::key);
+  frame.set_frame_divisor(4'000'000'000u);
+  joined.client.receive(ScriptedServer::serialise(frame));
+  EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_FAILED);
+}
+
 }  // namespace
 }  // namespace clothstream::client

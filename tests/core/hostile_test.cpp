@@ -2,6 +2,7 @@
 // Malformed and random input: the client reports an error and never crashes.
 #include <csignal>
 #include <cstdlib>
+#include <functional>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -10,6 +11,7 @@
 
 #include "clients/core/wire/server_message.h"
 #include "clients/core/wire/wire.h"
+#include "proto/text/utf8.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {
@@ -114,6 +116,137 @@ TEST(Hostile, MalformedMessageFailsTheClientWithAReason) {
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
   EXPECT_THAT(cs_error_text(client.get()), HasSubstr("is a clothstream-server"));
   EXPECT_EQ(client.receive(ScriptedServer().welcome()), 0u) << "a failed client ignores messages";
+}
+
+// Programs may pass names to functions that refuse other text.
+TEST(Hostile, NamesThatAreNotUtf8FailTheClient) {
+  ScriptedServer server;
+  ClientUnderTest client;
+  client.join(server);
+  v1::Frame frame = server.frameMessage(1, codec::PacketKind::key);
+  const std::string kName = "st\xcdne";
+  frame.mutable_colliders(1)->set_name(kName);
+  EXPECT_EQ(client.receive(ScriptedServer::serialise(frame)), static_cast<std::uint32_t>(CS_EVENT_ERROR));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  cs_collider collider;
+  for (std::uint32_t i = 0; cs_get_collider(client.get(), i, &collider) != 0; ++i)
+    EXPECT_NE(collider.name, kName);
+}
+
+TEST(Utf8, AcceptsEveryLengthOfCharacter) {
+  for (const std::string_view text :
+       {"", "a", "\xc2\x80", "\xdf\xbf", "\xe0\xa0\x80", "\xed\x9f\xbf", "\xee\x80\x80", "\xef\xbf\xbf",
+        "\xf0\x90\x80\x80", "\xf4\x8f\xbf\xbf", "a\xc3\xa4z"})
+    EXPECT_TRUE(isUtf8(text)) << text;
+}
+
+TEST(Utf8, RefusesMalformedText) {
+  for (const std::string_view text :
+       {"\x80", "\xc0\x80", "\xc1\xbf", "\xc2", "\xc2z", "\xe0\x9f\xbf", "\xe0\xa0", "\xed\xa0\x80",
+        "\xe2\x28\xa1", "\xf0\x8f\xbf\xbf", "\xf4\x90\x80\x80", "\xf5\x80\x80\x80", "\xf0\x90\x80", "\xff",
+        "a\xfe"})
+    EXPECT_FALSE(isUtf8(text)) << ::testing::PrintToString(text);
+}
+
+cs_limits defaultLimits() {
+  cs_limits limits;
+  cs_default_limits(&limits);
+  return limits;
+}
+
+// Joins with these limits and sends this description. Returns the error text, "" if the client has joined.
+std::string refusalOf(const v1::StreamDescription& description, const cs_limits& limits = defaultLimits()) {
+  ClientUnderTest client;
+  EXPECT_EQ(cs_set_limits(client.get(), &limits), 1);
+  client.receive(ScriptedServer().welcome());
+  client.receiveAll(chunksOf(description.SerializeAsString(), 256 * 1024, 1));
+  return cs_get_state(client.get()) == CS_STATE_FAILED ? cs_error_text(client.get()) : "";
+}
+
+TEST(Hostile, RefusesDescriptionBeyondEachLimit) {
+  const v1::StreamDescription description =
+      ScriptedServer({.cloths = {{"a", 4, 3}, {"b", 3, 3}}}).description();  // 21 vertices, 20 triangles
+  EXPECT_EQ(refusalOf(description), "");
+  cs_limits limits = defaultLimits();
+  limits.max_vertices = 21;
+  limits.max_triangles = 20;
+  limits.max_cloths = 2;
+  limits.max_content_bytes = description.ByteSizeLong();
+  EXPECT_EQ(refusalOf(description, limits), "") << "the limits themselves are allowed";
+  const auto lowered = [&](auto cs_limits::*limit) {
+    cs_limits lower = limits;
+    --(lower.*limit);
+    return refusalOf(description, lower);
+  };
+  EXPECT_THAT(lowered(&cs_limits::max_vertices),
+              HasSubstr("21 vertices; this client accepts at most 20 (cs_limits.max_vertices)"));
+  EXPECT_THAT(lowered(&cs_limits::max_triangles), HasSubstr("20 triangles; this client accepts at most 19"));
+  EXPECT_THAT(lowered(&cs_limits::max_cloths), HasSubstr("2 cloths; this client accepts at most 1"));
+  EXPECT_THAT(lowered(&cs_limits::max_content_bytes), HasSubstr("(cs_limits.max_content_bytes)"));
+}
+
+TEST(Hostile, RefusesHugeSizesThatAreOnlyStated) {
+  v1::StreamDescription description = ScriptedServer().description();
+  v1::ClothDescription& cloth = *description.mutable_cloths(0);
+  cloth.set_vertex_count(defaultLimits().max_vertices + 1);
+  EXPECT_THAT(refusalOf(description), HasSubstr("max_vertices"));
+  cloth.set_vertex_count(63);
+  cloth.set_rows(~0u);
+  cloth.set_columns(~0u);
+  EXPECT_THAT(refusalOf(description), HasSubstr("max_triangles"));
+}
+
+TEST(Hostile, RefusesMoreSubmeshesOfAllClothsThanAllowed) {
+  v1::StreamDescription description = ScriptedServer({.cloths = {{"a", 4, 3}, {"b", 3, 3}}}).description();
+  for (int i = 0; i < 40'000; ++i) {
+    description.mutable_cloths(0)->add_submeshes();
+    description.mutable_cloths(1)->add_submeshes();
+  }
+  EXPECT_THAT(refusalOf(description), HasSubstr("is not a StreamDescription"));
+}
+
+TEST(Hostile, RefusesWelcomeWithTooManyParticipants) {
+  v1::ServerMessage message;
+  ASSERT_TRUE(message.ParseFromString(ScriptedServer().welcome()));
+  for (int i = 0; i < 3; ++i) message.mutable_welcome()->add_participants()->set_id(i + 1);
+  cs_limits limits = defaultLimits();
+  limits.max_participants = 2;
+  ClientUnderTest client;
+  ASSERT_EQ(cs_set_limits(client.get(), &limits), 1);
+  client.receive(message.SerializeAsString());
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_THAT(cs_error_text(client.get()), HasSubstr("(cs_limits.max_participants)"));
+}
+
+TEST(Hostile, FloodOfPresenceKeepsABoundedNumberOfParticipantsWithShortNames) {
+  const ScriptedServer server;
+  ClientUnderTest client;
+  client.join(server);
+  v1::ServerMessage message;
+  v1::Presence& presence = *message.mutable_presence();
+  presence.set_kind(v1::PRESENCE_KIND_JOINED);
+  for (std::uint64_t id = 1; id <= 5000; ++id) {
+    presence.mutable_participant()->set_id(id);
+    client.receive(message.SerializeAsString());
+  }
+  EXPECT_EQ(cs_participant_count(client.get()), defaultLimits().max_participants);
+  presence.mutable_participant()->set_display_name(std::string(1025, 'x'));
+  client.receive(message.SerializeAsString());
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+}
+
+TEST(Hostile, RefusesLimitsThatAreNotAllowed) {
+  ClientUnderTest client;
+  for (const auto& change : std::vector<std::function<void(cs_limits&)>>{
+           [](cs_limits& limits) { limits.version = 0; }, [](cs_limits& limits) { limits.max_vertices = 0; },
+           [](cs_limits& limits) { limits.max_triangles = ~0u; },
+           [](cs_limits& limits) { limits.max_cloths = 257; },
+           [](cs_limits& limits) { limits.max_participants = ~0u; },
+           [](cs_limits& limits) { limits.max_content_bytes = 268'435'457; }}) {
+    cs_limits limits = defaultLimits();
+    change(limits);
+    EXPECT_EQ(cs_set_limits(client.get(), &limits), 0);
+  }
 }
 
 TEST(Hostile, SkipsUnknownFieldsAndBodies) {

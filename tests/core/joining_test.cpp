@@ -28,6 +28,75 @@ TEST(Joining, SendsOnlyHelloFirst) {
   EXPECT_NE(messages[0].request_id(), 0u);
 }
 
+TEST(Joining, SendsTheTokenBeforeHelloOnEachConnection) {
+  ClientUnderTest client;
+  cs_set_pairing_code(client.get(), "123456");
+  cs_set_token(client.get(), "a.b.c");
+  EXPECT_STREQ(cs_token(client.get()), "a.b.c");
+  for (int connection = 0; connection < 2; ++connection) {
+    const auto sent = client.outgoing();
+    ASSERT_THAT(sent, SizeIs(2));
+    EXPECT_EQ(sent[0].authenticate().token(), "a.b.c");
+    EXPECT_TRUE(sent[1].has_hello());
+    cs_connecting(client.get(), 1'000'000);
+  }
+  cs_set_token(client.get(), "");
+  EXPECT_THAT(client.outgoing(), SizeIs(1));
+}
+
+TEST(Joining, PairsAndReconnectsWithTheTokenOfTheServer) {
+  ClientUnderTest client;
+  cs_set_pairing_code(client.get(), "123456");
+  const auto first = client.outgoing();
+  ASSERT_THAT(first, SizeIs(2));
+  EXPECT_EQ(first[0].authenticate().pairing_code(), "123456");
+  EXPECT_STREQ(cs_token(client.get()), "");
+  v1::ServerMessage answer;
+  answer.mutable_authenticate()->set_token("d.e.f");
+  EXPECT_EQ(client.receive(answer.SerializeAsString()), std::uint32_t{CS_EVENT_TOKEN});
+  EXPECT_STREQ(cs_token(client.get()), "d.e.f");
+  cs_connecting(client.get(), 1'000'000);
+  EXPECT_EQ(client.outgoing()[0].authenticate().token(), "d.e.f");
+  // The answer to a token has none, and changes nothing.
+  answer.mutable_authenticate()->clear_token();
+  EXPECT_EQ(client.receive(answer.SerializeAsString()), 0u);
+  EXPECT_STREQ(cs_token(client.get()), "d.e.f");
+}
+
+TEST(Joining, FailsWithTheCodeOfTheServerAfterAWrongProof) {
+  ClientUnderTest client;
+  client.receive(ScriptedServer::error(v1::ERROR_CODE_WRONG_PAIRING_CODE, "the pairing code is wrong", true));
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_EQ(cs_error_code(client.get()), std::uint32_t{CS_ERROR_WRONG_PAIRING_CODE});
+  EXPECT_EQ(int{CS_ERROR_UNAUTHENTICATED}, int{v1::ERROR_CODE_UNAUTHENTICATED});
+  EXPECT_EQ(int{CS_ERROR_WRONG_PAIRING_CODE}, int{v1::ERROR_CODE_WRONG_PAIRING_CODE});
+}
+
+TEST(Joining, AsksForPairingCodesAndBans) {
+  ScriptedServer server;
+  ClientUnderTest client;
+  client.receive(server.welcome());
+  static_cast<void>(client.outgoing());
+  cs_pairing_code code;
+  EXPECT_EQ(cs_get_pairing_code(client.get(), &code), 0);
+  cs_create_pairing_code(client.get(), CS_ROLE_VIEWER);
+  cs_ban_participant(client.get(), 7);
+  const auto sent = client.outgoing();
+  ASSERT_THAT(sent, SizeIs(2));
+  EXPECT_EQ(sent[0].create_pairing_code().role(), v1::ROLE_VIEWER);
+  EXPECT_EQ(sent[1].remove_participant().participant_id(), 7u);
+  EXPECT_TRUE(sent[1].remove_participant().ban());
+  v1::ServerMessage answer;
+  answer.mutable_create_pairing_code()->set_code("012345");
+  answer.mutable_create_pairing_code()->set_role(v1::ROLE_VIEWER);
+  answer.mutable_create_pairing_code()->set_valid_s(300);
+  EXPECT_EQ(client.receive(answer.SerializeAsString()), std::uint32_t{CS_EVENT_PAIRING_CODE});
+  ASSERT_EQ(cs_get_pairing_code(client.get(), &code), 1);
+  EXPECT_STREQ(code.code, "012345");
+  EXPECT_EQ(code.role, std::uint32_t{CS_ROLE_VIEWER});
+  EXPECT_EQ(code.valid_s, 300u);
+}
+
 TEST(Joining, SendsTheWantedOperatingPointWithoutLosingRequests) {
   ClientUnderTest client;
   cs_list_scenes(client.get());
@@ -315,11 +384,11 @@ INSTANTIATE_TEST_SUITE_P(
                            d.mutable_cloths(0)->set_rows(0x10000);
                            d.mutable_cloths(0)->set_columns(0x10000);
                          },
-                         "rows x columns"},
+                         "8589672450 triangles; this client accepts at most 8388608"},
         WrongDescription{
             "too_many_vertices",
             [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_vertex_count(4'000'000'000); },
-            "rest_positions has 756 bytes for 4000000000 vertices"},
+            "4000000000 vertices; this client accepts at most 4194304"},
         WrongDescription{"max_error", [](v1::StreamDescription& d) { d.set_max_error(0); }, "max_error"},
         WrongDescription{"temporal_layers", [](v1::StreamDescription& d) { d.set_temporal_layers(257); },
                          "temporal_layers"},
@@ -332,7 +401,16 @@ INSTANTIATE_TEST_SUITE_P(
                            cloth.set_vertex_count(4);
                            cloth.set_rest_positions(floats({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, NAN}));
                          },
-                         "cloth \"curtain\": a rest position is not finite"}),
+                         "cloth \"curtain\": a rest position is not finite"},
+        WrongDescription{"too_far",
+                         [](v1::StreamDescription& d) {
+                           v1::ClothDescription& cloth = *d.mutable_cloths(0);
+                           cloth.set_rows(2);
+                           cloth.set_columns(2);
+                           cloth.set_vertex_count(4);
+                           cloth.set_rest_positions(floats({0, 0, 0, 1e30f, 0, 0, 0, 1e30f, 0, 0, 1, 0}));
+                         },
+                         "farther than 1000 km from the origin"}),
     [](const auto& instance) { return std::string(instance.param.name); });
 
 // ---- Chunks
@@ -345,20 +423,20 @@ Chunk chunk(std::uint64_t id, std::uint32_t index, std::uint32_t count, std::uin
 
 TEST(ContentAssembly, AssemblesInterleavedContents) {
   ContentAssembly assembly;
-  EXPECT_EQ(assembly.add(chunk(1, 0, 2, 4, "ab")).value(), std::nullopt);
-  EXPECT_EQ(assembly.add(chunk(2, 0, 3, 3, "x")).value(), std::nullopt);
-  EXPECT_EQ(assembly.add(chunk(1, 1, 2, 4, "cd")).value(), "abcd");
-  EXPECT_EQ(assembly.add(chunk(2, 1, 3, 3, "y")).value(), std::nullopt);
-  EXPECT_EQ(assembly.add(chunk(2, 2, 3, 3, "z")).value(), "xyz");
+  EXPECT_EQ(assembly.add(chunk(1, 0, 2, 4, "ab"), Limits{}.contentBytes).value(), std::nullopt);
+  EXPECT_EQ(assembly.add(chunk(2, 0, 3, 3, "x"), Limits{}.contentBytes).value(), std::nullopt);
+  EXPECT_EQ(assembly.add(chunk(1, 1, 2, 4, "cd"), Limits{}.contentBytes).value(), "abcd");
+  EXPECT_EQ(assembly.add(chunk(2, 1, 3, 3, "y"), Limits{}.contentBytes).value(), std::nullopt);
+  EXPECT_EQ(assembly.add(chunk(2, 2, 3, 3, "z"), Limits{}.contentBytes).value(), "xyz");
   // The id can be used again.
-  EXPECT_EQ(assembly.add(chunk(1, 0, 1, 1, "q")).value(), "q");
+  EXPECT_EQ(assembly.add(chunk(1, 0, 1, 1, "q"), Limits{}.contentBytes).value(), "q");
 }
 
 TEST(ContentAssembly, IgnoresUnknownKinds) {
   ContentAssembly assembly;
   Chunk unknown = chunk(1, 5, 2, ~0ull, "ab");
   unknown.kind = 77;
-  EXPECT_EQ(assembly.add(unknown).value(), std::nullopt);
+  EXPECT_EQ(assembly.add(unknown, Limits{}.contentBytes).value(), std::nullopt);
 }
 
 TEST(ContentAssembly, RefusesInconsistentChunks) {
@@ -366,7 +444,7 @@ TEST(ContentAssembly, RefusesInconsistentChunks) {
     ContentAssembly assembly;
     std::string text;
     for (const Chunk& piece : pieces) {
-      if (const auto result = assembly.add(piece); !result) text = result.error();
+      if (const auto result = assembly.add(piece, Limits{}.contentBytes); !result) text = result.error();
     }
     return text;
   };

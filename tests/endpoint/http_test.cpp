@@ -58,6 +58,21 @@ TEST_F(HttpEndpoint, ServesThePage) {
   EXPECT_EQ(field(core, http::field::content_type), "application/wasm");
 }
 
+TEST_F(HttpEndpoint, TellsThePageItsAddressForOtherDevices) {
+  EXPECT_EQ(get("/address.json").body(), R"({"address":"","fingerprint":""})");
+  EXPECT_EQ(get("/address.svg").result(), http::status::not_found);
+  open({.hostInNetwork = "192.0.2.2", .showsFingerprint = true});
+  const std::string port = std::to_string(endpoint_->port());
+  // Without TLS there is no key.
+  EXPECT_EQ(get("/address.json").body(),
+            R"({"address":"http://192.0.2.2:)" + port + R"(/","fingerprint":""})");
+  const Response code = get("/address.svg");
+  EXPECT_EQ(field(code, http::field::content_type), "image/svg+xml");
+  EXPECT_THAT(code.body(), HasSubstr("<svg"));
+  open({.hostInNetwork = "2001:db8::2"});
+  EXPECT_THAT(get("/address.json").body(), HasSubstr("http://[2001:db8::2]:"));
+}
+
 TEST_F(HttpEndpoint, AnswersSeveralRequestsOnOneConnection) {
   HttpClient client(endpoint_->port());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(client.get("/").result(), http::status::ok);

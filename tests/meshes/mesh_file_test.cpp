@@ -82,6 +82,8 @@ TEST_F(MeshFile, RefusesInvalidObjHereOrInBuildMesh) {
   for (const auto& [text, says] :
        {std::pair("v 0 0 0\nv 1 nan 0\n", "line 2 is \"v 1 nan 0\""), std::pair("v 0 0 inf\n", "line 1"),
         std::pair("  v nan 0 0\n", "line 1"), std::pair("v\t0 nan 0\n", "line 1"),
+        std::pair("v 0 0 0\nv 1e2147483648 0 0\n", "line 2 is \"v 1e2147483648 0 0\": an exponent"),
+        std::pair("v 0 0 0\n vt 0 1e-999999999\n", "line 2"), std::pair("vn 1E+2147483648 0 0\n", "line 1"),
         std::pair("v 0 0 0\nv 1 0 0\nf 1 2\n", "face 0 has 2 corners"),
         std::pair("v 0 0 0\nf 1 1 1 1 1\n", "face 0 has 5 corners; faces must have 3 or 4")}) {
     const auto source = parseObj(text);

@@ -21,7 +21,7 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr MeshLimits kLimits{
+const MeshLimits kLimits{
     .maxVertices = 10'000, .maxCoordinate = 1000, .minEdge = 0.0001f, .maxNodeSprings = 100};
 
 SourceFace triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {

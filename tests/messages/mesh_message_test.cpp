@@ -50,7 +50,7 @@ TEST(MeshMessage, BecomesAMesh) {
   EXPECT_EQ(cloth.mesh->shape.quads.size(), 1u);
   EXPECT_EQ(cloth.mesh->shape.submeshes[1].name, "silk");
   EXPECT_EQ(cloth.mesh->shape.uvs.size(), 6u);
-  EXPECT_NEAR(cloth.mesh->area(), 1.5 * 0.25, 1e-6);
+  EXPECT_NEAR(cloth.mesh->area, 1.5 * 0.25, 1e-6);
   for (const model::Vec3& p : cloth.mesh->shape.positions) EXPECT_GE(p.y(), 2);
 }
 

@@ -177,6 +177,12 @@ TEST(SceneFile, KeepsEveryFieldThroughJson) {
   EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(toMessage(*scene), toMessage(*again)));
 }
 
+TEST(SceneFile, RefusesMoreNodesThanPermitted) {
+  const std::uint32_t nodes = parseScene(kEveryField, "test")->nodeCount();
+  EXPECT_TRUE(parseScene(kEveryField, "test", {}, nodes));
+  EXPECT_FALSE(parseScene(kEveryField, "test", {}, nodes - 1));
+}
+
 std::string errorOf(const char* json) {
   const Result<model::Scene> scene = parseScene(json, "my.json");
   return scene ? "no error" : scene.error().text;

@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/model/springs.h"
 #include "tests/messages/scenes.h"
 
 namespace clothstream::messages {
@@ -592,6 +593,28 @@ TEST(ToScene, KeepsErrorsShortWhateverTheInput) {
   v1::Scene message = smallScene();
   message.set_name(std::string(1'000'000, 'x'));
   EXPECT_LT(toScene(message).error().text.size(), 300u);
+}
+
+TEST(ToScene, RefusesMoreSpringsOrAttachmentsThanTheLimits) {
+  v1::Scene message = smallScene();
+  const Result<model::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene);
+  std::uint64_t springs = 0;
+  for (const model::Cloth& cloth : scene->cloths) {
+    EXPECT_EQ(model::springCount(cloth), model::springLinks(cloth).size());
+    springs += model::springCount(cloth);
+  }
+  EXPECT_TRUE(toScene(message, {}, {.springs = springs}));
+  const Result<model::Scene> tooMany = toScene(message, {}, {.springs = springs - 1});
+  ASSERT_FALSE(tooMany);
+  EXPECT_THAT(tooMany.error().text,
+              HasSubstr("springs in all; must have at most " + std::to_string(springs - 1)));
+  EXPECT_EQ(tooMany.error().limit, telemetry::Refusal::sceneSize);
+  for (const char* name : {"one", "two"}) message.mutable_cloths(0)->add_attachments()->set_name(name);
+  const Result<model::Scene> attached = toScene(message, {}, {.attachments = 1});
+  ASSERT_FALSE(attached);
+  EXPECT_EQ(attached.error().text, "cloths: have 2 attachments in all; must have at most 1");
+  EXPECT_EQ(attached.error().limit, telemetry::Refusal::sceneSize);
 }
 
 }  // namespace

@@ -351,7 +351,7 @@ class BlockingJournal final : public scene::Journal {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return !blocked_; });
   }
-  void saved(const simulation::StateSnapshot&, bool) override {}
+  void saved(const simulation::StateSnapshot&) override {}
   void restored(std::uint64_t, const simulation::StateSnapshot&) override {}
   void end() override {}
   void sent(const delivery::SharedBytes&) override {}

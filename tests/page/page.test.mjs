@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
-import { tmpdir } from "node:os";
+import { networkInterfaces, tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { kChromium, launchBrowser, kPicture, luminance, openPage, takePicture, takePixels, untilFrames, untilState } from "./browser.mjs";
@@ -494,6 +494,76 @@ test("participants are listed, and a disconnected one returns with its id", asyn
   } finally {
     await ada.close();
     link.close();
+  }
+});
+
+test("the page shows its address for other devices", async (t) => {
+  const outside = Object.values(networkInterfaces())
+    .flat()
+    .some(({ family, internal }) => family === "IPv4" && !internal);
+  if (!outside) return t.skip("this machine has no address in a network");
+  const folder = await mkdtemp(join(tmpdir(), "clothstream-"));
+  const home = await startServer(0, ["--scene", "curtain", "--host", "0.0.0.0", "--insecure", "--tls", "self", "--announce", "off", "--state-dir", folder]);
+  try {
+    const context = await browser.newContext({ ignoreHTTPSErrors: true, viewport: { width: 900, height: 900 } });
+    const page = await context.newPage();
+    await page.goto(home.url.replace("http:", "https:"));
+    await untilState(page, "live");
+    await page.click("#share summary");
+    await page.waitForFunction(() => document.getElementById("share-code").naturalWidth > 0);
+    assert.match(await page.textContent("#share-address"), new RegExp(`^https://[0-9.]+:${home.port}/$`));
+    const { address, fingerprint } = await (await page.request.get(`${home.url.replace("http:", "https:")}address.json`)).json();
+    assert.equal(await page.getAttribute("#share-address", "href"), address);
+    assert.match(fingerprint, /^[0-9A-F]{2}(:[0-9A-F]{2}){31}$/);
+    assert.ok((await page.textContent("#share-key")).endsWith(fingerprint));
+    await takePicture(page, "share");
+    await context.close();
+  } finally {
+    await home.stop();
+    await rm(folder, { recursive: true });
+  }
+});
+
+test("the page asks for a pairing code, keeps its token, and shows a code to owners", async () => {
+  const folder = await mkdtemp(join(tmpdir(), "clothstream-"));
+  const paired = await startServer(0, ["--scene", "curtain", "--pairing", "--state-dir", folder]);
+  try {
+    const [, code] = await paired.line(/^pair +(\d{6})/);
+    const context = await browser.newContext({ viewport: { width: 900, height: 600 } });
+    const page = await context.newPage();
+    await page.goto(paired.url);
+    await untilState(page, "asking");
+    assert.match(await page.textContent("#proof-reason"), /requires a token or a pairing code/);
+    await takePicture(page, "asking");
+    await page.fill("#proof-input", code === "000000" ? "000001" : "000000");
+    await page.press("#proof-input", "Enter");
+    await page.waitForFunction(() => /is wrong/.test(document.getElementById("proof-reason").textContent));
+    await page.fill("#proof-input", `${code.slice(0, 3)} ${code.slice(3)}`);
+    await page.click("#proof button");
+    await untilState(page, "live");
+    assert.ok(await page.isHidden("#proof"));
+    await page.click("#pairing");
+    await page.waitForSelector("#pairing-code:not([hidden])");
+    await takePicture(page, "pairing");
+    const shown = /^(\d{3}) (\d{3}) makes a participant, for 5 minutes$/.exec(await page.textContent("#pairing-code"));
+    assert.ok(shown, await page.textContent("#pairing-code"));
+
+    // A token of the server works after the page is loaded again.
+    await page.reload();
+    await untilState(page, "live");
+
+    const guest = await (await browser.newContext()).newPage();
+    await guest.goto(paired.url);
+    await untilState(guest, "asking");
+    await guest.fill("#proof-input", shown[1] + shown[2]);
+    await guest.press("#proof-input", "Enter");
+    await untilState(guest, "live");
+    assert.ok(await guest.isHidden("#pairing"), "participants make no codes");
+    await guest.context().close();
+    await context.close();
+  } finally {
+    await paired.stop();
+    await rm(folder, { recursive: true });
   }
 });
 

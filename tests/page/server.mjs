@@ -6,6 +6,7 @@ import { once } from "node:events";
 import { createInterface } from "node:readline";
 
 const kStartMs = 60_000;
+const kPollMs = 20;
 
 for (const signal of ["SIGINT", "SIGTERM"]) process.once(signal, () => process.exit(1));
 
@@ -23,7 +24,7 @@ export async function startServer(port = 0, more = ["--scene", "curtain"]) {
     const timer = setTimeout(() => reject(new Error(`no address within ${kStartMs} ms\n${output.join("\n")}`)), kStartMs);
     const read = (line) => {
       output.push(line);
-      const found = /http:\/\/[^\s/]+:(\d+)/.exec(line);
+      const found = /https?:\/\/[^\s/]+:(\d+)/.exec(line);
       if (!found) return;
       clearTimeout(timer);
       resolve({ url: `http://127.0.0.1:${found[1]}/`, port: Number(found[1]) });
@@ -40,6 +41,14 @@ export async function startServer(port = 0, more = ["--scene", "curtain"]) {
   child.once("exit", complain);
   return {
     ...address,
+    // Waits for a line of the output that matches, and returns the match.
+    async line(pattern) {
+      for (let waited = 0; waited < kStartMs; waited += kPollMs) {
+        for (const text of output) if (pattern.test(text)) return pattern.exec(text);
+        await new Promise((done) => setTimeout(done, kPollMs));
+      }
+      throw new Error(`no line ${pattern}\n${output.join("\n")}`);
+    },
     async stop() {
       child.off("exit", complain);
       if (child.exitCode !== null || child.signalCode !== null) return;

@@ -422,7 +422,7 @@ TEST_F(RecorderTest, SlowDiskCompletesTheRecordingAndKeepsTheScene) {
   small.maxWaitingBytes = 20'000;
   RecordedScene recorded(small);
   // Too many states for any disk.
-  for (int i = 0; i < 200; ++i) recorded.recorder->saved({1, std::vector<std::byte>(10'000)}, false);
+  for (int i = 0; i < 200; ++i) recorded.recorder->saved({1, std::vector<std::byte>(10'000)});
   recorded.ticks(20);
   const std::string path = recorded.finish();
   EXPECT_EQ(recorded.recorder->state(), Recorder::State::failed);

@@ -240,33 +240,37 @@ TEST_F(SceneJournalTest, ContinuesInAnotherFileAtTheLimit) {
   EXPECT_EQ(all, static_cast<std::uint64_t>(run));
 }
 
-TEST_F(SceneJournalTest, SplitsTheFileWhenNoGrabIsHeldOrAGrabLasts) {
-  RecorderOptions limited;
-  limited.maxBytes = 240'000;
-  make(limited, true);
-  grab(true);
-  const auto files = [&] {
-    const RecordingCounts counts = journal->counts();
-    return counts.running + counts.complete;
+// The switch to another file changes no state, although a grab holds cloth.
+TEST_F(SceneJournalTest, SplitsTheFileWhileAGrabHolds) {
+  const auto simulate = [&](std::uint64_t maxBytes, const auto& isEnough) {
+    RecorderOptions limited;
+    limited.maxBytes = maxBytes;
+    make(limited, true);
+    grab(true);
+    std::vector<std::uint64_t> states;
+    while (!isEnough(states.size()) && states.size() < 20'000) {
+      ticks(1);
+      states.push_back(host->status().stateHash);
+    }
+    return states;
   };
-  // Few ticks at a time, so that each write is less than an eighth of the limit.
-  while (journal->counts().bytes < limited.maxBytes) {
-    const std::uint64_t before = journal->counts().bytes;
-    ticks(20);
-    ASSERT_EQ(files(), 1u);
-    while (journal->counts().bytes == before) std::this_thread::yield();
+  std::size_t end = 0;
+  const std::vector<std::uint64_t> split = simulate(240'000, [&](std::size_t ticks) {
+    if (end == 0 && journal->counts().complete > 0) end = ticks + 40;
+    return end > 0 && ticks >= end;
+  });
+  ASSERT_GT(end, 40u);
+  publisher->drain();
+  host.reset();
+  const std::uint64_t files = journal->counts().running + journal->counts().complete;
+  EXPECT_GE(files, 2u);
+  while (journal->counts().running > 0) std::this_thread::yield();
+  for (const auto& file : std::filesystem::directory_iterator(directory.path())) {
+    const Resimulation result = again(file.path().filename().string());
+    EXPECT_EQ(result.different, 0u) << file.path() << ": " << toText(result);
+    EXPECT_TRUE(result.missing.empty());
   }
-  ASSERT_LT(journal->counts().bytes, limited.maxBytes + limited.maxBytes / 8);
-  ticks(1);
-  EXPECT_EQ(files(), 1u);
-  grab(false);
-  ticks(3);  // releases the grab, then the file ends, then another one starts
-  EXPECT_EQ(files(), 2u);
-  grab(true);
-  for (int run = 0; files() < 3; ++run) {
-    ticks(1);
-    ASSERT_LT(run, 20'000);
-  }
+  EXPECT_EQ(split, simulate(0, [&](std::size_t ticks) { return ticks == split.size(); }));
 }
 
 // The device's thread gives up a scene whose ticks fail. A later participant gets another host.
@@ -346,6 +350,46 @@ TEST_F(SceneJournalTest, CountsRecordingsOfRemovedScenesWithoutKeepingThem) {
   std::uintmax_t bytes = 0;
   for (const auto& entry : std::filesystem::directory_iterator(directory.path())) bytes += entry.file_size();
   EXPECT_THAT(recordings.report(), HasSubstr(fmt::format("complete 3  failed 0  bytes {}\n", bytes)));
+}
+
+// Changes of the substeps: in the middle of a recording, before it starts, around a rollback, and after the
+// device was lost.
+TEST_F(SceneJournalTest, ResimulatesTicksWithFewerSubsteps) {
+  ticks(5);
+  host->setWork({.frameDivisor = 2, .substeps = 9});
+  ticks(3);
+  const auto file = journal->start("substeps");
+  ASSERT_TRUE(file) << file.error().text;
+  ticks(20);
+  host->setWork({.frameDivisor = 4, .substeps = 6});
+  ticks(20);
+  model::ParameterChange change;
+  change.cloths.push_back({.numbers = {{parameters::ClothNumber::damping, 1.5f}}});
+  ASSERT_TRUE(live->inbox.postChange({.participant = 3, .change = change}));
+  ticks(20);
+  publisher->drain();
+  host->release();
+  host->rebuild(std::make_unique<scene::SceneOnDevice>(tests::device(), live->start(), publisher->workers()),
+                "the device was lost");
+  ticks(20);
+  host->setWork(live->allWork());
+  ticks(5);
+  ASSERT_TRUE(journal->stop());
+  const Resimulation result = again(*file);
+  EXPECT_EQ(result.ticks, 85u);
+  EXPECT_EQ(result.different, 0u) << toText(result);
+  EXPECT_TRUE(result.missing.empty());
+
+  auto reader = RecordingReader::open(pathOf(*file));
+  ASSERT_TRUE(reader);
+  std::vector<std::uint32_t> substeps;
+  for (auto message = reader->next(); message && *message; message = reader->next()) {
+    if ((*message)->topic != Topic::ticks) continue;
+    v1::RecordedTick tick;
+    ASSERT_TRUE(tick.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())));
+    if (substeps.empty() || substeps.back() != tick.substeps()) substeps.push_back(tick.substeps());
+  }
+  EXPECT_THAT(substeps, ::testing::ElementsAre(9u, 6u, 0u));
 }
 
 }  // namespace

@@ -12,8 +12,8 @@
 
 namespace clothstream::tests {
 
-TestPeer::TestPeer(hosting::SceneServer& server, std::string name)
-    : session_(session::Session::open(server, std::move(name), [this] {
+TestPeer::TestPeer(hosting::SceneServer& server, session::Arrival arrival)
+    : session_(session::Session::open(server, std::move(arrival), [this] {
         const std::lock_guard lock(mutex_);
         awake_ = true;
         woken_.notify_all();

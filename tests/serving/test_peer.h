@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clothstream/v1/session.pb.h"
@@ -35,7 +36,10 @@ class TestPeer {
  public:
   static constexpr std::chrono::seconds kPatience{60};
 
-  explicit TestPeer(hosting::SceneServer& server, std::string name = "test");
+  // A peer of this machine without a token.
+  explicit TestPeer(hosting::SceneServer& server, std::string name = "test")
+      : TestPeer(server, session::Arrival{.peer = std::move(name), .address = {}, .token = {}}) {}
+  TestPeer(hosting::SceneServer& server, session::Arrival arrival);
 
   void send(const v1::ClientMessage& message);
   void sendBytes(const std::string& bytes);

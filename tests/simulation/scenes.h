@@ -75,6 +75,9 @@ class Running {
   // Runs one tick with a report. Returns the reports of all cloths.
   std::vector<simulation::ClothReport> tickAndReport(const simulation::TickInputs& inputs);
   void setCloths(std::span<const model::Cloth> cloths) { simulation_.setCloths(cloths); }
+  void setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths) {
+    simulation_.setSubsteps(substeps, cloths);
+  }
   void checkpoint();
   void rollback();
 

@@ -72,6 +72,29 @@ TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadTheSolver) {
     }
 }
 
+// The number of substeps changes between ticks. The motion has the same bits as that of a simulation that was
+// constructed with this number and continues from the same state.
+TEST_F(SolverChange, ContinuesAsIfTheSceneAlwaysHadTheSubsteps) {
+  for (const SolverKind kind : kKinds)
+    for (const bool selfCollision : {false, true}) {
+      SCOPED_TRACE(::testing::Message() << static_cast<int>(kind) << ", " << selfCollision);
+      model::Scene scene = withSolvers(softScene(), kind, kind);
+      if (selfCollision)
+        for (model::Cloth& cloth : scene.cloths) cloth.selfCollision = model::SelfCollision{.radius = 0.008f};
+      const simulation::TickInputs inputs = inputsWithBall(scene);
+      Running changing(scene);
+      for (const std::uint32_t substeps : {10u, 7u, 3u, 10u}) {
+        scene.substeps = substeps;
+        const simulation::StateSnapshot before = changing.save();
+        Running always(scene);
+        always.restore(before);
+        changing.setSubsteps(substeps, scene.cloths);
+        for (int tick = 0; tick < 4; ++tick)
+          ASSERT_EQ(changing.tick(inputs).stateHash, always.tick(inputs).stateHash) << substeps;
+      }
+    }
+}
+
 // As forces the sheet hangs stretched by tens of percents. ACAD lets go of 15 % of what is beyond 10 % a
 // substep, constraints of all of it: both are there within a second, and no node is thrown.
 TEST_F(SolverChange, ChangesTheStrainAsTheSolverPromises) {

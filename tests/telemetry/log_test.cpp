@@ -2,6 +2,8 @@
 // Text from outside cannot control a terminal or forge lines of the log.
 #include "server/telemetry/log.h"
 
+#include <chrono>
+#include <cstdint>
 #include <functional>
 #include <sstream>
 #include <string>
@@ -67,6 +69,31 @@ TEST(Log, BeginsATextLineWithTheSceneThatItIsAbout) {
   EXPECT_THAT(text, HasSubstr(" info flag: eve joined\n"));
   EXPECT_THAT(text, HasSubstr(" info about no scene\n"));
   EXPECT_THAT(text, testing::Not(HasSubstr("not shown")));
+}
+
+TEST(Log, LimitsLinesOfEachLevelAndSaysHowManyWereLeftOut) {
+  setUpLog("info", LogFormat::text, 3);
+  const std::uint64_t before = omittedLogLines();
+  testing::internal::CaptureStderr();
+  const spdlog::log_clock::time_point second{std::chrono::hours(1)};
+  const auto log = [&](std::chrono::milliseconds at, spdlog::level::level_enum level,
+                       const std::string& text) {
+    spdlog::default_logger()->log(second + at, {}, level, text);
+  };
+  using std::chrono::milliseconds;
+  for (int i = 0; i < 10; ++i) log(milliseconds(i), spdlog::level::info, "flood " + std::to_string(i));
+  log(milliseconds(20), spdlog::level::warn, "a warning");
+  log(milliseconds(1000), spdlog::level::info, "later");
+  log(milliseconds(1001), spdlog::level::info, "and again");
+  spdlog::default_logger()->flush();
+  const std::string text = testing::internal::GetCapturedStderr();
+  setUpLog("info");
+  EXPECT_THAT(text, HasSubstr("flood 2\n"));
+  EXPECT_THAT(text, testing::Not(HasSubstr("flood 3")));
+  EXPECT_THAT(text, HasSubstr("a warning\n")) << "a flood of one level hides no other";
+  EXPECT_THAT(text, testing::ContainsRegex("7 lines were left out here \\(--log-rate\\)\n.*info later\n"));
+  EXPECT_THAT(text, HasSubstr("and again\n"));
+  EXPECT_EQ(omittedLogLines() - before, 7u);
 }
 
 TEST(Log, WritesOneJsonObjectForEachMessage) {

@@ -218,6 +218,48 @@ TEST_F(ComputeTest, SlicesGiveTheResultOfTheWholeRecording) {
   }
 }
 
+TEST_F(ComputeTest, WorkBetweenSlicesBelongsToNoStage) {
+  constexpr std::uint32_t kCount = 256, kSteps = 6;
+  constexpr std::size_t kHeavyBytes = 64u << 20;
+  const Buffer a = uploadOf(countedFrom(0, kCount));
+  const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
+  const Buffer other(tests::device(), BufferPurpose::state, kHeavyBytes);
+  const Kernel kernel = countUp();
+  const Bindings bindings(tests::device(), kernel, {&a, &b});
+  Recorder recorder(tests::device()), between(tests::device());
+  recorder.sliceAfter(1);
+  recorder.begin();
+  recorder.beginStage("first");
+  for (std::uint32_t step = 0; step < kSteps; ++step) {
+    if (step == kSteps / 2) recorder.beginStage("second");
+    recorder.dispatch(bindings, kCount, kCount);
+    recorder.barrier();
+  }
+  ASSERT_EQ(recorder.sliceCount(), kSteps);
+  double elsewhere = 0;
+  for (std::uint32_t slice = 0; slice < kSteps; ++slice) {
+    tests::device().submitSlice(recorder, slice);
+    between.begin();
+    between.beginStage("elsewhere");
+    for (std::uint32_t fill = 0; fill < 4; ++fill) {
+      between.fill(other, fill, kHeavyBytes);
+      between.barrier();
+    }
+    tests::submitAndWait(tests::device(), between);
+    if (between.stageTimes().empty()) GTEST_SKIP() << "the device has no timestamps";
+    elsewhere += between.stageTimes().front().seconds;
+  }
+  double seconds = 0;
+  std::vector<std::string> names;
+  for (const StageTime& time : recorder.stageTimes()) {
+    names.emplace_back(time.stage);
+    seconds += time.seconds;
+  }
+  EXPECT_THAT(names, ::testing::ElementsAre("first", "second"));
+  EXPECT_GT(seconds, 0);
+  EXPECT_LT(seconds, elsewhere / 2);
+}
+
 TEST_F(ComputeTest, RecordingRunsAgainWhenItIsSubmittedAgain) {
   constexpr std::uint32_t kCount = 64;
   const Buffer a = uploadOf(countedFrom(0, kCount));

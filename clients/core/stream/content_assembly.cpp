@@ -20,7 +20,8 @@ std::uint64_t ContentAssembly::announcedBytes() const {
                          [](std::uint64_t sum, const Content& content) { return sum + content.totalBytes; });
 }
 
-tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(const Chunk& chunk) {
+tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(const Chunk& chunk,
+                                                                                std::uint64_t maxBytes) {
   const auto known = std::find_if(unfinished_.begin(), unfinished_.end(),
                                   [&](const Content& content) { return content.id == chunk.contentId; });
   if (known != unfinished_.end()) {
@@ -32,10 +33,10 @@ tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(
   }
   if (chunk.index != 0) return wrong(chunk, "the first piece is missing");
   if (chunk.count == 0) return wrong(chunk, "a content has at least one piece");
-  if (chunk.totalBytes > kMaxContentBytes - announcedBytes())
-    return wrong(chunk, std::to_string(chunk.totalBytes) + " bytes announced; " +
-                            std::to_string(kMaxContentBytes) +
-                            " are allowed for all unfinished contents together");
+  if (chunk.totalBytes > maxBytes - std::min(maxBytes, announcedBytes()))
+    return wrong(chunk,
+                 std::to_string(chunk.totalBytes) + " bytes announced; " + std::to_string(maxBytes) +
+                     " are allowed for all unfinished contents together (cs_limits.max_content_bytes)");
   if (unfinished_.size() == kMaxUnfinished)
     return wrong(chunk, "more than " + std::to_string(kMaxUnfinished) + " contents at the same time");
   Content& content = unfinished_.emplace_back();
@@ -45,12 +46,13 @@ tl::expected<ContentAssembly::Content*, std::string> ContentAssembly::contentOf(
   return &content;
 }
 
-tl::expected<std::optional<std::string>, std::string> ContentAssembly::add(const Chunk& chunk) {
+tl::expected<std::optional<std::string>, std::string> ContentAssembly::add(const Chunk& chunk,
+                                                                           std::uint64_t maxBytes) {
   if (chunk.kind != field::ContentKind::kStreamDescription) return std::nullopt;
   if (chunk.data.size() > kMaxChunkBytes)
     return wrong(chunk, std::to_string(chunk.data.size()) + " bytes; at most " +
                             std::to_string(kMaxChunkBytes) + " are allowed");
-  const auto found = contentOf(chunk);
+  const auto found = contentOf(chunk, maxBytes);
   if (!found) return tl::unexpected(found.error());
   Content& content = **found;
   if (chunk.data.size() > content.totalBytes - content.data.size())

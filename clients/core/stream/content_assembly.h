@@ -16,14 +16,14 @@ namespace clothstream::client {
 class ContentAssembly {
  public:
   static constexpr std::size_t kMaxChunkBytes = 256 * 1024;
-  // Limit for all unfinished contents together.
-  static constexpr std::uint64_t kMaxContentBytes = 256ull * 1024 * 1024;
   static constexpr std::size_t kMaxUnfinished = 4;
 
   // Adds a chunk. Chunks of one content must arrive in order; contents may interleave. Returns the bytes of a
   // stream description after its last chunk, else nullopt. Unknown kinds of content are ignored. The error
   // says what the server did wrong. Memory grows with the data that arrived, not with the announced size.
-  [[nodiscard]] tl::expected<std::optional<std::string>, std::string> add(const Chunk& chunk);
+  // `maxBytes` limits all unfinished contents together.
+  [[nodiscard]] tl::expected<std::optional<std::string>, std::string> add(const Chunk& chunk,
+                                                                          std::uint64_t maxBytes);
 
  private:
   struct Content {
@@ -33,7 +33,7 @@ class ContentAssembly {
     std::string data;
   };
 
-  tl::expected<Content*, std::string> contentOf(const Chunk& chunk);
+  tl::expected<Content*, std::string> contentOf(const Chunk& chunk, std::uint64_t maxBytes);
   std::uint64_t announcedBytes() const;
 
   std::vector<Content> unfinished_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Order of messages: Hello, control, acknowledgement, poses.
+// Order of messages: proof of identity, Hello, control, acknowledgement, poses.
 #include "clients/core/stream/outbox.h"
 
 namespace clothstream::client {
@@ -11,6 +11,7 @@ bool Outbox::addControl(std::string message) {
 }
 
 void Outbox::clear() {
+  proof_.clear();
   hello_.clear();
   control_.clear();
   poses_.clear();
@@ -18,7 +19,10 @@ void Outbox::clear() {
 }
 
 const std::string* Outbox::next() {
-  if (!hello_.empty()) {
+  if (!proof_.empty()) {
+    taken_.swap(proof_);
+    proof_.clear();
+  } else if (!hello_.empty()) {
     taken_.swap(hello_);
     hello_.clear();
   } else if (!control_.empty()) {

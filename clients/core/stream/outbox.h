@@ -12,13 +12,15 @@
 
 namespace clothstream::client {
 
-// Keeps only the newest acknowledgement and the newest poses. Hello is sent first, then the control messages
-// in order.
+// Keeps only the newest acknowledgement and the newest poses. The proof of identity is sent first, then
+// Hello, then the control messages in order.
 class Outbox {
  public:
   // Limit of waiting control messages. At the limit the transport has stopped sending.
   static constexpr std::size_t kMaxControl = 256;
 
+  // Replaces a proof that waits; empty: none.
+  void setProof(std::string authenticate) { proof_ = std::move(authenticate); }
   // Replaces a Hello that waits.
   void setHello(std::string hello) { hello_ = std::move(hello); }
   bool helloWaits() const { return !hello_.empty(); }
@@ -33,6 +35,7 @@ class Outbox {
   const std::string* next();
 
  private:
+  std::string proof_;  // empty if none waits
   std::string hello_;  // empty if none waits
   std::deque<std::string> control_;
   std::string poses_;  // empty if none wait

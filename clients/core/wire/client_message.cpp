@@ -90,6 +90,22 @@ void addShape(Writer& parent, const cs_own_collider& collider) {
 
 }  // namespace
 
+void writeAuthenticate(std::string& out, std::uint64_t requestId, const Proof& proof) {
+  writeMessage(out, requestId, field::ClientMessage::kAuthenticate, [&](Writer& message) {
+    using F = field::AuthenticateRequest;
+    if (!proof.token.empty())
+      message.add_string(F::kToken.number, proof.token);
+    else
+      message.add_string(F::kPairingCode.number, proof.pairingCode);
+  });
+}
+
+void writeCreatePairingCode(std::string& out, std::uint64_t requestId, std::uint32_t role) {
+  writeMessage(out, requestId, field::ClientMessage::kCreatePairingCode, [&](Writer& message) {
+    message.add_uint32(field::CreatePairingCodeRequest::kRole.number, role);
+  });
+}
+
 void writeHello(std::string& out, std::uint64_t requestId, const Hello& hello) {
   writeMessage(out, requestId, field::ClientMessage::kHello, [&](Writer& message) {
     using F = field::Hello;
@@ -177,9 +193,10 @@ void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t parti
   });
 }
 
-void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant) {
+void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant, bool ban) {
   writeMessage(out, requestId, field::ClientMessage::kRemoveParticipant, [&](Writer& message) {
     message.add_uint64(field::RemoveParticipant::kParticipantId.number, participant);
+    if (ban) message.add_bool(field::RemoveParticipant::kBan.number, true);
   });
 }
 

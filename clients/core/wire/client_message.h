@@ -33,6 +33,13 @@ struct Hello {
   std::uint32_t attempt = 1;  // number of this connection
 };
 
+// What proves who the client is: a token, or else a pairing code. Both empty: nothing.
+struct Proof {
+  std::string token, pairingCode;
+};
+void writeAuthenticate(std::string& out, std::uint64_t requestId, const Proof& proof);
+void writeCreatePairingCode(std::string& out, std::uint64_t requestId, std::uint32_t role);
+
 void writeHello(std::string& out, std::uint64_t requestId, const Hello& hello);
 
 struct AttachmentPose {
@@ -59,7 +66,7 @@ void writeFrameAck(std::string& out, std::uint64_t tick);
 // `early`: the client can decode the frames until then.
 void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early);
 void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t participant, std::uint32_t role);
-void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant);
+void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant, bool ban);
 void writeListScenes(std::string& out, std::uint64_t requestId);
 // Changes the clock of a scene. Empty members keep their value.
 struct SceneControl {

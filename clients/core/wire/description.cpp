@@ -28,7 +28,10 @@ struct ClothMessage {
   std::vector<Submesh> submeshes;  // firstIndex is set later
 };
 
-constexpr std::size_t kMaxSubmeshes = 65536;
+// Metres, on each axis. Far beyond any scene, and small enough that normals can be computed with floats.
+constexpr float kMaxRestCoordinate = 1e6f;
+constexpr std::size_t kMaxSubmeshes = 65536;  // of all cloths
+constexpr std::size_t kCornerBytes = sizeof(std::uint32_t), kPositionBytes = 3 * sizeof(float);
 constexpr std::size_t kMaxMaterials = 1024;
 
 bool readSubmesh(Bytes message, Submesh& submesh) {
@@ -42,7 +45,8 @@ bool readSubmesh(Bytes message, Submesh& submesh) {
   });
 }
 
-bool readCloth(Bytes message, ClothMessage& cloth) {
+// `submeshes` counts those of all cloths.
+bool readCloth(Bytes message, ClothMessage& cloth, std::size_t& submeshes) {
   using F = field::ClothDescription;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
     switch (tag) {
@@ -63,8 +67,7 @@ bool readCloth(Bytes message, ClothMessage& cloth) {
       case F::kUvTriangles.tag:
         return cloth.uvTriangles = reader.get_view(), true;
       case F::kSubmeshes.tag:
-        return cloth.submeshes.size() < kMaxSubmeshes &&
-               readSubmesh(reader.get_view(), cloth.submeshes.emplace_back());
+        return submeshes++ < kMaxSubmeshes && readSubmesh(reader.get_view(), cloth.submeshes.emplace_back());
       default:
         return skip(reader);
     }
@@ -110,6 +113,7 @@ bool readDefinition(Bytes message, Description& description) {
 bool readParts(Bytes message, Description& description, std::vector<ClothMessage>& cloths,
                Bytes& definition) {
   using F = field::StreamDescription;
+  std::size_t submeshes = 0;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
     switch (tag) {
       case F::kEpoch.tag:
@@ -132,7 +136,8 @@ bool readParts(Bytes message, Description& description, std::vector<ClothMessage
                                          : codec::NormalMode::none;
         return true;
       case F::kCloths.tag:
-        return cloths.size() <= codec::kMaxClothRanges && readCloth(reader.get_view(), cloths.emplace_back());
+        return cloths.size() <= codec::kMaxClothRanges &&
+               readCloth(reader.get_view(), cloths.emplace_back(), submeshes);
       case F::kColliders.tag:
         return description.colliders.size() < kMaxSceneColliders &&
                readCollider(reader.get_view(), description.colliders.emplace_back());
@@ -222,6 +227,26 @@ std::string check(const Description& description, const std::vector<ClothMessage
   return {};
 }
 
+// Returns the error; empty if the geometry stays within the limits.
+std::string checkLimits(const std::vector<ClothMessage>& cloths, const Limits& limits) {
+  const auto exceeds = [](std::uint64_t count, const char* what, std::uint32_t most, const char* field) {
+    return std::to_string(count) + " " + what + "; this client accepts at most " + std::to_string(most) +
+           " (cs_limits." + field + ")";
+  };
+  if (cloths.size() > limits.cloths) return exceeds(cloths.size(), "cloths", limits.cloths, "max_cloths");
+  std::uint64_t vertices = 0, triangles = 0;
+  for (const ClothMessage& cloth : cloths) {
+    vertices +=
+        std::max<std::uint64_t>(cloth.layout.vertexCount, cloth.restPositions.size() / kPositionBytes);
+    triangles += cloth.triangles.size() / (3 * kCornerBytes);
+    if (cloth.layout.rows > 0 && cloth.layout.columns > 0)
+      triangles += 2 * (std::uint64_t{cloth.layout.rows} - 1) * (cloth.layout.columns - 1);
+  }
+  if (vertices > limits.vertices) return exceeds(vertices, "vertices", limits.vertices, "max_vertices");
+  if (triangles > limits.triangles) return exceeds(triangles, "triangles", limits.triangles, "max_triangles");
+  return {};
+}
+
 void appendTriangles(const codec::ClothLayout& cloth, std::uint32_t firstVertex,
                      std::vector<std::uint32_t>& out) {
   for (const std::uint32_t vertex : cloth.triangles) out.push_back(firstVertex + vertex);
@@ -237,18 +262,21 @@ void appendTriangles(const codec::ClothLayout& cloth, std::uint32_t firstVertex,
 bool appendPositions(Bytes bytes, std::vector<float>& out) {
   const auto first = static_cast<std::ptrdiff_t>(out.size());
   appendNumbers(bytes, out);
-  return std::all_of(out.begin() + first, out.end(), isFinite);
+  return std::all_of(out.begin() + first, out.end(),
+                     [](float coordinate) { return std::abs(coordinate) <= kMaxRestCoordinate; });
 }
 
 }  // namespace
 
-tl::expected<Description, std::string> readDescription(Bytes message) {
+tl::expected<Description, std::string> readDescription(Bytes message, const Limits& limits) {
   Description description;
   description.layout.maxError = 0;  // a missing field is zero
   std::vector<ClothMessage> cloths;
   Bytes definition;
   if (!readParts(message, description, cloths, definition))
     return tl::unexpected(std::string("it is not a StreamDescription"));
+  if (std::string problem = checkLimits(cloths, limits); !problem.empty())
+    return tl::unexpected(std::move(problem));
   for (ClothMessage& cloth : cloths) {
     if (!appendNumbers(cloth.triangles, cloth.layout.triangles))
       return tl::unexpected(quoted(cloth.name) + ": the size of triangles is not a multiple of 4 bytes");
@@ -277,7 +305,8 @@ tl::expected<Description, std::string> readDescription(Bytes message) {
       return tl::unexpected(quoted(source.name) + ": " + problem);
     firstVertex += source.layout.vertexCount;
     if (!appendPositions(source.restPositions, description.restPositions))
-      return tl::unexpected(quoted(source.name) + ": a rest position is not finite");
+      return tl::unexpected(quoted(source.name) +
+                            ": a rest position is not finite, or farther than 1000 km from the origin");
     cloth.name = std::move(source.name);
   }
   description.restNormals.resize(description.restPositions.size());

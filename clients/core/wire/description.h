@@ -10,6 +10,7 @@
 #include <tl/expected.hpp>
 
 #include "clients/core/wire/collider.h"
+#include "clients/core/wire/limits.h"
 #include "clients/core/wire/parameter_change.h"
 #include "proto/codec/stream_layout.h"
 
@@ -54,9 +55,9 @@ struct Description {
 };
 
 // Reads a serialised StreamDescription, checks it, and adds triangles and normals. Memory grows with the
-// positions in the message, not with the counts that it states. The error names the field, its value and the
-// allowed values.
-[[nodiscard]] tl::expected<Description, std::string> readDescription(Bytes message);
+// positions in the message, not with the counts that it states, and stays within the limits. The error names
+// the field, its value and the allowed values.
+[[nodiscard]] tl::expected<Description, std::string> readDescription(Bytes message, const Limits& limits);
 
 // Returns nullptr if the collider is not a hull of this description.
 const Hull* hullOf(const Collider& collider, const Description& description);

@@ -283,6 +283,7 @@ struct NoticeKind {
   static constexpr std::uint32_t kRecordingStarted = 40;
   static constexpr std::uint32_t kRecordingStopped = 41;
   static constexpr std::uint32_t kRecordingDamaged = 42;
+  static constexpr std::uint32_t kLoadChanged = 60;
 };
 struct ErrorCode {
   static constexpr std::uint32_t kUnspecified = 0;
@@ -298,6 +299,8 @@ struct ErrorCode {
   static constexpr std::uint32_t kCutOff = 31;
   static constexpr std::uint32_t kTakenOver = 32;
   static constexpr std::uint32_t kRemoved = 33;
+  static constexpr std::uint32_t kUnauthenticated = 60;
+  static constexpr std::uint32_t kWrongPairingCode = 61;
 };
 struct ClientMessage {
   static constexpr Field kRequestId{1, WireType::kVarint};
@@ -317,6 +320,10 @@ struct ClientMessage {
   static constexpr Field kRemoveParticipant{31, WireType::kBytes};
   static constexpr Field kStartRecording{40, WireType::kBytes};
   static constexpr Field kStopRecording{41, WireType::kBytes};
+  static constexpr Field kAuthenticate{60, WireType::kBytes};
+  static constexpr Field kCreatePairingCode{61, WireType::kBytes};
+  static constexpr Field kListBans{62, WireType::kBytes};
+  static constexpr Field kLiftBan{63, WireType::kBytes};
 };
 struct ServerMessage {
   static constexpr Field kRequestId{1, WireType::kVarint};
@@ -338,6 +345,10 @@ struct ServerMessage {
   static constexpr Field kStartRecording{41, WireType::kBytes};
   static constexpr Field kStopRecording{42, WireType::kBytes};
   static constexpr Field kOperatingPoint{50, WireType::kBytes};
+  static constexpr Field kAuthenticate{60, WireType::kBytes};
+  static constexpr Field kCreatePairingCode{61, WireType::kBytes};
+  static constexpr Field kListBans{62, WireType::kBytes};
+  static constexpr Field kLiftBan{63, WireType::kBytes};
 };
 struct Hello {
   static constexpr Field kProtocolVersion{1, WireType::kVarint};
@@ -385,6 +396,39 @@ struct SetRole {
 };
 struct RemoveParticipant {
   static constexpr Field kParticipantId{1, WireType::kVarint};
+  static constexpr Field kBan{60, WireType::kVarint};
+};
+struct AuthenticateRequest {
+  static constexpr Field kToken{1, WireType::kBytes};
+  static constexpr Field kPairingCode{2, WireType::kBytes};
+};
+struct AuthenticateResponse {
+  static constexpr Field kToken{1, WireType::kBytes};
+  static constexpr Field kRole{2, WireType::kVarint};
+  static constexpr Field kScene{3, WireType::kBytes};
+  static constexpr Field kExpiresS{4, WireType::kVarint};
+};
+struct CreatePairingCodeRequest {
+  static constexpr Field kRole{1, WireType::kVarint};
+};
+struct CreatePairingCodeResponse {
+  static constexpr Field kCode{1, WireType::kBytes};
+  static constexpr Field kRole{2, WireType::kVarint};
+  static constexpr Field kValidS{3, WireType::kVarint};
+};
+struct Ban {
+  static constexpr Field kSubject{1, WireType::kBytes};
+  static constexpr Field kDisplayName{2, WireType::kBytes};
+};
+struct ListBansRequest {
+  static constexpr Field kScene{1, WireType::kBytes};
+};
+struct ListBansResponse {
+  static constexpr Field kBans{1, WireType::kBytes};
+};
+struct LiftBanRequest {
+  static constexpr Field kScene{1, WireType::kBytes};
+  static constexpr Field kSubject{2, WireType::kBytes};
 };
 struct Chunk {
   static constexpr Field kContentId{1, WireType::kVarint};
@@ -428,6 +472,7 @@ struct Frame {
   static constexpr Field kStateHash{5, WireType::kFixed64};
   static constexpr Field kColliders{6, WireType::kBytes};
   static constexpr Field kReport{7, WireType::kBytes};
+  static constexpr Field kFrameDivisor{60, WireType::kVarint};
 };
 struct SimulationReport {
   static constexpr Field kCloths{1, WireType::kBytes};

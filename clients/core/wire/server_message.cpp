@@ -65,9 +65,9 @@ bool readParticipant(Bytes message, Participant& out) {
       case F::kId.tag:
         return set(out.id, reader.get_uint64());
       case F::kDisplayName.tag:
-        return setText(out.name, reader);
+        return setText(out.name, reader) && out.name.size() <= kMaxNameBytes;
       case F::kClientName.tag:
-        return setText(out.clientName, reader);
+        return setText(out.clientName, reader) && out.clientName.size() <= kMaxNameBytes;
       case F::kRole.tag:
         return set(out.role, reader.get_uint32());
       case F::kAway.tag:
@@ -79,10 +79,13 @@ bool readParticipant(Bytes message, Participant& out) {
 }
 
 Body bodyOf(std::uint32_t tag) {
-  constexpr std::array kKnown{Body::welcome,  Body::chunk,      Body::frame,
-                              Body::pong,     Body::notice,     Body::parameterChanged,
-                              Body::error,    Body::tickEvents, Body::listScenes,
-                              Body::presence, Body::playback,   Body::operatingPoint};
+  constexpr std::array kKnown{Body::welcome,      Body::chunk,
+                              Body::frame,        Body::pong,
+                              Body::notice,       Body::parameterChanged,
+                              Body::error,        Body::tickEvents,
+                              Body::listScenes,   Body::presence,
+                              Body::playback,     Body::operatingPoint,
+                              Body::authenticate, Body::createPairingCode};
   for (const Body body : kKnown) {
     if (tag == bytes(static_cast<std::uint32_t>(body))) return body;
   }
@@ -100,9 +103,9 @@ std::optional<ServerMessage> readServerMessage(Bytes bytes) {
   });
 }
 
-std::optional<Welcome> readWelcome(Bytes message) {
+std::optional<Welcome> readWelcome(Bytes message, const Limits& limits) {
   using F = field::Welcome;
-  return readMessage<Welcome>(message, [](Welcome& welcome, std::uint32_t tag, Reader& reader) {
+  return readMessage<Welcome>(message, [&](Welcome& welcome, std::uint32_t tag, Reader& reader) {
     switch (tag) {
       case F::kProtocolVersion.tag:
         return set(welcome.protocolVersion, reader.get_uint32());
@@ -121,12 +124,12 @@ std::optional<Welcome> readWelcome(Bytes message) {
       case F::kRole.tag:
         return set(welcome.role, reader.get_uint32());
       case F::kResumeToken.tag:
-        return setText(welcome.token, reader);
+        return setBytes(welcome.token, reader);
       case F::kResumed.tag:
         return set(welcome.resumed, reader.get_bool());
       case F::kParticipants.tag:
-        return welcome.participants.size() < kMaxParticipants &&
-               readParticipant(reader.get_view(), welcome.participants.emplace_back());
+        if (welcome.participants.size() > limits.participants) return skip(reader);
+        return readParticipant(reader.get_view(), welcome.participants.emplace_back());
       case F::kHoldMs.tag:
         return set(welcome.graceMs, reader.get_uint32());
       default:
@@ -164,6 +167,7 @@ bool readFrame(Bytes message, Frame& frame) {
   frame.reconstructionHash = 0;
   frame.colliders.clear();
   frame.report.reset();
+  frame.divisor = 1;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
     switch (tag) {
       case F::kPacket.tag:
@@ -181,6 +185,9 @@ bool readFrame(Bytes message, Frame& frame) {
       case F::kReport.tag:
         frame.report = reader.get_view();
         return true;
+      case F::kFrameDivisor.tag:
+        return set(frame.divisor, reader.get_uint32()) && frame.divisor >= 1 &&
+               frame.divisor <= kMaxFrameDivisor;
       default:
         return skip(reader);
     }
@@ -265,6 +272,29 @@ std::optional<ParameterChange> readParameterChanged(Bytes message) {
         if (tag == F::kParticipantId.tag) return set(change.participantId, reader.get_uint64());
         return tag == F::kChange.tag ? readParameterChange(reader.get_view(), change) : skip(reader);
       });
+}
+
+std::optional<std::string> readToken(Bytes message) {
+  using F = field::AuthenticateResponse;
+  return readMessage<std::string>(message, [](std::string& token, std::uint32_t tag, Reader& reader) {
+    return tag == F::kToken.tag ? setText(token, reader) : skip(reader);
+  });
+}
+
+std::optional<PairingCode> readPairingCode(Bytes message) {
+  using F = field::CreatePairingCodeResponse;
+  return readMessage<PairingCode>(message, [](PairingCode& made, std::uint32_t tag, Reader& reader) {
+    switch (tag) {
+      case F::kCode.tag:
+        return setText(made.code, reader);
+      case F::kRole.tag:
+        return set(made.role, reader.get_uint32());
+      case F::kValidS.tag:
+        return set(made.validSeconds, reader.get_uint32());
+      default:
+        return skip(reader);
+    }
+  });
 }
 
 std::optional<ServerError> readError(Bytes message) {

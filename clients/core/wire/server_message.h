@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/core/wire/limits.h"
 #include "clients/core/wire/parameter_change.h"
 #include "clients/core/wire/wire.h"
 
@@ -29,6 +30,8 @@ enum class Body : std::uint32_t {
   presence = field::ServerMessage::kPresence.number,
   playback = field::ServerMessage::kPlayback.number,
   operatingPoint = field::ServerMessage::kOperatingPoint.number,
+  authenticate = field::ServerMessage::kAuthenticate.number,
+  createPairingCode = field::ServerMessage::kCreatePairingCode.number,
 };
 
 // An unknown kind of body is `none`.
@@ -86,12 +89,15 @@ struct SimulationReport {
   double deviceSeconds = 0;
 };
 
+inline constexpr std::uint32_t kMaxFrameDivisor = 1000;
+
 struct Frame {
   Bytes packet;
   std::uint64_t tickTimeUs = 0, packetTimeUs = 0;  // server's clock
   std::uint64_t reconstructionHash = 0;
   std::vector<Bytes> colliders;  // serialised ColliderStates
   std::optional<Bytes> report;   // a serialised SimulationReport
+  std::uint32_t divisor = 1;     // the server sends each divisor-th frame
 };
 
 struct Pong {
@@ -110,6 +116,11 @@ struct ServerError {
   bool fatal = false;
 };
 
+struct PairingCode {
+  std::string code;  // six digits
+  std::uint32_t role = 0, validSeconds = 0;
+};
+
 struct ContactEvent {
   std::uint32_t kind = 0, colliderId = 0;
   std::uint64_t participantId = 0;
@@ -125,7 +136,8 @@ struct TickEvents {
 // The functions return nullopt or false if the message is not well formed, a number is not finite, or there
 // are more elements than the protocol allows.
 [[nodiscard]] std::optional<ServerMessage> readServerMessage(Bytes message);
-[[nodiscard]] std::optional<Welcome> readWelcome(Bytes message);
+// Reads one participant more than the limit, so that the caller can tell.
+[[nodiscard]] std::optional<Welcome> readWelcome(Bytes message, const Limits& limits);
 [[nodiscard]] std::optional<Chunk> readChunk(Bytes message);
 // Reuses the memory of `frame`, whose views point into the message.
 [[nodiscard]] bool readFrame(Bytes message, Frame& frame);
@@ -137,13 +149,15 @@ struct TickEvents {
 [[nodiscard]] std::optional<OperatingPoint> readOperatingPoint(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
+// Returns the token of an AuthenticateResponse; empty if it has none.
+[[nodiscard]] std::optional<std::string> readToken(Bytes message);
+[[nodiscard]] std::optional<PairingCode> readPairingCode(Bytes message);
 [[nodiscard]] bool readTickEvents(Bytes message, TickEvents& events);
 // Returns the names of the scenes.
 [[nodiscard]] std::optional<std::vector<std::string>> readScenes(Bytes message);
 // Reuses the memory of `out`.
 [[nodiscard]] bool readReport(Bytes message, SimulationReport& out);
 
-inline constexpr std::size_t kMaxParticipants = 4096;
 inline constexpr std::size_t kMaxScenes = 65536;
 inline constexpr std::size_t kMaxEvents = 65536;  // per kind
 

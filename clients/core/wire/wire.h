@@ -15,6 +15,7 @@
 #include <protozero/pbf_reader.hpp>
 
 #include "clients/core/wire/field_numbers.h"
+#include "proto/text/utf8.h"
 
 namespace clothstream::client {
 
@@ -90,8 +91,16 @@ inline bool setFinite(double& target, Reader& reader) {
   return std::isfinite(target);
 }
 
+inline bool setBytes(std::string& target, Reader& reader) {
+  const Bytes view = reader.get_view();
+  target.assign(view.data(), view.size());
+  return true;
+}
+
+// Returns false, and leaves the target, if the text is not UTF-8.
 inline bool setText(std::string& target, Reader& reader) {
   const Bytes view = reader.get_view();
+  if (!isUtf8({view.data(), view.size()})) return false;
   target.assign(view.data(), view.size());
   return true;
 }

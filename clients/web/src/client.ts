@@ -12,6 +12,7 @@ import {
   cs_environment,
   cs_grab,
   cs_grab_event,
+  cs_pairing_code,
   cs_participant,
   cs_play_out_options,
   cs_playback,
@@ -40,7 +41,19 @@ export const ClientEvent = {
   grabs: 128,
   participants: 512,
   returned: 2048,
+  token: 8192,
+  pairingCode: 16384,
 } as const;
+
+// Values of Client.errorCode after which a person must give a token or a pairing code.
+export const kUnauthenticated = 60;
+export const kWrongPairingCode = 61;
+
+export interface PairingCode {
+  code: string;
+  role: number;
+  validSeconds: number;
+}
 
 export interface Statistics {
   tick: number;
@@ -217,6 +230,33 @@ export class Client {
       throw new Error("The client core is of another release than the page");
   }
 
+  // What the next connection sends before Hello; the newer call replaces the older one. "" means nothing.
+  setToken(token: string): void {
+    this.core.with([token], (text) => this.core.exports.cs_set_token(this.handle, text!));
+  }
+  setPairingCode(code: string): void {
+    this.core.with([code], (text) => this.core.exports.cs_set_pairing_code(this.handle, text!));
+  }
+  // Token in use: that of setToken, or of the server after pairing.
+  get token(): string {
+    return this.core.text(this.core.exports.cs_token(this.handle));
+  }
+
+  // Requests a code by which others become participants. ClientEvent.pairingCode or ClientEvent.error follows.
+  createPairingCode(): void {
+    this.core.exports.cs_create_pairing_code(this.handle, 0);
+  }
+  // The newest code.
+  pairingCode(): PairingCode | undefined {
+    if (this.core.exports.cs_get_pairing_code(this.handle, this.scratch) === 0) return undefined;
+    const view = this.core.view();
+    return {
+      code: this.core.text(view.getUint32(this.scratch + cs_pairing_code.code, true)),
+      role: view.getUint32(this.scratch + cs_pairing_code.role, true),
+      validSeconds: view.getUint32(this.scratch + cs_pairing_code.valid_s, true),
+    };
+  }
+
   destroy(): void {
     this.core.exports.cs_destroy(this.handle);
     this.core.exports.free(this.scratch);
@@ -281,6 +321,9 @@ export class Client {
   get state(): ClientState {
     return this.core.exports.cs_get_state(this.handle);
   }
+  get errorCode(): number {
+    return this.core.exports.cs_error_code(this.handle);
+  }
   get errorText(): string {
     return this.core.text(this.core.exports.cs_error_text(this.handle));
   }
@@ -292,6 +335,14 @@ export class Client {
   }
   get sceneName(): string {
     return this.core.text(this.core.exports.cs_scene_name(this.handle));
+  }
+  // Frames per second of the stream.
+  get streamRate(): number {
+    return this.core.exports.cs_stream_rate(this.handle);
+  }
+  // n if the server sends only each n-th frame, because its device is overloaded; else 1.
+  get frameDivisor(): number {
+    return this.core.exports.cs_frame_divisor(this.handle);
   }
   get vertexCount(): number {
     return this.core.exports.cs_vertex_count(this.handle);

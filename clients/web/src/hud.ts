@@ -84,7 +84,8 @@ export class Hud {
 
   showFigures(client: Client): void {
     const statistics = client.statistics();
-    this.figure("fps", statistics.framesPerSecond.toFixed(0));
+    const fps = statistics.framesPerSecond.toFixed(0);
+    this.figure("fps", client.frameDivisor > 1 ? `${fps} of ${client.streamRate}, overloaded` : fps);
     this.figure("kbit", statistics.kbitPerSecond.toFixed(0));
     this.figure("bits", statistics.bitsPerVertex.toFixed(1));
     this.figure("round-trip", `${statistics.roundTripMs.toFixed(1)} ms`);

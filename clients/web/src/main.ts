@@ -6,10 +6,12 @@ import { Roles } from "./client";
 import { Controls } from "./controls";
 import { Drag } from "./drag";
 import { element, Hud } from "./hud";
+import { PairingPanel, ProofForm } from "./identity";
 import { listenToKeys } from "./keys";
 import { Player } from "./player";
 import { expose } from "./probe";
 import { Session } from "./session";
+import { showAddress } from "./share";
 import { View } from "./view";
 import { CoreModule } from "./wasm";
 
@@ -36,6 +38,7 @@ async function start(): Promise<void> {
     throw error;
   });
 
+  void showAddress();
   const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
   const reports = new ClothReports();
   const drag = new Drag(view, (collider) => (controls.collider = collider));
@@ -52,8 +55,20 @@ async function start(): Promise<void> {
   const identity = { name: query.get("name") ?? "", role: wanted ?? 0, smooth: query.has("smooth") };
   if (role !== null && wanted === undefined)
     hud.showNotice(`"${role}" is not a role; use ${[...Roles.values()].join(", ")}.`);
+  const proof = new ProofForm((given) => session.prove(given));
+  const pairing = new PairingPanel(() => {
+    session.client.createPairingCode();
+    session.flush();
+  });
   const session: Session = new Session(core, address.href, scene, identity, {
-    stateChanged: () => hud.showState(session.state),
+    stateChanged: () => {
+      hud.showState(session.state);
+      proof.show(session.state.kind === "asking" ? session.state.reason : undefined);
+    },
+    pairingCodeMade: (client) => {
+      const made = client.pairingCode();
+      if (made) pairing.showCode(made);
+    },
     described: (client) => {
       hud.showScene(client);
       probe.described(client);
@@ -65,7 +80,10 @@ async function start(): Promise<void> {
       controls.show(client);
       reports.showSolvers(client);
     },
-    participantsChanged: (client) => hud.showParticipants(client),
+    participantsChanged: (client) => {
+      hud.showParticipants(client);
+      pairing.showFor(client);
+    },
     scenesListed: (scenes) => controls.listScenes(scenes, session.client.sceneName),
     grabsLost: (client) => client.lostGrabs().forEach((grab) => drag.slipped(grab)),
     notice: (text) => hud.showNotice(text),

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Membership in a scene across several connections. The client core decides when to connect, and as which participant.
 
-import { Client, ClientEvent, ClientState, type Identity } from "./client";
+import { Client, ClientEvent, ClientState, kUnauthenticated, kWrongPairingCode, type Identity } from "./client";
+import { keepToken, keptToken, type Proof } from "./identity";
 import { StreamSocket } from "./socket";
 import type { CoreModule } from "./wasm";
 
@@ -9,6 +10,7 @@ export type SessionState =
   | { kind: "connecting" }
   | { kind: "live" }
   | { kind: "reconnecting"; reason: string; attemptAt: number } // on the clock of performance.now()
+  | { kind: "asking"; reason: string } // the server requires a token or a pairing code
   | { kind: "failed"; reason: string };
 
 export interface SessionListener {
@@ -19,6 +21,7 @@ export interface SessionListener {
   scenesListed(scenes: string[]): void;
   grabsLost(client: Client): void;
   notice(text: string): void;
+  pairingCodeMade(client: Client): void;
   // The server refused a request; the session continues.
   refused(client: Client): void;
 }
@@ -29,6 +32,7 @@ export class Session {
   state: SessionState = { kind: "connecting" };
   client: Client;
   private readonly socket: StreamSocket;
+  private scene: string;
 
   constructor(
     private readonly core: CoreModule,
@@ -37,7 +41,9 @@ export class Session {
     private readonly identity: Identity,
     private readonly listener: SessionListener,
   ) {
+    this.scene = scene;
     this.client = new Client(core, scene, identity);
+    this.client.setToken(keptToken());
     this.socket = new StreamSocket(url, {
       opened: () => this.flush(),
       message: (bytes) => this.receive(bytes),
@@ -54,8 +60,18 @@ export class Session {
 
   // Joins a scene. Joining the current scene again starts a new session.
   join(scene: string): void {
-    this.client.destroy();
-    this.client = new Client(this.core, scene, this.identity);
+    const { token } = this.client;
+    this.begin(scene);
+    this.client.setToken(token);
+    this.enter({ kind: "connecting" });
+    this.connect();
+  }
+
+  // Joins with what a person has given.
+  prove(proof: Proof): void {
+    this.begin(this.scene);
+    if ("code" in proof) this.client.setPairingCode(proof.code);
+    else this.client.setToken(proof.token);
     this.enter({ kind: "connecting" });
     this.connect();
   }
@@ -74,6 +90,12 @@ export class Session {
     }
   }
 
+  private begin(scene: string): void {
+    this.scene = scene;
+    this.client.destroy();
+    this.client = new Client(this.core, scene, this.identity);
+  }
+
   private connect(): void {
     this.client.connecting();
     this.client.listScenes();
@@ -81,7 +103,7 @@ export class Session {
   }
 
   private tick(): void {
-    if (this.state.kind === "failed") return;
+    if (this.state.kind === "failed" || this.state.kind === "asking") return;
     this.client.update();
     this.flush();
     if (performance.now() < this.client.connectAtMs) return;
@@ -100,12 +122,18 @@ export class Session {
     if (events & ClientEvent.participants) this.listener.participantsChanged(client);
     if (events & ClientEvent.scenes) this.listener.scenesListed(client.scenes());
     if (events & ClientEvent.grabs) this.listener.grabsLost(client);
+    if (events & ClientEvent.token) keepToken(client.token);
+    if (events & ClientEvent.pairingCode) this.listener.pairingCodeMade(client);
     if (events & ClientEvent.notice) this.listener.notice(client.noticeText);
     if (events & ClientEvent.error) {
-      if (client.state === ClientState.failed) this.fail(client.errorText);
+      if (client.state === ClientState.failed) this.fail(client);
       else this.listener.refused(client);
     }
-    if (this.state.kind !== "live" && client.state === ClientState.joined) this.enter({ kind: "live" });
+    if (this.state.kind !== "live" && client.state === ClientState.joined) {
+      // A token that a person has typed works: keep it.
+      if (client.token) keepToken(client.token);
+      this.enter({ kind: "live" });
+    }
   }
 
   private lose(reason: string): void {
@@ -114,10 +142,13 @@ export class Session {
     if (performance.now() >= this.client.connectAtMs) this.connect();
   }
 
-  // Stops, because the same request would be refused again. The user must choose another scene.
-  private fail(reason: string): void {
+  // Stops, because the same request would be refused again. The user must give a proof, or choose another scene.
+  private fail(client: Client): void {
     this.socket.close();
-    this.enter({ kind: "failed", reason });
+    const reason = client.errorText;
+    const asks = client.errorCode === kUnauthenticated || client.errorCode === kWrongPairingCode;
+    if (client.errorCode === kUnauthenticated && client.token === keptToken()) keepToken("");
+    this.enter(asks ? { kind: "asking", reason } : { kind: "failed", reason });
   }
 
   private enter(state: SessionState): void {

@@ -10,6 +10,12 @@ export interface CoreExports {
   malloc(bytes: number): Pointer;
   free(pointer: Pointer): void;
   cs_create_as(scene: Pointer, clientName: Pointer, displayName: Pointer, role: number): Pointer;
+  cs_set_token(client: Pointer, token: Pointer): void;
+  cs_set_pairing_code(client: Pointer, code: Pointer): void;
+  cs_token(client: Pointer): Pointer;
+  cs_create_pairing_code(client: Pointer, role: number): void;
+  cs_get_pairing_code(client: Pointer, out: Pointer): number;
+  cs_error_code(client: Pointer): number;
   cs_connecting(client: Pointer, nowUs: bigint): void;
   cs_disconnected(client: Pointer, nowUs: bigint): void;
   cs_connect_at(client: Pointer): bigint;
@@ -25,6 +31,8 @@ export interface CoreExports {
   cs_get_statistics(client: Pointer, nowUs: bigint, out: Pointer): void;
   cs_device_name(client: Pointer): Pointer;
   cs_scene_name(client: Pointer): Pointer;
+  cs_stream_rate(client: Pointer): number;
+  cs_frame_divisor(client: Pointer): number;
   cs_vertex_count(client: Pointer): number;
   cs_positions(client: Pointer): Pointer;
   cs_normals(client: Pointer): Pointer;

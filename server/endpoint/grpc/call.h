@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <new>
+#include <thread>
 #include <unordered_set>
 #include <utility>
 
@@ -105,12 +107,18 @@ class Call : public std::enable_shared_from_this<Call> {
   bool isMade_ = false, isOver_ = false;
 };
 
-// Waits for the next call of this kind.
+// Waits for the next call of this kind. Without memory it tries again until there is some, because the
+// endpoint would accept no further call of this kind.
 template <typename Kind, typename... Arguments>
 void await(GrpcEndpointContext& endpoint, Arguments&&... arguments) {
-  const auto call = std::make_shared<Kind>(endpoint, std::forward<Arguments>(arguments)...);
-  endpoint.calls.insert(call);
-  call->await();
+  for (std::shared_ptr<Kind> call;;) try {
+      call = std::make_shared<Kind>(endpoint, arguments...);
+      endpoint.calls.insert(call);
+      return call->await();
+    } catch (const std::bad_alloc&) {
+      endpoint.calls.erase(call);
+      std::this_thread::yield();
+    }
 }
 
 }  // namespace clothstream::endpoint

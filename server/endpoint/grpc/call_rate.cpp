@@ -1,25 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/grpc/call_rate.h"
 
+#include "server/endpoint/grpc/caller.h"
+
 namespace clothstream::endpoint {
-namespace {
-
-// Address in `peer`, such as ipv4:192.0.2.1:50000 or ipv6:%5B2001:db8::1%5D:50000.
-boost::asio::ip::address addressIn(const std::string& peer) {
-  const std::size_t scheme = peer.find(':'), port = peer.rfind(':');
-  if (scheme == port) return {};
-  std::string host = peer.substr(scheme + 1, port - scheme - 1);
-  constexpr std::size_t kBracket = 3;  // %5B and %5D
-  if (host.starts_with("%5B") && host.size() > 2 * kBracket)
-    host = host.substr(kBracket, host.size() - 2 * kBracket);
-  boost::system::error_code unknown;  // counts as an address of its own
-  return boost::asio::ip::make_address(host, unknown);
-}
-
-}  // namespace
 
 bool CallRate::take(const std::string& peer, schedule::Clock::time_point now, double cost) {
-  return rate_.take(addressKey(addressIn(peer)), now, cost);
+  return rate_.take(addressKeyOf(peer), now, cost);
 }
 
 }  // namespace clothstream::endpoint

@@ -109,8 +109,8 @@ class HealthWatch final : public Call {
 }  // namespace
 
 void offerHealth(GrpcEndpointContext& endpoint, HealthService& service) {
-  offer(endpoint, service, &HealthService::RequestCheck,
-        [](const auto& request, auto answer) { answer(check(request)); });
+  offerToAll(endpoint, service, &HealthService::RequestCheck,
+             [](const auto& request, const grpc::ServerContext&, auto answer) { answer(check(request)); });
   await<HealthWatch>(endpoint, service);
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/status.h"
 
 namespace clothstream::endpoint {
@@ -41,6 +42,7 @@ void JoinStream::onBegun(bool ok) {
   begin(ended_);
   endpoint::await<JoinStream>(endpoint_, service_);
   if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
+  if (endpoint_.streams >= endpoint_.maxStreams) endpoint_.metrics.refuse(telemetry::Refusal::connections);
   if (endpoint_.streams >= endpoint_.maxStreams)
     return finish({grpc::StatusCode::RESOURCE_EXHAUSTED, "the server has no free stream; try again later"});
   ++endpoint_.streams;
@@ -55,7 +57,11 @@ void JoinStream::onBegun(bool ok) {
       if (const auto self = weak.lock()) self->pump();
     });
   };
-  session_ = session::Session::open(endpoint_.server, "grpc " + context_.peer(), std::move(wake));
+  session_ = session::Session::open(endpoint_.server,
+                                    {.peer = "grpc " + context_.peer(),
+                                     .address = addressKeyOf(context_.peer()),
+                                     .token = tokenIn(context_)},
+                                    std::move(wake));
   read();
   pump();
 }
@@ -74,7 +80,17 @@ void JoinStream::onRead(bool ok) {
   if (!incoming_.DumpToSingleSlice(&bytes).ok())
     return finish({grpc::StatusCode::INTERNAL, "cannot read the message"});
   session_->receive(std::as_bytes(std::span(bytes.begin(), bytes.size())));
-  read();
+  const schedule::Clock::duration pause = session_->readPause();
+  if (pause <= schedule::Clock::duration::zero()) return read();
+  pause_.emplace();
+  pause_->Set(&endpoint_.loop->queue(),
+              std::chrono::system_clock::now() +
+                  std::chrono::duration_cast<std::chrono::system_clock::duration>(pause),
+              begin(paused_));
+}
+
+void JoinStream::onPaused(bool) {
+  if (session_) read();
 }
 
 void JoinStream::pump() {
@@ -128,6 +144,7 @@ void JoinStream::onEnded(bool) {
   hasEnded_ = true;
   if (isCounted_) --endpoint_.streams;
   if (cancellation_) cancellation_->Cancel();
+  if (pause_) pause_->Cancel();
   if (departing_ && !context_.IsCancelled()) departing_->leave();
   departing_.reset();
   finish(cancelled());

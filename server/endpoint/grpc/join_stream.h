@@ -27,6 +27,7 @@ class JoinStream final : public Call {
   void onRead(bool ok);
   void onWritten(bool ok);
   void onLateForEnd(bool expired);
+  void onPaused(bool expired);
   void onFinished(bool) {}
   void onEnded(bool ok);
 
@@ -49,9 +50,11 @@ class JoinStream final : public Call {
   std::optional<grpc::Status> closing_;  // set while the stream closes
   bool isCounted_ = false, isWriting_ = false, hasEnded_ = false;
   std::optional<grpc::Alarm> cancellation_;  // set while the stream waits for its last write
+  std::optional<grpc::Alarm> pause_;         // before the next read, of a client that sends too fast
   Step<JoinStream> begun_{*this, &JoinStream::onBegun}, read_{*this, &JoinStream::onRead},
       written_{*this, &JoinStream::onWritten}, lateForEnd_{*this, &JoinStream::onLateForEnd},
-      finished_{*this, &JoinStream::onFinished}, ended_{*this, &JoinStream::onEnded};
+      finished_{*this, &JoinStream::onFinished}, paused_{*this, &JoinStream::onPaused},
+      ended_{*this, &JoinStream::onEnded};
 };
 
 }  // namespace clothstream::endpoint

@@ -1,40 +1,119 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/grpc/service.h"
 
+#include <exception>
 #include <utility>
 
 #include <boost/asio/post.hpp>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
+#include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/join_stream.h"
 #include "server/endpoint/grpc/unary_call.h"
-#include "server/hosting/scene_server.h"
+#include "server/hosting/server_state.h"
 
 namespace clothstream::endpoint {
+namespace {
+
+using hosting::Identity;
+
+// An exception, such as for a lack of memory, ends one call and not the thread.
+void endOnlyTheCall(const auto& work) {
+  try {
+    work();
+  } catch (const std::exception& failure) {
+    spdlog::error("gRPC: a call failed: {}", failure.what());
+  }
+}
+
+tl::expected<v1::GetSceneResponse, v1::Error> sceneOf(const hosting::SceneServer& server,
+                                                      const v1::GetSceneRequest& request,
+                                                      const Identity& by) {
+  try {
+    return server.getScene(request, by);
+  } catch (const std::exception& failure) {
+    v1::Error error;
+    error.set_code(v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+    error.set_text(fmt::format("getScene: failed on the server: {}", failure.what()));
+    return tl::unexpected(std::move(error));
+  }
+}
+
+template <typename Response>
+tl::expected<Response, v1::Error> toAnswer(messages::Result<Response> result) {
+  if (!result) return tl::unexpected(hosting::toMessage(result.error()));
+  return std::move(*result);
+}
+
+// Calls about identities and bans.
+void offerIdentity(GrpcEndpointContext& endpoint, Service& service) {
+  hosting::SceneServer::State& server = endpoint.server.state();
+  offerToAll(endpoint, service, &Service::RequestAuthenticate,
+             [&server](const auto& request, const grpc::ServerContext& context, auto answer) {
+               v1::AuthenticateResponse response;
+               const auto identity = server.authenticate(request, addressKeyOf(context.peer()),
+                                                         schedule::Clock::now(), response);
+               if (!identity) return answer(tl::unexpected(hosting::toMessage(identity.error())));
+               answer(std::move(response));
+             });
+  offer(endpoint, service, &Service::RequestCreatePairingCode,
+        [&server](const auto& request, const Identity& by, auto answer) {
+          answer(toAnswer(server.createPairingCode(by, request, schedule::Clock::now())));
+        });
+  offer(endpoint, service, &Service::RequestListBans,
+        [&server](const auto& request, const Identity& by, auto answer) {
+          const auto may = server.mayFromOutside(by, request.scene(), scene::Action::manageBans);
+          if (!may) return answer(tl::unexpected(hosting::toMessage(may.error())));
+          answer(toAnswer(server.listBans(request)));
+        });
+  offer(endpoint, service, &Service::RequestLiftBan,
+        [&server](const auto& request, const Identity& by, auto answer) {
+          const auto may = server.mayFromOutside(by, request.scene(), scene::Action::manageBans);
+          if (!may) return answer(tl::unexpected(hosting::toMessage(may.error())));
+          answer(toAnswer(server.liftBan(request)));
+        });
+}
+
+}  // namespace
 
 void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::thread_pool& slowCalls) {
   hosting::SceneServer& server = endpoint.server;
   offer(endpoint, service, &Service::RequestListScenes,
-        [&server](const auto&, auto answer) { answer(server.listScenes()); });
+        [&server](const auto&, const Identity& by, auto answer) { answer(server.listScenes(by)); });
   // Slow, since a scene may contain a mesh of millions of vertices.
   offer(
       endpoint, service, &Service::RequestGetScene,
-      [&server, &slowCalls](const auto& request, auto answer) {
-        boost::asio::post(
-            slowCalls, [&server, request, answer = std::move(answer)] { answer(server.getScene(request)); });
+      [&server, &slowCalls](const auto& request, const Identity& by, auto answer) {
+        boost::asio::post(slowCalls, [&server, request, by, answer = std::move(answer)] {
+          endOnlyTheCall([&] { answer(sceneOf(server, request, by)); });
+        });
       },
       CallRate::kSceneCost);
   offer(
       endpoint, service, &Service::RequestCreateScene,
-      [&server](const auto& request, auto answer) { server.createScene(request, std::move(answer)); },
+      [&server](const auto& request, const Identity& by, auto answer) {
+        auto wanted = answer.wanted();
+        server.createScene(request, std::move(answer), by, std::move(wanted));
+      },
       CallRate::kSceneCost);
   offer(endpoint, service, &Service::RequestDeleteScene,
-        [&server](const auto& request, auto answer) { server.deleteScene(request, std::move(answer)); });
+        [&server](const auto& request, const Identity& by, auto answer) {
+          server.deleteScene(request, std::move(answer), by);
+        });
   offer(endpoint, service, &Service::RequestControlScene,
-        [&server](const auto& request, auto answer) { answer(server.controlScene(request)); });
+        [&server](const auto& request, const Identity& by, auto answer) {
+          answer(server.controlScene(request, by));
+        });
   offer(endpoint, service, &Service::RequestStartRecording,
-        [&server](const auto& request, auto answer) { server.startRecording(request, std::move(answer)); });
+        [&server](const auto& request, const Identity& by, auto answer) {
+          server.startRecording(request, std::move(answer), by);
+        });
   offer(endpoint, service, &Service::RequestStopRecording,
-        [&server](const auto& request, auto answer) { server.stopRecording(request, std::move(answer)); });
+        [&server](const auto& request, const Identity& by, auto answer) {
+          server.stopRecording(request, std::move(answer), by);
+        });
+  offerIdentity(endpoint, service);
   await<JoinStream>(endpoint, service);
 }
 

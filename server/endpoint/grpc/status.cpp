@@ -22,6 +22,9 @@ grpc::StatusCode codeOf(v1::ErrorCode code) {
     case v1::ERROR_CODE_PERMISSION_DENIED:
     case v1::ERROR_CODE_REMOVED:
       return grpc::StatusCode::PERMISSION_DENIED;
+    case v1::ERROR_CODE_UNAUTHENTICATED:
+    case v1::ERROR_CODE_WRONG_PAIRING_CODE:
+      return grpc::StatusCode::UNAUTHENTICATED;
     case v1::ERROR_CODE_CUT_OFF:
       return grpc::StatusCode::UNAVAILABLE;
     case v1::ERROR_CODE_TAKEN_OVER:

@@ -27,7 +27,7 @@ class WebSocketStream;
 struct WebEndpointContext {
   hosting::SceneServer& server;
   boost::asio::io_context& io;
-  const Page page;
+  Page page;
   const HostNames names;
   const std::shared_ptr<const tls::ServerTls> tls;  // null without TLS
   const std::vector<std::string> allowedOrigins;

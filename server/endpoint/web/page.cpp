@@ -104,11 +104,14 @@ Page::Page(const fs::path& directory) {
       throw std::runtime_error(
           fmt::format("the page's directory {} holds more than {} MiB: is it the right one?",
                       directory.string(), kMaxPageBytes >> 20));
-    PageFile file{readFile(entry->path()), contentTypeOf(entry->path()), {}};
-    file.entityTag = fmt::format("\"{:016x}\"", std::hash<std::string_view>{}(file.content));
-    files_.emplace((fs::path("/") / entry->path().lexically_relative(root)).generic_string(),
-                   std::move(file));
+    add((fs::path("/") / entry->path().lexically_relative(root)).generic_string(), readFile(entry->path()));
   }
+}
+
+void Page::add(const std::string& path, std::string content) {
+  PageFile file{std::move(content), contentTypeOf(path), {}};
+  file.entityTag = fmt::format("\"{:016x}\"", std::hash<std::string_view>{}(file.content));
+  files_.emplace(path, std::move(file));
 }
 
 const PageFile* Page::find(std::string_view target) const {

@@ -18,14 +18,17 @@ struct PageFile {
 
 inline constexpr std::size_t kMaxPageBytes = 64 * 1024 * 1024;
 
-// Immutable. A request can only name a key of the map, so no path leads outside the directory. No request
-// waits for a disk.
+// Immutable while it is served. A request can only name a key of the map, so no path leads outside the
+// directory. No request waits for a disk.
 class Page {
  public:
   // Reads the files of the directory; an empty path gives a page without files. Skips hidden files and links
   // that lead outside. Throws std::runtime_error if the path is not a directory, a file cannot be read, or
   // the files exceed kMaxPageBytes.
   explicit Page(const std::filesystem::path& directory);
+
+  // Adds a file that is not in the directory; one with this path keeps its content.
+  void add(const std::string& path, std::string content);
 
   // `target` comes from a request: percent-encoded, with an optional query. A directory means its index.html.
   // Returns nullptr if there is no such file.

@@ -10,7 +10,9 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <fmt/format.h>
 #include <netinet/tcp.h>
+#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
@@ -19,6 +21,7 @@
 #include "server/endpoint/web/http_connection.h"
 #include "server/endpoint/web/web_socket_stream.h"
 #include "server/hosting/server_state.h"
+#include "server/tls/qr_code.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -38,6 +41,20 @@ ConnectionLimits limitsOf(const WebEndpointOptions& options) {
   ConnectionLimits limits = options.connections;
   limits.connections = options.maxConnections + kAnsweredBeyondLimit;
   return limits;
+}
+
+// Adds the files from which the page learns its address for other devices.
+void addAddress(Page& page, const WebEndpointOptions& options, std::uint16_t port) {
+  nlohmann::json shown{{"address", ""}, {"fingerprint", ""}};
+  if (!options.hostInNetwork.empty()) {
+    const bool isV6 = options.hostInNetwork.find(':') != std::string::npos;
+    const std::string address = fmt::format(fmt::runtime(isV6 ? "{}://[{}]:{}/" : "{}://{}:{}/"),
+                                            options.tls ? "https" : "http", options.hostInNetwork, port);
+    shown["address"] = address;
+    if (options.tls && options.showsFingerprint) shown["fingerprint"] = options.tls->fingerprint();
+    page.add("/address.svg", tls::qrImage(address));
+  }
+  page.add("/address.json", shown.dump());
 }
 
 void sendFresh(tcp::socket& socket) {
@@ -69,6 +86,7 @@ struct WebEndpoint::State {
         admission(limitsOf(options)),
         acceptor(listen(io, options.host, options.port, "--port")),
         port(acceptor.local_endpoint().port()) {
+    if (!context.page.empty()) addAddress(context.page, options, port);
     accept();
     thread = std::thread([this] { run(); });
   }

@@ -11,6 +11,7 @@
 #include <boost/beast/http/rfc7230.hpp>
 #include <fmt/format.h>
 
+#include "server/endpoint/listen/address_rate.h"
 #include "server/session/closing.h"
 
 namespace clothstream::endpoint {
@@ -30,10 +31,14 @@ constexpr auto kIdleTimeout = 4s;
 // RFC 6455 5.5: a control frame holds 125 bytes, of which the code takes two.
 constexpr std::size_t kMaxCloseText = 123;
 
-std::string peerOf(const beast::tcp_stream& socket) {
+session::Arrival arrivalOf(const beast::tcp_stream& socket) {
   beast::error_code error;
   const auto endpoint = socket.socket().remote_endpoint(error);
-  return error ? "web" : fmt::format("web {}:{}", endpoint.address().to_string(), endpoint.port());
+  // The address of a connection that has ended already is unknown; it must not count as this machine.
+  if (error) return {.peer = "web", .address = "unknown", .token = {}};
+  return {.peer = fmt::format("web {}:{}", endpoint.address().to_string(), endpoint.port()),
+          .address = addressKey(endpoint.address()),
+          .token = {}};
 }
 
 // Longest prefix of `text` that fits into a close frame and does not cut a UTF-8 sequence.
@@ -54,7 +59,11 @@ ws::close_reason reasonOf(const session::Closing& closing) {
 
 WebSocketStream::WebSocketStream(WebStream&& stream, WebEndpointContext& endpoint,
                                  std::unique_ptr<ConnectionSlot> slot)
-    : endpoint_(endpoint), slot_(std::move(slot)), socket_(std::move(stream)), closingTimer_(endpoint.io) {
+    : endpoint_(endpoint),
+      slot_(std::move(slot)),
+      socket_(std::move(stream)),
+      closingTimer_(endpoint.io),
+      pauseTimer_(endpoint.io) {
   socket_.binary(true);
   socket_.auto_fragment(false);
   socket_.read_message_max(session::kMaxClientMessageBytes);
@@ -88,7 +97,7 @@ void WebSocketStream::open() {
     });
   };
   session_ =
-      session::Session::open(endpoint_.server, peerOf(beast::get_lowest_layer(socket_)), std::move(wake));
+      session::Session::open(endpoint_.server, arrivalOf(beast::get_lowest_layer(socket_)), std::move(wake));
   read();
   pump();
 }
@@ -107,7 +116,12 @@ void WebSocketStream::onRead(beast::error_code error) {
     return close({ws::close_code::unknown_data, "messages must be binary, one ClientMessage each"});
   session_->receive({static_cast<const std::byte*>(incoming_.cdata().data()), incoming_.size()});
   incoming_.consume(incoming_.size());
-  read();
+  const schedule::Clock::duration pause = session_->readPause();
+  if (pause <= schedule::Clock::duration::zero()) return read();
+  pauseTimer_.expires_after(pause);
+  pauseTimer_.async_wait([self = shared_from_this()](beast::error_code cancelled) {
+    if (!cancelled && !self->closing_) self->read();
+  });
 }
 
 void WebSocketStream::pump() {
@@ -153,6 +167,7 @@ void WebSocketStream::end() {
   closing_ = true;
   leave();
   closingTimer_.cancel();
+  pauseTimer_.cancel();
   beast::get_lowest_layer(socket_).close();
   endpoint_.streams.erase(shared_from_this());
   if (endpoint_.stopping && endpoint_.streams.empty()) endpoint_.io.stop();

@@ -53,7 +53,8 @@ class WebSocketStream : public std::enable_shared_from_this<WebSocketStream> {
   std::shared_ptr<session::Session> session_;
   delivery::SharedBytes outgoing_;
   boost::asio::steady_timer closingTimer_;
-  bool ending_ = false;  // closingTimer_ runs
+  boost::asio::steady_timer pauseTimer_;  // before the next read, of a client that sends too fast
+  bool ending_ = false;                   // closingTimer_ runs
   bool writing_ = false;
   bool closing_ = false;
 };

@@ -59,7 +59,8 @@ shared::GrabRecord recordOf(const Grab& grab) {
 AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables,
                                  const StateBuffers& state, std::uint32_t nodeCount,
                                  std::uint32_t workgroupSize)
-    : workgroupSize_(workgroupSize),
+    : device_(device),
+      workgroupSize_(workgroupSize),
       nodeCount_(nodeCount),
       attachedCount_(static_cast<std::uint32_t>(tables.attached.size())),
       hasTethers_(!tables.tethers.empty()),
@@ -137,16 +138,19 @@ void AttachmentStage::setSlack(std::span<const model::Cloth> cloths) {
   slackened_ = false;
 }
 
+void AttachmentStage::recordTables(vulkan::Recorder& recorder) {
+  if (std::exchange(tabled_, true)) return;
+  attached_.recordUpload(recorder);
+  recorder.fill(grabbed_, 0, grabbed_.bytes());
+  recorder.fill(reports_, 0, reports_.bytes());
+  recorder.barrier();
+}
+
 void AttachmentStage::recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
                                    std::span<const Grab> grabs) {
   assert(frames.empty() || frames.size() == startFrames_.size());
   assert(grabs.size() <= kMaxGrabs);
-  if (!std::exchange(tabled_, true)) {
-    attached_.recordUpload(recorder);
-    recorder.fill(grabbed_, 0, grabbed_.bytes());
-    recorder.fill(reports_, 0, reports_.bytes());
-    recorder.barrier();
-  }
+  recordTables(recorder);
   if (!std::exchange(slackened_, true)) tethers_.recordUpload(recorder);
   slot_ = 1 - slot_;
   const Buffer& through = uploads_[slot_];
@@ -202,6 +206,60 @@ void AttachmentStage::recordReport(vulkan::Recorder& recorder) {
 
 std::span<const shared::GrabReport> AttachmentStage::report() const {
   return readbacks_[slot_].mapped<const shared::GrabReport>().first(grabCount_);
+}
+
+void AttachmentStage::recordSave(vulkan::Recorder& recorder) {
+  savedGrabs_ = grabCount_;
+  if (savedGrabs_ == 0) return;
+  if (heldReadback_.bytes() == 0)
+    heldReadback_ = Buffer(device_, BufferPurpose::readback, grabbed_.bytes() + kReportBytes);
+  recorder.copy(grabbed_, heldReadback_, grabbed_.bytes());
+  recorder.copy(reports_, heldReadback_, savedGrabs_ * sizeof(shared::GrabReport), 0, grabbed_.bytes());
+}
+
+HeldNodes AttachmentStage::collect() const {
+  HeldNodes held;
+  if (savedGrabs_ == 0) return held;
+  const std::span<const std::byte> bytes = heldReadback_.mapped();
+  for (std::uint32_t i = 0; i < savedGrabs_; ++i) {
+    shared::GrabReport report;
+    std::memcpy(&report, bytes.data() + grabbed_.bytes() + i * sizeof(report), sizeof(report));
+    held.grabs.push_back({.taken = report.grabbed, .slipped = report.slipped});
+  }
+  for (std::uint32_t i = 0; i < nodeCount_; ++i) {
+    shared::GrabbedNode node;
+    std::memcpy(&node, bytes.data() + i * sizeof(node), sizeof(node));
+    // Nodes of no grab, or of a grab that the tick did not have, are left out.
+    if (node.grabber < 1 || node.grabber > static_cast<float>(savedGrabs_)) continue;
+    held.nodes.push_back({.node = i,
+                          .grab = static_cast<std::uint32_t>(node.grabber) - 1,
+                          .place = {node.place.x, node.place.y, node.place.z}});
+  }
+  return held;
+}
+
+void AttachmentStage::recordRestore(vulkan::Recorder& recorder, const HeldNodes& held) {
+  recordTables(recorder);
+  if (held.grabs.empty()) {
+    recorder.fill(grabbed_, 0, grabbed_.bytes());
+    return;
+  }
+  if (heldUpload_.bytes() == 0)
+    heldUpload_ = Buffer(device_, BufferPurpose::upload, grabbed_.bytes() + kReportBytes);
+  const std::span<std::byte> bytes = heldUpload_.mapped();
+  std::memset(bytes.data(), 0, bytes.size());
+  for (const HeldNode& node : held.nodes) {
+    const shared::GrabbedNode record{.place = vectorOf(node.place),
+                                     .grabber = static_cast<float>(node.grab + 1)};
+    std::memcpy(bytes.data() + node.node * sizeof(record), &record, sizeof(record));
+  }
+  for (std::size_t i = 0; i < held.grabs.size(); ++i) {
+    const shared::GrabReport report{
+        .nearest = 0, .grabbed = held.grabs[i].taken, .slipped = held.grabs[i].slipped, .reserved = 0};
+    std::memcpy(bytes.data() + grabbed_.bytes() + i * sizeof(report), &report, sizeof(report));
+  }
+  recorder.copy(heldUpload_, grabbed_, grabbed_.bytes());
+  recorder.copy(heldUpload_, reports_, held.grabs.size() * sizeof(shared::GrabReport), grabbed_.bytes());
 }
 
 }  // namespace clothstream::simulation

@@ -13,6 +13,7 @@
 #include "server/simulation/device_table.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_buffers.h"
+#include "server/simulation/state_snapshot.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
@@ -50,11 +51,22 @@ class AttachmentStage {
   // Reports of the grabs of the last recorded tick, once it is complete.
   std::span<const shared::GrabReport> report() const;
 
+  // Copies what the grabs of the last recorded tick hold to the CPU. collect() returns it once the recording
+  // is complete. The caller records a barrier before and after each recording.
+  void recordSave(vulkan::Recorder& recorder);
+  HeldNodes collect() const;
+  // Replaces what grabs hold. Numbers of nodes and grabs must be in range. No earlier recording may be in
+  // flight.
+  void recordRestore(vulkan::Recorder& recorder, const HeldNodes& held);
+
  private:
+  // Records the upload of constant tables once.
+  void recordTables(vulkan::Recorder& recorder);
   Stage makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
   // Number of invocations, which share the nodes.
   std::uint64_t invocations() const;
 
+  const vulkan::Device& device_;
   std::uint32_t workgroupSize_, nodeCount_, attachedCount_;
   bool hasTethers_;
   bool tabled_ = false;    // the constant tables are on the device
@@ -70,6 +82,9 @@ class AttachmentStage {
   // Used alternately, because a tick may be in flight while the next one is recorded.
   std::array<vulkan::Buffer, 2> uploads_;  // frames, then grabs
   std::array<vulkan::Buffer, 2> readbacks_;
+  // Held nodes, then reports. Created when they are first needed.
+  vulkan::Buffer heldReadback_, heldUpload_;
+  std::uint32_t savedGrabs_ = 0;  // by the newest recordSave()
   Stage aim_, findNearest_, beginGrabs_, tie_, pull_;
 };
 

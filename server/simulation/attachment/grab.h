@@ -31,6 +31,7 @@ inline constexpr std::size_t kMaxGrabs = 1024;
 struct GrabStatus {
   std::uint32_t taken = 0;    // nodes that it grabbed
   std::uint32_t slipped = 0;  // grabbed nodes that slipped away since
+  bool operator==(const GrabStatus&) const = default;
 };
 
 }  // namespace clothstream::simulation

@@ -30,6 +30,11 @@ constexpr std::uint32_t kListsATick = 3;
 // Factor of the time until the next search, because velocities change in it.
 constexpr float kAhead = 1.25f;
 
+// Substeps between two searches.
+std::uint32_t searchInterval(std::uint32_t substeps) {
+  return (substeps + kListsATick - 1) / kListsATick;
+}
+
 // There are twice as many entries as nodes, so that cells that are not neighbours seldom share an entry.
 std::uint32_t cellCountOf(std::uint32_t nodes) {
   return std::max(shared::kCellBlock, std::bit_ceil(2 * nodes));
@@ -81,7 +86,7 @@ SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const model
       nodeCount_(scene.nodeCount()),
       cellCount_(cellCountOf(nodeCount_)),
       measureInvocations_((nodeCount_ + 63) / 64),
-      interval_((scene.substeps + kListsATick - 1) / kListsATick),
+      interval_(searchInterval(scene.substeps)),
       substepSeconds_(static_cast<float>(scene.substepSeconds())),
       reach_(reachOf(scene.cloths)),
       restsUpload_(device, BufferPurpose::upload, nodeCount_ * kTexelBytes),
@@ -205,6 +210,11 @@ void SelfCollisionStage::makeContacts(std::span<const model::Cloth> cloths) {
 void SelfCollisionStage::setCloths(std::span<const model::Cloth> cloths) {
   makeContacts(cloths);
   reach_ = reachOf(cloths);
+}
+
+void SelfCollisionStage::setSubsteps(std::uint32_t substeps, double substepSeconds) {
+  interval_ = searchInterval(substeps);
+  substepSeconds_ = static_cast<float>(substepSeconds);
 }
 
 void SelfCollisionStage::recordTables(vulkan::Recorder& recorder) const {

@@ -35,6 +35,9 @@ class SelfCollisionStage {
   // Sets radii and frictions of the cloths that have self-collision. No tick may be in flight.
   void setCloths(std::span<const model::Cloth> cloths);
 
+  // Sets the number of substeps of a tick. No tick may be in flight.
+  void setSubsteps(std::uint32_t substeps, double substepSeconds);
+
   // Uploads the tables, once, before the first tick.
   void recordTables(vulkan::Recorder& recorder) const;
   // Resets the tick's report. The caller records a barrier after it.

@@ -404,7 +404,7 @@ class TroubledJournal : public Journal {
   void begin(const vulkan::DeviceInfo&, const model::Scene&, const v1::StreamDescription&,
              const simulation::StateSnapshot&, const simulation::StateSnapshot&) override {}
   void ticked(const AppliedTick&) override {}
-  void saved(const simulation::StateSnapshot&, bool) override {}
+  void saved(const simulation::StateSnapshot&) override {}
   void restored(std::uint64_t, const simulation::StateSnapshot&) override {}
   void end() override {}
   void sent(const SharedBytes&) override {}

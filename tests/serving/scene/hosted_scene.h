@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <utility>
@@ -27,10 +28,13 @@ namespace clothstream::tests {
 // One scene on the shared device, with a subscriber that reads everything.
 class HostedScene {
  public:
-  explicit HostedScene(model::Scene scene = smallScene(), std::size_t subscribers = 1)
+  // `prepare` is called before the scene's host is created.
+  explicit HostedScene(
+      model::Scene scene = smallScene(), std::size_t subscribers = 1,
+      const std::function<void(scene::LiveScene&)>& prepare = [](scene::LiveScene&) {})
       : live(std::move(scene)),
         publisher(encode::FrameEncoder::kSlots, [] {}),
-        host(device(), live, publisher) {
+        host((prepare(live), device()), live, publisher) {
     for (std::size_t i = 0; i < subscribers; ++i) {
       mailboxes.push_back(std::make_shared<delivery::Mailbox>([] {}));
       live.subscribers.add(mailboxes.back());

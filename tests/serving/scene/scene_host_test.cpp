@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "server/step/step.h"
+#include "tests/serving/scene/busy_scene.h"
 #include "tests/serving/scene/hosted_scene.h"
 
 namespace clothstream::scene {
@@ -79,6 +80,93 @@ TEST_F(SceneHostTest, SlicesOfATickGiveTheSameStates) {
   EXPECT_EQ(simulate(0, many), simulate(2, none));
   EXPECT_GT(many, scene.substeps);
   EXPECT_EQ(none, 0u);
+}
+
+// Work that others submitted before the tick, such as kernels of a scene that is loaded.
+TEST_F(SceneHostTest, WaitingForOtherWorkIsNotTimeOfTheTick) {
+  HostedScene hosted;
+  hosted.ticks(3);
+  if (!hosted.host.deviceSeconds()) GTEST_SKIP() << "the device has no timestamps";
+  constexpr std::size_t kBytes = 64u << 20;
+  const vulkan::Buffer buffer(tests::device(), vulkan::BufferPurpose::state, kBytes);
+  vulkan::Recorder other(tests::device());
+  other.begin();
+  other.beginStage("other");
+  for (std::uint32_t fill = 0; fill < 40; ++fill) {
+    other.fill(buffer, fill, kBytes);
+    other.barrier();
+  }
+  const vulkan::TimelineValue submitted = tests::device().submit(other);
+  hosted.tick();
+  tests::device().wait(submitted);
+  const double waited = other.stageTimes().front().seconds;
+  EXPECT_GT(*hosted.host.deviceSeconds(), 0);
+  EXPECT_LT(*hosted.host.deviceSeconds(), waited / 2);
+  EXPECT_GE(*hosted.host.ownSeconds(), *hosted.host.deviceSeconds());
+}
+
+TEST_F(SceneHostTest, LessWorkSendsFewerFramesAndComputesFewerSubsteps) {
+  HostedScene hosted;
+  hosted.ticks(4);
+  EXPECT_EQ(hosted.frames.size(), 4u);
+  EXPECT_EQ(hosted.frames.back().frame_divisor(), 0u);
+  hosted.announced.clear();
+  hosted.host.setWork({.frameDivisor = 4, .substeps = 12});
+  hosted.ticks(8);
+  ASSERT_EQ(hosted.frames.size(), 6u);
+  EXPECT_EQ(hosted.frames.back().frame_divisor(), 4u);
+  EXPECT_EQ(hosted.live.metrics.overloadStepsDown.value(), 1u);
+  ASSERT_EQ(hosted.announced.size(), 1u);
+  const v1::Notice& notice = hosted.announced.front().notice();
+  EXPECT_EQ(notice.kind(), v1::NOTICE_KIND_LOAD_CHANGED);
+  EXPECT_EQ(notice.tick(), 5u);
+  EXPECT_EQ(notice.text(),
+            "the device is overloaded: the scene sends 10 of 40 frames/s and computes 12 of 12 substeps");
+  hosted.host.setWork({.frameDivisor = 4, .substeps = 6});
+  hosted.ticks(4);
+  EXPECT_EQ(hosted.live.work.load(), (WorkLevel{4, 6}));
+  EXPECT_EQ(hosted.live.metrics.overloadStepsDown.value(), 2u);
+  hosted.host.setWork(hosted.live.allWork());
+  hosted.tick();
+  EXPECT_EQ(hosted.frames.size(), 8u);
+  EXPECT_EQ(hosted.live.metrics.overloadStepsUp.value(), 1u);
+  EXPECT_EQ(hosted.announced.back().notice().text(),
+            "the device is no longer overloaded: the scene has all frames and substeps again");
+}
+
+// The same inputs with and without fewer substeps, and with fewer frames.
+TEST_F(SceneHostTest, OnlySubstepsChangeTheStates) {
+  const auto simulate = [](const WorkLevel& work) {
+    HostedScene hosted;
+    hosted.host.setWork(work);
+    hosted.ticks(40);
+    return hosted.host.status().stateHash;
+  };
+  const std::uint64_t all = simulate({1, 12});
+  EXPECT_EQ(simulate({4, 12}), all);
+  EXPECT_NE(simulate({1, 6}), all);
+}
+
+TEST_F(SceneHostTest, SubstepsStayWithinTheStabilityBoundOfThePresentParameters) {
+  model::Scene scene = smallScene();
+  scene.substeps = 40;
+  HostedScene hosted(scene);
+  const std::uint32_t least = hosted.host.leastSubsteps();
+  ASSERT_GT(least, 1u);
+  ASSERT_LT(least, 20u);
+  hosted.host.setWork({1, 1});
+  hosted.tick();
+  EXPECT_EQ(hosted.live.work.load().substeps, least);
+  model::ParameterChange stiffer;
+  stiffer.cloths.push_back({.numbers = {{parameters::ClothNumber::structuralStiffness, 20.0f}}});
+  hosted.change(stiffer);
+  hosted.tick();
+  const std::uint32_t more = hosted.live.work.load().substeps;
+  EXPECT_GT(more, least);
+  EXPECT_LT(more, 40u);
+  hosted.ticks(80);
+  EXPECT_TRUE(hosted.host.status().healthy);
+  EXPECT_EQ(hosted.live.metrics.rollbacks.value(), 0u);
 }
 
 TEST_F(SceneHostTest, HandIsPlacedAtTheTimeOfTheTick) {
@@ -298,6 +386,21 @@ TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {
   EXPECT_EQ(simulation.status().stateHash, hosted.frames.back().state_hash());
   hosted.publisher.drain();
   hosted.host.release();  // before its device
+}
+
+// A snapshot is saved with tick 201, while two grabs hold and a change of solver is eased.
+TEST_F(SceneHostTest, LosingTheDeviceChangesNoLaterState) {
+  const model::Scene scene = tests::busyScene(model::SolverKind::acad);
+  HostedScene lost(scene), whole(scene);
+  for (int number = 1; number <= 201; ++number) tests::busyTick(lost);
+  lost.host.release();
+  lost.host.rebuild(
+      std::make_unique<SceneOnDevice>(tests::device(), lost.live.start(), lost.publisher.workers()),
+      "the device was lost");
+  for (int number = 202; number <= 230; ++number) tests::busyTick(lost);
+  for (int number = 1; number <= 230; ++number) tests::busyTick(whole);
+  EXPECT_EQ(lost.stateHashes(), whole.stateHashes());
+  EXPECT_TRUE(lost.host.status().healthy);
 }
 
 // Returns the largest stretch of a column, m: its length along the springs minus its length at rest. Appends

@@ -87,6 +87,21 @@ class TickSchedulerTest : public ::testing::Test {
   std::vector<std::unique_ptr<SimulatedScene>> scenes_;
 };
 
+TEST(ShareOf, DividesThePeriodAmongRunningScenesAndOnceAmongAllGuests) {
+  TickSchedule one(50), two(100), firstGuest(50, true), secondGuest(50, true);
+  const TickSchedule* const all[] = {&one, &two, &firstGuest, &secondGuest};
+  one.running = true;
+  EXPECT_EQ(shareOf(one, all), 20ms);
+  two.running = true;
+  EXPECT_EQ(shareOf(one, all), 10ms);
+  EXPECT_EQ(shareOf(two, all), 5ms);
+  firstGuest.running = secondGuest.running = true;
+  EXPECT_EQ(shareOf(two, all), Clock::duration(10ms) / 3);
+  EXPECT_EQ(shareOf(firstGuest, all), Clock::duration(20ms) / 6);
+  one.running = two.running = false;
+  EXPECT_EQ(shareOf(firstGuest, all), 10ms);
+}
+
 TEST_F(TickSchedulerTest, HeavySceneUsesTheTimeThatOthersLeave) {
   std::vector<SimulatedScene*> light;
   for (int i = 0; i < 8; ++i) light.push_back(&add(72, 1ms));

@@ -353,7 +353,8 @@ TEST_F(JoinTest, PeerThatDoesNotSayHelloIsDisconnected) {
   reader.join();
   while (!stranger.finished()) reader.readFrames(1);
   const v1::Error error = stranger.readToTheEnd().error();
-  EXPECT_THAT(error.text(), HasSubstr("the client was silent for 0.3 s: send hello soon after connecting"));
+  EXPECT_THAT(error.text(),
+              HasSubstr("the client joined no scene within 0.3 s: send hello soon after connecting"));
   EXPECT_TRUE(error.fatal());
   EXPECT_FALSE(reader.finished());
 }

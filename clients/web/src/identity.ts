@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// How this page proves who it is: asks for a pairing code or a token, keeps the token, and shows codes to owners.
+
+import { Roles, type Client, type PairingCode } from "./client";
+import { element, write } from "./hud";
+
+const kStorageKey = "clothstream.token";
+const kOwner = 3;
+
+// Token that pairing has given for this server; "" without one. A browser may refuse to store anything.
+export function keptToken(): string {
+  try {
+    return window.localStorage.getItem(kStorageKey) ?? "";
+  } catch {
+    return "";
+  }
+}
+
+export function keepToken(token: string): void {
+  try {
+    if (token) window.localStorage.setItem(kStorageKey, token);
+    else window.localStorage.removeItem(kStorageKey);
+  } catch {
+    // The page then asks again the next time.
+  }
+}
+
+// Proof in typed text: six digits are a code, anything else is a token.
+export type Proof = { token: string } | { code: string };
+export function proofIn(text: string): Proof {
+  const typed = text.replace(/\s+/g, "");
+  return /^\d{6}$/.test(typed) ? { code: typed } : { token: typed };
+}
+
+// Form that asks for a code or a token.
+export class ProofForm {
+  private readonly form = element<HTMLFormElement>("proof");
+  private readonly input = element<HTMLInputElement>("proof-input");
+
+  constructor(given: (proof: Proof) => void) {
+    this.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      if (this.input.value.trim() === "") return;
+      const proof = proofIn(this.input.value);
+      this.input.value = "";
+      given(proof);
+    });
+  }
+
+  // Shows the form with the server's reason, or hides it.
+  show(reason: string | undefined): void {
+    const opens = reason !== undefined && this.form.hidden;
+    this.form.hidden = reason === undefined;
+    write(element("proof-reason"), reason ?? "");
+    if (opens) this.input.focus();
+  }
+}
+
+// Button with which an owner makes a pairing code, and the newest code.
+export class PairingPanel {
+  private readonly button = element<HTMLButtonElement>("pairing");
+  private readonly code = element("pairing-code");
+  private timer: number | undefined;
+
+  constructor(asked: () => void) {
+    this.button.addEventListener("click", asked);
+  }
+
+  // Only owners of a server that requires tokens can make codes.
+  showFor(client: Client): void {
+    const own = client.participants().find(({ self }) => self);
+    this.button.hidden = client.token === "" || own?.role !== kOwner;
+    if (this.button.hidden) this.code.hidden = true;
+  }
+
+  showCode({ code, role, validSeconds }: PairingCode): void {
+    const minutes = Math.round(validSeconds / 60);
+    write(this.code, `${code.slice(0, 3)} ${code.slice(3)} makes a ${Roles.get(role) ?? "client"}, for ${minutes} minutes`);
+    this.code.hidden = false;
+    window.clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => (this.code.hidden = true), 1000 * validSeconds);
+  }
+}

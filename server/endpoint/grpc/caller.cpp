@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+#include "server/endpoint/grpc/caller.h"
+
+#include <string_view>
+
+#include <boost/asio/ip/address.hpp>
+
+#include "server/endpoint/listen/address_rate.h"
+
+namespace clothstream::endpoint {
+namespace {
+
+// Address in `peer`, such as ipv4:192.0.2.1:50000 or ipv6:%5B2001:db8::1%5D:50000.
+boost::asio::ip::address addressIn(const std::string& peer) {
+  const std::size_t scheme = peer.find(':'), port = peer.rfind(':');
+  if (scheme == port) return {};
+  std::string host = peer.substr(scheme + 1, port - scheme - 1);
+  constexpr std::size_t kBracket = 3;  // %5B and %5D
+  if (host.starts_with("%5B") && host.size() > 2 * kBracket)
+    host = host.substr(kBracket, host.size() - 2 * kBracket);
+  boost::system::error_code unknown;  // counts as an address of its own
+  return boost::asio::ip::make_address(host, unknown);
+}
+
+}  // namespace
+
+std::string addressKeyOf(const std::string& peer) {
+  return addressKey(addressIn(peer));
+}
+
+std::string tokenIn(const grpc::ServerContext& context) {
+  constexpr std::string_view kScheme = "Bearer ";
+  const auto found = context.client_metadata().find("authorization");
+  if (found == context.client_metadata().end()) return {};
+  const std::string_view value(found->second.data(), found->second.size());
+  return value.starts_with(kScheme) ? std::string(value.substr(kScheme.size())) : std::string();
+}
+
+}  // namespace clothstream::endpoint

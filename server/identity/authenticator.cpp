@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+#include "server/identity/authenticator.h"
+
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/identity/token.h"
+
+namespace clothstream::identity {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kSubjectBytes = 8;
+
+// Reads the key for pairing from the state directory, and makes it before its first use.
+TokenKey pairingKey(const fs::path& stateDirectory) {
+  if (stateDirectory.empty())
+    throw std::runtime_error("--pairing needs a directory for its key: use --state-dir DIR");
+  const fs::path directory = stateDirectory / "identity";
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error)
+    throw std::runtime_error(fmt::format("{}: cannot be made: {}", directory.string(), error.message()));
+  fs::permissions(directory, fs::perms::owner_all, error);
+  const fs::path file = directory / fmt::format("{}.secret", kPairingKeyId);
+  if (!fs::exists(file)) makeTokenKey(file);
+  return readTokenKey(file);
+}
+
+}  // namespace
+
+Authenticator::Authenticator(AuthenticatorOptions options) : options_(std::move(options)) {
+  keys_ = readKeys();
+}
+
+TokenKeys Authenticator::readKeys() const {
+  TokenKeys keys;
+  if (!options_.keyDirectory.empty()) keys = readTokenKeys(options_.keyDirectory);
+  if (options_.pairing && !keys.emplace(kPairingKeyId, pairingKey(options_.stateDirectory)).second)
+    throw std::runtime_error(
+        fmt::format("{}: has a key named '{}', which is the name of the key for pairing; rename it",
+                    options_.keyDirectory.string(), kPairingKeyId));
+  return keys;
+}
+
+messages::Result<Identity> Authenticator::anonymous(bool isLoopback) const {
+  if (required())
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_UNAUTHENTICATED, options_.pairing ? "this server requires a token or a pairing code"
+                                                         : "this server requires a token"});
+  Identity identity;
+  identity.role = isLoopback ? scene::Role::owner : options_.anonymousRole;
+  return identity;
+}
+
+messages::Result<Identity> Authenticator::verify(const std::string& token, bool isLoopback) const {
+  if (!required()) return anonymous(isLoopback);
+  const std::lock_guard lock(mutex_);
+  return check(token, keys_, options_.audience, clock_());
+}
+
+messages::Result<Authenticator::Paired> Authenticator::pair(const std::string& code,
+                                                            const std::string& address,
+                                                            Clock::time_point now) {
+  if (!options_.pairing)
+    return tl::unexpected(messages::FieldError{v1::ERROR_CODE_WRONG_PAIRING_CODE,
+                                               "this server does not pair: it needs --pairing"});
+  const std::lock_guard lock(mutex_);
+  const messages::Result<scene::Role> role = codes_.take(code, address, now);
+  if (!role) return tl::unexpected(role.error());
+  Claims claims;
+  claims.role = *role;
+  claims.subject = "paired-" + randomHex(kSubjectBytes);
+  claims.audience = options_.audience;
+  claims.expires = clock_() + kPairingValid;
+  Paired paired;
+  paired.token = sign(keys_.at(kPairingKeyId), claims);
+  messages::Result<Identity> identity = check(paired.token, keys_, options_.audience, clock_());
+  if (!identity) return tl::unexpected(std::move(identity).error());
+  paired.identity = std::move(*identity);
+  return paired;
+}
+
+messages::Result<PairingCode> Authenticator::makeCode(scene::Role role, Clock::time_point now) {
+  if (!options_.pairing)
+    return tl::unexpected(
+        messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
+                             "createPairingCode: this server does not pair; start it with --pairing"});
+  const std::lock_guard lock(mutex_);
+  return codes_.make(role, now);
+}
+
+void Authenticator::reload() {
+  TokenKeys keys = readKeys();
+  const std::lock_guard lock(mutex_);
+  keys_ = std::move(keys);
+}
+
+WallClock::time_point Authenticator::now() const {
+  const std::lock_guard lock(mutex_);
+  return clock_();
+}
+
+void Authenticator::setClock(std::function<WallClock::time_point()> clock) {
+  const std::lock_guard lock(mutex_);
+  clock_ = std::move(clock);
+}
+
+}  // namespace clothstream::identity

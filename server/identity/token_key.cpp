@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: MIT
+#include "server/identity/token_key.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <openssl/bio.h>
+#include <openssl/crypto.h>
+#include <openssl/ec.h>
+#include <openssl/err.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <openssl/rand.h>
+#include <unistd.h>
+
+namespace clothstream::identity {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxFileBytes = 64 * 1024;
+constexpr std::size_t kMaxIdBytes = 64;
+constexpr std::size_t kNewSecretBytes = 32;
+
+template <auto Free>
+struct Freed {
+  template <typename T>
+  void operator()(T* pointer) const {
+    Free(pointer);
+  }
+};
+using Bio = std::unique_ptr<BIO, Freed<BIO_free>>;
+using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
+
+[[noreturn]] void fail(const fs::path& file, const std::string& what) {
+  throw std::runtime_error(fmt::format("{}: {}", file.string(), what));
+}
+
+std::string readFile(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) fail(file, fmt::format("cannot be read: {}", std::strerror(errno)));
+  std::string text(kMaxFileBytes + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (in.bad()) fail(file, fmt::format("cannot be read: {}", std::strerror(errno)));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  if (text.size() > kMaxFileBytes) fail(file, "is too large for a key");
+  return text;
+}
+
+Bio bioOf(const std::string& text) {
+  return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
+}
+
+template <typename Write>
+std::string toPem(const fs::path& file, Write write) {
+  const Bio bio(BIO_new(BIO_s_mem()));
+  if (!bio || write(bio.get()) != 1) fail(file, "the key cannot be converted");
+  char* data = nullptr;
+  const long size = BIO_get_mem_data(bio.get(), &data);
+  return {data, static_cast<std::size_t>(size)};
+}
+
+std::string privatePem(const fs::path& file, EVP_PKEY* key) {
+  return toPem(file, [&](BIO* bio) {
+    return PEM_write_bio_PKCS8PrivateKey(bio, key, nullptr, nullptr, 0, nullptr, nullptr);
+  });
+}
+
+bool isP256(const EVP_PKEY* key) {
+  std::array<char, 64> group{};
+  std::size_t size = 0;
+  return EVP_PKEY_is_a(key, "EC") == 1 &&
+         EVP_PKEY_get_group_name(key, group.data(), group.size(), &size) == 1 &&
+         std::string_view(group.data(), size) == "prime256v1";
+}
+
+void readPem(const fs::path& file, TokenKey& key) {
+  const std::string text = readFile(file);
+  const auto noPassword = [](char*, int, int, void*) { return 0; };
+  Key pair(PEM_read_bio_PrivateKey(bioOf(text).get(), nullptr, noPassword, nullptr));
+  const bool isPrivate = pair != nullptr;
+  if (!pair) pair.reset(PEM_read_bio_PUBKEY(bioOf(text).get(), nullptr, noPassword, nullptr));
+  ERR_clear_error();
+  if (!pair) fail(file, "has no public or private key in PEM form without a password");
+  if (!isP256(pair.get()))
+    fail(file,
+         "is not a key of the curve P-256, which ES256 needs; make one with "
+         "`clothstream-server token --new-key FILE.pem`");
+  key.algorithm = Algorithm::es256;
+  key.checking = toPem(file, [&](BIO* bio) { return PEM_write_bio_PUBKEY(bio, pair.get()); });
+  if (isPrivate) key.signing = privatePem(file, pair.get());
+}
+
+void readSecret(const fs::path& file, TokenKey& key) {
+  std::string secret = readFile(file);
+  const std::size_t last = secret.find_last_not_of(" \r\n\t");
+  secret.resize(last == std::string::npos ? 0 : last + 1);
+  if (secret.size() < kMinSecretBytes)
+    fail(file, fmt::format("has {} bytes; a secret needs at least {}", secret.size(), kMinSecretBytes));
+  key.algorithm = Algorithm::hs256;
+  key.checking = key.signing = std::move(secret);
+}
+
+}  // namespace
+
+const char* nameOf(Algorithm algorithm) {
+  return algorithm == Algorithm::es256 ? "ES256" : "HS256";
+}
+
+TokenKey readTokenKey(const fs::path& file) {
+  TokenKey key;
+  key.id = file.stem().string();
+  constexpr std::string_view kAllowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
+  if (key.id.empty() || key.id.size() > kMaxIdBytes ||
+      key.id.find_first_not_of(kAllowed) != std::string::npos)
+    fail(file, "the name of a key has 1 to 64 characters of A-Z, a-z, 0-9, '.', '_' and '-'");
+  if (file.extension() == ".pem")
+    readPem(file, key);
+  else if (file.extension() == ".secret")
+    readSecret(file, key);
+  else
+    fail(file, "the name of a key ends in .pem (ES256) or .secret (HS256)");
+  return key;
+}
+
+TokenKeys readTokenKeys(const fs::path& directory) {
+  std::error_code error;
+  std::vector<fs::path> files;
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error))
+    if (entry->path().extension() == ".pem" || entry->path().extension() == ".secret")
+      files.push_back(entry->path());
+  if (error) fail(directory, fmt::format("cannot be read: {}", error.message()));
+  std::ranges::sort(files);
+  TokenKeys keys;
+  for (const fs::path& file : files) {
+    TokenKey key = readTokenKey(file);
+    std::string id = key.id;
+    if (!keys.emplace(std::move(id), std::move(key)).second)
+      fail(file, "another key has the same name; rename one of them");
+  }
+  if (keys.empty())
+    fail(directory, "has no key; make one with `clothstream-server token --new-key DIR/NAME.pem`");
+  return keys;
+}
+
+void makeTokenKey(const fs::path& file) {
+  std::string content;
+  if (file.extension() == ".pem") {
+    const Key pair(EVP_EC_gen("P-256"));
+    if (!pair) fail(file, "the key cannot be made");
+    content = privatePem(file, pair.get());
+  } else if (file.extension() == ".secret") {
+    content = randomHex(kNewSecretBytes) + "\n";
+  } else {
+    fail(file, "the name of a key ends in .pem (ES256) or .secret (HS256)");
+  }
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (descriptor < 0) fail(file, fmt::format("cannot be made: {}", std::strerror(errno)));
+  const bool written =
+      ::write(descriptor, content.data(), content.size()) == static_cast<ssize_t>(content.size()) &&
+      ::fsync(descriptor) == 0;
+  const bool closed = ::close(descriptor) == 0;
+  OPENSSL_cleanse(content.data(), content.size());
+  if (written && closed) return;
+  ::unlink(file.c_str());
+  fail(file, fmt::format("cannot be written: {}", std::strerror(errno)));
+}
+
+std::string randomHex(std::size_t bytes) {
+  std::vector<unsigned char> random(bytes);
+  if (RAND_bytes(random.data(), static_cast<int>(random.size())) != 1)
+    throw std::runtime_error("the system has no random numbers");
+  std::string text;
+  for (const unsigned char byte : random) text += fmt::format("{:02x}", byte);
+  return text;
+}
+
+}  // namespace clothstream::identity

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/snapshot_message.h"
+
+#include <cstddef>
+#include <cstring>
+#include <span>
+
+#include <fmt/format.h>
+
+namespace clothstream::scene {
+namespace {
+
+using simulation::HeldNode;
+using simulation::HeldNodes;
+
+constexpr std::size_t kPlaceBytes = 12;
+
+void write(const HeldNodes& held, v1::HeldNodes& message) {
+  std::string& places = *message.mutable_places();
+  places.resize(held.nodes.size() * kPlaceBytes);
+  char* to = places.data();
+  for (const HeldNode& node : held.nodes) {
+    message.add_nodes(node.node);
+    message.add_grips(node.grab);
+    std::memcpy(to, node.place.data(), kPlaceBytes);
+    to += kPlaceBytes;
+  }
+  for (const simulation::GrabStatus& grab : held.grabs) {
+    message.add_taken(grab.taken);
+    message.add_slipped(grab.slipped);
+  }
+}
+
+tl::expected<HeldNodes, std::string> toHeldNodes(const v1::HeldNodes& message, std::uint32_t nodeCount) {
+  const auto wrong = [] { return tl::unexpected(std::string("holds nodes that do not fit its scene")); };
+  const auto nodes = static_cast<std::size_t>(message.nodes_size());
+  if (message.grips_size() != message.nodes_size() || message.places().size() != nodes * kPlaceBytes ||
+      nodes > nodeCount || message.slipped_size() != message.taken_size() ||
+      static_cast<std::size_t>(message.taken_size()) > simulation::kMaxGrabs)
+    return wrong();
+  HeldNodes held;
+  const char* from = message.places().data();
+  for (int i = 0; i < message.nodes_size(); ++i, from += kPlaceBytes) {
+    HeldNode node{.node = message.nodes(i), .grab = message.grips(i)};
+    if (node.node >= nodeCount || node.grab >= static_cast<std::uint32_t>(message.taken_size()))
+      return wrong();
+    std::memcpy(node.place.data(), from, kPlaceBytes);
+    held.nodes.push_back(node);
+  }
+  for (int i = 0; i < message.taken_size(); ++i)
+    held.grabs.push_back({.taken = message.taken(i), .slipped = message.slipped(i)});
+  return held;
+}
+
+}  // namespace
+
+void write(const simulation::StateSnapshot& snapshot, v1::Checkpoint& message) {
+  message.set_tick(snapshot.tick);
+  message.set_state(snapshot.bytes.data(), snapshot.bytes.size());
+  message.set_grips_hold(!snapshot.held.nodes.empty());
+  if (!snapshot.held.grabs.empty()) write(snapshot.held, *message.mutable_held());
+}
+
+tl::expected<simulation::StateSnapshot, std::string> toSnapshot(const v1::Checkpoint& message,
+                                                                std::uint32_t nodeCount) {
+  if (message.state().size() != std::size_t{nodeCount} * simulation::kSnapshotBytesPerNode)
+    return tl::unexpected(fmt::format("does not fit the {} nodes of its scene", nodeCount));
+  const auto state = std::as_bytes(std::span(message.state()));
+  simulation::StateSnapshot snapshot{message.tick(), {state.begin(), state.end()}};
+  if (message.has_held()) {
+    auto held = toHeldNodes(message.held(), nodeCount);
+    if (!held) return tl::unexpected(std::move(held).error());
+    snapshot.held = std::move(*held);
+  }
+  return snapshot;
+}
+
+}  // namespace clothstream::scene

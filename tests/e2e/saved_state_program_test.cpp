@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: MIT
+// The real clothstream-server ends, also by SIGKILL, and starts again with its state directory.
+#include <algorithm>
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/grpc/grpc_client.h"
+#include "clients/grpc/scene_control.h"
+#include "proto/codec/packet_header.h"
+#include "server/messages/scene_message.h"
+#include "tests/e2e/running_server.h"
+#include "tests/e2e/temporary_directory.h"
+#include "tests/serving/small_scene.h"
+
+namespace clothstream::e2e {
+namespace {
+
+using model::SolverKind;
+using ::testing::HasSubstr;
+
+constexpr SolverKind kSolvers[] = {SolverKind::massSpring, SolverKind::constraint, SolverKind::acad,
+                                   SolverKind::xpbd, SolverKind::implicitEuler};
+// 5 s of a small scene.
+constexpr std::uint64_t kMaxTicksLost = 200;
+
+// A client of one scene, over several runs of the server.
+class Member {
+ public:
+  Member(const std::string& address, const std::string& scene) {
+    GrpcClientOptions options;
+    options.scene = scene;
+    options.onMessage = [this](std::span<const std::byte> bytes) { receive(bytes); };
+    auto joined = GrpcClient::join(address, options, [](cs_client*, std::uint32_t) {});
+    if (!joined) throw std::runtime_error(joined.error().text);
+    client_ = std::move(*joined);
+  }
+
+  std::uint64_t tick() const {
+    const std::lock_guard lock(mutex_);
+    return tick_;
+  }
+  // Number of runs that this client has joined.
+  std::size_t runs() const {
+    const std::lock_guard lock(mutex_);
+    return welcomes_.size();
+  }
+  std::vector<v1::Welcome> welcomes() const {
+    const std::lock_guard lock(mutex_);
+    return welcomes_;
+  }
+  // First tick that was seen in each run.
+  std::vector<std::uint64_t> firstTicks() const {
+    const std::lock_guard lock(mutex_);
+    return firstTicks_;
+  }
+  // Ticks that were seen in two runs, and those of them with two states.
+  std::size_t repeated() const {
+    const std::lock_guard lock(mutex_);
+    return repeated_;
+  }
+  std::size_t different() const {
+    const std::lock_guard lock(mutex_);
+    return different_;
+  }
+
+ private:
+  void receive(std::span<const std::byte> bytes) {
+    v1::ServerMessage message;
+    if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
+    const std::lock_guard lock(mutex_);
+    if (message.has_welcome()) {
+      welcomes_.push_back(message.welcome());
+      begins_ = true;
+    }
+    if (!message.has_frame()) return;
+    const auto packet = codec::parsePacket(std::as_bytes(std::span(message.frame().packet())));
+    if (!packet) return;
+    tick_ = packet->header.tick;
+    if (std::exchange(begins_, false)) firstTicks_.push_back(tick_);
+    const auto [seen, isNew] = states_.emplace(tick_, message.frame().state_hash());
+    if (isNew) return;
+    ++repeated_;
+    if (seen->second != message.frame().state_hash()) ++different_;
+  }
+
+  mutable std::mutex mutex_;
+  std::vector<v1::Welcome> welcomes_;
+  std::vector<std::uint64_t> firstTicks_;
+  std::map<std::uint64_t, std::uint64_t> states_;  // hash by tick
+  std::uint64_t tick_ = 0;
+  std::size_t repeated_ = 0, different_ = 0;
+  bool begins_ = false;
+  std::unique_ptr<GrpcClient> client_;
+};
+
+class SavedStateProgram : public RunningServer {
+ protected:
+  Arguments options(const Arguments& more = {}) const {
+    Arguments all = kSmallScene;
+    all.insert(all.end(), {"--state-dir", directory_.path().string(), "--max-load", "1000",
+                           "--max-scene-load", "1000", "--keep-free", "0", "--overload", "keep"});
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  void createScene(const std::string& name, SolverKind solver) const {
+    model::Scene scene = tests::smallScene(name);
+    scene.cloths[0].solver.kind = solver;
+    CreateSceneOptions request;
+    request.scene = messages::toMessage(scene);
+    const auto made = clothstream::createScene(address_, request);
+    ASSERT_TRUE(made.has_value()) << made.error().text;
+  }
+  void startAgain() {
+    const std::string port = std::to_string(portIn(address_));
+    startServer(options(), port);
+  }
+
+  TemporaryDirectory directory_;
+};
+
+TEST_F(SavedStateProgram, ScenesOfEverySolverGoOnAfterSigkillAndSigterm) {
+  startServer(options());
+  if (address_.empty()) return;
+  std::vector<std::unique_ptr<Member>> members;
+  for (const SolverKind solver : kSolvers) {
+    const std::string name = "solver" + std::to_string(static_cast<int>(solver));
+    ASSERT_NO_FATAL_FAILURE(createScene(name, solver));
+    members.push_back(std::make_unique<Member>(address_, name));
+  }
+  const auto all = [&](const std::function<bool(const Member&)>& holds) {
+    return eventually([&] { return std::ranges::all_of(members, [&](const auto& m) { return holds(*m); }); });
+  };
+  ASSERT_TRUE(all([](const Member& member) { return member.tick() > kMaxTicksLost; }));
+  server_->signal(SIGKILL);
+  ASSERT_TRUE(server_->waitForEnd(kPatience));
+  std::vector<std::uint64_t> last;
+  for (const auto& member : members) last.push_back(member->tick());
+
+  startAgain();
+  ASSERT_TRUE(all([](const Member& member) { return member.firstTicks().size() == 2; }));
+  std::size_t repeated = 0;
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const Member& member = *members[i];
+    ASSERT_TRUE(eventually([&] { return member.tick() > last[i]; }));
+    EXPECT_TRUE(member.welcomes()[1].resumed());
+    EXPECT_EQ(member.welcomes()[1].participant_id(), member.welcomes()[0].participant_id());
+    EXPECT_EQ(member.welcomes()[1].role(), v1::ROLE_OWNER);
+    EXPECT_GT(member.firstTicks()[1] + kMaxTicksLost, last[i]);
+    repeated += member.repeated();
+    EXPECT_EQ(member.different(), 0u) << "solver " << i << ", " << member.repeated() << " ticks again";
+  }
+  EXPECT_GT(repeated, 0u);
+
+  stopServer();
+  last.clear();
+  for (const auto& member : members) last.push_back(member->tick());
+  startAgain();
+  ASSERT_TRUE(all([](const Member& member) { return member.firstTicks().size() == 3; }));
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    EXPECT_TRUE(members[i]->welcomes()[2].resumed());
+    EXPECT_GT(members[i]->firstTicks()[2], last[i]) << "an orderly end loses no tick";
+  }
+}
+
+TEST_F(SavedStateProgram, ADamagedDatabaseStopsTheStart) {
+  startServer(options());
+  if (address_.empty()) return;
+  stopServer();
+  server_.reset();
+  const std::filesystem::path file = directory_.path() / "scenes" / "scenes.sqlite";
+  std::ofstream(file, std::ios::binary | std::ios::trunc) << std::string(5000, 'x');
+  Arguments command{CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0"};
+  const Arguments more = options();
+  command.insert(command.end(), more.begin(), more.end());
+  Process server(command);
+  EXPECT_EQ(server.waitForEnd(kPatience), 1);
+  EXPECT_THAT(server.errors(), HasSubstr("scenes.sqlite: is damaged, and nothing in it was changed"));
+  EXPECT_EQ(std::filesystem::file_size(file), 5000u);
+}
+
+}  // namespace
+}  // namespace clothstream::e2e

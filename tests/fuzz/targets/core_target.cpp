@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: MIT
+#include "tests/fuzz/targets/core_target.h"
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/core/core.h"
+#include "clothstream/v1/session.pb.h"
+#include "inputs.pb.h"
+#include "proto/text/utf8.h"
+
+namespace clothstream::fuzz {
+namespace {
+
+constexpr int kMaxSteps = 256;
+constexpr std::uint64_t kMs = 1000;  // us
+// Memory and time are proportional to the vertices of a description, which few bytes may not name: the server
+// sends 12 bytes for each.
+constexpr std::size_t kMaxDescriptionBytes = 1 << 20;
+
+// Numbers of a call, which end in zeros.
+class Numbers {
+ public:
+  explicit Numbers(const CoreInput::Call& call) : call_(call) {}
+
+  float next() { return at_ < call_.numbers_size() ? call_.numbers(at_++) : 0; }
+  template <std::size_t count>
+  std::array<float, count> array() {
+    std::array<float, count> values{};
+    for (float& value : values) value = next();
+    return values;
+  }
+  template <std::size_t count>
+  void write(float (&values)[count]) {
+    for (float& value : values) value = next();
+  }
+
+ private:
+  const CoreInput::Call& call_;
+  int at_ = 0;
+};
+
+void expectText(const char* text) {
+  require(text != nullptr && isUtf8(text), "strings are UTF-8 and never null");
+}
+
+bool allFinite(const float* values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i)
+    if (!std::isfinite(values[i])) return false;
+  return true;
+}
+
+class Program {
+ public:
+  explicit Program(const CoreInput& input) : input_(input) {}
+
+  void run() {
+    int steps = 0;
+    for (const CoreInput::Step& step : input_.steps()) {
+      if (++steps > kMaxSteps) break;
+      now_ += step.milliseconds() * kMs;
+      act(step);
+      cs_update(client(), now_);
+      sendAll();
+    }
+    readGeometry();
+    readLists();
+  }
+
+ private:
+  cs_client* client() const { return client_.get(); }
+
+  void act(const CoreInput::Step& step) {
+    using Step = CoreInput::Step;
+    switch (step.action_case()) {
+      case Step::kMessage:
+        if (step.message().has_welcome()) content_ = step.message().welcome().description_content_id();
+        return receive(step.message().SerializeAsString());
+      case Step::kRaw:
+        return receive(step.raw());
+      case Step::kDescription:
+        return describe(step.description());
+      case Step::kCall:
+        return call(step.call());
+      case Step::ACTION_NOT_SET:
+        return;
+    }
+  }
+
+  void receive(const std::string& bytes) {
+    // Exactly sized, so that the sanitizer detects a read past the end.
+    const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
+    std::memcpy(exact.get(), bytes.data(), bytes.size());
+    cs_receive(client(), exact.get(), bytes.size(), now_);
+    expectText(cs_error_text(client()));
+  }
+
+  void describe(const v1::StreamDescription& description) {
+    const std::string bytes = description.SerializeAsString();
+    if (bytes.size() > kMaxDescriptionBytes) return;
+    v1::ServerMessage message;
+    v1::Chunk& chunk = *message.mutable_chunk();
+    chunk.set_content_id(content_);
+    chunk.set_kind(v1::CONTENT_KIND_STREAM_DESCRIPTION);
+    chunk.set_count(1);
+    chunk.set_total_bytes(bytes.size());
+    chunk.set_data(bytes);
+    receive(message.SerializeAsString());
+  }
+
+  void sendAll() {
+    std::size_t bytes = 0;
+    while (const std::uint8_t* message = cs_next_outgoing(client(), &bytes))
+      require(v1::ClientMessage().ParseFromArray(message, static_cast<int>(bytes)),
+              "the client sends messages that can be parsed");
+  }
+
+  void call(const CoreInput::Call& call);
+  void readGeometry();
+  void readColliders();
+  void readLists();
+
+  const CoreInput& input_;
+  const std::unique_ptr<cs_client, decltype(&cs_destroy)> client_{cs_create("curtain", "fuzz"), &cs_destroy};
+  std::uint64_t now_ = 0;  // us
+  std::uint64_t content_ = 0;
+};
+
+void Program::call(const CoreInput::Call& call) {
+  Numbers numbers(call);
+  const std::uint32_t index = call.index();
+  // Programs pass UTF-8.
+  const char* text = isUtf8(call.text()) ? call.text().c_str() : "";
+  switch (call.function() % 32) {
+    case 0:
+      return cs_connecting(client(), now_);
+    case 1:
+      return cs_disconnected(client(), now_);
+    case 2:
+      static_cast<void>(cs_connect_at(client()));
+      return;
+    case 3:
+      return cs_want(client(), index, static_cast<std::uint32_t>(call.numbers_size()));
+    case 4:
+      return cs_list_scenes(client());
+    case 5: {
+      cs_play_out_options options;
+      cs_default_play_out(&options);
+      if (call.numbers_size() > 0) {
+        options.frames = index;
+        options.delay_ms = numbers.next();
+        options.least_delay_ms = numbers.next();
+        options.most_delay_ms = numbers.next();
+        options.lead_ms = numbers.next();
+      }
+      cs_set_play_out(client(), index == 1 ? nullptr : &options);
+      return;
+    }
+    case 6: {
+      cs_played played;
+      played.version = CS_PLAYED_VERSION;
+      cs_play_out(client(), now_, now_ + index % 1'000'000, &played);
+      const std::size_t count = 3 * std::size_t{cs_vertex_count(client())};
+      require(allFinite(cs_played_positions(client()), count), "played positions are finite");
+      require(allFinite(cs_played_normals(client()), count), "played normals are finite");
+      cs_collider collider;
+      for (std::uint32_t i = 0; cs_get_played_collider(client(), i, &collider) != 0; ++i)
+        expectText(collider.name);
+      return;
+    }
+    case 7: {
+      std::vector<float> spheres;
+      for (int i = 0; i < call.numbers_size(); ++i) spheres.push_back(call.numbers(i));
+      return cs_set_colliders(client(), spheres.data(), static_cast<std::uint32_t>(spheres.size() / 4), now_);
+    }
+    case 8: {
+      std::vector<cs_own_collider> shapes(index % (2 * CS_MAX_COLLIDERS));
+      for (cs_own_collider& shape : shapes) {
+        shape.shape = index / 64;
+        numbers.write(shape.position);
+        numbers.write(shape.orientation);
+        shape.radius = numbers.next();
+        shape.length = numbers.next();
+        numbers.write(shape.size);
+      }
+      return cs_set_shapes(client(), shapes.data(), static_cast<std::uint32_t>(shapes.size()), now_);
+    }
+    case 9: {
+      std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
+      for (float& joint : joints) joint = numbers.next();
+      cs_set_hand(client(), index % 4, joints.data(), index / 4 % (CS_HAND_JOINTS + 1), now_);
+      return;
+    }
+    case 10: {
+      std::vector<cs_grab> grabs(index % (2 * CS_MAX_GRABS));
+      for (cs_grab& grab : grabs) {
+        grab.id = index;
+        numbers.write(grab.position);
+        numbers.write(grab.orientation);
+        grab.radius = numbers.next();
+        grab.reach = numbers.next();
+        grab.max_force = numbers.next();
+        grab.slip_distance = numbers.next();
+      }
+      return cs_set_grabs(client(), grabs.data(), static_cast<std::uint32_t>(grabs.size()), now_);
+    }
+    case 11: {
+      const auto position = numbers.array<3>();
+      const auto orientation = numbers.array<4>();
+      return cs_move_attachment(client(), text, position.data(), index == 0 ? nullptr : orientation.data(),
+                                now_);
+    }
+    case 12:
+      return cs_want_contacts(client(), static_cast<int>(index % 2), now_);
+    case 13: {
+      const auto gravity = numbers.array<3>(), wind = numbers.array<3>();
+      const float density = numbers.next();
+      return cs_set_environment(client(), gravity.data(), index == 0 ? nullptr : wind.data(), &density);
+    }
+    case 14: {
+      const float strength = numbers.next();
+      return cs_set_gust(client(), strength, numbers.next());
+    }
+    case 15: {
+      const auto structural = numbers.array<2>(), shear = numbers.array<2>(), bend = numbers.array<2>();
+      const float damping = numbers.next();
+      return cs_set_cloth(client(), text, structural.data(), index == 0 ? nullptr : shear.data(), bend.data(),
+                          &damping);
+    }
+    case 16: {
+      cs_cloth_settings settings;
+      cs_keep_cloth_settings(&settings);
+      numbers.write(settings.structural);
+      settings.solver = index % 8;
+      settings.iterations = index / 8;
+      settings.tolerance = numbers.next();
+      settings.compliance = numbers.next();
+      settings.assembled = static_cast<int>(index % 3) - 1;
+      cs_change_cloth(client(), text, &settings);
+      return;
+    }
+    case 17:
+      return cs_set_material(client(), text, cs_material(client(), index));
+    case 18: {
+      const auto position = numbers.array<3>();
+      const float radius = numbers.next();
+      return cs_set_collider(client(), text, index == 0 ? nullptr : position.data(), &radius);
+    }
+    case 19:
+      return cs_set_role(client(), index, index / 4);
+    case 20:
+      return cs_remove_participant(client(), index);
+    case 21:
+      return cs_request_key_frame(client(), now_);
+    case 22:
+      return cs_pause(client(), static_cast<int>(index % 2));
+    case 23:
+      return cs_seek(client(), numbers.next());
+    case 24:
+      return cs_set_speed(client(), numbers.next());
+    case 25:
+      return cs_set_loop(client(), static_cast<int>(index % 2));
+    case 26:
+      return readGeometry();
+    case 27:
+      return readLists();
+    default:
+      now_ += index % 60'000 * kMs;
+  }
+}
+
+void Program::readGeometry() {
+  const std::uint32_t vertices = cs_vertex_count(client());
+  require(allFinite(cs_positions(client()), 3 * std::size_t{vertices}), "positions are finite");
+  require(allFinite(cs_normals(client()), 3 * std::size_t{vertices}), "normals are finite");
+  std::uint32_t indices = 0;
+  const std::uint32_t* triangles = cs_triangles(client(), &indices);
+  for (std::uint32_t i = 0; i < indices; ++i)
+    require(triangles[i] < vertices, "triangles name existing vertices");
+  cs_cloth cloth;
+  for (std::uint32_t i = 0; cs_get_cloth(client(), i, &cloth) != 0; ++i) {
+    expectText(cloth.name);
+    require(std::uint64_t{cloth.first_vertex} + cloth.vertex_count <= vertices,
+            "a cloth has existing vertices");
+    require(std::uint64_t{cloth.first_index} + cloth.index_count <= indices,
+            "a cloth has existing triangles");
+    std::uint32_t uvs = 0, corners = 0;
+    const float* coordinates = cs_uvs(client(), i, &uvs);
+    require(allFinite(coordinates, 2 * std::size_t{uvs}), "texture coordinates are finite");
+    const std::uint32_t* uvIndices = cs_uv_indices(client(), i, &corners);
+    require(corners == 0 || corners == cloth.index_count, "every corner has texture coordinates");
+    for (std::uint32_t k = 0; k < corners; ++k)
+      require(uvIndices[k] < uvs, "corners name existing texture coordinates");
+    cs_submesh submesh;
+    for (std::uint32_t k = 0; cs_get_submesh(client(), i, k, &submesh) != 0; ++k) {
+      expectText(submesh.name);
+      require(std::uint64_t{submesh.first_index} + submesh.index_count <= indices,
+              "a part has existing triangles");
+    }
+    cs_cloth_settings settings;
+    settings.version = CS_CLOTH_SETTINGS_VERSION;
+    cs_get_cloth_settings(client(), i, &settings);
+    expectText(cs_cloth_material(client(), i));
+    cs_cloth_report report;
+    report.version = CS_CLOTH_REPORT_VERSION;
+    cs_get_cloth_report(client(), i, &report);
+  }
+  readColliders();
+}
+
+void Program::readColliders() {
+  cs_collider collider;
+  for (std::uint32_t i = 0; cs_get_collider(client(), i, &collider) != 0; ++i) {
+    expectText(collider.name);
+    std::uint32_t corners = 0, indices = 0;
+    const std::uint32_t* triangles = nullptr;
+    const float* hull = cs_get_hull(client(), i, &corners, &triangles, &indices);
+    require(allFinite(hull, 3 * std::size_t{corners}), "corners of hulls are finite");
+    for (std::uint32_t k = 0; k < indices; ++k)
+      require(triangles[k] < corners, "hulls name existing corners");
+  }
+}
+
+void Program::readLists() {
+  for (const char* text : {cs_error_text(client()), cs_notice_text(client()), cs_server_name(client()),
+                           cs_device_name(client()), cs_scene_name(client())})
+    expectText(text);
+  for (std::uint32_t i = 0; i < cs_scene_count(client()); ++i) expectText(cs_scene(client(), i));
+  for (std::uint32_t i = 0; i < cs_material_count(client()); ++i) expectText(cs_material(client(), i));
+  cs_participant participant;
+  for (std::uint32_t i = 0; cs_get_participant(client(), i, &participant) != 0; ++i) {
+    expectText(participant.name);
+    expectText(participant.client_name);
+  }
+  cs_presence presence;
+  if (cs_get_presence(client(), &presence) != 0) expectText(presence.participant.name);
+  cs_grab_event grab;
+  for (std::uint32_t i = 0; cs_get_grab_event(client(), i, &grab) != 0; ++i) continue;
+  cs_contact_event contact;
+  for (std::uint32_t i = 0; cs_get_contact_event(client(), i, &contact) != 0; ++i) {
+    expectText(contact.cloth);
+    expectText(contact.collider);
+  }
+  cs_statistics statistics;
+  cs_get_statistics(client(), now_, &statistics);
+  cs_stage_statistics stages;
+  stages.version = CS_STAGE_STATISTICS_VERSION;
+  cs_get_stage_statistics(client(), &stages);
+  cs_playback playback;
+  cs_get_playback(client(), now_, &playback);
+  cs_environment environment;
+  cs_get_environment(client(), &environment);
+}
+
+void run(const CoreInput& input) {
+  Program(input).run();
+}
+
+constexpr std::array<std::string_view, 7> kWords{"curtain", "sheet", "ball", "stone", "cotton", "rail", ""};
+
+}  // namespace
+
+const Target kCoreTarget{.name = "core",
+                         .run = &runStructured<CoreInput, &run>,
+                         .structure = &CoreInput::default_instance(),
+                         .words = kWords};
+
+}  // namespace clothstream::fuzz

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: MIT
+#include "tests/fuzz/targets/session_target.h"
+
+#include <array>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clothstream/v1/session.pb.h"
+#include "inputs.pb.h"
+#include "proto/codec/stream_layout.h"
+#include "server/delivery/envelope.h"
+#include "server/hosting/server_state.h"
+#include "server/messages/limits.h"
+#include "server/model/input.h"
+#include "server/scene/collider_set.h"
+#include "server/scene/grabs_and_attachments.h"
+#include "server/scene/live_scene.h"
+#include "server/scene/pose_history.h"
+#include "server/session/session.h"
+#include "server/simulation/cloth_simulation.h"
+#include "tests/fuzz/targets/still_server.h"
+#include "tests/serving/small_scene.h"
+
+namespace clothstream::fuzz {
+namespace {
+
+constexpr std::size_t kPeers = 3;
+constexpr std::size_t kMaxSteps = 400;  // below the rates of a session, so that they do not end every input
+
+model::Scene scene() {
+  model::Scene scene = tests::smallScene("small");
+  model::Attachment rail;
+  rail.name = "rail";
+  rail.vertices = {0, 1, 2};
+  scene.cloths[0].attachments.push_back(rail);
+  scene.cloths[0].pins.clear();
+  return scene;
+}
+
+// Ticks of a scene without a device: handles its inputs as SceneHost does.
+class Ticks {
+ public:
+  explicit Ticks(scene::LiveScene& live)
+      : live_(live), scene_(live.start()), colliders_(scene_), grabs_(scene_) {}
+
+  void run() {
+    if (live_.resetRequested.exchange(false)) {
+      live_.subscribers.announce(delivery::parametersChanged(live_.resetParameters(), tick_ + 1));
+      scene_ = live_.start();
+    }
+    live_.inbox.drain(inputs_);
+    for (const scene::AcceptedChange& accepted : inputs_.changes) {
+      model::applyChange(scene_, accepted.change);
+      live_.subscribers.announce(
+          delivery::parametersChanged(accepted.message, tick_ + 1, accepted.participant));
+    }
+    for (scene::Poses& poses : inputs_.poses) poses_.add(std::move(poses));
+    poses_.place(schedule::Clock::now(),
+                 [this](std::uint64_t participant, const model::ParticipantPoses& poses) {
+                   colliders_.place(participant, poses.colliders);
+                   grabs_.place(participant, poses.grabs, poses.attachments);
+                 });
+    const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
+    colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
+    grabs_.advance(scene_, endSeconds, tickInputs_);
+    require(tickInputs_.colliders.size() <= simulation::kMaxColliders,
+            "the simulation has room for all colliders");
+    require(tickInputs_.grabs.size() <= simulation::kMaxGrabs, "the simulation has room for all grabs");
+    live_.tick = ++tick_;
+  }
+
+ private:
+  scene::LiveScene& live_;
+  model::Scene scene_;
+  std::uint64_t tick_ = 0;
+  scene::Inputs inputs_;
+  simulation::TickInputs tickInputs_;
+  scene::ColliderSet colliders_;
+  scene::GrabsAndAttachments grabs_;
+  scene::PoseHistory poses_;
+};
+
+class Peer {
+ public:
+  Peer() { connect(); }
+
+  void connect() {
+    session_ = session::Session::open(stillServer(), {.peer = "peer", .address = {}, .token = {}}, [] {});
+  }
+  void send(const v1::ClientMessage& message) { send(message.SerializeAsString()); }
+  void send(const std::string& bytes) {
+    // Exactly sized, so that the sanitizer detects a read past the end.
+    const std::vector<char> exact(bytes.begin(), bytes.end());
+    session_->receive(std::as_bytes(std::span(exact)));
+  }
+  void read() {
+    if (!reads) return;
+    while (const std::optional<delivery::SharedBytes> bytes = session_->next()) {
+      require(last.ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size())),
+              "a peer is sent messages that can be parsed");
+      if (last.has_welcome()) token = last.welcome().resume_token();
+    }
+  }
+  void hello(const std::string& scene, const std::string& resume = {}) {
+    v1::ClientMessage message;
+    v1::Hello& hello = *message.mutable_hello();
+    hello.set_protocol_version(1);
+    for (const std::uint32_t codec : codec::kCodecs) hello.add_codecs(codec);
+    hello.set_scene(scene);
+    hello.set_resume_token(resume);
+    send(message);
+  }
+  void upload(const v1::Scene& scene) {
+    const std::string bytes = scene.SerializeAsString();
+    constexpr std::size_t kPiece = 32'768;
+    const std::size_t count = (bytes.size() + kPiece - 1) / kPiece;
+    for (std::size_t i = 0; i < count; ++i) {
+      v1::ClientMessage message;
+      v1::Chunk& chunk = *message.mutable_upload();
+      chunk.set_content_id(1);
+      chunk.set_kind(v1::CONTENT_KIND_SCENE);
+      chunk.set_index(static_cast<std::uint32_t>(i));
+      chunk.set_count(static_cast<std::uint32_t>(count));
+      chunk.set_total_bytes(bytes.size());
+      chunk.set_data(bytes.substr(i * kPiece, kPiece));
+      send(message);
+    }
+    v1::ClientMessage create;
+    create.mutable_create_scene()->set_uploaded_content_id(1);
+    send(create);
+  }
+  void leave() { session_->leave(); }
+  void vanish() { session_.reset(); }
+  bool finished() const { return session_->finished(); }
+
+  bool reads = true;
+  std::string token;
+  v1::ServerMessage last;
+
+ private:
+  std::shared_ptr<session::Session> session_;
+};
+
+// Waits until the scene maker has nothing to do.
+void waitForMaker() {
+  std::promise<void> done;
+  v1::DeleteSceneRequest request;
+  request.set_name("nothing");
+  stillServer().deleteScene(request, [&](const auto&) { done.set_value(); });
+  done.get_future().wait();
+}
+
+void act(Peer& peer, const SessionInput::Step& step, Ticks& ticks) {
+  using Step = SessionInput::Step;
+  switch (step.action_case()) {
+    case Step::kMessage:
+      return peer.send(step.message());
+    case Step::kRaw:
+      return peer.send(step.raw());
+    case Step::kUpload:
+      return peer.upload(step.upload());
+    case Step::kLeave:
+      peer.leave();
+      peer.read();
+      return peer.connect();
+    case Step::kVanish:
+      peer.vanish();
+      peer.connect();
+      return peer.hello("small", peer.token);
+    case Step::kStopReading:
+      peer.reads = false;
+      return;
+    case Step::kTick:
+      return ticks.run();
+    case Step::ACTION_NOT_SET:
+      return;
+  }
+}
+
+void run(const SessionInput& input) {
+  hosting::SceneServer::State& state = stillServer().state();
+  const auto live = std::make_shared<scene::LiveScene>(scene(), false, nullptr, kPeers + 1);
+  state.insert(live);
+  {
+    Ticks ticks(*live);
+    Peer honest;
+    std::array<Peer, kPeers> peers;
+    honest.hello("small");
+    honest.read();
+    std::size_t steps = 0;
+    for (const SessionInput::Step& step : input.steps()) {
+      if (++steps > kMaxSteps) break;
+      Peer& peer = peers[step.peer() % kPeers];
+      act(peer, step, ticks);
+      for (Peer& each : peers) each.read();
+      honest.read();
+      require(!honest.finished() || honest.last.error().code() == v1::ERROR_CODE_REMOVED,
+              "an honest peer is closed only by an owner");
+    }
+    waitForMaker();
+    for (Peer& each : peers) each.read();
+  }
+  state.erase(*live);
+}
+
+constexpr std::array<std::string_view, 16> kWords{
+    "small",   "played", "sheet", "ball",  "rail",  "cotton", "silk",      "flag",
+    "curtain", "",       "new",   "denim", "swing", "folds",  "obstacles", "a\xc2\x9b"};
+
+}  // namespace
+
+const Target kSessionTarget{.name = "session",
+                            .run = &runStructured<SessionInput, &run>,
+                            .structure = &SessionInput::default_instance(),
+                            .words = kWords};
+
+}  // namespace clothstream::fuzz

@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: MIT
+// Servers that end and start again with the same state directory.
+#include "server/saved_state/saved_state.h"
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clothstream/v1/saved_state.pb.h"
+#include "server/messages/scene_message.h"
+#include "server/scene/token_hash.h"
+#include "tests/e2e/temporary_directory.h"
+#include "tests/serving/server_test.h"
+#include "tests/support/eventually.h"
+
+// Starts the server, and ends the test if there is no device.
+#define START(...)  \
+  run(__VA_ARGS__); \
+  if (IsSkipped()) return
+
+namespace clothstream::saved_state {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using tests::eventually;
+using tests::TestPeer;
+
+class SavedStateTest : public tests::ServerTest {
+ protected:
+  // Starts a server on the directory. The former one must have ended.
+  void run(hosting::ServerOptions options = {}, const scene::BudgetLimits& budget = kNoLimits,
+           SavedStateOptions state = {}) {
+    state.directory = directory_.path();
+    state.checkpointInterval = 50ms;
+    state.lookInterval = 20ms;
+    store_ = std::make_shared<SavedState>(state);
+    options.store = store_;
+    start(std::move(options), {}, budget);
+  }
+  void end() {
+    stop();
+    store_.reset();
+  }
+  void create(const model::Scene& scene) {
+    v1::CreateSceneRequest request;
+    *request.mutable_scene() = messages::toMessage(scene);
+    std::promise<std::string> done;
+    server().createScene(request, [&](const auto& made) { done.set_value(made ? "" : made.error().text()); });
+    ASSERT_EQ(done.get_future().get(), "");
+  }
+  void remove(const std::string& name) {
+    v1::DeleteSceneRequest request;
+    request.set_name(name);
+    std::promise<std::string> done;
+    server().deleteScene(request, [&](const auto& made) { done.set_value(made ? "" : made.error().text()); });
+    ASSERT_EQ(done.get_future().get(), "");
+  }
+  std::vector<std::string> names() {
+    std::vector<std::string> names;
+    const v1::ListScenesResponse list = server().listScenes();
+    for (const v1::SceneSummary& scene : list.scenes()) names.push_back(scene.name());
+    return names;
+  }
+  std::shared_ptr<scene::LiveScene> live(const std::string& name) { return server().state().find(name); }
+  static v1::Hello helloTo(const std::string& scene, const std::string& token) {
+    v1::Hello hello;
+    hello.set_scene(scene);
+    hello.set_resume_token(token);
+    return hello;
+  }
+
+  e2e::TemporaryDirectory directory_;
+  std::shared_ptr<SavedState> store_;
+};
+
+TEST_F(SavedStateTest, CreatedScenesComeBackWithStateParametersAndParticipants) {
+  START();
+  create(tests::smallScene("mine"));
+  std::string ada, ben;
+  std::uint64_t adaId = 0, benId = 0, tick = 0;
+  {
+    TestPeer owner(server(), "owner"), other(server(), "other");
+    owner.join("mine");
+    other.join("mine");
+    ada = owner.welcome().resume_token(), adaId = owner.welcome().participant_id();
+    ben = other.welcome().resume_token(), benId = other.welcome().participant_id();
+    v1::ParameterChange change;
+    change.mutable_gravity()->mutable_value()->set_y(-3);
+    owner.change(change);
+    owner.readUntil(v1::ServerMessage::kParameterChanged);
+    owner.readFrames(20);
+    tick = owner.frames().back().tick;
+    server().stop();
+  }
+  end();
+  run();
+  EXPECT_THAT(names(), ::testing::Contains("mine"));
+  EXPECT_GE(live("mine")->tick.load(), tick);
+  EXPECT_EQ(live("mine")->definition().environment.gravity.y(), -3);
+  EXPECT_TRUE(live("mine")->created);
+  EXPECT_EQ(live("mine")->roster.away(), 2u);
+  TestPeer owner(server(), "owner"), other(server(), "other"), stranger(server(), "stranger");
+  owner.hello(helloTo("mine", ada));
+  owner.readFrames(2);
+  EXPECT_TRUE(owner.welcome().resumed());
+  EXPECT_EQ(owner.welcome().participant_id(), adaId);
+  EXPECT_EQ(owner.welcome().role(), v1::ROLE_OWNER);
+  EXPECT_EQ(owner.welcome().resume_token(), ada);
+  EXPECT_GT(owner.frames().front().tick, tick);
+  EXPECT_TRUE(owner.frames().front().key);
+  other.hello(helloTo("mine", ben));
+  other.readFrames(1);
+  EXPECT_EQ(other.welcome().participant_id(), benId);
+  EXPECT_EQ(other.welcome().role(), v1::ROLE_PARTICIPANT);
+  std::string wrong = ada;
+  wrong[0] = static_cast<char>(wrong[0] ^ 1);
+  stranger.hello(helloTo("mine", wrong));
+  stranger.readFrames(1);
+  EXPECT_FALSE(stranger.welcome().resumed());
+  EXPECT_GT(stranger.welcome().participant_id(), std::max(adaId, benId));
+}
+
+TEST_F(SavedStateTest, ScenesOfTheServerGoOnUnlessTheirDefinitionChanged) {
+  START();
+  std::uint64_t tick = 0;
+  {
+    TestPeer peer(server());
+    peer.join("small");
+    peer.readFrames(10);
+    tick = peer.frames().back().tick;
+    server().stop();
+  }
+  end();
+  run();
+  EXPECT_GE(live("small")->tick.load(), tick);
+  EXPECT_EQ(live("other")->tick.load(), 0u);
+  end();
+  store_ = std::make_shared<SavedState>(SavedStateOptions{.directory = directory_.path()});
+  model::Scene changed = tests::smallScene("small");
+  changed.cloths[0].mass *= 2;
+  EXPECT_FALSE(store_->take(changed).has_value());
+}
+
+// Nothing of the directory names a token.
+TEST_F(SavedStateTest, KeepsNoTokens) {
+  START();
+  create(tests::smallScene("mine"));
+  std::string token;
+  {
+    TestPeer peer(server());
+    peer.join("mine");
+    token = peer.welcome().resume_token();
+    server().stop();
+  }
+  end();
+  Database database({.directory = directory_.path() / "scenes"});
+  const auto contents = database.read("mine");
+  ASSERT_TRUE(contents && contents->session);
+  v1::SavedSession session;
+  ASSERT_TRUE(session.ParseFromString(*contents->session));
+  ASSERT_EQ(session.participants_size(), 1);
+  EXPECT_EQ(session.participants(0).token_hash(), scene::hashOfToken(token));
+  for (const auto& content : {contents->scene, contents->session, contents->checkpoint})
+    EXPECT_EQ(content.value_or("").find(token), std::string::npos);
+}
+
+TEST_F(SavedStateTest, DeletedScenesStayDeleted) {
+  hosting::ServerOptions options;
+  options.sceneLifetime = 300ms;
+  START(options);
+  create(tests::smallScene("mine"));
+  {
+    TestPeer peer(server());
+    peer.join("mine");
+    peer.readFrames(5);
+    peer.leave();
+  }
+  create(tests::smallScene("asked"));
+  remove("asked");
+  ASSERT_TRUE(eventually([&] { return live("mine") == nullptr; }));
+  ASSERT_TRUE(store_->flush(10s));
+  end();
+  run();
+  EXPECT_THAT(names(), ::testing::ElementsAre("small", "other"));
+}
+
+// Parameters that were accepted but have not reached a tick come back too.
+TEST_F(SavedStateTest, AScenePausedBeforeItsFirstTickKeepsChanges) {
+  START();
+  create(tests::smallScene("mine"));
+  live("mine")->paused = true;
+  v1::ParameterChange change;
+  change.mutable_gravity()->mutable_value()->set_y(-3);
+  ASSERT_TRUE(live("mine")->change(1, change));
+  ASSERT_TRUE(store_->flush(10s));
+  end();
+  run();
+  EXPECT_TRUE(live("mine")->paused);
+  EXPECT_EQ(live("mine")->definition().environment.gravity.y(), -3);
+}
+
+TEST_F(SavedStateTest, AnUnaffordableSceneIsKeptButDoesNotRun) {
+  START();
+  model::Scene large = tests::smallScene("large");
+  large.cloths[0].solver.kind = model::SolverKind::constraint;
+  large.cloths[0].solver.iterations = 10'000;
+  large.cloths[0].solver.tolerance = 0.1f;
+  create(large);
+  create(tests::smallScene("tiny"));
+  end();
+  scene::BudgetLimits little = kNoLimits;
+  little.load = little.sceneLoad = 0.001;
+  run({}, little);
+  EXPECT_THAT(names(), ::testing::IsSupersetOf({"large", "tiny"}));
+  TestPeer peer(server());
+  peer.hello("large");
+  const v1::ServerMessage last = peer.readToTheEnd();
+  EXPECT_EQ(last.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(last.error().text(), HasSubstr("is kept from before a restart, but does not run"));
+  EXPECT_THAT(last.error().text(), HasSubstr("--max-load"));
+  end();
+  run();
+  EXPECT_EQ(live("large")->quarantined(), "");
+  TestPeer again(server());
+  again.join("large");
+  remove("large");
+  end();
+  run();
+  EXPECT_THAT(names(), ::testing::Not(::testing::Contains("large")));
+}
+
+TEST_F(SavedStateTest, MoreScenesThanAllowedAreKeptButDoNotRun) {
+  START();
+  for (const char* name : {"one", "two"}) create(tests::smallScene(name));
+  end();
+  hosting::ServerOptions options;
+  options.maxCreatedScenes = 1;
+  run(options);
+  EXPECT_EQ(live("one")->quarantined(), "");
+  EXPECT_THAT(live("two")->quarantined(), HasSubstr("--max-created-scenes"));
+}
+
+TEST_F(SavedStateTest, LeavesOutTheLargestStateBeyondItsLimit) {
+  START({}, kNoLimits, {.maxBytes = 100'000});
+  model::Scene large = tests::smallScene("large");
+  large.cloths[0].grid.rows = large.cloths[0].grid.columns = 64;
+  large.cloths[0].mass = 0.001f * static_cast<float>(large.cloths[0].nodeCount());
+  create(large);
+  create(tests::smallScene("tiny"));
+  {
+    TestPeer inLarge(server()), inTiny(server());
+    inLarge.join("large");
+    inTiny.join("tiny");
+    ASSERT_TRUE(eventually([&] { return store_->status().leftOut == 1 && live("tiny")->keeper->savedAt(); }));
+    EXPECT_FALSE(live("large")->keeper->savedAt().has_value());
+    server().stop();
+  }
+  end();
+  run();
+  EXPECT_EQ(live("large")->tick.load(), 0u);
+  EXPECT_GT(live("tiny")->tick.load(), 0u);
+}
+
+TEST_F(SavedStateTest, SavesNothingMoreWhileTheDiskIsFull) {
+  START({}, kNoLimits, {.minFreeBytes = UINT64_MAX / 2});
+  create(tests::smallScene("mine"));
+  {
+    TestPeer peer(server());
+    peer.join("mine");
+    peer.readFrames(10);
+    ASSERT_TRUE(store_->flush(10s));
+    EXPECT_FALSE(live("mine")->keeper->savedAt().has_value());
+    EXPECT_GE(store_->status().waiting, 1u);
+    server().stop();
+  }
+  end();
+  run();
+  EXPECT_EQ(live("mine")->tick.load(), 0u) << "the scene is kept, and starts from the beginning";
+}
+
+TEST_F(SavedStateTest, WithoutAStoreNothingIsKept) {
+  start();
+  if (IsSkipped()) return;
+  create(tests::smallScene("mine"));
+  EXPECT_EQ(live("mine")->keeper, nullptr);
+}
+
+}  // namespace
+}  // namespace clothstream::saved_state
