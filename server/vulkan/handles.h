@@ -5,6 +5,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <tuple>
 #include <vector>
 
 #include <vulkan/vulkan_raii.hpp>
@@ -15,6 +19,16 @@
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::vulkan {
+
+struct Kernel::Handles {
+  vk::raii::DescriptorSetLayout setLayout = nullptr;
+  vk::raii::PipelineLayout layout = nullptr;
+  vk::raii::Pipeline pipeline = nullptr;
+};
+
+// Address of the embedded SPIR-V, bindings, bytes of push constants, workgroup size with specialisation.
+using PipelineKey =
+    std::tuple<const std::uint32_t*, std::vector<BindingKind>, std::uint32_t, std::vector<std::uint32_t>>;
 
 struct Device::Handles {
   vk::raii::Context context;
@@ -27,6 +41,9 @@ struct Device::Handles {
   vk::raii::PipelineCache pipelineCache = nullptr;
   std::uint32_t queueFamily = 0;
   mutable std::atomic<std::uint64_t> allocatedBytes{0};
+  // Pipelines that kernels use.
+  mutable std::mutex pipelinesMutex;
+  mutable std::map<PipelineKey, std::weak_ptr<const Kernel::Handles>> pipelines;
 
   bool validates() const { return *messenger != vk::DebugUtilsMessengerEXT{}; }
 };
@@ -42,12 +59,6 @@ struct Buffer::Handles {
   vk::raii::DeviceMemory memory = nullptr;
   vk::raii::Buffer buffer = nullptr;
   vk::raii::BufferView texelView = nullptr;
-};
-
-struct Kernel::Handles {
-  vk::raii::DescriptorSetLayout setLayout = nullptr;
-  vk::raii::PipelineLayout layout = nullptr;
-  vk::raii::Pipeline pipeline = nullptr;
 };
 
 struct Bindings::Handles {

@@ -28,6 +28,52 @@ constexpr std::uint32_t kWord = sizeof(std::uint32_t);
 
 }  // namespace
 
+std::shared_ptr<const Kernel::Handles> Kernel::makePipeline(const Device::Handles& device,
+                                                            const KernelDescription& description,
+                                                            std::span<const std::uint32_t> constants) {
+  std::vector<vk::DescriptorSetLayoutBinding> slots;
+  for (const BindingKind kind : description.bindings)
+    slots.push_back({.binding = static_cast<std::uint32_t>(slots.size()),
+                     .descriptorType = typeOf(kind),
+                     .descriptorCount = 1,
+                     .stageFlags = vk::ShaderStageFlagBits::eCompute});
+  std::vector<vk::SpecializationMapEntry> entries;
+  for (std::uint32_t id = 0; id < constants.size(); ++id)
+    entries.push_back({.constantID = id, .offset = id * kWord, .size = kWord});
+  const vk::SpecializationInfo specialisation{.mapEntryCount = static_cast<std::uint32_t>(entries.size()),
+                                              .pMapEntries = entries.data(),
+                                              .dataSize = constants.size_bytes(),
+                                              .pData = constants.data()};
+  const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
+                                   .size = description.pushConstantBytes};
+  const vk::raii::Device& vulkan = device.device;
+  auto made = std::make_shared<Handles>();
+  made->setLayout = vk::raii::DescriptorSetLayout(
+      vulkan, vk::DescriptorSetLayoutCreateInfo{.bindingCount = static_cast<std::uint32_t>(slots.size()),
+                                                .pBindings = slots.data()});
+  made->layout = vk::raii::PipelineLayout(
+      vulkan, vk::PipelineLayoutCreateInfo{.setLayoutCount = 1,
+                                           .pSetLayouts = &*made->setLayout,
+                                           .pushConstantRangeCount = description.pushConstantBytes > 0,
+                                           .pPushConstantRanges = &push});
+  const vk::raii::ShaderModule module(vulkan,
+                                      vk::ShaderModuleCreateInfo{.codeSize = description.spirv.size_bytes(),
+                                                                 .pCode = description.spirv.data()});
+  made->pipeline =
+      vk::raii::Pipeline(vulkan, device.pipelineCache,
+                         vk::ComputePipelineCreateInfo{.stage = {.stage = vk::ShaderStageFlagBits::eCompute,
+                                                                 .module = *module,
+                                                                 .pName = "main",
+                                                                 .pSpecializationInfo = &specialisation},
+                                                       .layout = *made->layout});
+  if (device.validates())
+    vulkan.setDebugUtilsObjectNameEXT(
+        {.objectType = vk::ObjectType::ePipeline,
+         .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*made->pipeline)),
+         .pObjectName = description.name});
+  return made;
+}
+
 Kernel::~Kernel() = default;
 Kernel::Kernel(Kernel&&) noexcept = default;
 Kernel& Kernel::operator=(Kernel&&) noexcept = default;
@@ -36,8 +82,7 @@ Kernel::Kernel(const Device& device, const KernelDescription& description)
     : name_(description.name),
       bindings_(description.bindings),
       pushConstantBytes_(description.pushConstantBytes),
-      workgroupSize_(description.workgroupSize),
-      handles_(std::make_unique<Handles>()) {
+      workgroupSize_(description.workgroupSize) {
   const Limits& limits = device.limits();
   if (workgroupSize_ > limits.maxWorkgroupSizeX || workgroupSize_ > limits.maxWorkgroupInvocations)
     throw std::runtime_error(fmt::format(
@@ -48,48 +93,14 @@ Kernel::Kernel(const Device& device, const KernelDescription& description)
                                          name_, pushConstantBytes_, limits.maxPushConstantBytes,
                                          device.info().name));
 
-  std::vector<vk::DescriptorSetLayoutBinding> slots;
-  for (const BindingKind kind : bindings_)
-    slots.push_back({.binding = static_cast<std::uint32_t>(slots.size()),
-                     .descriptorType = typeOf(kind),
-                     .descriptorCount = 1,
-                     .stageFlags = vk::ShaderStageFlagBits::eCompute});
   std::vector<std::uint32_t> constants{workgroupSize_};
   constants.insert(constants.end(), description.specialisation.begin(), description.specialisation.end());
-  std::vector<vk::SpecializationMapEntry> entries;
-  for (std::uint32_t id = 0; id < constants.size(); ++id)
-    entries.push_back({.constantID = id, .offset = id * kWord, .size = kWord});
-  const vk::SpecializationInfo specialisation{.mapEntryCount = static_cast<std::uint32_t>(entries.size()),
-                                              .pMapEntries = entries.data(),
-                                              .dataSize = constants.size() * kWord,
-                                              .pData = constants.data()};
-  const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
-                                   .size = pushConstantBytes_};
-  const vk::raii::Device& vulkan = device.handles().device;
   try {
-    handles_->setLayout = vk::raii::DescriptorSetLayout(
-        vulkan, vk::DescriptorSetLayoutCreateInfo{.bindingCount = static_cast<std::uint32_t>(slots.size()),
-                                                  .pBindings = slots.data()});
-    handles_->layout = vk::raii::PipelineLayout(
-        vulkan, vk::PipelineLayoutCreateInfo{.setLayoutCount = 1,
-                                             .pSetLayouts = &*handles_->setLayout,
-                                             .pushConstantRangeCount = pushConstantBytes_ > 0,
-                                             .pPushConstantRanges = &push});
-    const vk::raii::ShaderModule module(vulkan,
-                                        vk::ShaderModuleCreateInfo{.codeSize = description.spirv.size_bytes(),
-                                                                   .pCode = description.spirv.data()});
-    handles_->pipeline =
-        vk::raii::Pipeline(vulkan, device.handles().pipelineCache,
-                           vk::ComputePipelineCreateInfo{.stage = {.stage = vk::ShaderStageFlagBits::eCompute,
-                                                                   .module = *module,
-                                                                   .pName = "main",
-                                                                   .pSpecializationInfo = &specialisation},
-                                                         .layout = *handles_->layout});
-    if (device.handles().validates())
-      vulkan.setDebugUtilsObjectNameEXT(
-          {.objectType = vk::ObjectType::ePipeline,
-           .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*handles_->pipeline)),
-           .pObjectName = name_.c_str()});
+    const std::scoped_lock lock(device.handles().pipelinesMutex);
+    auto& shared =
+        device.handles().pipelines[{description.spirv.data(), bindings_, pushConstantBytes_, constants}];
+    handles_ = shared.lock();
+    if (!handles_) shared = handles_ = makePipeline(device.handles(), description, constants);
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(
         fmt::format("kernel {} is refused by {}: {}", name_, device.info().name, error.what()));

@@ -34,7 +34,9 @@ struct KernelDescription {
   std::vector<std::uint32_t> specialisation = {};  // constant_id 1, 2, 3, ...; pass floats by std::bit_cast
 };
 
-// Throws std::runtime_error, which names the kernel, if the device refuses it.
+// Kernels of one device with the same SPIR-V, specialisation and interface share one pipeline, because
+// software devices compile a pipeline when it first runs. Throws std::runtime_error, which names the kernel,
+// if the device refuses it.
 class Kernel {
  public:
   Kernel(const Device& device, const KernelDescription& description);
@@ -52,11 +54,15 @@ class Kernel {
   std::uint32_t pushConstantBytes() const { return pushConstantBytes_; }
 
  private:
+  static std::shared_ptr<const Handles> makePipeline(const Device::Handles& device,
+                                                     const KernelDescription& description,
+                                                     std::span<const std::uint32_t> constants);
+
   std::string name_;
   std::vector<BindingKind> bindings_;
   std::uint32_t pushConstantBytes_ = 0;
   std::uint32_t workgroupSize_ = 0;
-  std::unique_ptr<Handles> handles_;
+  std::shared_ptr<const Handles> handles_;
 };
 
 // One buffer for each of the kernel's bindings, in order. Kernel and buffers must outlive this object.

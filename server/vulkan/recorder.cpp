@@ -106,7 +106,9 @@ void Recorder::beginRehearsal() {
 }
 
 void Recorder::note(const Bindings& bindings) {
-  const auto same = [&](const Bindings* known) { return &known->kernel() == &bindings.kernel(); };
+  const auto same = [&](const Bindings* known) {
+    return &known->kernel().handles() == &bindings.kernel().handles();
+  };
   if (std::ranges::none_of(rehearsed_, same)) rehearsed_.push_back(&bindings);
 }
 

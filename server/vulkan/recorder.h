@@ -40,7 +40,7 @@ class Recorder {
 
   // Begins a rehearsal: the following dispatches do not run; their kernels are noted.
   void beginRehearsal();
-  // The first bindings of each kernel that the last rehearsal noted. Valid until the next rehearsal.
+  // The first bindings of each pipeline that the last rehearsal noted. Valid until the next rehearsal.
   std::span<const Bindings* const> rehearsed() const { return rehearsed_; }
   // Runs a kernel on no data, so that the device does its first-time work now. A software device compiles the
   // kernel then, which takes up to tenths of a second.

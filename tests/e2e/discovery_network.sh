@@ -3,7 +3,7 @@
 # discovery_network.sh DIRECTORY COMMAND [ARGUMENTS]: DIRECTORY is for files of the daemons.
 set -eu
 if [ -z "${IN_NAMESPACE:-}" ]; then
-  IN_NAMESPACE=1 exec unshare --net --mount --pid --fork --kill-child "$0" "$@"
+  IN_NAMESPACE=1 exec unshare --net --mount-proc --pid --fork --kill-child "$0" "$@"
 fi
 directory=$1
 shift

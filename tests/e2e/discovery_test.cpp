@@ -21,8 +21,8 @@ using ::testing::HasSubstr;
 class Discovery : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (std::system(
-            "unshare --net --mount --pid --fork ip link add home type veth peer name other 2>/dev/null") != 0)
+    if (std::system("unshare --net --mount-proc --pid --fork ip link add home type veth peer name other "
+                    "2>/dev/null") != 0)
       GTEST_SKIP() << "network namespaces with virtual links are not permitted here";
   }
 

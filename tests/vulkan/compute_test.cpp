@@ -2,6 +2,7 @@
 // Buffers, kernels and recordings: correct content and correct order.
 #include <bit>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -111,6 +112,19 @@ TEST_F(ComputeTest, KernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
       EXPECT_EQ(values.mapped<float>()[i], expected) << i;  // small integers and halves are exact
     }
   }
+}
+
+TEST_F(ComputeTest, EqualKernelsShareAPipeline) {
+  std::optional<Kernel> first = countUp(), second = countUp();
+  const Kernel other = countUp(32);
+  EXPECT_EQ(&first->handles(), &second->handles());
+  EXPECT_NE(&first->handles(), &other.handles());
+  const Buffer a = uploadOf(countedFrom(0, 64));
+  const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
+  first.reset();
+  const Bindings bindings(tests::device(), *second, {&a, &b});
+  tests::run([&](Recorder& recorder) { recorder.dispatch(bindings, 64u, 64); });
+  EXPECT_EQ(contents<std::uint32_t>(b), countedUp(64, 1));
 }
 
 TEST_F(ComputeTest, KernelReadsTexelsThatCopiesWrote) {
