@@ -114,19 +114,6 @@ TEST_F(ComputeTest, KernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
   }
 }
 
-TEST_F(ComputeTest, EqualKernelsShareAPipeline) {
-  std::optional<Kernel> first = countUp(), second = countUp();
-  const Kernel other = countUp(32);
-  EXPECT_EQ(&first->handles(), &second->handles());
-  EXPECT_NE(&first->handles(), &other.handles());
-  const Buffer a = uploadOf(countedFrom(0, 64));
-  const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
-  first.reset();
-  const Bindings bindings(tests::device(), *second, {&a, &b});
-  tests::run([&](Recorder& recorder) { recorder.dispatch(bindings, 64u, 64); });
-  EXPECT_EQ(contents<std::uint32_t>(b), countedUp(64, 1));
-}
-
 TEST_F(ComputeTest, KernelReadsTexelsThatCopiesWrote) {
   constexpr std::uint32_t kCount = 300;
   const Buffer upload(tests::device(), BufferPurpose::upload, kCount * 16);
@@ -288,6 +275,19 @@ TEST_F(ComputeTest, RecordingRunsAgainWhenItIsSubmittedAgain) {
   std::fill(a.mapped<std::uint32_t>().begin(), a.mapped<std::uint32_t>().end(), 41u);
   tests::submitAndWait(tests::device(), recorder);
   EXPECT_THAT(contents<std::uint32_t>(b), Each(42u));
+}
+
+TEST_F(ComputeTest, EqualKernelsShareAPipeline) {
+  std::optional<Kernel> first = countUp(), second = countUp();
+  const Kernel other = countUp(32);
+  EXPECT_EQ(&first->handles(), &second->handles());
+  EXPECT_NE(&first->handles(), &other.handles());
+  const Buffer a = uploadOf(countedFrom(0, 64));
+  const Buffer b(tests::device(), BufferPurpose::readback, a.bytes());
+  first.reset();
+  const Bindings bindings(tests::device(), *second, {&a, &b});
+  tests::run([&](Recorder& recorder) { recorder.dispatch(bindings, 64u, 64); });
+  EXPECT_EQ(contents<std::uint32_t>(b), countedUp(64, 1));
 }
 
 TEST_F(ComputeTest, ARehearsalRunsNoKernelAndNotesEachOnce) {
