@@ -119,7 +119,7 @@ TEST_F(TlsProgram, ReadsItsCertificateAgainWithoutEndingStreams) {
 
 TEST_F(TlsProgram, WarnsOfAKeyThatOthersMayRead) {
   use("first");
-  for (const mode_t mode : {0640, 0600}) {
+  for (const mode_t mode : {mode_t{0640}, mode_t{0600}}) {
     ASSERT_EQ(::chmod(key().c_str(), mode), 0);
     startWith({"--tls-certificate", chain(), "--tls-key", key()});
     if (IsSkipped()) return;
