@@ -55,7 +55,9 @@ class Signals {
  public:
   Signals() {
     sigemptyset(&set_);
+    sigemptyset(&ending_);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2}) sigaddset(&set_, signal);
+    for (const int signal : {SIGINT, SIGTERM}) sigaddset(&ending_, signal);
     pthread_sigmask(SIG_BLOCK, &set_, nullptr);
     std::signal(SIGPIPE, SIG_IGN);  // a closed peer is reported as an error of its socket
     std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is reported like a full disk
@@ -64,39 +66,73 @@ class Signals {
   // Returns the next signal.
   int wait() const { return std::max(0, sigwaitinfo(&set_, nullptr)); }
   // Returns the next signal, or 0 after `timeout`.
-  int wait(std::chrono::nanoseconds timeout) const {
+  int wait(std::chrono::nanoseconds timeout) const { return wait(set_, timeout); }
+  // Returns whether SIGINT or SIGTERM came within `timeout`. Leaves other signals for wait().
+  bool waitForEnd(std::chrono::nanoseconds timeout) const { return wait(ending_, timeout) != 0; }
+
+ private:
+  static int wait(const sigset_t& set, std::chrono::nanoseconds timeout) {
     const auto wholeSeconds = std::chrono::duration_cast<std::chrono::seconds>(timeout);
     const timespec limit{static_cast<std::time_t>(wholeSeconds.count()),
                          static_cast<long>((timeout - wholeSeconds).count())};
-    return std::max(0, sigtimedwait(&set_, nullptr, &limit));
+    return std::max(0, sigtimedwait(&set, nullptr, &limit));
+  }
+
+  sigset_t set_{}, ending_{};
+};
+
+using SteadyTime = std::chrono::steady_clock::time_point;
+
+// Interval in which the guards look for signals.
+constexpr std::chrono::milliseconds kGuardInterval{20};
+
+// Ends the process. The kernel closes files and connections; recordings stay readable.
+[[noreturn]] void endNow(const char* why) {
+  spdlog::error("ending at once: {}", why);
+  spdlog::default_logger()->flush();
+  std::_Exit(1);
+}
+
+// Takes SIGINT and SIGTERM while the server starts. Ends the process if the start goes on for `drain` after
+// the first of them, or at the second one.
+class StartGuard {
+ public:
+  StartGuard(const Signals& signals, std::chrono::nanoseconds drain)
+      : thread_([this, &signals, drain](const std::stop_token& stop) {
+          while (!stop.stop_requested()) {
+            const bool signalled = signals.waitForEnd(kGuardInterval);
+            if (signalled && stopAt_) endNow("another signal came");
+            if (signalled) {
+              spdlog::info("stopping when the start is complete, or after {} s (--drain)",
+                           std::chrono::duration<double>(drain).count());
+              stopAt_ = std::chrono::steady_clock::now() + drain;
+            }
+            if (stopAt_ && std::chrono::steady_clock::now() >= *stopAt_) endNow("the start takes too long");
+          }
+        }) {}
+
+  // Call it when the start is complete. Returns when the process must have ended, if SIGINT or SIGTERM came.
+  std::optional<SteadyTime> finish() {
+    thread_ = {};
+    return stopAt_;
   }
 
  private:
-  sigset_t set_{};
+  std::optional<SteadyTime> stopAt_;  // belongs to the thread until finish()
+  std::jthread thread_;
 };
 
-// Ends the process while it lives: when the time is over, or at the next SIGINT or SIGTERM. The kernel then
-// closes files and connections; recordings stay readable.
+// Ends the process while it lives: when the time is over, or at the next SIGINT or SIGTERM.
 class EndGuard {
  public:
-  EndGuard(const Signals& signals, std::chrono::nanoseconds time)
-      : thread_([&signals, time](const std::stop_token& stop) {
-          using Clock = std::chrono::steady_clock;
-          constexpr std::chrono::milliseconds kInterval{20};
-          for (const auto end = Clock::now() + time; Clock::now() < end && !stop.stop_requested();) {
-            const int signal = signals.wait(kInterval);
-            if (signal == SIGINT || signal == SIGTERM) endNow("another signal came");
-          }
+  EndGuard(const Signals& signals, SteadyTime end)
+      : thread_([&signals, end](const std::stop_token& stop) {
+          while (std::chrono::steady_clock::now() < end && !stop.stop_requested())
+            if (signals.waitForEnd(kGuardInterval)) endNow("another signal came");
           if (!stop.stop_requested()) endNow("the device or the disk does not answer");
         }) {}
 
  private:
-  [[noreturn]] static void endNow(const char* why) {
-    spdlog::error("ending at once: {}", why);
-    spdlog::default_logger()->flush();
-    std::_Exit(1);
-  }
-
   std::jthread thread_;
 };
 
@@ -209,6 +245,9 @@ std::shared_ptr<tls::ServerTls> openTls(const ProgramOptions& options) {
         std::move(clientCa));
   }
   if (options.tlsCertificate.empty()) return nullptr;
+  if (tls::othersMayRead(options.tlsKey))
+    spdlog::warn("--tls-key: other accounts of this machine may read {}; use chmod 600",
+                 options.tlsKey.string());
   return std::make_shared<tls::ServerTls>(
       [chain = options.tlsCertificate, key = options.tlsKey] {
         tls::Certificate certificate = tls::readCertificate(chain, key);
@@ -240,8 +279,13 @@ void reload(identity::Authenticator& authenticator) {
 // Null if every peer may act as an owner, because only programs of this machine reach the server.
 std::shared_ptr<identity::Authenticator> makeAuthenticator(const ProgramOptions& options) {
   const bool asks = options.pairing || !options.tokenKeys.empty();
-  if (!asks && isLoopback(options.host)) return nullptr;
-  if (!asks)
+  if (!asks && !isReachable(options)) return nullptr;
+  if (!asks && isLoopback(options.host))
+    spdlog::warn(
+        "--insecure: everyone who reaches {} through a program of this machine can join, and counts "
+        "as a program of this machine (docs/identity.md)",
+        options.publicNames.front());
+  else if (!asks)
     spdlog::warn("--insecure: everyone who reaches {} can join, with the role {} (docs/identity.md)",
                  options.host, scene::nameOf(options.anonymousRole));
   if (asks && !isLoopback(options.host) && !options.tlsSelf && options.tlsCertificate.empty())
@@ -283,9 +327,9 @@ void printHomeAddresses(const ProgramOptions& options, std::uint16_t port, const
   fmt::print("type    {}\n{}", address, tls::qrCode(address));
 }
 
-// Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP if there is nothing to reload. SIGHUP reloads
-// the certificate and the keys of tokens, SIGUSR1 prints the report, SIGUSR2 a pairing code. `tls` and
-// `authenticator` may be null.
+// Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP if there is neither TLS nor an authenticator.
+// SIGHUP reloads the certificate and the keys of tokens, SIGUSR1 prints the report, SIGUSR2 a pairing code.
+// `tls` and `authenticator` may be null.
 void waitForStop(const Signals& signals, const ProgramOptions& options, tls::ServerTls* tls,
                  identity::Authenticator* authenticator, const std::function<std::string()>& report) {
   using Clock = std::chrono::steady_clock;
@@ -293,10 +337,10 @@ void waitForStop(const Signals& signals, const ProgramOptions& options, tls::Ser
   if (options.stopAfter) end = Clock::now() + *options.stopAfter;
   while (!end || Clock::now() < *end) {
     const int signal = end ? signals.wait(*end - Clock::now()) : signals.wait();
-    const bool reloads = tls != nullptr || !options.tokenKeys.empty();
+    const bool reloads = tls != nullptr || authenticator != nullptr;
     if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && !reloads)) return;
     if (signal == SIGHUP && tls != nullptr) reload(*tls);
-    if (signal == SIGHUP && authenticator != nullptr) reload(*authenticator);
+    if (signal == SIGHUP && !options.tokenKeys.empty()) reload(*authenticator);
     if (signal == SIGUSR2 && options.pairing) printPairingCode(*authenticator);
     if (signal != SIGUSR1) continue;
     fmt::print("{}", report());
@@ -341,12 +385,10 @@ class Monitored {
 
 // Serves through both endpoints until a signal or --seconds ends it. `intro` is printed before the addresses.
 // `authenticator` and `monitoring` may be null. Returns what limits the time until the process ends.
-[[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server,
-                                                      const ProgramOptions& options, const Signals& signals,
-                                                      identity::Authenticator* authenticator,
-                                                      monitoring::MonitoringEndpoint* monitoring,
-                                                      const std::string& intro,
-                                                      const std::function<std::string()>& report) {
+[[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(
+    hosting::SceneServer& server, const ProgramOptions& options, const Signals& signals, StartGuard& start,
+    identity::Authenticator* authenticator, monitoring::MonitoringEndpoint* monitoring,
+    const std::string& intro, const std::function<std::string()>& report) {
   std::unique_ptr<EndGuard> guard;
   const std::shared_ptr<tls::ServerTls> tls = openTls(options);
   {
@@ -371,6 +413,7 @@ class Monitored {
                                               .port = options.grpcPort,
                                               .maxStreams = options.maxConnections,
                                               .connections = limits,
+                                              .reflects = options.tokenKeys.empty() && !options.pairing,
                                               .tls = tls});
 
     fmt::print("{}page    http{}://{}/\ngRPC    {}{}\n", intro, tls ? "s" : "",
@@ -388,9 +431,11 @@ class Monitored {
                                      .encrypted = tls != nullptr,
                                      .fingerprint = options.tlsSelf ? tls->fingerprint() : "",
                                      .version = kServerName});
-    waitForStop(signals, options, tls.get(), authenticator, report);
+    const std::optional<SteadyTime> stopAt = start.finish();
+    if (!stopAt) waitForStop(signals, options, tls.get(), authenticator, report);
     spdlog::info("stopping");
-    guard = std::make_unique<EndGuard>(signals, options.drain);
+    guard = std::make_unique<EndGuard>(signals,
+                                       stopAt.value_or(std::chrono::steady_clock::now() + options.drain));
     announcement.reset();
     monitored.stopping();
     server.stop();
@@ -400,6 +445,7 @@ class Monitored {
 }
 
 int play(const ProgramOptions& options, const Signals& signals) {
+  StartGuard start(signals, options.drain);
   const auto monitoring = openMonitoring(options);
   auto recording = recording::RecordedStream::open(options.recording);
   if (!recording) throw std::runtime_error(recording.error());
@@ -416,8 +462,8 @@ int play(const ProgramOptions& options, const Signals& signals) {
   serverOptions.authenticator = makeAuthenticator(options);
   hosting::SceneServer server(
       scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), serverOptions);
-  guard = openEndpoints(server, options, signals, serverOptions.authenticator.get(), monitoring.get(), intro,
-                        [&] { return server.report(); });
+  guard = openEndpoints(server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
+                        intro, [&] { return server.report(); });
   return 0;
 }
 
@@ -426,6 +472,7 @@ std::uint64_t bytesOf(double megabytes) {
 }
 
 int serve(const ProgramOptions& options, const Signals& signals) {
+  StartGuard start(signals, options.drain);
   const auto monitoring = openMonitoring(options);
   std::vector<model::Scene> scenes = loadScenes(options);
   std::string sceneList;
@@ -464,7 +511,7 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   serverOptions.store = savedState;
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  guard = openEndpoints(server, options, signals, authenticator.get(), monitoring.get(),
+  guard = openEndpoints(server, options, signals, start, authenticator.get(), monitoring.get(),
                         fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList),
                         report);
   return 0;

@@ -26,6 +26,12 @@ tl::unexpected<Error> makeError(ExitCode code, fmt::format_string<Arguments...> 
   return tl::unexpected(Error{code, fmt::format(text, std::forward<Arguments>(arguments)...)});
 }
 
+// Adds the exit code, and advice about the options of the program.
+inline Error errorOf(const Failure& failure) {
+  return {exitCodeOf(failure.kind),
+          failure.text + (failure.needsProof ? ". Use --token FILE, or --pair CODE." : "")};
+}
+
 // Adds the exit code to an error text.
 template <typename T>
 tl::expected<T, Error> orError(ExitCode code, tl::expected<T, std::string> result) {
@@ -47,6 +53,9 @@ inline ExitCode printError(ExitCode code, const std::string& text) {
 }
 inline ExitCode printError(const Error& error) {
   return printError(error.code, error.text);
+}
+inline ExitCode printError(const Failure& failure) {
+  return printError(errorOf(failure));
 }
 
 }  // namespace clothstream::cli

@@ -20,7 +20,7 @@ namespace {
 constexpr std::chrono::seconds kPatience{10};
 
 ExitCode refused(const Failure& failure) {
-  return printError(exitCodeOf(failure.kind), failure.text);
+  return printError(failure);
 }
 
 // The server's answer to a ban. The stream's thread sets it.

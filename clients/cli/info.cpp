@@ -117,7 +117,7 @@ std::string toText(const RecordingReader& reader, const RecordingFigures& figure
         "frames    {} decoded, {} of them key frames, {:.2f} bits a vertex; {} differ from the server's\n",
         figures.stream->frames, figures.stream->key_frames, figures.stream->bits_per_vertex,
         figures.stream->hash_mismatches);
-  if (!damage.empty()) return text + fmt::format("damaged   {}\n", damage);
+  if (!damage.empty()) return text + fmt::format("damaged   {}\n", printable(damage));
   return text +
          (options.quick ? "index     complete; the rest was not read\n" : "complete  all checksums match\n");
 }

@@ -127,7 +127,7 @@ ExitCode join(const JoinOptions& options) {
   if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };
   auto joined = GrpcClient::join(options.address, clientOptions, Listener(line, options.report));
-  if (!joined) return printError(exitCodeOf(joined.error().kind), joined.error().text);
+  if (!joined) return printError(joined.error());
   GrpcClient& client = **joined;
   sendColliders(client, options);
 

@@ -41,7 +41,7 @@ void printTable(const std::vector<SceneSummary>& scenes) {
 ExitCode list(const ListOptions& options) {
   const auto scenes = listScenes(options.address);
   if (!scenes) {
-    return printError(exitCodeOf(scenes.error().kind), scenes.error().text);
+    return printError(scenes.error());
   }
   if (options.json)
     fmt::print("{}\n", json(*scenes));

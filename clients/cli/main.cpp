@@ -140,6 +140,14 @@ struct ProofOptions {
       return tl::unexpected(Failure{Failure::Kind::refused, text});
     };
     const std::filesystem::path kept = tokenFileOf(server);
+    std::error_code none;
+    const bool hasToken = !tokenFile.empty() || std::filesystem::exists(kept, none);
+    if ((!code.empty() || hasToken) && !server.isEncrypted() && !server.isLoopback())
+      return wrong(fmt::format(
+          "{}: others in the network could read the {} on its way to the server. Use https://{}, with TLS on "
+          "the server (--tls self){}",
+          server.address, code.empty() ? "token" : "pairing code", server.address,
+          hasToken && tokenFile.empty() ? ", or delete " + kept.string() : ""));
     if (!code.empty()) {
       if (kept.empty()) return wrong("--pair needs a directory for the token: set HOME or XDG_STATE_HOME");
       if (auto learnt = TrustOptions::learnKey(server); !learnt) return learnt;
@@ -152,8 +160,7 @@ struct ProofOptions {
       server.token = *token;
       return {};
     }
-    std::error_code none;
-    if (tokenFile.empty() && !std::filesystem::exists(kept, none)) return {};
+    if (!hasToken) return {};
     const auto token = readToken(tokenFile.empty() ? kept : std::filesystem::path(tokenFile));
     if (!token) return wrong(token.error());
     server.token = *token;
@@ -270,7 +277,7 @@ int run(int argc, char** argv) {
   if (motionCommands.parsed()) return motionCommands.run();
   if (!recordingCommands.parsed() || recordingCommands.connects()) {
     const auto proved = proof.prove(joinOptions.address);
-    if (!proved) return printError(exitCodeOf(proved.error().kind), proved.error().text);
+    if (!proved) return printError(proved.error());
     listOptions.address = setOptions.address = joinOptions.address;
   }
   if (identityCommands.parsed()) return identityCommands.run(joinOptions.address);

@@ -199,16 +199,16 @@ ExitCode record(const RecordOptions& options) {
     auto joined = GrpcClient::join(options.address, clientOptions, onEvents);
     if (!joined) {
       std::filesystem::remove(options.output);
-      return printError(Error{exitCodeOf(joined.error().kind), joined.error().text});
+      return printError(joined.error());
     }
     problem = follow(**joined, file, options);
     (*joined)->visit([&](cs_client* core) { report = Report::of(core, GrpcClient::nowUs()); });
   }
   if (isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r\033[K");
   if (auto finished = file.finish(); !finished && !problem) problem = Error{kNotWritten, finished.error()};
-  fmt::print("{}: {}, {} frames in {:.1f} s, {:.1f} MiB; {} frames were lost\n", options.output, report.scene,
-             file.frames(), report.seconds, static_cast<double>(file.bytes()) / (1 << 20),
-             report.statistics.dropped);
+  fmt::print("{}: {}, {} frames in {:.1f} s, {:.1f} MiB; {} frames were lost\n", options.output,
+             printable(report.scene), file.frames(), report.seconds,
+             static_cast<double>(file.bytes()) / (1 << 20), report.statistics.dropped);
   return problem ? printError(*problem) : kOk;
 }
 

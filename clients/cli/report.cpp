@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "proto/text/printable.h"
+
 namespace clothstream::cli {
 
 std::string solverName(std::uint32_t solver) {
@@ -32,7 +34,7 @@ std::string text(const ClothFigures& figures) {
       "{} ({}), tick {}: strain {:.2f} % at most, {:.2f} % p99, {:.2f} % mean; energy {:.4g} J kinetic, "
       "{:.4g} J "
       "elastic, {:.4g} J gravity",
-      figures.name, figures.solver, now.tick, 100 * now.strain_max, 100 * now.strain_p99,
+      printable(figures.name), figures.solver, now.tick, 100 * now.strain_max, 100 * now.strain_p99,
       100 * now.strain_mean, now.kinetic_energy, now.elastic_energy, now.gravity_energy);
   if (now.iterations > 0 || now.active_constraints > 0)
     line += fmt::format("; {} constraints, {} iterations, residual {:.2g}", now.active_constraints,
@@ -120,9 +122,9 @@ std::string Report::text(bool hash) const {
       "{} of {} on {}: {} vertices, {} frames in {:.1f} s\n"
       "{:.1f} frames/s of {}, {:.0f} kbit/s, {:.2f} bits a vertex, {:.1f} ms round trip, {} dropped, {} "
       "refused",
-      scene, server, device, vertices, statistics.frames, seconds, framesPerSecond(), streamRate,
-      kbitPerSecond(), statistics.bits_per_vertex, statistics.round_trip_ms, statistics.dropped,
-      statistics.decode_errors);
+      printable(scene), printable(server), printable(device), vertices, statistics.frames, seconds,
+      framesPerSecond(), streamRate, kbitPerSecond(), statistics.bits_per_vertex, statistics.round_trip_ms,
+      statistics.dropped, statistics.decode_errors);
   if (hash)
     text += fmt::format("\n{} of {} frames equal the server's",
                         statistics.frames - statistics.hash_mismatches, statistics.frames);
@@ -134,8 +136,8 @@ void StatusLine::show(const Report& report) const {
   if (!shown_) return;
   const cs_statistics& now = report.statistics;
   fmt::print(
-      "\r\033[K{}  tick {}  {:.0f} fps{}  {:.0f} kbit/s  {:.1f} ms round trip  {} dropped", report.scene,
-      now.tick, now.frames_per_second,
+      "\r\033[K{}  tick {}  {:.0f} fps{}  {:.0f} kbit/s  {:.1f} ms round trip  {} dropped",
+      printable(report.scene), now.tick, now.frames_per_second,
       report.frameDivisor > 1 ? fmt::format(" of {}: the server is overloaded", report.streamRate) : "",
       now.kbit_per_second, now.round_trip_ms, now.dropped);
   std::fflush(stdout);

@@ -33,7 +33,7 @@ tl::expected<v1::Scene, std::string> readScene(const std::string& path) {
 }
 
 ExitCode done(const tl::expected<void, Failure>& result) {
-  return result ? kOk : printError(exitCodeOf(result.error().kind), result.error().text);
+  return result ? kOk : printError(result.error());
 }
 
 }  // namespace
@@ -101,8 +101,8 @@ ExitCode SceneCommands::create() const {
         fmt::print(stderr, "\rsent {} of {} KiB{}", sent / 1024, all / 1024, sent == all ? "\n" : "");
     };
   const auto created = createScene(options_.address, create);
-  if (!created) return printError(exitCodeOf(created.error().kind), created.error().text);
-  fmt::print("{}\n", *created);
+  if (!created) return printError(created.error());
+  fmt::print("{}\n", printable(*created));
   return kOk;
 }
 
@@ -115,10 +115,10 @@ ExitCode SceneCommands::control(const ServerAddress& address) const {
   if (speed_->parsed()) request.set_speed(options_.speed);
   if (loop_->parsed()) request.set_loop(options_.loop);
   const auto scene = controlScene(address, request);
-  if (!scene) return printError(exitCodeOf(scene.error().kind), scene.error().text);
+  if (!scene) return printError(scene.error());
   if (!scene->has_playback()) return kOk;
   const v1::Playback& playback = scene->playback();
-  fmt::print("{}: at {:.2f} s of {:.2f} s, speed {}{}{}\n", scene->name(), playback.position(),
+  fmt::print("{}: at {:.2f} s of {:.2f} s, speed {}{}{}\n", printable(scene->name()), playback.position(),
              playback.length(), playback.speed(), playback.loop() ? ", in a loop" : "",
              scene->paused() ? ", paused" : "");
   return kOk;
@@ -127,13 +127,14 @@ ExitCode SceneCommands::control(const ServerAddress& address) const {
 ExitCode SceneCommands::record(const ServerAddress& address) const {
   if (startRecording_->parsed()) {
     const auto file = startRecording(address, options_.name, options_.recording);
-    if (!file) return printError(exitCodeOf(file.error().kind), file.error().text);
-    fmt::print("{}\n", *file);
+    if (!file) return printError(file.error());
+    fmt::print("{}\n", printable(*file));
     return kOk;
   }
   const auto stopped = stopRecording(address, options_.name);
-  if (!stopped) return printError(exitCodeOf(stopped.error().kind), stopped.error().text);
-  fmt::print("{}: {:.1f} MiB\n", stopped->file(), static_cast<double>(stopped->bytes()) / (1 << 20));
+  if (!stopped) return printError(stopped.error());
+  fmt::print("{}: {:.1f} MiB\n", printable(stopped->file()),
+             static_cast<double>(stopped->bytes()) / (1 << 20));
   return kOk;
 }
 

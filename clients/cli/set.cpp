@@ -83,7 +83,7 @@ ExitCode set(const SetOptions& options) {
   auto joined =
       GrpcClient::join(options.address, clientOptions,
                        [&](cs_client* client, std::uint32_t events) { answers.heard(client, events); });
-  if (!joined) return printError(exitCodeOf(joined.error().kind), joined.error().text);
+  if (!joined) return printError(joined.error());
   int changes = 0;
   std::string refusal;
   const auto changeBy = [&](const auto& send) {

@@ -6,6 +6,9 @@
 #include <charconv>
 #include <cstdint>
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+
 namespace clothstream {
 namespace {
 
@@ -27,6 +30,18 @@ bool isHost(std::string_view text) {
 
 bool ServerAddress::isEncrypted() const {
   return address.starts_with(kTls);
+}
+
+bool ServerAddress::isLoopback() const {
+  std::string host = hostAndPort();
+  host.resize(host.rfind(':'));
+  constexpr std::uint32_t kLoopbackNet = 127;
+  in_addr v4{};
+  in6_addr v6{};
+  if (host.starts_with('[') && ::inet_pton(AF_INET6, host.substr(1, host.size() - 2).c_str(), &v6) == 1)
+    return IN6_IS_ADDR_LOOPBACK(&v6) != 0;
+  if (::inet_pton(AF_INET, host.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == kLoopbackNet;
+  return host == "localhost";
 }
 
 std::string ServerAddress::hostAndPort() const {

@@ -24,6 +24,8 @@ struct ServerAddress {
   ServerAddress(const char* complete) : address(complete) {}  // NOLINT(google-explicit-constructor)
 
   bool isEncrypted() const;
+  // Whether the server runs on this machine: localhost, or a loopback address.
+  bool isLoopback() const;
   // HOST:PORT.
   std::string hostAndPort() const;
 

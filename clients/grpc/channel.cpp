@@ -160,8 +160,8 @@ Failure notJoined(const ServerAddress& server, const grpc::Status& status) {
       return {Kind::refused, fmt::format("The server at {} is not a clothstream-server of this release{}.",
                                          server.address, inBrackets(status.error_message()))};
     case grpc::StatusCode::UNAUTHENTICATED:
-      return {Kind::refused, fmt::format("The server at {} refuses: {}. Use --token FILE, or --pair CODE.",
-                                         server.address, status.error_message())};
+      return {Kind::refused,
+              fmt::format("The server at {} refuses: {}", server.address, status.error_message()), true};
     default:
       return {Kind::refused,
               fmt::format("The server at {} refuses: {}", server.address, status.error_message())};

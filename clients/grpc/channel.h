@@ -2,6 +2,7 @@
 // Channels to a server, and failures from gRPC statuses.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -12,8 +13,12 @@
 
 #include "clients/grpc/address.h"
 #include "clients/grpc/failure.h"
+#include "clothstream/v1/session.grpc.pb.h"
 
 namespace clothstream {
+
+// Longest time of a unary call.
+inline constexpr std::chrono::seconds kCallTimeout{10};
 
 // Throws std::runtime_error if the file of authorities cannot be read.
 std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server);
@@ -27,6 +32,22 @@ void authorize(grpc::ClientContext& call, const ServerAddress& server);
 
 // Failure of a call that ended before any message arrived.
 Failure notJoined(const ServerAddress& server, const grpc::Status& status);
+// Makes a unary call on a separate connection, such as callServer<v1::ListBansResponse>(address, request,
+// &v1::ClothStream::Stub::ListBans).
+template <typename Response, typename Request, typename Method>
+[[nodiscard]] tl::expected<Response, Failure> callServer(const ServerAddress& server, const Request& request,
+                                                         const Method& method,
+                                                         std::chrono::milliseconds timeout = kCallTimeout) {
+  const auto stub = v1::ClothStream::NewStub(makeChannel(server));
+  grpc::ClientContext context;
+  authorize(context, server);
+  context.set_deadline(std::chrono::system_clock::now() + timeout);
+  Response response;
+  const grpc::Status status = (*stub.*method)(&context, request, &response);
+  if (!status.ok()) return tl::unexpected(notJoined(server, status));
+  return response;
+}
+
 // Failure of a stream that ended although the client had not left.
 Failure lost(const ServerAddress& server, const grpc::Status& status);
 

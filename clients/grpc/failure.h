@@ -15,6 +15,8 @@ struct Failure {
   Kind kind = Kind::lost;
   // Text for users, with the address and advice.
   std::string text;
+  // The server requires another token, or a pairing code.
+  bool needsProof = false;
 };
 
 }  // namespace clothstream

@@ -306,13 +306,10 @@ class GrpcClient::Stream {
     if (cs_get_state(core_.get()) == CS_STATE_FAILED) {
       const std::uint32_t code = cs_error_code(core_.get());
       const bool saidByServer = code != 0;
-      if (code == CS_ERROR_UNAUTHENTICATED)
-        return {Failure::Kind::refused,
-                fmt::format("The server at {} refuses: {}. Use --token FILE, or --pair CODE.",
-                            address_.address, cs_error_text(core_.get()))};
       const char* text = cs_error_text(core_.get());
       return {Failure::Kind::refused,
-              saidByServer ? fmt::format("The server at {} refuses: {}", address_.address, text) : text};
+              saidByServer ? fmt::format("The server at {} refuses: {}", address_.address, text) : text,
+              code == CS_ERROR_UNAUTHENTICATED};
     }
     if (leaving_) return {Failure::Kind::lost, "The client left the stream."};
     if (call_->silent && !call_->status.ok() && !reconnects_)

@@ -1,36 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "clients/grpc/identity.h"
 
-#include <chrono>
 #include <utility>
 
 #include "clients/grpc/channel.h"
-#include "clothstream/v1/session.grpc.pb.h"
 
 namespace clothstream {
-namespace {
-
-constexpr std::chrono::seconds kPatience{10};
-
-template <typename Response, typename Request, typename Method>
-tl::expected<Response, Failure> ask(const ServerAddress& address, const Request& request,
-                                    const Method& method) {
-  const auto stub = v1::ClothStream::NewStub(makeChannel(address));
-  grpc::ClientContext context;
-  authorize(context, address);
-  context.set_deadline(std::chrono::system_clock::now() + kPatience);
-  Response response;
-  const grpc::Status status = (*stub.*method)(&context, request, &response);
-  if (!status.ok()) return tl::unexpected(notJoined(address, status));
-  return response;
-}
-
-}  // namespace
-
 tl::expected<std::string, Failure> pair(const ServerAddress& address, const std::string& code) {
   v1::AuthenticateRequest request;
   request.set_pairing_code(code);
-  auto response = ask<v1::AuthenticateResponse>(address, request, &v1::ClothStream::Stub::Authenticate);
+  auto response =
+      callServer<v1::AuthenticateResponse>(address, request, &v1::ClothStream::Stub::Authenticate);
   if (!response) return tl::unexpected(std::move(response).error());
   if (response->token().empty())
     return tl::unexpected(
@@ -42,7 +22,7 @@ tl::expected<PairingCode, Failure> createPairingCode(const ServerAddress& addres
   v1::CreatePairingCodeRequest request;
   request.set_role(static_cast<v1::Role>(role));
   const auto response =
-      ask<v1::CreatePairingCodeResponse>(address, request, &v1::ClothStream::Stub::CreatePairingCode);
+      callServer<v1::CreatePairingCodeResponse>(address, request, &v1::ClothStream::Stub::CreatePairingCode);
   if (!response) return tl::unexpected(response.error());
   return PairingCode{response->code(), response->valid_s()};
 }
@@ -50,7 +30,7 @@ tl::expected<PairingCode, Failure> createPairingCode(const ServerAddress& addres
 tl::expected<std::vector<Ban>, Failure> listBans(const ServerAddress& address, const std::string& scene) {
   v1::ListBansRequest request;
   request.set_scene(scene);
-  const auto response = ask<v1::ListBansResponse>(address, request, &v1::ClothStream::Stub::ListBans);
+  const auto response = callServer<v1::ListBansResponse>(address, request, &v1::ClothStream::Stub::ListBans);
   if (!response) return tl::unexpected(response.error());
   std::vector<Ban> bans;
   for (const v1::Ban& ban : response->bans()) bans.push_back({ban.subject(), ban.display_name()});
@@ -62,7 +42,7 @@ tl::expected<void, Failure> liftBan(const ServerAddress& address, const std::str
   v1::LiftBanRequest request;
   request.set_scene(scene);
   request.set_subject(subject);
-  const auto response = ask<v1::LiftBanResponse>(address, request, &v1::ClothStream::Stub::LiftBan);
+  const auto response = callServer<v1::LiftBanResponse>(address, request, &v1::ClothStream::Stub::LiftBan);
   if (!response) return tl::unexpected(response.error());
   return {};
 }

@@ -5,14 +5,12 @@
 #include <algorithm>
 
 #include "clients/grpc/channel.h"
-#include "clothstream/v1/session.grpc.pb.h"
 
 namespace clothstream {
 namespace {
 
 constexpr std::size_t kPieceBytes = 48 * 1024;  // a message is at most 64 KiB
 constexpr std::uint64_t kContentId = 1;
-constexpr std::chrono::seconds kTimeout{10};
 
 using Stream = grpc::ClientReaderWriter<v1::ClientMessage, v1::ServerMessage>;
 
@@ -32,19 +30,6 @@ bool upload(Stream& stream, const std::string& bytes, const CreateSceneOptions& 
     if (options.progress) options.progress(first + chunk.data().size(), bytes.size());
   }
   return true;
-}
-
-template <typename Response, typename Request, typename Call>
-tl::expected<Response, Failure> call(const ServerAddress& address, const Request& request,
-                                     const Call& method) {
-  const auto stub = v1::ClothStream::NewStub(makeChannel(address));
-  grpc::ClientContext context;
-  authorize(context, address);
-  context.set_deadline(std::chrono::system_clock::now() + kTimeout);
-  Response response;
-  const grpc::Status status = (*stub.*method)(&context, request, &response);
-  if (!status.ok()) return tl::unexpected(notJoined(address, status));
-  return response;
 }
 
 tl::expected<void, Failure> nothingOf(tl::expected<v1::SceneSummary, Failure> scene) {
@@ -91,7 +76,8 @@ tl::expected<std::string, Failure> createScene(const ServerAddress& address,
 tl::expected<void, Failure> deleteScene(const ServerAddress& address, const std::string& name) {
   v1::DeleteSceneRequest request;
   request.set_name(name);
-  const auto done = call<v1::DeleteSceneResponse>(address, request, &v1::ClothStream::Stub::DeleteScene);
+  const auto done =
+      callServer<v1::DeleteSceneResponse>(address, request, &v1::ClothStream::Stub::DeleteScene);
   if (!done) return tl::unexpected(done.error());
   return {};
 }
@@ -107,7 +93,8 @@ tl::expected<void, Failure> controlScene(const ServerAddress& address, const std
 
 tl::expected<v1::SceneSummary, Failure> controlScene(const ServerAddress& address,
                                                      const v1::ControlSceneRequest& request) {
-  auto response = call<v1::ControlSceneResponse>(address, request, &v1::ClothStream::Stub::ControlScene);
+  auto response =
+      callServer<v1::ControlSceneResponse>(address, request, &v1::ClothStream::Stub::ControlScene);
   if (!response) return tl::unexpected(std::move(response).error());
   return std::move(*response->mutable_scene());
 }
@@ -117,7 +104,8 @@ tl::expected<std::string, Failure> startRecording(const ServerAddress& address, 
   v1::StartRecordingRequest request;
   request.set_scene(scene);
   request.set_name(file);
-  auto response = call<v1::StartRecordingResponse>(address, request, &v1::ClothStream::Stub::StartRecording);
+  auto response =
+      callServer<v1::StartRecordingResponse>(address, request, &v1::ClothStream::Stub::StartRecording);
   if (!response) return tl::unexpected(std::move(response).error());
   return response->file();
 }
@@ -126,7 +114,7 @@ tl::expected<v1::StopRecordingResponse, Failure> stopRecording(const ServerAddre
                                                                const std::string& scene) {
   v1::StopRecordingRequest request;
   request.set_scene(scene);
-  return call<v1::StopRecordingResponse>(address, request, &v1::ClothStream::Stub::StopRecording);
+  return callServer<v1::StopRecordingResponse>(address, request, &v1::ClothStream::Stub::StopRecording);
 }
 
 }  // namespace clothstream

@@ -9,15 +9,11 @@ namespace clothstream {
 
 tl::expected<std::vector<SceneSummary>, Failure> listScenes(const ServerAddress& address,
                                                             std::chrono::milliseconds timeout) {
-  const auto stub = v1::ClothStream::NewStub(makeChannel(address));
-  grpc::ClientContext context;
-  authorize(context, address);
-  context.set_deadline(std::chrono::system_clock::now() + timeout);
-  v1::ListScenesResponse response;
-  const grpc::Status status = stub->ListScenes(&context, {}, &response);
-  if (!status.ok()) return tl::unexpected(notJoined(address, status));
+  const auto response = callServer<v1::ListScenesResponse>(address, v1::ListScenesRequest(),
+                                                           &v1::ClothStream::Stub::ListScenes, timeout);
+  if (!response) return tl::unexpected(response.error());
   std::vector<SceneSummary> scenes;
-  for (const v1::SceneSummary& scene : response.scenes()) {
+  for (const v1::SceneSummary& scene : response->scenes()) {
     scenes.push_back({.name = scene.name(),
                       .description = scene.description(),
                       .vertexCount = scene.vertex_count(),

@@ -97,28 +97,33 @@ constexpr CounterRow kSceneCounters[] = {
 struct GaugeRow {
   const char* name;
   const char* help;
-  std::size_t (*of)(const LiveScene&);
+  double (*of)(const LiveScene&);
 };
+
+double number(std::size_t value) {
+  return static_cast<double>(value);
+}
 
 constexpr GaugeRow kSceneGauges[] = {
     {"participants", "Participants, disconnected ones included.",
-     [](const LiveScene& scene) { return scene.roster.size(); }},
+     [](const LiveScene& scene) { return number(scene.roster.size()); }},
     {"away_participants", "Participants that are disconnected and may come back.",
-     [](const LiveScene& scene) { return scene.roster.away(); }},
+     [](const LiveScene& scene) { return number(scene.roster.away()); }},
     {"subscribers", "Connections that receive frames.",
-     [](const LiveScene& scene) { return scene.subscribers.size(); }},
-    {"running", "1 while ticks run, else 0.",
-     [](const LiveScene& scene) { return std::size_t{scene.running}; }},
+     [](const LiveScene& scene) { return number(scene.subscribers.size()); }},
+    {"running", "1 while ticks run, else 0.", [](const LiveScene& scene) { return number(scene.running); }},
     {"paused", "1 while the scene is paused, else 0.",
-     [](const LiveScene& scene) { return std::size_t{scene.paused}; }},
+     [](const LiveScene& scene) { return number(scene.paused); }},
     {"frame_divisor", "Distance of the frames that the scene sends, in frames of its stream rate.",
-     [](const LiveScene& scene) { return std::size_t{scene.work.load().frameDivisor}; }},
+     [](const LiveScene& scene) { return number(scene.work.load().frameDivisor); }},
     {"substeps", "Substeps of a tick.",
-     [](const LiveScene& scene) { return std::size_t{scene.work.load().substeps}; }},
+     [](const LiveScene& scene) { return number(scene.work.load().substeps); }},
     {"waiting_changes", "Parameter changes that wait for the next tick.",
-     [](const LiveScene& scene) { return scene.inbox.depth().changes; }},
+     [](const LiveScene& scene) { return number(scene.inbox.depth().changes); }},
     {"waiting_poses", "Participants whose poses wait for the next tick.",
-     [](const LiveScene& scene) { return scene.inbox.depth().poses; }},
+     [](const LiveScene& scene) { return number(scene.inbox.depth().poses); }},
+    {"price", "Price of the scene: seconds of the device's time per second, by estimate.",
+     [](const LiveScene& scene) { return scene.price(); }},
 };
 
 // Largest age of the newest checkpoint of a running scene, in seconds; 0 without any.
@@ -162,6 +167,11 @@ Families serverFamilies(hosting::SceneServer& server) {
   gauge("clothstream_scenes", "Scenes of the server.", static_cast<double>(state.scenesNow().size()));
   gauge("clothstream_open_connections", "Open connections.", static_cast<double>(state.peersNow().size()));
   counter("clothstream_connections_total", "Connections admitted.", metrics.connections);
+  MetricFamily& sent =
+      add(families, MetricType::Counter, "clothstream_sent_bytes_total",
+          "Bytes of messages, answers and files that an endpoint has sent, without headers.");
+  addSample(sent, static_cast<double>(metrics.grpcBytes.value()), {{"endpoint", "grpc"}});
+  addSample(sent, static_cast<double>(metrics.webBytes.value()), {{"endpoint", "web"}});
   MetricFamily& refusals = add(families, MetricType::Counter, "clothstream_refusals_total",
                                "Connections, calls, messages and scenes refused, by reason.");
   for (std::size_t i = 0; i < telemetry::kRefusalNames.size(); ++i)
@@ -177,6 +187,14 @@ Families serverFamilies(hosting::SceneServer& server) {
   addSample(add(families, MetricType::Counter, "clothstream_log_lines_omitted_total",
                 "Lines of the log that were left out (--log-rate)."),
             static_cast<double>(telemetry::omittedLogLines()));
+  constexpr double kMegabyte = 1e6;
+  const scene::Budget::Usage usage = state.budget->usage();
+  gauge("clothstream_budget_used_load", "Price of what participants have added, of --max-load.", usage.load);
+  gauge("clothstream_budget_free_load", "What is free of --max-load.", usage.freeLoad);
+  gauge("clothstream_budget_used_memory_bytes", "Memory of what participants have added, of --max-memory.",
+        kMegabyte * usage.megabytes);
+  gauge("clothstream_budget_free_memory_bytes", "What is free of --max-memory.",
+        kMegabyte * usage.freeMegabytes);
   gauge("clothstream_device_memory_bytes", "Memory of all buffers on the device.",
         static_cast<double>(state.device.deviceMemory()));
   gauge("clothstream_device_silence_seconds", "Time since the last answer of the device thread.",
@@ -220,8 +238,7 @@ Families sceneFamilies(const std::vector<std::shared_ptr<LiveScene>>& scenes) {
   }
   for (const GaugeRow& row : kSceneGauges) {
     MetricFamily& family = add(families, MetricType::Gauge, prefix + row.name, row.help);
-    for (const auto& scene : scenes)
-      addSample(family, static_cast<double>(row.of(*scene)), {{"scene", scene->name()}});
+    for (const auto& scene : scenes) addSample(family, row.of(*scene), {{"scene", scene->name()}});
   }
   return families;
 }

@@ -176,8 +176,10 @@ void addIdentityOptions(OptionTable& table, Parsed& parsed) {
   table.text("--token-audience", options.tokenAudience, "NAME", "Audience (aud) that tokens must have");
   table.flag("--pairing", options.pairing,
              "Require a token, or a six-digit code that the server shows at its start and after SIGUSR2");
-  table.flag("--insecure", options.insecure,
-             "Let in everyone who reaches the server, although --host is not a loopback address");
+  table.flag(
+      "--insecure", options.insecure,
+      "Let in everyone who reaches the server, although --host is not a loopback address or there is a "
+      "--public-name");
   CLI::Option* role = table.choice("--anonymous-role", parsed.anonymousRole, kRoles,
                                    "Role of clients on other machines with --insecure");
   table.showDefault(role, "participant");
@@ -192,11 +194,12 @@ void checkIdentity(const ProgramOptions& options) {
   const bool asks = options.pairing || !options.tokenKeys.empty();
   if (options.insecure && asks)
     throw OptionError("--insecure excludes --token-keys and --pairing: remove it, or both of them");
-  if (!asks && !options.insecure && !isLoopback(options.host))
+  if (!asks && !options.insecure && isReachable(options))
     throw OptionError(fmt::format(
-        "--host: {} is reachable from other machines, and no client would have to prove who it is; add "
+        "{}: {} is reachable from other machines, and no client would have to prove who it is; add "
         "--pairing or --token-keys DIR, or --insecure to let everyone in (docs/identity.md)",
-        options.host));
+        isLoopback(options.host) ? "--public-name" : "--host",
+        isLoopback(options.host) ? options.publicNames.front() : options.host));
 }
 
 void addNetworkOptions(OptionTable& table, Parsed& parsed) {
@@ -219,11 +222,13 @@ void addNetworkOptions(OptionTable& table, Parsed& parsed) {
       checkChoice({"auto", "on", "off"}));
   table.number("--max-connections", options.maxConnections, {.min = 1, .max = 100'000},
                "Connections to each port at a time");
+  table.number("--max-connections-per-address", options.maxConnectionsPerAddress, {.min = 1, .max = 100'000},
+               "Connections of one address to each port at a time, and its gRPC streams. Programs on this "
+               "machine have no "
+               "such limit");
   table.number(
-      "--max-connections-per-address", options.maxConnectionsPerAddress, {.min = 1, .max = 100'000},
-      "Connections of one address to each port at a time. Programs on this machine have no such limit");
-  table.number("--connections-per-second", options.connectionsPerSecond, {.min = 1, .max = 1e6},
-               "New connections to each port per second, with a burst of as many");
+      "--connections-per-second", options.connectionsPerSecond, {.min = 1, .max = 1e6},
+      "New connections to each port per second, with a burst of as many; the same for new gRPC streams");
   table.number(
       "--connections-per-second-per-address", options.connectionsPerSecondPerAddress, {.min = 1, .max = 1e6},
       "The same of one address, TLS handshakes included. Programs on this machine have no such limit");
@@ -465,6 +470,10 @@ bool isLoopback(const std::string& host) {
   if (::inet_pton(AF_INET, host.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == kLoopbackNet;
   if (::inet_pton(AF_INET6, host.c_str(), &v6) == 1) return IN6_IS_ADDR_LOOPBACK(&v6) != 0;
   return host == "localhost";
+}
+
+bool isReachable(const ProgramOptions& options) {
+  return !isLoopback(options.host) || !options.publicNames.empty();
 }
 
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {

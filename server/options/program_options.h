@@ -96,6 +96,10 @@ struct ProgramOptions {
 // Returns whether only programs on this machine reach a server that listens on `host`.
 bool isLoopback(const std::string& host);
 
+// Whether clients on other machines reach the server: --host is not a loopback address, or --public-name says
+// that a program of this machine, such as a proxy, forwards them.
+bool isReachable(const ProgramOptions& options);
+
 // Returns the options, or the exit code if the program must end: after --help, --version, --print-config or a
 // wrong option. The output or the error has then been printed.
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv);

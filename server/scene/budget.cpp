@@ -72,8 +72,21 @@ Charge::Charge(std::shared_ptr<Budget> budget, const model::Scene& scene, bool f
   freeMegabytes_ = model_.bytes(scene) / kMegabyte;
 }
 
+Budget::Usage Budget::usage() const {
+  const std::lock_guard lock(mutex_);
+  return {.load = load_,
+          .freeLoad = std::max(0.0, limits_.load - load_),
+          .megabytes = megabytes_,
+          .freeMegabytes = std::max(0.0, limits_.megabytes - megabytes_)};
+}
+
 Charge::~Charge() {
   release();
+}
+
+double Charge::load(const model::Scene& scene) const {
+  return model_.work(scene, scene.colliders.size() + participantColliders_).seconds(budget_->speed()) *
+         scene.simulationRate;
 }
 
 void Charge::release() {

@@ -31,6 +31,13 @@ class Budget {
   void setSpeed(const model::DeviceSpeed& speed);
   model::DeviceSpeed speed() const;
 
+  // Amounts that all charges together use, and amounts that are free; 0 if charges exceed the budget.
+  struct Usage {
+    double load = 0, freeLoad = 0;
+    double megabytes = 0, freeMegabytes = 0;
+  };
+  Usage usage() const;
+
  private:
   friend class Charge;
 
@@ -61,6 +68,9 @@ class Charge {
   // Gives the charge back.
   void release();
 
+  // Price of the scene with the colliders of its participants: seconds of the device's time per second. 0
+  // until the speed of the device is known.
+  double load(const model::Scene& scene) const;
   // Work of a tick of the charged scene with this number of colliders.
   model::Work work(const model::Scene& scene, std::size_t colliders) const {
     return model_.work(scene, colliders);

@@ -141,6 +141,11 @@ model::Work LiveScene::tickWork(std::size_t colliders) const {
   return charge_.work(definition_, colliders);
 }
 
+double LiveScene::price() const {
+  const std::lock_guard lock(mutex_);
+  return charge_.load(definition_);
+}
+
 void LiveScene::quarantine(const std::string& why) {
   {
     const std::lock_guard lock(mutex_);

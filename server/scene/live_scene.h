@@ -78,6 +78,8 @@ class LiveScene {
   void discharge();
   // Price of a tick with the accepted changes and this number of colliders.
   model::Work tickWork(std::size_t colliders) const;
+  // Price of the scene as it is: seconds of the device's time per second, by estimate.
+  double price() const;
 
   // Minimum number of substeps with which `scene` is stable, at most start().substeps. `scene` is start()
   // with other parameters.

@@ -59,6 +59,8 @@ struct ServerMetrics {
   void refuse(Refusal reason) { refusals[static_cast<std::size_t>(reason)].add(); }
 
   Counter connections;
+  // Bytes of messages, answers and files that the endpoints have sent, without headers and encryption.
+  Counter grpcBytes, webBytes;
   std::array<Counter, kRefusalNames.size()> refusals;  // by Refusal
   Counter droppedConnections;  // connections closed because they were silent, too slow or abusive
   Counter rejectedMessages;    // messages answered by an Error before the client joined

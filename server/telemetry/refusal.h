@@ -37,10 +37,12 @@ enum class Refusal : std::uint8_t {
   pairingCode,       // a wrong pairing code
   connectionsOfToken,
   scenesOfTenant,
+  unreadCalls,  // answers of calls that clients have not read yet
+  requestRate,  // too many HTTP requests per second from one address
 };
 
 // Names for metrics and reports, in the order of Refusal.
-inline constexpr std::array<std::string_view, 28> kRefusalNames{"connections",
+inline constexpr std::array<std::string_view, 30> kRefusalNames{"connections",
                                                                 "connections of address",
                                                                 "connection rate",
                                                                 "connection rate of address",
@@ -67,7 +69,9 @@ inline constexpr std::array<std::string_view, 28> kRefusalNames{"connections",
                                                                 "token",
                                                                 "pairing code",
                                                                 "connections of token",
-                                                                "scenes of tenant"};
-static_assert(kRefusalNames.size() == static_cast<std::size_t>(Refusal::scenesOfTenant) + 1);
+                                                                "scenes of tenant",
+                                                                "unread calls",
+                                                                "request rate"};
+static_assert(kRefusalNames.size() == static_cast<std::size_t>(Refusal::requestRate) + 1);
 
 }  // namespace clothstream::telemetry

@@ -212,6 +212,12 @@ Certificate readCertificate(const fs::path& chain, const fs::path& key) {
   return certificate;
 }
 
+bool othersMayRead(const fs::path& key) {
+  constexpr mode_t kOthers = S_IRGRP | S_IROTH;
+  struct stat file {};
+  return ::stat(key.c_str(), &file) == 0 && (file.st_mode & kOthers) != 0;
+}
+
 std::string readCertificates(const fs::path& file) {
   std::string text = readFile(file);
   if (!firstCertificate(text))

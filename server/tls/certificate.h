@@ -19,6 +19,10 @@ struct Certificate {
 // certificate.
 Certificate readCertificate(const std::filesystem::path& chain, const std::filesystem::path& key);
 
+// Whether accounts other than the file's owner may read a file with a private key. False if it does not
+// exist.
+bool othersMayRead(const std::filesystem::path& key);
+
 // PEM text of a file with one or more certificates. Throws as readCertificate() does.
 std::string readCertificates(const std::filesystem::path& file);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/tls/server_tls.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <stdexcept>
 #include <string_view>
@@ -9,9 +10,11 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/system/system_error.hpp>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/ssl.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "proto/tls/fingerprint.h"
@@ -23,6 +26,8 @@ namespace ssl = boost::asio::ssl;
 
 // Of TLS 1.2, those with forward secrecy and authenticated encryption. TLS 1.3 has no others.
 constexpr const char* kCiphers = "ECDHE+AESGCM:ECDHE+CHACHA20";
+// Sessions of TLS belong to this name. At most 32 bytes.
+constexpr std::string_view kSessions = "clothstream";
 
 int chooseProtocol(SSL*, const unsigned char** out, unsigned char* outSize, const unsigned char* in,
                    unsigned int inSize, void*) {
@@ -48,6 +53,9 @@ std::shared_ptr<ssl::context> contextOf(const Certificate& certificate, const st
     if (!clientCa.empty()) {
       context->add_certificate_authority(boost::asio::buffer(clientCa));
       context->set_verify_mode(ssl::verify_peer);
+      // OpenSSL refuses to resume a session of a verified peer without it.
+      SSL_CTX_set_session_id_context(native, reinterpret_cast<const unsigned char*>(kSessions.data()),
+                                     static_cast<unsigned>(kSessions.size()));
     }
   } catch (const boost::system::system_error& refused) {
     throw std::runtime_error(fmt::format("TLS: the certificate cannot be used: {}", refused.what()));
@@ -55,10 +63,15 @@ std::shared_ptr<ssl::context> contextOf(const Certificate& certificate, const st
   return context;
 }
 
+int makeMemoryFile() {
+  const int descriptor = ::memfd_create("tls", MFD_CLOEXEC);
+  if (descriptor < 0) throw std::system_error(errno, std::system_category(), "memfd_create");
+  return descriptor;
+}
+
 }  // namespace
 
-MemoryFile::MemoryFile() : descriptor_(::memfd_create("tls", MFD_CLOEXEC)) {
-  if (descriptor_ < 0) throw std::system_error(errno, std::system_category(), "memfd_create");
+MemoryFile::MemoryFile() : descriptor_(makeMemoryFile()) {
   path_ = fmt::format("/proc/self/fd/{}", descriptor_);
 }
 
@@ -67,10 +80,15 @@ MemoryFile::~MemoryFile() {
 }
 
 void MemoryFile::write(const std::string& content) {
-  const bool written =
-      ::ftruncate(descriptor_, 0) == 0 &&
-      ::pwrite(descriptor_, content.data(), content.size(), 0) == static_cast<ssize_t>(content.size());
-  if (!written) throw std::system_error(errno, std::system_category(), "memory file");
+  const int next = makeMemoryFile();
+  time_ = std::max(std::time(nullptr), time_ + 1);
+  const timespec times[] = {{.tv_sec = time_, .tv_nsec = 0}, {.tv_sec = time_, .tv_nsec = 0}};
+  const bool replaced =
+      ::pwrite(next, content.data(), content.size(), 0) == static_cast<ssize_t>(content.size()) &&
+      ::futimens(next, times) == 0 && ::dup3(next, descriptor_, O_CLOEXEC) >= 0;
+  const int error = errno;
+  ::close(next);
+  if (!replaced) throw std::system_error(error, std::system_category(), "memory file");
 }
 
 ServerTls::ServerTls(std::function<Certificate()> load, std::string clientCa)
@@ -83,10 +101,9 @@ void ServerTls::reload() {
   const Certificate certificate = load_();
   auto context = contextOf(certificate, clientCa_);
   const std::lock_guard lock(mutex_);
+  file_.write(certificate.chain + "\n" + certificate.key);  // first, because it may throw
   context_ = std::move(context);
   fingerprint_ = fingerprintOf(certificate.chain).value_or("");
-  chain_.write(certificate.chain);
-  key_.write(certificate.key);
 }
 
 std::shared_ptr<ssl::context> ServerTls::context() const {

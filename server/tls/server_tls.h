@@ -2,6 +2,7 @@
 // What the endpoints need for TLS: the present certificate, replaced while connections continue.
 #pragma once
 
+#include <ctime>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -23,10 +24,14 @@ class MemoryFile {
 
   // Path in /proc, valid in this process.
   const std::string& path() const { return path_; }
-  void write(const std::string& content);  // throws std::system_error
+  // Replaces the content at once: a reader that opens the path gets the old or the new content. The time of
+  // the last modification grows by at least one second, so that a reader of several parts notices the change.
+  // Throws std::system_error, and keeps the old content.
+  void write(const std::string& content);
 
  private:
-  int descriptor_;
+  const int descriptor_;
+  std::time_t time_ = 0;
   std::string path_;
 };
 
@@ -46,16 +51,16 @@ class ServerTls {
   // SHA-256 of the public key (fingerprintOf).
   std::string fingerprint() const;
 
-  // Files with the present certificate, for gRPC.
-  const std::string& chainPath() const { return chain_.path(); }
-  const std::string& keyPath() const { return key_.path(); }
+  // File with the chain and the key of the present certificate, for gRPC. One file holds both, so that they
+  // always belong together.
+  const std::string& certificatePath() const { return file_.path(); }
   // Empty without client certificates.
   std::string clientCaPath() const { return clientCa_.empty() ? "" : clientCaFile_.path(); }
 
  private:
   const std::function<Certificate()> load_;
   const std::string clientCa_;
-  MemoryFile chain_, key_, clientCaFile_;
+  MemoryFile file_, clientCaFile_;
   mutable std::mutex mutex_;
   std::shared_ptr<boost::asio::ssl::context> context_;
   std::string fingerprint_;

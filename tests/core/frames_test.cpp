@@ -362,6 +362,15 @@ TEST(Frames, FramesThatAnOverloadedServerOmitsAreNotDropped) {
   EXPECT_EQ(joined.client.statistics().dropped, 1u);
 }
 
+TEST(Frames, DivisorOfZeroMeansAllFrames) {
+  Joined joined;
+  v1::Frame frame = joined.server.frameMessage(2, codec::PacketKind::key);
+  // proto3 leaves a 0 out, but other programs may write it.
+  v1::Frame::GetReflection()->MutableUnknownFields(&frame)->AddVarint(v1::Frame::kFrameDivisorFieldNumber, 0);
+  EXPECT_EQ(joined.client.receive(ScriptedServer::serialise(frame)), kFrame);
+  EXPECT_EQ(cs_frame_divisor(joined.client.get()), 1u);
+}
+
 TEST(Frames, RefusesAnImpossibleDivisor) {
   Joined joined;
   v1::Frame frame = joined.server.frameMessage(2, codec::PacketKind::key);

@@ -24,6 +24,13 @@ TEST(Address, KeepsItsPort) {
   EXPECT_EQ(completeAddress("https://[::1]:6000/"), "https://[::1]:6000");
 }
 
+TEST(Address, IsLoopbackOnThisMachineOnly) {
+  for (const char* text : {"localhost", "127.0.0.1", "127.1.2.3:60", "::1", "https://localhost:6000"})
+    EXPECT_TRUE(ServerAddress(*completeAddress(text)).isLoopback()) << text;
+  for (const char* text : {"10.0.0.7", "127.example.org", "localhost.example.org", "https://[fe80::1]:6000"})
+    EXPECT_FALSE(ServerAddress(*completeAddress(text)).isLoopback()) << text;
+}
+
 TEST(Address, IsRefusedWithReason) {
   for (const char* text : {"", ":50051", "http://host", "https://", "a b", "[::1", "[]:1"}) {
     const auto address = completeAddress(text);

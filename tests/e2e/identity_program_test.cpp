@@ -7,11 +7,13 @@
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include "tests/e2e/running_server.h"
 #include "tests/e2e/temporary_directory.h"
+#include "tests/endpoint/rpc_client.h"
 
 namespace clothstream::e2e {
 namespace {
@@ -75,9 +77,14 @@ TEST_F(IdentityProgram, ServesOnlyClientsWithTokens) {
   if (IsSkipped()) return;
   const Answer stranger = client({"list", address_});
   EXPECT_EQ(stranger.exitCode, 4);
-  EXPECT_THAT(stranger.errors, AllOf(HasSubstr("requires a token"), HasSubstr("--token FILE")));
+  EXPECT_THAT(stranger.errors,
+              AllOf(HasSubstr("requires a token"), HasSubstr("Use --token FILE, or --pair CODE.")));
   EXPECT_EQ(client({"join", address_, "--seconds", "0.5"}).exitCode, 4);
   EXPECT_EQ(client({"list", address_, "--token", "/nowhere"}).exitCode, 4);
+  tests::RpcStream reflection(portIn(address_),
+                              {.method = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"});
+  EXPECT_EQ(reflection.receive(), std::nullopt);
+  EXPECT_EQ(reflection.finish().error_code(), grpc::StatusCode::UNIMPLEMENTED);
 
   const std::string owner = token(first, {"--role", "owner", "--subject", "ada"});
   const std::string guest = token(first, {"--subject", "ben", "--name", "Ben"});
@@ -166,6 +173,30 @@ TEST_F(IdentityProgram, PairsAndKeepsTheToken) {
   EXPECT_THAT(lifted.errors, HasSubstr("no such ban"));
 }
 
+TEST_F(IdentityProgram, SendsNoProofWithoutEncryption) {
+  const std::string file = directory_.path() / "token";
+  std::ofstream(file) << "secret";
+  for (const Arguments& proof : {Arguments{"--token", file}, Arguments{"--pair", "123456"}}) {
+    Arguments list{"list", "192.0.2.1:50051"};
+    list.insert(list.end(), proof.begin(), proof.end());
+    const Answer refused = client(list);
+    EXPECT_EQ(refused.exitCode, 4);
+    EXPECT_THAT(refused.errors, HasSubstr("Use https://192.0.2.1:50051"));
+  }
+}
+
+TEST_F(IdentityProgram, ReloadDoesNotEndAServerThatOnlyPairs) {
+  startWith({"--pairing", "--state-dir", state()});
+  if (IsSkipped()) return;
+  server_->signal(SIGHUP);
+  server_->signal(SIGUSR1);
+  EXPECT_TRUE(server_->waitForOutput("scene small (ms)", kPatience)) << "the report, after the reload";
+  EXPECT_FALSE(server_->waitForEnd(std::chrono::milliseconds(0)));
+  stopServer();
+  EXPECT_THAT(server_->errors(), Not(HasSubstr("read again"))) << "there are no keys";
+  server_.reset();
+}
+
 TEST_F(IdentityProgram, ListensBeyondThisMachineOnlyWithADecision) {
   const auto refused = [&](Arguments options) {
     options.insert(options.begin(), {"--port", "0", "--grpc-port", "0"});
@@ -175,6 +206,8 @@ TEST_F(IdentityProgram, ListensBeyondThisMachineOnlyWithADecision) {
   };
   for (const char* host : {"0.0.0.0", "::", "192.0.2.1"})
     EXPECT_THAT(refused({"--host", host}), AllOf(HasSubstr("--pairing"), HasSubstr("--insecure")));
+  EXPECT_THAT(refused({"--public-name", "cloth.example.org"}),
+              AllOf(HasSubstr("--public-name: cloth.example.org is reachable"), HasSubstr("--insecure")));
   EXPECT_THAT(refused({"--insecure", "--pairing"}), HasSubstr("excludes"));
   EXPECT_THAT(refused({"--pairing", "--state-dir", ""}), HasSubstr("--state-dir"));
   EXPECT_THAT(refused({"--token-keys", "/nowhere"}), HasSubstr("/nowhere"));
@@ -189,6 +222,13 @@ TEST_F(IdentityProgram, ListensBeyondThisMachineOnlyWithADecision) {
   EXPECT_EQ(client({"list", address_}).exitCode, 0);
   stopServer();
   EXPECT_THAT(server_->errors(), HasSubstr("everyone who reaches 0.0.0.0 can join"));
+  // Debian's gRPC has published weaknesses.
+  if (grpc::Version().starts_with("1.51"))
+    EXPECT_THAT(server_->errors(), HasSubstr("gRPC 1.51.1 has published weaknesses"));
+  startWith({"--public-name", "cloth.example.org", "--insecure"});
+  EXPECT_EQ(client({"list", address_}).exitCode, 0);
+  stopServer();
+  EXPECT_THAT(server_->errors(), HasSubstr("everyone who reaches cloth.example.org through a program"));
   server_.reset();
 }
 

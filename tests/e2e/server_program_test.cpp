@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "server/messages/scene_file.h"
 #include "tests/e2e/server_process.h"
@@ -45,6 +46,31 @@ class ServerProgram : public ::testing::Test {
  private:
   std::filesystem::path directory_;
 };
+
+// A file that a start waits for, so that the start does not end by itself.
+std::filesystem::path makeFifo(const std::filesystem::path& path) {
+  EXPECT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  return path;
+}
+
+TEST_F(ServerProgram, EndsWithinDrainIfItIsStoppedWhileItStarts) {
+  const std::string fifo = makeFifo(sceneFile().replace_filename("never.json"));
+  ServerProcess server(options({"--scene-file", fifo, "--metrics-port", "0", "--drain", "0.5"}));
+  server.lineWith("metrics http://127.0.0.1:");
+  server.signal(SIGTERM);
+  EXPECT_EQ(server.exitCode(), 1);
+  EXPECT_THAT(server.output(), HasSubstr("ending at once: the start takes too long"));
+}
+
+TEST_F(ServerProgram, StopsAfterAStartDuringWhichItWasStopped) {
+  const std::string fifo = makeFifo(sceneFile().replace_filename("late.json"));
+  ServerProcess server(options({"--scene-file", fifo, "--metrics-port", "0", "--drain", "600"}));
+  server.lineWith("metrics http://127.0.0.1:");
+  server.signal(SIGTERM);
+  server.lineWith("stopping when the start is complete, or after 600 s");
+  std::ofstream(fifo) << messages::toJson(smallScene("late"));
+  EXPECT_EQ(server.exitCode(), 0);
+}
 
 TEST_F(ServerProgram, PrintsDeviceScenesAndAddressesAndStreams) {
   ServerProcess server(options());

@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "clients/grpc/grpc_client.h"
 #include "proto/tls/fingerprint.h"
@@ -114,6 +115,19 @@ TEST_F(TlsProgram, ReadsItsCertificateAgainWithoutEndingStreams) {
   EXPECT_THAT(server_->errors(),
               AllOf(HasSubstr("the old certificate stays in use"), HasSubstr("is not the key")));
   server_.reset();
+}
+
+TEST_F(TlsProgram, WarnsOfAKeyThatOthersMayRead) {
+  use("first");
+  for (const mode_t mode : {mode_t{0640}, mode_t{0600}}) {
+    ASSERT_EQ(::chmod(key().c_str(), mode), 0);
+    startWith({"--tls-certificate", chain(), "--tls-key", key()});
+    if (IsSkipped()) return;
+    stopServer();
+    const auto warns = HasSubstr("--tls-key: other accounts of this machine may read " + key());
+    EXPECT_EQ(testing::Value(server_->errors(), warns), mode == 0640) << server_->errors();
+    server_.reset();
+  }
 }
 
 TEST_F(TlsProgram, RefusesOptionsThatDoNotFit) {

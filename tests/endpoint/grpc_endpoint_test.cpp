@@ -2,15 +2,20 @@
 // Tests of the gRPC endpoint only: unary calls, health checks, reflection, statuses.
 #include "server/endpoint/grpc/grpc_endpoint.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <future>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
+#include <boost/asio/ip/address_v4.hpp>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <grpcpp/create_channel.h>
 #include <grpcpp/support/async_unary_call.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -19,9 +24,13 @@
 
 #include "clothstream/v1/session.grpc.pb.h"
 #include "grpc/health/v1/health.pb.h"
+#include "server/endpoint/grpc/answer_budget.h"
 #include "server/endpoint/grpc/call_rate.h"
+#include "server/hosting/server_state.h"
+#include "server/tls/certificate.h"
 #include "tests/endpoint/rpc_client.h"
 #include "tests/endpoint/small_server.h"
+#include "tests/support/eventually.h"
 
 namespace clothstream::tests {
 namespace {
@@ -203,6 +212,14 @@ TEST_F(GrpcEndpoint, ListsItsServicesByReflection) {
   EXPECT_THAT(*answer, HasSubstr("clothstream.v1.ClothStream"));
 }
 
+TEST_F(GrpcEndpoint, HasNoReflectionIfItShouldNot) {
+  open({.reflects = false});
+  RpcStream call(port(), {.method = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"});
+  call.send(std::string("\x3a\x01*"));
+  EXPECT_EQ(call.receive(), std::nullopt);
+  EXPECT_EQ(call.finish().error_code(), grpc::StatusCode::UNIMPLEMENTED);
+}
+
 TEST_F(GrpcEndpoint, RefusesCompressedMessages) {
   RpcStream stream(port(), {.compressed = true});
   stream.send(hello());
@@ -247,6 +264,146 @@ TEST(CallRateTest, LimitsCallsOfAnAddressWithoutItsPort) {
   EXPECT_EQ(callsAllowed("ipv6:%5B2001:db8::1%5D:50000"), kAtOnce);
   EXPECT_EQ(callsAllowed("ipv6:%5B2001:db8::2%5D:50001"), 0) << "the same first 64 bits";
   EXPECT_TRUE(rate.take("ipv4:192.0.2.1:50000", now + std::chrono::seconds(1)));
+}
+
+TEST(AnswerBudgetTest, LimitsAnswersInAllAndOfAnAddress) {
+  endpoint::AnswerBudget budget({.bytes = 100, .bytesOfAddress = 60});
+  EXPECT_TRUE(budget.take("a", 40) && budget.take("a", 20));
+  EXPECT_FALSE(budget.take("a", 1));
+  EXPECT_TRUE(budget.take("b", 30));
+  EXPECT_FALSE(budget.take("b", 11)) << "101 bytes in all";
+  EXPECT_TRUE(budget.take("", 10)) << "of this machine";
+  EXPECT_FALSE(budget.take("", 1));
+  budget.release("a", 40);
+  EXPECT_TRUE(budget.take("", 40)) << "addresses of this machine have no limit of their own";
+  budget.release("a", 20);
+  budget.release("b", 30);
+  budget.release("", 50);
+  EXPECT_TRUE(budget.take("a", 1000)) << "the only one may be larger";
+  EXPECT_FALSE(budget.take("b", 1));
+  budget.release("a", 1000);
+  EXPECT_TRUE(budget.take("b", 1));
+}
+
+// Makes the scene "mesh", whose definition has about 240 kB.
+void makeMeshScene(hosting::SceneServer& server) {
+  constexpr std::uint32_t kSide = 96;
+  v1::GetSceneRequest get;
+  get.set_name("other");
+  const auto other = server.getScene(get);
+  ASSERT_TRUE(other);
+  v1::CreateSceneRequest request;
+  request.set_name("mesh");
+  *request.mutable_scene() = other->scene();
+  v1::Cloth& cloth = *request.mutable_scene()->mutable_cloths(0);
+  cloth.clear_pins();
+  cloth.set_mass(0.015f * kSide * kSide);  // stable, also at the light nodes of the edge
+  v1::Mesh& mesh = *cloth.mutable_mesh();
+  for (std::uint32_t y = 0; y < kSide; ++y)
+    for (std::uint32_t x = 0; x < kSide; ++x) {
+      for (const float coordinate : {0.01f * static_cast<float>(x), 0.01f * static_cast<float>(y), 0.0f})
+        mesh.add_positions(coordinate);
+      const std::uint32_t node = y * kSide + x;
+      if (x == 0 || y == 0) continue;
+      for (const std::uint32_t corner :
+           {node, node - 1, node - kSide, node - 1, node - kSide - 1, node - kSide})
+        mesh.add_triangles(corner);
+    }
+  std::promise<std::string> made;
+  server.createScene(request,
+                     [&](const auto& answer) { made.set_value(answer ? "" : answer.error().text()); });
+  ASSERT_EQ(made.get_future().get(), "");
+}
+
+// A call of GetScene for the scene "mesh" whose client does not read the answer.
+std::unique_ptr<RpcStream> getMeshWithoutReading(std::uint16_t port) {
+  auto call = std::make_unique<RpcStream>(
+      port, RpcOptions{.method = "/clothstream.v1.ClothStream/GetScene", .smallWindow = true});
+  v1::GetSceneRequest request;
+  request.set_name("mesh");
+  call->send(request.SerializeAsString());
+  call->sendDone();
+  return call;
+}
+
+grpc::Status getMesh(std::uint16_t port) {
+  grpc::ClientContext context;
+  v1::GetSceneRequest request;
+  request.set_name("mesh");
+  v1::GetSceneResponse response;
+  return v1::ClothStream::NewStub(channelTo(port))->GetScene(&context, request, &response);
+}
+
+bool isWithoutRoom(const grpc::Status& status) {
+  return status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED &&
+         status.error_message().find("answers that clients have not read yet") != std::string::npos;
+}
+
+TEST_F(GrpcEndpoint, LimitsAnswersThatClientsDoNotRead) {
+  makeMeshScene(server());
+  open({.answers = {.bytes = 300'000}});
+  EXPECT_TRUE(getMesh(port()).ok());
+  const auto unread = getMeshWithoutReading(port());
+  EXPECT_TRUE(eventually([&] { return isWithoutRoom(getMesh(port())); }));
+  const auto reason = static_cast<std::size_t>(telemetry::Refusal::unreadCalls);
+  EXPECT_GE(server().state().metrics.refusals[reason].value(), 1U);
+  unread->disconnect();
+  EXPECT_TRUE(eventually([&] { return getMesh(port()).ok(); })) << "an ended call makes room";
+}
+
+TEST_F(GrpcEndpoint, CancelsCallWhoseAnswerIsNotRead) {
+  makeMeshScene(server());
+  open({.answers = {.bytes = 300'000}, .answerTimeout = 1s});
+  const auto unread = getMeshWithoutReading(port());
+  EXPECT_TRUE(eventually([&] { return isWithoutRoom(getMesh(port())); }));
+  EXPECT_TRUE(eventually([&] { return getMesh(port()).ok(); }));
+  EXPECT_EQ(unread->finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+// Opens Join streams, or health watches, on one connection. Returns the status of the first refused one.
+grpc::Status openUntilRefused(const std::shared_ptr<grpc::Channel>& channel, const std::string& method) {
+  std::vector<std::unique_ptr<RpcStream>> streams;
+  while (streams.size() < 40) {
+    streams.push_back(std::make_unique<RpcStream>(channel, method));
+    RpcStream& stream = *streams.back();
+    const bool isJoin = method == kJoin;
+    if (stream.send(isJoin ? ping() : healthRequest("")) && stream.receive()) continue;
+    return stream.finish();
+  }
+  return grpc::Status::OK;
+}
+
+constexpr const char* kWatch = "/grpc.health.v1.Health/Watch";
+
+TEST_F(GrpcEndpoint, LimitsNewStreamsPerSecond) {
+  open({.connections = {.connectionsPerSecond = 5}});
+  for (const char* method : {kJoin, kWatch}) {
+    const grpc::Status status = openUntilRefused(channelTo(port()), method);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    EXPECT_THAT(status.error_message(), HasSubstr("too many new streams (--connections-per-second)"));
+  }
+  const auto reason = static_cast<std::size_t>(telemetry::Refusal::connectionRate);
+  EXPECT_GE(server().state().metrics.refusals[reason].value(), 2U);
+}
+
+// Needs an address of this machine other than loopback, which has no such limit.
+TEST_F(GrpcEndpoint, LimitsStreamsOfAnAddressOnOneConnection) {
+  const std::vector<std::string> names = tls::namesOfThisMachine();
+  const auto other = std::ranges::find_if(names, [](const std::string& name) {
+    boost::system::error_code error;
+    const auto address = boost::asio::ip::make_address_v4(name, error);
+    return !error && !address.is_loopback();
+  });
+  if (other == names.end()) GTEST_SKIP() << "this machine has only loopback addresses";
+  open({.host = "0.0.0.0", .connections = {.connectionsPerAddress = 4}});
+  for (const char* method : {kJoin, kWatch}) {
+    const auto channel =
+        grpc::CreateChannel(fmt::format("{}:{}", *other, port()), grpc::InsecureChannelCredentials());
+    const grpc::Status status = openUntilRefused(channel, method);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    EXPECT_THAT(status.error_message(), HasSubstr("--max-connections-per-address"));
+  }
+  EXPECT_EQ(openUntilRefused(channelTo(port()), kJoin).error_code(), grpc::StatusCode::OK);
 }
 
 TEST_F(GrpcEndpoint, RefusesTooManyCalls) {

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "server/endpoint/web/web_endpoint.h"
+#include "server/hosting/server_state.h"
 #include "tests/endpoint/page_directory.h"
 #include "tests/endpoint/small_server.h"
 #include "tests/endpoint/web_client.h"
@@ -79,6 +80,29 @@ TEST_F(HttpEndpoint, AnswersSeveralRequestsOnOneConnection) {
   client.send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_EQ(client.readResponse().body(), "<html>cloth</html>");
   EXPECT_EQ(client.readResponse().body(), "ok");
+}
+
+TEST_F(HttpEndpoint, ForbidsFramesOfThePage) {
+  const Response page = get("/");
+  EXPECT_EQ(std::string(page["Content-Security-Policy"]), "frame-ancestors 'none'");
+  EXPECT_EQ(std::string(page["X-Frame-Options"]), "DENY");
+}
+
+TEST_F(HttpEndpoint, RefusesTooManyRequestsOnOneConnection) {
+  std::string requests;
+  for (int i = 0; i < 1000; ++i) requests += "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  HttpClient client(endpoint_->port());
+  client.send(requests);
+  int answered = 0;
+  Response response = client.readResponse();
+  for (; response.result() == http::status::ok; response = client.readResponse()) ++answered;
+  EXPECT_GE(answered, 200) << "as many at once";
+  EXPECT_EQ(response.result(), http::status::too_many_requests);
+  EXPECT_EQ(response.body(), "Too many requests: try again in a second.\n");
+  EXPECT_TRUE(client.closes());
+  const auto reason = static_cast<std::size_t>(telemetry::Refusal::requestRate);
+  EXPECT_EQ(server().state().metrics.refusals[reason].value(), 1U);
+  EXPECT_NO_THROW(WebSocketClient(endpoint_->port())) << "the rate of connections limits WebSockets";
 }
 
 TEST_F(HttpEndpoint, RefusesNamesThatItDoesNotHave) {

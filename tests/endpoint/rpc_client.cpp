@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "tests/endpoint/rpc_client.h"
 
+#include <utility>
+
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/byte_buffer.h>
@@ -30,10 +32,14 @@ std::shared_ptr<grpc::Channel> channelTo(std::uint16_t port, const RpcOptions& o
                                    arguments);
 }
 
-RpcStream::RpcStream(std::uint16_t port, const RpcOptions& options) : channel_(channelTo(port, options)) {
+RpcStream::RpcStream(std::uint16_t port, const RpcOptions& options)
+    : RpcStream(channelTo(port, options), options.method, options.compressed) {}
+
+RpcStream::RpcStream(std::shared_ptr<grpc::Channel> channel, const std::string& method, bool compressed)
+    : channel_(std::move(channel)) {
   context_.set_wait_for_ready(true);
-  if (options.compressed) context_.set_compression_algorithm(GRPC_COMPRESS_GZIP);
-  call_ = grpc::GenericStub(channel_).PrepareCall(&context_, options.method, &queue_);
+  if (compressed) context_.set_compression_algorithm(GRPC_COMPRESS_GZIP);
+  call_ = grpc::GenericStub(channel_).PrepareCall(&context_, method, &queue_);
   call_->StartCall(this);
   await("start");
 }

@@ -35,6 +35,8 @@ std::shared_ptr<grpc::Channel> channelTo(std::uint16_t port, const RpcOptions& o
 class RpcStream final : public Client {
  public:
   explicit RpcStream(std::uint16_t port, const RpcOptions& options = {});
+  // Shares the connection of this channel with other streams.
+  RpcStream(std::shared_ptr<grpc::Channel> channel, const std::string& method, bool compressed = false);
   ~RpcStream() override;
   RpcStream(const RpcStream&) = delete;
   RpcStream& operator=(const RpcStream&) = delete;

@@ -140,10 +140,35 @@ TEST_F(MonitoringTest, MetricsAgreeWithWhatTheClientReceived) {
   EXPECT_GE(of("device_stage_seconds_count", {{"scene", "small"}, {"stage", "advance"}}), of("ticks_total"));
   EXPECT_GT(atRest.value("clothstream_device_memory_bytes"), 8 * 8 * 32);
   EXPECT_LT(atRest.value("clothstream_device_silence_seconds"), 5);
+  EXPECT_GE(atRest.value("clothstream_sent_bytes_total", {{"endpoint", "web"}}),
+            of("packet_bytes_total") / 2);
+  EXPECT_EQ(atRest.value("clothstream_sent_bytes_total", {{"endpoint", "grpc"}}), 0);
+  EXPECT_GT(of("price"), 0);
+  EXPECT_FLOAT_EQ(static_cast<float>(of("price")),
+                  static_cast<float>(server().state().find("small")->price()));
 
   joined.client->leave();
   EXPECT_TRUE(eventually([&] { return scrape().value("clothstream_open_connections") == 0; }));
   EXPECT_EQ(scrape().value("clothstream_scene_participants", kSmall), 0);
+}
+
+TEST_F(MonitoringTest, BudgetIsUsedByCreatedScenes) {
+  const auto used = [&](const std::string& what) {
+    return scrape().value("clothstream_budget_used_" + what);
+  };
+  const auto freed = [&](const std::string& what) {
+    return scrape().value("clothstream_budget_free_" + what);
+  };
+  const double before = used("memory_bytes"), load = used("load"), free = freed("memory_bytes");
+  v1::CreateSceneRequest request;
+  request.set_named("large");
+  request.set_name("copy");
+  std::promise<bool> made;
+  server().createScene(request, [&](const auto& answer) { made.set_value(answer.has_value()); });
+  ASSERT_TRUE(made.get_future().get());
+  EXPECT_GT(used("memory_bytes"), before + 128 * 128 * 12);
+  EXPECT_GT(used("load"), load);
+  EXPECT_LT(freed("memory_bytes"), free);
 }
 
 TEST_F(MonitoringTest, MetricsOfADeletedSceneVanish) {

@@ -567,6 +567,19 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
   }
 });
 
+// Another web server delivers the page, and answers unknown files with a page.
+function answerAddressWithPage() {
+  const own = window.fetch;
+  window.fetch = (resource, ...rest) =>
+    String(resource).endsWith("address.json") ? Promise.resolve(new Response("<html></html>")) : own(resource, ...rest);
+}
+
+test("an address that is not JSON is not shown", () =>
+  withPage({ prepare: answerAddressWithPage }, async (page) => {
+    await untilState(page, "live");
+    assert.ok(await page.isHidden("#share"));
+  }));
+
 test("a browser without WebGL shows what is missing", () =>
   withPage({ prepare: () => (HTMLCanvasElement.prototype.getContext = () => null) }, async (page) => {
     await page.waitForSelector("#banner:not([hidden])");

@@ -36,8 +36,14 @@ TEST(Printable, EscapesControlCharactersAndKeepsOtherText) {
                       "cba"),
             "\\xe2\\x80\\xaecba");                          // U+202E, right to left
   EXPECT_EQ(printable("\xe2\x81\xa6"), "\\xe2\\x81\\xa6");  // U+2066, isolate
-  EXPECT_TRUE(hasControlCharacters("cloth\xe2\x80\xa8"));   // U+2028, line separator
-  EXPECT_EQ(printable("\xc2"), "\xc2");                     // truncated, not a control character
+  EXPECT_EQ(printable("\xd8\x9c"), "\\xd8\\x9c");           // U+061C, Arabic letter mark
+  EXPECT_EQ(printable("\x9b"
+                      "1m"),
+            "\\x9b1m");                                  // CSI of a terminal with 8 bits
+  EXPECT_EQ(printable("\xe2\x82\x9b"), "\xe2\x82\x9b");  // the same byte in U+209B
+  EXPECT_TRUE(hasControlCharacters("cloth\x80"));
+  EXPECT_TRUE(hasControlCharacters("cloth\xe2\x80\xa8"));  // U+2028, line separator
+  EXPECT_EQ(printable("\xc2"), "\xc2");                    // truncated, not a control character
 }
 
 TEST(Log, WritesOneLineForAMessageFromOutside) {

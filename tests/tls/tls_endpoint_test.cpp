@@ -2,8 +2,11 @@
 // The web endpoint with TLS.
 #include <atomic>
 #include <chrono>
+#include <ctime>
 #include <memory>
+#include <stop_token>
 #include <string>
+#include <thread>
 
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
@@ -18,6 +21,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openssl/ssl.h>
+#include <sys/stat.h>
 
 #include "clothstream/v1/session.pb.h"
 #include "proto/tls/fingerprint.h"
@@ -30,6 +34,7 @@
 #include "tests/endpoint/viewer.h"
 #include "tests/endpoint/web_client.h"
 #include "tests/support/eventually.h"
+#include "tests/tls/client_certificate.h"
 
 namespace clothstream::tests {
 namespace {
@@ -78,6 +83,21 @@ class TlsClient {
     const timeval patience{kPatience.count(), 0};
     ::setsockopt(stream_.next_layer().native_handle(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   }
+  // Shows this certificate to the server.
+  void use(const tls::Certificate& certificate) {
+    context_.use_certificate_chain(net::buffer(certificate.chain));
+    context_.use_private_key(net::buffer(certificate.key), ssl::context::pem);
+    SSL_use_certificate(stream_.native_handle(), SSL_CTX_get0_certificate(context_.native_handle()));
+    SSL_use_PrivateKey(stream_.native_handle(), SSL_CTX_get0_privatekey(context_.native_handle()));
+  }
+  // Session for a later connection. With TLS 1.3 the server has sent it after the first answer.
+  std::shared_ptr<SSL_SESSION> session() {
+    return {SSL_get1_session(stream_.native_handle()), &SSL_SESSION_free};
+  }
+  void resume(const std::shared_ptr<SSL_SESSION>& session) {
+    SSL_set_session(stream_.native_handle(), session.get());
+  }
+  bool isResumed() { return SSL_session_reused(stream_.native_handle()) == 1; }
   beast::error_code shakeHands() {
     beast::error_code error;
     stream_.handshake(ssl::stream_base::client, error);
@@ -171,6 +191,91 @@ TEST_F(TlsEndpoint, UsesNewCertificateForNewConnectionsOnly) {
   EXPECT_EQ(before.get("/").body(), "<html>cloth</html>") << "an open connection continues";
 }
 
+class TlsEndpointWithClientCa : public TlsEndpoint {
+ protected:
+  void SetUp() override {
+    TlsEndpoint::SetUp();
+    if (IsSkipped()) return;
+    tls_ = std::make_shared<tls::ServerTls>([this] { return tls::selfSigned(directory(), {"localhost"}); },
+                                            client_.chain);
+    endpoint_.reset();
+    endpoint_ = std::make_unique<endpoint::WebEndpoint>(
+        server(), endpoint::WebEndpointOptions{.port = 0, .pageDirectory = files_.path(), .tls = tls_});
+  }
+
+  const tls::Certificate client_ = makeClientCertificate();
+};
+
+TEST_F(TlsEndpointWithClientCa, ResumesSessions) {
+  for (const int version : {TLS1_2_VERSION, TLS1_3_VERSION})
+    for (const bool hasCertificate : {false, true}) {
+      TlsClient first(endpoint_->port(), version);
+      if (hasCertificate) first.use(client_);
+      ASSERT_FALSE(first.shakeHands());
+      EXPECT_EQ(first.get("/").body(), "<html>cloth</html>");
+      TlsClient second(endpoint_->port(), version);
+      if (hasCertificate) second.use(client_);
+      second.resume(first.session());
+      ASSERT_FALSE(second.shakeHands());
+      EXPECT_TRUE(second.isResumed());
+      EXPECT_EQ(second.get("/").body(), "<html>cloth</html>");
+    }
+  EXPECT_EQ(failedHandshakes().value(), 0U);
+}
+
+TEST_F(TlsEndpointWithClientCa, RefusesOnlyCertificatesOfOtherAuthorities) {
+  TlsClient stranger(endpoint_->port(), TLS1_2_VERSION);
+  stranger.use(makeClientCertificate());
+  EXPECT_TRUE(stranger.shakeHands());
+  EXPECT_TRUE(eventually([&] { return failedHandshakes().value() == 1; }));
+  for (const bool hasCertificate : {false, true}) {
+    TlsClient client(endpoint_->port());
+    if (hasCertificate) client.use(client_);
+    ASSERT_FALSE(client.shakeHands());
+    EXPECT_EQ(client.get("/").body(), "<html>cloth</html>");
+  }
+}
+
+TEST_F(TlsEndpoint, RefusesTargetThatWouldRedirectToAnotherHost) {
+  HttpClient client(endpoint_->port());
+  client.send("GET @evil.example/ HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_EQ(client.readResponse().result(), http::status::bad_request);
+  EXPECT_TRUE(client.closes());
+}
+
+// gRPC reads the chain and the key one after the other, and again if the file has changed in between.
+TEST(ServerTlsTest, FileAlwaysHasAChainAndItsKey) {
+  const e2e::TemporaryDirectory directory;
+  bool second = false;
+  tls::ServerTls tls(
+      [&] { return tls::selfSigned(directory.path() / (second ? "second" : "first"), {"localhost"}); }, "");
+  const std::string path = tls.certificatePath();
+  const auto changed = [&] {
+    struct stat file {};
+    EXPECT_EQ(::stat(path.c_str(), &file), 0);
+    return file.st_mtime;
+  };
+  std::atomic<int> reads = 0;
+  std::jthread reader([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      const std::time_t before = changed();
+      try {
+        tls::readCertificate(path, path);
+        ++reads;
+      } catch (const std::exception& mismatch) {
+        EXPECT_NE(changed(), before) << mismatch.what();
+      }
+    }
+  });
+  for (int i = 0; i < 200; ++i) {
+    second = !second;
+    tls.reload();
+  }
+  EXPECT_TRUE(eventually([&] { return reads > 0; }));
+  reader = {};
+  EXPECT_EQ(fingerprintOf(tls::readCertificate(path, path).chain).value(), tls.fingerprint());
+}
+
 TEST(ServerTlsTest, KeepsTheOldCertificateIfTheNewOneIsBad) {
   const e2e::TemporaryDirectory directory;
   bool bad = false;
@@ -187,6 +292,8 @@ TEST(ServerTlsTest, KeepsTheOldCertificateIfTheNewOneIsBad) {
   EXPECT_THROW(tls.reload(), std::runtime_error);
   EXPECT_EQ(tls.fingerprint(), fingerprint);
   EXPECT_EQ(tls.context(), context);
+  const tls::Certificate shown = tls::readCertificate(tls.certificatePath(), tls.certificatePath());
+  EXPECT_EQ(fingerprintOf(shown.chain).value(), fingerprint);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // Reads the messages of session.proto that a server sends, field by field.
 #include "clients/core/wire/server_message.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -186,8 +187,9 @@ bool readFrame(Bytes message, Frame& frame) {
         frame.report = reader.get_view();
         return true;
       case F::kFrameDivisor.tag:
-        return set(frame.divisor, reader.get_uint32()) && frame.divisor >= 1 &&
-               frame.divisor <= kMaxFrameDivisor;
+        if (!set(frame.divisor, reader.get_uint32()) || frame.divisor > kMaxFrameDivisor) return false;
+        frame.divisor = std::max(frame.divisor, 1u);  // 0 means all frames
+        return true;
       default:
         return skip(reader);
     }

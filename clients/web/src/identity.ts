@@ -5,7 +5,6 @@ import { Roles, type Client, type PairingCode } from "./client";
 import { element, write } from "./hud";
 
 const kStorageKey = "clothstream.token";
-const kOwner = 3;
 
 // Token that pairing has given for this server; "" without one. A browser may refuse to store anything.
 export function keptToken(): string {
@@ -56,6 +55,18 @@ export class ProofForm {
   }
 }
 
+// Whether the server makes codes for a client with this token (docs/identity.md): one with the role owner that is not
+// for one scene. An owner of a scene may have a token with another role.
+function makesCodes(token: string): boolean {
+  try {
+    const payload = token.split(".")[1] ?? "";
+    const claims = JSON.parse(atob(payload.replaceAll("-", "+").replaceAll("_", "/"))) as { role?: unknown; scene?: unknown };
+    return claims.role === "owner" && !claims.scene;
+  } catch {
+    return false;
+  }
+}
+
 // Button with which an owner makes a pairing code, and the newest code.
 export class PairingPanel {
   private readonly button = element<HTMLButtonElement>("pairing");
@@ -66,10 +77,8 @@ export class PairingPanel {
     this.button.addEventListener("click", asked);
   }
 
-  // Only owners of a server that requires tokens can make codes.
   showFor(client: Client): void {
-    const own = client.participants().find(({ self }) => self);
-    this.button.hidden = client.token === "" || own?.role !== kOwner;
+    this.button.hidden = !makesCodes(client.token);
     if (this.button.hidden) this.code.hidden = true;
   }
 

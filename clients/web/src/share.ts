@@ -7,7 +7,9 @@ import { element, write } from "./hud";
 export async function showAddress(): Promise<void> {
   const answer = await fetch("address.json").catch(() => undefined);
   if (!answer?.ok) return;
-  const { address, fingerprint } = (await answer.json()) as { address: string; fingerprint: string };
+  // Another server may answer with a page.
+  const shown = (await answer.json().catch(() => undefined)) as { address?: string; fingerprint?: string } | undefined;
+  const { address, fingerprint } = shown ?? {};
   if (!address) return;
   const link = element<HTMLAnchorElement>("share-address");
   link.href = address;

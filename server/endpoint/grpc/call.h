@@ -2,6 +2,7 @@
 // Base class of a gRPC call, and the state that all calls of one endpoint share.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -13,8 +14,10 @@
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/status.h>
 
+#include "server/endpoint/grpc/answer_budget.h"
 #include "server/endpoint/grpc/call_rate.h"
 #include "server/endpoint/grpc/completion_loop.h"
+#include "server/endpoint/listen/admission.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::hosting {
@@ -30,9 +33,11 @@ struct GrpcEndpointContext {
   hosting::SceneServer& server;
   telemetry::ServerMetrics& metrics;
   const std::shared_ptr<CompletionLoop> loop;
-  const std::size_t maxStreams;
-  std::size_t streams = 0;  // open Join streams, without refused ones
-  std::size_t watches = 0;  // open health watches
+  // One connection may carry many streams, so streams and health watches are admitted like connections.
+  Admission streams, watches;
+  AnswerBudget answers;
+  // A call whose answer has not been read by then is cancelled.
+  const std::chrono::milliseconds answerTimeout;
   CallRate callRate = {};
   std::unordered_set<std::shared_ptr<Call>> calls = {};
   std::size_t callsMade = 0;               // number of these that a client has made

@@ -3,29 +3,23 @@
 
 #include <string_view>
 
-#include <boost/asio/ip/address.hpp>
-
 #include "server/endpoint/listen/address_rate.h"
 
 namespace clothstream::endpoint {
-namespace {
 
-// Address in `peer`, such as ipv4:192.0.2.1:50000 or ipv6:%5B2001:db8::1%5D:50000.
-boost::asio::ip::address addressIn(const std::string& peer) {
+boost::asio::ip::address addressOf(const std::string& peer) {
   const std::size_t scheme = peer.find(':'), port = peer.rfind(':');
   if (scheme == port) return {};
   std::string host = peer.substr(scheme + 1, port - scheme - 1);
   constexpr std::size_t kBracket = 3;  // %5B and %5D
   if (host.starts_with("%5B") && host.size() > 2 * kBracket)
     host = host.substr(kBracket, host.size() - 2 * kBracket);
-  boost::system::error_code unknown;  // counts as an address of its own
+  boost::system::error_code unknown;
   return boost::asio::ip::make_address(host, unknown);
 }
 
-}  // namespace
-
 std::string addressKeyOf(const std::string& peer) {
-  return addressKey(addressIn(peer));
+  return addressKey(addressOf(peer));
 }
 
 std::string tokenIn(const grpc::ServerContext& context) {

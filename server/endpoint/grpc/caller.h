@@ -4,9 +4,14 @@
 
 #include <string>
 
+#include <boost/asio/ip/address.hpp>
 #include <grpcpp/server_context.h>
 
 namespace clothstream::endpoint {
+
+// Address of a peer as gRPC writes it, such as ipv4:192.0.2.1:50000 or ipv6:%5B2001:db8::1%5D:50000. A
+// text of another form gives the unspecified address.
+boost::asio::ip::address addressOf(const std::string& peer);
 
 // Key (addressKey) of a peer as gRPC writes it, such as ipv4:192.0.2.1:50000. Empty for programs of this
 // machine.

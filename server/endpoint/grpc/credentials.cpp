@@ -12,8 +12,8 @@ std::shared_ptr<grpc::ServerCredentials> credentialsOf(const tls::ServerTls* tls
   if (tls == nullptr) return grpc::InsecureServerCredentials();
   const std::string clientCa = tls->clientCaPath();
   grpc::experimental::TlsServerCredentialsOptions options(
-      std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(tls->keyPath(), tls->chainPath(),
-                                                                           clientCa, kCertificateInterval));
+      std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(
+          tls->certificatePath(), tls->certificatePath(), clientCa, kCertificateInterval));
   options.watch_identity_key_cert_pairs();
   if (clientCa.empty()) {
     options.set_cert_request_type(GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE);

@@ -9,12 +9,15 @@
 #include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include <absl/synchronization/mutex.h>
 #include <boost/asio/thread_pool.hpp>
 #include <grpc/compression.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
+#include <grpcpp/impl/server_builder_option.h>
+#include <grpcpp/impl/server_builder_plugin.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
@@ -69,6 +72,15 @@ void configure(grpc::ServerBuilder& builder) {
   builder.SetResourceQuota(quota);
 }
 
+// Adds reflection to one server. gRPC's own function adds it to every server of the process.
+class Reflection final : public grpc::ServerBuilderOption {
+ public:
+  void UpdateArguments(grpc::ChannelArguments*) override {}
+  void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
+    plugins->push_back(std::make_unique<grpc::reflection::ProtoServerReflectionPlugin>());
+  }
+};
+
 // Returns whether this gRPC has weaknesses by which a peer can end the process or exhaust its memory:
 // CVE-2023-1428, CVE-2023-33953, CVE-2023-4785 and CVE-2023-44487, the last of which 1.60 limits.
 bool hasWeaknesses() {
@@ -89,8 +101,8 @@ struct GrpcEndpoint::State {
   boost::asio::thread_pool slowCalls{1};  // for calls that take longer than a frame may wait
 
   State(hosting::SceneServer& scenes, const GrpcEndpointOptions& options) {
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
+    if (options.reflects) builder.SetOption(std::make_unique<Reflection>());
     configure(builder);
     ConnectionLimits limits = options.connections;
     limits.connections = options.maxStreams + kAnsweredBeyondLimit;
@@ -105,7 +117,14 @@ struct GrpcEndpoint::State {
     const auto loop = std::make_shared<CompletionLoop>(builder.AddCompletionQueue());
     server = builder.BuildAndStart();
     if (!server) throw std::runtime_error("gRPC cannot start a server");
-    context.emplace(GrpcEndpointContext{scenes, scenes.state().metrics, loop, options.maxStreams});
+    limits.connections = options.maxStreams;
+    context.emplace(GrpcEndpointContext{.server = scenes,
+                                        .metrics = scenes.state().metrics,
+                                        .loop = loop,
+                                        .streams = Admission(limits),
+                                        .watches = Admission(limits),
+                                        .answers = AnswerBudget(options.answers),
+                                        .answerTimeout = options.answerTimeout});
     offerService(*context, service, slowCalls);
     offerHealth(*context, health);
     if (hasWeaknesses() && !acceptor->isLoopback())

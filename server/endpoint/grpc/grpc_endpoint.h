@@ -2,11 +2,13 @@
 // gRPC endpoint: the service of session.proto, health checks and reflection.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
 
+#include "server/endpoint/grpc/answer_budget.h"
 #include "server/endpoint/listen/admission.h"
 
 namespace clothstream::hosting {
@@ -22,9 +24,15 @@ struct GrpcEndpointOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = 50051;  // 0: a free port
   // Maximum number of open Join streams. Further ones end with RESOURCE_EXHAUSTED.
+  // The same holds for health watches.
   std::size_t maxStreams = 256;
-  // `connections` is ignored: it follows from maxStreams.
+  // Also for Join streams and for health watches, each. `connections` is ignored: it follows from maxStreams.
   ConnectionLimits connections{};
+  // Memory of the answers that clients have not read yet, and the time after which their calls are cancelled.
+  AnswerLimits answers{};
+  std::chrono::milliseconds answerTimeout{10'000};
+  // Offers reflection, to everyone. Without it only clients that have session.proto can make calls.
+  bool reflects = true;
   // Null: no TLS. Must outlive the endpoint.
   std::shared_ptr<const tls::ServerTls> tls{};
 };

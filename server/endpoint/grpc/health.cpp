@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/grpc/health.h"
 
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,8 +16,6 @@ namespace {
 
 using grpc::health::v1::HealthCheckRequest;
 using grpc::health::v1::HealthCheckResponse;
-
-constexpr std::size_t kMaxWatches = 64;
 
 bool isOffered(const std::string& service) {
   return service.empty() || service == v1::ClothStream::service_full_name() ||
@@ -56,11 +53,12 @@ class HealthWatch final : public Call {
     begin(ended_);
     endpoint::await<HealthWatch>(endpoint_, service_);
     if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
-    if (endpoint_.watches >= kMaxWatches)
-      return finish(
-          {grpc::StatusCode::RESOURCE_EXHAUSTED, "too many health watches are open; call Check instead"});
-    ++endpoint_.watches;
-    isCounted_ = true;
+    auto ticket = endpoint_.watches.admit(addressOf(context_.peer()), schedule::Clock::now());
+    if (!ticket) {
+      endpoint_.metrics.refuse(ticket.error());
+      return finish(statusOf(ticket.error()));
+    }
+    ticket_.emplace(std::move(*ticket));
     write(HealthCheckResponse::SERVING);
   }
   void onWritten(bool) {
@@ -74,13 +72,13 @@ class HealthWatch final : public Call {
   void onFinished(bool) {}
   void onEnded(bool) {
     hasEnded_ = true;
-    if (isCounted_) --endpoint_.watches;
+    ticket_.reset();
     over();
   }
 
   // Reports NOT_SERVING before the end, after a write that is under way.
   void close(const grpc::Status& status) override {
-    if (!isCounted_ || hasEnded_) return;
+    if (!ticket_ || hasEnded_) return;
     closing_ = status;
     if (!isWriting_) onWritten(true);
   }
@@ -100,8 +98,9 @@ class HealthWatch final : public Call {
   HealthService& service_;
   HealthCheckRequest request_;
   grpc::ServerAsyncWriter<HealthCheckResponse> writer_{&context_};
-  std::optional<grpc::Status> closing_;  // set while the watch closes
-  bool isCounted_ = false, isWriting_ = false, isLast_ = false, hasEnded_ = false;
+  std::optional<grpc::Status> closing_;      // set while the watch closes
+  std::optional<Admission::Ticket> ticket_;  // none for a refused watch
+  bool isWriting_ = false, isLast_ = false, hasEnded_ = false;
   Step<HealthWatch> begun_{*this, &HealthWatch::onBegun}, written_{*this, &HealthWatch::onWritten},
       finished_{*this, &HealthWatch::onFinished}, ended_{*this, &HealthWatch::onEnded};
 };

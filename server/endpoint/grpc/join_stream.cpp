@@ -42,11 +42,12 @@ void JoinStream::onBegun(bool ok) {
   begin(ended_);
   endpoint::await<JoinStream>(endpoint_, service_);
   if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
-  if (endpoint_.streams >= endpoint_.maxStreams) endpoint_.metrics.refuse(telemetry::Refusal::connections);
-  if (endpoint_.streams >= endpoint_.maxStreams)
-    return finish({grpc::StatusCode::RESOURCE_EXHAUSTED, "the server has no free stream; try again later"});
-  ++endpoint_.streams;
-  isCounted_ = true;
+  auto ticket = endpoint_.streams.admit(addressOf(context_.peer()), schedule::Clock::now());
+  if (!ticket) {
+    endpoint_.metrics.refuse(ticket.error());
+    return finish(statusOf(ticket.error()));
+  }
+  ticket_.emplace(std::move(*ticket));
   // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
   // would deadlock: the release of the session waits for that wake to return.
   std::weak_ptr<JoinStream> weak = std::static_pointer_cast<JoinStream>(shared_from_this());
@@ -101,6 +102,7 @@ void JoinStream::pump() {
   } else if (std::optional<delivery::SharedBytes> message = session_->next()) {
     lastMessage_ = std::move(*message);
     isWriting_ = true;
+    endpoint_.metrics.grpcBytes.add(lastMessage_->size());
     io_.Write(sharedBuffer(lastMessage_), begin(written_));
   } else if (finished) {
     finish(statusOf(session::closingOf(lastMessage_)));
@@ -142,7 +144,7 @@ void JoinStream::onLateForEnd(bool expired) {
 
 void JoinStream::onEnded(bool) {
   hasEnded_ = true;
-  if (isCounted_) --endpoint_.streams;
+  ticket_.reset();
   if (cancellation_) cancellation_->Cancel();
   if (pause_) pause_->Cancel();
   if (departing_ && !context_.IsCancelled()) departing_->leave();

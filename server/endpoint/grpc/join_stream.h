@@ -47,8 +47,9 @@ class JoinStream final : public Call {
   std::shared_ptr<session::Session> departing_;
   grpc::ByteBuffer incoming_;
   delivery::SharedBytes lastMessage_;
-  std::optional<grpc::Status> closing_;  // set while the stream closes
-  bool isCounted_ = false, isWriting_ = false, hasEnded_ = false;
+  std::optional<grpc::Status> closing_;      // set while the stream closes
+  std::optional<Admission::Ticket> ticket_;  // none for a refused stream
+  bool isWriting_ = false, hasEnded_ = false;
   std::optional<grpc::Alarm> cancellation_;  // set while the stream waits for its last write
   std::optional<grpc::Alarm> pause_;         // before the next read, of a client that sends too fast
   Step<JoinStream> begun_{*this, &JoinStream::onBegun}, read_{*this, &JoinStream::onRead},

@@ -40,6 +40,24 @@ grpc::Status statusOf(const v1::Error& error) {
   return {codeOf(error.code()), error.text()};
 }
 
+grpc::Status statusOf(telemetry::Refusal reason) {
+  constexpr auto kCode = grpc::StatusCode::RESOURCE_EXHAUSTED;
+  switch (reason) {
+    case telemetry::Refusal::connectionsOfAddress:
+      return {
+          kCode,
+          "too many streams of this address are open (--max-connections-per-address): close others first"};
+    case telemetry::Refusal::connectionRateOfAddress:
+      return {kCode,
+              "too many new streams of this address (--connections-per-second-per-address): try again in a "
+              "second"};
+    case telemetry::Refusal::connectionRate:
+      return {kCode, "too many new streams (--connections-per-second): try again in a second"};
+    default:
+      return {kCode, "the server has no free stream; try again later"};
+  }
+}
+
 grpc::Status statusOf(const session::Closing& closing) {
   switch (closing.reason) {
     case session::Closing::Reason::error:

@@ -6,10 +6,14 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/session/closing.h"
+#include "server/telemetry/refusal.h"
 
 namespace clothstream::endpoint {
 
 grpc::Status statusOf(const v1::Error& error);
+
+// RESOURCE_EXHAUSTED for a stream or a health watch that an Admission refuses.
+grpc::Status statusOf(telemetry::Refusal reason);
 
 // NOT_FOUND for a deleted scene, UNAVAILABLE if the server stops.
 grpc::Status statusOf(const session::Closing& closing);

@@ -3,11 +3,16 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 
+#include <fmt/format.h>
+#include <grpcpp/alarm.h>
 #include <grpcpp/support/async_unary_call.h>
 #include <tl/expected.hpp>
 
@@ -81,15 +86,42 @@ class UnaryCall final : public Call {
   }
   // The call is answered, or the client has cancelled it, or its deadline is over.
   void onEnded(bool) { *isWanted_ = false; }
-  void onFinished(bool) { over(); }
+  void onFinished(bool) {
+    endpoint_.answers.release(address_, bytes_);
+    late_.Cancel();
+    over();
+  }
+  void onLate(bool expired) {
+    if (expired) context_.TryCancel();
+  }
   void close(const grpc::Status& status) override { finish(status); }
 
   void finish(const grpc::Status& status) {
     if (std::exchange(isFinishing_, true)) return;
     if (status.ok())
-      writer_.Finish(response_, status, begin(finished_));
+      give();
     else
       writer_.FinishWithError(status, begin(finished_));
+    late_.Set(&endpoint_.loop->queue(), std::chrono::system_clock::now() + endpoint_.answerTimeout,
+              begin(expired_));
+  }
+
+  // Sends the response if the budget of answers has room for it.
+  void give() {
+    address_ = addressKeyOf(context_.peer());
+    const std::size_t bytes = response_.ByteSizeLong();
+    if (!endpoint_.answers.take(address_, bytes)) {
+      endpoint_.metrics.refuse(telemetry::Refusal::unreadCalls);
+      return writer_.FinishWithError({grpc::StatusCode::RESOURCE_EXHAUSTED,
+                                      fmt::format("the answer of {} bytes has no room next to answers that "
+                                                  "clients have not read yet: read them, or try again later",
+                                                  bytes)},
+                                     begin(finished_));
+    }
+    bytes_ = bytes;
+    endpoint_.metrics.grpcBytes.add(bytes);
+    writer_.Finish(response_, grpc::Status::OK, begin(finished_));
+    response_ = {};  // gRPC has its own copy
   }
 
   const Take take_;
@@ -99,9 +131,12 @@ class UnaryCall final : public Call {
   Response response_;
   Writer writer_{&context_};
   bool isFinishing_ = false;
+  std::string address_;    // key of the peer's address, while its answer is sent
+  std::size_t bytes_ = 0;  // of the answer that is sent
+  grpc::Alarm late_;       // set while the answer is sent
   const std::shared_ptr<std::atomic<bool>> isWanted_ = std::make_shared<std::atomic<bool>>(true);
   Step<UnaryCall> begun_{*this, &UnaryCall::onBegun}, finished_{*this, &UnaryCall::onFinished},
-      ended_{*this, &UnaryCall::onEnded};
+      ended_{*this, &UnaryCall::onEnded}, expired_{*this, &UnaryCall::onLate};
 };
 
 // gRPC function that requests the next call of a method.

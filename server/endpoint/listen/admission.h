@@ -34,6 +34,9 @@ class Admission {
     Ticket& operator=(Ticket&&) = delete;
     ~Ticket();
 
+    // Key of the address (addressKey).
+    const std::string& address() const { return address_; }
+
    private:
     friend class Admission;
     struct Counts;

@@ -11,6 +11,7 @@
 
 #include <boost/asio/io_context.hpp>
 
+#include "server/endpoint/listen/address_rate.h"
 #include "server/endpoint/listen/admission.h"
 #include "server/endpoint/web/host_names.h"
 #include "server/endpoint/web/page.h"
@@ -24,6 +25,9 @@ namespace clothstream::endpoint {
 
 class WebSocketStream;
 
+// Rate of HTTP requests of one address, with twice as many at once.
+inline constexpr double kRequestsPerSecond = 100;
+
 struct WebEndpointContext {
   hosting::SceneServer& server;
   boost::asio::io_context& io;
@@ -33,6 +37,8 @@ struct WebEndpointContext {
   const std::vector<std::string> allowedOrigins;
   const std::size_t maxConnections;
   std::size_t connections = 0;
+  // HTTP requests of each address. Programs of this machine share one limit.
+  AddressRate requestRate{kRequestsPerSecond, 2 * kRequestsPerSecond};
   std::unordered_set<std::shared_ptr<WebSocketStream>> streams;
   bool stopping = false;
 };
@@ -47,6 +53,9 @@ class ConnectionSlot {
   ~ConnectionSlot() { --endpoint_.connections; }
   ConnectionSlot(const ConnectionSlot&) = delete;
   ConnectionSlot& operator=(const ConnectionSlot&) = delete;
+
+  // Key of the peer's address (addressKey).
+  const std::string& address() const { return ticket_.address(); }
 
  private:
   WebEndpointContext& endpoint_;

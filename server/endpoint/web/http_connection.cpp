@@ -117,27 +117,38 @@ void HttpConnection::onHeader(beast::error_code error) {
     return refuse(
         http::status::misdirected_request,
         "This server does not have the name of the Host field. The server option --public-name adds it.\n");
-  if (endpoint_.tls && !stream_.isEncrypted()) return write(redirection(parser_->get()));
   const std::string_view target = view(parser_->get().target());
-  if (target.substr(0, target.find('?')) == "/stream") return answerStream(parser_->get());
-  write(answer(parser_->get()));
+  if (!target.starts_with('/'))
+    return refuse(http::status::bad_request, "The target of a request must begin with '/'.\n");
+  if (endpoint_.tls && !stream_.isEncrypted()) return write(redirection(parser_->get()));
+  const bool isStream = target.substr(0, target.find('?')) == "/stream";
+  // A connection becomes a WebSocket once, so the rate of connections limits these.
+  if (isStream && beast::websocket::is_upgrade(parser_->get())) return answerStream(parser_->get());
+  if (!endpoint_.requestRate.take(slot_->address(), schedule::Clock::now())) {
+    endpoint_.server.state().metrics.refuse(telemetry::Refusal::requestRate);
+    return refuse(http::status::too_many_requests, "Too many requests: try again in a second.\n");
+  }
+  write(isStream ? upgradeRequired(parser_->get()) : answer(parser_->get()));
 }
 
 void HttpConnection::answerStream(const Request& request) {
-  if (!beast::websocket::is_upgrade(request)) {
-    Response response =
-        plainAnswer(request, http::status::upgrade_required, "/stream accepts only WebSocket connections.\n");
-    response.set(http::field::upgrade, "websocket");
-    return write(std::move(response));
-  }
   if (!originAllowed(request, endpoint_.allowedOrigins)) {
-    return write(plainAnswer(
+    Response response = plainAnswer(
         request, http::status::forbidden,
-        "Pages of this origin may not open /stream. The server option --allow-origin allows them.\n"));
+        "Pages of this origin may not open /stream. The server option --allow-origin allows them.\n");
+    response.keep_alive(false);
+    return write(std::move(response));
   }
   stream_.next_layer().expires_never();  // the WebSocket sets its own timeouts
   std::make_shared<WebSocketStream>(std::move(stream_), endpoint_, std::move(slot_))
       ->accept(parser_->release());
+}
+
+HttpConnection::Response HttpConnection::upgradeRequired(const Request& request) const {
+  Response response =
+      plainAnswer(request, http::status::upgrade_required, "/stream accepts only WebSocket connections.\n");
+  response.set(http::field::upgrade, "websocket");
+  return response;
 }
 
 HttpConnection::Response HttpConnection::redirection(const Request& request) const {
@@ -173,6 +184,9 @@ HttpConnection::Response HttpConnection::answerFile(const Request& request, cons
   response.set(http::field::content_type,
                beast::string_view(file.contentType.data(), file.contentType.size()));
   response.set("X-Content-Type-Options", "nosniff");
+  // Another page that shows this one in a frame could make a person click on it without seeing it.
+  response.set("Content-Security-Policy", "frame-ancestors 'none'");
+  response.set("X-Frame-Options", "DENY");
   response.keep_alive(request.keep_alive());
   if (!known) response.body() = {file.content.data(), file.content.size()};
   return response;
@@ -183,6 +197,7 @@ void HttpConnection::write(Response&& response) {
   response_.set(http::field::server, "clothstream");
   if (response_.result() != http::status::not_modified) response_.content_length(response_.body().size());
   if (parser_->get().method() == http::verb::head) response_.body() = {};
+  endpoint_.server.state().metrics.webBytes.add(response_.body().size());
   stream_.next_layer().expires_after(kResponseTimeout);
   http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code error, std::size_t) {
     self->onWritten(error);

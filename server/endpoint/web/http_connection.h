@@ -40,6 +40,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void read();
   void onHeader(boost::beast::error_code error);
   void answerStream(const Request& request);
+  Response upgradeRequired(const Request& request) const;
   Response redirection(const Request& request) const;
   Response answer(const Request& request) const;
   Response answerFile(const Request& request, const PageFile& file) const;

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "server/endpoint/listen/address_rate.h"
+#include "server/hosting/server_state.h"
 #include "server/session/closing.h"
 
 namespace clothstream::endpoint {
@@ -132,6 +133,7 @@ void WebSocketStream::pump() {
   } else if (std::optional<delivery::SharedBytes> message = session_->next()) {
     outgoing_ = std::move(*message);
     writing_ = true;
+    endpoint_.server.state().metrics.webBytes.add(outgoing_->size());
     socket_.async_write(
         boost::asio::buffer(outgoing_->data(), outgoing_->size()),
         [self = shared_from_this()](beast::error_code error, std::size_t) { self->onWritten(error); });
