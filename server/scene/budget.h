@@ -58,7 +58,7 @@ class Charge {
                                          std::size_t count);
   // Charges the scene with parameters that it had before, also beyond the budget.
   void restore(const model::Scene& scene);
-  // Gives the charge back.
+  // Gives the charge back. Until the scene is charged again, its colliders cost nothing.
   void release();
 
   // Work of a tick of the charged scene with this number of colliders.
@@ -79,7 +79,8 @@ class Charge {
   model::Work freeWork_;
   double freeMegabytes_ = 0;
   Amount charged_;
-  bool made_;  // the scene exists: its shape and substeps stay
+  bool released_ = false;  // and not charged again since
+  bool made_;              // the scene exists: its shape and substeps stay
 };
 
 }  // namespace clothstream::scene
