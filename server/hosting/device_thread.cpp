@@ -128,6 +128,8 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
       scene::LiveScene& first = *runs_.front()->scene;
       runs_.front()->host = std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_);
+      continueOverload(*runs_.front());
+      runs_.front()->host->setWork(runs_.front()->overload.level());
       info_ = device_->info();
     }
   } catch (...) {
@@ -169,10 +171,11 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
 void DeviceThread::saveLast() {
   // Ticks in slices get this time to end. Longer ones are dropped, and an earlier state stays saved.
   const Clock::time_point end = Clock::now() + std::chrono::seconds(1);
-  try {
-    for (const auto& run : runs_) {
-      if (!run->host || !run->host->isReady() || !run->scene->keeper) continue;
-      scene::SceneHost& host = *run->host;
+  // After a device loss, scenes whose newest state is already on the CPU are still saved.
+  for (const auto& run : runs_) {
+    if (!run->host || !run->host->isReady() || !run->scene->keeper) continue;
+    scene::SceneHost& host = *run->host;
+    try {
       while (run->begun && host.hasSlices() && Clock::now() < end) {
         host.submitSlice();
         host.waitForSlice();
@@ -180,9 +183,10 @@ void DeviceThread::saveLast() {
       if (run->begun && host.hasSlices()) continue;
       if (std::exchange(run->begun, false)) host.finish();
       host.saveLast();
+    } catch (const std::exception& failure) {
+      telemetry::log({run->scene->name()}, spdlog::level::warn,
+                     "its last state is not saved, but an earlier one may be: {}", failure.what());
     }
-  } catch (const std::exception& failure) {
-    spdlog::warn("the last states of scenes are not saved, but earlier ones may be: {}", failure.what());
   }
 }
 
@@ -214,10 +218,12 @@ void DeviceThread::takeLoadedScenes() {
 
 void DeviceThread::take(Run& run) {
   try {
-    if (run.host)
+    if (run.host) {
       run.host->rebuild(run.loading.get(), run.rebuiltAfter);
-    else
+    } else {
       run.host = std::make_unique<scene::SceneHost>(run.loading.get(), *run.scene, publisher_, reportRate_);
+      continueOverload(run);
+    }
     run.host->setWork(run.overload.level());
     if (run.whenAdded) run.whenAdded->set_value();
     run.whenAdded.reset();
@@ -233,6 +239,10 @@ void DeviceThread::take(Run& run) {
     else
       dismiss(run, failure.what());
   }
+}
+
+void DeviceThread::continueOverload(Run& run) {
+  if (adaptsToLoad_ && run.host->tick() > 0) run.overload.beginAt(run.host->work());
 }
 
 void DeviceThread::dismiss(Run& run, const std::string& why) {

@@ -151,6 +151,8 @@ class DeviceThread {
   // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
   void checkPrice(Run& run);
   void quarantine(Run& run, const std::string& why);
+  // Lets a new host that continues from a checkpoint keep the checkpoint's work.
+  void continueOverload(Run& run);
   // Gives the scene up and dismisses its participants.
   void dismiss(Run& run, const std::string& why);
   // Encodes frames of paused scenes for subscribers that need a key frame.

@@ -89,7 +89,8 @@ void SceneMaker::expireLater() {
 
 void SceneMaker::deleteUnused(std::chrono::milliseconds lifetime) {
   for (const auto& scene : server_.scenesNow()) {
-    if (!scene->created || !scene->hasBeenEmptyFor(lifetime, Clock::now())) continue;
+    // A scene that waits for room cannot be used.
+    if (!scene->created || scene->waitsForRoom || !scene->hasBeenEmptyFor(lifetime, Clock::now())) continue;
     v1::DeleteSceneRequest request;
     request.set_name(scene->name());
     spdlog::info("{}: nobody has used it for {} s", scene->name(), schedule::seconds(lifetime));
@@ -118,14 +119,19 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
         cancellation.check();
         return createNow(request, uploaded ? uploaded->bytes : nothing, tenant, cancellation);
       } catch (const model::Cancelled&) {
-        const bool late = Clock::now() > end;
-        if (late) server_.metrics.refuse(telemetry::Refusal::creationTime);
-        return refused(
-            v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-            late ? fmt::format("createScene: takes longer than {} s (--max-creation-time); make the "
-                               "scene smaller",
-                               schedule::seconds(server_.options.maxCreationTime))
-                 : std::string("createScene: cancelled"));
+        if (stopping_)
+          return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                         "createScene: cancelled, because the server stops; create the scene again when the "
+                         "server runs again");
+        if (Clock::now() <= end)
+          return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                         "createScene: cancelled, because the peer that asked for it has left; connect and "
+                         "create the scene again");
+        server_.metrics.refuse(telemetry::Refusal::creationTime);
+        return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                       fmt::format("createScene: takes longer than {} s (--max-creation-time); make the "
+                                   "scene smaller",
+                                   schedule::seconds(server_.options.maxCreationTime)));
       }
     });
     uploaded.reset();  // before the answer, so that the peer may upload again at once
@@ -290,6 +296,7 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
     cancellation.check();
   } catch (const model::Cancelled&) {
     server_.device.remove(scene).wait();
+    server_.forget(*scene);
     throw;
   }
   server_.insert(scene);

@@ -33,9 +33,15 @@ std::vector<std::shared_ptr<scene::LiveScene>> liveScenes(std::vector<model::Sce
 // Longest wait for the disk before an answer, which is then given without it.
 constexpr std::chrono::seconds kStorePatience{2};
 
-void raise(std::atomic<std::uint64_t>& newest, const scene::SavedScene& saved) {
-  for (const scene::SavedParticipant& known : saved.roster.participants)
-    newest = std::max(newest.load(), known.participant.id);
+// No later participant gets a number of a saved one. A checkpoint may have participants who left after it.
+void raiseNewestParticipant(std::atomic<std::uint64_t>& newest, const scene::SavedScene& saved) {
+  const auto include = [&](std::uint64_t id) { newest = std::max(newest.load(), id); };
+  for (const scene::SavedParticipant& known : saved.roster.participants) include(known.participant.id);
+  if (!saved.checkpoint) return;
+  for (const scene::ColliderSet::Placed& placed : saved.checkpoint->colliders.colliders)
+    include(placed.participant);
+  for (const scene::GrabsAndAttachments::Slot& slot : saved.checkpoint->grabs.slots)
+    include(slot.participant);
 }
 
 // Viewers of a recording have numbers above this one, so that they differ from the participants in it.
@@ -96,6 +102,7 @@ SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions o
           (scenes.size() + options.maxCreatedScenes) * codec::kMaxQualities * encode::FrameEncoder::kSlots,
           [this] {
             for (const auto& peer : peersNow()) peer->checkSilence(Clock::now());
+            if (!started) return;
             for (const auto& scene : scenesNow()) scene->roster.expire(Clock::now());
           },
           options.encoderThreads > 0 ? options.encoderThreads
@@ -104,6 +111,9 @@ SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions o
              options.adaptsToLoad),
       maker(*this) {
   restoreCreated();
+  // Participants of an earlier run cannot come back before this time, however long the start took.
+  for (const auto& scene : scenesNow()) scene->roster.restartGrace(options.reconnectGrace, Clock::now());
+  started = true;
 }
 
 SceneServer::State::State(std::shared_ptr<scene::LiveScene> played, ServerOptions options_)
@@ -117,7 +127,7 @@ const std::vector<std::shared_ptr<scene::LiveScene>>& SceneServer::State::restor
   if (!options.store) return scenes;
   for (const auto& scene : scenes) {
     if (auto saved = options.store->take(scene->start())) {
-      raise(participants, *saved);
+      raiseNewestParticipant(participants, *saved);
       scene->restore(std::move(*saved), options.reconnectGrace, Clock::now());
     }
     scene->keeper = options.store->keep(scene);
@@ -132,27 +142,32 @@ void SceneServer::State::restoreCreated() {
     const std::string name = saved.start.name;
     if (find(name)) {
       telemetry::log({name}, spdlog::level::warn,
-                     "a saved scene is not restored, because the server starts with a scene of this name");
+                     "the saved scene that a client created is not restored, and the server's scene of this "
+                     "name is not saved; rename the server's scene, or start the server without it");
       continue;
     }
-    raise(participants, saved);
+    raiseNewestParticipant(participants, saved);
     auto scene = std::make_shared<scene::LiveScene>(
         saved.start, true, options.journals ? options.journals(saved.start) : nullptr,
         std::min(saved.maxParticipants, options.maxParticipants), budget);
     scene->tenant = saved.tenant;
     scene->restore(std::move(saved), options.reconnectGrace, Clock::now());
-    messages::Result<void> charged = scene->charge("it");
+    messages::Result<void> charged = scene->charge("");
     if (created++ >= options.maxCreatedScenes)
-      charged = tl::unexpected(
-          messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                               fmt::format("the server may have {} created scenes (--max-created-scenes)",
-                                           options.maxCreatedScenes)});
+      charged = tl::unexpected(messages::FieldError{
+          v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+          fmt::format("would be more than the {} created scenes that the server may have "
+                      "(--max-created-scenes)",
+                      options.maxCreatedScenes)});
     if (!charged) {
       metrics.refuse(telemetry::Refusal::budget);
       const std::string why = fmt::format(
-          "the scene '{}' is kept from before a restart, but does not run: {}", name, charged.error().text);
+          "the scene '{}' is kept from before a restart, but does not run: it {}; restart the server with "
+          "room for it, or delete it",
+          name, charged.error().text);
       telemetry::log({name}, spdlog::level::warn, "{}", why);
       scene->discharge();
+      scene->waitsForRoom = true;
       scene->quarantine(why);
     } else {
       scene->keeper = options.store->keep(scene);
@@ -171,7 +186,7 @@ void SceneServer::State::forget(const scene::LiveScene& scene) const {
 }
 
 void SceneServer::State::flushStore(const scene::LiveScene& scene) const {
-  if (options.store && !options.store->flush(kStorePatience))
+  if (options.store && !options.store->flush(kStorePatience, scene.name()))
     telemetry::log(
         {scene.name()}, spdlog::level::warn,
         "the disk is slow or full: what was just created or deleted may not survive the server's end");

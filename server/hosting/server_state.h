@@ -91,6 +91,8 @@ struct SceneServer::State {
   UploadBudget uploads;
   const std::shared_ptr<scene::Budget> budget;
   std::atomic<std::uint64_t> participants{0};  // newest participant number
+  // Set when peers can join; before, no reconnect grace ends.
+  std::atomic<bool> started{false};
 
   mutable std::mutex mutex;  // protects the next four
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;

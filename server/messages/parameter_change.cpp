@@ -54,6 +54,20 @@ void checkSolvers(Checks& checks, const Path& path, const model::Scene& changed,
   }
 }
 
+// The mass of every cloth that gets another mass per area must be in range.
+void checkMasses(Checks& checks, const Path& path, const model::Scene& changed,
+                 const model::ParameterChange& change) {
+  for (std::size_t i = 0; i < change.cloths.size(); ++i) {
+    const model::ClothChange& chosen = change.cloths[i];
+    if (!chosen.arealMass && !chosen.material) continue;
+    const Path element = path.at("cloths", static_cast<int>(i));
+    for (const model::Cloth* cloth : addressed(changed, chosen.name))
+      checks.derivedMass(element / (chosen.arealMass ? "arealMass" : "material"),
+                         chosen.arealMass ? fmt::format("{}", *chosen.arealMass) : *chosen.material,
+                         cloth->mass, model::areaOf(*cloth));
+  }
+}
+
 model::ColliderChange toColliderChange(Checks& checks, const Path& path, const v1::ColliderChange& message,
                                        const model::Scene& scene) {
   model::ColliderChange change;
@@ -146,6 +160,7 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
     model::Scene changed = scene;
     model::applyChange(changed, change);
     checkSolvers(checks, path, changed, change);
+    checkMasses(checks, path, changed, change);
     if (const auto error = unfitBending(changed)) checks.fail(path / "cloths[].dihedralBending", "", *error);
     if (const auto error = instability(changed, bound))
       checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *error));

@@ -253,11 +253,17 @@ void readMass(Checks& checks, const Path& path, const v1::Cloth& message, model:
   if (message.has_mass() && message.has_areal_mass())
     checks.fail(path / "arealMass", fmt::format("{}", message.areal_mass()),
                 "must be absent if \"mass\" is given; give one or the other");
-  if (message.has_mass()) cloth.mass = checks.number(path / "mass", message.mass(), limits::kMass);
+  if (message.has_mass()) {
+    cloth.mass = checks.number(path / "mass", message.mass(), limits::kMass);
+    return;
+  }
+  const double area = model::areaOf(cloth);
   if (message.has_areal_mass())
     cloth.mass = static_cast<float>(
-        double{checks.number(path / "arealMass", message.areal_mass(), limits::kArealMass)} *
-        model::areaOf(cloth));
+        double{checks.number(path / "arealMass", message.areal_mass(), limits::kArealMass)} * area);
+  checks.derivedMass(path / "arealMass",
+                     message.has_areal_mass() ? fmt::format("{}", message.areal_mass()) : std::string(),
+                     cloth.mass, area);
 }
 
 model::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,

@@ -37,6 +37,16 @@ float Checks::number(const Path& path, float value, Range allowed) {
   return value;
 }
 
+void Checks::derivedMass(const Path& path, std::string_view value, float mass, double area) {
+  const Range allowed = limits::kMass;
+  if (mass >= static_cast<float>(allowed.min) && mass <= static_cast<float>(allowed.max)) return;
+  fail(path, value,
+       fmt::format(
+           "gives the cloth of {:g} m^2 a mass of {:g} kg, which must be from {:g} to {:g}; change the "
+           "mass per area or the size of the cloth",
+           area, mass, allowed.min, allowed.max));
+}
+
 std::uint32_t Checks::integer(const Path& path, std::uint32_t value, std::uint32_t min, std::uint32_t max) {
   if (value < min || value > max)
     fail(path, fmt::format("{}", value), fmt::format("must be a whole number from {} to {}", min, max));

@@ -41,6 +41,8 @@ class Path {
 class Checks {
  public:
   float number(const Path& path, float value, Range allowed);
+  // Mass in kg that a mass per area gives a cloth. `value` is the given number; empty if none is given.
+  void derivedMass(const Path& path, std::string_view value, float mass, double area);
   std::uint32_t integer(const Path& path, std::uint32_t value, std::uint32_t min, std::uint32_t max);
   // Number of elements of a repeated field.
   void count(const Path& path, std::size_t count, std::size_t min, std::size_t max);

@@ -126,12 +126,12 @@ constexpr GaugeRow kSceneGauges[] = {
      [](const LiveScene& scene) { return scene.price(); }},
 };
 
-// Largest age of the newest checkpoint of a running scene, in seconds; 0 without any.
+// Largest time since which a running scene has no newer state on the disk, in seconds; 0 without any.
 double oldestState(const std::vector<std::shared_ptr<LiveScene>>& scenes) {
   double oldest = 0;
   for (const auto& scene : scenes) {
-    const auto savedAt = scene->running && scene->keeper ? scene->keeper->savedAt() : std::nullopt;
-    if (savedAt) oldest = std::max(oldest, schedule::seconds(schedule::Clock::now() - *savedAt));
+    const auto since = scene->running && scene->keeper ? scene->keeper->unsavedSince() : std::nullopt;
+    if (since) oldest = std::max(oldest, schedule::seconds(schedule::Clock::now() - *since));
   }
   return oldest;
 }
@@ -207,7 +207,8 @@ Families serverFamilies(hosting::SceneServer& server) {
         static_cast<double>(store.waiting));
   gauge("clothstream_state_left_out", "Scenes whose states have no room (--state-limit).",
         static_cast<double>(store.leftOut));
-  gauge("clothstream_state_age_seconds", "Largest age of the newest state on the disk of a running scene.",
+  gauge("clothstream_state_age_seconds",
+        "Largest age of the newest state on the disk of a running scene; without one, the time it has run.",
         oldestState(state.scenesNow()));
   const auto total = [&](const char* name, const char* help, std::uint64_t value) {
     addSample(add(families, MetricType::Counter, name, help), static_cast<double>(value));

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
-#include <string_view>
 #include <utility>
 
 #include <fcntl.h>
@@ -13,7 +12,8 @@
 #include <sqlite3.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <zlib.h>
+
+#include "server/saved_state/crc.h"
 
 namespace clothstream::saved_state {
 namespace {
@@ -29,10 +29,6 @@ constexpr const char* kCreateTables =
     "CREATE TABLE session(name TEXT PRIMARY KEY NOT NULL, content BLOB NOT NULL, crc INTEGER NOT NULL);"
     "CREATE TABLE checkpoint(name TEXT PRIMARY KEY NOT NULL, content BLOB NOT NULL, crc INTEGER NOT NULL);";
 
-std::int64_t crcOf(std::string_view bytes) {
-  return static_cast<std::int64_t>(::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
-
 struct Finalize {
   void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 };
@@ -46,12 +42,12 @@ class Statement {
     statement_.reset(statement);
   }
   void bind(int place, const std::string& text) {
-    keep(sqlite3_bind_text64(statement_.get(), place, text.data(), text.size(), SQLITE_STATIC, SQLITE_UTF8));
+    check(sqlite3_bind_text64(statement_.get(), place, text.data(), text.size(), SQLITE_STATIC, SQLITE_UTF8));
   }
   void bindBlob(int place, const std::string& bytes) {
-    keep(sqlite3_bind_blob64(statement_.get(), place, bytes.data(), bytes.size(), SQLITE_STATIC));
+    check(sqlite3_bind_blob64(statement_.get(), place, bytes.data(), bytes.size(), SQLITE_STATIC));
   }
-  void bind(int place, std::int64_t number) { keep(sqlite3_bind_int64(statement_.get(), place, number)); }
+  void bind(int place, std::int64_t number) { check(sqlite3_bind_int64(statement_.get(), place, number)); }
   // SQLITE_ROW, SQLITE_DONE or an error.
   int step() { return code_ == SQLITE_OK ? sqlite3_step(statement_.get()) : code_; }
   std::int64_t number(int column) { return sqlite3_column_int64(statement_.get(), column); }
@@ -62,7 +58,7 @@ class Statement {
   }
 
  private:
-  void keep(int code) {
+  void check(int code) {
     if (code_ == SQLITE_OK) code_ = code;
   }
 
@@ -97,7 +93,7 @@ int put(sqlite3* database, const char* table, const std::string& name, const std
                             table));
   statement.bind(1, name);
   statement.bindBlob(2, content);
-  statement.bind(3, crcOf(content));
+  statement.bind(3, std::int64_t{crcOf(content)});
   return statement.step();
 }
 
@@ -106,7 +102,7 @@ int putScene(sqlite3* database, const std::string& name, const std::string& cont
   statement.bind(1, name);
   statement.bind(2, std::int64_t{created});
   statement.bindBlob(3, content);
-  statement.bind(4, crcOf(content));
+  statement.bind(4, std::int64_t{crcOf(content)});
   return statement.step();
 }
 
@@ -269,18 +265,18 @@ Database::Done Database::remove(const std::string& name) {
 std::vector<Database::Row> Database::rows() const {
   Statement statement(
       database_.get(),
-      "SELECT s.name, s.created, coalesce(length(c.content), 0), length(s.content) + "
-      "coalesce(length(n.content), 0) FROM scene s LEFT JOIN checkpoint c USING(name) LEFT JOIN "
+      "SELECT s.name, s.created, length(s.content), coalesce(length(n.content), 0), "
+      "coalesce(length(c.content), 0), s.rowid FROM scene s LEFT JOIN checkpoint c USING(name) LEFT JOIN "
       "session n USING(name) ORDER BY s.name");
   std::vector<Row> rows;
   int code = statement.step();
-  for (; code == SQLITE_ROW; code = statement.step()) {
-    const auto checkpoint = static_cast<std::uint64_t>(statement.number(2));
+  for (; code == SQLITE_ROW; code = statement.step())
     rows.push_back({.name = statement.bytes(0),
                     .created = statement.number(1) != 0,
-                    .checkpointBytes = checkpoint,
-                    .bytes = checkpoint + static_cast<std::uint64_t>(statement.number(3))});
-  }
+                    .sceneBytes = static_cast<std::uint64_t>(statement.number(2)),
+                    .sessionBytes = static_cast<std::uint64_t>(statement.number(3)),
+                    .checkpointBytes = static_cast<std::uint64_t>(statement.number(4)),
+                    .order = statement.number(5)});
   if (code != SQLITE_DONE)
     refuse(
         fmt::format("its list of scenes cannot be read: {}; nothing in it was changed; restore it from a "

@@ -55,8 +55,10 @@ class Database {
   struct Row {
     std::string name;
     bool created = false;
-    std::uint64_t checkpointBytes = 0;
-    std::uint64_t bytes = 0;  // of all contents
+    std::uint64_t sceneBytes = 0, sessionBytes = 0, checkpointBytes = 0;  // of the contents
+    std::int64_t order = 0;  // smaller for a scene whose definition was written earlier
+
+    std::uint64_t bytes() const { return sceneBytes + sessionBytes + checkpointBytes; }
   };
   // All scenes, in the order of their names. Throws std::runtime_error if the database is damaged.
   std::vector<Row> rows() const;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <system_error>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -20,28 +21,57 @@ using schedule::Clock;
 constexpr double kContentShare = 0.8;
 constexpr std::chrono::seconds kAfterFailure{2};
 
-// Adds what is the same for all scenes. Returns the first problem.
-Read<void> readRest(const SceneContents& contents, scene::SavedScene& saved) {
-  const auto wrong = [](std::string what) { return tl::unexpected(std::move(what)); };
+void warnOfDamage(const std::string& name, const std::filesystem::path& file, const std::string& problem) {
+  telemetry::log({name}, spdlog::level::err,
+                 "not restored: {} (in {}); its row stays until a scene of this name "
+                 "is kept or deleted",
+                 problem, file.string());
+}
+
+// Logs what is damaged, and leaves it out.
+v1::SavedSession parseSession(const std::string& name, const SceneContents& contents) {
   v1::SavedSession session;
-  if (contents.session && !session.ParseFromString(*contents.session)) return wrong("its session is damaged");
+  if (contents.session && !session.ParseFromString(*contents.session)) {
+    telemetry::log({name}, spdlog::level::err, "its participants and bans are not restored: damaged");
+    session.Clear();
+  }
+  return session;
+}
+
+Read<scene::Checkpoint> readCheckpoint(const v1::SavedCheckpoint& message, bool isParsed,
+                                       const model::Scene& start) {
+  if (!isParsed) return tl::unexpected(std::string("it is damaged"));
+  return toCheckpoint(message, start);
+}
+
+// Adds session and checkpoint. A part that cannot be used is left out, and logged.
+void addSessionAndCheckpoint(const SceneContents& contents, scene::SavedScene& saved) {
+  const std::string& name = saved.start.name;
+  const v1::SavedSession session = parseSession(name, contents);
   saved.roster = toRoster(session);
   saved.paused = session.paused();
-  v1::SavedCheckpoint checkpoint;
+  saved.resetRequested = session.reset_requested();
+  v1::Scene then = messages::toMessageWithoutMeshes(saved.start);
   if (contents.checkpoint) {
-    if (!checkpoint.ParseFromString(*contents.checkpoint)) return wrong("its checkpoint is damaged");
-    auto read = toCheckpoint(checkpoint, saved.start);
-    if (!read) return wrong(std::move(read).error());
-    saved.checkpoint = std::move(*read);
+    v1::SavedCheckpoint message;
+    const bool isParsed = message.ParseFromString(*contents.checkpoint);
+    if (auto checkpoint = readCheckpoint(message, isParsed, saved.start)) {
+      saved.checkpoint = std::move(*checkpoint);
+      then = message.parameters();
+    } else {
+      telemetry::log({name}, spdlog::level::err,
+                     "its state is not restored: {}; it starts from the beginning, with its participants "
+                     "and bans",
+                     checkpoint.error());
+    }
   }
-  if (!session.has_parameters()) return {};
-  const v1::Scene then =
-      contents.checkpoint ? checkpoint.parameters() : messages::toMessageWithoutMeshes(saved.start);
-  if (session.parameters().SerializeAsString() == then.SerializeAsString()) return {};
-  auto accepted = withParameters(session.parameters(), saved.start);
-  if (!accepted) return wrong(std::move(accepted).error());
-  saved.accepted = std::move(*accepted);
-  return {};
+  if (!session.has_parameters() || session.parameters().SerializeAsString() == then.SerializeAsString())
+    return;
+  if (auto accepted = withParameters(session.parameters(), saved.start))
+    saved.accepted = std::move(*accepted);
+  else
+    telemetry::log({name}, spdlog::level::err, "changes of its parameters are not restored: {}",
+                   accepted.error());
 }
 
 Read<scene::SavedScene> toCreated(const SceneContents& contents) {
@@ -52,52 +82,48 @@ Read<scene::SavedScene> toCreated(const SceneContents& contents) {
   if (!start) return tl::unexpected(std::move(start).error());
   scene::SavedScene saved{
       .start = std::move(*start), .maxParticipants = message.max_participants(), .tenant = message.tenant()};
-  if (auto rest = readRest(contents, saved); !rest) return tl::unexpected(std::move(rest).error());
+  addSessionAndCheckpoint(contents, saved);
   return saved;
-}
-
-void warnOfDamage(const std::string& name, const std::filesystem::path& file, const std::string& problem) {
-  telemetry::log({name}, spdlog::level::err,
-                 "not restored: {} (in {}); its row stays until a scene of this name "
-                 "is kept or deleted",
-                 problem, file.string());
 }
 
 }  // namespace
 
-class SavedState::Keeper final : public scene::SceneKeeper {
+// Newest checkpoint of a scene, on its way from the device's thread to the writer.
+class SavedState::CheckpointSlot final : public scene::SceneKeeper {
  public:
-  explicit Keeper(std::chrono::milliseconds interval) : interval_(interval) {}
+  explicit CheckpointSlot(std::chrono::milliseconds interval) : interval_(interval) {}
 
   bool due(Clock::time_point now) override {
     if (now < next_) return false;
+    if (next_ == Clock::time_point{}) {
+      const std::lock_guard lock(mutex_);
+      runsSince_ = now;
+    }
     next_ = now + interval_;
     return true;
   }
   void save(scene::Checkpoint checkpoint) override {
     const std::lock_guard lock(mutex_);
-    waiting_ = std::move(checkpoint);
-    takenAt_ = Clock::now();
+    waiting_ = Taken{std::move(checkpoint), Clock::now()};
   }
   std::optional<Clock::time_point> savedAt() const override {
     const std::lock_guard lock(mutex_);
     return savedAt_;
   }
+  std::optional<Clock::time_point> unsavedSince() const override {
+    const std::lock_guard lock(mutex_);
+    return savedAt_ ? savedAt_ : runsSince_;
+  }
 
   // The following belong to the writer.
-  std::optional<std::pair<scene::Checkpoint, Clock::time_point>> take() {
+  std::optional<Taken> take() {
     const std::lock_guard lock(mutex_);
-    if (!waiting_) return {};
-    std::pair taken(std::move(*waiting_), takenAt_);
-    waiting_.reset();
-    return taken;
+    return std::exchange(waiting_, std::nullopt);
   }
   // Returns a checkpoint that was not written, unless there is a newer one.
-  void putBack(std::pair<scene::Checkpoint, Clock::time_point> taken) {
+  void putBack(Taken taken) {
     const std::lock_guard lock(mutex_);
-    if (waiting_) return;
-    waiting_ = std::move(taken.first);
-    takenAt_ = taken.second;
+    if (!waiting_) waiting_ = std::move(taken);
   }
   void written(Clock::time_point takenAt) {
     const std::lock_guard lock(mutex_);
@@ -113,9 +139,8 @@ class SavedState::Keeper final : public scene::SceneKeeper {
   Clock::time_point next_{};  // device's thread only
 
   mutable std::mutex mutex_;
-  std::optional<scene::Checkpoint> waiting_;
-  Clock::time_point takenAt_{};  // of waiting_
-  std::optional<Clock::time_point> savedAt_;
+  std::optional<Taken> waiting_;
+  std::optional<Clock::time_point> savedAt_, runsSince_;
 };
 
 SavedState::SavedState(SavedStateOptions options)
@@ -131,6 +156,7 @@ SavedState::SavedState(SavedStateOptions options)
       warnOfDamage(row.name, database_.file(), saved.error());
     } else {
       created_.push_back(std::move(*saved));
+      createdNames_.insert(row.name);
     }
     rows_.emplace(row.name, std::move(row));
   }
@@ -150,6 +176,8 @@ SavedState::~SavedState() {
 std::vector<scene::SavedScene> SavedState::takeCreated() {
   const std::lock_guard lock(mutex_);
   for (const scene::SavedScene& saved : created_) restored_.insert(saved.start.name);
+  for (const auto& [name, contents] : ofServer_) unused_.insert(name);
+  ofServer_.clear();
   return std::exchange(created_, {});
 }
 
@@ -163,33 +191,35 @@ std::optional<scene::SavedScene> SavedState::take(const model::Scene& start) {
     ofServer_.erase(found);
   }
   v1::SavedScene message;
-  if (!contents.scene || !message.ParseFromString(*contents.scene)) {
-    warnOfDamage(start.name, database_.file(), "its definition is damaged");
-    return {};
-  }
-  if (!isOf(message, start)) {
-    telemetry::log({start.name}, spdlog::level::info,
-                   "its definition is not that of the saved state: it starts from the beginning");
-    return {};
-  }
+  const bool isParsed = contents.scene && message.ParseFromString(*contents.scene);
+  if (!isParsed) warnOfDamage(start.name, database_.file(), "its definition is damaged");
   scene::SavedScene saved{.start = start, .maxParticipants = message.max_participants()};
-  if (const auto rest = readRest(contents, saved); !rest) {
-    warnOfDamage(start.name, database_.file(), rest.error());
-    return {};
+  if (isParsed && isOf(message, start)) {
+    addSessionAndCheckpoint(contents, saved);
+    const std::lock_guard lock(mutex_);
+    restored_.insert(start.name);
+    return saved;
   }
-  const std::lock_guard lock(mutex_);
-  restored_.insert(start.name);
+  if (isParsed)
+    telemetry::log({start.name}, spdlog::level::info,
+                   "its definition is not that of the saved state: it starts from the beginning, with the "
+                   "bans of before");
+  saved.roster = toRoster(parseSession(start.name, contents));
+  saved.roster.participants.clear();
+  if (saved.roster.bans.empty() && saved.roster.refusedTokenHashes.empty()) return {};
   return saved;
 }
 
 std::shared_ptr<scene::SceneKeeper> SavedState::keep(const std::shared_ptr<scene::LiveScene>& scene) {
-  auto keeper = std::make_shared<Keeper>(options_.checkpointInterval);
+  auto slot = std::make_shared<CheckpointSlot>(options_.checkpointInterval);
   {
     const std::lock_guard lock(mutex_);
-    kept_[scene->name()] = std::make_shared<Kept>(scene, keeper, restored_.contains(scene->name()));
+    if (!scene->created && createdNames_.contains(scene->name())) return nullptr;
+    unused_.erase(scene->name());
+    kept_[scene->name()] = std::make_shared<KeptScene>(scene, slot, restored_.contains(scene->name()));
   }
   changed_.notify_all();
-  return keeper;
+  return slot;
 }
 
 void SavedState::remove(const std::string& name) {
@@ -197,163 +227,223 @@ void SavedState::remove(const std::string& name) {
     const std::lock_guard lock(mutex_);
     kept_.erase(name);
     restored_.erase(name);
+    createdNames_.erase(name);
     removed_.insert(name);
   }
   changed_.notify_all();
 }
 
-bool SavedState::flush(std::chrono::milliseconds timeout) {
+bool SavedState::flush(std::chrono::milliseconds timeout, const std::string& name) {
   std::unique_lock lock(mutex_);
   const std::uint64_t number = ++asked_;
+  flushed_.insert(name);
   changed_.notify_all();
-  return written_.wait_for(lock, timeout, [&] { return done_ >= number; }) && !failed_;
+  if (!written_.wait_for(lock, timeout, [&] { return done_ >= number; }) || passFailed_) return false;
+  return name.empty() ? retryAt_.empty() : !retryAt_.contains(name);
 }
 
 scene::StoreStatus SavedState::status() const {
   const std::lock_guard lock(mutex_);
   scene::StoreStatus status = status_;
-  status.waiting =
-      removed_.size() + static_cast<std::size_t>(std::ranges::count_if(
-                            kept_, [](const auto& kept) { return kept.second->keeper->waits(); }));
+  status.waiting = removed_.size() + failedRemovals_ +
+                   static_cast<std::size_t>(std::ranges::count_if(
+                       kept_, [](const auto& kept) { return kept.second->slot->waits(); }));
   return status;
 }
 
 void SavedState::run() {
-  for (bool good = true;;) {
-    bool last = false;
+  for (bool last = false; !last;) {
+    std::uint64_t asked = 0;
     {
       std::unique_lock lock(mutex_);
-      const auto something = [&] { return stopping_ || asked_ > done_ || !removed_.empty(); };
-      // A failure delays the next pass, unless flush() waits for it.
-      changed_.wait_for(lock, good ? options_.lookInterval : kAfterFailure,
-                        [&] { return good ? something() : stopping_ || asked_ > done_; });
+      changed_.wait_for(lock, options_.lookInterval,
+                        [&] { return stopping_ || asked_ > done_ || !removed_.empty(); });
       last = stopping_;
+      asked = asked_;
     }
-    good = pass();
-    if (last) return;
+    bool failed = false;
+    try {
+      pass();
+    } catch (const std::exception& failure) {
+      failed = true;
+      if (std::exchange(logsNextFailure_, false))
+        spdlog::error("states of scenes are not saved: {}; trying again", failure.what());
+    }
+    if (!failed) logsNextFailure_ = true;
+    const std::lock_guard lock(mutex_);
+    passFailed_ = failed;
+    done_ = asked;
+    written_.notify_all();
   }
 }
 
-bool SavedState::pass() {
-  Names kept;
-  std::set<std::string> removed;
-  std::uint64_t asked = 0;
+void SavedState::pass() {
+  KeptScenes kept;
+  std::set<std::string> flushed;
   {
     const std::lock_guard lock(mutex_);
     kept = kept_;
-    removed = std::exchange(removed_, {});
-    asked = asked_;
+    flushed = std::exchange(flushed_, {});
+    toRemove_.merge(removed_);
+    removed_.clear();
   }
-  bool good = true;
-  for (const std::string& name : removed) {
-    if (note(name, database_.remove(name))) {
-      rows_.erase(name);
-      leftOut_.erase(name);
+  // A scene that failed is tried again later, or when flush() waits for it. Other scenes do not wait.
+  const auto isDue = [&](const std::string& name) {
+    const std::lock_guard lock(mutex_);
+    const auto failed = retryAt_.find(name);
+    return failed == retryAt_.end() || Clock::now() >= failed->second || stopping_ ||
+           flushed.contains(name) || flushed.contains(std::string());
+  };
+  for (auto name = toRemove_.begin(); name != toRemove_.end();) {
+    if (!isDue(*name) || !recordResult(*name, database_.remove(*name))) {
+      ++name;
       continue;
     }
-    good = false;
-    const std::lock_guard lock(mutex_);
-    removed_.insert(name);
+    recordSuccess(*name);
+    rows_.erase(*name);
+    leftOut_.erase(*name);
+    name = toRemove_.erase(name);
   }
-  const bool hasRoom = diskHasRoom();
-  for (const auto& [name, scene] : kept) {
-    look(*scene);
-    // A removal that failed comes before another scene of the same name.
-    if (removed.contains(name) && rows_.contains(name) && !scene->hasRow) continue;
-    if (hasRoom || scene->waitingSession || !scene->hasRow) good = write(name, *scene) && good;
-  }
+  findFreeSpace();
+  // A removal that failed comes before another scene of the same name.
+  for (const auto& [name, scene] : kept)
+    if (!toRemove_.contains(name) && isDue(name)) saveScene(name, *scene);
   const std::lock_guard lock(mutex_);
   status_.bytes = database_.bytes();
   status_.leftOut = leftOut_.size();
-  done_ = asked;
-  failed_ = !good;
-  written_.notify_all();
-  return good;
+  failedRemovals_ = toRemove_.size();
 }
 
-void SavedState::look(Kept& kept) {
+void SavedState::saveScene(const std::string& name, KeptScene& kept) {
+  // The checkpoint is taken before the session is read, so that the session is not older.
+  std::optional<Taken> checkpoint = diskIsFull_ ? std::nullopt : kept.slot->take();
+  bool written = false;
+  try {
+    if (options_.beforeWrite) options_.beforeWrite(name);
+    readSession(kept);
+    written = write(name, kept, checkpoint);
+  } catch (const std::exception& failure) {
+    recordFailure(name, failure.what());
+  }
+  if (written)
+    recordSuccess(name);
+  else if (checkpoint)
+    kept.slot->putBack(std::move(*checkpoint));
+}
+
+void SavedState::readSession(KeptScene& kept) {
   const std::shared_ptr<scene::LiveScene> live = kept.scene.lock();
   if (!live) return;
-  // The version is read first: a change in between is seen by the next look.
+  // The version is read first: a change in between is seen by the next call.
   if (const std::uint64_t version = live->version(); kept.version != version) {
     kept.parameters = messages::toMessageWithoutMeshes(live->definition());
     kept.version = version;
   }
-  std::string session = toMessage(live->roster.saved(), live->paused, kept.parameters).SerializeAsString();
+  const scene::SavedRoster roster = live->roster.saved();
+  kept.hasRoster = !roster.participants.empty() || !roster.bans.empty() || !roster.refusedTokenHashes.empty();
+  v1::SavedSession message = toMessage(roster, kept.parameters);
+  message.set_paused(live->paused);
+  message.set_reset_requested(live->resetRequested);
+  std::string session = message.SerializeAsString();
   if (session != kept.session)
     kept.waitingSession = std::move(session);
   else
     kept.waitingSession.reset();
 }
 
-bool SavedState::write(const std::string& name, Kept& kept) {
-  SceneContents contents{.created = kept.created};
-  auto checkpoint = diskIsFull_ ? std::nullopt : kept.keeper->take();
-  // A scene of the server has a row once it has run.
-  if (!kept.created && !kept.hasRow && !checkpoint) return true;
-  if (!kept.waitingSession && !checkpoint && kept.hasRow) return true;
+bool SavedState::write(const std::string& name, KeptScene& kept, const std::optional<Taken>& checkpoint) {
+  // A scene of the server has a row once it has run, or has a participant or a ban.
+  if (!kept.hasRow && !kept.created && !checkpoint && !kept.hasRoster) return true;
+  if (kept.hasRow && !checkpoint && !kept.waitingSession) return true;
+  SceneContents contents{.session = kept.waitingSession, .created = kept.created};
   if (!kept.hasRow) {
     const std::shared_ptr<scene::LiveScene> live = kept.scene.lock();
     if (!live) return true;
     contents.scene =
         toMessage(live->start(), kept.created, live->maxParticipants, live->tenant).SerializeAsString();
   }
-  contents.session = kept.waitingSession;
-  if (checkpoint) {
-    contents.checkpoint = toMessage(checkpoint->first).SerializeAsString();
-    if (!makeRoom(name, contents.checkpoint->size())) contents.checkpoint.reset();
+  if (checkpoint) contents.checkpoint = toMessage(checkpoint->checkpoint).SerializeAsString();
+  Database::Row row = kept.hasRow ? rows_[name] : Database::Row{.name = name, .created = kept.created};
+  if (contents.scene) row.sceneBytes = contents.scene->size();
+  if (contents.session) row.sessionBytes = contents.session->size();
+  const std::uint64_t rest = row.sceneBytes + row.sessionBytes;
+  if (contents.checkpoint && !makeRoom(name, rest, contents.checkpoint->size())) {
+    contents.checkpoint.reset();
+    if (kept.hasRow) row.checkpointBytes = rows_[name].checkpointBytes;
   }
+  // A definition that does not fit is refused by the database.
+  if (contents.scene && !contents.checkpoint) std::ignore = makeRoom(name, rest, 0);
   if (!contents.scene && !contents.session && !contents.checkpoint) return true;
-  if (!note(name, database_.write(name, contents))) {
-    if (checkpoint) kept.keeper->putBack(std::move(*checkpoint));
-    return false;
-  }
-  Database::Row& row = rows_[name];
-  row.name = name;
-  row.created = kept.created;
-  const std::uint64_t rest = contents.scene ? contents.scene->size() : row.bytes - row.checkpointBytes;
-  if (contents.checkpoint || contents.scene)
-    row.checkpointBytes = contents.checkpoint ? contents.checkpoint->size() : 0;
-  row.bytes = rest + row.checkpointBytes;
+  if (!recordResult(name, database_.write(name, contents))) return false;
+  if (contents.checkpoint) row.checkpointBytes = contents.checkpoint->size();
+  rows_[name] = std::move(row);
   kept.hasRow = true;
   if (contents.session) kept.session = std::move(*contents.session);
   kept.waitingSession.reset();
-  if (contents.checkpoint) kept.keeper->written(checkpoint->second);
+  if (contents.checkpoint) kept.slot->written(checkpoint->at);
   return true;
 }
 
-bool SavedState::makeRoom(const std::string& name, std::uint64_t bytes) {
+bool SavedState::makeRoom(const std::string& name, std::uint64_t rest, std::uint64_t checkpoint) {
   if (options_.maxBytes == 0) return true;
   const auto room = static_cast<std::uint64_t>(kContentShare * static_cast<double>(options_.maxBytes));
   for (;;) {
-    std::uint64_t others = 0;
-    const Database::Row* largest = nullptr;
-    for (const auto& [key, row] : rows_) {
-      others += key == name ? row.bytes - row.checkpointBytes : row.bytes;
-      if (key != name && (largest == nullptr || row.checkpointBytes > largest->checkpointBytes))
-        largest = &row;
+    std::uint64_t bytes = rest + checkpoint, withoutCheckpoints = rest;
+    Database::Row* largest = nullptr;
+    for (auto& [key, row] : rows_) {
+      if (key == name) continue;
+      bytes += row.bytes();
+      withoutCheckpoints += row.sceneBytes + row.sessionBytes;
+      if (largest == nullptr || row.checkpointBytes > largest->checkpointBytes) largest = &row;
     }
-    if (others + bytes <= room) {
-      leftOut_.erase(name);
+    if (bytes <= room) {
+      if (checkpoint > 0) leftOut_.erase(name);
       return true;
     }
-    const bool isLargest = largest == nullptr || largest->checkpointBytes <= bytes;
-    const std::string leaves = isLargest ? name : largest->name;
-    if (leftOut_.insert(leaves).second)
-      telemetry::log({leaves}, spdlog::level::warn,
-                     "its state is not saved: all scenes would take more than {:.0f} MB (--state-limit); "
-                     "after a restart it starts from the beginning",
-                     static_cast<double>(options_.maxBytes) / 1e6);
-    Database::Row& row = rows_[leaves];
-    // An old checkpoint would bring back a state that everybody has forgotten.
-    if (row.checkpointBytes > 0 && !note(leaves, database_.removeCheckpoint(leaves))) return false;
-    row.bytes -= row.checkpointBytes;
-    row.checkpointBytes = 0;
-    if (isLargest) return false;
+    // What never fits takes nothing away from others.
+    const bool neverFits = withoutCheckpoints > room;
+    if (!neverFits && dropOldestUnused()) continue;
+    const bool isLargest = neverFits || largest == nullptr || largest->checkpointBytes <= checkpoint;
+    if (isLargest && checkpoint == 0) return false;
+    if (!leaveOut(isLargest ? name : largest->name) || isLargest) return false;
   }
 }
 
-bool SavedState::diskHasRoom() {
+bool SavedState::leaveOut(const std::string& name) {
+  if (leftOut_.insert(name).second)
+    telemetry::log({name}, spdlog::level::warn,
+                   "its state is not saved: all scenes would take more than {:.0f} MB (--state-limit); "
+                   "after a restart it starts from the beginning",
+                   static_cast<double>(options_.maxBytes) / 1e6);
+  const auto row = rows_.find(name);
+  // An old checkpoint would bring back a state that everybody has forgotten.
+  if (row == rows_.end() || row->second.checkpointBytes == 0) return true;
+  if (!recordResult(name, database_.removeCheckpoint(name))) return false;
+  row->second.checkpointBytes = 0;
+  return true;
+}
+
+bool SavedState::dropOldestUnused() {
+  auto oldest = rows_.end();
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto row = rows_.begin(); row != rows_.end(); ++row)
+      if (unused_.contains(row->first) && (oldest == rows_.end() || row->second.order < oldest->second.order))
+        oldest = row;
+  }
+  if (oldest == rows_.end()) return false;
+  const std::string name = oldest->first;
+  if (!recordResult(name, database_.remove(name))) return false;
+  telemetry::log({name}, spdlog::level::warn,
+                 "its saved state is deleted, because the server does not start with this scene and other "
+                 "scenes need the room (--state-limit)");
+  rows_.erase(oldest);
+  const std::lock_guard lock(mutex_);
+  unused_.erase(name);
+  return true;
+}
+
+void SavedState::findFreeSpace() {
   std::error_code problem;
   const std::filesystem::space_info space = std::filesystem::space(options_.directory, problem);
   const bool full = !problem && space.available < options_.minFreeBytes;
@@ -364,21 +454,29 @@ bool SavedState::diskHasRoom() {
         static_cast<double>(options_.minFreeBytes) / 1e6);
   if (!full && diskIsFull_) spdlog::info("states of scenes are saved again");
   diskIsFull_ = full;
-  return !full;
 }
 
-bool SavedState::note(const std::string& name, const Database::Done& done) {
-  const std::lock_guard lock(mutex_);
-  ++status_.writes;
-  if (done) {
-    if (!std::exchange(complains_, true)) spdlog::info("states of scenes are saved again");
-    return true;
+bool SavedState::recordResult(const std::string& name, const Database::Done& done) {
+  {
+    const std::lock_guard lock(mutex_);
+    ++status_.writes;
   }
+  if (!done) recordFailure(name, done.error());
+  return done.has_value();
+}
+
+void SavedState::recordFailure(const std::string& name, const std::string& why) {
+  const std::lock_guard lock(mutex_);
   ++status_.failedWrites;
-  if (std::exchange(complains_, false))
-    telemetry::log({name}, spdlog::level::err, "its state cannot be saved in {}: {}; trying again",
-                   database_.file().string(), done.error());
-  return false;
+  const bool isFirst = retryAt_.insert_or_assign(name, Clock::now() + kAfterFailure).second;
+  if (isFirst)
+    telemetry::log({name}, spdlog::level::err, "it cannot be saved in {}: {}; trying again",
+                   database_.file().string(), why);
+}
+
+void SavedState::recordSuccess(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  if (retryAt_.erase(name) > 0) telemetry::log({name}, spdlog::level::info, "it is saved again");
 }
 
 }  // namespace clothstream::saved_state

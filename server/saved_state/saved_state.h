@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -30,6 +31,8 @@ struct SavedStateOptions {
   std::uint64_t maxBytes = 1'000'000'000;
   // Free space of the disk below which no checkpoint is written.
   std::uint64_t minFreeBytes = 0;
+  // Called by the writer before it looks at a scene of this name. For tests.
+  std::function<void(const std::string&)> beforeWrite = {};
   // Interval of the checkpoints of a running scene, and interval at which participants and parameters are
   // looked at. A checkpoint is thus at most 5 s old while a write takes less than 1.5 s.
   std::chrono::milliseconds checkpointInterval{3000}, lookInterval{500};
@@ -51,50 +54,73 @@ class SavedState final : public scene::SceneStore {
   std::optional<scene::SavedScene> take(const model::Scene& start) override;
   std::shared_ptr<scene::SceneKeeper> keep(const std::shared_ptr<scene::LiveScene>& scene) override;
   void remove(const std::string& name) override;
-  bool flush(std::chrono::milliseconds timeout) override;
+  bool flush(std::chrono::milliseconds timeout, const std::string& name = {}) override;
   scene::StoreStatus status() const override;
 
  private:
-  class Keeper;
-  // A scene that is kept. Belongs to the writer, except for the constant members.
-  struct Kept {
-    Kept(const std::shared_ptr<scene::LiveScene>& live, std::shared_ptr<Keeper> taker, bool exists)
-        : created(live->created), scene(live), keeper(std::move(taker)), hasRow(exists) {}
+  class CheckpointSlot;
+  struct Taken {
+    scene::Checkpoint checkpoint;
+    schedule::Clock::time_point at;
+  };
+  // Belongs to the writer, except for the constant members.
+  struct KeptScene {
+    KeptScene(const std::shared_ptr<scene::LiveScene>& live, std::shared_ptr<CheckpointSlot> checkpoints,
+              bool exists)
+        : created(live->created), scene(live), slot(std::move(checkpoints)), hasRow(exists) {}
     const bool created;
     const std::weak_ptr<scene::LiveScene> scene;
-    const std::shared_ptr<Keeper> keeper;
+    const std::shared_ptr<CheckpointSlot> slot;
     bool hasRow;                           // the database has the scene
     std::optional<std::uint64_t> version;  // of the parameters in `parameters`
     v1::Scene parameters;
-    std::string session;  // on the disk
+    bool hasRoster = false;  // participants, bans or refused tokens
+    std::string session;     // on the disk
     // Read from the scene, and not on the disk yet.
     std::optional<std::string> waitingSession;
   };
-  using Names = std::map<std::string, std::shared_ptr<Kept>>;
+  using KeptScenes = std::map<std::string, std::shared_ptr<KeptScene>>;
 
   void run();
-  // Writes everything that waits. Returns false if a write failed.
-  bool pass();
-  bool write(const std::string& name, Kept& kept);
+  // Writes everything that waits.
+  void pass();
+  void saveScene(const std::string& name, KeptScene& kept);
+  // Writes what differs from the database. Returns false if that fails.
+  bool write(const std::string& name, KeptScene& kept, const std::optional<Taken>& checkpoint);
   // Serialises the session if it has changed.
-  static void look(Kept& kept);
-  // Removes checkpoints of larger scenes until one of `bytes` has room. Returns false if this scene is among
-  // the largest.
-  bool makeRoom(const std::string& name, std::uint64_t bytes);
-  bool diskHasRoom();
-  // Logs the first failure of a row of failures.
-  bool note(const std::string& name, const Database::Done& done);
+  static void readSession(KeptScene& kept);
+  // Makes room for a scene whose checkpoint has `checkpoint` bytes, and definition and session `rest`.
+  // Deletes states of scenes that are not in use, then checkpoints of larger scenes. Returns false if that is
+  // not enough, or if this scene is among the largest.
+  bool makeRoom(const std::string& name, std::uint64_t rest, std::uint64_t checkpoint);
+  // Removes the checkpoint of this scene. Returns false if that fails.
+  bool leaveOut(const std::string& name);
+  // Deletes the oldest state of a scene that is not in use. Returns false if there is no such state.
+  bool dropOldestUnused();
+  // Sets diskIsFull_.
+  void findFreeSpace();
+  // Counts a write. Returns whether it succeeded.
+  bool recordResult(const std::string& name, const Database::Done& done);
+  // A scene that failed is tried again later. The first failure is logged.
+  void recordFailure(const std::string& name, const std::string& why);
+  void recordSuccess(const std::string& name);
 
   const SavedStateOptions options_;
 
-  mutable std::mutex mutex_;  // protects the members down to stopping_
+  mutable std::mutex mutex_;  // protects the members down to ofServer_
   std::condition_variable changed_, written_;
-  Names kept_;
-  std::set<std::string> restored_;  // scenes that were taken
-  std::set<std::string> removed_;   // since the newest pass
-  std::uint64_t asked_ = 0;         // calls of flush()
-  std::uint64_t done_ = 0;          // those that a pass has served
-  bool failed_ = false;             // the newest pass
+  KeptScenes kept_;
+  std::set<std::string> restored_;      // scenes that were taken
+  std::set<std::string> createdNames_;  // scenes of earlier runs that peers created
+  std::set<std::string> unused_;        // scenes that earlier runs started with, and this one does not
+  std::set<std::string> removed_;       // since the newest pass
+  std::size_t failedRemovals_ = 0;      // at the end of the newest pass
+  std::set<std::string> flushed_;       // names of flush() since the newest pass began
+  std::uint64_t asked_ = 0;             // calls of flush()
+  std::uint64_t done_ = 0;              // those that a pass has served
+  bool passFailed_ = false;             // the newest pass ended early
+  // Scenes whose newest write failed, with the time of the next one.
+  std::map<std::string, schedule::Clock::time_point> retryAt_;
   scene::StoreStatus status_;
   bool stopping_ = false;
   std::vector<scene::SavedScene> created_;         // until taken
@@ -103,9 +129,10 @@ class SavedState final : public scene::SceneStore {
   // Belong to the writer after construction.
   Database database_;
   std::map<std::string, Database::Row> rows_;
+  std::set<std::string> toRemove_;  // removed scenes that the database still has
   std::set<std::string> leftOut_;
-  bool complains_ = true;    // the next failure is logged
-  bool diskIsFull_ = false;  // at the newest look
+  bool logsNextFailure_ = true;  // of a whole pass
+  bool diskIsFull_ = false;      // at the newest look
 
   std::thread thread_;
 };

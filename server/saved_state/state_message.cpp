@@ -6,11 +6,10 @@
 #include <cstddef>
 #include <utility>
 
-#include <zlib.h>
-
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/vectors.h"
+#include "server/saved_state/crc.h"
 #include "server/scene/snapshot_message.h"
 #include "server/scene/token_hash.h"
 
@@ -18,10 +17,6 @@ namespace clothstream::saved_state {
 namespace {
 
 using Slot = scene::GrabsAndAttachments::Slot;
-
-std::uint32_t crcOf(const std::string& bytes) {
-  return static_cast<std::uint32_t>(::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
 
 // Reads numbers unchanged: quaternions are not normalised again.
 model::Vec3 toVec3(const v1::Vec3& message) {
@@ -168,9 +163,8 @@ Read<model::Scene> toScene(const v1::Scene& message) {
   return std::move(*scene);
 }
 
-v1::SavedSession toMessage(const scene::SavedRoster& roster, bool paused, const v1::Scene& parameters) {
+v1::SavedSession toMessage(const scene::SavedRoster& roster, const v1::Scene& parameters) {
   v1::SavedSession message;
-  message.set_paused(paused);
   *message.mutable_parameters() = parameters;
   for (const scene::SavedParticipant& saved : roster.participants) {
     v1::SavedParticipant& to = *message.add_participants();
@@ -238,6 +232,8 @@ v1::SavedCheckpoint toMessage(const scene::Checkpoint& checkpoint) {
   }
   for (const Slot& slot : checkpoint.grabs.slots) write(slot, *message.add_grabs());
   if (checkpoint.lastRecovery) message.set_last_recovery(*checkpoint.lastRecovery);
+  message.set_frame_divisor(checkpoint.work.frameDivisor);
+  message.set_substeps(checkpoint.work.substeps);
   return message;
 }
 
@@ -282,6 +278,11 @@ Read<scene::Checkpoint> toCheckpoint(const v1::SavedCheckpoint& message, const m
   if (!readGrabs(message, checkpoint.scene, checkpoint.state.held, checkpoint.grabs))
     return wrong("grabs do not fit the scene");
   if (message.has_last_recovery()) checkpoint.lastRecovery = message.last_recovery();
+  // Without the work, the scene has all of it.
+  checkpoint.work = {std::max(1u, message.frame_divisor()),
+                     message.substeps() > 0 ? message.substeps() : start.substeps};
+  if (checkpoint.work.frameDivisor > start.streamRate || checkpoint.work.substeps > start.substeps)
+    return wrong("work is more than that of the scene");
   return checkpoint;
 }
 

@@ -23,7 +23,8 @@ bool isOf(const v1::SavedScene& message, const model::Scene& start);
 // Definition of a created scene.
 [[nodiscard]] Read<model::Scene> toScene(const v1::Scene& message);
 
-v1::SavedSession toMessage(const scene::SavedRoster& roster, bool paused, const v1::Scene& parameters);
+// Session without the pause and the reset of its scene.
+v1::SavedSession toMessage(const scene::SavedRoster& roster, const v1::Scene& parameters);
 scene::SavedRoster toRoster(const v1::SavedSession& message);
 
 v1::SavedCheckpoint toMessage(const scene::Checkpoint& checkpoint);

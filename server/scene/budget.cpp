@@ -92,6 +92,7 @@ double Charge::load(const model::Scene& scene) const {
 void Charge::release() {
   const std::lock_guard lock(budget_->mutex_);
   replace({});
+  released_ = true;
 }
 
 Charge::Amount Charge::priceOf(const model::Scene& scene) const {
@@ -106,6 +107,7 @@ void Charge::replace(const Amount& next) {
   budget_->load_ += next.load - charged_.load;
   budget_->megabytes_ += next.megabytes - charged_.megabytes;
   charged_ = next;
+  released_ = false;
 }
 
 void Charge::restore(const model::Scene& scene) {
@@ -119,7 +121,8 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   const Amount price = priceOf(scene);
   const auto refuse = [&](std::string text) {
     return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                                               path + ": " + std::move(text), telemetry::Refusal::budget});
+                                               path.empty() ? std::move(text) : path + ": " + std::move(text),
+                                               telemetry::Refusal::budget});
   };
   // A price that is no higher than before is always allowed.
   const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
@@ -151,6 +154,7 @@ messages::Result<void> Charge::chargeColliders(const std::string& path, const mo
   const std::lock_guard lock(budget_->mutex_);
   const BudgetLimits& limits = budget_->limits_;
   const std::size_t before = std::exchange(participantColliders_, count);
+  if (released_) return {};
   const Amount price = priceOf(scene);
   const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
   const double room = std::min(limits.sceneLoad, freeLoad);

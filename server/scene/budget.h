@@ -65,7 +65,7 @@ class Charge {
                                          std::size_t count);
   // Charges the scene with parameters that it had before, also beyond the budget.
   void restore(const model::Scene& scene);
-  // Gives the charge back.
+  // Gives the charge back. Until the scene is charged again, its colliders cost nothing.
   void release();
 
   // Price of the scene with the colliders of its participants: seconds of the device's time per second. 0
@@ -89,7 +89,8 @@ class Charge {
   model::Work freeWork_;
   double freeMegabytes_ = 0;
   Amount charged_;
-  bool made_;  // the scene exists: its shape and substeps stay
+  bool released_ = false;  // and not charged again since
+  bool made_;              // the scene exists: its shape and substeps stay
 };
 
 }  // namespace clothstream::scene

@@ -11,6 +11,7 @@
 #include "server/scene/collider_set.h"
 #include "server/scene/grabs_and_attachments.h"
 #include "server/scene/roster.h"
+#include "server/schedule/overload_policy.h"
 #include "server/simulation/state_snapshot.h"
 
 namespace clothstream::scene {
@@ -25,6 +26,7 @@ struct Checkpoint {
   ColliderSet::State colliders;
   GrabsAndAttachments::State grabs;
   std::optional<std::uint64_t> lastRecovery;  // newest tick with an invalid state
+  schedule::WorkLevel work;  // of the tick; less than all work while the device is overloaded
 };
 
 // A scene of an earlier run of the server.
@@ -32,9 +34,10 @@ struct SavedScene {
   model::Scene start;
   std::uint32_t maxParticipants = 0;
   bool paused = false;
+  bool resetRequested = false;
   std::string tenant = {};  // of the peer that created it
   SavedRoster roster = {};
-  // Nothing if the scene never ran, or if there was no room for it.
+  // Nothing if the scene never ran, if there was no room for it, or if it cannot be used.
   std::optional<Checkpoint> checkpoint = {};
   // Definition with the changes that were accepted after the checkpoint; nothing if there were none.
   std::optional<model::Scene> accepted = {};

@@ -42,6 +42,23 @@ std::function<void(const delivery::SharedBytes&)> tapOf(const std::shared_ptr<Jo
   return [journal](const delivery::SharedBytes& message) { journal->sent(message); };
 }
 
+// Drops colliders and grabs of participants that are not in the roster: they left after the checkpoint.
+void dropAbsent(const SavedRoster& roster, Checkpoint& checkpoint) {
+  const auto isAbsent = [&](std::uint64_t id) {
+    return std::ranges::find(roster.participants, id, [](const SavedParticipant& known) {
+             return known.participant.id;
+           }) == roster.participants.end();
+  };
+  std::erase_if(checkpoint.colliders.colliders,
+                [&](const ColliderSet::Placed& placed) { return isAbsent(placed.participant); });
+  std::vector<GrabsAndAttachments::Slot>& slots = checkpoint.grabs.slots;
+  for (GrabsAndAttachments::Slot& slot : slots)
+    if (slot.phase != GrabsAndAttachments::Slot::Phase::empty && isAbsent(slot.participant)) slot = {};
+  std::erase_if(checkpoint.state.held.nodes, [&](const simulation::HeldNode& node) {
+    return slots[node.grab].phase == GrabsAndAttachments::Slot::Phase::empty;
+  });
+}
+
 std::shared_ptr<const std::string> clothsOf(const v1::StreamDescription& description) {
   v1::StreamDescription cloths;
   *cloths.mutable_cloths() = description.cloths();
@@ -91,6 +108,7 @@ std::uint32_t LiveScene::leastSubsteps(const model::Scene& scene) const {
 }
 
 void LiveScene::restore(SavedScene saved, const ReconnectGrace& grace, Clock::time_point now) {
+  if (saved.checkpoint) dropAbsent(saved.roster, *saved.checkpoint);
   {
     const std::lock_guard lock(mutex_);
     if (saved.accepted)
@@ -101,19 +119,27 @@ void LiveScene::restore(SavedScene saved, const ReconnectGrace& grace, Clock::ti
     for (model::Cloth& cloth : definition_.cloths) cloth.solver.correctionFraction.reset();
     if (saved.checkpoint) tick = saved.checkpoint->state.tick;
     if (!created) charge_.restore(definition_);
-    restored_ = {std::move(saved.checkpoint), std::move(saved.accepted)};
+    if (saved.checkpoint || saved.accepted)
+      restored_ =
+          std::make_shared<const Restored>(Restored{std::move(saved.checkpoint), std::move(saved.accepted)});
     // A participant may hold a description of the earlier run. Its number must not be given again.
     std::random_device random;
     contents_ = (std::uint64_t{random()} << 30) | (std::uint64_t{1} << 62);
     definitionChanged();
   }
   paused = saved.paused;
+  resetRequested = saved.resetRequested;
   roster.restore(saved.roster, grace, now);
 }
 
-LiveScene::Restored LiveScene::takeRestored() {
+std::shared_ptr<const LiveScene::Restored> LiveScene::restored() const {
   const std::lock_guard lock(mutex_);
-  return std::exchange(restored_, {});
+  return restored_;
+}
+
+void LiveScene::forgetRestored() {
+  const std::lock_guard lock(mutex_);
+  restored_.reset();
 }
 
 std::uint64_t LiveScene::version() const {
@@ -221,6 +247,7 @@ v1::ParameterChange LiveScene::restart() {
   const std::lock_guard lock(mutex_);
   inbox.dropChanges();
   definition_ = start_;
+  restored_.reset();
   charge_.restore(definition_);
   definitionChanged();
   tick = 0;

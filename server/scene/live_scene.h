@@ -57,20 +57,25 @@ class LiveScene {
   model::Scene definition() const;
 
   // Continues a scene of an earlier run of the server; `saved` has this scene's start. Its participants are
-  // disconnected since `now`. Must be called before the scene runs.
+  // disconnected since `now`. Colliders and grabs of other participants, which left after the checkpoint, are
+  // dropped. Must be called before the scene runs.
   void restore(SavedScene saved, const ReconnectGrace& grace, Clock::time_point now);
-  // State from which the first host of a restored scene continues.
+  // State from which the first host of a restored scene continues. A host that cannot be created leaves it to
+  // the next one.
   struct Restored {
     std::optional<Checkpoint> checkpoint;
     std::optional<model::Scene> accepted;  // as in SavedScene
   };
-  Restored takeRestored();
+  // Null if there is nothing to continue from.
+  std::shared_ptr<const Restored> restored() const;
+  // A host continues from it, so that a later host does not.
+  void forgetRestored();
 
   // Number of changes of definition(). Differs from that of an earlier definition.
   std::uint64_t version() const;
 
   // Charges a created scene before it first runs, or returns why it exceeds the budget. `path` begins the
-  // text.
+  // text; without it the text begins with a verb, as in "would take".
   messages::Result<void> charge(const std::string& path = "createScene.scene");
   // Charges the colliders that all participants have together, or returns why they exceed the budget.
   messages::Result<void> chargeColliders(std::size_t count);
@@ -119,6 +124,9 @@ class LiveScene {
   const bool created;
   // Tenant of the peer that created it; empty if it has none. Set before other threads know the scene.
   std::string tenant;
+  // Whether it is a scene of an earlier run that has no room in this one. It does not run, and stays kept.
+  // Set before other threads know the scene.
+  bool waitsForRoom = false;
   const std::uint32_t maxParticipants;
   const std::shared_ptr<Journal> journal;     // null: the scene has none
   const std::shared_ptr<FrameSource> source;  // null: the scene is simulated
@@ -155,7 +163,7 @@ class LiveScene {
   mutable std::mutex mutex_;
   model::Scene definition_;
   std::uint64_t version_ = 0;  // of definition_
-  Restored restored_;
+  std::shared_ptr<const Restored> restored_;
   Charge charge_;  // of definition_
   std::string quarantined_;
   schedule::TokenBucket changes_{kChangesPerSecond, kChangesPerSecond};

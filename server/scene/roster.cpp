@@ -316,6 +316,15 @@ void Roster::restore(const SavedRoster& from, const ReconnectGrace& grace, Clock
   }
 }
 
+void Roster::restartGrace(const ReconnectGrace& grace, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  for (Entry& entry : entries_) {
+    if (!entry.participant.away) continue;
+    entry.posesExpire = now + std::min(grace.poses, grace.place);
+    entry.placeExpires = now + grace.place;
+  }
+}
+
 std::size_t Roster::size() const {
   const std::lock_guard lock(mutex_);
   return entries_.size();

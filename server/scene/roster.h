@@ -129,6 +129,9 @@ class Roster {
   // must be empty.
   void restore(const SavedRoster& saved, const ReconnectGrace& grace, Clock::time_point now);
 
+  // The grace of all participants that are away begins now, as if they were disconnected now.
+  void restartGrace(const ReconnectGrace& grace, Clock::time_point now);
+
   // Number of all participants, and of those that are away.
   std::size_t size() const;
   std::size_t away() const;

@@ -46,28 +46,34 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
       onDevice_(std::move(loaded)) {
   live_.work = work_;
   newestState_ = onDevice_->start;
-  continueFrom(live_.takeRestored());
+  const std::shared_ptr<const LiveScene::Restored> restored = live_.restored();
+  if (restored) continueFrom(*restored);
   const bool atStart = tick_ == 0;
   const double seconds = static_cast<double>(tick_) * scene_.tickSeconds();
   if (live_.journal && live_.journal->due())
     live_.journal->begin(onDevice_->device.info(), scene_,
                          messages::toDescription(scene_, LiveScene::kEpoch, live_.codec(), seconds),
                          atStart ? onDevice_->start : newestState_, onDevice_->start);
+  // Until here a failure leaves the restored state to the next host.
+  if (restored) live_.forgetRestored();
 }
 
-void SceneHost::continueFrom(LiveScene::Restored restored) {
+void SceneHost::continueFrom(const LiveScene::Restored& restored) {
   SceneOnDevice& on = *onDevice_;
   if (restored.checkpoint) {
-    Checkpoint& from = *restored.checkpoint;
+    const Checkpoint& from = *restored.checkpoint;
     tick_ = from.state.tick;
-    scene_ = std::move(from.scene);
-    easeUntil_ = std::move(from.easeUntil);
-    colliders_.restore(std::move(from.colliders));
-    grabs_.restore(std::move(from.grabs));
+    scene_ = from.scene;
+    easeUntil_ = from.easeUntil;
+    colliders_.restore(from.colliders);
+    grabs_.restore(from.grabs);
     lastRecovery_ = from.lastRecovery;
-    newestState_ = std::move(from.state);
+    newestState_ = from.state;
     grabsThen_ = grabs_.state().slots;
+    wantedWork_ = work_ = from.work;
+    live_.work = work_;
     on.simulation.setCloths(scene_.cloths);
+    on.simulation.setSubsteps(work_.substeps, scene_.cloths);
     on.recorder.begin();
     on.simulation.recordRestoreState(on.recorder, newestState_);
     on.simulation.recordRestoreGrabs(on.recorder, newestState_.held);
@@ -75,7 +81,7 @@ void SceneHost::continueFrom(LiveScene::Restored restored) {
     telemetry::log({live_.name()}, spdlog::level::info, "goes on after tick {}", tick_);
   }
   if (restored.accepted) {
-    model::Scene changed = std::move(*restored.accepted);
+    model::Scene changed = *restored.accepted;
     easeSolverChanges(changed);
     setCloths(changed.cloths);
     scene_ = std::move(changed);
@@ -89,17 +95,20 @@ Checkpoint SceneHost::checkpoint() const {
           .easeUntil = easeUntil_,
           .colliders = colliders_.state(),
           .grabs = grabs_.state(),
-          .lastRecovery = lastRecovery_};
+          .lastRecovery = lastRecovery_,
+          .work = work_};
 }
 
 void SceneHost::saveLast() {
   // A state that a rollback or a reset will replace is not worth keeping; neither is the start.
   if (!live_.keeper || recovery_ != Recovery::none || tick_ == 0) return;
-  SceneOnDevice& on = *onDevice_;
-  on.recorder.begin();
-  on.simulation.recordSaveState(on.recorder);
-  on.device.wait(on.device.submit(on.recorder));
-  newestState_ = on.simulation.collectState(tick_);
+  if (newestState_.tick != tick_) {
+    SceneOnDevice& on = *onDevice_;
+    on.recorder.begin();
+    on.simulation.recordSaveState(on.recorder);
+    on.device.wait(on.device.submit(on.recorder));
+    newestState_ = on.simulation.collectState(tick_);
+  }
   live_.keeper->save(checkpoint());
 }
 
@@ -414,9 +423,7 @@ void SceneHost::finish() {
     live_.tick = tick_;
     if (savesState_) {
       newestState_ = on.simulation.collectState(tick_);
-      grabsThen_ = grabs_.state().slots;
       if (recordsState_ && live_.journal) live_.journal->saved(newestState_);
-      if (live_.keeper) live_.keeper->save(checkpoint());
     }
   }
   telemetry::SceneMetrics& metrics = live_.metrics;
@@ -437,6 +444,11 @@ void SceneHost::finish() {
     publisher_.push(frame_);
   }
   announceEvents();
+  if (status_.healthy && savesState_) {
+    // The slots now know the events that were announced, so that none is announced again later.
+    grabsThen_ = grabs_.state().slots;
+    if (live_.keeper) live_.keeper->save(checkpoint());
+  }
   announceRecording();
   if (!status_.healthy) recover();
 

@@ -60,6 +60,8 @@ class SceneHost {
 
   // Sets the work from the next tick on. Substeps are raised to leastSubsteps(). A change is announced.
   void setWork(const schedule::WorkLevel& work) { wantedWork_ = work; }
+  // Work of the newest tick.
+  const schedule::WorkLevel& work() const { return work_; }
   // Minimum number of substeps with which the scene is stable with its present parameters.
   std::uint32_t leastSubsteps() const { return leastSubsteps_; }
 
@@ -109,7 +111,7 @@ class SceneHost {
 
  private:
   // Continues a restored scene.
-  void continueFrom(LiveScene::Restored restored);
+  void continueFrom(const LiveScene::Restored& restored);
   // The state after the newest complete tick, which `newestState_` holds.
   Checkpoint checkpoint() const;
   // The next tick starts from the scene's start.

@@ -30,6 +30,9 @@ class SceneKeeper {
   // Time at which the newest checkpoint that is on the disk was taken; nothing if this run wrote none. Any
   // thread.
   virtual std::optional<schedule::Clock::time_point> savedAt() const = 0;
+  // savedAt(), or the time of the first due() while this run has written no checkpoint. The scene loses what
+  // happened since then if the server is killed. Nothing if the scene has not run. Any thread.
+  virtual std::optional<schedule::Clock::time_point> unsavedSince() const = 0;
 };
 
 // Numbers for operators.
@@ -46,20 +49,23 @@ class SceneStore {
  public:
   virtual ~SceneStore() = default;
 
-  // Scenes that peers created in earlier runs. Each is returned once.
-  virtual std::vector<SavedScene> takeCreated() = 0;
-  // State of a scene that the server starts with. Returns nothing if no state
-  // is kept, or if the definition has changed.
+  // State of a scene that the server starts with. Returns nothing if no state is kept. If the definition has
+  // changed, the result has only bans and refused tokens.
   virtual std::optional<SavedScene> take(const model::Scene& start) = 0;
+  // Scenes that peers created in earlier runs. Each is returned once. Must be called after take() for all
+  // scenes that the server starts with. States of other scenes that a server started with stay on the disk;
+  // when room is needed, they are deleted, the oldest first.
+  virtual std::vector<SavedScene> takeCreated() = 0;
 
   // Keeps a scene from now on. Participants, parameters and pauses are looked at by themselves; the caller
-  // gives the keeper to the scene. A scene that is destroyed stays kept.
+  // gives the keeper to the scene. A scene that is destroyed stays kept. Returns null for a scene that the
+  // server starts with if a scene of this name that a peer created is kept; that one stays kept.
   virtual std::shared_ptr<SceneKeeper> keep(const std::shared_ptr<LiveScene>& scene) = 0;
   // Forgets a scene, which was deleted.
   virtual void remove(const std::string& name) = 0;
-  // Waits until everything up to this call is on the disk. Returns false if that fails, or takes longer than
-  // `timeout`.
-  virtual bool flush(std::chrono::milliseconds timeout) = 0;
+  // Waits until everything of a scene up to this call is on the disk; of all scenes if `name` is empty.
+  // Returns false if that fails, or takes longer than `timeout`.
+  virtual bool flush(std::chrono::milliseconds timeout, const std::string& name = {}) = 0;
 
   virtual StoreStatus status() const = 0;
 };

@@ -21,7 +21,7 @@ void write(const HeldNodes& held, v1::HeldNodes& message) {
   char* to = places.data();
   for (const HeldNode& node : held.nodes) {
     message.add_nodes(node.node);
-    message.add_grips(node.grab);
+    message.add_grabs(node.grab);
     std::memcpy(to, node.place.data(), kPlaceBytes);
     to += kPlaceBytes;
   }
@@ -34,14 +34,14 @@ void write(const HeldNodes& held, v1::HeldNodes& message) {
 tl::expected<HeldNodes, std::string> toHeldNodes(const v1::HeldNodes& message, std::uint32_t nodeCount) {
   const auto wrong = [] { return tl::unexpected(std::string("holds nodes that do not fit its scene")); };
   const auto nodes = static_cast<std::size_t>(message.nodes_size());
-  if (message.grips_size() != message.nodes_size() || message.places().size() != nodes * kPlaceBytes ||
+  if (message.grabs_size() != message.nodes_size() || message.places().size() != nodes * kPlaceBytes ||
       nodes > nodeCount || message.slipped_size() != message.taken_size() ||
       static_cast<std::size_t>(message.taken_size()) > simulation::kMaxGrabs)
     return wrong();
   HeldNodes held;
   const char* from = message.places().data();
   for (int i = 0; i < message.nodes_size(); ++i, from += kPlaceBytes) {
-    HeldNode node{.node = message.nodes(i), .grab = message.grips(i)};
+    HeldNode node{.node = message.nodes(i), .grab = message.grabs(i)};
     if (node.node >= nodeCount || node.grab >= static_cast<std::uint32_t>(message.taken_size()))
       return wrong();
     std::memcpy(node.place.data(), from, kPlaceBytes);

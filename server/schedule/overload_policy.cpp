@@ -26,6 +26,15 @@ WorkLevel OverloadPolicy::level(std::uint32_t leastSubsteps) const {
   return at(index_, leastSubsteps);
 }
 
+void OverloadPolicy::beginAt(const WorkLevel& work) {
+  // Stability may have raised the substeps of the work above those of its level.
+  const auto same = std::ranges::find_if(levels_, [&](const WorkLevel& level) {
+    return level.frameDivisor >= work.frameDivisor && level.substeps <= work.substeps;
+  });
+  index_ = same == levels_.end() ? levels_.size() - 1 : static_cast<std::size_t>(same - levels_.begin());
+  began_.reset();
+}
+
 void OverloadPolicy::begin(const Tick& tick) {
   if (!began_) calmSince_ = tick.now;
   began_ = tick.now;

@@ -61,6 +61,9 @@ class OverloadPolicy {
   // The scene has paused: starts a new interval.
   void restart() { began_.reset(); }
 
+  // Begins at the level of this work, which another policy for the same scene chose.
+  void beginAt(const WorkLevel& work);
+
   // Present level, with at least this number of substeps.
   WorkLevel level(std::uint32_t leastSubsteps = 1) const;
 

@@ -251,6 +251,10 @@ TEST_F(ToParameterChange, RefusesUnknownAndUnusableMaterials) {
   message_.Clear();
   message_.add_cloths()->set_areal_mass(0);
   EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].arealMass = 0:"));
+  scene_.cloths[0].grid.width = scene_.cloths[0].grid.height = 1000;
+  message_.mutable_cloths(0)->set_areal_mass(100);
+  EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].arealMass = 100: gives the cloth of 1e+06 m^2 a "
+                                  "mass of 1e+08 kg, which must be from 1e-06 to 1e+06;"));
   message_.Clear();
   message_.mutable_gust()->set_strength(-1);
   EXPECT_THAT(error(), StartsWith("parameterChange.gust.strength = -1:"));

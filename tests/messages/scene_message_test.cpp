@@ -319,6 +319,14 @@ const BadScene kBadScenes[] = {
     {"cloths[0].material = \"velvet\":", [](v1::Scene& s) { cloth(s).set_material("velvet"); },
      "must be one of cotton, denim, flag_nylon, leather, paper, rubber, silk, wool"},
     {"cloths[0].arealMass = 0:", [](v1::Scene& s) { cloth(s).set_areal_mass(0); }, "from 0.0001 to 1000"},
+    {"cloths[0].arealMass = 1000:",
+     [](v1::Scene& s) {
+       cloth(s).mutable_grid()->set_width(1000);
+       cloth(s).mutable_grid()->set_height(1000);
+       cloth(s).clear_mass();
+       cloth(s).set_areal_mass(1000);
+     },
+     "a mass of 1e+09 kg, which must be from 1e-06 to 1e+06"},
     {"cloths[0].arealMass = 1:",
      [](v1::Scene& s) {
        cloth(s).set_mass(1);

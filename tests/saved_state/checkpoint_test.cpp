@@ -13,6 +13,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/saved_state/state_message.h"
+#include "server/scene/token_hash.h"
 #include "tests/serving/scene/busy_scene.h"
 
 namespace clothstream::saved_state {
@@ -21,7 +22,7 @@ namespace {
 using model::SolverKind;
 using tests::HostedScene;
 
-// Keeps the checkpoint of one tick.
+// Keeps the checkpoint of one tick, or of the end of the server at that tick.
 class TickKeeper final : public scene::SceneKeeper {
  public:
   explicit TickKeeper(std::uint64_t tick) : tick_(tick) {}
@@ -30,6 +31,7 @@ class TickKeeper final : public scene::SceneKeeper {
     if (checkpoint.state.tick == tick_) kept = std::move(checkpoint);
   }
   std::optional<schedule::Clock::time_point> savedAt() const override { return {}; }
+  std::optional<schedule::Clock::time_point> unsavedSince() const override { return {}; }
 
   std::optional<scene::Checkpoint> kept;
 
@@ -46,6 +48,40 @@ scene::Checkpoint throughBytes(const scene::Checkpoint& checkpoint, const model:
   return read ? std::move(*read) : scene::Checkpoint{};
 }
 
+// The scene with this checkpoint, and with participant 7, who moves everything in busyTick().
+scene::SavedScene savedScene(const model::Scene& start, const scene::Checkpoint& checkpoint) {
+  scene::SavedScene saved{.start = start};
+  saved.checkpoint = throughBytes(checkpoint, start);
+  scene::SavedParticipant& mover = saved.roster.participants.emplace_back();
+  mover.participant.id = 7;
+  mover.tokenHash = scene::hashOfToken(std::string(scene::Roster::kTokenBytes, 'x'));
+  return saved;
+}
+
+void restore(scene::LiveScene& live, scene::SavedScene saved) {
+  live.restore(std::move(saved), {}, schedule::Clock::now());
+}
+
+// A journal that fails when it begins.
+class FailingJournal final : public scene::Journal {
+ public:
+  bool active() const override { return false; }
+  bool due() const override { return true; }
+  void begin(const vulkan::DeviceInfo&, const model::Scene&, const v1::StreamDescription&,
+             const simulation::StateSnapshot&, const simulation::StateSnapshot&) override {
+    if (fails) throw vulkan::DeviceLost("the test loses the device");
+  }
+  void ticked(const scene::AppliedTick&) override {}
+  void saved(const simulation::StateSnapshot&) override {}
+  void restored(std::uint64_t, const simulation::StateSnapshot&) override {}
+  void end() override {}
+  void sent(const delivery::SharedBytes&) override {}
+  void joined(std::uint64_t, const std::string&, const std::string&) override {}
+  void left(std::uint64_t) override {}
+
+  bool fails = true;
+};
+
 class CheckpointTest : public tests::GpuTest {};
 class EverySolver : public CheckpointTest, public ::testing::WithParamInterface<SolverKind> {};
 
@@ -60,11 +96,8 @@ TEST_P(EverySolver, ContinuesFromACheckpointToTheBit) {
   EXPECT_FALSE(keeper->kept->state.held.nodes.empty());
   EXPECT_EQ(keeper->kept->grabs.slots.size(), 2u);
 
-  HostedScene restored(scene, 1, [&](scene::LiveScene& live) {
-    scene::SavedScene saved{.start = scene};
-    saved.checkpoint = throughBytes(*keeper->kept, scene);
-    live.restore(std::move(saved), {}, schedule::Clock::now());
-  });
+  HostedScene restored(scene, 1,
+                       [&](scene::LiveScene& live) { restore(live, savedScene(scene, *keeper->kept)); });
   EXPECT_EQ(restored.host.tick(), 30u);
   for (int number = 31; number <= 60; ++number) tick(restored);
   const std::vector<std::uint64_t> all = whole.stateHashes();
@@ -96,14 +129,122 @@ TEST_F(CheckpointTest, NamedScenesContinueToTheBit) {
     };
     for (int number = 1; number <= 12; ++number) run(whole, expected);
     ASSERT_TRUE(keeper->kept.has_value()) << name;
-    HostedScene restored(*scene, 0, [&](scene::LiveScene& live) {
-      scene::SavedScene saved{.start = *scene};
-      saved.checkpoint = throughBytes(*keeper->kept, *scene);
-      live.restore(std::move(saved), {}, schedule::Clock::now());
-    });
+    HostedScene restored(*scene, 0,
+                         [&](scene::LiveScene& live) { restore(live, savedScene(*scene, *keeper->kept)); });
     for (int number = 7; number <= 12; ++number) run(restored, states);
     EXPECT_EQ(states, std::vector(expected.begin() + 6, expected.end())) << name;
   }
+}
+
+// The busy scene after this many ticks, with a grab that holds from tick 1 on.
+scene::Checkpoint checkpointAfter(std::uint64_t ticks) {
+  const auto keeper = std::make_shared<TickKeeper>(ticks);
+  HostedScene whole(tests::busyScene(SolverKind::massSpring), 1,
+                    [&](scene::LiveScene& live) { live.keeper = keeper; });
+  for (std::uint64_t number = 1; number <= ticks; ++number) tests::busyTick(whole);
+  EXPECT_TRUE(keeper->kept.has_value());
+  return keeper->kept.value_or(scene::Checkpoint{});
+}
+
+// Each server ends before the scene has a tick.
+TEST_F(CheckpointTest, SurvivesRestartsWithoutATickInBetween) {
+  const model::Scene scene = tests::busyScene(SolverKind::massSpring);
+  const scene::Checkpoint first = checkpointAfter(5);
+  ASSERT_FALSE(first.state.held.nodes.empty());
+  scene::Checkpoint newest = first;
+  for (int start = 1; start <= 2; ++start) {
+    const auto keeper = std::make_shared<TickKeeper>(5);
+    HostedScene restored(scene, 1, [&](scene::LiveScene& live) {
+      restore(live, savedScene(scene, newest));
+      live.keeper = keeper;
+    });
+    restored.host.saveLast();
+    ASSERT_TRUE(keeper->kept.has_value());
+    newest = *keeper->kept;
+  }
+  EXPECT_EQ(newest.state.bytes, first.state.bytes);
+  EXPECT_EQ(newest.state.held.nodes, first.state.held.nodes);
+}
+
+TEST_F(CheckpointTest, KeepsGrabsOfAHostThatWasRebuiltAndHasNotTicked) {
+  const model::Scene scene = tests::busyScene(SolverKind::massSpring);
+  const auto periodic = std::make_shared<TickKeeper>(5);
+  HostedScene hosted(scene, 1, [&](scene::LiveScene& live) { live.keeper = periodic; });
+  for (int number = 1; number <= 8; ++number) tests::busyTick(hosted);
+  hosted.host.release();
+  hosted.host.rebuild(
+      std::make_unique<scene::SceneOnDevice>(tests::device(), scene, hosted.publisher.workers()), "test");
+  const auto last = std::make_shared<TickKeeper>(8);
+  hosted.live.keeper = last;
+  hosted.host.saveLast();
+  ASSERT_TRUE(last->kept.has_value());
+  EXPECT_EQ(last->kept->grabs.slots.size(), 1u);
+  EXPECT_EQ(throughBytes(*last->kept, scene).state.held.nodes, periodic->kept->state.held.nodes);
+}
+
+TEST_F(CheckpointTest, DropsWhatParticipantsHeldWhoAreNotInTheRoster) {
+  const model::Scene scene = tests::busyScene(SolverKind::massSpring);
+  const scene::Checkpoint with = checkpointAfter(5);
+  ASSERT_EQ(with.colliders.colliders.size(), 1u);
+  const auto keeper = std::make_shared<TickKeeper>(5);
+  HostedScene restored(scene, 1, [&](scene::LiveScene& live) {
+    scene::SavedScene saved = savedScene(scene, with);
+    saved.roster.participants.front().participant.id = 8;
+    restore(live, std::move(saved));
+    live.keeper = keeper;
+  });
+  restored.host.saveLast();
+  ASSERT_TRUE(keeper->kept.has_value());
+  EXPECT_TRUE(keeper->kept->colliders.colliders.empty());
+  EXPECT_TRUE(keeper->kept->state.held.nodes.empty());
+  const scene::Checkpoint without = throughBytes(*keeper->kept, scene);
+  for (const auto& slot : without.grabs.slots)
+    EXPECT_EQ(slot.phase, scene::GrabsAndAttachments::Slot::Phase::empty);
+  restored.tick();
+  EXPECT_TRUE(restored.host.status().healthy);
+}
+
+// A tick that is repeated after a restart does the same work as before.
+TEST_F(CheckpointTest, ContinuesWithTheWorkOfAnOverload) {
+  const model::Scene scene = tests::busyScene(SolverKind::massSpring);
+  const auto keeper = std::make_shared<TickKeeper>(6);
+  HostedScene whole(scene, 1, [&](scene::LiveScene& live) { live.keeper = keeper; });
+  const auto run = [](HostedScene& hosted, int ticks) {
+    std::vector<std::uint64_t> hashes;
+    for (int i = 0; i < ticks; ++i) {
+      tests::busyTick(hosted);
+      hashes.push_back(hosted.host.status().stateHash);
+    }
+    return hashes;
+  };
+  run(whole, 3);
+  whole.host.setWork({2, 9});
+  run(whole, 3);
+  ASSERT_TRUE(keeper->kept.has_value());
+  ASSERT_EQ(keeper->kept->work, (schedule::WorkLevel{2, 9}));
+  HostedScene restored(scene, 1,
+                       [&](scene::LiveScene& live) { restore(live, savedScene(scene, *keeper->kept)); });
+  EXPECT_EQ(restored.host.work(), (schedule::WorkLevel{2, 9}));
+  EXPECT_EQ(run(restored, 6), run(whole, 6));
+}
+
+TEST_F(CheckpointTest, HasTheEventsThatWereAnnounced) {
+  const scene::Checkpoint checkpoint = checkpointAfter(1);
+  ASSERT_EQ(checkpoint.grabs.slots.size(), 1u);
+  EXPECT_GT(checkpoint.grabs.slots[0].vertices.value_or(0), 0u);
+}
+
+TEST_F(CheckpointTest, StaysUntilAHostContinuesFromIt) {
+  const model::Scene scene = tests::busyScene(SolverKind::massSpring);
+  const auto journal = std::make_shared<FailingJournal>();
+  scene::LiveScene live(scene, false, journal);
+  restore(live, savedScene(scene, checkpointAfter(5)));
+  delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
+  EXPECT_THROW(scene::SceneHost(tests::device(), live, publisher), vulkan::DeviceLost);
+  journal->fails = false;
+  const scene::SceneHost host(tests::device(), live, publisher);
+  EXPECT_EQ(host.tick(), 5u);
+  EXPECT_EQ(live.restored(), nullptr);
 }
 
 TEST_F(CheckpointTest, RefusesWhatDoesNotFitTheScene) {
@@ -124,7 +265,7 @@ TEST_F(CheckpointTest, RefusesWhatDoesNotFitTheScene) {
     m.mutable_state()->mutable_state()->replace(0, 4, std::string("\x00\x00\xc0\x7f", 4));
   });
   refuses("held node", [](v1::SavedCheckpoint& m) { m.mutable_state()->mutable_held()->set_nodes(0, 120); });
-  refuses("held grab", [](v1::SavedCheckpoint& m) { m.mutable_state()->mutable_held()->set_grips(0, 2); });
+  refuses("held grab", [](v1::SavedCheckpoint& m) { m.mutable_state()->mutable_held()->set_grabs(0, 2); });
   refuses("places",
           [](v1::SavedCheckpoint& m) { m.mutable_state()->mutable_held()->mutable_places()->pop_back(); });
   refuses("grab", [](v1::SavedCheckpoint& m) { m.mutable_grabs()->RemoveLast(); });
@@ -134,6 +275,7 @@ TEST_F(CheckpointTest, RefusesWhatDoesNotFitTheScene) {
   refuses("colliders", [](v1::SavedCheckpoint& m) { m.mutable_scene_colliders()->RemoveLast(); });
   refuses("shape", [](v1::SavedCheckpoint& m) { m.mutable_colliders(0)->clear_shape(); });
   refuses("cloths", [](v1::SavedCheckpoint& m) { m.clear_cloths(); });
+  refuses("substeps", [](v1::SavedCheckpoint& m) { m.set_substeps(13); });
   refuses("parameters", [](v1::SavedCheckpoint& m) { m.mutable_parameters()->clear_cloths(); });
   refuses("rows", [](v1::SavedCheckpoint& m) {
     m.mutable_parameters()->mutable_cloths(0)->mutable_grid()->set_rows(13);

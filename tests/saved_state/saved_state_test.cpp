@@ -2,18 +2,23 @@
 // Servers that end and start again with the same state directory.
 #include "server/saved_state/saved_state.h"
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <memory>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/saved_state.pb.h"
 #include "server/messages/scene_message.h"
+#include "server/model/price.h"
 #include "server/scene/token_hash.h"
 #include "tests/e2e/temporary_directory.h"
+#include "tests/model/meshes.h"
 #include "tests/serving/server_test.h"
 #include "tests/support/eventually.h"
 
@@ -34,13 +39,13 @@ class SavedStateTest : public tests::ServerTest {
  protected:
   // Starts a server on the directory. The former one must have ended.
   void run(hosting::ServerOptions options = {}, const scene::BudgetLimits& budget = kNoLimits,
-           SavedStateOptions state = {}) {
+           SavedStateOptions state = {}, const std::vector<model::Scene>& more = {}) {
     state.directory = directory_.path();
     state.checkpointInterval = 50ms;
     state.lookInterval = 20ms;
     store_ = std::make_shared<SavedState>(state);
     options.store = store_;
-    start(std::move(options), {}, budget);
+    start(std::move(options), more, budget);
   }
   void end() {
     stop();
@@ -170,9 +175,7 @@ TEST_F(SavedStateTest, KeepsNoTokens) {
 }
 
 TEST_F(SavedStateTest, DeletedScenesStayDeleted) {
-  hosting::ServerOptions options;
-  options.sceneLifetime = 300ms;
-  START(options);
+  START();
   create(tests::smallScene("mine"));
   {
     TestPeer peer(server());
@@ -182,6 +185,11 @@ TEST_F(SavedStateTest, DeletedScenesStayDeleted) {
   }
   create(tests::smallScene("asked"));
   remove("asked");
+  end();
+  // In the next run its lifetime ends.
+  hosting::ServerOptions options;
+  options.sceneLifetime = 100ms;
+  run(options);
   ASSERT_TRUE(eventually([&] { return live("mine") == nullptr; }));
   ASSERT_TRUE(store_->flush(10s));
   end();
@@ -212,17 +220,23 @@ TEST_F(SavedStateTest, AnUnaffordableSceneIsKeptButDoesNotRun) {
   large.cloths[0].solver.tolerance = 0.1f;
   create(large);
   create(tests::smallScene("tiny"));
+  const double load =
+      model::PriceModel(large).work(large).seconds(server().state().budget->speed()) * large.simulationRate;
   end();
+  // Room for many small scenes. The speed of the device is measured again.
   scene::BudgetLimits little = kNoLimits;
-  little.load = little.sceneLoad = 0.001;
+  little.load = little.sceneLoad = load / 5;
   run({}, little);
   EXPECT_THAT(names(), ::testing::IsSupersetOf({"large", "tiny"}));
   TestPeer peer(server());
   peer.hello("large");
   const v1::ServerMessage last = peer.readToTheEnd();
   EXPECT_EQ(last.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
-  EXPECT_THAT(last.error().text(), HasSubstr("is kept from before a restart, but does not run"));
+  EXPECT_THAT(last.error().text(),
+              HasSubstr("is kept from before a restart, but does not run: it would take "));
   EXPECT_THAT(last.error().text(), HasSubstr("--max-load"));
+  EXPECT_EQ(live("tiny")->quarantined(), "");
+  create(tests::smallScene("later"));
   end();
   run();
   EXPECT_EQ(live("large")->quarantined(), "");
@@ -243,6 +257,231 @@ TEST_F(SavedStateTest, MoreScenesThanAllowedAreKeptButDoNotRun) {
   run(options);
   EXPECT_EQ(live("one")->quarantined(), "");
   EXPECT_THAT(live("two")->quarantined(), HasSubstr("--max-created-scenes"));
+}
+
+// The scene with the first name is looked at before the one that is deleted.
+TEST_F(SavedStateTest, ASceneThatWaitsForRoomOutlivesItsLifetime) {
+  START();
+  model::Scene large = tests::smallScene("a_large");
+  large.cloths[0].grid.rows = large.cloths[0].grid.columns = 64;
+  large.cloths[0].mass = 0.001f * static_cast<float>(large.cloths[0].nodeCount());
+  create(large);
+  create(tests::smallScene("unused"));
+  end();
+  scene::BudgetLimits little = kNoLimits;
+  little.megabytes = little.sceneMegabytes = model::PriceModel(large).bytes(large) / 2e6;
+  hosting::ServerOptions options;
+  options.sceneLifetime = 100ms;
+  run(options, little);
+  ASSERT_NE(live("a_large")->quarantined(), "");
+  ASSERT_TRUE(eventually([&] { return live("unused") == nullptr; }));
+  EXPECT_NE(live("a_large"), nullptr);
+  end();
+  run();
+  EXPECT_EQ(live("a_large")->quarantined(), "");
+}
+
+TEST_F(SavedStateTest, AServerSceneDoesNotReplaceACreatedOneOfTheSameName) {
+  START();
+  create(tests::smallScene("mine"));
+  end();
+  run({}, kNoLimits, {}, {tests::smallScene("mine")});
+  EXPECT_FALSE(live("mine")->created);
+  EXPECT_EQ(live("mine")->keeper, nullptr);
+  {
+    TestPeer peer(server());
+    peer.join("mine");
+    peer.readFrames(5);
+    server().stop();
+  }
+  end();
+  run();
+  ASSERT_NE(live("mine"), nullptr);
+  EXPECT_TRUE(live("mine")->created);
+}
+
+// The scene has never run, and the disk is too full for states.
+TEST_F(SavedStateTest, BansAndRefusedTokensOfServerScenesSurvive) {
+  START({}, kNoLimits, {.minFreeBytes = UINT64_MAX / 2});
+  live("small")->paused = true;
+  live("small")->roster.setBans({{.subject = "eve", .displayName = "Eve"}});
+  live("other")->paused = true;
+  live("other")->roster.setBans({{.subject = "eve", .displayName = "Eve"}});
+  std::string token;
+  {
+    TestPeer owner(server(), "owner"), removed(server(), "removed");
+    owner.join("other");
+    removed.join("other");
+    token = removed.welcome().resume_token();
+    v1::ClientMessage message;
+    message.mutable_remove_participant()->set_participant_id(removed.welcome().participant_id());
+    owner.send(message);
+    EXPECT_EQ(removed.readToTheEnd().error().code(), v1::ERROR_CODE_REMOVED);
+    ASSERT_TRUE(store_->flush(30s));
+    server().stop();
+  }
+  end();
+  run();
+  EXPECT_TRUE(live("small")->roster.isBanned("eve"));
+  EXPECT_TRUE(live("other")->roster.isBanned("eve"));
+  TestPeer again(server(), "again");
+  again.hello(helloTo("other", token));
+  EXPECT_EQ(again.readToTheEnd().error().code(), v1::ERROR_CODE_REMOVED);
+  end();
+  store_ = std::make_shared<SavedState>(SavedStateOptions{.directory = directory_.path()});
+  model::Scene changed = tests::smallScene("other");
+  changed.cloths[0].mass *= 2;
+  const auto saved = store_->take(changed);
+  ASSERT_TRUE(saved.has_value());
+  EXPECT_EQ(saved->roster.bans.size(), 1u);
+  EXPECT_EQ(saved->roster.refusedTokenHashes.size(), 1u);
+  EXPECT_TRUE(saved->roster.participants.empty());
+  EXPECT_FALSE(saved->checkpoint.has_value());
+}
+
+// A checkpoint that cannot be used costs neither the scene nor its participants.
+TEST_F(SavedStateTest, ARefusedCheckpointCostsOnlyTheState) {
+  START();
+  create(tests::smallScene("mine"));
+  std::string token;
+  {
+    TestPeer peer(server());
+    peer.join("mine");
+    token = peer.welcome().resume_token();
+    v1::ParameterChange change;
+    change.mutable_gravity()->mutable_value()->set_y(-3);
+    peer.change(change);
+    peer.readUntil(v1::ServerMessage::kParameterChanged);
+    ASSERT_TRUE(eventually([&] { return live("mine")->keeper->savedAt().has_value(); }));
+    server().stop();
+  }
+  end();
+  {
+    Database database({.directory = directory_.path() / "scenes"});
+    ASSERT_TRUE(database.write("mine", {.checkpoint = v1::SavedCheckpoint().SerializeAsString()}));
+  }
+  run();
+  ASSERT_NE(live("mine"), nullptr);
+  EXPECT_EQ(live("mine")->tick.load(), 0u);
+  EXPECT_EQ(live("mine")->definition().environment.gravity.y(), -3);
+  TestPeer peer(server());
+  peer.hello(helloTo("mine", token));
+  peer.readFrames(1);
+  EXPECT_TRUE(peer.welcome().resumed());
+}
+
+// A new participant never gets the number of one that only a checkpoint has.
+TEST_F(SavedStateTest, NumbersOfParticipantsInACheckpointStayTaken) {
+  START();
+  create(tests::smallScene("mine"));
+  std::uint64_t id = 0;
+  {
+    TestPeer peer(server());
+    peer.join("mine");
+    id = peer.welcome().participant_id();
+    peer.poses({{1, 2}});
+    peer.readUntil([](const v1::ServerMessage& message) { return message.frame().colliders_size() == 2; });
+    server().stop();
+  }
+  end();
+  {
+    Database database({.directory = directory_.path() / "scenes"});
+    ASSERT_TRUE(database.write("mine", {.session = v1::SavedSession().SerializeAsString()}));
+  }
+  run();
+  TestPeer peer(server());
+  peer.join("mine");
+  EXPECT_GT(peer.welcome().participant_id(), id);
+  peer.readFrames(1);
+  EXPECT_EQ(peer.frames().back().colliders.size(), 1u);
+}
+
+TEST_F(SavedStateTest, AResetOfASleepingSceneIsNotLost) {
+  START();
+  create(tests::smallScene("mine"));
+  {
+    TestPeer peer(server());
+    peer.join("mine");
+    peer.readFrames(3);
+    peer.leave();
+  }
+  ASSERT_TRUE(eventually([&] { return !live("mine")->running; }));
+  live("mine")->resetRequested = true;
+  ASSERT_TRUE(store_->flush(30s));
+  end();
+  run();
+  EXPECT_TRUE(live("mine")->resetRequested);
+}
+
+// A definition that is larger than the database fails at each write.
+TEST_F(SavedStateTest, ASceneThatCannotBeSavedDelaysNoOther) {
+  START({}, kNoLimits, {.maxBytes = 200'000});
+  model::Scene huge = tests::smallScene("huge");
+  model::Cloth grid = huge.cloths[0];
+  grid.grid.rows = grid.grid.columns = 100;
+  grid.mass = 0.001f * static_cast<float>(grid.nodeCount());
+  huge.cloths[0] = model::asMesh(grid);
+  huge.simulationRate = huge.streamRate = 10;
+  huge.cloths[0].structural.stiffness = huge.cloths[0].shear.stiffness = huge.cloths[0].bend.stiffness =
+      0.001f;
+  create(huge);
+  create(tests::smallScene("mine"));
+  EXPECT_TRUE(store_->flush(30s, "mine"));
+  EXPECT_FALSE(store_->flush(30s, "huge"));
+  EXPECT_FALSE(store_->flush(30s));
+  TestPeer peer(server());
+  peer.join("mine");
+  ASSERT_TRUE(eventually([&] { return live("mine")->keeper->savedAt().has_value(); }));
+  EXPECT_TRUE(store_->flush(30s, "mine"));
+  EXPECT_GT(store_->status().failedWrites, 0u);
+}
+
+TEST_F(SavedStateTest, AnExceptionOfTheWriterLosesNothing) {
+  std::atomic<bool> throws = true;
+  START({}, kNoLimits, {.beforeWrite = [&](const std::string& name) {
+          if (throws && name == "mine") throw std::runtime_error("no memory");
+        }});
+  create(tests::smallScene("mine"));
+  create(tests::smallScene("healthy"));
+  EXPECT_TRUE(store_->flush(30s, "healthy"));
+  EXPECT_FALSE(store_->flush(30s, "mine"));
+  throws = false;
+  EXPECT_TRUE(store_->flush(30s, "mine"));
+  end();
+  run();
+  EXPECT_THAT(names(), ::testing::IsSupersetOf({"mine", "healthy"}));
+}
+
+// States of scenes that the server no longer starts with make room for others.
+TEST_F(SavedStateTest, UnusedStatesMakeRoom) {
+  model::Scene unused = tests::smallScene("unused");
+  unused.cloths[0].grid.rows = unused.cloths[0].grid.columns = 64;
+  unused.cloths[0].mass = 0.001f * static_cast<float>(unused.cloths[0].nodeCount());
+  START({}, kNoLimits, {}, {unused});
+  {
+    TestPeer peer(server());
+    peer.join("unused");
+    ASSERT_TRUE(eventually([&] { return live("unused")->keeper->savedAt().has_value(); }));
+    server().stop();
+  }
+  end();
+  run({}, kNoLimits, {.maxBytes = 150'000});
+  model::Scene used = tests::smallScene("used");
+  used.cloths[0].grid.rows = used.cloths[0].grid.columns = 32;
+  used.cloths[0].mass = 0.001f * static_cast<float>(used.cloths[0].nodeCount());
+  create(used);
+  {
+    TestPeer peer(server());
+    peer.join("used");
+    ASSERT_TRUE(eventually([&] { return live("used")->keeper->savedAt().has_value(); }));
+    server().stop();
+  }
+  end();
+  const Database database({.directory = directory_.path() / "scenes"});
+  std::vector<std::string> left;
+  for (const Database::Row& row : database.rows()) left.push_back(row.name);
+  EXPECT_THAT(left, ::testing::Not(::testing::Contains("unused")));
+  EXPECT_THAT(left, ::testing::Contains("used"));
 }
 
 TEST_F(SavedStateTest, LeavesOutTheLargestStateBeyondItsLimit) {
@@ -275,6 +514,7 @@ TEST_F(SavedStateTest, SavesNothingMoreWhileTheDiskIsFull) {
     peer.readFrames(10);
     ASSERT_TRUE(store_->flush(10s));
     EXPECT_FALSE(live("mine")->keeper->savedAt().has_value());
+    EXPECT_TRUE(live("mine")->keeper->unsavedSince().has_value());
     EXPECT_GE(store_->status().waiting, 1u);
     server().stop();
   }

@@ -240,6 +240,8 @@ HeldNodes AttachmentStage::collect() const {
 
 void AttachmentStage::recordRestore(vulkan::Recorder& recorder, const HeldNodes& held) {
   recordTables(recorder);
+  // A state that is saved before the next tick has the same grabs.
+  grabCount_ = static_cast<std::uint32_t>(held.grabs.size());
   if (held.grabs.empty()) {
     recorder.fill(grabbed_, 0, grabbed_.bytes());
     return;

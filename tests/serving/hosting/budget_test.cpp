@@ -23,6 +23,7 @@ namespace clothstream::scene {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 using tests::TestPeer;
 
 // 1 microsecond a node-step and nothing for a dispatch.
@@ -81,6 +82,18 @@ TEST(BudgetTest, ScenesShareOneBudgetAndGiveItBack) {
   }
   Charge third(budget, scene, false);
   EXPECT_TRUE(third.charge("third", scene));
+}
+
+TEST(BudgetTest, AReleasedSceneCostsNothingWhenItsParticipantsLeave) {
+  const model::Scene scene = tests::smallScene();
+  model::Scene fewer = scene;
+  fewer.substeps = 5;
+  const auto budget = budgetOf({.sceneLoad = 100, .load = loadOf(fewer) * 1.001});
+  Charge large(budget, scene, false), small(budget, fewer, false);
+  EXPECT_THAT(large.charge("", scene).error().text, StartsWith("would take "));
+  large.release();
+  EXPECT_TRUE(large.chargeColliders("large", scene, 0));
+  EXPECT_TRUE(small.charge("small", fewer));
 }
 
 TEST(BudgetTest, LimitsMemoryOfASceneAndOfAll) {

@@ -7,6 +7,7 @@
 #include <future>
 #include <latch>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -242,6 +243,45 @@ TEST_F(ScenesTest, DeletesCreatedSceneThatNobodyUses) {
   while (scenes() > 2 && std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(scenes(), 2);
+}
+
+// Notes which scenes are kept and forgotten.
+class NotingStore final : public scene::SceneStore {
+ public:
+  std::optional<scene::SavedScene> take(const model::Scene&) override { return {}; }
+  std::vector<scene::SavedScene> takeCreated() override { return {}; }
+  std::shared_ptr<scene::SceneKeeper> keep(const std::shared_ptr<scene::LiveScene>& scene) override {
+    if (scene->created) isKept = true;
+    return nullptr;
+  }
+  void remove(const std::string& name) override { removed = name; }
+  bool flush(std::chrono::milliseconds, const std::string&) override { return true; }
+  scene::StoreStatus status() const override { return {}; }
+
+  std::atomic<bool> isKept = false;
+  std::string removed;
+};
+
+TEST_F(ScenesTest, ACancelledCreationIsNotKeptAndTheErrorSaysWhy) {
+  const auto store = std::make_shared<NotingStore>();
+  ServerOptions options;
+  options.store = store;
+  START(options);
+  v1::CreateSceneRequest request;
+  request.set_named("small");
+  request.set_name("mine");
+  const auto error = [&] {
+    std::promise<std::string> done;
+    // The peer leaves while the device loads the scene.
+    server().createScene(
+        request, [&](const auto& made) { done.set_value(made ? "" : made.error().text()); },
+        identity::local(), [&] { return !store->isKept; });
+    return done.get_future().get();
+  };
+  EXPECT_THAT(error(), HasSubstr("the peer that asked for it has left"));
+  EXPECT_EQ(store->removed, "mine");
+  server().stop();
+  EXPECT_THAT(error(), HasSubstr("the server stops"));
 }
 
 TEST_F(ScenesTest, LimitsCreatedScenes) {

@@ -35,6 +35,31 @@ TEST(LiveScene, RestartRestoresTheStart) {
   EXPECT_FALSE(live.resetRequested);
 }
 
+TEST(LiveScene, RestartForgetsTheRestoredState) {
+  LiveScene live(smallScene());
+  SavedScene saved{.start = smallScene(), .accepted = smallScene()};
+  saved.accepted->environment.gravity.y() = -3;
+  live.restore(std::move(saved), {}, Clock::now());
+  ASSERT_NE(live.restored(), nullptr);
+  live.restart();
+  EXPECT_EQ(live.restored(), nullptr);
+}
+
+// The grace of an earlier run's participants does not pass while the server starts.
+TEST(LiveScene, GraceOfRestoredParticipantsCanBeginLater) {
+  LiveScene live(smallScene());
+  SavedScene saved{.start = smallScene()};
+  saved.roster.participants.emplace_back().participant.id = 3;
+  const ReconnectGrace grace{.place = std::chrono::seconds(5)};
+  const Clock::time_point restored = Clock::now(), opened = restored + std::chrono::seconds(60);
+  live.restore(std::move(saved), grace, restored);
+  live.roster.restartGrace(grace, opened);
+  live.roster.expire(opened + std::chrono::seconds(4));
+  EXPECT_EQ(live.roster.away(), 1u);
+  live.roster.expire(opened + std::chrono::seconds(5));
+  EXPECT_EQ(live.roster.away(), 0u);
+}
+
 TEST(LiveScene, LimitsChangesPerSecond) {
   LiveScene live(smallScene());
   v1::ParameterChange change;

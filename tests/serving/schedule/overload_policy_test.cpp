@@ -206,6 +206,19 @@ TEST(OverloadPolicyTest, UsesTimeThatOtherScenesLeave) {
   EXPECT_EQ(scene.policy.level(), (WorkLevel{1, 8}));
 }
 
+TEST(OverloadPolicyTest, BeginsAtTheLevelOfSavedWork) {
+  for (const WorkLevel& work : {WorkLevel{1, 8}, WorkLevel{2, 8}, WorkLevel{4, 8}, WorkLevel{4, 4}}) {
+    OverloadPolicy policy(kRate, 8);
+    policy.beginAt(work);
+    EXPECT_EQ(policy.level(), work);
+  }
+  // Stability needed 5 substeps at the level of 4.
+  OverloadPolicy raised(kRate, 8);
+  raised.beginAt({4, 5});
+  EXPECT_EQ(raised.level(), (WorkLevel{4, 4}));
+  EXPECT_EQ(raised.level(5), (WorkLevel{4, 5}));
+}
+
 TEST(OverloadPolicyTest, RestartBeginsAnInterval) {
   LoadedScene scene;
   scene.substep = 5ms;
