@@ -109,8 +109,9 @@ class SavedStateProgram : public RunningServer {
  protected:
   Arguments options(const Arguments& more = {}) const {
     Arguments all = kSmallScene;
-    all.insert(all.end(), {"--state-dir", directory_.path().string(), "--max-load", "1000",
-                           "--max-scene-load", "1000", "--keep-free", "0", "--overload", "keep"});
+    all.insert(all.end(),
+               {"--state-dir", directory_.path().string(), "--max-load", "1000", "--max-scene-load", "1000",
+                "--max-tick-time", "0", "--keep-free", "0", "--overload", "keep"});
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
