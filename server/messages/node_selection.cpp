@@ -64,13 +64,22 @@ NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& na
   checks.count(path / named.rangesField, static_cast<std::size_t>(named.ranges.size()), 0, limits::kMaxPins);
   checks.count(path / named.regionsField, static_cast<std::size_t>(named.regions.size()), 0,
                limits::kMaxPins);
+  // More entries than vertices would name a vertex twice.
+  checks.count(path / named.verticesField, static_cast<std::size_t>(named.vertices.size()), 0,
+               cloth.mesh ? nodeOfVertex.size() : cloth.grid.nodeCount());
   if (cloth.mesh && !named.ranges.empty())
     checks.fail(path / named.rangesField, "",
                 fmt::format("must be absent for a mesh; use \"{}\" or \"{}\"", named.verticesField,
                             named.regionsField));
-  for (int i = 0; i < named.vertices.size() && !checks.failed(); ++i)
-    selection.vertices.push_back(
-        toNode(checks, path.at(named.verticesField, i), named.vertices[i], cloth, nodeOfVertex));
+  // A node is listed once, because several vertices of a mesh may have the same node.
+  std::vector<bool> listed(named.vertices.empty() || checks.failed() ? 0 : cloth.nodeCount());
+  for (int i = 0; i < named.vertices.size() && !checks.failed(); ++i) {
+    const std::uint32_t node =
+        toNode(checks, path.at(named.verticesField, i), named.vertices[i], cloth, nodeOfVertex);
+    if (checks.failed() || listed[node]) continue;
+    listed[node] = true;
+    selection.vertices.push_back(node);
+  }
   for (int i = 0; i < named.ranges.size() && !checks.failed(); ++i)
     selection.ranges.push_back(toRange(checks, path.at(named.rangesField, i), named.ranges[i], cloth.grid));
   for (int i = 0; i < named.regions.size() && !checks.failed(); ++i)

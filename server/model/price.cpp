@@ -16,8 +16,8 @@ namespace {
 constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
 constexpr double kRungeKutta = 14;  // as a factor
 constexpr double kAir = 0.5, kHinge = 2, kSelfCollision = 20;
-// Each node and collider costs these. A third of the nodes are assumed to be near each collider.
-constexpr double kCollider = 0.5, kGatherCollider = 0.1;
+// Each node and collider costs these. Each plane of a shape costs kPlane more.
+constexpr double kCollider = 0.5, kPlane = 0.05, kBoxPlanes = 6, kGatherCollider = 0.1;
 // Each spring of the linear system costs these. ACAD is assumed to have a quarter of its springs active.
 constexpr double kPrepare = 2, kIteration = 0.5, kActive = 0.25;
 // Each pair of springs that share a node costs these in an assembled system.
@@ -35,11 +35,36 @@ constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
 
+// Copies of a scene's lists: as it started, as it was accepted, as it runs, and as descriptions.
+constexpr double kListCopies = 6;
+
+double listBytes(const auto& list) {
+  return kListCopies * static_cast<double>(sizeof(list[0]) * list.size());
+}
+
+// Lists of a cloth that select nodes, and the keys of its attachments.
+double listsOf(const Cloth& cloth) {
+  double bytes = listBytes(cloth.pins) + listBytes(cloth.pinnedVertices) + listBytes(cloth.pinnedRegions);
+  for (const Attachment& attachment : cloth.attachments)
+    bytes += listBytes(attachment.ranges) + listBytes(attachment.vertices) + listBytes(attachment.regions) +
+             listBytes(attachment.motion.keys);
+  return bytes;
+}
+
 bool isSystem(SolverKind kind) {
   return kind == SolverKind::constraint || kind == SolverKind::acad || kind == SolverKind::implicitEuler;
 }
 
 }  // namespace
+
+double colliderWork(const Shape& shape) {
+  const double planes =
+      std::visit(ShapeVisitor{[](const Sphere&) { return 0.0; }, [](const Capsule&) { return 0.0; },
+                              [](const Plane&) { return 1.0; }, [](const Box&) { return kBoxPlanes; },
+                              [](const Hull& hull) { return static_cast<double>(hull->planes.size()); }},
+                 shape);
+  return kCollider + kPlane * planes;
+}
 
 PriceModel::ClothCounts PriceModel::countsOf(const Grid& grid) {
   const std::uint64_t rows = grid.rows, columns = grid.columns, nodes = rows * columns;
@@ -109,6 +134,10 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
   assert(scene.cloths.size() == cloths_.size());
   const double substeps = scene.substeps;
   const auto colliders = static_cast<double>(colliderCount);
+  double collisions = 0;
+  for (const Collider& collider : scene.colliders) collisions += colliderWork(collider.shape);
+  if (colliderCount > scene.colliders.size())
+    collisions += static_cast<double>(colliderCount - scene.colliders.size()) * colliderWork(Box{});
   const double framesPerTick = static_cast<double>(scene.streamRate) / scene.simulationRate;
   Work work{.nodeSteps = 0,
             .groupNodeSteps = 0,
@@ -123,7 +152,7 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
     if (scene.environment.airDensity != 0 && (cloth.drag != 0 || cloth.lift != 0)) step += kAir * nodes;
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
     if (cloth.selfCollision) step += kSelfCollision * nodes;
-    step += kCollider * colliders * nodes;
+    step += collisions * nodes;
     work.nodeSteps +=
         substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
     work += solverWork(scene, cloth, counts);
@@ -139,13 +168,17 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
 double PriceModel::bytes(const Scene& scene) const {
   assert(scene.cloths.size() == cloths_.size());
   double bytes = kSceneBytes;
+  for (const Collider& collider : scene.colliders) bytes += listBytes(collider.motion.keys);
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     const Cloth& cloth = scene.cloths[i];
     const ClothCounts& counts = cloths_[i];
     const auto nodes = static_cast<double>(counts.nodes);
     const auto springs = static_cast<double>(counts.allSprings());
     bytes += kNodeBytes * nodes + kSpringBytes * springs;
-    if (cloth.mesh) bytes += kMeshNodeBytes * nodes;
+    bytes += listsOf(cloth);
+    if (cloth.mesh)
+      bytes += kMeshNodeBytes * nodes + listBytes(cloth.mesh->shape.uvs) +
+               listBytes(cloth.mesh->shape.uvTriangles);
     if (cloth.selfCollision) bytes += kSelfCollisionBytes * nodes;
     if (cloth.dihedralBending != 0) bytes += kHingeBytes * static_cast<double>(counts.hinges);
     if (isSystem(cloth.solver.kind) || cloth.solver.kind == SolverKind::xpbd) bytes += kSystemBytes * springs;

@@ -42,6 +42,10 @@ struct Work {
   }
 };
 
+// Work of a collider with this shape for each node and substep, in node-steps. A third of the nodes are
+// assumed to be near each collider.
+double colliderWork(const Shape& shape);
+
 // The constructor takes time linear in nodes and springs; the other functions only depend on the number of
 // cloths, so parameters can be priced often.
 //
@@ -52,7 +56,8 @@ class PriceModel {
   explicit PriceModel(const Scene& scene);
 
   // Work of a tick and its frame. `scene` is the scene of the constructor, whose parameters may have changed
-  // since. `colliders` includes those of participants.
+  // since. `colliders` includes those of participants, whose shapes are assumed to be boxes, the costliest
+  // that participants may have.
   Work work(const Scene& scene, std::size_t colliders) const;
   Work work(const Scene& scene) const { return work(scene, scene.colliders.size()); }
   // Memory on the device and on the host, in bytes.

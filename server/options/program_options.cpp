@@ -53,6 +53,10 @@ void addBudgetOptions(OptionTable& table, scene::BudgetLimits& budget) {
       "Seconds of the device's time a second that clients may take in all by creating scenes and changing "
       "parameters, by estimate. 1 is all that the device has");
   table.number("--max-scene-load", budget.sceneLoad, loads, "The same for one scene");
+  table.number(
+      "--max-tick-time", budget.tickSeconds, {.min = 0, .max = 3600, .type = "SECONDS"},
+      "Time of the device that one tick of a created or changed scene may take, by estimate. 0 means no "
+      "limit");
   table.number("--max-memory", budget.megabytes, megabytes,
                "Memory that clients may take in all by creating scenes and changing parameters, by estimate");
   table.number("--max-scene-memory", budget.sceneMegabytes, megabytes, "The same for one scene");

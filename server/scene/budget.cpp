@@ -110,6 +110,28 @@ void Charge::replace(const Amount& next) {
   released_ = false;
 }
 
+Charge::Room Charge::roomFor(const model::Scene& scene) const {
+  const BudgetLimits& limits = budget_->limits_;
+  const double free = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
+  const double room = std::min(limits.sceneLoad, free);
+  const double tick = limits.tickSeconds * scene.simulationRate;
+  if (limits.tickSeconds > 0 && tick < room) return {tick, true, free};
+  return {room, false, free};
+}
+
+std::string Charge::excessOf(const model::Scene& scene, double load, const Room& room) const {
+  const BudgetLimits& limits = budget_->limits_;
+  if (room.tick)
+    return fmt::format(
+        "would take {:.2f} s of the device's time a tick, by estimate; one tick may take {:.2f} s "
+        "(--max-tick-time)",
+        load / scene.simulationRate, limits.tickSeconds);
+  return fmt::format(
+      "would take {:.2f} s of the device's time a second, by estimate; one scene may take {:.2f} s "
+      "(--max-scene-load), and {:.2f} s of {:.2f} s (--max-load) are free",
+      load, limits.sceneLoad, room.free, limits.load);
+}
+
 void Charge::restore(const model::Scene& scene) {
   const std::lock_guard lock(budget_->mutex_);
   replace(priceOf(scene));
@@ -125,15 +147,11 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
                                                telemetry::Refusal::budget});
   };
   // A price that is no higher than before is always allowed.
-  const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
-  const double roomForLoad = std::min(limits.sceneLoad, freeLoad);
-  if (price.load > charged_.load && price.load > roomForLoad) {
+  const Room roomForLoad = roomFor(scene);
+  if (price.load > charged_.load && price.load > roomForLoad.load) {
     const auto loadOf = [&](const model::Scene& other) { return priceOf(other).load; };
-    return refuse(fmt::format(
-        "would take {:.2f} s of the device's time a second, by estimate; one scene may take {:.2f} s "
-        "(--max-scene-load), and {:.2f} s of {:.2f} s (--max-load) are free: {}",
-        price.load, limits.sceneLoad, freeLoad, limits.load,
-        whatFits(scene, made_, price.load, roomForLoad, loadOf)));
+    return refuse(excessOf(scene, price.load, roomForLoad) + ": " +
+                  whatFits(scene, made_, price.load, roomForLoad.load, loadOf));
   }
   const double free = std::max(0.0, limits.megabytes - (budget_->megabytes_ - charged_.megabytes));
   const double room = std::min(limits.sceneMegabytes, free);
@@ -152,29 +170,23 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
 messages::Result<void> Charge::chargeColliders(const std::string& path, const model::Scene& scene,
                                                std::size_t count) {
   const std::lock_guard lock(budget_->mutex_);
-  const BudgetLimits& limits = budget_->limits_;
   const std::size_t before = std::exchange(participantColliders_, count);
   if (released_) return {};
   const Amount price = priceOf(scene);
-  const double freeLoad = std::max(0.0, limits.load - (budget_->load_ - charged_.load));
-  const double room = std::min(limits.sceneLoad, freeLoad);
-  if (count <= before || price.load <= charged_.load || price.load <= room) {
+  const Room room = roomFor(scene);
+  if (count <= before || price.load <= charged_.load || price.load <= room.load) {
     replace(price);
     return {};
   }
   const std::uint32_t fit = largest(static_cast<std::uint32_t>(count - 1), [&](std::uint32_t fewer) {
     participantColliders_ = fewer;
-    return priceOf(scene).load <= room;
+    return priceOf(scene).load <= room.load;
   });
   participantColliders_ = before;
-  return tl::unexpected(messages::FieldError{
-      v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-      fmt::format(
-          "{}: {} colliders of participants would take {:.2f} s of the device's time a second, by estimate; "
-          "one scene may take {:.2f} s (--max-scene-load), and {:.2f} s of {:.2f} s (--max-load) are free: "
-          "{} would fit",
-          path, count, price.load, limits.sceneLoad, freeLoad, limits.load, fit),
-      telemetry::Refusal::colliders});
+  return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                                             fmt::format("{}: {} colliders of participants {}: {} would fit",
+                                                         path, count, excessOf(scene, price.load, room), fit),
+                                             telemetry::Refusal::colliders});
 }
 
 }  // namespace clothstream::scene

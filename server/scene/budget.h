@@ -20,6 +20,9 @@ struct BudgetLimits {
   // The first of each pair limits one scene, the second all scenes together.
   double sceneLoad = 4, load = 4;
   double sceneMegabytes = 256, megabytes = 256;
+  // Seconds of the device's time that one tick of a scene may take; 0: no limit. A load allows long ticks at
+  // a low rate, and a long tick keeps its slices on the device when other scenes need it.
+  double tickSeconds = 0.5;
 };
 
 // Thread-safe.
@@ -81,7 +84,16 @@ class Charge {
     double load = 0, megabytes = 0;
   };
   Amount priceOf(const model::Scene& scene) const;  // the budget's mutex is held
-  void replace(const Amount& next);                 // the budget's mutex is held
+  // A load that the scene may have, and the limit that it follows from. The budget's mutex is held.
+  struct Room {
+    double load = 0;
+    bool tick = false;  // the limit of a tick is below the others
+    double free = 0;    // load that all scenes together leave
+  };
+  Room roomFor(const model::Scene& scene) const;
+  // Says what the load is, what it may be and by which option.
+  std::string excessOf(const model::Scene& scene, double load, const Room& room) const;
+  void replace(const Amount& next);  // the budget's mutex is held
 
   const std::shared_ptr<Budget> budget_;
   const model::PriceModel model_;

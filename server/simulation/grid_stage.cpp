@@ -82,7 +82,8 @@ void GridStage::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, co
   const TileRange tiles = cut_.tiles.ranges.of(follow);
   push.firstTile = tiles.first;
   if (tiles.count > 0)
-    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * cut_.workgroupSize);
+    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * cut_.workgroupSize,
+                      std::uint64_t{cut_.rowsPerInvocation} * push.collision.nodeWork);
 }
 
 void GridStage::recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const {

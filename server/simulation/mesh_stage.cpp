@@ -11,6 +11,13 @@ using vulkan::BindingKind;
 using vulkan::Bindings;
 using vulkan::Kernel;
 
+namespace {
+
+// Work of a node of a mesh (vulkan::Recorder::dispatch).
+constexpr std::uint64_t kMeshWork = 2;
+
+}  // namespace
+
 MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
                      const vulkan::Buffer& normals, model::Integrator integrator, std::uint32_t workgroupSize)
     : device_(device),
@@ -74,7 +81,8 @@ void MeshStage::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, co
   const TileRange tiles = tileRanges_.of(follow);
   push.firstTile = tiles.first;
   if (tiles.count > 0)
-    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * workgroupSize_);
+    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * workgroupSize_,
+                      kMeshWork * push.collision.nodeWork);
 }
 
 void MeshStage::recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const {

@@ -155,7 +155,8 @@ void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
         penetrationsIn_[present],
         shared::PenetrationPush{
             .collision = collision, .blockCount = blocks, .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
-        std::uint64_t{blocks} * (shared::kReportBlock / shared::kReportDepths));
+        std::uint64_t{blocks} * (shared::kReportBlock / shared::kReportDepths),
+        std::uint64_t{shared::kReportDepths} * collision.nodeWork);
   recorder.barrier();
   recorder.dispatch(addUpAll_, of_.cloths.size() * workgroupSize_);
   recorder.barrier();

@@ -74,7 +74,7 @@ void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,
       push.firstNode = offsets_[push.cloth];
       push.count = offsets_[push.cloth + 1] - push.firstNode;
       recorder.barrier();
-      recorder.dispatch(combineFrom_[stage][stepFrom], push, push.count);
+      recorder.dispatch(combineFrom_[stage][stepFrom], push, push.count, collision.nodeWork);
     }
   }
 }

@@ -16,6 +16,7 @@
 #include "kernels/solve_velocities.h"
 #include "kernels/update_corrections.h"
 #include "server/simulation/device_table.h"
+#include "server/simulation/workgroup_work.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -55,21 +56,23 @@ std::uint32_t solveWorkgroup(const vulkan::Device& device, std::uint32_t wanted)
   return std::bit_floor(std::min({wanted, kSolveLanes, device.limits().maxWorkgroupInvocations}));
 }
 
-// Nodes times iterations that one workgroup computes in about 10 ms. A dispatch cannot be cut into slices.
-constexpr std::uint32_t kSoftwareDispatch = 1 << 18, kGpuDispatch = 1 << 20;
+constexpr std::uint32_t kChunkNodes = kSolveLanes * CLOTHSTREAM_SOLVE_WALK;
+// Work of a node (vulkan::Recorder::dispatch) when the system is prepared.
+constexpr std::uint32_t kPrepareWork = 12;
 
 // lavapipe allows an invocation 65,535 loop rounds, over all loops together. Beyond that it ends each loop
 // after one round.
 std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
                                     std::uint32_t listed, std::uint32_t workgroup) {
-  const std::uint32_t nodes = std::max(1u, group.smallChunks * kSolveLanes);
-  if (!device.isSoftware()) return std::max(1u, kGpuDispatch / nodes);
+  const std::uint32_t nodes = std::max(1u, group.smallChunks * kChunkNodes);
+  const std::uint32_t most = std::max(1u, nodesPerDispatch(device) / nodes);
+  if (!device.isSoftware()) return most;
   const std::uint32_t tree = 2 * kSolveLanes / workgroup + 16;
   const std::uint32_t walks = kSolveLanes / workgroup;
   const std::uint32_t walk = group.mesh ? CLOTHSTREAM_SOLVE_WALK * (listed + 2) + 2 : 1;
   const std::uint32_t chunk = walks * (walk + 2) + tree;
   const std::uint32_t iteration = group.smallChunks * (chunk + 2) + tree + group.smallChunks;
-  return std::max(1u, std::min((65'535 - 2 * iteration) / iteration, kSoftwareDispatch / nodes));
+  return std::max(1u, std::min((65'535 - 2 * iteration) / iteration, most));
 }
 
 }  // namespace
@@ -324,7 +327,8 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
     recorder.barrier();
   }
   if (group.check.empty()) {
-    recorder.dispatch(group.prepare[from], push, all);
+    recorder.dispatch(group.prepare[from], push, all,
+                      workPerInvocation(kChunkNodes * kPrepareWork, workgroup));
     return;
   }
   recorder.dispatch(group.check[from], push, all);
@@ -338,17 +342,22 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
   if (group.on.smallSystems == 0) return;
   for (std::uint32_t first = 0; first < group.on.iterations;) {
     const std::uint32_t end = first + std::min(group.iterationsPerDispatch, group.on.iterations - first);
+    const shared::SolvePush push{.nodes = nodes,
+                                 .firstSystem = group.on.firstSystem,
+                                 .firstIteration = first,
+                                 .endIteration = end,
+                                 .firstChunk = 0,
+                                 .nextGroup = 0};
+    const std::uint64_t threads = std::uint64_t{group.on.smallSystems} * workgroup;
+    const std::uint64_t work =
+        workPerInvocation(std::uint64_t{group.on.smallChunks} * kChunkNodes * (end - first), workgroup);
     recorder.barrier();
-    recorder.dispatchIndirect(
-        group.whole[from],
-        shared::SolvePush{.nodes = nodes,
-                          .firstSystem = group.on.firstSystem,
-                          .firstIteration = first,
-                          .endIteration = end,
-                          .firstChunk = 0,
-                          .nextGroup = 0},
-        groupSizes, (group.firstSize + kSmallSystems) * sizeof(std::uint32_t),
-        std::uint64_t{group.on.smallSystems} * group.on.smallChunks * kSolveLanes * (end - first));
+    // ACAD may have nothing to solve. Indirect dispatches cannot be divided.
+    if (isAdaptive(group.on) && !recorder.divides(group.whole[from], threads, work))
+      recorder.dispatchIndirect(group.whole[from], push, groupSizes,
+                                (group.firstSize + kSmallSystems) * sizeof(std::uint32_t), threads * work);
+    else
+      recorder.dispatch(group.whole[from], push, threads, work);
     first = end;
   }
 }
@@ -402,7 +411,8 @@ void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
       recorder.dispatchIndirect(group.apply[from], push, all.groupSizes,
                                 group.firstSize * sizeof(std::uint32_t), threads);
     else
-      recorder.dispatch(group.apply[from], push, threads);
+      recorder.dispatch(group.apply[from], push, threads,
+                        workPerInvocation(std::uint64_t{kChunkNodes} * collision.nodeWork, all.workgroup));
   }
 }
 

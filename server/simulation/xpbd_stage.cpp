@@ -7,6 +7,8 @@
 #include "kernels/correct_grids.h"
 #include "kernels/correct_meshes.h"
 #include "kernels/finish_corrections.h"
+#include "server/model/spring_colours.h"
+#include "server/simulation/workgroup_work.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -44,9 +46,10 @@ std::uint64_t threads(const TileRange& tiles, std::uint32_t workgroupSize) {
 }
 
 // All dispatches work on the same positions: each waits for the one before it.
-void dispatch(vulkan::Recorder& recorder, const Bindings& bindings, const auto& push, std::uint64_t threads) {
+void dispatch(vulkan::Recorder& recorder, const Bindings& bindings, const auto& push, std::uint64_t threads,
+              std::uint64_t work) {
   recorder.barrier();
-  recorder.dispatch(bindings, push, threads);
+  recorder.dispatch(bindings, push, threads, work);
 }
 
 }  // namespace
@@ -151,23 +154,27 @@ void XpbdStage::prepare(const XpbdVariant& variant) {
   finish(variant);
 }
 
-// Records as many dispatches as the device's limit on loop rounds requires.
+// Records as many dispatches as the device's limit on loop rounds and the time of a dispatch require.
 void XpbdStage::recordWhole(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant) {
-  const std::uint32_t each = std::max(1u, cut_.rounds / std::max(1u, tables_.roundsPerIteration));
+  const std::uint32_t nodes = std::max(1u, tables_.wholeNodes);
+  const std::uint32_t each = std::max(1u, std::min(cut_.rounds / std::max(1u, tables_.roundsPerIteration),
+                                                   nodesPerDispatch(device_) / nodes));
   for (std::uint32_t first = 0; first < tables_.wholeIterations; first += each) {
     shared::XpbdPush push{};
     push.firstMultiplier = tables_.gridMultipliers;
     push.firstIteration = first;
     push.endIteration = first + std::min(each, tables_.wholeIterations - first);
+    const std::uint64_t work =
+        workPerInvocation(std::uint64_t{nodes} * (push.endIteration - first), cut_.wholeWorkgroup);
     if (tables_.wholeGrids.count > 0) {
       push.firstTile = tables_.wholeGrids.first;
       dispatch(recorder, grids(variant, kAllPasses).from[from], push,
-               threads(tables_.wholeGrids, cut_.wholeWorkgroup));
+               threads(tables_.wholeGrids, cut_.wholeWorkgroup), work);
     }
     if (tables_.wholeMeshes.count > 0) {
       push.firstTile = tables_.wholeMeshes.first;
       dispatch(recorder, meshes(variant, true).from[from], push,
-               threads(tables_.wholeMeshes, cut_.wholeWorkgroup));
+               threads(tables_.wholeMeshes, cut_.wholeWorkgroup), work);
     }
   }
 }
@@ -180,7 +187,7 @@ void XpbdStage::recordParts(vulkan::Recorder& recorder, std::uint32_t from, cons
       push.endIteration = push.firstIteration + 1;
       push.firstTile = tables_.partGrids[pass].first;
       dispatch(recorder, grids(variant, 1u << pass).from[from], push,
-               threads(tables_.partGrids[pass], cut_.partWorkgroup));
+               threads(tables_.partGrids[pass], cut_.partWorkgroup), model::kBlock * model::kBlock);
     }
   for (const XpbdTables::PartMesh& mesh : tables_.partMeshes) {
     push.cloth = mesh.cloth;
@@ -188,7 +195,7 @@ void XpbdStage::recordParts(vulkan::Recorder& recorder, std::uint32_t from, cons
       for (const TileRange& colour : mesh.colours) {
         push.firstSpring = colour.first;
         push.springs = colour.count;
-        dispatch(recorder, meshes(variant, false).from[from], push, colour.count);
+        dispatch(recorder, meshes(variant, false).from[from], push, colour.count, 1);
       }
   }
 }
@@ -201,7 +208,8 @@ void XpbdStage::record(vulkan::Recorder& recorder, std::uint32_t from, const Xpb
   for (std::uint32_t done = 0; done < tables_.nodes.count; done += most) {
     push.firstTile = tables_.nodes.first + done;
     dispatch(recorder, finish(variant).from[from], push,
-             std::uint64_t{std::min(most, tables_.nodes.count - done)} * cut_.partWorkgroup);
+             std::uint64_t{std::min(most, tables_.nodes.count - done)} * cut_.partWorkgroup,
+             push.collision.nodeWork);
   }
 }
 

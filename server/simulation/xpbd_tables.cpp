@@ -100,6 +100,7 @@ class XpbdTablesMaker {
     if (cloth.nodeCount() > limit || rounds > cut_.rounds) return false;
     tables_.roundsPerIteration = std::max(tables_.roundsPerIteration, rounds);
     tables_.wholeIterations = std::max(tables_.wholeIterations, cloth.solver.iterations);
+    tables_.wholeNodes = std::max(tables_.wholeNodes, cloth.nodeCount());
     return true;
   }
 

@@ -47,6 +47,7 @@ struct XpbdTables {
   std::vector<PartMesh> partMeshes;
   std::uint32_t partGridIterations = 0;  // the largest of any grid in parts
   std::uint32_t wholeIterations = 0;
+  std::uint32_t wholeNodes = 0;          // of the largest whole cloth
   std::uint32_t roundsPerIteration = 0;  // the largest of any whole cloth
   std::uint32_t gridMultipliers = 0;     // 0 if no cloth is swept twice
   bool iterated = false;

@@ -24,6 +24,9 @@ namespace {
 constexpr const char* kLost =
     "the Vulkan device was lost (VK_ERROR_DEVICE_LOST): create everything on it again on another device";
 
+// Workgroups that a small GPU runs at the same time.
+constexpr std::uint32_t kGpuWorkgroups = 64;
+
 Limits limitsOf(const vk::raii::PhysicalDevice& physical) {
   const auto chain =
       physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceVulkan11Properties>();
@@ -40,6 +43,7 @@ Limits limitsOf(const vk::raii::PhysicalDevice& physical) {
           .maxStorageRange = limits.maxStorageBufferRange,
           .maxTexelElements = limits.maxTexelBufferElements,
           .maxPushConstantBytes = limits.maxPushConstantsSize,
+          .parallelWorkgroups = kGpuWorkgroups,
           .subgroupSize = chain.get<vk::PhysicalDeviceVulkan11Properties>().subgroupSize,
           .timestampPeriod = limits.timestampPeriod,
           .deviceMemoryBytes = memory};
@@ -140,6 +144,7 @@ Device::Device(const DeviceOptions& options) : handles_(new Handles{.context = o
         fmt::format("the Vulkan device {} cannot be opened: {}", chosen.info.name, error.what()));
   }
   limits_ = limitsOf(chosen.physical);
+  if (chosen.info.kind == DeviceKind::software) limits_.parallelWorkgroups = threads.count();
   handles_->queueFamily = chosen.queueFamily;
   info_ = std::move(chosen.info);
   handles_->physical = std::move(chosen.physical);

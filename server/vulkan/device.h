@@ -48,6 +48,8 @@ struct Limits {
   std::uint64_t maxStorageRange = 0;   // bytes per binding
   std::uint64_t maxTexelElements = 0;  // elements per texel-buffer binding
   std::uint32_t maxPushConstantBytes = 0;
+  // Workgroups that run at the same time: threads of a software device, an estimate for a GPU.
+  std::uint32_t parallelWorkgroups = 1;
   std::uint32_t subgroupSize = 0;
   float timestampPeriod = 0;  // ns per tick of the timestamp counter
   std::uint64_t deviceMemoryBytes = 0;

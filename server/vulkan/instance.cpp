@@ -132,6 +132,14 @@ SoftwareThreads::SoftwareThreads(std::optional<std::uint32_t> threads) {
   setenv(kSoftwareThreads, number.c_str(), threads.has_value() ? 1 : 0);
 }
 
+std::uint32_t SoftwareThreads::count() const {
+  // More threads than Mesa's own limit do not run.
+  constexpr unsigned long kMostThreads = 32;
+  const char* number = std::getenv(kSoftwareThreads);
+  const unsigned long threads = number != nullptr ? std::strtoul(number, nullptr, 10) : 0;
+  return static_cast<std::uint32_t>(std::clamp(threads, 1ul, kMostThreads));
+}
+
 SoftwareThreads::~SoftwareThreads() {
   if (before_)
     setenv(kSoftwareThreads, before_->c_str(), 1);

@@ -26,6 +26,9 @@ class SoftwareThreads {
   SoftwareThreads(const SoftwareThreads&) = delete;
   SoftwareThreads& operator=(const SoftwareThreads&) = delete;
 
+  // Threads that run kernels at the same time, at least 1.
+  std::uint32_t count() const;
+
  private:
   std::optional<std::string> before_;
 };

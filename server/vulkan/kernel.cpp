@@ -61,7 +61,8 @@ std::shared_ptr<const Kernel::Handles> Kernel::makePipeline(const Device::Handle
                                                                  .pCode = description.spirv.data()});
   made->pipeline =
       vk::raii::Pipeline(vulkan, device.pipelineCache,
-                         vk::ComputePipelineCreateInfo{.stage = {.stage = vk::ShaderStageFlagBits::eCompute,
+                         vk::ComputePipelineCreateInfo{.flags = vk::PipelineCreateFlagBits::eDispatchBase,
+                                                       .stage = {.stage = vk::ShaderStageFlagBits::eCompute,
                                                                  .module = *module,
                                                                  .pName = "main",
                                                                  .pSpecializationInfo = &specialisation},

@@ -22,6 +22,10 @@ constexpr std::uint32_t kMaxTimestamps = Recorder::kMaxMarks + 1 + 2 * Recorder:
 // Stage of the time between two slices, in which other work may run.
 constexpr std::string_view kBetweenSlices;
 
+// Least work of a dispatch that shares a larger one. A dispatch costs a software device up to 0.1 ms, and
+// this work about 1 ms.
+constexpr std::uint64_t kLeastDispatch = 1 << 16;
+
 constexpr vk::AccessFlags kUses = Access::eShaderRead | Access::eShaderWrite | Access::eTransferRead |
                                   Access::eTransferWrite | Access::eIndirectCommandRead;
 
@@ -58,6 +62,7 @@ void Recorder::begin() {
   if (*handles_->timestamps) handles_->current().resetQueryPool(*handles_->timestamps, 0, kMaxTimestamps);
   marks_.clear();
   timedSlices_ = 0;
+  largestDispatch_ = 0;
   open_ = true;
   rehearses_ = false;
 }
@@ -97,6 +102,7 @@ void Recorder::count(std::uint64_t invocations) {
     }
   }
   invocations_ += invocations;
+  largestDispatch_ = std::max(largestDispatch_, invocations);
 }
 
 void Recorder::beginRehearsal() {
@@ -124,8 +130,20 @@ void Recorder::mark() {
                                        static_cast<std::uint32_t>(marks_.size()));
 }
 
+std::uint64_t Recorder::groupsPerDispatch(const Kernel& kernel, std::uint64_t work) const {
+  const std::uint64_t parallel = device_->limits().parallelWorkgroups;
+  const std::uint64_t groups = std::max(sliceInvocations_, kLeastDispatch) / (kernel.workgroupSize() * work);
+  // The parts keep all processors of the device busy.
+  return std::max(parallel, groups - groups % parallel);
+}
+
+bool Recorder::divides(const Bindings& bindings, std::uint64_t threads, std::uint64_t work) const {
+  const Kernel& kernel = bindings.kernel();
+  return threads > groupsPerDispatch(kernel, work) * kernel.workgroupSize();
+}
+
 void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                             std::uint64_t threads) {
+                             std::uint64_t threads, std::uint64_t work) {
   if (threads == 0) return;
   if (rehearses_) return note(bindings);
   const Kernel& kernel = bindings.kernel();
@@ -136,9 +154,15 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
         "kernel {}: {} invocations are {} workgroups of {}, more than the {} that {} runs at once; make the "
         "workgroups larger or the invocations fewer",
         kernel.name(), threads, groups, kernel.workgroupSize(), most, device_->info().name));
-  count(threads);
-  bind(bindings, push, pushBytes);
-  handles_->current().dispatch(static_cast<std::uint32_t>(groups), 1, 1);
+  const std::uint64_t each = work == 0 ? groups : std::min(groups, groupsPerDispatch(kernel, work));
+  for (std::uint64_t first = 0; first < groups; first += each) {
+    const std::uint64_t now = std::min(each, groups - first);
+    const std::uint64_t done = first * kernel.workgroupSize();
+    count(std::min(now * kernel.workgroupSize(), threads - done) * std::max<std::uint64_t>(work, 1));
+    bind(bindings, push, pushBytes);
+    handles_->current().dispatchBase(static_cast<std::uint32_t>(first), 0, 0, static_cast<std::uint32_t>(now),
+                                     1, 1);
+  }
 }
 
 void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,

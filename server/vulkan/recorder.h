@@ -31,9 +31,12 @@ class Recorder {
 
   // Divides recordings, from the next begin() on, into slices that can be submitted one by one, so that other
   // work can run between them. A slice ends before the first dispatch that would exceed `invocations` in all,
-  // and has one dispatch at least. By default a recording has one slice.
+  // and has one dispatch at least. A dispatch with a stated work (below) that exceeds `invocations` by itself
+  // is divided. By default a recording has one slice.
   void sliceAfter(std::uint64_t invocations) { sliceInvocations_ = invocations; }
   std::uint32_t sliceCount() const;
+  // Work of the largest dispatch since begin(), in invocations as slices count them.
+  std::uint64_t largestDispatch() const { return largestDispatch_; }
 
   // Clears the recording. Earlier submissions of all its slices that were submitted must be complete.
   void begin();
@@ -66,6 +69,17 @@ class Recorder {
     dispatchBytes(bindings, nullptr, 0, threads);
   }
 
+  // The same for a kernel whose invocations take `work` times as long as an invocation that moves one node by
+  // its springs. Slices count threads times work. If that is more than a slice, several dispatches share the
+  // workgroups, without barriers between them. The kernel must not use gl_NumWorkGroups.
+  template <typename Push>
+  void dispatch(const Bindings& bindings, const Push& push, std::uint64_t threads, std::uint64_t work) {
+    static_assert(std::is_trivially_copyable_v<Push>);
+    dispatchBytes(bindings, &push, sizeof(Push), threads, work);
+  }
+  // True if several dispatches would share this work.
+  bool divides(const Bindings& bindings, std::uint64_t threads, std::uint64_t work) const;
+
   // Runs as many workgroups as three 32-bit numbers (x, y, z) in `groups` say at run time. `groups` must be a
   // buffer with purpose `indirect`. `most` is the number of invocations that slices count for it.
   template <typename Push>
@@ -95,8 +109,11 @@ class Recorder {
   Handles& handles() const { return *handles_; }
 
  private:
+  // A work of 0 means 1, without division.
   void dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                     std::uint64_t threads);
+                     std::uint64_t threads, std::uint64_t work = 0);
+  // Workgroups of each dispatch that shares this work.
+  std::uint64_t groupsPerDispatch(const Kernel& kernel, std::uint64_t work) const;
   void dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                              const Buffer& groups, std::size_t offset, std::uint64_t most);
   // Counts a dispatch, and ends the slice before it if it is full.
@@ -115,7 +132,8 @@ class Recorder {
   std::vector<StageTime> times_;
   std::vector<const Bindings*> rehearsed_;
   std::uint64_t sliceInvocations_ = ~std::uint64_t{0}, invocations_ = 0;  // limit, and of the current slice
-  std::uint32_t timedSlices_ = 0;                                         // slices whose start was marked
+  std::uint64_t largestDispatch_ = 0;
+  std::uint32_t timedSlices_ = 0;  // slices whose start was marked
   bool open_ = false, rehearses_ = false;
 };
 

@@ -63,7 +63,8 @@ struct CollisionPush {
   float tickRate;  // 1/s
   float substepRate;
   uint32_t contactClothCount;  // cloths in the scene if contacts are reported, else 0
-  uint32_t reserved0, reserved1;
+  uint32_t nodeWork;           // for the host: work of a node that collides (vulkan::Recorder::dispatch)
+  uint32_t reserved;
 };
 
 // The effect of a collider on a cloth in a tick is one number, at (collider times cloths plus cloth): the

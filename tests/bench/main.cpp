@@ -49,6 +49,8 @@ constexpr std::array kSuites{
                  &bench::runCodecDevice},
     bench::Suite{"price", "the computed price of a tick, and the measured tick, for every solver",
                  &bench::runPrice},
+    bench::Suite{"creation", "time to check, prepare, load and delete a scene, for each of its nodes",
+                 &bench::runCreation},
 };
 
 }  // namespace

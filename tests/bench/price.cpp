@@ -2,7 +2,9 @@
 // Suite price: the price of a tick, computed from the scene, and the tick that was measured.
 #include "server/model/price.h"
 
+#include <cmath>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -22,18 +24,41 @@ struct Case {
   model::Integrator integrator = model::Integrator::semiImplicitEuler;
   bool air = false, bending = false, selfCollision = false;
   std::uint32_t colliders = 0;
+  model::Shape shape = model::Sphere{.radius = 0.3f};
 };
+
+// A prism of radius 0.3 m and length 0.5 m. It has two faces more than `sides`.
+model::Shape prism(std::uint32_t sides) {
+  std::vector<model::Vec3> vertices;
+  std::vector<std::vector<std::uint32_t>> faces(2);
+  for (std::uint32_t i = 0; i < sides; ++i) {
+    const double angle = 2 * std::numbers::pi * i / sides;
+    for (const double y : {-0.25, 0.25})
+      vertices.emplace_back(0.3 * std::cos(angle), y, 0.3 * std::sin(angle));
+    const std::uint32_t next = (i + 1) % sides;
+    faces[0].push_back(2 * i);
+    faces[1].insert(faces[1].begin(), 2 * i + 1);
+    faces.push_back({2 * i, 2 * i + 1, 2 * next + 1, 2 * next});
+  }
+  return std::make_shared<const model::ConvexHull>(
+      std::get<model::ConvexHull>(model::makeConvexHull(std::move(vertices), std::move(faces))));
+}
 
 // Solvers that may end early never do: the tolerance is 0.
 std::vector<Case> cases() {
-  std::vector<Case> all = {{"mass_spring"},
-                           {.method = "runge_kutta", .integrator = model::Integrator::rungeKutta4},
-                           {.method = "air", .air = true},
-                           {.method = "dihedral", .bending = true},
-                           {.method = "self_collision", .selfCollision = true},
-                           {.method = "1 collider", .colliders = 1},
-                           {.method = "8 colliders", .colliders = 8},
-                           {.method = "64 colliders", .colliders = 64}};
+  std::vector<Case> all = {
+      {"mass_spring"},
+      {.method = "runge_kutta", .integrator = model::Integrator::rungeKutta4},
+      {.method = "air", .air = true},
+      {.method = "dihedral", .bending = true},
+      {.method = "self_collision", .selfCollision = true},
+      {.method = "1 collider", .colliders = 1},
+      {.method = "8 colliders", .colliders = 8},
+      {.method = "64 colliders", .colliders = 64},
+      {.method = "8 capsules", .colliders = 8, .shape = model::Capsule{.radius = 0.3f}},
+      {.method = "8 boxes", .colliders = 8, .shape = model::Box{.size = {0.5, 0.5, 0.5}}},
+      {.method = "8 hulls of 32 faces", .colliders = 8, .shape = prism(30)},
+      {.method = "8 hulls of 128 faces", .colliders = 8, .shape = prism(126)}};
   const auto solver = [&](const char* method, model::SolverKind kind, std::uint32_t iterations) {
     all.push_back({.method = method});
     all.back().solver.kind = kind;
@@ -68,7 +93,7 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   for (std::uint32_t i = 0; i < experiment.colliders; ++i) {
     model::Collider collider;
     collider.name = std::to_string(i);
-    collider.shape = model::Sphere{.radius = 0.3f};
+    collider.shape = experiment.shape;
     collider.pose.position = model::Vec3(0, -0.5f, 0.3f);
     scene.colliders.push_back(collider);
   }

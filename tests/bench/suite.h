@@ -57,5 +57,6 @@ Rows runSelfCollision(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
 Rows runCodecDevice(vulkan::Device& device, const Settings& settings);
 Rows runPrice(vulkan::Device& device, const Settings& settings);
+Rows runCreation(vulkan::Device& device, const Settings& settings);
 
 }  // namespace clothstream::bench

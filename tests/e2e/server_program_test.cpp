@@ -396,6 +396,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--scene-lifetime=0",
                                        "--max-load=2",
                                        "--max-scene-load=0.25",
+                                       "--max-tick-time=1.5",
                                        "--max-memory=1000",
                                        "--max-scene-memory=100.5",
                                        "--encoder-threads=7",

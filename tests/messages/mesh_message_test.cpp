@@ -109,6 +109,27 @@ TEST(MeshMessage, PinsGridsByVertexAndRegion) {
               HasSubstr("cloths[0].pinnedVertices[1] = 100000: must be a whole number from 0 to"));
 }
 
+TEST(MeshMessage, RefusesMoreEntriesThanVertices) {
+  v1::Scene grid = smallScene();
+  grid.mutable_cloths(0)->clear_pins();
+  for (v1::Scene message : {grid, meshScene()}) {
+    const Result<model::Scene> before = toScene(message);
+    ASSERT_TRUE(before) << before.error().text;
+    v1::Cloth& cloth = *message.mutable_cloths(0);
+    const int vertices = cloth.has_mesh() ? 6 : static_cast<int>(before->cloths[0].nodeCount());
+    for (int i = 0; i < vertices; ++i) cloth.add_pinned_vertices(1);
+    const Result<model::Scene> most = toScene(message);
+    ASSERT_TRUE(most) << most.error().text;
+    // A node is listed once.
+    EXPECT_EQ(most->cloths[0].pinnedVertices.size(), 1u);
+    cloth.add_pinned_vertices(1);
+    const Result<model::Scene> more = toScene(message);
+    ASSERT_FALSE(more);
+    EXPECT_THAT(more.error().text, HasSubstr("cloths[0].pinnedVertices"));
+    EXPECT_THAT(more.error().text, HasSubstr(std::to_string(vertices + 1) + " elements; must have 0 to"));
+  }
+}
+
 // Fan of triangles that share one node.
 TEST(MeshMessage, RefusesAssembledSystemsThatAreTooLarge) {
   v1::Scene message = smallScene();

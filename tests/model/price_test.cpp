@@ -53,6 +53,58 @@ TEST(Price, TimeGrowsWithNodesSubstepsIterationsAndColliders) {
   }
 }
 
+// Collision with a polyhedron tests its planes, one after the other.
+TEST(Price, CollidersCostMoreWithMorePlanes) {
+  const auto priceWith = [](const Shape& shape) {
+    Scene scene = sheet(100);
+    scene.colliders.resize(8);
+    for (Collider& collider : scene.colliders) collider.shape = shape;
+    return secondsOf(scene);
+  };
+  const auto hull = [](std::size_t planes) {
+    ConvexHull made;
+    made.planes.resize(planes);
+    return std::make_shared<const ConvexHull>(made);
+  };
+  EXPECT_EQ(priceWith(Sphere{}), priceWith(Capsule{}));
+  EXPECT_GT(priceWith(Box{}), priceWith(Sphere{}));
+  EXPECT_GT(priceWith(hull(32)), priceWith(Box{}));
+  EXPECT_GT(priceWith(hull(128)), 2 * priceWith(hull(32)));
+  // Participants may have boxes, but no hulls.
+  const Scene plain = sheet(100);
+  Scene boxes = plain;
+  boxes.colliders.resize(8);
+  for (Collider& collider : boxes.colliders) collider.shape = Box{};
+  EXPECT_DOUBLE_EQ(PriceModel(plain).work(plain, 8).nodeSteps, PriceModel(boxes).work(boxes).nodeSteps);
+}
+
+TEST(Price, MemoryGrowsWithListsKeysAndTextureCoordinates) {
+  constexpr std::size_t kEntries = 10'000;
+  const Scene plain = sheet(100);
+  const double before = PriceModel(plain).bytes(plain);
+  const auto added = [&](const Scene& scene) { return PriceModel(scene).bytes(scene) - before; };
+  Scene scene = plain;
+  scene.cloths[0].pinnedVertices.resize(kEntries);
+  EXPECT_GE(added(scene), 4.0 * kEntries * sizeof(std::uint32_t));
+  scene = plain;
+  scene.cloths[0].attachments.resize(1);
+  scene.cloths[0].attachments[0].vertices.resize(kEntries);
+  scene.cloths[0].attachments[0].motion.keys.resize(kEntries);
+  EXPECT_GE(added(scene), 4.0 * kEntries * (sizeof(std::uint32_t) + sizeof(MotionKey)));
+  scene = plain;
+  scene.colliders.resize(1);
+  scene.colliders[0].motion.keys.resize(kEntries);
+  EXPECT_GE(added(scene), 4.0 * kEntries * sizeof(MotionKey));
+  Scene mesh = plain, textured = plain;
+  Mesh shape;
+  shape.shape.positions.resize(kEntries);
+  mesh.cloths[0].mesh = std::make_shared<const Mesh>(shape);
+  shape.shape.uvs.resize(kEntries);
+  shape.shape.uvTriangles.resize(kEntries);
+  textured.cloths[0].mesh = std::make_shared<const Mesh>(shape);
+  EXPECT_GE(added(textured) - added(mesh), 2.0 * kEntries * (sizeof(Uv) + sizeof(Triangle)));
+}
+
 // The scene that stopped every other scene for good before scenes had a price.
 TEST(Price, HostileSceneCostsManyTimesTheDevice) {
   Scene scene = sheet(512, SolverKind::constraint);

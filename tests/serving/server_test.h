@@ -21,7 +21,7 @@ class ServerTest : public ::testing::Test {
  protected:
   // Load and memory without a limit.
   static constexpr scene::BudgetLimits kNoLimits{
-      .sceneLoad = 1e9, .load = 1e9, .sceneMegabytes = 1e9, .megabytes = 1e9};
+      .sceneLoad = 1e9, .load = 1e9, .sceneMegabytes = 1e9, .megabytes = 1e9, .tickSeconds = 0};
 
   // Starts the server with the scenes "small" (the default), "other" and `more`. Call it once per test.
   void start(hosting::ServerOptions options = {}, const std::vector<model::Scene>& more = {},

@@ -219,6 +219,26 @@ TEST_F(ComputeTest, SlicesGiveTheResultOfTheWholeRecording) {
   }
 }
 
+TEST_F(ComputeTest, DispatchLargerThanASliceIsDivided) {
+  constexpr std::uint32_t kCount = 1 << 16, kWork = 8, kSlice = 1 << 17;
+  const Buffer upload = uploadOf(countedFrom(0, kCount));
+  const Buffer readback(tests::device(), BufferPurpose::readback, upload.bytes());
+  const Kernel kernel = countUp();
+  const Bindings bindings(tests::device(), kernel, {&upload, &readback});
+  Recorder recorder(tests::device());
+  recorder.sliceAfter(kSlice);
+  recorder.begin();
+  EXPECT_TRUE(recorder.divides(bindings, kCount, kWork));
+  EXPECT_FALSE(recorder.divides(bindings, kCount, 1));
+  recorder.dispatch(bindings, kCount, kCount, kWork);
+  EXPECT_LE(recorder.largestDispatch(),
+            std::max(kSlice, tests::device().limits().parallelWorkgroups * kernel.workgroupSize() * kWork));
+  EXPECT_GE(recorder.sliceCount(), std::uint64_t{kCount} * kWork / recorder.largestDispatch());
+  EXPECT_GT(recorder.sliceCount(), 1u);
+  tests::submitAndWait(tests::device(), recorder);
+  EXPECT_EQ(contents<std::uint32_t>(readback), countedUp(kCount, 1));
+}
+
 TEST_F(ComputeTest, WorkBetweenSlicesBelongsToNoStage) {
   constexpr std::uint32_t kCount = 256, kSteps = 6;
   constexpr std::size_t kHeavyBytes = 64u << 20;

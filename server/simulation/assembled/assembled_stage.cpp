@@ -12,6 +12,7 @@
 #include "kernels/multiply_system.h"
 #include "kernels/solve_multipliers.h"
 #include "kernels/update_multipliers.h"
+#include "server/simulation/workgroup_work.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -34,6 +35,11 @@ AssembledCut cutAssembled(const vulkan::Device& device, std::uint32_t workgroupS
       .wholeNodes = wholeNodes.value_or(software ? 4096 : 1024),
       .rounds = software ? 65'000 : ~0u};
 }
+
+// Loop rounds of a solve that take as long as one unit of work.
+constexpr std::uint32_t kRoundsPerWork = 4;
+// Work of a row of J (vulkan::Recorder::dispatch) when the matrices are filled.
+constexpr std::uint32_t kFillWork = 8;
 
 // Bindings need a buffer even for an empty table.
 std::size_t texels(std::size_t count) {
@@ -138,8 +144,11 @@ void AssembledStage::recordWhole(vulkan::Recorder& recorder, bool measures) cons
   while (push.firstIteration < tables_.wholeIterations) {
     push.endIteration = push.firstIteration + std::min(each, tables_.wholeIterations - push.firstIteration);
     push.measures = measures && push.endIteration == tables_.wholeIterations ? 1 : 0;
+    const std::uint64_t rounds =
+        std::uint64_t{tables_.wholeRounds} * (push.endIteration - push.firstIteration);
     recorder.barrier();
-    recorder.dispatch(solve_->bindings, push, std::uint64_t{tables_.wholeSystems.count} * cut_.workgroup);
+    recorder.dispatch(solve_->bindings, push, std::uint64_t{tables_.wholeSystems.count} * cut_.workgroup,
+                      rounds / kRoundsPerWork + 1);
     push.firstIteration = push.endIteration;
   }
 }
@@ -167,7 +176,8 @@ void AssembledStage::record(vulkan::Recorder& recorder, std::uint32_t from,
   const std::uint64_t chunkThreads = std::uint64_t{tables_.chunks.size()} * cut_.workgroup;
   recorder.barrier();
   recorder.dispatch(fill_.from[from], shared::AssemblePush{static_cast<float>(1 / substepSeconds)},
-                    chunkThreads);
+                    chunkThreads,
+                    workPerInvocation(CLOTHSTREAM_ASSEMBLED_CHUNK_ROWS * kFillWork, cut_.workgroup));
   recorder.barrier();
   recorder.dispatch(multiplyJacobians_.bindings, chunkThreads);
   recordWhole(recorder, measures);
@@ -179,7 +189,7 @@ void AssembledStage::record(vulkan::Recorder& recorder, std::uint32_t from,
                                                 .reserved0 = 0,
                                                 .reserved1 = 0,
                                                 .reserved2 = 0},
-                    std::uint64_t{tables_.nodeRanges.size()} * cut_.workgroup);
+                    std::uint64_t{tables_.nodeRanges.size()} * cut_.workgroup, collision.nodeWork);
 }
 
 void AssembledStage::recordReport(vulkan::Recorder& recorder) const {

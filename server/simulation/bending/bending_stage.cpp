@@ -13,6 +13,9 @@ namespace {
 using vulkan::kStorage;
 using vulkan::kTexels;
 
+// Work of a node (vulkan::Recorder::dispatch), which gathers from its hinges.
+constexpr std::uint32_t kBendWork = 4;
+
 std::vector<bool> bending(std::span<const model::Cloth> cloths) {
   std::vector<bool> bends;
   for (const model::Cloth& cloth : cloths) bends.push_back(cloth.dihedralBending > 0);
@@ -69,10 +72,10 @@ void BendingStage::recordTables(vulkan::Recorder& recorder) const {
 
 void BendingStage::record(vulkan::Recorder& recorder, std::uint32_t present, double substepSeconds) const {
   shared::BendingPush push{hingeCount_, static_cast<float>(substepSeconds)};
-  recorder.dispatch(measure_.from[present], push, hingeCount_);
+  recorder.dispatch(measure_.from[present], push, hingeCount_, 1);
   recorder.barrier();
   push.count = nodeCount_;
-  recorder.dispatch(bend_.from[present], push, nodeCount_);
+  recorder.dispatch(bend_.from[present], push, nodeCount_, kBendWork);
 }
 
 }  // namespace clothstream::simulation

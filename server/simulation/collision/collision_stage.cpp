@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/gather_near_colliders.h"
+#include "server/model/price.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -62,6 +63,9 @@ void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const Mo
                                   bool reportsContacts) {
   fill(tables_, colliders);
   count_ = static_cast<std::uint32_t>(colliders.size());
+  double work = 1;
+  for (const MovingCollider& collider : colliders) work += model::colliderWork(collider.shape);
+  nodeWork_ = static_cast<std::uint32_t>(work);
   slot_ = 1 - slot_;
   const Buffer& through = uploads_[slot_];
   std::size_t offset = upload(recorder, tables_.records, through, 0, colliders_, 0);
@@ -92,7 +96,7 @@ void CollisionStage::recordGather(vulkan::Recorder& recorder, std::uint32_t pres
                                   float thickness) {
   if (!active()) return;
   recorder.dispatch(from_[present], shared::GatherPush{nodeCount_, count_, tickSeconds, thickness},
-                    listsOf(nodeCount_));
+                    listsOf(nodeCount_), shared::kNearNodes + count_);
 }
 
 shared::CollisionPush CollisionStage::push(std::uint32_t substep, std::uint32_t substeps,
@@ -103,8 +107,8 @@ shared::CollisionPush CollisionStage::push(std::uint32_t substep, std::uint32_t 
           .tickRate = tickRate,
           .substepRate = tickRate * static_cast<float>(substeps),
           .contactClothCount = reportsContacts_ ? clothCount_ : 0,
-          .reserved0 = 0,
-          .reserved1 = 0};
+          .nodeWork = nodeWork_,
+          .reserved = 0};
 }
 
 }  // namespace clothstream::simulation

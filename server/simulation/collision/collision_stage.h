@@ -58,6 +58,7 @@ class CollisionStage {
   std::uint32_t nodeCount_, clothCount_;
   bool reportsContacts_ = false;
   std::uint32_t count_ = 0;
+  std::uint32_t nodeWork_ = 1;
   std::uint32_t slot_ = 0;
   ColliderTables tables_;
   vulkan::Buffer colliders_, bounds_, nearLists_, contactImpulses_;

@@ -27,6 +27,8 @@ using vulkan::kStorage;
 using vulkan::kTexels;
 
 constexpr std::uint32_t kListsATick = 3;
+// Work of a node (vulkan::Recorder::dispatch) when its neighbours are listed, and in a contact iteration.
+constexpr std::uint32_t kGatherWork = 8, kContactWork = 4;
 // Factor of the time until the next search, because velocities change in it.
 constexpr float kAhead = 1.25f;
 
@@ -250,7 +252,8 @@ void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint3
   dispatch(startCells_, cellCount_ / shared::kCellBlock);
   dispatch(fillCells_, nodeCount_);
   dispatch(sortCells_, nodeCount_);
-  dispatch(gather_, nodeCount_);
+  recorder.barrier();
+  recorder.dispatch(gather_.on[state], push, nodeCount_, kGatherWork);
 }
 
 void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_t state,
@@ -264,9 +267,15 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, touching));
   recorder.barrier();
-  recorder.dispatch(contactKernels_[several_]->count.on[state], push, nodeCount_);
+  recorder.dispatch(contactKernels_[several_]->count.on[state], push, nodeCount_, kContactWork);
   recorder.barrier();
-  recorder.dispatchIndirect(contactKernels_[several_]->resolve.on[state], push, groups_, 0, nodeCount_);
+  const Bindings& resolve = contactKernels_[several_]->resolve.on[state];
+  const std::uint64_t work = std::uint64_t{kContactWork} * collision.nodeWork;
+  // Indirect dispatches cannot be divided.
+  if (recorder.divides(resolve, nodeCount_, work))
+    recorder.dispatch(resolve, push, nodeCount_, work);
+  else
+    recorder.dispatchIndirect(resolve, push, groups_, 0, nodeCount_ * work);
 }
 
 void SelfCollisionStage::recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const {

@@ -40,7 +40,9 @@ model::Scene constrained(std::uint32_t iterations) {
   return scene;
 }
 
-std::shared_ptr<Budget> budgetOf(const BudgetLimits& limits) {
+// Ticks have no limit by default.
+std::shared_ptr<Budget> budgetOf(BudgetLimits limits, double tickSeconds = 0) {
+  limits.tickSeconds = tickSeconds;
   auto budget = std::make_shared<Budget>(limits);
   budget->setSpeed(kSpeed);
   return budget;
@@ -68,6 +70,27 @@ TEST(BudgetTest, NamesSubstepsOrNodesIfFewerIterationsDoNotHelp) {
   EXPECT_THAT(charge.charge("x", scene).error().text, HasSubstr("at most 5 substeps would fit"));
   Charge tiny(budgetOf({.sceneLoad = loadOf(scene) / 100, .load = 100}), scene, false);
   EXPECT_THAT(tiny.charge("x", scene).error().text, HasSubstr("about 1 nodes would fit"));
+}
+
+// At a low rate, a scene within its load may still have a tick that delays other scenes for seconds.
+TEST(BudgetTest, RefusesSceneWithALongTickAndNamesIterationsThatFit) {
+  model::Scene large = constrained(1000), small = constrained(17);
+  large.simulationRate = large.streamRate = small.simulationRate = small.streamRate = 1;
+  const double tickSeconds = loadOf(small) * 1.001;
+  const auto budget = budgetOf({.sceneLoad = loadOf(large) * 2, .load = 1e9}, tickSeconds);
+  Charge charge(budget, large, false);
+  const auto refused = charge.charge("createScene.scene", large);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_EQ(refused.error().limit, telemetry::Refusal::budget);
+  EXPECT_THAT(refused.error().text, HasSubstr("s of the device's time a tick"));
+  EXPECT_THAT(refused.error().text, HasSubstr("(--max-tick-time): at most 17 iterations would fit"));
+  EXPECT_TRUE(charge.charge("createScene.scene", small));
+  const auto colliders = charge.chargeColliders("colliderPoses", small, 50);
+  ASSERT_FALSE(colliders);
+  EXPECT_THAT(colliders.error().text, HasSubstr("(--max-tick-time)"));
+  Charge unlimited(budgetOf({.sceneLoad = loadOf(large) * 2, .load = 1e9}), large, false);
+  EXPECT_TRUE(unlimited.charge("createScene.scene", large));
 }
 
 TEST(BudgetTest, ScenesShareOneBudgetAndGiveItBack) {

@@ -159,7 +159,7 @@ TEST_F(PeerLimitsTest, CollidersOfParticipantsHaveAPrice) {
   const auto loadOf = [&](std::size_t count) {
     return price.work(scene, scene.colliders.size() + count).seconds(kSpeed) * scene.simulationRate;
   };
-  START({}, {}, {.sceneLoad = (loadOf(30) - loadOf(0)) * 1.001, .load = 1e9});
+  START({}, {}, {.sceneLoad = (loadOf(30) - loadOf(0)) * 1.001, .load = 1e9, .tickSeconds = 0});
   server().state().budget->setSpeed(kSpeed);
   TestPeer first(server()), second(server());
   first.join();
