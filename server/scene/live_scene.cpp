@@ -2,6 +2,7 @@
 #include "server/scene/live_scene.h"
 
 #include <algorithm>
+#include <iterator>
 #include <random>
 #include <utility>
 #include <vector>
@@ -168,7 +169,8 @@ messages::Result<void> LiveScene::countChangeLocked(std::uint64_t participant, c
         fmt::format("{}: too many changes of '{}'{} in one second; send it again later", call, name(), whose),
         telemetry::Refusal::parameterChanges});
   };
-  std::erase_if(changesOf_, [&](auto& known) { return known.second.isFull(now); });
+  for (auto known = changesOf_.begin(); known != changesOf_.end();)
+    known = known->second.isFull(now) ? changesOf_.erase(known) : std::next(known);
   auto& own =
       changesOf_.try_emplace(participant, kChangesOfParticipantPerSecond, kChangesOfParticipantPerSecond)
           .first->second;
