@@ -32,7 +32,7 @@ server/step        | server/model server/vulkan server/simulation server/message
 server/tls         | proto/tls
 server/discovery   | proto/discovery
 server/endpoint/listen | server/schedule server/telemetry
-server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/telemetry clothstream grpc/health
+server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/hosting server/recording server/step server/scene server/model

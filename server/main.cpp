@@ -192,13 +192,16 @@ model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
   return std::move(*checked);
 }
 
-// Built-in scenes and those from files. A file replaces a built-in scene of the same name.
-std::vector<model::Scene> loadScenes(const ProgramOptions& options) {
+// Built-in scenes and those from files. A file replaces a built-in scene of the same name. `builtIn` gets the
+// names of those that are not replaced.
+std::vector<model::Scene> loadScenes(const ProgramOptions& options, std::vector<std::string>& builtIn) {
+  builtIn = messages::namedScenes();
   std::vector<model::Scene> scenes;
   for (const std::string& name : messages::namedScenes()) scenes.push_back(loaded(messages::loadScene(name)));
   for (const std::filesystem::path& file : options.sceneFiles) {
     model::Scene scene = loaded(messages::readSceneFile(file));
     std::erase_if(scenes, [&](const model::Scene& other) { return other.name == scene.name; });
+    std::erase(builtIn, scene.name);
     scenes.push_back(std::move(scene));
   }
   for (model::Scene& scene : scenes)
@@ -474,7 +477,8 @@ std::uint64_t bytesOf(double megabytes) {
 int serve(const ProgramOptions& options, const Signals& signals) {
   StartGuard start(signals, options.drain);
   const auto monitoring = openMonitoring(options);
-  std::vector<model::Scene> scenes = loadScenes(options);
+  std::vector<std::string> builtIn;
+  std::vector<model::Scene> scenes = loadScenes(options, builtIn);
   std::string sceneList;
   for (const model::Scene& scene : scenes)
     sceneList +=
@@ -509,6 +513,7 @@ int serve(const ProgramOptions& options, const Signals& signals) {
     return recordings ? recordings->add(scene.name) : nullptr;
   };
   serverOptions.store = savedState;
+  serverOptions.guestScenes = std::move(builtIn);
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   guard = openEndpoints(server, options, signals, start, authenticator.get(), monitoring.get(),

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/delivery/merged_announcements.h"
 
 namespace clothstream::delivery {
 namespace {
@@ -50,20 +49,25 @@ bool Mailbox::reply(SharedBytes message) {
 }
 
 void Mailbox::announce(SharedBytes message) {
+  SharedMerges merges;
+  announce(std::move(message), merges);
+}
+
+void Mailbox::announce(SharedBytes message, SharedMerges& merges) {
   {
     const std::lock_guard lock(mutex_);
     if (closed_) return;
     announcements_.bytes += costOf(*message);
     announcements_.messages.push_back(std::move(message));
-    if (announcements_.bytes > mergeBeyond_) mergeAnnouncements();
+    if (announcements_.bytes > mergeBeyond_) mergeAnnouncements(merges);
     if (!streaming_) return;
     endpointWaits_ = false;
   }
   wake();
 }
 
-void Mailbox::mergeAnnouncements() {
-  announcements_.messages = merged(announcements_.messages);
+void Mailbox::mergeAnnouncements(SharedMerges& merges) {
+  announcements_.messages = merges.of(announcements_.messages);
   announcements_.bytes = 0;
   for (const SharedBytes& message : announcements_.messages) announcements_.bytes += costOf(*message);
   mergeBeyond_ = std::max(kMaxControlBytes, announcements_.bytes + kMinMergeBytes);

@@ -15,6 +15,7 @@
 #include "server/delivery/description_chunks.h"
 #include "server/delivery/envelope.h"
 #include "server/delivery/link_adaptation.h"
+#include "server/delivery/merged_announcements.h"
 #include "server/delivery/published_frame.h"
 #include "server/telemetry/metrics.h"
 
@@ -64,6 +65,8 @@ class Mailbox {
   [[nodiscard]] bool reply(SharedBytes message);
   // Queues a message that all subscribers of the scene get; it is sent after the description.
   void announce(SharedBytes message);
+  // Same; `merges` is shared by all mailboxes that get this message.
+  void announce(SharedBytes message, SharedMerges& merges);
 
   // Starts sending frames: the description first, unless it is null because the peer has it already. `wanted`
   // is limited to what the stream has. `metrics` must outlive the mailbox.
@@ -111,7 +114,7 @@ class Mailbox {
   std::optional<SharedBytes> take(Clock::time_point now);
   bool push(Control& control, SharedBytes message);
   static SharedBytes pop(Control& control);
-  void mergeAnnouncements();
+  void mergeAnnouncements(SharedMerges& merges);
   bool hasRoom() const { return sent_.size() < window(); }
   std::size_t window() const;
   // Quality that the adaptation chose; the present one if the stream has a single quality.

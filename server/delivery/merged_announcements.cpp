@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "server/delivery/merged_announcements.h"
 
-#include <algorithm>
+#include <compare>
 #include <cstdint>
+#include <iterator>
+#include <list>
+#include <map>
 #include <string>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/scene_message.h"
@@ -20,7 +22,7 @@ using Body = v1::ServerMessage;
 struct Key {
   Body::BodyCase body = Body::BODY_NOT_SET;
   std::uint64_t id = 0;
-  bool operator==(const Key&) const = default;
+  auto operator<=>(const Key&) const = default;
 };
 
 // Notices about the same thing have the same number.
@@ -51,18 +53,35 @@ auto keyOf(const v1::ContactEvent& event) {
       event.participant_id(), event.collider_id(), event.collider(), event.cloth());
 }
 
-// Appends the events, each instead of an older one of the same key.
+// The newest event of each key, in the order of their arrival.
 template <typename Event>
-void mergeEvents(google::protobuf::RepeatedPtrField<Event>& newer,
-                 google::protobuf::RepeatedPtrField<Event>& all) {
-  for (Event& event : newer) {
-    const auto older =
-        std::ranges::find_if(all, [&](const Event& known) { return keyOf(known) == keyOf(event); });
-    if (older != all.end()) all.erase(older);
-    if (all.size() == static_cast<int>(kMaxMergedEvents)) all.erase(all.begin());
-    all.Add()->Swap(&event);
+class NewestEvents {
+ public:
+  void add(google::protobuf::RepeatedPtrField<Event>& newer) {
+    for (Event& event : newer) {
+      if (const auto older = byKey_.find(keyOf(event)); older != byKey_.end()) erase(older);
+      if (events_.size() == kMaxMergedEvents) erase(byKey_.find(keyOf(events_.front())));
+      events_.emplace_back().Swap(&event);
+      byKey_.emplace(keyOf(events_.back()), std::prev(events_.end()));
+    }
+    newer.Clear();
   }
-}
+  void moveTo(google::protobuf::RepeatedPtrField<Event>& all) {
+    for (Event& event : events_) all.Add()->Swap(&event);
+  }
+
+ private:
+  // Keys refer to texts of the events, so they must end first.
+  using ByKey = std::map<decltype(keyOf(std::declval<const Event&>())), typename std::list<Event>::iterator>;
+  void erase(typename ByKey::iterator known) {
+    const auto event = known->second;
+    byKey_.erase(known);
+    events_.erase(event);
+  }
+
+  std::list<Event> events_;
+  ByKey byKey_;
+};
 
 // Merges `newer`, which replaces `older`, with it. Returns false if neither is worth sending.
 bool merge(Waiting& older, Waiting& newer) {
@@ -78,12 +97,6 @@ bool merge(Waiting& older, Waiting& newer) {
     message.mutable_presence()->set_kind(v1::PRESENCE_KIND_JOINED);
     newer.bytes = nullptr;
   } else if (message.has_tick_events()) {
-    v1::TickEvents& events = *message.mutable_tick_events();
-    v1::TickEvents all = std::move(*older.message.mutable_tick_events());
-    mergeEvents(*events.mutable_grabs(), *all.mutable_grabs());
-    mergeEvents(*events.mutable_contacts(), *all.mutable_contacts());
-    all.set_tick(events.tick());
-    events = std::move(all);
     newer.bytes = nullptr;
   }
   return true;
@@ -92,23 +105,44 @@ bool merge(Waiting& older, Waiting& newer) {
 }  // namespace
 
 std::deque<SharedBytes> merged(const std::deque<SharedBytes>& announcements) {
-  std::vector<Waiting> waiting;
+  std::list<Waiting> waiting;
+  std::map<Key, std::list<Waiting>::iterator> byKey;
+  NewestEvents<v1::GrabEvent> grabs;
+  NewestEvents<v1::ContactEvent> contacts;
   for (const SharedBytes& bytes : announcements) {
     Waiting next{.key = {}, .message = {}, .bytes = bytes};
     if (next.message.ParseFromArray(bytes->data(), static_cast<int>(bytes->size())))
       next.key = keyOf(next.message);
-    const auto older = std::ranges::find(waiting, next.key, &Waiting::key);
-    bool keeps = true;
-    if (older != waiting.end()) {
-      keeps = merge(*older, next);
-      waiting.erase(older);
+    if (next.message.has_tick_events()) {
+      grabs.add(*next.message.mutable_tick_events()->mutable_grabs());
+      contacts.add(*next.message.mutable_tick_events()->mutable_contacts());
     }
-    if (keeps) waiting.push_back(std::move(next));
+    const auto older = byKey.find(next.key);
+    bool keeps = true;
+    if (older != byKey.end()) {
+      keeps = merge(*older->second, next);
+      waiting.erase(older->second);
+      byKey.erase(older);
+    }
+    if (!keeps) continue;
+    waiting.push_back(std::move(next));
+    byKey.emplace(waiting.back().key, std::prev(waiting.end()));
   }
   std::deque<SharedBytes> result;
-  for (Waiting& each : waiting)
+  for (Waiting& each : waiting) {
+    if (!each.bytes && each.message.has_tick_events()) {
+      grabs.moveTo(*each.message.mutable_tick_events()->mutable_grabs());
+      contacts.moveTo(*each.message.mutable_tick_events()->mutable_contacts());
+    }
     result.push_back(each.bytes ? std::move(each.bytes) : serialise(each.message));
+  }
   return result;
+}
+
+const std::deque<SharedBytes>& SharedMerges::of(const std::deque<SharedBytes>& announcements) {
+  for (const Merge& known : merges_)
+    if (known.from == announcements) return known.to;
+  return merges_.emplace_back(announcements, merged(announcements)).to;
 }
 
 }  // namespace clothstream::delivery

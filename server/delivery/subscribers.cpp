@@ -52,7 +52,8 @@ void Subscribers::announce(const SharedBytes& message) {
     const std::lock_guard lock(mutex_);
     receivers = subscribers_;
   }
-  for (const Subscriber& receiver : receivers) receiver.mailbox->announce(message);
+  SharedMerges merges;
+  for (const Subscriber& receiver : receivers) receiver.mailbox->announce(message, merges);
 }
 
 void Subscribers::closeAll(const SharedBytes& last) {

@@ -31,7 +31,7 @@ void QualityEncoders::unwanted(std::uint8_t quality, Clock::time_point now) {
   Quality& of = qualities_[quality];
   if (of.encoder) of.encoder->forgetHistory();
   const bool idle = !of.encoder || of.encoder->isIdle();
-  if (quality > 0 && now - of.lastWanted >= kKept && idle) of = {};
+  if (quality > 0 && now - of.lastWanted >= kKept && idle) drop(of);
 }
 
 void QualityEncoders::forgetHistory() {
@@ -40,7 +40,14 @@ void QualityEncoders::forgetHistory() {
 }
 
 void QualityEncoders::drop() {
-  for (std::size_t i = 1; i < qualities_.size(); ++i) qualities_[i] = {};
+  for (std::size_t i = 1; i < qualities_.size(); ++i) drop(qualities_[i]);
+}
+
+void QualityEncoders::drop(Quality& quality) {
+  quality.encoder.reset();
+  // A future of std::async waits for its thread when it ends.
+  if (quality.coming.valid() && quality.coming.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
+    quality.coming = {};
 }
 
 }  // namespace clothstream::encode

@@ -34,7 +34,8 @@ class QualityEncoders {
 
   // Makes the next frame of each quality a key frame, after a rollback or restore.
   void forgetHistory();
-  // Destroys all encoders but the finest; they must be idle.
+  // Destroys all encoders but the finest; they must be idle. One that is being created stays until the next
+  // wanted(), unwanted() or drop() of its quality finds it complete. Does not wait.
   void drop();
 
  private:
@@ -43,6 +44,8 @@ class QualityEncoders {
     std::unique_ptr<FrameEncoder> encoder;
     Clock::time_point lastWanted{};
   };
+
+  static void drop(Quality& quality);
 
   const vulkan::Device& device_;
   const simulation::ClothSimulation& simulation_;

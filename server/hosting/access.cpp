@@ -58,18 +58,22 @@ std::shared_ptr<const void> SceneServer::State::countConnection(const Identity& 
   if (!identity.verified) return {std::shared_ptr<const void>(), &uncounted};
   // Subjects of two tenants are different.
   const std::string key = identity.tenant + '\0' + identity.subject;
-  const std::lock_guard lock(mutex);
-  const auto [count, isNew] = connectionsOfSubjects.try_emplace(key, 0);
-  if (count->second >= options.maxConnectionsPerToken) {
-    metrics.refuse(telemetry::Refusal::connectionsOfToken);
-    return nullptr;
+  auto release = [this, key](const void*) {
+    const std::lock_guard lock(mutex);
+    const auto known = connectionsOfSubjects.find(key);
+    if (--known->second == 0) connectionsOfSubjects.erase(known);
+  };
+  {
+    const std::lock_guard lock(mutex);
+    std::uint32_t& count = connectionsOfSubjects[key];
+    if (count >= options.maxConnectionsPerToken) {
+      metrics.refuse(telemetry::Refusal::connectionsOfToken);
+      return nullptr;
+    }
+    ++count;
   }
-  ++count->second;
-  return {&count->second, [this, key](const void*) {
-            const std::lock_guard guard(mutex);
-            const auto known = connectionsOfSubjects.find(key);
-            if (--known->second == 0) connectionsOfSubjects.erase(known);
-          }};
+  // Made without the lock, because it calls `release` at once if there is no memory for it.
+  return {&uncounted, std::move(release)};
 }
 
 messages::Result<void> SceneServer::State::mayUse(const Identity& by, const std::string& name) const {

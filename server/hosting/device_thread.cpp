@@ -11,6 +11,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/delivery/envelope.h"
+#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
@@ -67,6 +68,17 @@ void DeviceThread::simulateDeviceLoss() {
     loseDevice_ = true;
   }
   changed_.notify_all();
+}
+
+void DeviceThread::simulateDeviceLossIn(std::string scene) {
+  const std::lock_guard lock(mutex_);
+  losesDeviceIn_ = std::move(scene);
+}
+
+void DeviceThread::checkSimulatedLoss(const Run& run) const {
+  const std::lock_guard lock(mutex_);
+  if (!losesDeviceIn_.empty() && losesDeviceIn_ == run.scene->name())
+    throw vulkan::DeviceLost("the loss of the device in a scene is simulated");
 }
 
 vulkan::DeviceInfo DeviceThread::info() const {
@@ -152,12 +164,9 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       runSlice();
     } catch (const std::exception& failure) {
       // A lack of memory may also end the attempt.
-      for (bool tried = false; !tried;) try {
-          rebuildDevice(failure.what());
-          tried = true;
-        } catch (const std::exception& again) {
-          spdlog::error("device: {}; trying again", again.what());
-        }
+      schedule::retryUntilDone(
+          [&] { rebuildDevice(failure.what()); },
+          [](const std::exception& again) { spdlog::error("device: {}; trying again", again.what()); });
     }
   }
   loader_.abandon();
@@ -218,6 +227,7 @@ void DeviceThread::takeLoadedScenes() {
 
 void DeviceThread::take(Run& run) {
   try {
+    checkSimulatedLoss(run);
     if (run.host) {
       run.host->rebuild(run.loading.get(), run.rebuiltAfter);
     } else {
@@ -228,6 +238,7 @@ void DeviceThread::take(Run& run) {
     if (run.whenAdded) run.whenAdded->set_value();
     run.whenAdded.reset();
   } catch (const vulkan::DeviceLost&) {
+    countLoss(run);
     throw;
   } catch (const std::exception& failure) {
     run.refused = run.whenAdded.has_value();
@@ -291,6 +302,12 @@ void DeviceThread::checkPrice(Run& run) {
 }
 
 void DeviceThread::quarantine(Run& run, const std::string& why) {
+  if (!run.scene->created && !std::exchange(run.hasHarmed, true)) {
+    publisher_.drain();
+    run.price = {};
+    return dismiss(
+        run, fmt::format("it harms other scenes: {}; join again to start it with its own parameters", why));
+  }
   const std::string text =
       fmt::format("the scene '{}' is stopped because it harms other scenes: {}", run.scene->name(), why);
   spdlog::error("{}", text);
@@ -304,27 +321,47 @@ void DeviceThread::quarantine(Run& run, const std::string& why) {
   run.scene->quarantine(text);
 }
 
-void DeviceThread::startAndStopScenes() {
+DeviceThread::Run* DeviceThread::sceneToLoad() const {
+  const auto urgency = [this](const Run& run) {
+    return std::pair(&run == runs_.front().get(), run.scene->subscribers.size());
+  };
+  Run* next = nullptr;
   for (const auto& run : runs_) {
+    if (run->loading.valid()) return run.get();
+    if (run->needsDevice() && (next == nullptr || urgency(*run) > urgency(*next))) next = run.get();
+  }
+  return next;
+}
+
+void DeviceThread::startAndStopScenes() {
+  const Clock::time_point now = Clock::now();
+  Run* const loads = sceneToLoad();
+  // While a scene is loaded, neither of the two may run: all others if it must be alone, and those that must.
+  const auto waits = [&](const Run& run) {
+    return loads != nullptr && (loads->aloneUntil > now || run.aloneUntil > now);
+  };
+  for (const auto& run : runs_) {
+    run->guest = run->scene->isGuest();
     if (run->begun || run->quarantined) continue;
     const scene::LiveScene& scene = *run->scene;
     const bool inUse = scene.subscribers.size() > 0;
     const bool ready = run->host && run->host->isReady();
-    if ((inUse || run->host || run->whenAdded) && !ready && !run->loading.valid())
-      run->loading = loader_.load(*device_, scene.start());
     const bool stopped = scene.paused && !scene.resetRequested && !(ready && run->host->owesFrame());
     const bool wanted = ready && !stopped && (runAlways_ || inUse);
     if (wanted && !run->running) {
-      run->pacer.start(Clock::now());
+      run->pacer.start(now);
       run->slow.restart();
       run->overload.restart();
     }
     const bool paused = ready && inUse && !wanted;
     if (ready && !wanted && (run->running || (run->paused && !paused))) run->host->releaseCoarseEncoders();
-    run->running = wanted;
-    run->paused = paused;
+    run->running = wanted && !waits(*run);
+    run->paused = paused && !waits(*run);
     run->scene->running = wanted;
   }
+  const bool busy = std::ranges::any_of(runs_, [&](const auto& run) { return run->begun && waits(*run); });
+  if (loads != nullptr && !loads->loading.valid() && !busy)
+    loads->loading = loader_.load(*device_, loads->scene->start());
 }
 
 void DeviceThread::encodePausedFrames() {
@@ -349,16 +386,24 @@ void DeviceThread::runDueTicks() {
   }
   Clock::time_point before = Clock::now();
   scheduler_.choose(schedules(), before, chosen_);
+  const bool oneByOne = std::ranges::any_of(runs_, [&](const auto& run) { return run->aloneUntil > before; });
   for (schedule::TickSchedule* due : chosen_) {
     Run& run = static_cast<Run&>(*due);
     run.used = {};
-    run.begun = survives(run, [&] { begin(run, Clock::now()); });
+    run.begun = run.inFlight = survives(run, [&] { begin(run, Clock::now()); });
+    if (oneByOne) waitForFirstSlice(run, before);
   }
-  for (schedule::TickSchedule* due : chosen_) {
-    Run& run = static_cast<Run&>(*due);
-    if (!run.begun || !survives(run, [&] { run.host->waitForSlice(before); })) continue;
-    endSlice(run, std::exchange(before, Clock::now()));
-  }
+  for (schedule::TickSchedule* due : chosen_) waitForFirstSlice(static_cast<Run&>(*due), before);
+}
+
+void DeviceThread::waitForFirstSlice(Run& run, Clock::time_point& deviceFree) {
+  if (!run.inFlight) return;
+  const bool survived = survives(run, [&] {
+    run.host->waitForSlice(deviceFree);
+    checkSimulatedLoss(run);
+  });
+  run.inFlight = false;
+  if (survived) endSlice(run, std::exchange(deviceFree, Clock::now()));
 }
 
 void DeviceThread::runSlice() {
@@ -395,13 +440,29 @@ bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
     partOfTick();
     return true;
   } catch (const vulkan::DeviceLost&) {
-    const Clock::time_point now = Clock::now();
-    run.lostDeviceTwice = run.lostDevice && now - *run.lostDevice < kLossWindow;
-    run.lostDevice = now;
+    countLoss(run);
     throw;
   } catch (const std::exception& failure) {
     rebuildScene(run, failure.what());
     return false;
+  }
+}
+
+void DeviceThread::countLoss(const Run& noticed) {
+  const Clock::time_point now = Clock::now();
+  std::vector<Run*> suspects;
+  for (const auto& run : runs_)
+    if (run.get() == &noticed || run->inFlight || run->loading.valid()) suspects.push_back(run.get());
+  for (Run* suspect : suspects) {
+    const bool again = suspect->lostDevice && now - *suspect->lostDevice < kLossWindow;
+    if (again && suspects.size() == 1) suspect->lostDeviceTwice = true;
+    if (again && suspects.size() > 1) suspect->aloneUntil = now + kLossWindow;
+    suspect->lostDevice = now;
+    if (!suspect->whenAdded) continue;
+    suspect->whenAdded->set_exception(
+        std::make_exception_ptr(std::runtime_error("the device was lost while the scene was being loaded")));
+    suspect->whenAdded.reset();
+    suspect->refused = true;
   }
 }
 
@@ -443,7 +504,7 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
   loader_.abandon();
   for (const auto& run : runs_) {
     run->loading = {};
-    run->begun = false;
+    run->begun = run->inFlight = false;
     if (std::exchange(run->lostDeviceTwice, false))
       quarantine(*run, "the device was lost twice while it ran");
   }
@@ -477,19 +538,12 @@ bool DeviceThread::tryRebuildDevice() {
 }
 
 void DeviceThread::reloadScenes() {
-  std::vector<Run*> lost;
   for (const auto& run : runs_) {
     run->overload.restart();
     if (!run->host) continue;
     run->rebuiltAfter = "the device was lost";
     run->rebuildFailed = false;
-    lost.push_back(run.get());
   }
-  // runs_ begins with the default scene.
-  std::ranges::stable_sort(lost, std::ranges::greater{}, [&](const Run* run) {
-    return std::pair(run == runs_.front().get(), run->scene->subscribers.size());
-  });
-  for (Run* run : lost) run->loading = loader_.load(*device_, run->scene->start());
 }
 
 }  // namespace clothstream::hosting

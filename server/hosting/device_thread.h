@@ -51,7 +51,14 @@ using schedule::Clock;
 // (schedule::OverloadPolicy).
 //
 // A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), or if the device
-// is lost twice within kLossWindow while the thread runs this scene.
+// is lost twice within kLossWindow while it works on this scene: runs a tick, or loads it. A scene that the
+// server started with gets a second chance, because a participant's change may be the reason: the first time
+// it is given up, so that the next join starts it with its own parameters. A scene that add() loads is
+// refused if the device is lost meanwhile.
+//
+// If the device worked on several scenes when it was lost, none of them is to blame yet. If that happens
+// again within kLossWindow, each of them runs alone for kLossWindow: the device works on nothing else
+// meanwhile.
 class DeviceThread {
  public:
   static constexpr std::chrono::seconds kLossWindow{60};
@@ -88,11 +95,14 @@ class DeviceThread {
 
   // Treats the device as lost before the next tick. For tests.
   void simulateDeviceLoss();
+  // Treats the device as lost whenever it has loaded this scene or has worked on a tick of it. An empty name
+  // ends this. For tests.
+  void simulateDeviceLossIn(std::string scene);
 
  private:
   struct Run : schedule::TickSchedule {
     explicit Run(std::shared_ptr<scene::LiveScene> live)
-        : TickSchedule(live->start().simulationRate, live->created),
+        : TickSchedule(live->start().simulationRate, live->isGuest()),
           scene(std::move(live)),
           overload(scene->start().streamRate, scene->start().substeps) {}
     // Adds slipped ticks, and returns the whole ticks that are not counted yet.
@@ -101,6 +111,12 @@ class DeviceThread {
       const double whole = std::floor(slipped);
       slipped -= whole;
       return static_cast<std::uint64_t>(whole);
+    }
+
+    // Returns whether the scene is to be loaded.
+    bool needsDevice() const {
+      const bool wanted = scene->subscribers.size() > 0 || host || whenAdded;
+      return wanted && !begun && !quarantined && !(host && host->isReady());
     }
 
     // Time at which the scene next needs the thread.
@@ -123,8 +139,11 @@ class DeviceThread {
     const char* rebuiltAfter = "";                // event after which the host is rebuilt
     std::optional<std::uint64_t> failed;          // tick count at the newest failure
     bool rebuildFailed = false;                   // since the newest failure
-    std::optional<Clock::time_point> lostDevice;  // newest loss while the thread ran this scene
-    bool lostDeviceTwice = false;                 // within kLossWindow
+    bool inFlight = false;                        // the device works on a slice of its tick
+    std::optional<Clock::time_point> lostDevice;  // newest loss while the device worked on this scene
+    bool lostDeviceTwice = false;                 // within kLossWindow, the second time on it alone
+    Clock::time_point aloneUntil{};  // the device works on nothing else while it works on this scene
+    bool hasHarmed = false;          // it was given up once instead of a quarantine
     schedule::SlowWatch slow;
     schedule::PriceWatch price;
     schedule::OverloadPolicy overload;
@@ -138,9 +157,13 @@ class DeviceThread {
   // Returns false when the thread must end.
   bool waitForWork();
   void startAndStopScenes();
+  // The scene that is being loaded, else the one to load next: the default scene first, then the one with the
+  // most subscribers. Null if no scene waits. One is loaded at a time, so that it is known which one the
+  // device works on.
+  Run* sceneToLoad() const;
   // Creates the hosts of loaded scenes.
   void takeLoadedScenes();
-  // Throws vulkan::DeviceLost.
+  // Throws vulkan::DeviceLost, and counts that as the scene's.
   void take(Run& run);
   // Gives the states of all scenes to their keepers, because the thread ends. Ends short ticks first.
   void saveLast();
@@ -150,6 +173,7 @@ class DeviceThread {
   void adaptToLoad(Run& run, Clock::time_point now);
   // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
   void checkPrice(Run& run);
+  // Stops a scene that harms others; a scene of the server is only given up the first time.
   void quarantine(Run& run, const std::string& why);
   // Lets a new host that continues from a checkpoint keep the checkpoint's work.
   void continueOverload(Run& run);
@@ -160,6 +184,8 @@ class DeviceThread {
   // Of all scenes, until the next call.
   std::span<schedule::TickSchedule* const> schedules();
   void runDueTicks();
+  // Waits for the first slice of a tick that began when the device was busy until `deviceFree`.
+  void waitForFirstSlice(Run& run, Clock::time_point& deviceFree);
   // Runs one slice of a tick that has begun and takes longer than a slice.
   void runSlice();
   // Accounts for the time since `before`, and finishes the tick if it has no more slices.
@@ -167,11 +193,15 @@ class DeviceThread {
   // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost,
   // and counts that as the scene's.
   bool survives(Run& run, const std::function<void()>& partOfTick);
+  // Throws vulkan::DeviceLost if simulateDeviceLossIn() asks for that.
+  void checkSimulatedLoss(const Run& run) const;
+  // Counts a loss of the device, which was noticed at the work for this scene.
+  void countLoss(const Run& noticed);
   void rebuildScene(Run& run, const std::string& reason);
   void begin(Run& run, Clock::time_point now);
   void rebuildDevice(const std::string& reason);
   bool tryRebuildDevice();
-  // Starts to load all scenes that were on the former device.
+  // Prepares all scenes that were on the former device for being loaded again.
   void reloadScenes();
 
   const vulkan::DeviceOptions options_;
@@ -186,6 +216,7 @@ class DeviceThread {
   std::condition_variable changed_;
   // Initially woken, because a scene may run without subscribers.
   bool stopping_ = false, woken_ = true, loseDevice_ = false;
+  std::string losesDeviceIn_;
   vulkan::DeviceInfo info_;
   std::vector<std::packaged_task<void()>> tasks_;
 

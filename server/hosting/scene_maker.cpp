@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <future>
 #include <memory>
 #include <span>
 #include <utility>
@@ -12,6 +13,7 @@
 #include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/hosting/give_answer.h"
 #include "server/hosting/server_state.h"
 #include "server/messages/limits.h"
 #include "server/messages/parsed_size.h"
@@ -22,6 +24,9 @@
 
 namespace clothstream::hosting {
 namespace {
+
+// Interval at which a scene that is being loaded is checked for cancellation.
+constexpr std::chrono::milliseconds kLoadingCheck{20};
 
 tl::unexpected<v1::Error> refused(v1::ErrorCode code, std::string text) {
   v1::Error error;
@@ -135,15 +140,29 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
       }
     });
     uploaded.reset();  // before the answer, so that the peer may upload again at once
-    done(std::move(made));
+    giveAnswer("createScene", done, std::move(made));
   });
   return {};
 }
 
-void SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
-  postTo(thread_, [this, request = std::move(request), done = std::move(done)] {
-    done(attempt("deleteScene", [&] { return removeNow(request); }));
+template <class Work, class Done>
+tl::expected<void, v1::Error> SceneMaker::enqueue(const char* call, Work work, Done done) {
+  if (++requests_ > kMaxWaiting) {
+    --requests_;
+    server_.metrics.refuse(telemetry::Refusal::waitingScenes);
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                   fmt::format("{}: {} requests about scenes wait; try again later", call, kMaxWaiting));
+  }
+  postTo(thread_, [this, call, work = std::move(work), done = std::move(done)] {
+    --requests_;
+    giveAnswer(call, done, attempt(call, work));
   });
+  return {};
+}
+
+tl::expected<void, v1::Error> SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
+  return enqueue(
+      "deleteScene", [this, request = std::move(request)] { return removeNow(request); }, std::move(done));
 }
 
 tl::expected<std::shared_ptr<scene::Journal>, v1::Error> SceneMaker::journalOf(
@@ -160,16 +179,16 @@ tl::expected<std::shared_ptr<scene::Journal>, v1::Error> SceneMaker::journalOf(
   return scene->journal;
 }
 
-void SceneMaker::startRecording(v1::StartRecordingRequest request, StartRecordingDone done) {
-  postTo(thread_, [this, request = std::move(request), done = std::move(done)] {
-    done(attempt("startRecording", [&] { return startNow(request); }));
-  });
+tl::expected<void, v1::Error> SceneMaker::startRecording(v1::StartRecordingRequest request,
+                                                         StartRecordingDone done) {
+  return enqueue(
+      "startRecording", [this, request = std::move(request)] { return startNow(request); }, std::move(done));
 }
 
-void SceneMaker::stopRecording(v1::StopRecordingRequest request, StopRecordingDone done) {
-  postTo(thread_, [this, request = std::move(request), done = std::move(done)] {
-    done(attempt("stopRecording", [&] { return stopNow(request); }));
-  });
+tl::expected<void, v1::Error> SceneMaker::stopRecording(v1::StopRecordingRequest request,
+                                                        StopRecordingDone done) {
+  return enqueue(
+      "stopRecording", [this, request = std::move(request)] { return stopNow(request); }, std::move(done));
 }
 
 tl::expected<v1::StartRecordingResponse, v1::Error> SceneMaker::startNow(
@@ -285,19 +304,21 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
     return refused(charged.error().code, std::move(charged.error().text));
   }
   server_.keep(scene);
+  std::future<void> added = server_.device.add(scene);
   try {
-    server_.device.add(scene).get();
+    while (added.wait_for(kLoadingCheck) != std::future_status::ready) cancellation.check();
+    added.get();
+    cancellation.check();
+  } catch (const model::Cancelled&) {
+    // Nothing waits for the device here, because it may be what takes too long.
+    server_.device.remove(scene);
+    scene->discharge();
+    server_.forget(*scene);
+    throw;
   } catch (const std::exception& failure) {
     server_.forget(*scene);
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("createScene: the device cannot run it: {}", failure.what()));
-  }
-  try {
-    cancellation.check();
-  } catch (const model::Cancelled&) {
-    server_.device.remove(scene).wait();
-    server_.forget(*scene);
-    throw;
   }
   server_.insert(scene);
   server_.flushStore(*scene);

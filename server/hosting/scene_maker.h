@@ -34,7 +34,7 @@ class SceneMaker {
   // Cancels the scene that is being created, and refuses those that wait and come.
   void stop() { stopping_ = true; }
 
-  // Maximum number of scenes that wait to be created.
+  // Maximum number of scenes that wait to be created, and also of other requests that wait.
   static constexpr std::uint32_t kMaxWaiting = 64;
 
   // `uploaded` is the content that `request` names, if it names one. Its reservation ends before the answer.
@@ -44,12 +44,18 @@ class SceneMaker {
   [[nodiscard]] tl::expected<void, v1::Error> create(v1::CreateSceneRequest request,
                                                      std::optional<UploadedContent> uploaded,
                                                      std::string tenant, Wanted wanted, CreateDone done);
-  void remove(v1::DeleteSceneRequest request, DeleteDone done);
+  // While kMaxWaiting of the following requests wait, they return an error, and `done` is not called.
+  [[nodiscard]] tl::expected<void, v1::Error> remove(v1::DeleteSceneRequest request, DeleteDone done);
   // Both block the worker thread on the disk.
-  void startRecording(v1::StartRecordingRequest request, StartRecordingDone done);
-  void stopRecording(v1::StopRecordingRequest request, StopRecordingDone done);
+  [[nodiscard]] tl::expected<void, v1::Error> startRecording(v1::StartRecordingRequest request,
+                                                             StartRecordingDone done);
+  [[nodiscard]] tl::expected<void, v1::Error> stopRecording(v1::StopRecordingRequest request,
+                                                            StopRecordingDone done);
 
  private:
+  // Gives the result of `work` to `done`, on the worker thread.
+  template <class Work, class Done>
+  tl::expected<void, v1::Error> enqueue(const char* call, Work work, Done done);
   tl::expected<v1::CreateSceneResponse, v1::Error> createNow(const v1::CreateSceneRequest& request,
                                                              const std::string& uploaded,
                                                              const std::string& tenant,
@@ -71,7 +77,8 @@ class SceneMaker {
 
   SceneServer::State& server_;
   std::atomic<bool> stopping_ = false;
-  std::atomic<std::uint32_t> waiting_ = 0;  // scenes to be created
+  std::atomic<std::uint32_t> waiting_ = 0;   // scenes to be created
+  std::atomic<std::uint32_t> requests_ = 0;  // other requests that wait
   boost::asio::thread_pool thread_{1};
   boost::asio::steady_timer expiry_{thread_};
   bool ended_ = false;  // belongs to the thread, like expiry_

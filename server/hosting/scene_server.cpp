@@ -69,21 +69,24 @@ void SceneServer::createScene(const v1::CreateSceneRequest& request, const Creat
 void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done, const Identity& by) {
   if (const auto may = state_->mayFromOutside(by, request.name(), scene::Action::deleteScene); !may)
     return done(tl::unexpected(toMessage(may.error())));
-  state_->maker.remove(request, std::move(done));
+  if (auto accepted = state_->maker.remove(request, done); !accepted)
+    done(tl::unexpected(std::move(accepted.error())));
 }
 
 void SceneServer::startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done,
                                  const Identity& by) {
   if (const auto may = state_->mayFromOutside(by, request.scene(), scene::Action::recordScene); !may)
     return done(tl::unexpected(toMessage(may.error())));
-  state_->maker.startRecording(request, std::move(done));
+  if (auto accepted = state_->maker.startRecording(request, done); !accepted)
+    done(tl::unexpected(std::move(accepted.error())));
 }
 
 void SceneServer::stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done,
                                 const Identity& by) {
   if (const auto may = state_->mayFromOutside(by, request.scene(), scene::Action::recordScene); !may)
     return done(tl::unexpected(toMessage(may.error())));
-  state_->maker.stopRecording(request, std::move(done));
+  if (auto accepted = state_->maker.stopRecording(request, done); !accepted)
+    done(tl::unexpected(std::move(accepted.error())));
 }
 
 tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::controlScene(

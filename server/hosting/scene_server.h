@@ -49,6 +49,9 @@ struct ServerOptions {
   vulkan::DeviceOptions device;
   // Scene of peers that name none. Must be one of the scenes.
   std::string defaultScene;
+  // Scenes that the server starts with and that share the device like created ones. The default scene is
+  // never one of them.
+  std::vector<std::string> guestScenes{};
   // Sent to clients in Welcome.
   std::string serverName = "clothstream-server";
   // Scenes without subscribers keep running: the default scene from the start, others once they were joined.

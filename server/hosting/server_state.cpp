@@ -26,6 +26,9 @@ std::vector<std::shared_ptr<scene::LiveScene>> liveScenes(std::vector<model::Sce
     std::shared_ptr<scene::Journal> journal = options.journals ? options.journals(definition) : nullptr;
     scenes.push_back(std::make_shared<scene::LiveScene>(std::move(definition), false, std::move(journal),
                                                         options.maxParticipants, budget));
+    const std::string& name = scenes.back()->name();
+    scenes.back()->sharesAsGuest =
+        name != options.defaultScene && std::ranges::count(options.guestScenes, name) > 0;
   }
   return scenes;
 }
@@ -303,6 +306,10 @@ tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlSce
     const v1::ControlSceneRequest& request, std::uint64_t participant) {
   const std::shared_ptr<scene::LiveScene> scene = find(request.name());
   if (!scene) return tl::unexpected(noSuchScene(request.name()));
+  if (const auto counted = scene->countChange(participant, "controlScene"); !counted) {
+    metrics.refuse(*counted.error().limit);
+    return tl::unexpected(toMessage(counted.error()));
+  }
   if (const auto controlled = controlSource(*scene, request); !controlled)
     return tl::unexpected(toMessage(controlled.error()));
   if (request.has_paused() && scene->paused.exchange(request.paused()) != request.paused())

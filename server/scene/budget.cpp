@@ -103,6 +103,12 @@ Charge::Amount Charge::priceOf(const model::Scene& scene) const {
           .megabytes = std::max(0.0, model_.bytes(scene) / kMegabyte - freeMegabytes_)};
 }
 
+bool Charge::exceedsStart(const model::Scene& scene) const {
+  const std::lock_guard lock(budget_->mutex_);
+  const double seconds = model_.work(scene, scene.colliders.size()).seconds(budget_->speed_);
+  return seconds > freeWork_.seconds(budget_->speed_) || model_.bytes(scene) / kMegabyte > freeMegabytes_;
+}
+
 void Charge::replace(const Amount& next) {
   budget_->load_ += next.load - charged_.load;
   budget_->megabytes_ += next.megabytes - charged_.megabytes;

@@ -68,6 +68,9 @@ class Charge {
                                          std::size_t count);
   // Charges the scene with parameters that it had before, also beyond the budget.
   void restore(const model::Scene& scene);
+  // Returns whether a free scene would cost more than it did at first. Colliders of participants do not
+  // count.
+  bool exceedsStart(const model::Scene& scene) const;
   // Gives the charge back. Until the scene is charged again, its colliders cost nothing.
   void release();
 

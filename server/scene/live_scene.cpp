@@ -2,6 +2,7 @@
 #include "server/scene/live_scene.h"
 
 #include <algorithm>
+#include <iterator>
 #include <random>
 #include <utility>
 #include <vector>
@@ -185,18 +186,37 @@ std::string LiveScene::quarantined() const {
   return quarantined_;
 }
 
+messages::Result<void> LiveScene::countChange(std::uint64_t participant, const char* call) {
+  const std::lock_guard lock(mutex_);
+  return countChangeLocked(participant, call);
+}
+
+// Each change is sent to all participants.
+messages::Result<void> LiveScene::countChangeLocked(std::uint64_t participant, const char* call) {
+  const Clock::time_point now = Clock::now();
+  const auto refuse = [&](const char* whose) {
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        fmt::format("{}: too many changes of '{}'{} in one second; send it again later", call, name(), whose),
+        telemetry::Refusal::parameterChanges});
+  };
+  for (auto known = changesOf_.begin(); known != changesOf_.end();)
+    known = known->second.isFull(now) ? changesOf_.erase(known) : std::next(known);
+  auto& own =
+      changesOf_.try_emplace(participant, kChangesOfParticipantPerSecond, kChangesOfParticipantPerSecond)
+          .first->second;
+  if (!own.take(now)) return refuse(" by one participant");
+  if (!changes_.take(now)) return refuse("");
+  return {};
+}
+
 messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
   if (source)
     return tl::unexpected(messages::FieldError{
         v1::ERROR_CODE_INVALID_ARGUMENT,
         "parameterChange: '" + name() + "' is a recording that is played; its parameters cannot be changed"});
   const std::lock_guard lock(mutex_);
-  // Each change is sent to all participants.
-  if (!changes_.take(Clock::now()))
-    return tl::unexpected(messages::FieldError{
-        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-        "parameterChange: too many changes of '" + name() + "' in one second; send it again later",
-        telemetry::Refusal::parameterChanges});
+  if (auto counted = countChangeLocked(participant, "parameterChange"); !counted) return counted;
   messages::Result<model::ParameterChange> change =
       messages::toParameterChange(message, definition_, stability_);
   if (!change) return tl::unexpected(std::move(change).error());

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -81,6 +82,9 @@ class LiveScene {
   messages::Result<void> chargeColliders(std::size_t count);
   // Gives the charge back, because the scene has been deleted. Others may hold the object for longer.
   void discharge();
+  // Returns whether the scene shares the device as a guest (schedule::TickSchedule): a peer created it, it is
+  // `sharesAsGuest`, or participants have made it more expensive than it was at its start.
+  bool isGuest() const { return created || sharesAsGuest || isDearer_; }
   // Price of a tick with the accepted changes and this number of colliders.
   model::Work tickWork(std::size_t colliders) const;
   // Price of the scene as it is: seconds of the device's time per second, by estimate.
@@ -117,6 +121,12 @@ class LiveScene {
 
   // Parameter changes of all participants together.
   static constexpr double kChangesPerSecond = 240;
+  // Parameter changes, pauses and resets of one participant; peers outside the scene count as one.
+  static constexpr double kChangesOfParticipantPerSecond = kChangesPerSecond / 4;
+
+  // Counts a change by this participant, 0 for peers outside the scene, or returns why there are too many.
+  // `call` begins the text.
+  messages::Result<void> countChange(std::uint64_t participant, const char* call);
 
   // Epoch of the stream; a server has only one.
   static constexpr std::uint32_t kEpoch = 1;
@@ -127,6 +137,8 @@ class LiveScene {
   // Whether it is a scene of an earlier run that has no room in this one. It does not run, and stays kept.
   // Set before other threads know the scene.
   bool waitsForRoom = false;
+  // Set before other threads know the scene.
+  bool sharesAsGuest = false;
   const std::uint32_t maxParticipants;
   const std::shared_ptr<Journal> journal;     // null: the scene has none
   const std::shared_ptr<FrameSource> source;  // null: the scene is simulated
@@ -150,10 +162,13 @@ class LiveScene {
       work;  // of the newest tick; less than allWork() while the device is overloaded
 
  private:
+  // The same; the caller holds the lock.
+  messages::Result<void> countChangeLocked(std::uint64_t participant, const char* call);
   // The definition has changed. The caller holds the lock.
   void definitionChanged() {
     description_.reset();
     ++version_;
+    isDearer_ = charge_.exceedsStart(definition_);
   }
 
   const model::Scene start_;
@@ -164,9 +179,12 @@ class LiveScene {
   model::Scene definition_;
   std::uint64_t version_ = 0;  // of definition_
   std::shared_ptr<const Restored> restored_;
-  Charge charge_;  // of definition_
+  Charge charge_;                      // of definition_
+  std::atomic<bool> isDearer_{false};  // definition_ costs more than start_
   std::string quarantined_;
   schedule::TokenBucket changes_{kChangesPerSecond, kChangesPerSecond};
+  // Buckets by participant. Full ones are removed.
+  std::map<std::uint64_t, schedule::TokenBucket> changesOf_;
   std::optional<Clock::time_point> emptySince_;                     // of the newest call of hasBeenEmptyFor()
   std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
   std::uint64_t contents_ = 0;                                      // newest content id

@@ -2,6 +2,7 @@
 #include "server/schedule/overload_policy.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace clothstream::schedule {
 
@@ -42,6 +43,17 @@ void OverloadPolicy::begin(const Tick& tick) {
   own_ = {};
   ticks_ = slipped_ = 0;
   disturbed_ = false;
+  newest_ = judged_ = tick.now;
+  newestIdle_ = tick.idle;
+}
+
+void OverloadPolicy::leaveOut(const Tick& tick) {
+  const Clock::duration passed = tick.now - newest_;
+  *began_ += passed;
+  calmSince_ += passed;
+  idleBefore_ += tick.idle - newestIdle_;
+  newest_ = tick.now;
+  newestIdle_ = tick.idle;
 }
 
 bool OverloadPolicy::note(const Tick& tick, std::uint32_t leastSubsteps) {
@@ -49,18 +61,26 @@ bool OverloadPolicy::note(const Tick& tick, std::uint32_t leastSubsteps) {
     begin(tick);
     return false;
   }
+  const bool leavesOut = tick.disturbed && tick.now - judged_ < kLongestDisturbance;
+  const bool leftOut = std::exchange(disturbed_, leavesOut);
+  if (leavesOut) {
+    leaveOut(tick);
+    return false;
+  }
   ticks_ += 1;
-  slipped_ += tick.slippedTicks;
+  // Time that slips before the first tick after a disturbance is due to the disturbance.
+  if (!leftOut) slipped_ += tick.slippedTicks;
   own_ += tick.own;
-  disturbed_ |= tick.disturbed;
+  newest_ = tick.now;
+  newestIdle_ = tick.idle;
   if (tick.now - *began_ < kInterval) return false;
   const bool slow = ticks_ / (ticks_ + slipped_) < kSlow;
   const double own = seconds(own_) / ticks_, share = seconds(tick.share);
   bool changed = false;
   if (slow) {
     calmSince_ = tick.now;
-    if (!disturbed_ && own > kMostUse * share) changed = stepDown(tick.now, leastSubsteps);
-  } else if (!disturbed_) {
+    if (own > kMostUse * share) changed = stepDown(tick.now, leastSubsteps);
+  } else {
     changed = stepUp(tick, leastSubsteps);
   }
   begin(tick);

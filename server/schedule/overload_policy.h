@@ -23,6 +23,10 @@ struct WorkLevel {
 // three quarters, a half and a quarter of its substeps. Beyond that, simulated time is slower. A scene whose
 // ticks fit their share is late because of other work and does not step down.
 //
+// Disturbed ticks are left out, and their time does not count: an interval has kInterval of undisturbed time.
+// After kLongestDisturbance without a complete interval they count, so that a scene is judged even while
+// other scenes are loaded all the time.
+//
 // The scene steps up again after a pause without slip, if the higher level is expected to fit. A step up that
 // fails within twice the pause doubles the pause, so that levels do not oscillate.
 //
@@ -33,6 +37,8 @@ class OverloadPolicy {
   static constexpr std::chrono::seconds kInterval{1};
   // Time without slip before a step up: at first, and at most.
   static constexpr std::chrono::seconds kPause{10}, kLongestPause{160};
+  // Longest time for which disturbed ticks are left out, until the next interval is complete.
+  static constexpr std::chrono::seconds kLongestDisturbance{10};
   // Simulated seconds per real second below which time slips, as for SlowWatch.
   static constexpr double kSlow = 0.95;
   // Part of its share that the ticks of a scene may need, and part that they may need after a step up.
@@ -70,6 +76,8 @@ class OverloadPolicy {
  private:
   WorkLevel at(std::size_t index, std::uint32_t leastSubsteps) const;
   void begin(const Tick& tick);
+  // Moves the interval by the time of this tick, which is left out.
+  void leaveOut(const Tick& tick);
   bool stepDown(Clock::time_point now, std::uint32_t leastSubsteps);
   bool stepUp(const Tick& tick, std::uint32_t leastSubsteps);
 
@@ -79,7 +87,9 @@ class OverloadPolicy {
   std::optional<Clock::time_point> began_;  // interval
   Clock::duration idleBefore_{}, own_{};
   double ticks_ = 0, slipped_ = 0;
-  bool disturbed_ = false;
+  bool disturbed_ = false;                 // the newest tick was left out
+  Clock::time_point newest_{}, judged_{};  // ends of the newest tick, and of the newest complete interval
+  Clock::duration newestIdle_{};           // at newest_
 
   Clock::time_point calmSince_{};
   std::optional<Clock::time_point> steppedUp_;  // newest step up since the newest step down

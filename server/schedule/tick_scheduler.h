@@ -13,7 +13,7 @@ namespace clothstream::schedule {
 
 // Due times and cost of one scene's ticks.
 struct TickSchedule {
-  // `isGuest`: a participant created the scene. All guests together get the share of one other scene.
+  // `isGuest`: all guests together get the share of one other scene.
   explicit TickSchedule(std::uint32_t ticksPerSecond, bool isGuest = false)
       : pacer(ticksPerSecond), guest(isGuest) {}
 
@@ -21,7 +21,7 @@ struct TickSchedule {
   void tickEnded(Clock::duration time, Clock::time_point now);
 
   Pacer pacer;
-  const bool guest;
+  bool guest;  // may change between two calls of the scheduler
   bool running = false;
   bool begun = false;         // the current tick has begun, and is not finished
   Clock::duration cost{};     // recent average for one tick

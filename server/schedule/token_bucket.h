@@ -22,6 +22,12 @@ class TokenBucket {
     return true;
   }
 
+  // Returns whether the bucket has all its tokens, like a new one.
+  bool isFull(Clock::time_point now) {
+    refill(now);
+    return tokens_ >= burst_;
+  }
+
   // Takes `cost` tokens, also if there are fewer. Returns the time until the missing ones are there, else 0.
   Clock::duration pay(Clock::time_point now, double cost) {
     refill(now);

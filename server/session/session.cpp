@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <exception>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,6 +14,7 @@
 #include "server/hosting/server_state.h"
 #include "server/identity/authenticator.h"
 #include "server/messages/client_message.h"
+#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::session {
@@ -144,11 +144,13 @@ template <typename Response>
 std::function<void(tl::expected<Response, v1::Error>)> Session::answering(
     Response* (v1::ServerMessage::*body)()) {
   ++asked_;
-  return [weak = weak_from_this(), requestId = requestId_, body](tl::expected<Response, v1::Error> response) {
+  return [weak = weak_from_this(), requestId = requestId_, body,
+          counted = true](tl::expected<Response, v1::Error> response) mutable {
     const std::shared_ptr<Session> session = weak.lock();
     if (!session) return;
     const std::lock_guard lock(session->mutex_);
-    --session->asked_;
+    // A call that throws is repeated.
+    if (std::exchange(counted, false)) --session->asked_;
     if (session->mailbox_->closed()) return;
     session->now_ = Clock::now();
     session->requestId_ = requestId;
@@ -204,8 +206,9 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
     case Body::kDeleteScene:
       if (!allowed(controlRate_, "requests about scenes")) return;
       if (!actor(message.delete_scene().name(), Action::deleteScene)) return;
-      return server_.maker.remove(message.delete_scene(), answering<v1::DeleteSceneResponse>(
-                                                              &v1::ServerMessage::mutable_delete_scene));
+      return refuseUnlessQueued(
+          server_.maker.remove(message.delete_scene(),
+                               answering<v1::DeleteSceneResponse>(&v1::ServerMessage::mutable_delete_scene)));
     case Body::kControlScene: {
       if (!allowed(controlRate_, "requests about scenes")) return;
       const auto participant = actor(message.control_scene().name(), Action::controlScene);
@@ -219,15 +222,15 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
     case Body::kStartRecording:
       if (!allowed(controlRate_, "requests about scenes")) return;
       if (!actor(message.start_recording().scene(), Action::recordScene)) return;
-      return server_.maker.startRecording(
+      return refuseUnlessQueued(server_.maker.startRecording(
           message.start_recording(),
-          answering<v1::StartRecordingResponse>(&v1::ServerMessage::mutable_start_recording));
+          answering<v1::StartRecordingResponse>(&v1::ServerMessage::mutable_start_recording)));
     case Body::kStopRecording:
       if (!allowed(controlRate_, "requests about scenes")) return;
       if (!actor(message.stop_recording().scene(), Action::recordScene)) return;
-      return server_.maker.stopRecording(
+      return refuseUnlessQueued(server_.maker.stopRecording(
           message.stop_recording(),
-          answering<v1::StopRecordingResponse>(&v1::ServerMessage::mutable_stop_recording));
+          answering<v1::StopRecordingResponse>(&v1::ServerMessage::mutable_stop_recording)));
     default:
       break;
   }
@@ -403,12 +406,15 @@ void Session::create(const v1::CreateSceneRequest& request) {
     const std::shared_ptr<Session> session = weak.lock();
     return session && !session->mailbox_->closed();
   };
-  const auto accepted =
+  refuseUnlessQueued(
       server_.maker.create(request, std::move(uploaded), identity_->tenant, wanted,
-                           answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene));
-  if (accepted) return;
+                           answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene)));
+}
+
+void Session::refuseUnlessQueued(const tl::expected<void, v1::Error>& queued) {
+  if (queued) return;
   --asked_;
-  refuse({accepted.error().code(), accepted.error().text()});
+  refuse({queued.error().code(), queued.error().text()});
 }
 
 void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
@@ -531,13 +537,9 @@ void Session::end() {
   now_ = Clock::now();
   // The owner's destructor calls this, so nothing may leave it. A lack of memory leaves the participant in
   // its scene until the next attempt.
-  for (bool tried = false; !tried;) try {
-      closeLocked(nullptr, DisconnectReason::lost);
-      tried = true;
-    } catch (const std::exception& failure) {
-      spdlog::error("{}: {}; trying again", peer_, failure.what());
-      std::this_thread::yield();
-    }
+  schedule::retryUntilDone(
+      [&] { closeLocked(nullptr, DisconnectReason::lost); },
+      [&](const std::exception& failure) { spdlog::error("{}: {}; trying again", peer_, failure.what()); });
   counted_.reset();
 }
 

@@ -112,6 +112,8 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void answer(v1::ServerMessage& message);
   void refuse(const messages::FieldError& reason, double cost = 1);
   void refuseUnless(const messages::Result<void>& done);
+  // For a request whose answer is made by answering().
+  void refuseUnlessQueued(const tl::expected<void, v1::Error>& queued);
   void fail(v1::ErrorCode code, std::string text);
   // Takes a token, or refuses the message.
   bool allowed(TokenBucket& bucket, const char* what);

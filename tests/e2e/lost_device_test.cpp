@@ -158,7 +158,7 @@ TEST_F(LostDevice, StreamContinuesAfterLossOfDevice) {
   EXPECT_THAT(server_->output(), ::testing::ContainsRegex("device rebuilds 1"));
 }
 
-TEST_F(LostDevice, SceneThatLosesTheDeviceTwiceIsStoppedAndOthersContinue) {
+TEST_F(LostDevice, SceneThatKeepsLosingTheDeviceIsStopped) {
   Arguments scenes = kSmallScene;
   scenes.insert(scenes.end(), {"--scene-file", "tests/e2e/small_with_normals.json"});
   startServer(scenes);
@@ -171,8 +171,14 @@ TEST_F(LostDevice, SceneThatLosesTheDeviceTwiceIsStoppedAndOthersContinue) {
   ASSERT_TRUE(watcher.hasContinued());
   fail("device");
   ASSERT_TRUE(eventually([&] { return client->ended().has_value(); }));
+  EXPECT_THAT(client->ended()->text, HasSubstr("join again to start it with its own parameters"));
+  Watcher later;
+  auto third = later.join(address_, "small");
+  ASSERT_TRUE(later.seesMore(30));
+  fail("device");
+  ASSERT_TRUE(eventually([&] { return third->ended().has_value(); }));
   const std::string why = "the scene 'small' is stopped because it harms other scenes";
-  EXPECT_THAT(client->ended()->text, HasSubstr(why));
+  EXPECT_THAT(third->ended()->text, HasSubstr(why));
   const auto again = GrpcClient::join(address_, {}, [](cs_client*, std::uint32_t) {});
   ASSERT_FALSE(again.has_value());
   EXPECT_THAT(again.error().text, HasSubstr(why));

@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/encode/quality_encoders.h"
 #include "tests/encode/encoding.h"
 
 namespace clothstream::tests {
@@ -135,6 +136,27 @@ TEST_F(FrameEncoderSlots, AFrameAfterForgettingIsAKeyFrame) {
   encoding.encoder.forgetHistory();
   EXPECT_EQ(encoding.tick(3, false).kind, codec::PacketKind::key);
   EXPECT_EQ(encoding.tick(4, false).referenceTick, 3u);
+}
+
+class QualityEncoders : public GpuTest {};
+
+TEST_F(QualityEncoders, DroppingDoesNotWaitForAnEncoderThatIsBeingCreated) {
+  using Clock = encode::QualityEncoders::Clock;
+  model::Scene scene = sceneOf({calmCloth(500, 500)});
+  scene.stream.qualities = 2;
+  const simulation::ClothSimulation simulation(device(), scene);
+  const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
+  encode::QualityEncoders encoders(device(), simulation, layout, nullptr);
+  const Clock::time_point before = Clock::now();
+  const auto alone = codec::Encoder::make(layout, {.quality = 1});
+  const Clock::duration creation = Clock::now() - before;
+
+  EXPECT_EQ(encoders.wanted(1, Clock::now()), nullptr);
+  const Clock::time_point dropped = Clock::now();
+  encoders.drop();
+  EXPECT_LT(Clock::now() - dropped, creation / 2);
+  // The encoder is there when the quality is needed again.
+  while (encoders.wanted(1, Clock::now()) == nullptr) std::this_thread::yield();
 }
 
 }  // namespace

@@ -4,10 +4,9 @@
 
 #include <chrono>
 #include <cstddef>
+#include <exception>
 #include <functional>
 #include <memory>
-#include <new>
-#include <thread>
 #include <unordered_set>
 #include <utility>
 
@@ -18,6 +17,7 @@
 #include "server/endpoint/grpc/call_rate.h"
 #include "server/endpoint/grpc/completion_loop.h"
 #include "server/endpoint/listen/admission.h"
+#include "server/schedule/retry.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::hosting {
@@ -116,14 +116,14 @@ class Call : public std::enable_shared_from_this<Call> {
 // endpoint would accept no further call of this kind.
 template <typename Kind, typename... Arguments>
 void await(GrpcEndpointContext& endpoint, Arguments&&... arguments) {
-  for (std::shared_ptr<Kind> call;;) try {
-      call = std::make_shared<Kind>(endpoint, arguments...);
-      endpoint.calls.insert(call);
-      return call->await();
-    } catch (const std::bad_alloc&) {
-      endpoint.calls.erase(call);
-      std::this_thread::yield();
-    }
+  std::shared_ptr<Kind> call;
+  schedule::retryUntilDone(
+      [&] {
+        call = std::make_shared<Kind>(endpoint, arguments...);
+        endpoint.calls.insert(call);
+        call->await();
+      },
+      [&](const std::exception&) { endpoint.calls.erase(call); });
 }
 
 }  // namespace clothstream::endpoint

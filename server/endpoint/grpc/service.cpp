@@ -6,26 +6,17 @@
 
 #include <boost/asio/post.hpp>
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/join_stream.h"
 #include "server/endpoint/grpc/unary_call.h"
+#include "server/hosting/give_answer.h"
 #include "server/hosting/server_state.h"
 
 namespace clothstream::endpoint {
 namespace {
 
 using hosting::Identity;
-
-// An exception, such as for a lack of memory, ends one call and not the thread.
-void endOnlyTheCall(const auto& work) {
-  try {
-    work();
-  } catch (const std::exception& failure) {
-    spdlog::error("gRPC: a call failed: {}", failure.what());
-  }
-}
 
 tl::expected<v1::GetSceneResponse, v1::Error> sceneOf(const hosting::SceneServer& server,
                                                       const v1::GetSceneRequest& request,
@@ -86,7 +77,7 @@ void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::
       endpoint, service, &Service::RequestGetScene,
       [&server, &slowCalls](const auto& request, const Identity& by, auto answer) {
         boost::asio::post(slowCalls, [&server, request, by, answer = std::move(answer)] {
-          endOnlyTheCall([&] { answer(sceneOf(server, request, by)); });
+          hosting::giveAnswer("getScene", answer, sceneOf(server, request, by));
         });
       },
       CallRate::kSceneCost);

@@ -152,6 +152,61 @@ TEST(MergedAnnouncements, KeepsTheNewestEventOfEachContactAndBoundsThem) {
   EXPECT_EQ(events[0].tick_events().contacts(0).collider_id(), kMaxMergedEvents) << "the newest stay";
 }
 
+// The events of one tick of a scene with many contacts.
+SharedBytes contactsOf(std::uint64_t tick) {
+  v1::ServerMessage message;
+  message.mutable_tick_events()->set_tick(tick);
+  for (std::uint32_t collider = 0; collider < 200; ++collider) {
+    v1::ContactEvent& event = *message.mutable_tick_events()->add_contacts();
+    event.set_kind(tick % 2 == 0 ? v1::CONTACT_EVENT_KIND_BEGAN : v1::CONTACT_EVENT_KIND_ENDED);
+    event.set_participant_id(collider);
+    event.set_collider_id(collider);
+    event.set_cloth("sheet");
+  }
+  return serialise(message);
+}
+
+TEST(MergedAnnouncements, SubscribersWithTheSameAnnouncementsShareOneMerge) {
+  SharedMerges merges;
+  const std::deque<SharedBytes> same{contactsOf(1), contactsOf(2)};
+  const std::deque<SharedBytes> copy = same, fewer{same.back()};
+  const SharedBytes first = merges.of(same).front();
+  EXPECT_EQ(merges.of(copy).front(), first);
+  EXPECT_EQ(merges.computed(), 1u);
+  EXPECT_EQ(merges.of(fewer).size(), 1u);
+  EXPECT_EQ(merges.computed(), 2u);
+  EXPECT_EQ(merges.of(copy).front(), first) << "after other announcements were merged";
+  EXPECT_EQ(merges.computed(), 2u);
+}
+
+TEST(Subscribers, SilentOnesGetTheirAnnouncementsMergedOnceForAll) {
+  telemetry::SceneMetrics metrics;
+  Subscribers subscribers;
+  std::vector<std::shared_ptr<Mailbox>> silent;
+  for (std::uint64_t i = 1; i <= 60; ++i) {
+    silent.push_back(std::make_shared<Mailbox>([] {}));
+    silent.back()->subscribe(nullptr, {.rate = 72}, metrics);
+    subscribers.add(silent.back(), i);
+  }
+  // More than twice what makes a mailbox merge.
+  std::uint64_t tick = 0;
+  for (std::size_t bytes = 0; bytes <= 3 * Mailbox::kMaxControlBytes;) {
+    const SharedBytes message = contactsOf(++tick);
+    bytes += message->size() + Mailbox::kMessageOverhead;
+    subscribers.announce(message);
+  }
+  std::vector<std::vector<SharedBytes>> all;
+  for (const auto& mailbox : silent) {
+    auto& messages = all.emplace_back();
+    while (const auto message = mailbox->next(Clock::now())) messages.push_back(*message);
+    ASSERT_EQ(messages.size(), all.front().size());
+    EXPECT_EQ(messages, all.front()) << "a merged message is one object for all mailboxes";
+  }
+  const v1::ServerMessage merged = parsed(all.front().front());
+  EXPECT_EQ(merged.tick_events().contacts_size(), 200);
+  EXPECT_EQ(parsed(all.front().back()).tick_events().tick(), tick);
+}
+
 TEST(Subscribers, ChangesOfOthersNeverCloseASubscriberThatDoesNotRead) {
   telemetry::SceneMetrics metrics;
   Subscribers subscribers;

@@ -216,7 +216,13 @@ TEST_F(BudgetOfServerTest, SceneThatTakesFarMoreThanItsPriceIsStopped) {
   honest.join("small");
   TestPeer peer(server());
   peer.join("heavy");
-  const v1::ServerMessage last = peer.readToTheEnd();
+  // A scene of the server starts again first, with its own parameters.
+  EXPECT_THAT(peer.readToTheEnd().error().text(),
+              HasSubstr("join again to start it with its own parameters"));
+  EXPECT_EQ(server().state().metrics.quarantines.value(), 0u);
+  TestPeer again(server());
+  again.hello("heavy");
+  const v1::ServerMessage last = again.readToTheEnd();
   EXPECT_EQ(last.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   EXPECT_TRUE(last.error().fatal());
   EXPECT_THAT(last.error().text(), HasSubstr("the scene 'heavy' is stopped because it harms other scenes"));

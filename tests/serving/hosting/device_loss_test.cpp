@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Loss of the device in a server with several scenes: each runs again as soon as it is loaded.
-#include <algorithm>
 #include <cstdint>
-#include <future>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -18,29 +18,74 @@ namespace {
 
 using tests::TestPeer;
 
-using DeviceLossTest = tests::ServerTest;
+using testing::HasSubstr;
 
-// Start of the frame's tick, microseconds of the server's clock.
-std::uint64_t timeOf(const tests::SeenFrame& frame) {
-  v1::ServerMessage message;
-  EXPECT_TRUE(message.ParseFromArray(frame.message->data(), static_cast<int>(frame.message->size())));
-  return message.frame().tick_time_us();
-}
+// Notes the names of scenes in the order in which their simulations were replaced.
+class NamesInOrder {
+ public:
+  void add(const std::string& name) {
+    const std::lock_guard lock(mutex_);
+    names_.push_back(name);
+  }
+  std::vector<std::string> names() const {
+    const std::lock_guard lock(mutex_);
+    return names_;
+  }
 
-// Reads until the scene was rebuilt and has sent a frame, and returns the time of that frame.
-std::uint64_t readToTheNextStart(TestPeer& peer) {
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::string> names_;
+};
+
+class NotingJournal : public scene::Journal {
+ public:
+  NotingJournal(std::string name, std::shared_ptr<NamesInOrder> order)
+      : name_(std::move(name)), order_(std::move(order)) {}
+  bool active() const override { return false; }
+  bool due() const override { return false; }
+  void begin(const vulkan::DeviceInfo&, const model::Scene&, const v1::StreamDescription&,
+             const simulation::StateSnapshot&, const simulation::StateSnapshot&) override {}
+  void ticked(const scene::AppliedTick&) override {}
+  void saved(const simulation::StateSnapshot&) override {}
+  void restored(std::uint64_t, const simulation::StateSnapshot&) override { order_->add(name_); }
+  void end() override {}
+  void sent(const delivery::SharedBytes&) override {}
+  void joined(std::uint64_t, const std::string&, const std::string&) override {}
+  void left(std::uint64_t) override {}
+
+ private:
+  const std::string name_;
+  const std::shared_ptr<NamesInOrder> order_;
+};
+
+class DeviceLossTest : public tests::ServerTest {
+ protected:
+  DeviceThread& device() { return server().state().device; }
+  // Says hello to the scene, and returns the text of the error that ends the session.
+  std::string whyEnded(const std::string& scene) {
+    TestPeer peer(server());
+    peer.hello(scene);
+    return peer.readToTheEnd().error().text();
+  }
+};
+
+void readUntilRebuilt(TestPeer& peer) {
   const v1::ServerMessage rebuilt = peer.readUntil([](const v1::ServerMessage& message) {
     return message.notice().kind() == v1::NOTICE_KIND_DEVICE_REBUILT;
   });
   EXPECT_THAT(rebuilt.notice().text(), testing::StartsWith("the device was lost; the scene goes on from"));
   peer.readFrames(1);
-  return timeOf(peer.frames().back());
 }
 
 TEST_F(DeviceLossTest, RunsScenesAgainOneByOneDefaultFirst) {
+  const auto order = std::make_shared<NamesInOrder>();
+  ServerOptions options;
+  options.journals = [order](const model::Scene& scene) {
+    return std::make_shared<NotingJournal>(scene.name, order);
+  };
   std::vector<model::Scene> more;
   for (int i = 0; i < 4; ++i) more.push_back(tests::smallScene(fmt::format("more-{}", i)));
-  start({}, more);
+  start(std::move(options), more);
   if (IsSkipped()) return;
   TestPeer first(server());
   first.join("small");
@@ -49,24 +94,80 @@ TEST_F(DeviceLossTest, RunsScenesAgainOneByOneDefaultFirst) {
     others.push_back(std::make_unique<TestPeer>(server()));
     others.back()->join(scene);
   }
-  server().state().device.simulateDeviceLoss();
-  // All read at the same time, because a peer that does not read loses frames.
-  std::vector<std::future<std::uint64_t>> reading;
-  for (const auto& peer : others)
-    reading.push_back(std::async(std::launch::async, [&peer] { return readToTheNextStart(*peer); }));
-  const std::uint64_t start = readToTheNextStart(first);
-  const std::uint64_t startTick = first.frames().back().tick;
-  std::vector<std::uint64_t> starts;
-  for (std::future<std::uint64_t>& each : reading) starts.push_back(each.get());
-  const std::uint64_t mostJoined = starts.back();
-  starts.resize(4);  // of the scenes with one participant
-  EXPECT_LT(start, mostJoined);
-  EXPECT_LT(mostJoined, *std::ranges::min_element(starts));
-  // The default scene has run while the last ones were being loaded.
-  const std::uint64_t last = *std::ranges::max_element(starts);
-  while (timeOf(first.frames().back()) < last) first.readFrames(1);
-  EXPECT_GT(first.frames().back().tick, startTick + 1);
+  device().simulateDeviceLoss();
+  readUntilRebuilt(first);
+  for (const auto& peer : others) readUntilRebuilt(*peer);
+  const std::vector<std::string> names = order->names();
+  ASSERT_EQ(names.size(), 6u);
+  EXPECT_EQ(names[0], "small");
+  EXPECT_EQ(names[1], "more-3") << "it has the most participants";
+  EXPECT_THAT(names, testing::UnorderedElementsAre("small", "other", "more-0", "more-1", "more-2", "more-3"));
   EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 1u);
+}
+
+TEST_F(DeviceLossTest, SceneThatIsLostWhileItLoadsIsGivenUpThenStopped) {
+  start();
+  if (IsSkipped()) return;
+  device().simulateDeviceLossIn("other");
+  EXPECT_THAT(whyEnded("other"), HasSubstr("it harms other scenes: the device was lost twice"));
+  EXPECT_THAT(whyEnded("other"), HasSubstr("the scene 'other' is stopped because it harms other scenes"));
+  EXPECT_EQ(server().state().metrics.quarantines.value(), 1u);
+  TestPeer honest(server());
+  honest.join("small");
+  honest.readFrames(3);
+  EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 3u);
+}
+
+TEST_F(DeviceLossTest, SceneGivenUpOnceRunsAgainWithItsOwnParameters) {
+  start();
+  if (IsSkipped()) return;
+  TestPeer peer(server());
+  peer.join("other");
+  v1::ParameterChange change;
+  change.mutable_gravity()->mutable_value()->set_y(-5);
+  peer.change(change);
+  peer.readUntil(v1::ServerMessage::kParameterChanged);
+  device().simulateDeviceLossIn("other");
+  EXPECT_THAT(peer.readToTheEnd().error().text(),
+              HasSubstr("join again to start it with its own parameters"));
+  device().simulateDeviceLossIn("");
+  TestPeer again(server());
+  again.join("other");
+  const model::Scene now = server().state().find("other")->definition();
+  EXPECT_EQ(now.environment.gravity.y(), tests::smallScene().environment.gravity.y());
+  EXPECT_EQ(server().state().metrics.quarantines.value(), 0u);
+}
+
+TEST_F(DeviceLossTest, OnlyTheSceneThatLosesTheDeviceIsGivenUp) {
+  start();
+  if (IsSkipped()) return;
+  TestPeer honest(server()), peer(server());
+  honest.join("small");
+  peer.join("other");
+  device().simulateDeviceLossIn("other");
+  EXPECT_THAT(peer.readToTheEnd().error().text(), HasSubstr("the device was lost twice"));
+  EXPECT_THAT(whyEnded("other"), HasSubstr("is stopped because it harms other scenes"));
+  honest.readFrames(3);
+  EXPECT_FALSE(honest.finished());
+}
+
+TEST_F(DeviceLossTest, RefusesACreatedSceneThatLosesTheDeviceWhileItLoads) {
+  start();
+  if (IsSkipped()) return;
+  device().simulateDeviceLossIn("mine");
+  TestPeer peer(server());
+  v1::ClientMessage message;
+  message.set_request_id(7);
+  message.mutable_create_scene()->set_named("small");
+  message.mutable_create_scene()->set_name("mine");
+  peer.send(message);
+  const v1::ServerMessage answer =
+      peer.readUntil([](const v1::ServerMessage& each) { return each.request_id() == 7; });
+  EXPECT_THAT(answer.error().text(),
+              HasSubstr("the device cannot run it: the device was lost while the scene was being loaded"));
+  peer.join("small");
+  EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 1u);
+  EXPECT_EQ(server().listScenes().scenes_size(), 2);
 }
 
 }  // namespace

@@ -4,9 +4,12 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <future>
 #include <latch>
 #include <memory>
+#include <mutex>
+#include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -19,6 +22,7 @@
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <gtest/gtest.h>
 
+#include "server/hosting/give_answer.h"
 #include "server/hosting/scene_maker.h"
 #include "server/messages/scene_message.h"
 #include "tests/model/meshes.h"
@@ -465,6 +469,139 @@ TEST_F(ScenesTest, RecordingExceptionsBecomeErrors) {
   EXPECT_EQ(ask(peer, message).error().text(), "stopRecording: failed on the server: no stop");
   ASSERT_TRUE(createNamed(peer, "small", "mine").has_create_scene());
   EXPECT_TRUE(deleteScene(peer, "mine").has_delete_scene());
+}
+
+// Blocks the device's thread between two ticks, from block() to release().
+class BlockingJournal : public TroubledJournal {
+ public:
+  bool due() const override {
+    std::unique_lock lock(mutex_);
+    waits_ = blocks_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return !blocks_; });
+    waits_ = false;
+    return false;
+  }
+  // Returns when the thread waits.
+  void block() {
+    std::unique_lock lock(mutex_);
+    blocks_ = true;
+    changed_.wait(lock, [this] { return waits_; });
+  }
+  void release() {
+    const std::lock_guard lock(mutex_);
+    blocks_ = false;
+    changed_.notify_all();
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  mutable bool waits_ = false;
+  bool blocks_ = false;
+};
+
+TEST_F(ScenesTest, CancelsASceneThatTheDeviceDoesNotLoad) {
+  ServerOptions options;
+  const auto journal = std::make_shared<BlockingJournal>();
+  options.journals = [journal](const model::Scene& scene) -> std::shared_ptr<Journal> {
+    return scene.name == "small" ? journal : nullptr;
+  };
+  START(std::move(options));
+  TestPeer peer(server());
+  peer.join();
+  journal->block();
+  // Only a wait that checks for cancellation asks this often.
+  constexpr int kChecks = 30;
+  std::atomic<int> checks = 0;
+  std::promise<std::string> answered;
+  std::future<std::string> answer = answered.get_future();
+  v1::CreateSceneRequest request;
+  request.set_named("small");
+  request.set_name("stuck");
+  server().createScene(
+      request, [&](const auto& created) { answered.set_value(created ? "" : created.error().text()); },
+      identity::local(), [&] { return ++checks < kChecks; });
+  const bool inTime = answer.wait_for(TestPeer::kPatience) == std::future_status::ready;
+  // Requests after it are answered as well while the device is stuck.
+  v1::StopRecordingRequest stopping;
+  stopping.set_scene("nowhere");
+  std::promise<void> stopped;
+  server().stopRecording(stopping, [&](const auto&) { stopped.set_value(); });
+  if (inTime) stopped.get_future().wait();
+  journal->release();
+  ASSERT_TRUE(inTime);
+  EXPECT_EQ(answer.get(), "createScene: cancelled");
+  peer.readFrames(3);
+  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+  EXPECT_TRUE(createNamed(peer, "small", "stuck").has_create_scene()) << "the name is free again";
+}
+
+TEST_F(ScenesTest, RefusesOtherRequestsWhileTooManyWait) {
+  START();
+  const auto began = std::make_shared<std::promise<void>>();
+  std::promise<void> mayEnd;
+  v1::CreateSceneRequest unknown;
+  unknown.set_named("no such scene");
+  server().createScene(unknown, [began, end = mayEnd.get_future().share()](const auto&) {
+    began->set_value();
+    end.wait();  // the maker's thread stays busy, so all others wait
+  });
+  began->get_future().wait();
+  v1::DeleteSceneRequest request;
+  request.set_name("no such scene");
+  for (std::uint32_t i = 0; i < SceneMaker::kMaxWaiting; ++i)
+    server().deleteScene(request, [](const auto&) {});
+  TestPeer peer(server());
+  EXPECT_THAT(deleteScene(peer, "small").error().text(),
+              StartsWith("deleteScene: 64 requests about scenes wait; try again later"));
+  v1::ClientMessage message;
+  message.mutable_start_recording();
+  EXPECT_THAT(ask(peer, message).error().text(), StartsWith("startRecording: 64 requests about scenes wait"));
+  message.mutable_stop_recording();
+  EXPECT_THAT(ask(peer, message).error().text(), StartsWith("stopRecording: 64 requests about scenes wait"));
+  const auto counter = static_cast<std::size_t>(telemetry::Refusal::waitingScenes);
+  EXPECT_EQ(server().state().metrics.refusals[counter].value(), 3u);
+  mayEnd.set_value();
+}
+
+TEST(GiveAnswer, GivesAnErrorIfTheAnswerThrows) {
+  using Answer = tl::expected<v1::DeleteSceneResponse, v1::Error>;
+  int calls = 0;
+  std::string text;
+  const auto done = [&](const Answer& answer) {
+    if (++calls <= 2) throw std::bad_alloc();
+    text = answer ? "" : answer.error().text();
+  };
+  giveAnswer("deleteScene", done, Answer(v1::DeleteSceneResponse()));
+  EXPECT_EQ(calls, 3);
+  EXPECT_EQ(text, "deleteScene: the server could not give the answer; check whether it took effect");
+}
+
+TEST_F(ScenesTest, LimitsPausesAndResetsOfOneParticipant) {
+  START();
+  v1::ControlSceneRequest request;
+  request.set_paused(false);
+  std::string text;
+  for (int i = 0; i <= 10 * LiveScene::kChangesOfParticipantPerSecond && text.empty(); ++i)
+    if (const auto controlled = server().state().controlScene(request, 1); !controlled)
+      text = controlled.error().text();
+  EXPECT_EQ(
+      text,
+      "controlScene: too many changes of 'small' by one participant in one second; send it again later");
+  EXPECT_TRUE(server().state().controlScene(request, 2)) << "another participant may";
+}
+
+TEST_F(ScenesTest, BuiltInScenesShareTheDeviceAsGuests) {
+  ServerOptions options;
+  options.guestScenes = {"small", "other"};
+  START(std::move(options), {tests::smallScene("own")});
+  TestPeer peer(server());
+  ASSERT_TRUE(createNamed(peer, "small", "mine").has_create_scene());
+  EXPECT_FALSE(server().state().find("small")->isGuest()) << "it is the default scene";
+  EXPECT_TRUE(server().state().find("other")->isGuest());
+  EXPECT_FALSE(server().state().find("own")->isGuest());
+  EXPECT_TRUE(server().state().find("mine")->isGuest());
 }
 
 TEST_F(ScenesTest, PausedSceneStandsStillAndContinues) {

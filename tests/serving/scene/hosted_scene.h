@@ -28,11 +28,12 @@ namespace clothstream::tests {
 // One scene on the shared device, with a subscriber that reads everything.
 class HostedScene {
  public:
-  // `prepare` is called before the scene's host is created.
+  // `prepare` is called before the scene's host is created. `journal` may be null.
   explicit HostedScene(
       model::Scene scene = smallScene(), std::size_t subscribers = 1,
-      const std::function<void(scene::LiveScene&)>& prepare = [](scene::LiveScene&) {})
-      : live(std::move(scene)),
+      const std::function<void(scene::LiveScene&)>& prepare = [](scene::LiveScene&) {},
+      std::shared_ptr<scene::Journal> journal = nullptr)
+      : live(std::move(scene), false, std::move(journal)),
         publisher(encode::FrameEncoder::kSlots, [] {}),
         host((prepare(live), device()), live, publisher) {
     for (std::size_t i = 0; i < subscribers; ++i) {

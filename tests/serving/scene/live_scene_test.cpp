@@ -2,6 +2,9 @@
 // Definition of a scene after its simulation was reset or reverted.
 #include "server/scene/live_scene.h"
 
+#include <cstdint>
+#include <memory>
+#include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -60,21 +63,67 @@ TEST(LiveScene, GraceOfRestoredParticipantsCanBeginLater) {
   EXPECT_EQ(live.roster.away(), 0u);
 }
 
-TEST(LiveScene, LimitsChangesPerSecond) {
-  LiveScene live(smallScene());
+// Changes of one participant until one is refused.
+struct Changes {
+  int accepted = 0;
+  std::string refused;
+};
+Changes changeUntilRefused(LiveScene& live, std::uint64_t participant) {
   v1::ParameterChange change;
   change.mutable_wind()->mutable_value()->set_x(3);
-  int accepted = 0;
+  Changes changes;
   messages::Result<void> result;
   Inputs applied;
-  while (accepted < 10'000 && (result = live.change(1, change))) {
-    ++accepted;
+  while (changes.accepted < 10'000 && (result = live.change(participant, change))) {
+    ++changes.accepted;
     live.inbox.drain(applied);
   }
+  if (!result) changes.refused = result.error().text;
+  return changes;
+}
+
+TEST(LiveScene, LimitsChangesOfOneParticipantSoThatOthersHaveTheirs) {
+  LiveScene live(smallScene());
+  const Changes first = changeUntilRefused(live, 1);
+  EXPECT_GE(first.accepted, static_cast<int>(LiveScene::kChangesOfParticipantPerSecond));
+  EXPECT_EQ(
+      first.refused,
+      "parameterChange: too many changes of 'small' by one participant in one second; send it again later");
+  EXPECT_GE(changeUntilRefused(live, 2).accepted,
+            static_cast<int>(LiveScene::kChangesOfParticipantPerSecond));
+}
+
+TEST(LiveScene, LimitsChangesPerSecondOfAllParticipants) {
+  LiveScene live(smallScene());
+  int accepted = 0;
+  std::string refused;
+  for (std::uint64_t participant = 1; participant < 1000; ++participant) {
+    const Changes changes = changeUntilRefused(live, participant);
+    accepted += changes.accepted;
+    refused = changes.refused;
+    if (refused.find("by one participant") == std::string::npos) break;
+  }
   EXPECT_GE(accepted, static_cast<int>(LiveScene::kChangesPerSecond));
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().text,
-            "parameterChange: too many changes of 'small' in one second; send it again later");
+  EXPECT_EQ(refused, "parameterChange: too many changes of 'small' in one second; send it again later");
+}
+
+TEST(LiveScene, BecomesAGuestWhileItCostsMoreThanAtItsStart) {
+  const auto budget = std::make_shared<Budget>(
+      BudgetLimits{.sceneLoad = 1e9, .load = 1e9, .sceneMegabytes = 1e9, .megabytes = 1e9});
+  budget->setSpeed({.nodeStepSeconds = 1e-9, .dispatchSeconds = 1e-6, .workgroupFactor = 1});
+  model::Scene scene = smallScene();
+  scene.cloths[0].solver.kind = model::SolverKind::constraint;
+  scene.cloths[0].solver.iterations = 10;
+  LiveScene live(std::move(scene), false, nullptr, 8, budget);
+  EXPECT_FALSE(live.isGuest());
+  v1::ParameterChange change;
+  v1::ClothChange& cloth = *change.add_cloths();
+  cloth.set_name("sheet");
+  cloth.mutable_solver()->mutable_constraint()->set_iterations(100);
+  ASSERT_TRUE(live.change(1, change));
+  EXPECT_TRUE(live.isGuest());
+  live.resetParameters();
+  EXPECT_FALSE(live.isGuest());
 }
 
 TEST(LiveScene, RevertKeepsAppliedAndWaitingChanges) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,9 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "server/recording/scene_journal.h"
 #include "server/step/step.h"
+#include "tests/e2e/temporary_directory.h"
 #include "tests/serving/scene/busy_scene.h"
 #include "tests/serving/scene/hosted_scene.h"
 
@@ -52,6 +55,29 @@ TEST_F(SceneHostTest, SameInputsGiveTheSameStatesForAnySubscribers) {
   const std::vector<std::uint64_t> alone = simulate(1);
   EXPECT_EQ(alone.size(), 60u);
   EXPECT_EQ(simulate(4), alone);
+}
+
+TEST_F(SceneHostTest, StartingARecordingChangesNoState) {
+  e2e::TemporaryDirectory directory;
+  const auto journal = std::make_shared<recording::SceneJournal>(
+      "small", recording::RecorderOptions{.directory = directory.path(), .serverName = "test"}, false);
+  const auto simulate = [](const std::shared_ptr<Journal>& recordedBy) {
+    HostedScene hosted(
+        smallScene(), 1, [](LiveScene&) {}, recordedBy);
+    hosted.ticks(30);
+    if (recordedBy) {
+      EXPECT_TRUE(recordedBy->start("twin"));
+    }
+    hosted.change(wind(3));
+    hosted.ticks(60);
+    if (recordedBy) {
+      EXPECT_TRUE(recordedBy->active());
+    }
+    return hosted.stateHashes();
+  };
+  const std::vector<std::uint64_t> unrecorded = simulate(nullptr);
+  EXPECT_EQ(unrecorded.size(), 90u);
+  EXPECT_EQ(simulate(journal), unrecorded);
 }
 
 TEST_F(SceneHostTest, SlicesOfATickGiveTheSameStates) {

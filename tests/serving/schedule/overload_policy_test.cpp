@@ -136,11 +136,51 @@ TEST(OverloadPolicyTest, LoadingAnotherSceneIsNoOverload) {
   LoadedScene scene;
   scene.substep = 2ms;
   scene.disturbed = true;
-  scene.run(60s);
+  scene.run(9s);
   EXPECT_THAT(scene.levels, SizeIs(0));
   scene.disturbed = false;
   scene.run(3s);
   EXPECT_EQ(scene.levels.front(), (WorkLevel{2, 8}));
+}
+
+TEST(OverloadPolicyTest, JudgesASceneWhileOthersAreLoadedAllTheTime) {
+  LoadedScene scene;
+  scene.substep = 20ms;
+  scene.disturbed = true;
+  scene.run(120s);
+  EXPECT_THAT(scene.levels, SizeIs(5));
+  EXPECT_GE(scene.changed.front() - Clock::time_point{}, OverloadPolicy::kLongestDisturbance);
+}
+
+TEST(OverloadPolicyTest, FrequentLoadsDoNotKeepASceneFromSteppingDownOrUp) {
+  LoadedScene scene;
+  const auto runWithLoads = [&](Clock::duration time) {
+    for (const Clock::time_point end = scene.now + time; scene.now < end;) {
+      scene.disturbed = !scene.disturbed;
+      scene.run(400ms);
+    }
+  };
+  scene.substep = 5ms;
+  runWithLoads(16s);
+  EXPECT_THAT(scene.levels, SizeIs(5)) << "a step for each second without a load";
+  scene.substep = 500us;
+  runWithLoads(240s);
+  EXPECT_EQ(scene.policy.level(), (WorkLevel{1, 8}));
+}
+
+TEST(OverloadPolicyTest, TimeThatSlippedDuringALoadDoesNotCountAfterIt) {
+  LoadedScene scene;
+  scene.substep = 1150us;  // more than kMostUse of the share, and less than a period
+  for (int i = 0; i < 30; ++i) {
+    scene.run(700ms);
+    scene.disturbed = true;
+    scene.others = 300ms;
+    scene.run(1ms);
+    scene.disturbed = false;
+    scene.run(1ms);
+    scene.others = 0ms;
+  }
+  EXPECT_THAT(scene.levels, SizeIs(0));
 }
 
 TEST(OverloadPolicyTest, OneLongTickIsNoOverload) {
