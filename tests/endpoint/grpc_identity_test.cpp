@@ -6,6 +6,7 @@
 #include <string>
 
 #include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
@@ -116,7 +117,7 @@ TEST_F(GrpcIdentity, EveryCallNeedsAToken) {
   for (const auto& [name, code] : codes) EXPECT_EQ(code, grpc::StatusCode::UNAUTHENTICATED) << name;
   const auto* const service = v1::ClientMessage::descriptor()->file()->FindServiceByName("ClothStream");
   for (int i = 0; i < service->method_count(); ++i) {
-    const std::string& name = service->method(i)->name();
+    const std::string name(service->method(i)->name());
     EXPECT_TRUE(name == "Join" || codes.contains(name)) << name;
   }
 }
