@@ -550,7 +550,7 @@ int cs_get_presence(const cs_client* client, cs_presence* out) CS_NOEXCEPT;
 void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role) CS_NOEXCEPT;
 void cs_remove_participant(cs_client* client, uint64_t participant_id) CS_NOEXCEPT;
 /* Like cs_remove_participant. The subject of the participant's token also stays out of the scene, until the
- * scene is deleted or an owner lifts the ban. Without a token only its resume token is refused. */
+ * scene is deleted or an owner lifts the ban. Fails for a participant without a token. */
 void cs_ban_participant(cs_client* client, uint64_t participant_id) CS_NOEXCEPT;
 
 /* Code by which others pair with the server. */

@@ -56,16 +56,14 @@ messages::Result<Identity> SceneServer::State::authenticate(const v1::Authentica
 std::shared_ptr<const void> SceneServer::State::countConnection(const Identity& identity) {
   static const int uncounted = 0;
   if (!identity.verified) return {std::shared_ptr<const void>(), &uncounted};
-  // Subjects of two tenants are different.
-  const std::string key = identity.tenant + '\0' + identity.subject;
-  auto release = [this, key](const void*) {
+  auto release = [this, subject = identity.subject](const void*) {
     const std::lock_guard lock(mutex);
-    const auto known = connectionsOfSubjects.find(key);
+    const auto known = connectionsOfSubjects.find(subject);
     if (--known->second == 0) connectionsOfSubjects.erase(known);
   };
   {
     const std::lock_guard lock(mutex);
-    std::uint32_t& count = connectionsOfSubjects[key];
+    std::uint32_t& count = connectionsOfSubjects[identity.subject];
     if (count >= options.maxConnectionsPerToken) {
       metrics.refuse(telemetry::Refusal::connectionsOfToken);
       return nullptr;
@@ -76,14 +74,26 @@ std::shared_ptr<const void> SceneServer::State::countConnection(const Identity& 
   return {&uncounted, std::move(release)};
 }
 
+std::uint32_t SceneServer::State::scenesPerTenant() const {
+  constexpr std::uint32_t kTenants = 4;  // with the default, this many tenants can fill the server
+  if (options.maxScenesPerTenant) return *options.maxScenesPerTenant;
+  const bool hasTenants = options.authenticator && options.authenticator->hasTenants();
+  return hasTenants ? std::max(1U, options.maxCreatedScenes / kTenants) : options.maxCreatedScenes;
+}
+
+bool SceneServer::State::isOfOtherTenant(const Identity& by, const scene::LiveScene& scene) {
+  return by.verified && scene.created && scene.tenant != by.subject.tenant;
+}
+
 messages::Result<void> SceneServer::State::mayUse(const Identity& by, const std::string& name) const {
   const std::string& meant = name.empty() ? options.defaultScene : name;
   if (!by.reaches(meant))
     return denied(v1::ERROR_CODE_PERMISSION_DENIED,
                   fmt::format("'{:.64}': your token is only for the scene '{:.64}'", printable(meant),
                               printable(by.scene)));
-  const std::shared_ptr<scene::LiveScene> scene = by.verified ? find(name) : nullptr;
-  if (scene && scene->roster.isBanned(by.subject))
+  const std::shared_ptr<scene::LiveScene> scene = find(name);
+  if (!scene) return denied(v1::ERROR_CODE_NOT_FOUND, noSuchScene(name, by).text());
+  if (by.verified && scene->roster.isBanned(by.subject))
     return denied(v1::ERROR_CODE_PERMISSION_DENIED,
                   fmt::format("an owner banned you from the scene '{}'", scene->name()));
   return {};
@@ -99,8 +109,11 @@ messages::Result<void> SceneServer::State::mayCreate(const Identity& by) const {
 messages::Result<void> SceneServer::State::mayFromOutside(const Identity& by, const std::string& name,
                                                           scene::Action action) const {
   if (auto may = mayUse(by, name); !may) return may;
-  if (by.isVerifiedOwner()) return {};
   const std::shared_ptr<scene::LiveScene> scene = find(name);
+  if (scene && isOfOtherTenant(by, *scene))
+    return denied(v1::ERROR_CODE_PERMISSION_DENIED,
+                  fmt::format("the scene '{}' belongs to another tenant than your token", scene->name()));
+  if (by.isVerifiedOwner()) return {};
   // Without identities, every program that reaches a scene without an owner may act as one.
   const bool actsAsOwner =
       by.role == scene::Role::owner && (options.outsideControl || !scene || !scene->roster.owned());
@@ -120,6 +133,9 @@ messages::Result<v1::CreatePairingCodeResponse> SceneServer::State::createPairin
   if (!by.isVerifiedOwner() || !by.scene.empty())
     return denied(v1::ERROR_CODE_PERMISSION_DENIED,
                   "createPairingCode: requires a token with the role owner for all scenes");
+  // Streams continue for some time after their token has expired, but a code made then would outlive it.
+  if (const char* const why = options.authenticator->whyEnded(by, std::chrono::seconds(0)))
+    return denied(v1::ERROR_CODE_UNAUTHENTICATED, fmt::format("createPairingCode: {}", why));
   if (request.role() < v1::ROLE_UNSPECIFIED || request.role() > v1::ROLE_OWNER)
     return denied(
         v1::ERROR_CODE_INVALID_ARGUMENT,
@@ -147,7 +163,8 @@ messages::Result<v1::ListBansResponse> SceneServer::State::listBans(
   v1::ListBansResponse response;
   for (const scene::Ban& ban : scene->roster.bans()) {
     v1::Ban& listed = *response.add_bans();
-    listed.set_subject(ban.subject);
+    listed.set_subject(ban.subject.name);
+    listed.set_tenant(ban.subject.tenant);
     listed.set_display_name(ban.displayName);
   }
   return response;

@@ -15,7 +15,8 @@ class Peer {
   // Closes the connection with this last message, because the server stops. The participant counts as
   // disconnected: it may come back to the next run of the server.
   virtual void close(delivery::SharedBytes last) = 0;
-  // Disconnects the peer if it has been silent for too long. Called about once a second.
+  // Disconnects the peer if it has been silent for too long, or if its token has ended. Called about once a
+  // second. Does not wait for a message that the peer's thread handles.
   virtual void checkSilence(schedule::Clock::time_point now) = 0;
 };
 

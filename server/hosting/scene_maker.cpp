@@ -168,7 +168,7 @@ tl::expected<void, v1::Error> SceneMaker::remove(v1::DeleteSceneRequest request,
 tl::expected<std::shared_ptr<scene::Journal>, v1::Error> SceneMaker::journalOf(
     const std::string& call, const std::string& name) const {
   const std::shared_ptr<scene::LiveScene> scene = server_.find(name);
-  if (!scene) return tl::unexpected(server_.noSuchScene(name));
+  if (!scene) return tl::unexpected(SceneServer::State::noSuchScene(name));
   if (scene->source)
     return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
                    fmt::format("{}: '{}' is a recording that is played", call, scene->name()));
@@ -248,7 +248,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
       if (const std::shared_ptr<scene::LiveScene> live = server_.find(request.named())) return live->start();
       if (std::ranges::count(messages::namedScenes(), request.named()) > 0)
         return checked(messages::loadScene(request.named()));
-      return tl::unexpected(server_.noSuchScene(request.named()));
+      return tl::unexpected(server_.noSuchScene(request.named(), identity::local()));
     default:
       return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
                      "createScene: must have one of \"scene\", \"uploadedContentId\" and \"named\"");
@@ -281,7 +281,7 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
   }
   const auto ofTenant = static_cast<std::uint32_t>(std::ranges::count_if(
       scenes, [&](const auto& scene) { return scene->created && scene->tenant == tenant; }));
-  if (ofTenant >= server_.options.maxScenesPerTenant) {
+  if (ofTenant >= server_.scenesPerTenant()) {
     server_.metrics.refuse(telemetry::Refusal::scenesOfTenant);
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("your tenant has {} created scenes, its maximum (--max-scenes-per-tenant): "
@@ -332,7 +332,7 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
     const v1::DeleteSceneRequest& request) {
   const std::shared_ptr<scene::LiveScene> scene =
       request.name().empty() ? nullptr : server_.find(request.name());
-  if (!scene) return tl::unexpected(server_.noSuchScene(request.name()));
+  if (!scene) return tl::unexpected(SceneServer::State::noSuchScene(request.name()));
   if (!scene->created)
     return refused(
         v1::ERROR_CODE_INVALID_ARGUMENT,

@@ -62,7 +62,8 @@ void SceneServer::createScene(const v1::CreateSceneRequest& request, const Creat
     error.set_text("createScene.uploadedContentId: upload the scene and create it in the same stream");
     return done(tl::unexpected(std::move(error)));
   }
-  if (auto accepted = state_->maker.create(request, {}, by.tenant, std::move(wanted), done); !accepted)
+  if (auto accepted = state_->maker.create(request, {}, by.subject.tenant, std::move(wanted), done);
+      !accepted)
     done(tl::unexpected(std::move(accepted.error())));
 }
 

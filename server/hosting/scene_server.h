@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -104,8 +105,9 @@ struct ServerOptions {
   std::shared_ptr<identity::Authenticator> authenticator{};
   // Open connections with tokens of one subject.
   std::uint32_t maxConnectionsPerToken = 16;
-  // Created scenes of one tenant. Peers without a tenant share one number.
-  std::uint32_t maxScenesPerTenant = 16;
+  // Created scenes of one tenant. Peers without a tenant share one number. Unset: if the authenticator has
+  // keys for tokens, a quarter of maxCreatedScenes, but at least 1; else maxCreatedScenes.
+  std::optional<std::uint32_t> maxScenesPerTenant{};
 };
 
 // Returns whether the peer still waits for the answer. Called on any thread; must not block.

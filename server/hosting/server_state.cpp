@@ -227,12 +227,19 @@ void SceneServer::State::erase(const scene::LiveScene& scene) {
   std::erase_if(scenes, [&](const auto& known) { return known.get() == &scene; });
 }
 
-v1::Error SceneServer::State::noSuchScene(const std::string& name) const {
+v1::Error SceneServer::State::noSuchScene(const std::string& name, const Identity& by) const {
+  v1::Error error = noSuchScene(name);
   std::string known;
-  for (const auto& scene : scenesNow()) known += (known.empty() ? "" : ", ") + scene->name();
+  for (const auto& scene : scenesNow())
+    if (by.reaches(scene->name())) known += (known.empty() ? "; there are " : ", ") + scene->name();
+  error.mutable_text()->append(known);
+  return error;
+}
+
+v1::Error SceneServer::State::noSuchScene(const std::string& name) {
   v1::Error error;
   error.set_code(v1::ERROR_CODE_NOT_FOUND);
-  error.set_text(fmt::format("there is no scene '{:.64}'; there are {}", printable(name), known));
+  error.set_text(fmt::format("there is no scene '{:.64}'", printable(name)));
   return error;
 }
 

@@ -38,8 +38,11 @@ struct SceneServer::State {
   std::vector<std::shared_ptr<scene::LiveScene>> scenesNow() const;
   void insert(std::shared_ptr<scene::LiveScene> scene);
   void erase(const scene::LiveScene& scene);
-  // Error text such as: there is no scene 'x'; there are curtain, flag.
-  v1::Error noSuchScene(const std::string& name) const;
+  // Error text such as: there is no scene 'x'; there are curtain, flag. Lists only scenes that the peer may
+  // use.
+  v1::Error noSuchScene(const std::string& name, const Identity& by) const;
+  // The same without the list, for a scene that was deleted after the peer's rights were checked.
+  static v1::Error noSuchScene(const std::string& name);
 
   // Admits a peer. Returns null, or the last message to the peer if it is refused, because there are too many
   // peers or the server stops.
@@ -68,7 +71,12 @@ struct SceneServer::State {
   // Counts a connection of a subject while the result lives. Null if it has too many; identities that are not
   // verified are not counted. The result must not outlive this.
   std::shared_ptr<const void> countConnection(const Identity& identity);
-  // Each of the following returns PERMISSION_DENIED, with the reason, if the peer may not do this.
+  // Created scenes that one tenant may have.
+  std::uint32_t scenesPerTenant() const;
+  // Returns whether a peer with a token of another tenant has created the scene.
+  static bool isOfOtherTenant(const Identity& by, const scene::LiveScene& scene);
+  // Each of the following returns PERMISSION_DENIED, with the reason, if the peer may not do this, and
+  // NOT_FOUND if there is no such scene.
   messages::Result<void> mayUse(const Identity& by, const std::string& scene) const;
   messages::Result<void> mayCreate(const Identity& by) const;
   // For peers outside the scene of this name.
@@ -98,7 +106,7 @@ struct SceneServer::State {
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;
   std::vector<std::weak_ptr<Peer>> peers;
   bool stopping = false;
-  std::map<std::string, std::uint32_t> connectionsOfSubjects;  // without zeros
+  std::map<scene::Subject, std::uint32_t> connectionsOfSubjects;  // without zeros
 
   delivery::FramePublisher publisher;
   DeviceThread device;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <unistd.h>
+#include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
 #include "server/identity/token.h"
@@ -36,17 +36,27 @@ TokenKey pairingKey(const fs::path& stateDirectory) {
 }  // namespace
 
 Authenticator::Authenticator(AuthenticatorOptions options) : options_(std::move(options)) {
-  keys_ = readKeys();
+  keys_ = readKeys({});
 }
 
-TokenKeys Authenticator::readKeys() const {
+std::shared_ptr<const TokenKeys> Authenticator::readKeys(const TokenKeys& known) const {
   TokenKeys keys;
   if (!options_.keyDirectory.empty()) keys = readTokenKeys(options_.keyDirectory);
   if (options_.pairing && !keys.emplace(kPairingKeyId, pairingKey(options_.stateDirectory)).second)
     throw std::runtime_error(
         fmt::format("{}: has a key named '{}', which is the name of the key for pairing; rename it",
                     options_.keyDirectory.string(), kPairingKeyId));
-  return keys;
+  for (const auto& [id, key] : keys)
+    if (key.exposed && !known.contains(id))
+      spdlog::warn(
+          "other users of this machine can read the key '{}' and make tokens with it: set its mode to 600",
+          id);
+  return std::make_shared<const TokenKeys>(std::move(keys));
+}
+
+Authenticator::Present Authenticator::present() const {
+  const std::lock_guard lock(mutex_);
+  return {.keys = keys_, .now = clock_()};
 }
 
 messages::Result<Identity> Authenticator::anonymous(bool isLoopback) const {
@@ -61,8 +71,8 @@ messages::Result<Identity> Authenticator::anonymous(bool isLoopback) const {
 
 messages::Result<Identity> Authenticator::verify(const std::string& token, bool isLoopback) const {
   if (!required()) return anonymous(isLoopback);
-  const std::lock_guard lock(mutex_);
-  return check(token, keys_, options_.audience, clock_());
+  const Present with = present();
+  return check(token, *with.keys, options_.audience, with.now);
 }
 
 messages::Result<Authenticator::Paired> Authenticator::pair(const std::string& code,
@@ -71,17 +81,20 @@ messages::Result<Authenticator::Paired> Authenticator::pair(const std::string& c
   if (!options_.pairing)
     return tl::unexpected(messages::FieldError{v1::ERROR_CODE_WRONG_PAIRING_CODE,
                                                "this server does not pair: it needs --pairing"});
-  const std::lock_guard lock(mutex_);
-  const messages::Result<scene::Role> role = codes_.take(code, address, now);
+  const messages::Result<scene::Role> role = [&] {
+    const std::lock_guard lock(codesMutex_);
+    return codes_.take(code, address, now);
+  }();
   if (!role) return tl::unexpected(role.error());
+  const Present with = present();
   Claims claims;
   claims.role = *role;
   claims.subject = "paired-" + randomHex(kSubjectBytes);
   claims.audience = options_.audience;
-  claims.expires = clock_() + kPairingValid;
+  claims.expires = with.now + kPairingValid;
   Paired paired;
-  paired.token = sign(keys_.at(kPairingKeyId), claims);
-  messages::Result<Identity> identity = check(paired.token, keys_, options_.audience, clock_());
+  paired.token = sign(with.keys->at(kPairingKeyId), claims);
+  messages::Result<Identity> identity = check(paired.token, *with.keys, options_.audience, with.now);
   if (!identity) return tl::unexpected(std::move(identity).error());
   paired.identity = std::move(*identity);
   return paired;
@@ -92,19 +105,25 @@ messages::Result<PairingCode> Authenticator::makeCode(scene::Role role, Clock::t
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
                              "createPairingCode: this server does not pair; start it with --pairing"});
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(codesMutex_);
   return codes_.make(role, now);
 }
 
-void Authenticator::reload() {
-  TokenKeys keys = readKeys();
-  const std::lock_guard lock(mutex_);
-  keys_ = std::move(keys);
+const char* Authenticator::whyEnded(const Identity& identity, std::chrono::seconds grace) const {
+  if (!identity.verified) return nullptr;
+  const Present with = present();
+  if (identity.expires && with.now - grace >= *identity.expires)
+    return "your token has expired: connect again with a new one";
+  const auto key = with.keys->find(identity.keyId);
+  if (key == with.keys->end() || key->second.digest != identity.keyDigest)
+    return "the key of your token is no longer in use: connect again with a token of another key";
+  return nullptr;
 }
 
-WallClock::time_point Authenticator::now() const {
+void Authenticator::reload() {
+  std::shared_ptr<const TokenKeys> keys = readKeys(*present().keys);
   const std::lock_guard lock(mutex_);
-  return clock_();
+  keys_ = std::move(keys);
 }
 
 void Authenticator::setClock(std::function<WallClock::time_point()> clock) {

@@ -2,8 +2,10 @@
 // Decides who a peer is: by its token, by a pairing code, or by where it comes from.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 
@@ -38,6 +40,8 @@ class Authenticator {
   // Returns whether every peer needs a token.
   bool required() const { return !options_.keyDirectory.empty() || options_.pairing; }
   bool pairs() const { return options_.pairing; }
+  // Returns whether tokens may name tenants. Those of pairing do not.
+  bool hasTenants() const { return !options_.keyDirectory.empty(); }
 
   // Identity of a peer that has sent neither token nor code; UNAUTHENTICATED if one is required.
   [[nodiscard]] messages::Result<Identity> anonymous(bool isLoopback) const;
@@ -54,21 +58,34 @@ class Authenticator {
   // INVALID_ARGUMENT without pairing.
   [[nodiscard]] messages::Result<PairingCode> makeCode(scene::Role role, Clock::time_point now);
 
+  // Returns null while this identity may be used, or why not, in words for the peer: its token has expired
+  // `grace` ago, or the key of the token is no longer in use. Waits for no work of other threads.
+  const char* whyEnded(const Identity& identity, std::chrono::seconds grace) const;
+
   // Reads the keys of tokens again. If it throws, the former keys stay in use.
   void reload();
 
-  WallClock::time_point now() const;
   // Replaces the clock by which tokens expire, in tests.
   void setClock(std::function<WallClock::time_point()> clock);
 
  private:
-  TokenKeys readKeys() const;
+  using Time = std::function<WallClock::time_point()>;
+  // Keys and time at one moment.
+  struct Present {
+    std::shared_ptr<const TokenKeys> keys;
+    WallClock::time_point now;
+  };
+
+  Present present() const;
+  // Warns of keys with a secret that other users can read, unless `known` has them.
+  std::shared_ptr<const TokenKeys> readKeys(const TokenKeys& known) const;
 
   const AuthenticatorOptions options_;
-  mutable std::mutex mutex_;  // protects all below
-  TokenKeys keys_;            // that of pairing included
+  std::mutex codesMutex_;  // protects codes_
   PairingCodes codes_;
-  std::function<WallClock::time_point()> clock_ = &WallClock::now;
+  mutable std::mutex mutex_;               // protects all below; held only to copy or replace them
+  std::shared_ptr<const TokenKeys> keys_;  // that of pairing included; never null
+  Time clock_ = &WallClock::now;
 };
 
 // Name of the key with which the server signs tokens of pairing.

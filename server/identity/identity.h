@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/scene/roles.h"
+#include "server/scene/subject.h"
 
 namespace clothstream::identity {
 
@@ -16,11 +17,11 @@ using WallClock = std::chrono::system_clock;
 struct Identity {
   scene::Role role = scene::Role::none;
   bool verified = false;
-  std::string subject;      // never empty if verified; the same for all tokens of a person or program
-  std::string tenant;       // may be empty
+  scene::Subject subject;   // never empty if verified; the same for all tokens of a person or program
   std::string displayName;  // replaces the one in Hello; empty: none
   std::string scene;        // the only scene that it may use; empty: all
   std::optional<WallClock::time_point> expires;
+  std::string keyId, keyDigest;  // of the key that has signed the token
 
   // Returns whether it may use the scene of this name.
   bool reaches(const std::string& name) const { return scene.empty() || scene == name; }
@@ -32,10 +33,11 @@ inline Identity local() {
   return {.role = scene::Role::owner,
           .verified = false,
           .subject = {},
-          .tenant = {},
           .displayName = {},
           .scene = {},
-          .expires = {}};
+          .expires = {},
+          .keyId = {},
+          .keyDigest = {}};
 }
 
 }  // namespace clothstream::identity

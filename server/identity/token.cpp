@@ -117,12 +117,14 @@ std::optional<scene::Role> roleNamed(const std::string& name) {
   return std::nullopt;
 }
 
-// Identifies a token without a subject.
+// Identifies a token without a subject. Only header and claims count: a holder of a token can write its
+// signature in several ways.
 std::string digestOf(const std::string& token) {
+  const std::string_view content = std::string_view(token).substr(0, token.rfind('.'));
   constexpr std::size_t kShownBytes = 8;
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned size = 0;
-  if (EVP_Digest(token.data(), token.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1)
+  if (EVP_Digest(content.data(), content.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1)
     return "token";
   std::string text = "token-";
   for (std::size_t i = 0; i < kShownBytes; ++i) text += fmt::format("{:02x}", digest[i]);
@@ -159,15 +161,14 @@ messages::Result<Identity> identityIn(const std::string& token, const Struct& co
     identity.role = *known;
   else
     claims.fail("role", "must be viewer, participant or owner");
-  identity.subject = claims.text("sub");
-  identity.tenant = claims.text("tenant");
+  identity.subject = {.tenant = claims.text("tenant"), .name = claims.text("sub")};
   identity.displayName = claims.text("name");
   identity.scene = claims.text("scene");
   if (!claims.problem().empty()) return refused(claims.problem());
   if (!identity.expires) return refused("it has no expiry (exp)");
   if (*identity.expires <= now) return refused("it has expired; get a new one");
-  if (notBefore && *notBefore > now) return refused("it is not valid yet (nbf)");
-  if (identity.subject.empty()) identity.subject = digestOf(token);
+  if (notBefore && *notBefore - kLeeway > now) return refused("it is not valid yet (nbf)");
+  if (identity.subject.empty()) identity.subject.name = digestOf(token);
   return identity;
 }
 
@@ -227,7 +228,12 @@ messages::Result<Identity> check(const std::string& token, const TokenKeys& keys
     return refused("its signature is wrong");
   const messages::Result<Struct> claims = claimsOf(checked.get());
   if (!claims) return tl::unexpected(claims.error());
-  return identityIn(token, *claims, audience, now);
+  messages::Result<Identity> identity = identityIn(token, *claims, audience, now);
+  if (identity) {
+    identity->keyId = key->second.id;
+    identity->keyDigest = key->second.digest;
+  }
+  return identity;
 }
 
 }  // namespace clothstream::identity

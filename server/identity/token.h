@@ -2,6 +2,7 @@
 // JSON Web Tokens: signs and checks them with libjwt.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -13,13 +14,15 @@
 namespace clothstream::identity {
 
 inline constexpr std::size_t kMaxTokenBytes = 4096;
+// A token is valid this long before its beginning (nbf), because the clocks of two machines differ.
+inline constexpr std::chrono::seconds kLeeway{30};
 
 // Content of a token. Names of the claims are those of the members, except `sub`, `aud`, `exp` and `nbf`.
 struct Claims {
   scene::Role role = scene::Role::participant;  // absent: participant
   std::string scene;                            // absent: every scene
   std::string name;                             // display name
-  std::string subject;                          // absent: a digest of the token
+  std::string subject;                          // absent: a digest of header and claims
   std::string tenant;
   std::string audience;                            // required
   std::optional<WallClock::time_point> expires;    // required; whole seconds

@@ -23,7 +23,10 @@
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/rand.h>
+#include <sys/stat.h>
 #include <unistd.h>
+
+#include "server/scene/token_hash.h"
 
 namespace clothstream::identity {
 namespace {
@@ -33,6 +36,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxFileBytes = 64 * 1024;
 constexpr std::size_t kMaxIdBytes = 64;
 constexpr std::size_t kNewSecretBytes = 32;
+constexpr std::size_t kDraftBytes = 8;
 
 template <auto Free>
 struct Freed {
@@ -57,6 +61,32 @@ std::string readFile(const fs::path& file) {
   text.resize(static_cast<std::size_t>(in.gcount()));
   if (text.size() > kMaxFileBytes) fail(file, "is too large for a key");
   return text;
+}
+
+// Writes a new file with mode 0600 to the disk. Returns 0, or the errno of the first call that failed.
+int writeFile(const fs::path& file, const std::string& content) {
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (descriptor < 0) return errno;
+  int failure = 0;
+  for (std::size_t done = 0; failure == 0 && done < content.size();) {
+    const ssize_t count = ::write(descriptor, content.data() + done, content.size() - done);
+    if (count >= 0)
+      done += static_cast<std::size_t>(count);
+    else if (errno != EINTR)
+      failure = errno;
+  }
+  if (failure == 0 && ::fsync(descriptor) != 0) failure = errno;
+  if (::close(descriptor) != 0 && failure == 0) failure = errno;
+  return failure;
+}
+
+// Makes the name of a new file survive a failure of the machine. Some file systems cannot do that; the file
+// is usable all the same.
+void syncDirectory(const fs::path& directory) {
+  const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
 }
 
 Bio bioOf(const std::string& text) {
@@ -132,6 +162,10 @@ TokenKey readTokenKey(const fs::path& file) {
     readSecret(file, key);
   else
     fail(file, "the name of a key ends in .pem (ES256) or .secret (HS256)");
+  key.digest = scene::hashOfToken(key.checking);
+  struct stat status {};
+  key.exposed = !key.signing.empty() && ::stat(file.c_str(), &status) == 0 &&
+                (status.st_mode & (S_IRWXG | S_IRWXO)) != 0;
   return key;
 }
 
@@ -166,16 +200,16 @@ void makeTokenKey(const fs::path& file) {
   } else {
     fail(file, "the name of a key ends in .pem (ES256) or .secret (HS256)");
   }
-  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  if (descriptor < 0) fail(file, fmt::format("cannot be made: {}", std::strerror(errno)));
-  const bool written =
-      ::write(descriptor, content.data(), content.size()) == static_cast<ssize_t>(content.size()) &&
-      ::fsync(descriptor) == 0;
-  const bool closed = ::close(descriptor) == 0;
+  fs::path draft = file;
+  draft += fmt::format(".{}.draft", randomHex(kDraftBytes));
+  const int written = writeFile(draft, content);
   OPENSSL_cleanse(content.data(), content.size());
-  if (written && closed) return;
-  ::unlink(file.c_str());
-  fail(file, fmt::format("cannot be written: {}", std::strerror(errno)));
+  // Unlike a rename, a link does not replace a file.
+  const int linked = written != 0 || ::link(draft.c_str(), file.c_str()) == 0 ? 0 : errno;
+  ::unlink(draft.c_str());
+  if (written != 0) fail(file, fmt::format("cannot be written: {}", std::strerror(written)));
+  if (linked != 0) fail(file, fmt::format("cannot be made: {}", std::strerror(linked)));
+  syncDirectory(file.has_parent_path() ? file.parent_path() : fs::path("."));
 }
 
 std::string randomHex(std::size_t bytes) {

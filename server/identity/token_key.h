@@ -21,6 +21,8 @@ struct TokenKey {
   Algorithm algorithm = Algorithm::es256;
   std::string checking;  // ES256: public key as PEM; HS256: secret
   std::string signing;   // ES256: private key as PEM, or empty; HS256: secret
+  std::string digest{};  // SHA-256 of `checking`: differs from that of every other key
+  bool exposed = false;  // other users of the machine can read `signing`
 };
 
 // By id.
@@ -36,8 +38,9 @@ TokenKey readTokenKey(const std::filesystem::path& file);
 // same id.
 TokenKeys readTokenKeys(const std::filesystem::path& directory);
 
-// Writes a new key with mode 0600: a private key for a name that ends in .pem, a secret for .secret. Throws
-// std::runtime_error, also if the file exists.
+// Writes a new key with mode 0600: a private key for a name that ends in .pem, a secret for .secret. The file
+// appears when it is complete, also if the process or the machine stops meanwhile. Throws std::runtime_error,
+// also if the file exists.
 void makeTokenKey(const std::filesystem::path& file);
 
 // Random bytes of the operating system, in hexadecimal digits: two for each byte. Throws std::runtime_error.

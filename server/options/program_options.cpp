@@ -189,8 +189,10 @@ void addIdentityOptions(OptionTable& table, Parsed& parsed) {
   table.showDefault(role, "participant");
   table.number("--max-connections-per-token", options.server.maxConnectionsPerToken,
                {.min = 1, .max = 100'000}, "Open connections with tokens of one subject");
-  table.number("--max-scenes-per-tenant", options.server.maxScenesPerTenant, {.min = 0, .max = 1000},
-               "Created scenes of one tenant. Clients without a tenant share one number");
+  CLI::Option* ofTenant =
+      table.number("--max-scenes-per-tenant", options.server.maxScenesPerTenant, {.min = 0, .max = 1000},
+                   "Created scenes of one tenant. Clients without a tenant share one number");
+  table.showDefault(ofTenant, "a quarter of --max-created-scenes with --token-keys, else all of them");
 }
 
 // Checks the options together.

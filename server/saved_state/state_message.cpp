@@ -174,11 +174,15 @@ v1::SavedSession toMessage(const scene::SavedRoster& roster, const v1::Scene& pa
     to.set_role(scene::toMessage(saved.participant.role));
     to.set_token_hash(saved.tokenHash);
     to.set_attempt(saved.attempt);
-    to.set_subject(saved.subject);
+    to.set_subject(saved.subject.name);
+    to.set_tenant(saved.subject.tenant);
+    to.set_granted_role(saved.grantedRole);
+    to.set_owns_by_token(saved.ownsByToken);
   }
   for (const scene::Ban& ban : roster.bans) {
     v1::SavedBan& to = *message.add_bans();
-    to.set_subject(ban.subject);
+    to.set_subject(ban.subject.name);
+    to.set_tenant(ban.subject.tenant);
     to.set_display_name(ban.displayName);
   }
   for (const std::string& hash : roster.refusedTokenHashes) message.add_refused_token_hashes(hash);
@@ -195,10 +199,13 @@ scene::SavedRoster toRoster(const v1::SavedSession& message) {
                                                      .role = scene::fromMessage(from.role()),
                                                      .away = true},
                                      .tokenHash = from.token_hash(),
-                                     .subject = from.subject(),
-                                     .attempt = from.attempt()});
+                                     .subject = {.tenant = from.tenant(), .name = from.subject()},
+                                     .attempt = from.attempt(),
+                                     .grantedRole = from.granted_role(),
+                                     .ownsByToken = from.owns_by_token()});
   for (const v1::SavedBan& ban : message.bans())
-    if (!ban.subject().empty()) roster.bans.push_back({ban.subject(), ban.display_name()});
+    if (!ban.subject().empty())
+      roster.bans.push_back({{.tenant = ban.tenant(), .name = ban.subject()}, ban.display_name()});
   for (const std::string& hash : message.refused_token_hashes())
     if (hash.size() == scene::kTokenHashBytes) roster.refusedTokenHashes.push_back(hash);
   return roster;

@@ -9,10 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "server/scene/subject.h"
+
 namespace clothstream::scene {
 
 struct Ban {
-  std::string subject;      // of the banned tokens; not empty
+  Subject subject;          // of the banned tokens; not empty
   std::string displayName;  // when the ban began, for people; may be empty
 
   friend bool operator==(const Ban&, const Ban&) = default;
@@ -30,11 +32,11 @@ class BanList {
     bans_.push_back(std::move(ban));
     return true;
   }
-  // Returns whether there was such a ban.
-  bool lift(std::string_view subject) {
-    return std::erase_if(bans_, [&](const Ban& ban) { return ban.subject == subject; }) > 0;
+  // Lifts the bans of subjects with this name, of every tenant. Returns whether there was one.
+  bool lift(std::string_view name) {
+    return std::erase_if(bans_, [&](const Ban& ban) { return ban.subject.name == name; }) > 0;
   }
-  bool contains(std::string_view subject) const {
+  bool contains(const Subject& subject) const {
     return std::ranges::any_of(bans_, [&](const Ban& ban) { return ban.subject == subject; });
   }
 

@@ -115,27 +115,28 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
       (!known->participant.away || now < known->placeExpires)) {
     if (request.attempt < known->attempt) return tl::unexpected(Refusal::late);
     known->attempt = request.attempt;
-    known->ownership = request.ownership;
-    return resume(*known, request.token, mailbox, now);
+    return resume(*known, request, mailbox, now);
   }
   if (entries_.size() >= limit && !makeRoom(now)) return tl::unexpected(Refusal::full);
 
   const bool isOwned =
       std::ranges::any_of(entries_, [](const Entry& entry) { return entry.participant.role == Role::owner; });
-  const bool owns =
-      request.ownership == Ownership::always || (request.ownership == Ownership::ifNone && !isOwned);
+  const Ownership ownership = request.rights.ownership;
+  const bool owns = ownership == Ownership::always || (ownership == Ownership::ifNone && !isOwned);
+  const bool demoted = isDemoted(request.subject);
   Entry entry;
   std::string token = makeToken();
   entry.tokenHash = hashOfToken(token);
   entry.subject = request.subject;
-  entry.ownership = request.ownership;
+  entry.rights = request.rights;
   entry.attempt = request.attempt;
   entry.participant = {.id = ++ids,
                        .displayName = request.displayName,
                        .clientName = request.clientName,
-                       .role = request.role == Role::viewer ? Role::viewer
-                               : owns                       ? Role::owner
-                                                            : Role::participant};
+                       .role = demoted || request.rights.onlyViews || request.role == Role::viewer
+                                   ? Role::viewer
+                               : owns ? Role::owner
+                                      : Role::participant};
   if (journal_) journal_->joined(entry.participant.id, request.clientName, request.displayName);
   // Announced before the new participant subscribes, because its Welcome already contains itself.
   announce(Presence::joined, entry.participant);
@@ -144,7 +145,7 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
   return admissionOf(entries_.back(), std::move(token), false);
 }
 
-Roster::Admission Roster::resume(Entry& entry, const std::string& token,
+Roster::Admission Roster::resume(Entry& entry, const JoinRequest& request,
                                  const std::shared_ptr<Mailbox>& mailbox, Clock::time_point now) {
   if (const std::shared_ptr<Mailbox> former = subscribers_.find(entry.participant.id)) {
     subscribers_.remove(*former);
@@ -153,13 +154,38 @@ Roster::Admission Roster::resume(Entry& entry, const std::string& token,
   }
   const bool wasAway = std::exchange(entry.participant.away, false);
   if (wasAway) announce(Presence::returned, entry.participant);
+  // Announced before the participant subscribes, because its Welcome already contains its role.
+  limitRole(entry, request.rights, now);
   subscribers_.add(mailbox, entry.participant.id);
   if (!entry.posed && !(entry.poses.colliders.empty() && entry.poses.grabs.empty()) &&
       charge(entry, entry.poses.colliders.size())) {
     inbox_.postPoses(entry.participant.id, entry.poses, now);
     entry.posed = true;
   }
-  return admissionOf(entry, token, true);
+  return admissionOf(entry, request.token, true);
+}
+
+void Roster::limitRole(Entry& entry, const Rights& rights, Clock::time_point now) {
+  entry.rights = rights;
+  if (!entry.grantedRole && entry.participant.role > rights.highest())
+    changeRole(entry, rights.highest(), 0, now);
+  ensureOwner(now);
+}
+
+void Roster::renew(const Mailbox& mailbox, const Rights& rights, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  if (const auto entry = find(mailbox); entry != entries_.end()) limitRole(*entry, rights, now);
+}
+
+bool Roster::isDemoted(const Subject& subject) const {
+  return !subject.empty() && std::ranges::find(demoted_, subject) != demoted_.end();
+}
+
+void Roster::rememberRole(const Subject& subject, Role role) {
+  if (subject.empty()) return;
+  std::erase(demoted_, subject);
+  if (role == Role::viewer) demoted_.push_back(subject);
+  if (demoted_.size() > kMaxDemoted) demoted_.pop_front();
 }
 
 Roster::Admission Roster::admissionOf(const Entry& entry, std::string token, bool resumed) const {
@@ -244,7 +270,7 @@ void Roster::ensureOwner(Clock::time_point now) {
   if (std::ranges::any_of(entries_, [](const Entry& entry) { return entry.participant.role == Role::owner; }))
     return;
   const auto mayOwn = [](const Entry& entry) {
-    return entry.participant.role == Role::participant && entry.ownership != Ownership::never;
+    return entry.participant.role == Role::participant && entry.rights.ownership != Ownership::never;
   };
   // Connected participants come before those who are away.
   auto heir = std::ranges::find_if(
@@ -289,7 +315,12 @@ SavedRoster Roster::saved() const {
                     .bans = bans_.get(),
                     .refusedTokenHashes = {refusedTokens_.begin(), refusedTokens_.end()}};
   for (const Entry& entry : entries_) {
-    saved.participants.push_back({entry.participant, entry.tokenHash, entry.subject, entry.attempt});
+    saved.participants.push_back({.participant = entry.participant,
+                                  .tokenHash = entry.tokenHash,
+                                  .subject = entry.subject,
+                                  .attempt = entry.attempt,
+                                  .grantedRole = entry.grantedRole,
+                                  .ownsByToken = entry.rights.ownership == Ownership::always});
     // Whether a participant is connected does not outlive the server.
     saved.participants.back().participant.away = true;
   }
@@ -307,6 +338,10 @@ void Roster::restore(const SavedRoster& from, const ReconnectGrace& grace, Clock
     entry.tokenHash = saved.tokenHash;
     entry.subject = saved.subject;
     entry.attempt = saved.attempt;
+    // Its next identity decides whether it may own the scene. Until then only a token of the former run
+    // counts.
+    entry.rights.ownership = saved.ownsByToken ? Ownership::always : Ownership::never;
+    entry.grantedRole = saved.grantedRole;
     // The scene may have colliders and grabs of it from a checkpoint.
     entry.posed = true;
     entry.posesExpire = now + std::min(grace.poses, grace.place);
@@ -379,6 +414,7 @@ messages::Result<void> Roster::setRole(const Mailbox& by, const v1::SetRole& mes
                     static_cast<int>(message.role()))});
   const auto entry = target("setRole", message.participant_id());
   if (!entry) return tl::unexpected(entry.error());
+  if (auto may = mayActOn("setRole", *owner, **entry); !may) return may;
   const Role role = fromMessage(message.role());
   if ((*entry)->participant.role == role) return {};
   const auto owners = std::ranges::count_if(
@@ -387,8 +423,19 @@ messages::Result<void> Roster::setRole(const Mailbox& by, const v1::SetRole& mes
     return tl::unexpected(messages::FieldError{
         v1::ERROR_CODE_INVALID_ARGUMENT,
         "setRole: the only owner of a scene cannot give up the role; make another participant owner first"});
+  (*entry)->grantedRole = role > (*entry)->rights.highest();
+  rememberRole((*entry)->subject, role);
   changeRole(**entry, role, owner->participant.id, now);
   return {};
+}
+
+messages::Result<void> Roster::mayActOn(const char* field, const Entry& by, const Entry& entry) const {
+  const auto ownsByToken = [](const Entry& known) { return known.rights.ownership == Ownership::always; };
+  if (!ownsByToken(entry) || ownsByToken(by)) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_PERMISSION_DENIED,
+      fmt::format("{}.participantId = {}: is an owner by its token; only another owner by token may do this",
+                  field, entry.participant.id)});
 }
 
 messages::Result<void> Roster::remove(const Mailbox& by, const v1::RemoveParticipant& message,
@@ -400,12 +447,23 @@ messages::Result<void> Roster::remove(const Mailbox& by, const v1::RemovePartici
     return permitted;
   const auto entry = target("removeParticipant", message.participant_id());
   if (!entry) return tl::unexpected(entry.error());
+  if (auto may = mayActOn("removeParticipant", *owner, **entry); !may) return may;
   const std::uint64_t remover = owner->participant.id;
-  if (!message.ban() || (*entry)->subject.empty()) {
+  if (!message.ban()) {
     expel(*entry, "an owner removed this participant from the scene", remover, now);
     return {};
   }
-  const std::string subject = (*entry)->subject;
+  const Subject subject = (*entry)->subject;
+  if (subject.empty())
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format(
+            "removeParticipant.ban: participant {} has no subject, because it joined without a token, "
+            "so that a ban would not hold; remove it without a ban",
+            message.participant_id())});
+  for (const Entry& other : entries_)
+    if (other.subject == subject)
+      if (auto may = mayActOn("removeParticipant", *owner, other); !may) return may;
   if (subject == owner->subject)
     return tl::unexpected(messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
                                                "removeParticipant.ban: you cannot ban your own subject"});
@@ -439,14 +497,14 @@ void Roster::setBans(std::vector<Ban> bans) {
   bans_.set(std::move(bans));
 }
 
-bool Roster::isBanned(const std::string& subject) const {
+bool Roster::isBanned(const Subject& subject) const {
   const std::lock_guard lock(mutex_);
   return bans_.contains(subject);
 }
 
-bool Roster::liftBan(const std::string& subject) {
+bool Roster::liftBan(const std::string& name) {
   const std::lock_guard lock(mutex_);
-  return bans_.lift(subject);
+  return bans_.lift(name);
 }
 
 void Roster::announce(Presence presence, const Participant& participant, std::uint64_t by) {

@@ -22,6 +22,7 @@
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/roles.h"
+#include "server/scene/subject.h"
 #include "server/schedule/clock.h"
 
 namespace clothstream::scene {
@@ -48,12 +49,26 @@ enum class Ownership : std::uint8_t {
   always,
 };
 
+// Permissions of a participant's identity in a scene.
+struct Rights {
+  Ownership ownership = Ownership::ifNone;
+  bool onlyViews = false;  // viewer is its only role
+
+  // Highest role without an owner's help.
+  Role highest() const {
+    if (onlyViews) return Role::viewer;
+    return ownership == Ownership::never ? Role::participant : Role::owner;
+  }
+};
+
 // A participant as it is kept beyond the end of the server.
 struct SavedParticipant {
   Participant participant;
   std::string tokenHash;      // hashOfToken() of its resume token
-  std::string subject;        // of its identity; empty without one
+  Subject subject;            // of its identity; empty without one
   std::uint32_t attempt = 0;  // of its newest session
+  bool grantedRole = false;   // an owner gave it a higher role than its identity permits
+  bool ownsByToken = false;   // its token has the role owner
 };
 
 // What is kept of a roster beyond the end of the server.
@@ -71,11 +86,17 @@ enum class LeaveReason : std::uint8_t { left, timedOut, removed };
 //
 // If the scene has no owner, the first participant to join that may own it becomes one. When the last owner
 // leaves, it is the one of these that has been there longest. Viewers own nothing.
+//
+// A role that no owner gave is at most the one that the identity permits, also after a return or a new token.
+// A role that an owner gave stays. The roster remembers whom an owner made a viewer: the subject of that
+// participant is a viewer again when it joins again.
 class Roster {
  public:
   static constexpr std::size_t kTokenBytes = 16;
   // Resume tokens of removed participants that are refused; the oldest are forgotten.
   static constexpr std::size_t kMaxRefusedTokens = 256;
+  // Subjects that stay viewers; the oldest are forgotten.
+  static constexpr std::size_t kMaxDemoted = 256;
   // Accepted range of pose times. Later times count as unknown, earlier ones as kMaxBehind.
   static constexpr std::chrono::milliseconds kMaxAhead{100}, kMaxBehind{10'000};
 
@@ -89,10 +110,10 @@ class Roster {
 
   struct JoinRequest {
     std::string clientName, displayName;
-    Role role = Role::none;  // requested
-    std::string token;       // of a participant that reconnects; else empty
-    std::string subject;     // of the peer's identity; empty without one
-    Ownership ownership = Ownership::ifNone;
+    Role role = Role::none;     // requested
+    std::string token;          // of a participant that reconnects; else empty
+    Subject subject;            // of the peer's identity; empty without one
+    Rights rights{};            // of the peer's identity
     std::uint32_t attempt = 0;  // grows with each connection of the participant
   };
   struct Admission {
@@ -113,6 +134,8 @@ class Roster {
                                                       const std::shared_ptr<delivery::Mailbox>& mailbox,
                                                       std::atomic<std::uint64_t>& ids, std::size_t limit,
                                                       Clock::time_point now);
+  // The participant's identity has other rights now, because it has sent a new token.
+  void renew(const delivery::Mailbox& mailbox, const Rights& rights, Clock::time_point now);
   // Removes the participant for good.
   void leave(const delivery::Mailbox& mailbox, LeaveReason reason, Clock::time_point now);
   // The connection is lost: the participant is away and may come back.
@@ -153,12 +176,13 @@ class Roster {
   // Bans of the scene. They are lifted by LiftBan, or end with the scene.
   std::vector<Ban> bans() const;
   void setBans(std::vector<Ban> bans);
-  bool isBanned(const std::string& subject) const;
-  // Returns whether there was such a ban.
-  bool liftBan(const std::string& subject);
+  bool isBanned(const Subject& subject) const;
+  // Lifts the bans of subjects with this name, of every tenant. Returns whether there was one.
+  bool liftBan(const std::string& name);
 
-  // Requests of an owner. They return NOT_FOUND if there is no such participant. remove() with a ban also
-  // removes other participants of the same subject.
+  // Requests of an owner. They return NOT_FOUND if there is no such participant, and PERMISSION_DENIED for an
+  // owner by token (Ownership::always) if the sender is not one. remove() with a ban also removes other
+  // participants of the same subject. It returns INVALID_ARGUMENT for a participant without a subject.
   [[nodiscard]] messages::Result<void> setRole(const delivery::Mailbox& by, const v1::SetRole& message,
                                                Clock::time_point now);
   [[nodiscard]] messages::Result<void> remove(const delivery::Mailbox& by,
@@ -167,8 +191,10 @@ class Roster {
  private:
   struct Entry {
     Participant participant;
-    std::string tokenHash, subject;  // hashOfToken() of the resume token
-    Ownership ownership = Ownership::ifNone;
+    std::string tokenHash;  // hashOfToken() of the resume token
+    Subject subject;
+    Rights rights;
+    bool grantedRole = false;                         // as in SavedParticipant
     std::uint32_t attempt = 0;                        // of the newest session
     model::ParticipantPoses poses;                    // the newest, without attachments
     bool posed = false;                               // the scene may have colliders or grabs of it
@@ -184,10 +210,17 @@ class Roster {
   // Ends the participant's session and refuses its resume token from now on. Returns the next entry.
   Entries::iterator expel(Entries::iterator entry, const char* why, std::uint64_t by, Clock::time_point now);
   Role roleOf(const delivery::Mailbox& mailbox) const;
+  bool isDemoted(const Subject& subject) const;
+  void rememberRole(const Subject& subject, Role role);
+  // Sets the rights, lowers a role that no owner gave to what they permit, and gives the scene an owner if it
+  // has none.
+  void limitRole(Entry& entry, const Rights& rights, Clock::time_point now);
+  // Returns PERMISSION_DENIED if the participant is an owner by token and the sender is not.
+  messages::Result<void> mayActOn(const char* field, const Entry& by, const Entry& entry) const;
   // Participant that an owner's request names in `field`.
   messages::Result<Entries::iterator> target(const char* field, std::uint64_t id);
-  Admission resume(Entry& entry, const std::string& token, const std::shared_ptr<delivery::Mailbox>& mailbox,
-                   Clock::time_point now);
+  Admission resume(Entry& entry, const JoinRequest& request,
+                   const std::shared_ptr<delivery::Mailbox>& mailbox, Clock::time_point now);
   // Evicts the participant that has been away longest. Returns false if all are connected.
   bool makeRoom(Clock::time_point now);
   // Returns the next entry. `by` is the participant that caused it, or 0.
@@ -213,6 +246,7 @@ class Roster {
   Entries entries_;           // in the order in which they joined
   BanList bans_;
   std::deque<std::string> refusedTokens_;  // hashes of those of removed participants, newest last
+  std::deque<Subject> demoted_;            // made viewers by an owner, newest last
   bool closed_ = false;
 };
 

@@ -25,7 +25,6 @@ using delivery::SharedBytes;
 using scene::Action;
 
 constexpr double kMalformedCost = 60;
-constexpr const char* kExpired = "your token has expired: connect again with a new one";
 constexpr double kMegabyte = 1e6, kKilobyte = 1e3;
 // Largest answer in a stream; it bounds the memory that a peer costs. Scenes with large meshes need the unary
 // call.
@@ -74,8 +73,7 @@ void Session::identify(const std::string& token) {
 
 bool Session::become(identity::Identity identity) {
   // A new token of the same subject replaces the former one.
-  const bool same = identity_ && identity_->verified && identity_->subject == identity.subject &&
-                    identity_->tenant == identity.tenant;
+  const bool same = identity_ && identity_->verified && identity_->subject == identity.subject;
   if (!same) {
     counted_.reset();
     counted_ = server_.countConnection(identity);
@@ -87,7 +85,6 @@ bool Session::become(identity::Identity identity) {
     return false;
   }
   identity_ = std::move(identity);
-  expires_ = identity_->expires.value_or(identity::WallClock::time_point::max());
   return true;
 }
 
@@ -97,18 +94,13 @@ void Session::authenticate(const v1::AuthenticateRequest& request) {
       server_.authenticate(request, address_, now_, *reply.mutable_authenticate());
   if (!identity) return fail(identity.error().code, identity.error().text);
   if (scene_ != nullptr && identity->verified &&
-      (identity->subject != identity_->subject || identity->tenant != identity_->tenant ||
-       !identity->reaches(scene_->name())))
+      (identity->subject != identity_->subject || !identity->reaches(scene_->name())))
     return refuse({v1::ERROR_CODE_OUT_OF_ORDER,
                    "authenticate: a stream in a scene accepts only tokens of the same subject and tenant "
                    "that are valid for this scene"});
-  if (become(std::move(*identity))) answer(reply);
-}
-
-bool Session::isExpired(std::chrono::seconds grace) const {
-  const identity::WallClock::time_point expires = expires_;
-  if (expires == identity::WallClock::time_point::max()) return false;
-  return server_.options.authenticator->now() - grace >= expires;
+  if (!become(std::move(*identity))) return;
+  if (scene_ != nullptr) scene_->roster.renew(*mailbox_, rightsIn(*scene_), now_);
+  answer(reply);
 }
 
 std::optional<SharedBytes> Session::next() {
@@ -299,10 +291,13 @@ bool Session::manage(const v1::ClientMessage& message) {
   }
 }
 
-scene::Ownership Session::ownership() const {
-  if (identity_->isVerifiedOwner()) return scene::Ownership::always;
+scene::Rights Session::rightsIn(const scene::LiveScene& scene) const {
+  using scene::Ownership;
+  if (identity_->role == scene::Role::viewer) return {.ownership = Ownership::never, .onlyViews = true};
+  if (hosting::SceneServer::State::isOfOtherTenant(*identity_, scene)) return {.ownership = Ownership::never};
+  if (identity_->isVerifiedOwner()) return {.ownership = Ownership::always};
   const bool mayOwn = identity_->role == scene::Role::owner || server_.options.participantsMay.own;
-  return mayOwn ? scene::Ownership::ifNone : scene::Ownership::never;
+  return {.ownership = mayOwn ? Ownership::ifNone : Ownership::never};
 }
 
 void Session::hello(const v1::Hello& message) {
@@ -315,13 +310,12 @@ void Session::hello(const v1::Hello& message) {
   if (!joining) return fail(joining.error().code, joining.error().text);
   if (joining->scene.empty()) joining->scene = identity_->scene;
   if (const auto may = server_.mayUse(*identity_, joining->scene); !may)
-    return fail(server_.find(joining->scene) && identity_->reaches(joining->scene)
-                    ? v1::ERROR_CODE_REMOVED
-                    : v1::ERROR_CODE_PERMISSION_DENIED,
+    return fail(server_.find(joining->scene) && identity_->reaches(joining->scene) ? v1::ERROR_CODE_REMOVED
+                                                                                   : may.error().code,
                 may.error().text);
   const std::shared_ptr<scene::LiveScene> scene = server_.find(joining->scene);
   if (!scene) {
-    const v1::Error error = server_.noSuchScene(joining->scene);
+    const v1::Error error = server_.noSuchScene(joining->scene, *identity_);
     return fail(error.code(), error.text());
   }
   if (const std::string why = scene->quarantined(); !why.empty())
@@ -331,16 +325,14 @@ void Session::hello(const v1::Hello& message) {
     return fail(
         v1::ERROR_CODE_UNSUPPORTED_CODEC,
         fmt::format("hello.codecs: must contain {}, the codec of '{}'", scene->codec(), scene->name()));
-  auto admission =
-      scene->roster.join({.clientName = joining->clientName,
-                          .displayName = joining->displayName,
-                          .role = identity_->role == scene::Role::viewer ? scene::Role::viewer
-                                                                         : scene::fromMessage(joining->role),
-                          .token = message.resume_token(),
-                          .subject = identity_->subject,
-                          .ownership = ownership(),
-                          .attempt = message.attempt()},
-                         mailbox_, server_.participants, scene->maxParticipants, now_);
+  auto admission = scene->roster.join({.clientName = joining->clientName,
+                                       .displayName = joining->displayName,
+                                       .role = scene::fromMessage(joining->role),
+                                       .token = message.resume_token(),
+                                       .subject = identity_->subject,
+                                       .rights = rightsIn(*scene),
+                                       .attempt = message.attempt()},
+                                      mailbox_, server_.participants, scene->maxParticipants, now_);
   if (!admission && admission.error() == scene::Roster::Refusal::closed)
     return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just closed", scene->name()));
   if (!admission && admission.error() == scene::Roster::Refusal::removed)
@@ -407,7 +399,7 @@ void Session::create(const v1::CreateSceneRequest& request) {
     return session && !session->mailbox_->closed();
   };
   refuseUnlessQueued(
-      server_.maker.create(request, std::move(uploaded), identity_->tenant, wanted,
+      server_.maker.create(request, std::move(uploaded), identity_->subject.tenant, wanted,
                            answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene)));
 }
 
@@ -494,18 +486,22 @@ void Session::leave() {
 
 void Session::checkSilence(Clock::time_point now) {
   const hosting::ServerOptions& options = server_.options;
-  const std::lock_guard lock(mutex_);
+  // This runs on a thread that publishes frames. A session that handles a message is not silent; the next
+  // call checks it.
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock) return;
   // A mailbox that others closed, such as the scene's roster, is noticed here too.
   if (mailbox_->closed()) {
     now_ = now;
     return disconnect(DisconnectReason::lost);
   }
   // A stream in a scene has some time to send a new token.
-  if (isExpired(scene_ ? identity::Authenticator::kExpiryGrace : std::chrono::seconds(0))) {
+  const auto grace = scene_ ? identity::Authenticator::kExpiryGrace : std::chrono::seconds(0);
+  if (const char* const why =
+          identity_ && options.authenticator ? options.authenticator->whyEnded(*identity_, grace) : nullptr) {
     now_ = now;
-    spdlog::info("{}: disconnected: its token has expired", peer_);
-    return closeLocked(delivery::error(v1::ERROR_CODE_UNAUTHENTICATED, kExpired, true),
-                       DisconnectReason::lost);
+    spdlog::info("{}: disconnected: {}", peer_, why);
+    return closeLocked(delivery::error(v1::ERROR_CODE_UNAUTHENTICATED, why, true), DisconnectReason::lost);
   }
   requestId_ = 0;
   now_ = now;

@@ -98,11 +98,10 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void authenticate(const v1::AuthenticateRequest& request);
   // Sets the identity and counts the connection. Returns false, and ends the session, if there are too many.
   bool become(identity::Identity identity);
-  // Returns whether the token has expired `grace` ago.
-  bool isExpired(std::chrono::seconds grace) const;
   // Handles requests about identities and bans. Returns false if the message is none of these.
   bool manage(const v1::ClientMessage& message);
-  scene::Ownership ownership() const;
+  // What the identity permits in this scene.
+  scene::Rights rightsIn(const scene::LiveScene& scene) const;
   void hello(const v1::Hello& message);
   void poses(const v1::ColliderPoses& message, Clock::time_point now);
   void create(const v1::CreateSceneRequest& request);
@@ -131,8 +130,6 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   const std::shared_ptr<delivery::Mailbox> mailbox_;
   const Clock::time_point opened_;
   std::atomic<Clock::time_point> lastHeard_;
-  // Of the token. The largest value without one.
-  std::atomic<identity::WallClock::time_point> expires_{identity::WallClock::time_point::max()};
   std::atomic<Clock::duration> readPause_{};
 
   std::mutex mutex_;  // protects all below

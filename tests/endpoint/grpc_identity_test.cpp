@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Tokens in the metadata of gRPC calls, and pairing by a call.
 #include <chrono>
+#include <map>
 #include <memory>
 #include <string>
 
 #include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
@@ -88,6 +90,38 @@ TEST_F(GrpcIdentity, CallsNeedAToken) {
   EXPECT_TRUE(list("Bearer " + token(scene::Role::viewer)).ok());
 }
 
+// Status of a call without a token.
+template <typename Request, typename Response>
+grpc::StatusCode codeOf(v1::ClothStream::Stub& stub,
+                        grpc::Status (v1::ClothStream::Stub::*call)(grpc::ClientContext*, const Request&,
+                                                                    Response*)) {
+  grpc::ClientContext context;
+  Response response;
+  return (stub.*call)(&context, {}, &response).error_code();
+}
+
+TEST_F(GrpcIdentity, EveryCallNeedsAToken) {
+  using Stub = v1::ClothStream::Stub;
+  const std::map<std::string, grpc::StatusCode> codes{
+      {"ListScenes", codeOf(*stub_, &Stub::ListScenes)},
+      {"GetScene", codeOf(*stub_, &Stub::GetScene)},
+      {"CreateScene", codeOf(*stub_, &Stub::CreateScene)},
+      {"DeleteScene", codeOf(*stub_, &Stub::DeleteScene)},
+      {"ControlScene", codeOf(*stub_, &Stub::ControlScene)},
+      {"StartRecording", codeOf(*stub_, &Stub::StartRecording)},
+      {"StopRecording", codeOf(*stub_, &Stub::StopRecording)},
+      {"Authenticate", codeOf(*stub_, &Stub::Authenticate)},
+      {"CreatePairingCode", codeOf(*stub_, &Stub::CreatePairingCode)},
+      {"ListBans", codeOf(*stub_, &Stub::ListBans)},
+      {"LiftBan", codeOf(*stub_, &Stub::LiftBan)}};
+  for (const auto& [name, code] : codes) EXPECT_EQ(code, grpc::StatusCode::UNAUTHENTICATED) << name;
+  const auto* const service = v1::ClientMessage::descriptor()->file()->FindServiceByName("ClothStream");
+  for (int i = 0; i < service->method_count(); ++i) {
+    const std::string name(service->method(i)->name());
+    EXPECT_TRUE(name == "Join" || codes.contains(name)) << name;
+  }
+}
+
 TEST_F(GrpcIdentity, RoleOfTheTokenDecidesOutsideOfScenes) {
   EXPECT_EQ(pause("Bearer " + token(scene::Role::participant)).error_code(),
             grpc::StatusCode::PERMISSION_DENIED);
@@ -140,7 +174,8 @@ TEST_F(GrpcIdentity, PairsWithoutAToken) {
 }
 
 TEST_F(GrpcIdentity, ListsAndLiftsBans) {
-  server().state().find("small")->roster.setBans({{.subject = "eve", .displayName = "Eve"}});
+  server().state().find("small")->roster.setBans(
+      {{.subject = {.tenant = "studio", .name = "eve"}, .displayName = "Eve"}});
   const auto lift = [&](scene::Role role) {
     grpc::ClientContext call;
     authorize(call, "Bearer " + token(role));
@@ -155,6 +190,7 @@ TEST_F(GrpcIdentity, ListsAndLiftsBans) {
   ASSERT_TRUE(stub_->ListBans(&call, {}, &bans).ok());
   ASSERT_EQ(bans.bans_size(), 1);
   EXPECT_EQ(bans.bans(0).subject(), "eve");
+  EXPECT_EQ(bans.bans(0).tenant(), "studio");
   EXPECT_EQ(lift(scene::Role::participant).error_code(), grpc::StatusCode::PERMISSION_DENIED);
   EXPECT_TRUE(lift(scene::Role::owner).ok());
   EXPECT_EQ(lift(scene::Role::owner).error_code(), grpc::StatusCode::NOT_FOUND);

@@ -51,7 +51,7 @@ TEST(AuthenticatorTest, WithKeysEveryPeerNeedsAToken) {
   EXPECT_TRUE(authenticator.required());
   for (const bool isLoopback : {true, false})
     EXPECT_EQ(authenticator.anonymous(isLoopback).error().code, v1::ERROR_CODE_UNAUTHENTICATED);
-  EXPECT_EQ(authenticator.verify(tokenOf(key), false)->subject, "ada");
+  EXPECT_EQ(authenticator.verify(tokenOf(key), false)->subject.name, "ada");
   EXPECT_FALSE(authenticator.verify("", true));
 }
 
@@ -71,6 +71,36 @@ TEST(AuthenticatorTest, ReloadRotatesKeysAndKeepsTheOldOnesAfterAnError) {
   EXPECT_TRUE(authenticator.verify(tokenOf(next), true));
 }
 
+TEST(AuthenticatorTest, IdentityEndsWithItsTokenOrKey) {
+  const KeyDirectory directory;
+  const TokenKey old = directory.make("old.pem"), replaced = directory.make("replaced.secret");
+  Authenticator authenticator({.keyDirectory = directory.path(), .stateDirectory = {}});
+  const Identity byOld = *authenticator.verify(tokenOf(old), true);
+  const Identity byReplaced = *authenticator.verify(tokenOf(replaced), true);
+  directory.make("next.pem");
+  authenticator.reload();
+  for (const Identity& identity : {byOld, byReplaced, local()})
+    EXPECT_EQ(authenticator.whyEnded(identity, 0s), nullptr);
+  std::filesystem::remove(directory.path() / "old.pem");
+  std::filesystem::remove(directory.path() / "replaced.secret");
+  directory.make("replaced.secret");
+  EXPECT_EQ(authenticator.whyEnded(byOld, 0s), nullptr) << "the keys are not read before SIGHUP";
+  authenticator.reload();
+  for (const Identity& identity : {byOld, byReplaced})
+    EXPECT_THAT(authenticator.whyEnded(identity, 0s), HasSubstr("key of your token is no longer in use"));
+  EXPECT_EQ(authenticator.whyEnded(local(), 0s), nullptr) << "it has no token";
+}
+
+TEST(AuthenticatorTest, IdentityEndsAfterTheGrace) {
+  const KeyDirectory directory;
+  const TokenKey key = directory.make("a.pem");
+  Authenticator authenticator({.keyDirectory = directory.path(), .stateDirectory = {}});
+  const Identity identity = *authenticator.verify(tokenOf(key), true);
+  authenticator.setClock([&] { return *identity.expires + 30s; });
+  EXPECT_EQ(authenticator.whyEnded(identity, 60s), nullptr);
+  EXPECT_THAT(authenticator.whyEnded(identity, 30s), HasSubstr("expired"));
+}
+
 TEST(AuthenticatorTest, PairingGivesATokenThatWorksAfterARestart) {
   const KeyDirectory state;
   std::string token, subject;
@@ -81,16 +111,16 @@ TEST(AuthenticatorTest, PairingGivesATokenThatWorksAfterARestart) {
     const auto first = authenticator.pair(code, "a", kBegin), second = authenticator.pair(code, "b", kBegin);
     ASSERT_TRUE(first && second);
     EXPECT_NE(first->identity.subject, second->identity.subject);
-    EXPECT_THAT(first->identity.subject, testing::MatchesRegex("paired-[0-9a-f]{16}"));
+    EXPECT_THAT(first->identity.subject.name, testing::MatchesRegex("paired-[0-9a-f]{16}"));
     token = first->token;
-    subject = first->identity.subject;
+    subject = first->identity.subject.name;
   }
   struct stat status {};
   ASSERT_EQ(::stat((state.path() / "identity" / "pairing.secret").c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777, 0600u);
   Authenticator again({.keyDirectory = {}, .pairing = true, .stateDirectory = state.path()});
   ASSERT_TRUE(again.verify(token, false));
-  EXPECT_EQ(again.verify(token, false)->subject, subject);
+  EXPECT_EQ(again.verify(token, false)->subject.name, subject);
   EXPECT_EQ(again.verify(token, false)->role, Role::owner);
   again.setClock([] { return WallClock::now() + Authenticator::kPairingValid + 1s; });
   EXPECT_THAT(again.verify(token, false).error().text, HasSubstr("expired"));

@@ -2,11 +2,15 @@
 // Keys and tokens: what is accepted, and each reason for a refusal.
 #include "server/identity/token.h"
 
+#include <array>
 #include <chrono>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,6 +30,39 @@ using testing::Not;
 using tests::KeyDirectory;
 
 const WallClock::time_point kNow{std::chrono::seconds(1'800'000'000)};
+
+constexpr const char* kBase64 = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+
+// Signature (r, order - s) of the ES256 signature (r, s), both as base64url without padding.
+std::string withNegatedHalf(const std::string& signature) {
+  const std::string alphabet = kBase64;
+  std::vector<unsigned char> bytes;
+  unsigned bits = 0, count = 0;
+  for (const char digit : signature) {
+    bits = bits << 6 | static_cast<unsigned>(alphabet.find(digit));
+    count += 6;
+    if (count >= 8) bytes.push_back(static_cast<unsigned char>(bits >> (count -= 8)));
+  }
+  constexpr std::size_t kHalf = 32;
+  constexpr std::array<unsigned char, kHalf> kOrder{
+      0xff, 0xff, 0xff, 0xff, 0x00, 0x00, 0x00, 0x00, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
+      0xbc, 0xe6, 0xfa, 0xad, 0xa7, 0x17, 0x9e, 0x84, 0xf3, 0xb9, 0xca, 0xc2, 0xfc, 0x63, 0x25, 0x51};
+  EXPECT_EQ(bytes.size(), 2 * kHalf);
+  int borrow = 0;
+  for (std::size_t i = kHalf; i-- > 0;) {
+    const int difference = kOrder[i] - bytes.at(kHalf + i) - borrow;
+    borrow = difference < 0 ? 1 : 0;
+    bytes[kHalf + i] = static_cast<unsigned char>(difference & 0xff);
+  }
+  std::string text;
+  bits = count = 0;
+  for (const unsigned char byte : bytes) {
+    bits = bits << 8 | byte;
+    for (count += 8; count >= 6; count -= 6) text += alphabet[bits >> (count - 6) & 63];
+  }
+  if (count > 0) text += alphabet[bits << (6 - count) & 63];
+  return text;
+}
 
 Claims validClaims() {
   return {.role = scene::Role::owner,
@@ -97,8 +134,7 @@ TEST_F(TokenTest, AcceptsBothAlgorithmsWithAllClaims) {
     EXPECT_EQ(identity->role, scene::Role::owner);
     EXPECT_EQ(identity->scene, "flag");
     EXPECT_EQ(identity->displayName, "Ada");
-    EXPECT_EQ(identity->subject, "ada@example.org");
-    EXPECT_EQ(identity->tenant, "studio");
+    EXPECT_EQ(identity->subject, (scene::Subject{.tenant = "studio", .name = "ada@example.org"}));
     EXPECT_EQ(identity->expires, kNow + 1h);
   }
 }
@@ -117,7 +153,7 @@ TEST_F(TokenTest, DefaultsAreParticipantOfEveryScene) {
   ASSERT_TRUE(identity) << identity.error().text;
   EXPECT_EQ(identity->role, scene::Role::participant);
   EXPECT_EQ(identity->scene, "");
-  EXPECT_THAT(identity->subject, testing::StartsWith("token-"));
+  EXPECT_THAT(identity->subject.name, testing::StartsWith("token-"));
 }
 
 TEST_F(TokenTest, AudienceMayBeAList) {
@@ -171,9 +207,9 @@ TEST_F(TokenTest, RefusesWrongSignature) {
 TEST_F(TokenTest, RefusesWrongTimes) {
   Claims claims = validClaims();
   EXPECT_THAT(refusal(claims, kNow + 1h), HasSubstr("expired"));
-  claims.notBefore = kNow + 1s;
+  claims.notBefore = kNow + kLeeway + 1s;
   EXPECT_THAT(refusal(claims), HasSubstr("not valid yet"));
-  EXPECT_EQ(refusal(claims, kNow + 1s), "accepted");
+  EXPECT_EQ(refusal(claims, kNow + 1s), "accepted") << "clocks may differ by the leeway";
   claims.expires.reset();
   claims.notBefore.reset();
   EXPECT_THAT(refusal(claims), HasSubstr("no expiry"));
@@ -205,15 +241,41 @@ TEST_F(TokenTest, RefusesTextThatIsNoToken) {
   EXPECT_THAT(refusal(std::string(kMaxTokenBytes + 1, 'a')), HasSubstr("at most 4096"));
 }
 
-// Every token with one changed character is refused, or has the same content.
-TEST_F(TokenTest, ChangedTokensAreRefused) {
-  const std::string token = sign(keys_.at("shared"), validClaims());
-  for (std::size_t i = 0; i < token.size(); ++i) {
-    std::string changed = token;
-    changed[i] = changed[i] == 'A' ? 'B' : 'A';
-    if (changed == token || !check(changed)) continue;
-    EXPECT_EQ(i, token.size() - 1) << "only the last character has bits that are not used";
+// Every token with one changed character is refused, or proves the same identity. The last character has bits
+// that are not used.
+TEST_F(TokenTest, ChangedTokensAreRefusedOrProveTheSame) {
+  Claims claims = validClaims();
+  claims.subject.clear();
+  for (const char* id : {"new", "shared"}) {
+    const std::string token = sign(keys_.at(id), claims);
+    const std::string subject = check(token)->subject.name;
+    EXPECT_THAT(subject, testing::StartsWith("token-"));
+    for (std::size_t i = 0; i < token.size(); ++i) {
+      // All other last characters are tried, because some differ only in unused bits.
+      const bool isLast = i == token.size() - 1;
+      for (const char other : std::string_view(isLast ? kBase64 : "AB")) {
+        std::string changed = token;
+        changed[i] = other;
+        const auto identity = check(changed);
+        if (changed == token || !identity) continue;
+        EXPECT_TRUE(isLast) << i;
+        EXPECT_EQ(identity->subject.name, subject);
+      }
+    }
   }
+}
+
+// A holder of a token can negate the second half of its ES256 signature, modulo the order of the curve.
+TEST_F(TokenTest, NegatedSignatureProvesTheSameSubject) {
+  Claims claims = validClaims();
+  claims.subject.clear();
+  const std::string token = sign(keys_.at("new"), claims);
+  const std::size_t dot = token.rfind('.');
+  const std::string negated = token.substr(0, dot + 1) + withNegatedHalf(token.substr(dot + 1));
+  ASSERT_NE(negated, token);
+  const auto first = check(token), second = check(negated);
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(first->subject, second->subject);
 }
 
 TEST(TokenKeyTest, NewKeysArePrivateFilesThatAreNotOverwritten) {
@@ -232,6 +294,29 @@ TEST(TokenKeyTest, NewKeysArePrivateFilesThatAreNotOverwritten) {
     EXPECT_EQ((std::string{std::istreambuf_iterator<char>(again), {}}), before);
   }
   EXPECT_THROW(makeTokenKey(directory.path() / "a.key"), std::runtime_error);
+  const auto files = std::filesystem::directory_iterator(directory.path());
+  EXPECT_EQ(std::distance(begin(files), end(files)), 2) << "no draft is left";
+}
+
+TEST(TokenKeyTest, NamesReasonWhenAKeyCannotBeMade) {
+  const KeyDirectory directory;
+  directory.make("a.pem");
+  EXPECT_THAT([&] { makeTokenKey(directory.path() / "a.pem"); },
+              testing::ThrowsMessage<std::runtime_error>(HasSubstr("a.pem: cannot be made: File exists")));
+  EXPECT_THAT([&] { makeTokenKey(directory.path() / "none" / "a.pem"); },
+              testing::ThrowsMessage<std::runtime_error>(HasSubstr("cannot be written: No such file")));
+}
+
+TEST(TokenKeyTest, KnowsWhetherOtherUsersCanReadASecret) {
+  using std::filesystem::perms;
+  const KeyDirectory directory;
+  EXPECT_FALSE(directory.make("a.pem").exposed);
+  const auto file = directory.path() / "a.pem";
+  std::filesystem::permissions(file, perms::owner_read | perms::owner_write | perms::group_read);
+  EXPECT_TRUE(readTokenKey(file).exposed);
+  const auto isPublic = directory.write("b.pem", readTokenKey(file).checking);
+  std::filesystem::permissions(isPublic, perms::owner_read | perms::others_read);
+  EXPECT_FALSE(readTokenKey(isPublic).exposed) << "a public key is no secret";
 }
 
 TEST(TokenKeyTest, RefusesKeysThatDoNotFit) {

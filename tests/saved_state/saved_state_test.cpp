@@ -130,6 +130,32 @@ TEST_F(SavedStateTest, CreatedScenesComeBackWithStateParametersAndParticipants) 
   EXPECT_GT(stranger.welcome().participant_id(), std::max(adaId, benId));
 }
 
+TEST_F(SavedStateTest, BansAndRemovedParticipantsStayOutAfterARestart) {
+  START();
+  const std::vector<scene::Ban> bans{{.subject = {.tenant = "studio", .name = "eve"}, .displayName = "Eve"}};
+  std::string refused;
+  {
+    TestPeer owner(server(), "owner"), removed(server(), "removed");
+    owner.join("small");
+    removed.join("small");
+    refused = removed.welcome().resume_token();
+    v1::ClientMessage message;
+    message.mutable_remove_participant()->set_participant_id(removed.welcome().participant_id());
+    owner.send(message);
+    EXPECT_EQ(removed.readToTheEnd().error().code(), v1::ERROR_CODE_REMOVED);
+    live("small")->roster.setBans(bans);
+    server().stop();
+  }
+  end();
+  run();
+  EXPECT_EQ(live("small")->roster.bans(), bans);
+  EXPECT_TRUE(live("small")->roster.isBanned(bans[0].subject));
+  EXPECT_FALSE(live("small")->roster.isBanned({.tenant = {}, .name = "eve"}));
+  TestPeer again(server(), "removed");
+  again.hello(helloTo("small", refused));
+  EXPECT_EQ(again.readToTheEnd().error().code(), v1::ERROR_CODE_REMOVED);
+}
+
 TEST_F(SavedStateTest, ScenesOfTheServerGoOnUnlessTheirDefinitionChanged) {
   START();
   std::uint64_t tick = 0;

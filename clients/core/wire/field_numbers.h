@@ -419,6 +419,7 @@ struct CreatePairingCodeResponse {
 struct Ban {
   static constexpr Field kSubject{1, WireType::kBytes};
   static constexpr Field kDisplayName{2, WireType::kBytes};
+  static constexpr Field kTenant{3, WireType::kBytes};
 };
 struct ListBansRequest {
   static constexpr Field kScene{1, WireType::kBytes};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Tokens, pairing, roles, bans and quotas, as peers see them.
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -96,7 +97,7 @@ class IdentityTest : public tests::ServerTest {
   }
   // Every message that needs an identity.
   static std::vector<v1::ClientMessage> demands() {
-    std::vector<v1::ClientMessage> all(14);
+    std::vector<v1::ClientMessage> all(18);
     all[0].mutable_hello()->set_protocol_version(1);
     all[1].mutable_list_scenes();
     all[2].mutable_get_scene();
@@ -111,6 +112,10 @@ class IdentityTest : public tests::ServerTest {
     all[11].mutable_create_pairing_code();
     all[12].mutable_set_role();
     all[13].mutable_parameter_change();
+    all[14].mutable_collider_poses();
+    all[15].mutable_remove_participant();
+    all[16].mutable_frame_ack();
+    all[17].mutable_key_frame_request();
     return all;
   }
 
@@ -129,6 +134,9 @@ TEST_F(IdentityTest, PeerWithoutTokenGetsNothingButAnError) {
     EXPECT_TRUE(last.error().fatal());
     EXPECT_THAT(last.error().text(), HasSubstr("requires a token or a pairing code"));
   }
+  const auto* const bodies = v1::ClientMessage::descriptor()->FindOneofByName("body");
+  ASSERT_EQ(demands().size() + 2, static_cast<std::size_t>(bodies->field_count()))
+      << "all messages except ping and authenticate are demands";
   TestPeer peer(server());
   v1::ClientMessage ping;
   ping.mutable_ping()->set_client_time_us(7);
@@ -193,6 +201,27 @@ TEST_F(IdentityTest, TokenOfOneSceneReachesNoOther) {
   TestPeer stranger(server(), with(token(content)));
   stranger.hello("small");
   EXPECT_EQ(stranger.readToTheEnd().error().code(), v1::ERROR_CODE_PERMISSION_DENIED);
+}
+
+TEST_F(IdentityTest, TokenOfOneSceneLearnsNoNamesOfOthers) {
+  START_ASKING();
+  Claims content = claims("ada", Role::owner);
+  content.scene = "gone";
+  TestPeer peer(server(), with(token(content)));
+  v1::ClientMessage get, drop, bans, record;
+  get.mutable_get_scene()->set_name("gone");
+  drop.mutable_delete_scene()->set_name("gone");
+  bans.mutable_list_bans()->set_scene("gone");
+  record.mutable_start_recording()->set_scene("gone");
+  for (const v1::ClientMessage& message : {get, drop, bans, record, pause("gone")}) {
+    const v1::Error error = ask(peer, message).error();
+    EXPECT_EQ(error.code(), v1::ERROR_CODE_NOT_FOUND) << message.ShortDebugString();
+    EXPECT_EQ(error.text(), "there is no scene 'gone'");
+  }
+  peer.hello("");
+  EXPECT_EQ(peer.readToTheEnd().error().text(), "there is no scene 'gone'");
+  TestPeer everywhere(server(), with(token("ben", Role::viewer)));
+  EXPECT_EQ(ask(everywhere, get).error().text(), "there is no scene 'gone'; there are small, other");
 }
 
 TEST_F(IdentityTest, OnlyOwnersByTokenOwnScenes) {
@@ -289,6 +318,61 @@ TEST_F(IdentityTest, StreamEndsAfterItsTokenUnlessItIsRenewed) {
   EXPECT_FALSE(renewed.finished());
 }
 
+TEST_F(IdentityTest, StreamEndsWhenItsKeyIsRemoved) {
+  hosting::ServerOptions options;
+  options.helloTimeout = 60s;
+  START_ASKING(options);
+  const identity::TokenKey next = keys_.make("next.pem");
+  authenticator_->reload();
+  TestPeer joined(server(), with(token("ada", Role::owner))),
+      outside(server(), with(token("ben", Role::viewer)));
+  TestPeer other(server(), with(sign(next, claims("cy", Role::participant))));
+  joined.join();
+  other.join();
+  std::filesystem::remove(keys_.path() / "test.pem");
+  authenticator_->reload();
+  for (TestPeer* peer : {&joined, &outside}) {
+    const v1::Error error = peer->readToTheEnd().error();
+    EXPECT_EQ(error.code(), v1::ERROR_CODE_UNAUTHENTICATED);
+    EXPECT_THAT(error.text(), HasSubstr("key of your token is no longer in use"));
+  }
+  other.readFrames(2);
+  EXPECT_FALSE(other.finished());
+}
+
+TEST_F(IdentityTest, LowerTokenLowersTheRoleInTheStreamAndAfterAReturn) {
+  START_ASKING();
+  TestPeer owner(server(), with(token("ada", Role::owner)));
+  owner.join();
+  ASSERT_EQ(owner.welcome().role(), v1::ROLE_OWNER);
+  owner.send(authenticate(token("ada", Role::participant)));
+  EXPECT_EQ(owner.readUntil(Body::kPresence).presence().participant().role(), v1::ROLE_PARTICIPANT);
+  v1::ClientMessage drop = remove(owner, false);
+  EXPECT_EQ(ask(owner, drop).error().code(), v1::ERROR_CODE_PERMISSION_DENIED);
+  TestPeer viewer(server(), with(token("ada", Role::viewer)));
+  v1::Hello hello;
+  hello.set_resume_token(owner.welcome().resume_token());
+  hello.set_attempt(2);
+  viewer.hello(hello);
+  const v1::Welcome welcome = viewer.readUntil(Body::kWelcome).welcome();
+  EXPECT_TRUE(welcome.resumed());
+  EXPECT_EQ(welcome.role(), v1::ROLE_VIEWER);
+}
+
+TEST_F(IdentityTest, ExpiredTokenMakesNoPairingCodeDuringTheGrace) {
+  START_ASKING();
+  TestPeer owner(server(), with(token("ada", Role::owner)));
+  owner.join();
+  v1::ClientMessage demand;
+  demand.mutable_create_pairing_code();
+  EXPECT_TRUE(ask(owner, demand).has_create_pairing_code());
+  authenticator_->setClock([] { return WallClock::now() + 1h + 1s; });
+  const v1::Error error = ask(owner, demand).error();
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_UNAUTHENTICATED);
+  EXPECT_THAT(error.text(), HasSubstr("expired"));
+  EXPECT_FALSE(owner.finished());
+}
+
 TEST_F(IdentityTest, BanHoldsForTheSubjectUntilItIsLifted) {
   START_ASKING();
   TestPeer owner(server(), with(token("ada", Role::owner)));
@@ -325,6 +409,25 @@ TEST_F(IdentityTest, BanHoldsForTheSubjectUntilItIsLifted) {
   EXPECT_EQ(ask(owner, lift).error().code(), v1::ERROR_CODE_NOT_FOUND);
   TestPeer forgiven(server(), with(token("ben", Role::participant)));
   forgiven.join();
+}
+
+TEST_F(IdentityTest, BanDoesNotHoldForTheSameNameInAnotherTenant) {
+  START_ASKING();
+  Claims one = claims("ben", Role::participant), other = one;
+  one.tenant = "studio";
+  other.tenant = "school";
+  TestPeer owner(server(), with(token("ada", Role::owner))), banned(server(), with(token(one)));
+  owner.join();
+  banned.join();
+  owner.send(remove(banned, true));
+  EXPECT_EQ(banned.readToTheEnd().error().code(), v1::ERROR_CODE_REMOVED);
+  TestPeer namesake(server(), with(token(other))), again(server(), with(token(one)));
+  namesake.join();
+  again.hello("");
+  EXPECT_EQ(again.readToTheEnd().error().code(), v1::ERROR_CODE_REMOVED);
+  v1::ClientMessage list;
+  list.mutable_list_bans();
+  EXPECT_EQ(ask(owner, list).list_bans().bans(0).tenant(), "studio");
 }
 
 TEST_F(IdentityTest, OwnerCannotBanItsOwnSubject) {
@@ -394,6 +497,43 @@ TEST_F(IdentityTest, CreatedScenesOfATenantAreLimited) {
   EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   EXPECT_THAT(error.text(), HasSubstr("--max-scenes-per-tenant"));
   EXPECT_TRUE(ask(ben, create("third")).has_create_scene());
+}
+
+TEST_F(IdentityTest, TenantMayCreateAQuarterOfTheScenesByDefault) {
+  hosting::ServerOptions options;
+  options.maxCreatedScenes = 7;
+  START_ASKING(options);
+  Claims one = claims("ada", Role::owner), other = claims("ben", Role::owner);
+  one.tenant = "studio";
+  TestPeer ada(server(), with(token(one))), ben(server(), with(token(other)));
+  EXPECT_TRUE(ask(ada, create("first")).has_create_scene());
+  EXPECT_THAT(ask(ada, create("second")).error().text(), HasSubstr("--max-scenes-per-tenant"));
+  EXPECT_TRUE(ask(ben, create("third")).has_create_scene());
+}
+
+TEST_F(IdentityTest, CreatedSceneIsControlledByItsTenantAlone) {
+  START_ASKING();
+  Claims mine = claims("ada", Role::owner), theirs = claims("ben", Role::owner);
+  mine.tenant = "studio";
+  TestPeer owner(server(), with(token(mine)));
+  ASSERT_TRUE(ask(owner, create("mine")).has_create_scene());
+  for (const char* tenant : {"", "school"}) {
+    theirs.tenant = tenant;
+    TestPeer other(server(), with(token(theirs)));
+    v1::ClientMessage drop, record, bans;
+    drop.mutable_delete_scene()->set_name("mine");
+    record.mutable_start_recording()->set_scene("mine");
+    bans.mutable_list_bans()->set_scene("mine");
+    for (const v1::ClientMessage& message : {pause("mine"), drop, record, bans}) {
+      const v1::Error error = ask(other, message).error();
+      EXPECT_EQ(error.code(), v1::ERROR_CODE_PERMISSION_DENIED) << message.ShortDebugString();
+      EXPECT_THAT(error.text(), HasSubstr("belongs to another tenant"));
+    }
+    EXPECT_TRUE(ask(other, pause("small")).has_control_scene()) << "the server started with this one";
+    other.hello("mine");
+    EXPECT_EQ(other.readUntil(Body::kWelcome).welcome().role(), v1::ROLE_PARTICIPANT);
+  }
+  EXPECT_TRUE(ask(owner, pause("mine")).has_control_scene());
 }
 
 TEST_F(IdentityTest, CodePairsAndItsTokenWorksLater) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <future>
 #include <memory>
+#include <span>
 #include <string>
 #include <thread>
 
@@ -46,6 +47,26 @@ v1::ClientMessage ping() {
   v1::ClientMessage message;
   message.mutable_ping()->set_client_time_us(1);
   return message;
+}
+
+// Frames of all scenes wait for this check.
+TEST_F(PeerLimitsTest, CheckOfSilenceDoesNotWaitForABusySession) {
+  START();
+  std::promise<void> entered, release;
+  std::atomic<bool> isFirst{true};
+  const auto session = Session::open(server(), {.peer = "busy", .address = {}, .token = {}}, [&] {
+    if (!isFirst.exchange(false)) return;
+    entered.set_value();
+    release.get_future().wait();
+  });
+  const std::string bytes = ping().SerializeAsString();
+  std::thread handler([&] { session->receive(std::as_bytes(std::span(bytes))); });
+  entered.get_future().wait();
+  auto check = std::async(std::launch::async, [&] { checkAfter(0s); });
+  EXPECT_EQ(check.wait_for(60s), std::future_status::ready);
+  release.set_value();
+  handler.join();
+  check.get();
 }
 
 // Chunk 0 of an upload of this many bytes in all.
