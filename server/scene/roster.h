@@ -56,7 +56,7 @@ struct SavedParticipant {
   std::uint32_t attempt = 0;  // of its newest session
 };
 
-// What is kept of a roster beyond the end of the server.
+// Part of a roster that is kept beyond the end of the server.
 struct SavedRoster {
   std::vector<SavedParticipant> participants;  // in the order in which they joined
   std::vector<Ban> bans;

@@ -48,8 +48,8 @@ class SceneStore {
 
   // Scenes that peers created in earlier runs. Each is returned once.
   virtual std::vector<SavedScene> takeCreated() = 0;
-  // State of a scene that the server starts with. Returns nothing if no state
-  // is kept, or if the definition has changed.
+  // State of a scene that the server starts with. Returns nothing if no state is kept, or if the definition
+  // has changed.
   virtual std::optional<SavedScene> take(const model::Scene& start) = 0;
 
   // Keeps a scene from now on. Participants, parameters and pauses are looked at by themselves; the caller

@@ -40,7 +40,7 @@ using schedule::TokenBucket;
 // Largest serialised ClientMessage. Endpoints refuse larger ones before they allocate memory for them.
 inline constexpr std::size_t kMaxClientMessageBytes = messages::limits::kMaxClientMessageBytes;
 
-// What an endpoint knows about a new peer.
+// Knowledge of an endpoint about a new peer.
 struct Arrival {
   std::string peer;     // name for logs
   std::string address;  // groups the peers of one machine; empty for programs of this machine
@@ -129,7 +129,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   const std::shared_ptr<delivery::Mailbox> mailbox_;
   const Clock::time_point opened_;
   std::atomic<Clock::time_point> lastHeard_;
-  // Of the token. The largest value without one.
+  // Expiry of the token. The largest value without a token.
   std::atomic<identity::WallClock::time_point> expires_{identity::WallClock::time_point::max()};
   std::atomic<Clock::duration> readPause_{};
 

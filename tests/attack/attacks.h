@@ -14,7 +14,7 @@ struct Target {
   std::chrono::seconds time;
 };
 
-// What the server requires of its clients.
+// Identity that the server requires of its clients.
 enum class Access : std::uint8_t {
   open,
   tokens,   // signed by the key `attack`, which only the honest client has

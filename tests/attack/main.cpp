@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", seconds, "Seconds of each attack")
       ->check(CLI::Range(1, 600))
       ->capture_default_str();
-  // The program runs itself to attack, so that the honest client has a process of its own.
+  // The program runs itself to attack, so that the honest client has a separate process.
   app.add_option("--perform", perform)->group("");
   app.add_option("--grpc", grpc)->group("");
   app.add_option("--web", web)->group("");

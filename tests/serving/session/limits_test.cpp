@@ -100,7 +100,7 @@ TEST_F(PeerLimitsTest, DropsSlowUploadAndGivesItsRoomBack) {
   other.send(firstChunk(800, 800));
   checkAfter(50s);
   EXPECT_FALSE(other.finished()) << "the time of an upload is added to that for hello";
-  // A complete upload that nobody uses is dropped as well.
+  // A complete upload without a use is dropped as well.
   checkAfter(61s);
   EXPECT_THAT(other.readUntil(Body::kError).error().text(), HasSubstr("--max-upload-time"));
   EXPECT_EQ(refused(Refusal::uploads), 1u);
