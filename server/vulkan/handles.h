@@ -42,8 +42,8 @@ struct Device::Handles {
   std::uint32_t queueFamily = 0;
   mutable std::atomic<std::uint64_t> allocatedBytes{0};
   // Pipelines that kernels use.
-  mutable std::mutex pipelinesMutex;
-  mutable std::map<PipelineKey, std::weak_ptr<const Kernel::Handles>> pipelines;
+  mutable std::mutex pipelinesMutex{};
+  mutable std::map<PipelineKey, std::weak_ptr<const Kernel::Handles>> pipelines{};
 
   bool validates() const { return *messenger != vk::DebugUtilsMessengerEXT{}; }
 };
