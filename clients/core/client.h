@@ -83,7 +83,7 @@ class Client {
   const ServerClock& clock() const { return clock_; }
   // Quality and layers that the server sends now; no layers before the description.
   OperatingPoint operatingPoint() const;
-  // Of the newest frame; 1 before the first.
+  // Divisor of the newest frame; 1 before the first.
   std::uint32_t frameDivisor() const { return frameDivisor_; }
   // State of the recording at this time.
   std::optional<cs_playback> playback(std::uint64_t nowUs) const;

@@ -30,7 +30,7 @@ std::string whyNotTrusted(const std::string& text) {
   constexpr std::string_view kShown = "the server has the fingerprint ";
   if (const std::size_t at = text.find(kShown); at != std::string::npos)
     return text.substr(at, text.find(')', at) - at) +
-           ". If this is right, use it with --fingerprint; otherwise somebody else answers.";
+           ". If this is right, use it with --fingerprint; otherwise another server answers.";
   if (text.find("certificate verify failed") != std::string::npos)
     return "no known authority has signed its certificate. Use --ca FILE, or --fingerprint with what the "
            "server prints.";

@@ -181,7 +181,7 @@ class DeviceThread {
   void dismiss(Run& run, const std::string& why);
   // Encodes frames of paused scenes for subscribers that need a key frame.
   void encodePausedFrames();
-  // Of all scenes, until the next call.
+  // Schedules of all scenes, valid until the next call.
   std::span<schedule::TickSchedule* const> schedules();
   void runDueTicks();
   // Waits for the first slice of a tick that began when the device was busy until `deviceFree`.

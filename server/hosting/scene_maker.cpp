@@ -98,7 +98,7 @@ void SceneMaker::deleteUnused(std::chrono::milliseconds lifetime) {
     if (!scene->created || scene->waitsForRoom || !scene->hasBeenEmptyFor(lifetime, Clock::now())) continue;
     v1::DeleteSceneRequest request;
     request.set_name(scene->name());
-    spdlog::info("{}: nobody has used it for {} s", scene->name(), schedule::seconds(lifetime));
+    spdlog::info("{}: unused for {} s", scene->name(), schedule::seconds(lifetime));
     attempt("deleteScene", [&] { return removeNow(request); });
   }
 }

@@ -71,7 +71,7 @@ class SceneMaker {
       const v1::StartRecordingRequest& request) const;
   tl::expected<v1::StopRecordingResponse, v1::Error> stopNow(const v1::StopRecordingRequest& request) const;
 
-  // Deletes created scenes that nobody uses, from time to time.
+  // Deletes unused created scenes at intervals.
   void expireLater();
   void deleteUnused(std::chrono::milliseconds lifetime);
 

@@ -101,7 +101,7 @@ struct ServerOptions {
   // True: peers outside a scene may always pause, reset, record and delete it. False: only while it has no
   // owner.
   bool outsideControl = true;
-  // Decides who peers are. Null: nobody is asked, and every peer is like identity::local().
+  // Decides who peers are. Null: every peer counts as identity::local().
   std::shared_ptr<identity::Authenticator> authenticator{};
   // Open connections with tokens of one subject.
   std::uint32_t maxConnectionsPerToken = 16;

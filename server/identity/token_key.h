@@ -30,8 +30,7 @@ using TokenKeys = std::map<std::string, TokenKey>;
 
 // Reads ID.pem (public or private key of the curve P-256, for ES256) or ID.secret (at least kMinSecretBytes,
 // for HS256; spaces and line ends at its end are ignored). An id has 1 to 64 characters of A-Z, a-z, 0-9,
-// '.',
-// '_' and '-'. Throws std::runtime_error that names the file and what is wrong.
+// '.', '_' and '-'. Throws std::runtime_error that names the file and what is wrong.
 TokenKey readTokenKey(const std::filesystem::path& file);
 
 // Reads all *.pem and *.secret files of the directory. Throws as above, or if there are none or two have the

@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -51,8 +52,10 @@ struct MonitoringEndpoint::State {
   // Belong to the thread. The context outlives the sockets, which are destroyed with `io`.
   HttpContext context;
   net::io_context io{1};
+  net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};  // until io.stop()
   tcp::acceptor acceptor;
   net::steady_timer acceptTimer{io}, probeTimer{io};
+  bool accepting = false, probing = false;  // accept() and probe() wait
   std::uint16_t port;
   std::thread thread;
 
@@ -73,9 +76,12 @@ struct MonitoringEndpoint::State {
     thread.join();
   }
 
-  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint.
+  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint. It may
+  // also have ended accept() or probe().
   void run() {
     for (;;) try {
+        if (!accepting) accept();
+        if (!probing) probe();
         io.run();
         return;
       } catch (const std::exception& failure) {
@@ -85,15 +91,21 @@ struct MonitoringEndpoint::State {
 
   void accept() {
     acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
+      accepting = false;
       if (error) {  // such as no free descriptor; an immediate retry would only spin
         acceptTimer.expires_after(kAcceptPause);
-        acceptTimer.async_wait([this](boost::system::error_code) { accept(); });
+        acceptTimer.async_wait([this](boost::system::error_code) {
+          accepting = false;
+          accept();
+        });
+        accepting = true;
         return;
       }
       accept();  // first, so that it goes on if the connection fails
       if (context.connections < HttpContext::kMaxConnections)
         std::make_shared<HttpConnection>(std::move(socket), context)->read();
     });
+    accepting = true;
   }
 
   // Wakes the device thread, which otherwise sleeps while no scene runs.
@@ -103,7 +115,11 @@ struct MonitoringEndpoint::State {
       if (server != nullptr) server->state().device.wake();
     }
     probeTimer.expires_after(deviceSilence / kProbes);
-    probeTimer.async_wait([this](boost::system::error_code) { probe(); });
+    probeTimer.async_wait([this](boost::system::error_code) {
+      probing = false;
+      probe();
+    });
+    probing = true;
   }
 
   Answer answer(std::string_view target) {

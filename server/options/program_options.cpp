@@ -240,8 +240,7 @@ void addNetworkOptions(OptionTable& table, Parsed& parsed) {
       "The same of one address, TLS handshakes included. Programs on this machine have no such limit");
   table.number("--hello-timeout", options.server.helloTimeout, {.min = 1, .max = 30, .type = "SECONDS"},
                "Seconds after which a connection that has not joined a scene is closed, even if it sends "
-               "messages. The time "
-               "of an upload is added");
+               "messages. The time of an upload is added");
   table.number("--max-read-rate", options.server.maxReadRate, {.min = 0.1, .max = 1e6, .type = "MEGABYTES"},
                "Megabytes per second that are read from one connection in a stream. A faster client waits");
   table.number("--max-upload-time", options.server.maxUploadTime, {.min = 1, .max = 3600, .type = "SECONDS"},

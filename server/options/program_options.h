@@ -65,7 +65,7 @@ struct ProgramOptions {
   std::string metricsHost = "127.0.0.1";
   std::optional<std::uint16_t> metricsPort;  // unset: no monitoring
   bool announces = false;                    // by mDNS
-  // TLS for both endpoints: with a certificate of its own, or with that in the files.
+  // TLS for both endpoints: with a self-signed certificate, or with that in the files.
   bool tlsSelf = false;
   std::filesystem::path tlsCertificate, tlsKey, tlsClientCa;  // empty: none
 

@@ -185,8 +185,7 @@ void Database::setUp(const DatabaseOptions& options) {
     if (kind == SQLITE_NOTADB || kind == SQLITE_CORRUPT)
       refuse(
           "is damaged, and nothing in it was changed; restore it from a copy, or move it away to start "
-          "without "
-          "saved scenes");
+          "without saved scenes");
     refuse(fmt::format("cannot be used: {}", failed(database, code).value()));
   };
   // The exclusive lock needs no shared memory. It is taken by the first read.

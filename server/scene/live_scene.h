@@ -37,7 +37,7 @@ class LiveScene {
   // A simulated scene. `definition` must be valid. `created`: a peer created it while the server runs.
   // `journal` gets everything that happens in the scene; it may be null. `maxParticipants` includes
   // disconnected ones. A created scene is charged to `budget` by charge(), other scenes only for changes;
-  // null means a budget of its own.
+  // null means a separate budget.
   explicit LiveScene(model::Scene definition, bool created = false,
                      std::shared_ptr<Journal> journal = nullptr,
                      std::uint32_t maxParticipants = kDefaultMaxParticipants,
@@ -152,7 +152,8 @@ class LiveScene {
   Roster roster;
   telemetry::SceneMetrics metrics;
 
-  // Returns whether nobody has taken part, not even disconnected, for this long. Belongs to one thread.
+  // Returns whether the scene has had no participant for this long, not even a disconnected one. Belongs to
+  // one thread.
   bool hasBeenEmptyFor(std::chrono::milliseconds time, Clock::time_point now);
 
   // Written by the device's thread, or by the source.

@@ -28,7 +28,7 @@ enum class Action : std::uint8_t {
   manageBans,
 };
 
-// What the role participant may do in addition to colliders, grabs and attachments. Owners may do all of it.
+// Rights of the role participant in addition to colliders, grabs and attachments. Owners have all of them.
 struct Permissions {
   bool environment = true, cloths = true, colliders = true;  // parameters that they may change
   bool create = false, remove = false;                       // scenes

@@ -71,7 +71,7 @@ struct SavedParticipant {
   bool ownsByToken = false;   // its token has the role owner
 };
 
-// What is kept of a roster beyond the end of the server.
+// Part of a roster that is kept beyond the end of the server.
 struct SavedRoster {
   std::vector<SavedParticipant> participants;  // in the order in which they joined
   std::vector<Ban> bans;

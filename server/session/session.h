@@ -40,7 +40,7 @@ using schedule::TokenBucket;
 // Largest serialised ClientMessage. Endpoints refuse larger ones before they allocate memory for them.
 inline constexpr std::size_t kMaxClientMessageBytes = messages::limits::kMaxClientMessageBytes;
 
-// What an endpoint knows about a new peer.
+// Knowledge of an endpoint about a new peer.
 struct Arrival {
   std::string peer;     // name for logs
   std::string address;  // groups the peers of one machine; empty for programs of this machine

@@ -17,7 +17,7 @@ enum class Refusal : std::uint8_t {
   handshake,         // TLS was not agreed on
   callRate,          // too many calls per second from one address
   createdScenes,     // too many scenes exist
-  budget,            // the price of a scene exceeds what is left
+  budget,            // the price of a scene exceeds the remaining budget
   helloTimeout,      // a connection did not join a scene in time
   silence,           // a connection sent nothing for too long
   unreadAnswers,     // a client does not read its answers
@@ -30,7 +30,7 @@ enum class Refusal : std::uint8_t {
   creationTime,      // creating a scene took too long
   sceneSize,         // too many nodes, springs or attachments
   participants,      // the scene is full
-  colliders,         // the price of the participants' colliders exceeds what is left
+  colliders,         // the price of the participants' colliders exceeds the remaining budget
   parameterChanges,  // too many changes of a scene
   diskShare,         // recordings have used their share of the disk
   token,             // no token, or one that is not valid

@@ -12,12 +12,16 @@ namespace clothstream::attack {
 struct Target {
   std::string grpc, web;  // HOST:PORT of both endpoints
   std::chrono::seconds time;
+  std::string token = {};  // of an honest participant of another tenant than the victim's; empty: none
 };
 
-// What the server requires of its clients.
+// Scene of the honest client.
+inline constexpr const char* kVictimScene = "curtain";
+
+// Identity that the server requires of its clients.
 enum class Access : std::uint8_t {
   open,
-  tokens,   // signed by the key `attack`, which only the honest client has
+  tokens,   // signed by the key `attack`; Target::token is one
   pairing,  // the honest client has paired
 };
 
@@ -26,9 +30,14 @@ struct Attack {
   const char* description;
   // Attacks for about Target::time. Returns what the server answered.
   std::string (*perform)(const Target& target);
+  // Regular expression that the whole answer must match. Otherwise the server has accepted or refused what it
+  // should not.
+  const char* expected;
   // Further arguments of the server, separated by spaces. DIRECTORY is replaced by an empty directory.
   const char* serverArguments = "";
   Access access = Access::open;
+  // The server gets SIGTERM while the attack still runs.
+  bool endsDuring = false;
 };
 
 std::span<const Attack> attacks();

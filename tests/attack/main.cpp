@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: MIT
 // clothstream-attack: attacks a server that it starts, while an honest client watches a scene of it.
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
-#include <mutex>
 #include <optional>
+#include <regex>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -19,10 +17,10 @@
 #include <sys/resource.h>
 
 #include "clients/grpc/address.h"
-#include "clients/grpc/grpc_client.h"
 #include "clients/grpc/identity.h"
 #include "tests/attack/attacks.h"
 #include "tests/attack/measured_server.h"
+#include "tests/attack/victim.h"
 #include "tests/e2e/process.h"
 #include "tests/e2e/temporary_directory.h"
 
@@ -37,59 +35,16 @@ using e2e::Process;
 constexpr double kMinFrames = 0.9, kMaxGapSeconds = 0.25, kMaxMegabytes = 268.4, kMaxEndSeconds = 10;
 constexpr auto kPatience = 60s;
 
-double seconds(Clock::duration time) {
-  return std::chrono::duration<double>(time).count();
-}
-
-// Counts the frames that an honest client receives.
-class Victim {
- public:
-  explicit Victim(const ServerAddress& address) {
-    auto joined = GrpcClient::join(address, {}, [this](cs_client*, std::uint32_t events) {
-      if ((events & CS_EVENT_FRAME) == 0) return;
-      const auto now = Clock::now();
-      const std::lock_guard lock(mutex_);
-      ++frames_;
-      longestGap_ = std::max(longestGap_, now - newest_);
-      newest_ = now;
-    });
-    if (!joined) throw std::runtime_error("the victim cannot join: " + joined.error().text);
-    client_ = std::move(*joined);
-  }
-
-  void begin() {
-    const std::lock_guard lock(mutex_);
-    frames_ = 0;
-    longestGap_ = {};
-    begun_ = newest_ = Clock::now();
-  }
-
-  struct Seen {
-    double framesPerSecond = 0, longestGap = 0;
-  };
-  Seen seen() {
-    const std::lock_guard lock(mutex_);
-    const auto now = Clock::now();
-    return {.framesPerSecond = static_cast<double>(frames_) / seconds(now - begun_),
-            .longestGap = seconds(std::max(longestGap_, now - newest_))};
-  }
-
- private:
-  std::mutex mutex_;
-  std::uint64_t frames_ = 0;
-  Clock::time_point begun_{}, newest_{};
-  Clock::duration longestGap_{};
-  std::unique_ptr<GrpcClient> client_;
-};
-
 struct Result {
   std::string answer;
   Victim::Seen before, during;
   double startMegabytes = 0, peakMegabytes = 0, endSeconds = 0;
   bool ended = false;
+  bool expected = false;   // Attack::expected
+  bool printable = false;  // the log has no control characters
 
   bool reached() const {
-    return during.framesPerSecond >= kMinFrames * before.framesPerSecond &&
+    return expected && printable && during.framesPerSecond >= kMinFrames * before.framesPerSecond &&
            during.longestGap <= kMaxGapSeconds && peakMegabytes - startMegabytes <= kMaxMegabytes && ended;
   }
 };
@@ -102,17 +57,33 @@ std::string tokenCommand(const std::string& server, std::vector<std::string> arg
   return process.output().substr(0, process.output().find('\n'));
 }
 
-Result run(const std::string& self, const std::string& server, const Attack& attack, int attackSeconds) {
+// Whether a text has no control characters other than line ends.
+bool isPrintable(const std::string& text) {
+  // U+0080 to U+009F are C2 80 to C2 9F in UTF-8.
+  char before = ' ';
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if ((byte < 0x20 && c != '\n') || byte == 0x7f || (before == '\xc2' && byte < 0xa0)) return false;
+    before = c;
+  }
+  return true;
+}
+
+// The honest client joins the web endpoint if `web` and the server has no TLS.
+Result run(const std::string& self, const std::string& server, const Attack& attack, int attackSeconds,
+           bool web) {
   const e2e::TemporaryDirectory directory;
   std::vector<std::string> options;
   std::istringstream further(attack.serverArguments);
   for (std::string word; further >> word;)
     options.push_back(word == "DIRECTORY" ? directory.path().string() : word);
-  std::string token;
+  std::string token, othersToken;
   if (attack.access == Access::tokens) {
     const std::string key = directory.path() / "attack.pem";
     tokenCommand(server, {"--new-key", key});
     token = tokenCommand(server, {"--key", key, "--subject", "victim"});
+    othersToken = tokenCommand(
+        server, {"--key", key, "--subject", "other", "--tenant", "others", "--role", "participant"});
     options.insert(options.end(), {"--token-keys", directory.path().string()});
   } else if (attack.access == Access::pairing) {
     options.insert(options.end(), {"--pairing", "--state-dir", directory.path().string()});
@@ -135,7 +106,10 @@ Result run(const std::string& self, const std::string& server, const Attack& att
 
   Result result;
   {
-    Victim victim(trusted);
+    ServerAddress page(target.web());
+    page.token = token;
+    Victim victim(web && !trusted.isEncrypted() ? page : trusted,
+                  web && !trusted.isEncrypted() ? Victim::Endpoint::web : Victim::Endpoint::grpc);
     std::this_thread::sleep_for(2s);
     victim.begin();
     std::this_thread::sleep_for(4s);
@@ -144,16 +118,20 @@ Result run(const std::string& self, const std::string& server, const Attack& att
     target.forgetPeak();
     victim.begin();
     Process attacker({self, "--perform", attack.name, "--grpc", trusted.hostAndPort(), "--web", target.web(),
-                      "--seconds", std::to_string(attackSeconds)});
+                      "--seconds", std::to_string(attackSeconds), "--token", othersToken});
     const auto begun = Clock::now();
-    attacker.waitForEnd(kPatience);
+    if (!attack.endsDuring) attacker.waitForEnd(std::chrono::seconds(attackSeconds) + kPatience);
     // An attack that ends at once may have effects later.
     std::this_thread::sleep_until(begun + std::chrono::seconds(attackSeconds));
     result.during = victim.seen();
     result.peakMegabytes = target.peakMegabytes();
+    const std::optional<double> end = target.end(std::chrono::seconds(static_cast<int>(kMaxEndSeconds)));
+    const bool attacked = attacker.waitForEnd(kPatience) == 0;
     result.answer = attacker.output() + attacker.errors();
     std::ranges::replace(result.answer, '\n', ' ');
-    const std::optional<double> end = target.end(std::chrono::seconds(static_cast<int>(kMaxEndSeconds)));
+    if (result.answer.ends_with(' ')) result.answer.pop_back();
+    result.expected = attacked && std::regex_match(result.answer, std::regex(attack.expected));
+    result.printable = isPrintable(target.process().errors());
     result.ended = end.has_value();
     result.endSeconds = end.value_or(kMaxEndSeconds);
   }
@@ -167,6 +145,8 @@ void print(const Attack& attack, const Result& result) {
       attack.name, result.reached() ? "ok    " : "FAILED", result.before.framesPerSecond,
       result.during.framesPerSecond, result.during.longestGap, result.startMegabytes,
       std::max(0.0, result.peakMegabytes - result.startMegabytes), result.endSeconds, result.answer);
+  if (!result.expected) fmt::print("    expected: {}\n", attack.expected);
+  if (!result.printable) fmt::print("    the log has control characters\n");
   std::fflush(stdout);
 }
 
@@ -177,9 +157,9 @@ int main(int argc, char** argv) {
   using namespace clothstream;
   CLI::App app{
       "Attacks a server that it starts, and prints what an honest client sees meanwhile. Exit code 1 if a "
-      "goal is "
-      "missed: 90 % of the frames, no gap above 0.25 s, at most 256 MiB more memory, an end within 10 s."};
-  std::string server, perform, grpc, web;
+      "goal is missed: 90 % of the frames, no gap above 0.25 s, at most 256 MiB more memory, an end within "
+      "10 s, the expected answer, and a log without control characters."};
+  std::string server, perform, grpc, web, token;
   std::vector<std::string> only;
   int seconds = 6;
   std::vector<std::string> names;
@@ -193,25 +173,30 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", seconds, "Seconds of each attack")
       ->check(CLI::Range(1, 600))
       ->capture_default_str();
-  // The program runs itself to attack, so that the honest client has a process of its own.
+  // The program runs itself to attack, so that the honest client has a separate process.
   app.add_option("--perform", perform)->group("");
   app.add_option("--grpc", grpc)->group("");
   app.add_option("--web", web)->group("");
+  app.add_option("--token", token)->group("");
   CLI11_PARSE(app, argc, argv);
 
-  bool reached = true;
+  // Alternates, so that honest clients of both endpoints are attacked.
+  bool reached = true, joinsWeb = false;
   try {
     for (const attack::Attack& each : attack::attacks()) {
       if (!perform.empty()) {
         if (each.name != perform) continue;
         // The attacker's own work must not slow down the server.
         ::setpriority(PRIO_PROCESS, 0, 19);
-        fmt::print("{}\n", each.perform({.grpc = grpc, .web = web, .time = std::chrono::seconds(seconds)}));
+        fmt::print(
+            "{}\n",
+            each.perform({.grpc = grpc, .web = web, .time = std::chrono::seconds(seconds), .token = token}));
         continue;
       }
+      joinsWeb = !joinsWeb;
       if (!only.empty() && std::ranges::find(only, each.name) == only.end()) continue;
       const attack::Result result =
-          attack::run(std::filesystem::canonical("/proc/self/exe"), server, each, seconds);
+          attack::run(std::filesystem::canonical("/proc/self/exe"), server, each, seconds, joinsWeb);
       attack::print(each, result);
       reached = reached && result.reached();
     }

@@ -62,7 +62,7 @@ TEST_F(Discovery, FindsServersWithAddressPortsAndKey) {
                                  "echo LISTED; $client list $address --fingerprint $fingerprint; "
                                  "kill $first $second; wait $first $second; "
                                  // Other machines may remember the announcement for a second.
-                                 "until [ \"$($client discover --json)\" = '[]' ]; do :; done");
+                                 "until [ \"$($client discover --json)\" = '[]' ]; do sleep 0.1; done");
   const std::size_t found = output.find("FOUND\n"), listed = output.find("LISTED\n");
   ASSERT_TRUE(found != std::string::npos && listed != std::string::npos) << output;
   const auto servers = nlohmann::json::parse(output.substr(found + 6, listed - found - 6));

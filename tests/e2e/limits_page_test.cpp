@@ -42,16 +42,23 @@ std::vector<std::string> codesOf(const std::string& cell) {
   std::vector<std::string> codes;
   for (std::size_t begin = cell.find('`'); begin != std::string::npos;) {
     const std::size_t end = cell.find('`', begin + 1);
+    if (end == std::string::npos) {
+      ADD_FAILURE() << "odd number of backticks:" << cell;
+      break;
+    }
     codes.push_back(cell.substr(begin + 1, end - begin - 1));
     begin = cell.find('`', end + 1);
   }
   return codes;
 }
 
-// Default of an option on the page of options, such as 256; empty if the option does not exist.
+// Default of an option on the page of options, such as 256. Fails the test if the option does not exist.
 std::string defaultOf(const std::string& option, const std::string& options) {
   const std::size_t row = options.find("- `" + option + " ");
-  if (row == std::string::npos) return {};
+  if (row == std::string::npos) {
+    ADD_FAILURE() << option << " is not an option of the server";
+    return {};
+  }
   const std::string text = options.substr(row, options.find("\n- ", row) - row);
   const std::size_t value = text.find("Default:");
   const std::size_t begin = text.find('`', value);

@@ -367,7 +367,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackUnchanged) {
 
 TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
   const Result defaults = run({"--print-config"});
-  // Options that exclude each other are set by turns.
+  // Options that exclude each other are set in separate rounds.
   struct Turn {
     std::vector<std::string> arguments, unset;
   };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "tests/endpoint/viewer.h"
 
+#include <algorithm>
 #include <random>
 #include <span>
 
@@ -21,7 +22,7 @@ codec::StreamLayout layoutOf(const v1::StreamDescription& description) {
   layout.normals = description.normals() == v1::NORMALS_OCTAHEDRAL ? codec::NormalMode::octahedral
                                                                    : codec::NormalMode::none;
   layout.temporalLayers = static_cast<std::uint8_t>(description.temporal_layers());
-  layout.qualities = static_cast<std::uint8_t>(description.qualities());
+  layout.qualities = static_cast<std::uint8_t>(std::max(1u, description.qualities()));
   for (const v1::ClothDescription& cloth : description.cloths())
     layout.cloths.push_back({cloth.vertex_count(), cloth.rows(), cloth.columns()});
   return layout;

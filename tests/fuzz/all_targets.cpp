@@ -8,6 +8,7 @@
 #include "tests/fuzz/targets/hull_target.h"
 #include "tests/fuzz/targets/obj_target.h"
 #include "tests/fuzz/targets/recording_target.h"
+#include "tests/fuzz/targets/saved_state_target.h"
 #include "tests/fuzz/targets/scene_json_target.h"
 #include "tests/fuzz/targets/scene_target.h"
 #include "tests/fuzz/targets/session_target.h"
@@ -17,8 +18,9 @@ namespace clothstream::fuzz {
 
 std::span<const Target* const> targets() {
   static constexpr const Target* kAll[]{
-      &kCoreTarget, &kDecoderTarget,   &kFilesTarget,     &kGltfTarget,  &kHttpTarget,    &kHullTarget,
-      &kObjTarget,  &kRecordingTarget, &kSceneJsonTarget, &kSceneTarget, &kSessionTarget, &kTokenTarget};
+      &kCoreTarget,      &kDecoderTarget, &kFilesTarget,     &kGltfTarget,       &kHttpTarget,
+      &kHullTarget,      &kObjTarget,     &kRecordingTarget, &kSavedStateTarget, &kSceneTarget,
+      &kSceneJsonTarget, &kSessionTarget, &kTokenTarget};
   return kAll;
 }
 

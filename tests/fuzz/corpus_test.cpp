@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Every target with every committed input, among them all that ever broke a promise.
 #include <algorithm>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -20,6 +21,8 @@ namespace {
 constexpr std::size_t kMaxFiles = 100;
 constexpr std::uintmax_t kMaxFolderBytes = 64 * 1024;
 constexpr double kMebibyte = 1 << 20;
+// Processor time of one input. The fuzzers allow one second; sanitizers and debug builds are slower.
+constexpr double kMaxSeconds = 10;
 
 std::vector<std::filesystem::path> filesOf(const Target& target) {
   std::vector<std::filesystem::path> files;
@@ -35,6 +38,13 @@ std::vector<std::byte> readFile(const std::filesystem::path& path) {
   const std::string bytes((std::istreambuf_iterator<char>(in)), {});
   const auto view = std::as_bytes(std::span(bytes));
   return {view.begin(), view.end()};
+}
+
+// Processor time of all threads of the process, s. Does not depend on other programs of the machine.
+double processorSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 // Largest memory of the process so far.
@@ -55,7 +65,10 @@ TEST_P(Corpus, KeepsThePromises) {
   for (const bool first : {true, false}) {
     for (const std::filesystem::path& file : files) {
       SCOPED_TRACE(file.string());
-      target.run(readFile(file));
+      const std::vector<std::byte> input = readFile(file);
+      const double begin = processorSeconds();
+      target.run(input);
+      EXPECT_LE(processorSeconds() - begin, kMaxSeconds) << "the input costs too much";
     }
     if (first) settled = tests::allocatedBytes();
   }

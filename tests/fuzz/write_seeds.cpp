@@ -14,6 +14,7 @@
 #include <google/protobuf/util/json_util.h>
 
 #include "clothstream/v1/recording.pb.h"
+#include "clothstream/v1/saved_state.pb.h"
 #include "inputs.pb.h"
 #include "server/messages/embedded_scenes.h"
 #include "tests/codec/golden.h"
@@ -91,7 +92,7 @@ void writeCore(const std::filesystem::path& directory) {
   *calls.add_steps()->mutable_message() = parsed(client::ScriptedServer().welcome());
   *calls.add_steps()->mutable_description() =
       client::ScriptedServer({.cloths = {{"curtain", 2, 2}}}).description();
-  for (std::uint32_t function = 0; function < 29; ++function) {
+  for (std::uint32_t function = 0; function < 40; ++function) {
     CoreInput::Call& call = *calls.add_steps()->mutable_call();
     call.set_function(function);
     call.set_index(1);
@@ -284,6 +285,47 @@ void writeRecording(const std::filesystem::path& directory) {
   folder.add(input);
 }
 
+void writeSavedState(const std::filesystem::path& directory) {
+  Folder folder(directory, "saved_state");
+  SavedStateInput input;
+  v1::SavedScene& scene = *input.mutable_scene();
+  *scene.mutable_definition() = smallMesh();
+  scene.set_max_participants(4);
+  scene.set_tenant("a");
+  v1::SavedSession& session = *input.mutable_session();
+  v1::SavedParticipant& participant = *session.add_participants();
+  participant.set_id(1);
+  participant.set_display_name("Ada");
+  participant.set_role(v1::ROLE_OWNER);
+  participant.set_token_hash(std::string(32, 'h'));
+  session.add_bans()->set_subject("eve");
+  session.add_refused_token_hashes(std::string(32, 'r'));
+  *session.mutable_parameters() = smallMesh();
+  folder.add(input);
+  v1::SavedCheckpoint& checkpoint = *input.mutable_checkpoint();
+  checkpoint.mutable_state()->set_tick(7);
+  checkpoint.mutable_state()->set_state(std::string(4 * 24, '\0'));
+  *checkpoint.mutable_parameters() = smallMesh();
+  checkpoint.add_cloths();
+  folder.add(input);
+  v1::HeldNodes& held = *checkpoint.mutable_state()->mutable_held();
+  held.add_nodes(1);
+  held.add_grips(0);
+  held.set_places(std::string(12, '\0'));
+  held.add_taken(1);
+  held.add_slipped(0);
+  v1::SavedGrab& grab = *checkpoint.add_grabs();
+  grab.set_number(1);
+  grab.set_participant_id(1);
+  grab.mutable_pose()->mutable_orientation()->set_w(1);
+  grab.set_radius(0.1f);
+  folder.add(input);
+  input.set_raw_checkpoint(checkpoint.SerializeAsString());
+  folder.add(input);
+  input.set_raw_scene("x");
+  folder.add(input);
+}
+
 void writeHulls(const std::filesystem::path& directory) {
   Folder folder(directory, "hull");
   HullInput tetrahedron;
@@ -411,6 +453,26 @@ void writeTokens(const std::filesystem::path& directory) {
   TokenInput raw;
   raw.set_raw("e30.e30.");
   folder.add(raw);
+  TokenInput elliptic;
+  elliptic.set_header(R"({"alg":"ES256","typ":"JWT","kid":"key"})");
+  elliptic.set_claims(R"({"aud":"clothstream","exp":1798761600,"role":"owner","sub":"ada"})");
+  elliptic.set_es256(true);
+  folder.add(elliptic);
+  elliptic.set_wrongly_signed(true);
+  elliptic.set_signature(std::string(64, '\1'));
+  folder.add(elliptic);
+  TokenInput file;
+  file.set_key_file(std::string(40, 's') + "\n");
+  file.set_secret(true);
+  folder.add(file);
+  file.set_secret(false);
+  // A public key of the curve P-256.
+  file.set_key_file(
+      "-----BEGIN PUBLIC KEY-----\n"
+      "MFkwEwYHKoZIzj0CAQYIKoZIzj0DAQcDQgAEEVs/o5+uQbTjL3chynL4wXgUg2R9\n"
+      "q9UU8I5mEovUf86QZ7kOBIjJwqnzD1omageEHWwHdBO6B+dFabmdT9POxg==\n"
+      "-----END PUBLIC KEY-----\n");
+  folder.add(file);
 }
 
 void writeAll(const std::filesystem::path& directory) {
@@ -419,6 +481,7 @@ void writeAll(const std::filesystem::path& directory) {
   writeScenes(directory);
   writeSession(directory);
   writeRecording(directory);
+  writeSavedState(directory);
   writeHulls(directory);
   writeHttp(directory);
   writeMeshes(directory);

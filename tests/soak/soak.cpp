@@ -33,8 +33,10 @@ using load::ParticipantOptions;
 constexpr std::uint32_t kScenes = 8;
 constexpr double kFramesPerSecond = 36;
 constexpr auto kStep = 28ms;  // between two poses of a participant
-// Time for scenes to load, and for a server to return to rest.
-constexpr auto kPatience = 60s;
+// Time for scenes to load, with the address sanitizer too, and for a server to return to rest.
+constexpr auto kPatience = 120s;
+// The server drains for 10 s at most (--drain), and then saves and ends.
+constexpr auto kEndPatience = 30s;
 // Frames count from this time after a participant has joined.
 constexpr auto kSettled = 2s;
 // Threads and descriptors that gRPC keeps more or fewer of from one moment to the next.
@@ -121,7 +123,7 @@ class Soak {
     hostileClients_.clear();
     report_.crashed = !server_.runs();
     if (!report_.crashed) report_.after = restingServer(report_.before);
-    const std::optional<double> end = server_.end(10s);
+    const std::optional<double> end = server_.end(kEndPatience);
     report_.crashed |= !end;
     report_.endSeconds = end.value_or(0);
     return std::move(report_);
@@ -142,8 +144,10 @@ class Soak {
     std::filesystem::create_directory(directory_.path() / "recordings");
     std::vector<std::string> all = writeScenes(directory_.path());
     // The recordings reach their share of the disk, places and created scenes expire soon.
-    all.insert(all.end(), {"--recordings", (directory_.path() / "recordings").string(), "--recordings-limit",
-                           "4", "--keep-free", "0", "--hold", "3", "--scene-lifetime", "3"});
+    all.insert(all.end(),
+               {"--recordings", (directory_.path() / "recordings").string(), "--recordings-limit", "4",
+                "--keep-free", "0", "--hold", "3", "--scene-lifetime", "3", "--state-dir",
+                (directory_.path() / "state").string(), "--log-level", "warning", "--log-format", "json"});
     return all;
   }
   std::filesystem::path lossFile() const { return directory_.path() / "lose"; }
@@ -185,7 +189,7 @@ class Soak {
   }
 
   // Measures the server without participants, when it has returned to `before` or kPatience is over. Without
-  // `before`, when it has stayed the same for two seconds.
+  // `before`, when it has stayed the same for five seconds.
   Sample restingServer(const std::optional<Sample>& before) {
     const auto end = Clock::now() + kPatience;
     Sample newest = measure();
@@ -369,13 +373,24 @@ double SoakReport::share(bool healthy) const {
 
 double SoakReport::drift() const {
   const std::size_t warm = samples.size() / 4, part = (samples.size() - warm) / 5;
-  if (samples.size() < 20) return 0;
+  if (samples.size() < kLeastSamples) return 0;
   const auto mean = [&](std::size_t from) {
     double sum = 0;
     for (std::size_t i = 0; i < part; ++i) sum += samples[from + i].megabytes;
     return sum / static_cast<double>(part);
   };
   return mean(samples.size() - part) / mean(warm) - 1;
+}
+
+double SoakReport::growth(std::uint64_t Sample::*count) const {
+  const std::size_t part = samples.size() / 5;
+  if (samples.size() < kLeastSamples) return 0;
+  const auto mean = [&](std::size_t from) {
+    double sum = 0;
+    for (std::size_t i = 0; i < part; ++i) sum += static_cast<double>(samples[from + i].*count);
+    return sum / static_cast<double>(part);
+  };
+  return mean(samples.size() - part) - mean(2 * part);
 }
 
 bool SoakReport::leaks() const {
@@ -405,13 +420,15 @@ std::string toText(const SoakReport& report) {
   }
   text += fmt::format(
       "drift of memory after warm-up {:>7.2f} %\n"
+      "growth from middle to end     {:>7.2f} descriptors, {:.2f} threads\n"
       "frames of honest viewers      {:>7.2f} %, {:.2f} % without {:.0f} s after each loss of the device\n"
       "visits {}, of hostile clients {}, created scenes {}, recordings {}, losses of the device {}\n"
       "honest viewers cut off {}{}\n"
       "scenes refused {}{}\n",
-      100 * report.drift(), 100 * report.share(false), 100 * report.share(true), SoakReport::kLossWindow,
-      report.visits, report.hostileVisits, report.createdScenes, report.recordings, report.losses,
-      report.cutOff, report.cutOff > 0 ? ": " + report.firstReason : "", report.refusedScenes,
+      100 * report.drift(), report.growth(&Sample::descriptors), report.growth(&Sample::threads),
+      100 * report.share(false), 100 * report.share(true), SoakReport::kLossWindow, report.visits,
+      report.hostileVisits, report.createdScenes, report.recordings, report.losses, report.cutOff,
+      report.cutOff > 0 ? ": " + report.firstReason : "", report.refusedScenes,
       report.refusedScenes > 0 ? ": " + report.firstRefusal : "");
   text += report.crashed ? "the server ended unexpectedly\n"
                          : fmt::format("the server ended within {:.1f} s of SIGTERM\n", report.endSeconds);

@@ -2,6 +2,7 @@
 // A server under mixed use and all faults for a long time: what honest viewers receive, and what leaks.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -32,6 +33,8 @@ struct Sample {
 struct SoakReport {
   // Time after a loss of the device in which its scenes are loaded again, s.
   static constexpr double kLossWindow = 10;
+  // Samples without which memory and growth say nothing.
+  static constexpr std::size_t kLeastSamples = 60;
 
   std::vector<Sample> samples;
   Sample before, after;  // without participants
@@ -48,8 +51,11 @@ struct SoakReport {
   // Part of the frames that honest viewers received; without seconds after losses if `healthy`.
   double share(bool healthy) const;
   // Change of the mean resident memory from the first to the last fifth of the time after warm-up, which is
-  // the first quarter. 0 with fewer than 20 samples.
+  // the first quarter. 0 with fewer than kLeastSamples.
   double drift() const;
+  // Change of the mean of a count, such as that of descriptors, from the middle fifth of the time to the
+  // last. Shows leaks that are too slow for leaks(). 0 with fewer than kLeastSamples.
+  double growth(std::uint64_t Sample::*count) const;
   bool leaks() const;
 };
 

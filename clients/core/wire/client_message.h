@@ -33,7 +33,7 @@ struct Hello {
   std::uint32_t attempt = 1;  // number of this connection
 };
 
-// What proves who the client is: a token, or else a pairing code. Both empty: nothing.
+// Proof of who the client is: a token, or else a pairing code. Both are empty without a proof.
 struct Proof {
   std::string token, pairingCode;
 };

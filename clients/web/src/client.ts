@@ -230,7 +230,7 @@ export class Client {
       throw new Error("The client core is of another release than the page");
   }
 
-  // What the next connection sends before Hello; the newer call replaces the older one. "" means nothing.
+  // Token or code that the next connection sends before Hello; a newer call replaces an older one. "" means none.
   setToken(token: string): void {
     this.core.with([token], (text) => this.core.exports.cs_set_token(this.handle, text!));
   }

@@ -47,9 +47,11 @@ void Acceptor::start() {
   thread_ = std::thread([this] { run(); });
 }
 
-// An exception, such as for a lack of memory, ends the acceptance of one connection and not the endpoint.
+// An exception, such as for a lack of memory, ends the acceptance of one connection and not the endpoint. It
+// may also have ended accept().
 void Acceptor::run() {
   for (;;) try {
+      if (!accepting_ && acceptor_.is_open()) accept();
       io_.run();
       return;
     } catch (const std::exception& failure) {
@@ -59,6 +61,7 @@ void Acceptor::run() {
 
 void Acceptor::accept() {
   acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
+    accepting_ = false;
     if (!error) {
       accept();  // first, so that it goes on if accepted() throws
       return accepted(std::move(socket));
@@ -66,9 +69,12 @@ void Acceptor::accept() {
     // For example, no descriptor is free. An immediate retry would only spin.
     pause_.expires_after(kAcceptPause);
     pause_.async_wait([this](boost::system::error_code cancelled) {
+      accepting_ = false;
       if (!cancelled) accept();
     });
+    accepting_ = true;
   });
+  accepting_ = true;
 }
 
 void Acceptor::accepted(tcp::socket socket) {
@@ -95,8 +101,8 @@ void Acceptor::checkLater() {
   check_.expires_after(kCheckInterval);
   check_.async_wait([this](boost::system::error_code cancelled) {
     if (cancelled) return;
+    checkLater();  // first, so that it goes on if forgetEnded() throws
     forgetEnded();
-    checkLater();
   });
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -51,8 +52,11 @@ class Acceptor {
   void forgetEnded();
 
   boost::asio::io_context io_{1};
+  // Lets the thread run until io_.stop().
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_{io_.get_executor()};
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer pause_{io_}, check_{io_};
+  bool accepting_ = false;  // accept() or its pause waits
   const boost::asio::ip::tcp::endpoint address_;
   const std::size_t maxConnections_;
   Admission admission_;

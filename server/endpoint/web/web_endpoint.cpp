@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
@@ -69,8 +70,10 @@ struct WebEndpoint::State {
   WebEndpointContext context;  // outlives the sockets, which are destroyed with `io`
   Admission admission;
   net::io_context io{1};
+  net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};  // until io.stop()
   tcp::acceptor acceptor;
   net::steady_timer timer{io};
+  bool accepting = false;  // accept() or its timer waits
   std::uint16_t port;
   std::thread thread;
 
@@ -99,9 +102,11 @@ struct WebEndpoint::State {
     context.streams.clear();
   }
 
-  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint.
+  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint. It may
+  // also have ended accept().
   void run() {
     for (;;) try {
+        if (!accepting && !context.stopping) accept();
         io.run();
         return;
       } catch (const std::exception& failure) {
@@ -111,17 +116,21 @@ struct WebEndpoint::State {
 
   void accept() {
     acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
+      accepting = false;
       if (context.stopping) return;
       if (error) {  // such as no free descriptor; an immediate retry would only spin
         timer.expires_after(kAcceptPause);
         timer.async_wait([this](boost::system::error_code cancelled) {
+          accepting = false;
           if (!cancelled) accept();
         });
+        accepting = true;
         return;
       }
       accept();  // first, so that it goes on if serve() throws
       serve(std::move(socket));
     });
+    accepting = true;
   }
 
   void serve(tcp::socket socket) {

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -70,6 +71,7 @@ class Program {
     }
     readGeometry();
     readLists();
+    readNumbers();
   }
 
  private:
@@ -124,6 +126,7 @@ class Program {
   void readGeometry();
   void readColliders();
   void readLists();
+  void readNumbers();
 
   const CoreInput& input_;
   const std::unique_ptr<cs_client, decltype(&cs_destroy)> client_{cs_create("curtain", "fuzz"), &cs_destroy};
@@ -136,7 +139,7 @@ void Program::call(const CoreInput::Call& call) {
   const std::uint32_t index = call.index();
   // Programs pass UTF-8.
   const char* text = isUtf8(call.text()) ? call.text().c_str() : "";
-  switch (call.function() % 32) {
+  switch (call.function() % 48) {
     case 0:
       return cs_connecting(client(), now_);
     case 1:
@@ -269,6 +272,40 @@ void Program::call(const CoreInput::Call& call) {
       return readGeometry();
     case 27:
       return readLists();
+    case 32:
+      cs_set_token(client(), text);
+      return require(cs_token(client()) == std::string_view(text), "the client uses the new token");
+    case 33:
+      return cs_set_pairing_code(client(), text);
+    case 34:
+      return cs_ban_participant(client(), index);
+    case 35:
+      return cs_create_pairing_code(client(), index);
+    case 36: {
+      cs_limits limits;
+      cs_default_limits(&limits);
+      if (index % 2 != 0) {
+        limits.max_vertices = index;
+        limits.max_triangles = 2 * limits.max_vertices;
+        limits.max_cloths = index % 300;
+        limits.max_participants = index % 100'000;
+        limits.max_content_bytes = index;
+      }
+      cs_set_limits(client(), index == 2 ? nullptr : &limits);
+      return;
+    }
+    case 37:
+      return cs_set_clock(
+          client(), index % 2 == 0 ? nullptr : +[] { return std::uint64_t{1}; });
+    case 38: {
+      const std::unique_ptr<cs_client, decltype(&cs_destroy)> other(cs_create_as(text, text, text, index),
+                                                                    &cs_destroy);
+      cs_connecting(other.get(), now_);
+      require(cs_get_state(other.get()) == CS_STATE_JOINING, "a client that connects joins");
+      return;
+    }
+    case 39:
+      return readNumbers();
     default:
       now_ += index % 60'000 * kMs;
   }
@@ -355,6 +392,48 @@ void Program::readLists() {
   cs_get_playback(client(), now_, &playback);
   cs_environment environment;
   cs_get_environment(client(), &environment);
+}
+
+void Program::readNumbers() {
+  const auto role = cs_get_role(client());
+  require(role <= CS_ROLE_OWNER, "the role is one of cs_role");
+  cs_pairing_code code;
+  if (cs_get_pairing_code(client(), &code) != 0) expectText(code.code);
+  expectText(cs_token(client()));
+  std::uint32_t quality = 0, layers = 0;
+  cs_get_operating_point(client(), &quality, &layers);
+  require(std::isfinite(cs_stream_seconds(client())), "the time of the stream is finite");
+  require(cs_frame_divisor(client()) >= 1, "frames have a divisor");
+  cs_collider played;
+  require(cs_get_played_collider(client(), cs_played_collider_count(client()), &played) == 0,
+          "there are no more colliders than their number");
+  for (std::uint32_t i = 0; i < cs_cloth_count(client()); ++i) {
+    cs_cloth_parameters parameters;
+    cs_get_cloth_parameters(client(), i, &parameters);
+    cs_submesh submesh;
+    require(cs_get_submesh(client(), i, cs_submesh_count(client(), i), &submesh) == 0,
+            "there are no more parts than their number");
+  }
+  cs_collider collider;
+  require(cs_get_collider(client(), cs_collider_count(client()), &collider) == 0,
+          "there are no more colliders than their number");
+  cs_participant participant;
+  require(cs_get_participant(client(), cs_participant_count(client()), &participant) == 0,
+          "there are no more participants than their number");
+  cs_grab_event grab;
+  require(cs_get_grab_event(client(), cs_grab_event_count(client()), &grab) == 0,
+          "there are no more events than their number");
+  cs_contact_event contact;
+  require(cs_get_contact_event(client(), cs_contact_event_count(client()), &contact) == 0,
+          "there are no more events than their number");
+  static_cast<void>(cs_error_code(client()));
+  static_cast<void>(cs_notice_participant(client()));
+  static_cast<void>(cs_parameters_participant(client()));
+  static_cast<void>(cs_participant_id(client()));
+  static_cast<void>(cs_reconstruction_hash(client()));
+  static_cast<void>(cs_resumed(client()));
+  static_cast<void>(cs_simulation_rate(client()));
+  static_cast<void>(cs_stream_rate(client()));
 }
 
 void run(const CoreInput& input) {

@@ -18,6 +18,7 @@
 #include "server/messages/scene_message.h"
 #include "server/recording/recorded_stream.h"
 #include "server/recording/tick_message.h"
+#include "server/scene/snapshot_message.h"
 #include "server/simulation/cloth_simulation.h"
 #include "tests/codec/golden.h"
 
@@ -29,6 +30,8 @@ using recording::RecordingReader;
 using recording::Topic;
 
 constexpr std::uint64_t kMaxNodes = 16'384;
+// Nodes that a state is compared with if the recording has no scene.
+constexpr std::uint32_t kNodesWithoutScene = 4;
 constexpr std::uint64_t kMillisecond = 1'000'000;  // ns
 
 const codec::GoldenStream& golden() {
@@ -109,6 +112,20 @@ class Simulation {
     definition_ = message.scene();
     scene_ = std::move(*scene);
   }
+  void take(const v1::Checkpoint& message) {
+    const auto nodes = scene_ ? static_cast<std::uint32_t>(scene_->nodeCount()) : kNodesWithoutScene;
+    const auto snapshot = scene::toSnapshot(message, nodes);
+    if (!snapshot) return require(!snapshot.error().empty(), "an error has a text");
+    require(snapshot->bytes.size() == nodes * simulation::kSnapshotBytesPerNode,
+            "an accepted state has every node of its scene");
+    for (const simulation::HeldNode& held : snapshot->held.nodes)
+      require(held.node < nodes && held.grab < snapshot->held.grabs.size(),
+              "held nodes and their grabs exist");
+    static_cast<void>(simulation::statusOf(*snapshot));
+    v1::Checkpoint written;
+    scene::write(*snapshot, written);
+    require(scene::toSnapshot(written, nodes).has_value(), "an accepted state is accepted again");
+  }
   void take(const v1::RecordedTick& message) {
     if (!scene_) return;
     if (message.cloths_size() > 0)
@@ -145,6 +162,8 @@ void readAll(const std::string& bytes) {
       simulation.take(parsed<v1::RecordedScene>(content));
     else if ((*message)->topic == Topic::ticks)
       simulation.take(parsed<v1::RecordedTick>(content));
+    else if ((*message)->topic == Topic::checkpoints)
+      simulation.take(parsed<v1::Checkpoint>(content));
   }
 }
 

@@ -228,7 +228,7 @@ TEST_F(ScenesTest, CreatedSceneLivesUntilDeleted) {
   again.join("mine");
 }
 
-TEST_F(ScenesTest, DeletesCreatedSceneThatNobodyUses) {
+TEST_F(ScenesTest, DeletesUnusedCreatedScene) {
   ServerOptions options;
   options.sceneLifetime = std::chrono::milliseconds(300);
   options.reconnectGrace.place = std::chrono::seconds(0);

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// An honest client that counts the frames that it receives.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "clients/grpc/address.h"
+
+namespace clothstream::attack {
+
+// Watches the default scene until its destruction.
+class Victim {
+ public:
+  enum class Endpoint : std::uint8_t { grpc, web };
+
+  // Throws std::runtime_error if it cannot join.
+  Victim(const ServerAddress& address, Endpoint endpoint);
+  ~Victim();
+  Victim(const Victim&) = delete;
+  Victim& operator=(const Victim&) = delete;
+
+  // Counts from now on.
+  void begin();
+
+  struct Seen {
+    double framesPerSecond = 0;
+    double longestGap = 0;  // s, without a frame
+  };
+  // Figures since begin().
+  Seen seen() const;
+
+ private:
+  class Counts;
+  class Client;
+  std::unique_ptr<Counts> counts_;
+  std::unique_ptr<Client> client_;  // counts until it ends
+};
+
+}  // namespace clothstream::attack
