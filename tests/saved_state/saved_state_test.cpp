@@ -295,7 +295,7 @@ TEST_F(SavedStateTest, ASceneThatWaitsForRoomOutlivesItsLifetime) {
   create(tests::smallScene("unused"));
   end();
   scene::BudgetLimits little = kNoLimits;
-  little.megabytes = little.sceneMegabytes = model::PriceModel(large).bytes(large) / 2e6;
+  little.megabytes = little.sceneMegabytes = model::PriceModel(large).bytes(large) * 0.8 / 1e6;
   hosting::ServerOptions options;
   options.sceneLifetime = 100ms;
   run(options, little);
