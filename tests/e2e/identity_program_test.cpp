@@ -223,8 +223,9 @@ TEST_F(IdentityProgram, ListensBeyondThisMachineOnlyWithADecision) {
   stopServer();
   EXPECT_THAT(server_->errors(), HasSubstr("everyone who reaches 0.0.0.0 can join"));
   // Debian's gRPC has published weaknesses.
-  if (grpc::Version().starts_with("1.51"))
+  if (grpc::Version().starts_with("1.51")) {
     EXPECT_THAT(server_->errors(), HasSubstr("gRPC 1.51.1 has published weaknesses"));
+  }
   startWith({"--public-name", "cloth.example.org", "--insecure"});
   EXPECT_EQ(client({"list", address_}).exitCode, 0);
   stopServer();

@@ -330,9 +330,9 @@ TEST_F(SavedStateTest, AServerSceneDoesNotReplaceACreatedOneOfTheSameName) {
 TEST_F(SavedStateTest, BansAndRefusedTokensOfServerScenesSurvive) {
   START({}, kNoLimits, {.minFreeBytes = UINT64_MAX / 2});
   live("small")->paused = true;
-  live("small")->roster.setBans({{.subject = "eve", .displayName = "Eve"}});
+  live("small")->roster.setBans({{.subject = {"acme", "eve"}, .displayName = "Eve"}});
   live("other")->paused = true;
-  live("other")->roster.setBans({{.subject = "eve", .displayName = "Eve"}});
+  live("other")->roster.setBans({{.subject = {"acme", "eve"}, .displayName = "Eve"}});
   std::string token;
   {
     TestPeer owner(server(), "owner"), removed(server(), "removed");
@@ -348,8 +348,8 @@ TEST_F(SavedStateTest, BansAndRefusedTokensOfServerScenesSurvive) {
   }
   end();
   run();
-  EXPECT_TRUE(live("small")->roster.isBanned("eve"));
-  EXPECT_TRUE(live("other")->roster.isBanned("eve"));
+  EXPECT_TRUE(live("small")->roster.isBanned({"acme", "eve"}));
+  EXPECT_TRUE(live("other")->roster.isBanned({"acme", "eve"}));
   TestPeer again(server(), "again");
   again.hello(helloTo("other", token));
   EXPECT_EQ(again.readToTheEnd().error().code(), v1::ERROR_CODE_REMOVED);

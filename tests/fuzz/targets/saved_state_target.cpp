@@ -48,9 +48,8 @@ void readCheckpoint(const v1::SavedCheckpoint& message, const model::Scene& star
 
 void readSession(const v1::SavedSession& message, const model::Scene& start) {
   const scene::SavedRoster roster = saved_state::toRoster(message);
-  const v1::SavedSession written = saved_state::toMessage(roster, message.paused(), message.parameters());
-  const v1::SavedSession again =
-      saved_state::toMessage(saved_state::toRoster(written), written.paused(), written.parameters());
+  const v1::SavedSession written = saved_state::toMessage(roster, message.parameters());
+  const v1::SavedSession again = saved_state::toMessage(saved_state::toRoster(written), written.parameters());
   require(again.SerializeAsString() == written.SerializeAsString(),
           "a session is written and read without a change");
   if (const auto changed = saved_state::withParameters(message.parameters(), start))
