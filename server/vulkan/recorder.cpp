@@ -139,7 +139,7 @@ std::uint64_t Recorder::groupsPerDispatch(const Kernel& kernel, std::uint64_t wo
 
 bool Recorder::divides(const Bindings& bindings, std::uint64_t threads, std::uint64_t work) const {
   const Kernel& kernel = bindings.kernel();
-  return threads > groupsPerDispatch(kernel, work) * kernel.workgroupSize();
+  return work > 0 && threads > groupsPerDispatch(kernel, work) * kernel.workgroupSize();
 }
 
 void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
@@ -160,8 +160,12 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
     const std::uint64_t done = first * kernel.workgroupSize();
     count(std::min(now * kernel.workgroupSize(), threads - done) * std::max<std::uint64_t>(work, 1));
     bind(bindings, push, pushBytes);
-    handles_->current().dispatchBase(static_cast<std::uint32_t>(first), 0, 0, static_cast<std::uint32_t>(now),
-                                     1, 1);
+    // Synchronisation checks of the validation layer do not know vkCmdDispatchBase.
+    if (first == 0)
+      handles_->current().dispatch(static_cast<std::uint32_t>(now), 1, 1);
+    else
+      handles_->current().dispatchBase(static_cast<std::uint32_t>(first), 0, 0,
+                                       static_cast<std::uint32_t>(now), 1, 1);
   }
 }
 

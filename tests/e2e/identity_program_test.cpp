@@ -190,7 +190,7 @@ TEST_F(IdentityProgram, ReloadDoesNotEndAServerThatOnlyPairs) {
   if (IsSkipped()) return;
   server_->signal(SIGHUP);
   server_->signal(SIGUSR1);
-  EXPECT_TRUE(server_->waitForOutput("scene small (ms)", kPatience)) << "the report, after the reload";
+  EXPECT_TRUE(server_->waitForOutput("scenes in quarantine", kPatience)) << "the report, after the reload";
   EXPECT_FALSE(server_->waitForEnd(std::chrono::milliseconds(0)));
   stopServer();
   EXPECT_THAT(server_->errors(), Not(HasSubstr("read again"))) << "there are no keys";

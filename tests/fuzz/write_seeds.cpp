@@ -310,7 +310,7 @@ void writeSavedState(const std::filesystem::path& directory) {
   folder.add(input);
   v1::HeldNodes& held = *checkpoint.mutable_state()->mutable_held();
   held.add_nodes(1);
-  held.add_grips(0);
+  held.add_grabs(0);
   held.set_places(std::string(12, '\0'));
   held.add_taken(1);
   held.add_slipped(0);

@@ -72,12 +72,12 @@ void configure(grpc::ServerBuilder& builder) {
   builder.SetResourceQuota(quota);
 }
 
-// Adds reflection to one server. gRPC's own function adds it to every server of the process.
-class Reflection final : public grpc::ServerBuilderOption {
+// Takes reflection from one server. gRPC adds it to every server of the process.
+class WithoutReflection final : public grpc::ServerBuilderOption {
  public:
   void UpdateArguments(grpc::ChannelArguments*) override {}
   void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
-    plugins->push_back(std::make_unique<grpc::reflection::ProtoServerReflectionPlugin>());
+    std::erase_if(*plugins, [](const auto& plugin) { return plugin->name() == "proto_server_reflection"; });
   }
 };
 
@@ -101,8 +101,9 @@ struct GrpcEndpoint::State {
   boost::asio::thread_pool slowCalls{1};  // for calls that take longer than a frame may wait
 
   State(hosting::SceneServer& scenes, const GrpcEndpointOptions& options) {
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
-    if (options.reflects) builder.SetOption(std::make_unique<Reflection>());
+    if (!options.reflects) builder.SetOption(std::make_unique<WithoutReflection>());
     configure(builder);
     ConnectionLimits limits = options.connections;
     limits.connections = options.maxStreams + kAnsweredBeyondLimit;

@@ -463,9 +463,9 @@ TEST_F(ScenesTest, RecordingExceptionsBecomeErrors) {
   TestPeer peer(server());
   peer.join();
   v1::ClientMessage message;
-  message.mutable_start_recording();
+  message.mutable_start_recording()->set_scene("small");
   EXPECT_EQ(ask(peer, message).error().text(), "startRecording: failed on the server: no start");
-  message.mutable_stop_recording();
+  message.mutable_stop_recording()->set_scene("small");
   EXPECT_EQ(ask(peer, message).error().text(), "stopRecording: failed on the server: no stop");
   ASSERT_TRUE(createNamed(peer, "small", "mine").has_create_scene());
   EXPECT_TRUE(deleteScene(peer, "mine").has_delete_scene());
@@ -531,7 +531,8 @@ TEST_F(ScenesTest, CancelsASceneThatTheDeviceDoesNotLoad) {
   if (inTime) stopped.get_future().wait();
   journal->release();
   ASSERT_TRUE(inTime);
-  EXPECT_EQ(answer.get(), "createScene: cancelled");
+  EXPECT_THAT(answer.get(),
+              StartsWith("createScene: cancelled, because the peer that asked for it has left"));
   peer.readFrames(3);
   EXPECT_EQ(server().listScenes().scenes_size(), 2);
   EXPECT_TRUE(createNamed(peer, "small", "stuck").has_create_scene()) << "the name is free again";
@@ -549,16 +550,16 @@ TEST_F(ScenesTest, RefusesOtherRequestsWhileTooManyWait) {
   });
   began->get_future().wait();
   v1::DeleteSceneRequest request;
-  request.set_name("no such scene");
+  request.set_name("small");
   for (std::uint32_t i = 0; i < SceneMaker::kMaxWaiting; ++i)
     server().deleteScene(request, [](const auto&) {});
   TestPeer peer(server());
   EXPECT_THAT(deleteScene(peer, "small").error().text(),
               StartsWith("deleteScene: 64 requests about scenes wait; try again later"));
   v1::ClientMessage message;
-  message.mutable_start_recording();
+  message.mutable_start_recording()->set_scene("small");
   EXPECT_THAT(ask(peer, message).error().text(), StartsWith("startRecording: 64 requests about scenes wait"));
-  message.mutable_stop_recording();
+  message.mutable_stop_recording()->set_scene("small");
   EXPECT_THAT(ask(peer, message).error().text(), StartsWith("stopRecording: 64 requests about scenes wait"));
   const auto counter = static_cast<std::size_t>(telemetry::Refusal::waitingScenes);
   EXPECT_EQ(server().state().metrics.refusals[counter].value(), 3u);
