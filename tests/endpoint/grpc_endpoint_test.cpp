@@ -357,6 +357,7 @@ TEST_F(GrpcEndpoint, CancelsCallWhoseAnswerIsNotRead) {
   const auto unread = getMeshWithoutReading(port());
   EXPECT_TRUE(eventually([&] { return isWithoutRoom(getMesh(port())); }));
   EXPECT_TRUE(eventually([&] { return getMesh(port()).ok(); }));
+  EXPECT_EQ(unread->receive(), std::nullopt) << "the rest of the answer never comes";
   EXPECT_EQ(unread->finish().error_code(), grpc::StatusCode::CANCELLED);
 }
 
