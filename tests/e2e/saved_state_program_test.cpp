@@ -113,7 +113,7 @@ class SavedStateProgram : public RunningServer {
     Arguments all = kSmallScene;
     all.insert(all.end(),
                {"--state-dir", directory_.path().string(), "--max-load", "1000", "--max-scene-load", "1000",
-                 "--max-tick-time", "0", "--keep-free", "0", "--overload", "keep", "--metrics-port", "0"});
+                "--max-tick-time", "0", "--keep-free", "0", "--overload", "keep", "--metrics-port", "0"});
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
