@@ -11,7 +11,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(Report, ShowsControlCharactersOfTheServerAsText) {
+TEST(ReportOfClient, ShowsControlCharactersOfTheServerAsText) {
   Report report;
   report.scene = report.server = report.device = "a\x1b[2J";
   report.cloths.push_back({.name = "b\x9b", .solver = "xpbd"});

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A lack of memory on a thread of scenes, recordings or saved states ends neither the server nor its streams.
+// A lack of memory on a thread of recordings, playback or saved states ends neither the server nor its
+// streams.
 #include "tests/faults/lack_of_memory.h"
 
 #include <algorithm>
@@ -174,18 +175,6 @@ class LackOfMemoryTest : public SmallServer {
 TEST_F(LackOfMemoryTest, WriterOfSavedStateSurvives) {
   starve("state", viewer_, [this] { work(); });
   EXPECT_TRUE(store_->flush(1min));
-}
-
-// The device thread, the publisher, the scene maker and the scene loader.
-TEST_F(LackOfMemoryTest, ThreadsOfScenesSurvive) {
-  ASSERT_TRUE(viewer_.seesFrame());
-  const std::vector<int> threads = threadsNamed(kServer);
-  ASSERT_GE(threads.size(), 4u);
-  for (std::size_t i = 0; i < threads.size(); ++i) {
-    const std::string name = fmt::format("{}-{}", kServer, i);
-    renameThread(threads[i], name);
-    starve(name, viewer_, [this] { work(); });
-  }
 }
 
 TEST_F(LackOfMemoryTest, RecorderSurvives) {
