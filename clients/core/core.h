@@ -537,7 +537,7 @@ typedef struct cs_presence {
 
 /* Id of this participant; 0 before Welcome. */
 uint64_t cs_participant_id(const cs_client* client) CS_NOEXCEPT;
-/* cs_role of this participant, as the server granted it. */
+/* cs_role of this participant, or a newer role, as the server granted it. */
 uint32_t cs_get_role(const cs_client* client) CS_NOEXCEPT;
 /* Number of participants in the scene, this one included. */
 uint32_t cs_participant_count(const cs_client* client) CS_NOEXCEPT;
