@@ -239,7 +239,7 @@ TEST_F(PeerLimitsTest, CreatingASceneEndsWhenThePeerDoesNotWantItAnyMore) {
   // Whenever the peer goes, the scene is not made. The number of checks depends on the time that loading
   // takes.
   int refused = 0;
-  for (int last = 0;; last += 3, ++refused) {
+  for (int last = 0;; last = 2 * last + 1, ++refused) {
     int left = last;
     const Created created = create(server(), [&] { return left-- > 0; });
     if (created) break;
