@@ -400,7 +400,7 @@ bool SavedState::makeRoom(const std::string& name, std::uint64_t rest, std::uint
       if (checkpoint > 0) leftOut_.erase(name);
       return true;
     }
-    // What never fits takes nothing away from others.
+    // A scene that never fits takes no room from others.
     const bool neverFits = withoutCheckpoints > room;
     if (!neverFits && dropOldestUnused()) continue;
     const bool isLargest = neverFits || largest == nullptr || largest->checkpointBytes <= checkpoint;

@@ -100,7 +100,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   bool become(identity::Identity identity);
   // Handles requests about identities and bans. Returns false if the message is none of these.
   bool manage(const v1::ClientMessage& message);
-  // What the identity permits in this scene.
+  // Rights that the identity has in this scene.
   scene::Rights rightsIn(const scene::LiveScene& scene) const;
   void hello(const v1::Hello& message);
   void poses(const v1::ColliderPoses& message, Clock::time_point now);

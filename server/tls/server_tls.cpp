@@ -24,7 +24,7 @@ namespace {
 
 namespace ssl = boost::asio::ssl;
 
-// Of TLS 1.2, those with forward secrecy and authenticated encryption. TLS 1.3 has no others.
+// Ciphers of TLS 1.2 with forward secrecy and authenticated encryption. TLS 1.3 has no others.
 constexpr const char* kCiphers = "ECDHE+AESGCM:ECDHE+CHACHA20";
 // Sessions of TLS belong to this name. At most 32 bytes.
 constexpr std::string_view kSessions = "clothstream";
