@@ -344,10 +344,14 @@ void waitForStop(const Signals& signals, const ProgramOptions& options, tls::Ser
     if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && !reloads)) return;
     if (signal == SIGHUP && tls != nullptr) reload(*tls);
     if (signal == SIGHUP && !options.tokenKeys.empty()) reload(*authenticator);
-    if (signal == SIGUSR2 && options.pairing) printPairingCode(*authenticator);
-    if (signal != SIGUSR1) continue;
-    fmt::print("{}", report());
-    std::fflush(stdout);
+    try {
+      if (signal == SIGUSR2 && options.pairing) printPairingCode(*authenticator);
+      if (signal != SIGUSR1) continue;
+      fmt::print("{}", report());
+      std::fflush(stdout);
+    } catch (const std::exception& failure) {  // such as a closed pipe or a lack of memory
+      spdlog::error("printing after a signal failed: {}", failure.what());
+    }
   }
 }
 
@@ -365,7 +369,7 @@ std::unique_ptr<monitoring::MonitoringEndpoint> openMonitoring(const ProgramOpti
   return endpoint;
 }
 
-// Shows a server to the operators while this lives.
+// Makes a server visible to the monitoring endpoint while the object lives.
 class Monitored {
  public:
   // `endpoint` may be null.
@@ -437,8 +441,8 @@ class Monitored {
     const std::optional<SteadyTime> stopAt = start.finish();
     if (!stopAt) waitForStop(signals, options, tls.get(), authenticator, report);
     spdlog::info("stopping");
-    guard = std::make_unique<EndGuard>(signals,
-                                       stopAt.value_or(std::chrono::steady_clock::now() + options.drain));
+    guard = std::make_unique<EndGuard>(
+        signals, stopAt.value_or(std::chrono::steady_clock::now() + options.server.drain));
     announcement.reset();
     monitored.stopping();
     server.stop();
@@ -448,7 +452,7 @@ class Monitored {
 }
 
 int play(const ProgramOptions& options, const Signals& signals) {
-  StartGuard start(signals, options.drain);
+  StartGuard start(signals, options.server.drain);
   const auto monitoring = openMonitoring(options);
   auto recording = recording::RecordedStream::open(options.recording);
   if (!recording) throw std::runtime_error(recording.error());
@@ -475,7 +479,7 @@ std::uint64_t bytesOf(double megabytes) {
 }
 
 int serve(const ProgramOptions& options, const Signals& signals) {
-  StartGuard start(signals, options.drain);
+  StartGuard start(signals, options.server.drain);
   const auto monitoring = openMonitoring(options);
   std::vector<std::string> builtIn;
   std::vector<model::Scene> scenes = loadScenes(options, builtIn);

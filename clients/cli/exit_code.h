@@ -27,7 +27,7 @@ struct ExitMeaning {
 inline constexpr ExitMeaning kExitMeanings[] = {
     {kOk, "success"},
     {kHashMismatch,
-     "--hash found a frame that differs from the server's, or encode one that breaks its promise"},
+     "--hash or load found a frame that differs from the server's, or encode one that breaks its promise"},
     {kUsage, "wrong arguments"},
     {kUnreachable, "no server answers"},
     {kRefused, "the server refuses (unknown scene, value not allowed)"},

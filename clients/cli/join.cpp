@@ -66,7 +66,7 @@ class Listener {
     cs_participant other;
     for (std::uint32_t i = 0; cs_get_participant(client, i, &other) != 0; ++i)
       if (other.id != cs_participant_id(client))
-        say(fmt::format("{} is here as {}{}", nameOf(other), roleName(other.role),
+        say(fmt::format("{} is here as {}{}{}", nameOf(other), roleName(other.role), numberOf(other),
                         other.away != 0 ? ", currently disconnected" : ""));
   }
 

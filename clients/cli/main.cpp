@@ -69,7 +69,7 @@ struct TrustOptions {
                        "server. Default: those of the system")
             ->check(CLI::ExistingFile);
     app.add_option("--fingerprint", fingerprint,
-                   "Key of an https:// server with a certificate of its own, as the server prints it")
+                   "Fingerprint of the key of an https:// server with --tls self, as the server prints it")
         ->excludes(ca);
   }
 
@@ -188,8 +188,7 @@ int run(int argc, char** argv) {
   std::string role;
   joinCommand.add_option("--name", joinOptions.name, "Name that other participants see, at most 64 bytes");
   joinCommand
-      .add_option("--role", role,
-                  "viewer, participant or owner; the first client that is not a viewer becomes the owner")
+      .add_option("--role", role, "Role to request: viewer, participant or owner. Default: participant")
       ->check(CLI::IsMember({"viewer", "participant", "owner"}));
   joinCommand
       .add_option("--quality", joinOptions.quality,

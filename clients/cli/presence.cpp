@@ -40,11 +40,16 @@ std::string nameOf(const cs_client* client, std::uint64_t participant) {
   return fmt::format("participant {}", participant);
 }
 
+std::string numberOf(const cs_participant& participant) {
+  return *participant.name == '\0' ? "" : fmt::format(", number {}", participant.id);
+}
+
 std::string text(const cs_client* client, const cs_presence& presence) {
   const std::string name = nameOf(presence.participant);
   switch (presence.kind) {
     case CS_PRESENCE_JOINED:
-      return fmt::format("{} joined as {}", name, roleName(presence.participant.role));
+      return fmt::format("{} joined as {}{}", name, roleName(presence.participant.role),
+                         numberOf(presence.participant));
     case CS_PRESENCE_LEFT:
       if (presence.reason == CS_LEAVE_TIMED_OUT) return name + " was disconnected and did not return";
       if (presence.reason == CS_LEAVE_REMOVED)

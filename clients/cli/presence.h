@@ -20,7 +20,10 @@ std::string nameOf(const cs_participant& participant);
 // Name of the participant with this id; its number if it is not in the scene.
 std::string nameOf(const cs_client* client, std::uint64_t participant);
 
-// Text of a presence event, such as "Ada joined as participant".
+// Number of a participant whose name does not contain it, such as ", number 3"; else "".
+std::string numberOf(const cs_participant& participant);
+
+// Text of a presence event, such as "Ada joined as participant, number 3".
 std::string text(const cs_client* client, const cs_presence& presence);
 
 }  // namespace clothstream::cli

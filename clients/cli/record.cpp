@@ -162,8 +162,8 @@ std::optional<Error> follow(GrpcClient& client, StreamFile& file, const RecordOp
     if (file.broken())
       return Error{
           kLost,
-          "The stream could not be resumed, because the connection was lost for too long or the server "
-          "was restarted: the recording ends there."};
+          "the stream could not be resumed, because the connection was lost for too long or the server "
+          "was restarted; the recording ends there"};
     if (const auto failure = client.ended()) return Error{exitCodeOf(failure->kind), failure->text};
     if (terminal)
       fmt::print(stderr, "\r\033[K{:.0f} s, {} frames, {:.1f} MiB", passed.count(), file.frames(),

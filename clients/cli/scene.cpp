@@ -44,9 +44,10 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
     added->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
         ->capture_default_str();
   };
-  create_ = command("create", "Create a scene on a server from a JSON file or a built-in scene");
+  create_ =
+      command("create", "Create a scene on a server from a JSON file, or as a copy of a scene of the server");
   CLI::Option* file = create_->add_option("FILE", options_.file, "Scene in JSON");
-  create_->add_option("--named", options_.named, "Copy this built-in scene of the server instead of a file")
+  create_->add_option("--named", options_.named, "Copy this scene of the server instead of a file")
       ->excludes(file);
   create_->add_option("--name", options_.name, "Name of the new scene; default: the name in the file");
   create_->add_option("--max-participants", options_.maxParticipants,
@@ -75,7 +76,7 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
 
 void SceneCommands::check() const {
   if (create_->parsed() && options_.file.empty() && options_.named.empty())
-    throw CLI::ValidationError("create", "give a FILE, or --named with a built-in scene of the server");
+    throw CLI::ValidationError("create", "give a FILE, or --named with a scene of the server");
 }
 
 bool SceneCommands::parsed() const {

@@ -12,12 +12,12 @@
 
 #include "clients/cli/error.h"
 #include "clients/grpc/grpc_client.h"
+#include "proto/parameters/settings.h"
 
 namespace clothstream::cli {
 namespace {
 
 constexpr std::chrono::seconds kPatience{10};
-constexpr float kGustSeconds = 2;  // default of scene.proto
 
 bool changesCloths(const SetOptions& options) {
   // Compares the bits, because unchanged values are NaN.
@@ -110,7 +110,8 @@ ExitCode set(const SetOptions& options) {
       ++changes;
     }
     if (!options.gust.empty()) {
-      cs_set_gust(client, options.gust[0], options.gust.size() > 1 ? options.gust[1] : kGustSeconds);
+      cs_set_gust(client, options.gust[0],
+                  options.gust.size() > 1 ? options.gust[1] : parameters::kGustSeconds.initial);
       ++changes;
     }
   });

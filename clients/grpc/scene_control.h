@@ -17,7 +17,7 @@
 namespace clothstream {
 
 struct CreateSceneOptions {
-  std::string named;                  // built-in scene of the server to copy; empty: use `scene`
+  std::string named;                  // scene of the server to copy; empty: use `scene`
   v1::Scene scene;                    // with the geometry of its meshes
   std::string name;                   // replaces the scene's name; empty: keep it
   std::uint32_t maxParticipants = 0;  // 0: the server's limit

@@ -68,8 +68,7 @@ void HostileClient::visit() {
   if (kind_ != kNeverReads) link_->read();
 }
 
-void HostileClient::received(std::span<const std::byte> message) {
-  static_cast<void>(message);
+void HostileClient::received(std::span<const std::byte> /*message*/) {
   joined_ = true;
   link_->read();
 }

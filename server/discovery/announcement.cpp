@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "server/discovery/announcement.h"
 
+#include <exception>
+#include <new>
 #include <stdexcept>
 #include <utility>
 
 #include <avahi-client/client.h>
 #include <avahi-client/publish.h>
 #include <avahi-common/alternative.h>
+#include <avahi-common/domain.h>
 #include <avahi-common/error.h>
 #include <avahi-common/malloc.h>
 #include <avahi-common/strlst.h>
@@ -60,13 +63,23 @@ class Announcement::Avahi {
   Avahi& operator=(const Avahi&) = delete;
 
  private:
+  // No exception may reach Avahi, which is written in C.
+  static void attempt(const auto& step) {
+    try {
+      step();
+    } catch (const std::exception& failure) {
+      spdlog::warn("the server is not announced by mDNS: {}", failure.what());
+    }
+  }
+
   bool connect() {
     int error = 0;
     group_ = nullptr;
     client_ = avahi_client_new(
         avahi_threaded_poll_get(poll_), AVAHI_CLIENT_NO_FAIL,
         [](AvahiClient* client, AvahiClientState state, void* self) {
-          static_cast<Avahi*>(self)->onClient(client, state);
+          Avahi& avahi = *static_cast<Avahi*>(self);
+          attempt([&] { avahi.onClient(client, state); });
         },
         this, &error);
     if (client_ == nullptr) problem_ = avahi_strerror(error);
@@ -110,13 +123,18 @@ class Announcement::Avahi {
       group_ = avahi_entry_group_new(
           client_,
           [](AvahiEntryGroup* group, AvahiEntryGroupState state, void* self) {
-            static_cast<Avahi*>(self)->group_ = group;
-            static_cast<Avahi*>(self)->onGroup(state);
+            Avahi& avahi = *static_cast<Avahi*>(self);
+            avahi.group_ = group;
+            attempt([&] { avahi.onGroup(state); });
           },
           this);
     if (group_ == nullptr) return giveUp(avahi_client_errno(client_));
     avahi_entry_group_reset(group_);
-    if (name_.empty()) name_ = fmt::format("ClothStream on {}", avahi_client_get_host_name(client_));
+    if (name_.empty()) {
+      const char* const host = avahi_client_get_host_name(client_);
+      if (host == nullptr) return giveUp(avahi_client_errno(client_));  // the daemon does not answer
+      name_ = fmt::format("ClothStream on {}", host).substr(0, AVAHI_LABEL_MAX - 1);
+    }
     const TextRecord text = textRecord(server_);
     const auto add = [&] {
       return avahi_entry_group_add_service_strlst(group_, AVAHI_IF_UNSPEC, AVAHI_PROTO_UNSPEC,
@@ -135,6 +153,7 @@ class Announcement::Avahi {
 
   void takeNextName() {
     char* const next = avahi_alternative_service_name(name_.c_str());
+    if (next == nullptr) throw std::bad_alloc();
     name_ = next;
     avahi_free(next);
   }

@@ -11,7 +11,7 @@ namespace clothstream::discovery {
 struct AnnouncedServer {
   std::uint16_t pagePort = 0, grpcPort = 0;
   bool encrypted = false;
-  std::string fingerprint;  // of a certificate of the server's own; empty: none
+  std::string fingerprint;  // of a self-signed certificate; empty: none
   std::string version;      // program and version
 };
 

@@ -70,7 +70,7 @@ struct FrameEncoder::State {
   // Belong to the device's thread.
   bool hasReference = false;
   std::uint64_t tick = 0;
-  // Set by record(), cleared by entropyCode().
+  // Set by record(), cleared by entropyCode() and discard().
   std::array<std::atomic<bool>, kSlots> taken{};
 };
 
@@ -133,6 +133,10 @@ EncodedFrame FrameEncoder::entropyCode(const RecordedFrame& frame, std::span<std
     ~Release() { taken.store(false, std::memory_order_release); }
   } release{state_->taken[frame.slot]};
   return state_->stage->entropyCode(frame, out);
+}
+
+void FrameEncoder::discard(const RecordedFrame& frame) {
+  state_->taken[frame.slot].store(false, std::memory_order_release);
 }
 
 std::size_t FrameEncoder::packetBound() const {

@@ -84,6 +84,8 @@ class FrameEncoder {
   // Codes a frame whose recording is complete, in the order of record(). Frees the slot. `out` has at least
   // packetBound() bytes.
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out);
+  // Frees the slot of a frame that is not coded.
+  void discard(const RecordedFrame& frame);
 
   std::size_t packetBound() const;
 

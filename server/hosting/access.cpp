@@ -41,8 +41,8 @@ messages::Result<Identity> SceneServer::State::authenticate(const v1::Authentica
           std::chrono::duration_cast<std::chrono::seconds>(identity->expires->time_since_epoch()).count()));
     return identity;
   };
-  const bool asks = options.authenticator && options.authenticator->required();
-  if (!asks || request.proof_case() != v1::AuthenticateRequest::kPairingCode)
+  const bool isRequired = options.authenticator && options.authenticator->required();
+  if (!isRequired || request.proof_case() != v1::AuthenticateRequest::kPairingCode)
     return answer(identify(request.token(), address.empty()));
   auto paired = options.authenticator->pair(request.pairing_code(), address, now);
   if (!paired) {
@@ -129,7 +129,7 @@ messages::Result<v1::CreatePairingCodeResponse> SceneServer::State::createPairin
     const Identity& by, const v1::CreatePairingCodeRequest& request, Clock::time_point now) {
   if (!options.authenticator || !options.authenticator->pairs())
     return denied(v1::ERROR_CODE_INVALID_ARGUMENT,
-                  "createPairingCode: this server does not pair; it needs --pairing");
+                  "createPairingCode: this server does not pair; start it with --pairing");
   if (!by.isVerifiedOwner() || !by.scene.empty())
     return denied(v1::ERROR_CODE_PERMISSION_DENIED,
                   "createPairingCode: requires a token with the role owner for all scenes");

@@ -100,17 +100,22 @@ std::future<void> DeviceThread::add(std::shared_ptr<scene::LiveScene> scene) {
   std::promise<void> added;
   std::future<void> whenAdded = added.get_future();
   post(std::packaged_task<void()>([this, scene = std::move(scene), added = std::move(added)]() mutable {
-    if (!device_)
-      return added.set_exception(std::make_exception_ptr(std::runtime_error("there is no device")));
-    runs_.push_back(std::make_unique<Run>(std::move(scene)));
-    runs_.back()->whenAdded = std::move(added);
+    try {
+      if (!device_) throw std::runtime_error("there is no device");
+      runs_.push_back(std::make_unique<Run>(std::move(scene)));
+      runs_.back()->whenAdded = std::move(added);
+    } catch (...) {
+      added.set_exception(std::current_exception());
+    }
   }));
   return whenAdded;
 }
 
 void DeviceThread::adopt(std::shared_ptr<scene::LiveScene> scene) {
-  post(std::packaged_task<void()>([this, scene = std::move(scene)]() mutable {
-    runs_.push_back(std::make_unique<Run>(std::move(scene)));
+  post(std::packaged_task<void()>([this, scene = std::move(scene)] {
+    schedule::retryUntilDone(
+        [&] { runs_.push_back(std::make_unique<Run>(scene)); },
+        [](const std::exception& failure) { spdlog::error("{}; trying again", failure.what()); });
   }));
 }
 
@@ -169,7 +174,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
           [](const std::exception& again) { spdlog::error("device: {}; trying again", again.what()); });
     }
   }
-  loader_.abandon();
+  abandonLoading();
   saveLast();
   publisher_.drain();
   runs_.clear();
@@ -216,6 +221,14 @@ bool DeviceThread::waitForWork() {
   idle_ += Clock::now() - lastAnswer_.load();
   woken_ = false;
   return !stopping_;
+}
+
+void DeviceThread::abandonLoading() {
+  for (const auto& run : runs_) {
+    run->stopLoading.request_stop();
+    run->loading = {};
+  }
+  loader_.wait();
 }
 
 void DeviceThread::takeLoadedScenes() {
@@ -361,7 +374,8 @@ void DeviceThread::startAndStopScenes() {
   }
   const bool busy = std::ranges::any_of(runs_, [&](const auto& run) { return run->begun && waits(*run); });
   if (loads != nullptr && !loads->loading.valid() && !busy)
-    loads->loading = loader_.load(*device_, loads->scene->start());
+    loads->loading =
+        loader_.load(*device_, loads->scene->start(), (loads->stopLoading = std::stop_source()).get_token());
 }
 
 void DeviceThread::encodePausedFrames() {
@@ -501,9 +515,12 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
   spdlog::error("device: {}; rebuilding it and every scene", reason);
   // Frames of the old device are published first, because they use its memory.
   publisher_.drain();
-  loader_.abandon();
+  abandonLoading();
+  try {
+    if (device_) device_->drain();  // it may still work, if the failure was a lack of memory on the CPU
+  } catch (const vulkan::DeviceLost&) {
+  }
   for (const auto& run : runs_) {
-    run->loading = {};
     run->begun = run->inFlight = false;
     if (std::exchange(run->lostDeviceTwice, false))
       quarantine(*run, "the device was lost twice while it ran");

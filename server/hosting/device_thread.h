@@ -12,6 +12,7 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -105,6 +106,9 @@ class DeviceThread {
         : TickSchedule(live->start().simulationRate, live->isGuest()),
           scene(std::move(live)),
           overload(scene->start().streamRate, scene->start().substeps) {}
+    ~Run() { stopLoading.request_stop(); }
+    Run(const Run&) = delete;
+    Run& operator=(const Run&) = delete;
     // Adds slipped ticks, and returns the whole ticks that are not counted yet.
     std::uint64_t wholeSlippedTicks(double ticks) {
       slipped += ticks;
@@ -128,6 +132,7 @@ class DeviceThread {
 
     std::shared_ptr<scene::LiveScene> scene;
     scene::SceneLoader::Future loading;           // valid while it is loaded
+    std::stop_source stopLoading;                 // of `loading`
     std::unique_ptr<scene::SceneHost> host;       // once it is loaded
     std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
     bool quarantined = false;
@@ -161,6 +166,8 @@ class DeviceThread {
   // most subscribers. Null if no scene waits. One is loaded at a time, so that it is known which one the
   // device works on.
   Run* sceneToLoad() const;
+  // Stops loading, and waits for the loader.
+  void abandonLoading();
   // Creates the hosts of loaded scenes.
   void takeLoadedScenes();
   // Throws vulkan::DeviceLost, and counts that as the scene's.

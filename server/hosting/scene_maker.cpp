@@ -20,6 +20,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/validation.h"
+#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
@@ -61,6 +62,12 @@ void postTo(boost::asio::thread_pool& thread, Work work) {
   });
 }
 
+// Counts a waiting request until it is reset or destroyed.
+struct EndWaiting {
+  void operator()(std::atomic<std::uint32_t>* count) const { --*count; }
+};
+using Waiting = std::unique_ptr<std::atomic<std::uint32_t>, EndWaiting>;
+
 }  // namespace
 
 SceneMaker::SceneMaker(SceneServer::State& server) : server_(server) {
@@ -80,15 +87,22 @@ void SceneMaker::expireLater() {
   const std::chrono::milliseconds lifetime = server_.options.sceneLifetime;
   if (lifetime.count() == 0 || ended_) return;
   constexpr std::chrono::milliseconds kInterval{1000};
-  expiry_.expires_after(std::min(lifetime, kInterval));
-  expiry_.async_wait([this, lifetime](const boost::system::error_code& cancelled) {
-    if (cancelled) return;
-    try {
-      deleteUnused(lifetime);
-    } catch (const std::exception& failure) {
-      spdlog::error("unused scenes are not deleted: {}", failure.what());
-    }
-    expireLater();
+  const std::chrono::milliseconds interval = std::min(lifetime, kInterval);
+  const auto startTimer = [this, lifetime, interval] {
+    expiry_.expires_after(interval);
+    expiry_.async_wait([this, lifetime](const boost::system::error_code& cancelled) {
+      if (cancelled) return;
+      try {
+        deleteUnused(lifetime);
+      } catch (const std::exception& failure) {
+        spdlog::error("unused scenes are not deleted: {}", failure.what());
+      }
+      expireLater();
+    });
+  };
+  // An exception would end the process, because it would leave a thread of the pool.
+  schedule::retryUntilDone(startTimer, [](const std::exception& failure) {
+    spdlog::error("unused scenes are not deleted: {}; trying again", failure.what());
   });
 }
 
@@ -106,15 +120,17 @@ void SceneMaker::deleteUnused(std::chrono::milliseconds lifetime) {
 tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
                                                  std::optional<UploadedContent> uploaded, std::string tenant,
                                                  Wanted wanted, CreateDone done) {
-  if (++waiting_ > kMaxWaiting) {
-    --waiting_;
+  const bool isFull = ++waiting_ > kMaxWaiting;
+  Waiting waits(&waiting_);
+  if (isFull) {
     server_.metrics.refuse(telemetry::Refusal::waitingScenes);
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("createScene: {} scenes wait to be created; try again later", kMaxWaiting));
   }
-  postTo(thread_, [this, request = std::move(request), uploaded = std::move(uploaded),
-                   tenant = std::move(tenant), wanted = std::move(wanted), done = std::move(done)]() mutable {
-    --waiting_;
+  postTo(thread_, [this, waits = std::move(waits), request = std::move(request),
+                   uploaded = std::move(uploaded), tenant = std::move(tenant), wanted = std::move(wanted),
+                   done = std::move(done)]() mutable {
+    waits.reset();
     static const std::string nothing;
     const auto end = Clock::now() + server_.options.maxCreationTime;
     const model::Cancellation cancellation(
@@ -147,14 +163,15 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
 
 template <class Work, class Done>
 tl::expected<void, v1::Error> SceneMaker::enqueue(const char* call, Work work, Done done) {
-  if (++requests_ > kMaxWaiting) {
-    --requests_;
+  const bool isFull = ++requests_ > kMaxWaiting;
+  Waiting waits(&requests_);
+  if (isFull) {
     server_.metrics.refuse(telemetry::Refusal::waitingScenes);
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("{}: {} requests about scenes wait; try again later", call, kMaxWaiting));
   }
-  postTo(thread_, [this, call, work = std::move(work), done = std::move(done)] {
-    --requests_;
+  postTo(thread_, [waits = std::move(waits), call, work = std::move(work), done = std::move(done)]() mutable {
+    waits.reset();
     giveAnswer(call, done, attempt(call, work));
   });
   return {};
@@ -304,28 +321,37 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
     return refused(charged.error().code, std::move(charged.error().text));
   }
   server_.keep(scene);
-  std::future<void> added = server_.device.add(scene);
   try {
+    std::future<void> added = server_.device.add(scene);
     while (added.wait_for(kLoadingCheck) != std::future_status::ready) cancellation.check();
     added.get();
     cancellation.check();
+    server_.insert(scene);
   } catch (const model::Cancelled&) {
-    // Nothing waits for the device here, because it may be what takes too long.
-    server_.device.remove(scene);
-    scene->discharge();
-    server_.forget(*scene);
+    undoCreation(scene);
     throw;
   } catch (const std::exception& failure) {
-    server_.forget(*scene);
+    undoCreation(scene);
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("createScene: the device cannot run it: {}", failure.what()));
   }
-  server_.insert(scene);
   server_.flushStore(*scene);
   telemetry::log({scene->name()}, spdlog::level::info, "created, {} vertices", scene->start().nodeCount());
   v1::CreateSceneResponse response;
   *response.mutable_scene() = summaryOf(*scene);
   return response;
+}
+
+void SceneMaker::undoCreation(const std::shared_ptr<scene::LiveScene>& scene) {
+  const auto undo = [&] {
+    // Nothing waits for the device here, because it may be what takes too long.
+    server_.device.remove(scene);
+    scene->discharge();
+    server_.forget(*scene);
+  };
+  schedule::retryUntilDone(undo, [&](const std::exception& failure) {
+    spdlog::error("{}: its creation is not undone: {}; trying again", scene->name(), failure.what());
+  });
 }
 
 tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
@@ -339,13 +365,20 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
         fmt::format("deleteScene.name = \"{}\": must be of a scene that was created; the server started "
                     "with this one",
                     request.name()));
+  const delivery::SharedBytes last =
+      delivery::notice(v1::NOTICE_KIND_SCENE_DELETED,
+                       fmt::format("the scene '{}' was deleted", scene->name()), scene->tick.load());
   server_.erase(*scene);
-  scene->roster.close(delivery::notice(v1::NOTICE_KIND_SCENE_DELETED,
-                                       fmt::format("the scene '{}' was deleted", scene->name()),
-                                       scene->tick.load()));
-  server_.device.remove(scene).wait();
-  scene->discharge();
-  server_.forget(*scene);
+  const auto finish = [&] {
+    scene->roster.close(last);
+    server_.device.remove(scene).wait();
+    scene->discharge();
+    server_.forget(*scene);
+  };
+  // No later request finds the scene, so its deletion must be completed here.
+  schedule::retryUntilDone(finish, [&](const std::exception& failure) {
+    spdlog::error("{}: not deleted: {}; trying again", scene->name(), failure.what());
+  });
   server_.flushStore(*scene);
   telemetry::log({scene->name()}, spdlog::level::info, "deleted");
   return v1::DeleteSceneResponse();

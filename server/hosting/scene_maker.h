@@ -19,6 +19,10 @@
 #include "server/messages/field_error.h"
 #include "server/model/cancellation.h"
 
+namespace clothstream::scene {
+class LiveScene;
+}
+
 namespace clothstream::hosting {
 
 // Thread-safe. Does one request at a time, on a worker thread, which also calls each `done`: checking a large
@@ -66,6 +70,8 @@ class SceneMaker {
   tl::expected<model::Scene, v1::Error> checked(messages::Result<model::Scene> scene);
   tl::expected<std::shared_ptr<scene::Journal>, v1::Error> journalOf(const std::string& call,
                                                                      const std::string& scene) const;
+  // Removes a scene that cannot be used, because its creation was cancelled or has failed.
+  void undoCreation(const std::shared_ptr<scene::LiveScene>& scene);
   tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
   tl::expected<v1::StartRecordingResponse, v1::Error> startNow(
       const v1::StartRecordingRequest& request) const;

@@ -43,7 +43,7 @@ inline constexpr std::uint32_t kMaxParticipants =
     (simulation::kMaxColliders - messages::limits::kMaxColliders) /
     messages::limits::kMaxParticipantColliders;
 
-// Time of an upload that minUploadRate does not concern.
+// Time at the start of an upload to which minUploadRate does not apply.
 inline constexpr std::chrono::seconds kUploadPatience{5};
 
 struct ServerOptions {
@@ -91,6 +91,8 @@ struct ServerOptions {
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};
   // Keeps scenes beyond the end of the server; null: nothing is kept.
   std::shared_ptr<scene::SceneStore> store{};
+  // Time after stop() in which the program ends. Told to peers.
+  std::chrono::milliseconds drain{10'000};
   // A peer that sends nothing for this long is disconnected.
   std::chrono::milliseconds silence{30'000};
   // A peer that has not joined a scene by then is disconnected, even if it sends messages. The time of an

@@ -2,16 +2,19 @@
 #include "server/hosting/server_state.h"
 
 #include <algorithm>
+#include <exception>
 #include <thread>
 #include <utility>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
 #include "proto/text/printable.h"
 #include "server/messages/description.h"
 #include "server/messages/scene_message.h"
 #include "server/scene/scene_store.h"
+#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
@@ -50,8 +53,14 @@ void raiseNewestParticipant(std::atomic<std::uint64_t>& newest, const scene::Sav
 // Viewers of a recording have numbers above this one, so that they differ from the participants in it.
 constexpr std::uint64_t kFirstViewer = std::uint64_t{1} << 32;
 
-delivery::SharedBytes stoppingNotice() {
-  return delivery::notice(v1::NOTICE_KIND_SERVER_STOPPING, "the server is stopping", 0);
+delivery::SharedBytes stoppingNotice(std::chrono::milliseconds drain) {
+  const float seconds = std::chrono::duration<float>(drain).count();
+  v1::ServerMessage message;
+  v1::Notice& notice = *message.mutable_notice();
+  notice.set_kind(v1::NOTICE_KIND_SERVER_STOPPING);
+  notice.set_text(fmt::format("the server is stopping; it ends within {} s", seconds));
+  notice.set_ends_within_seconds(seconds);
+  return delivery::serialise(message);
 }
 
 messages::Result<void> controlSource(scene::LiveScene& scene, const v1::ControlSceneRequest& request) {
@@ -247,7 +256,7 @@ delivery::SharedBytes SceneServer::State::admit(const std::shared_ptr<Peer>& pee
   const std::lock_guard lock(mutex);
   if (stopping) {
     metrics.refuse(telemetry::Refusal::stopping);
-    return stoppingNotice();
+    return stoppingNotice(options.drain);
   }
   std::erase_if(peers, [](const auto& known) { return known.expired(); });
   if (peers.size() >= options.maxConnections) {
@@ -275,7 +284,12 @@ void SceneServer::State::stop() {
     stopping = true;
   }
   maker.stop();
-  for (const auto& peer : peersNow()) peer->close(stoppingNotice());
+  schedule::retryUntilDone(
+      [this] {
+        const delivery::SharedBytes notice = stoppingNotice(options.drain);
+        for (const auto& peer : peersNow()) peer->close(notice);
+      },
+      [](const std::exception& failure) { spdlog::error("stopping: {}; trying again", failure.what()); });
   if (options.store) options.store->flush(kStorePatience);
 }
 

@@ -45,21 +45,23 @@ class Authenticator {
 
   // Identity of a peer that has sent neither token nor code; UNAUTHENTICATED if one is required.
   [[nodiscard]] messages::Result<Identity> anonymous(bool isLoopback) const;
-  // As check() in token.h. Without keys and pairing, tokens are ignored.
+  // Checks a token as check() in token.h does. Without keys and pairing, tokens are ignored.
   [[nodiscard]] messages::Result<Identity> verify(const std::string& token, bool isLoopback) const;
 
   struct Paired {
     Identity identity;
     std::string token;
   };
-  // Gives a peer that knows a code a token with a random subject. Errors as PairingCodes::take().
+  // Issues a token with a random subject to a peer that knows a code. Errors are those of
+  // PairingCodes::take(), and WRONG_PAIRING_CODE without pairing.
   [[nodiscard]] messages::Result<Paired> pair(const std::string& code, const std::string& address,
                                               Clock::time_point now);
   // INVALID_ARGUMENT without pairing.
   [[nodiscard]] messages::Result<PairingCode> makeCode(scene::Role role, Clock::time_point now);
 
-  // Returns null while this identity may be used, or why not, in words for the peer: its token has expired
-  // `grace` ago, or the key of the token is no longer in use. Waits for no work of other threads.
+  // Returns null while this identity is valid. Otherwise returns the reason as a text for the peer: `grace`
+  // has passed since its token expired, or the key of the token is no longer in use. Does not wait for other
+  // threads.
   const char* whyEnded(const Identity& identity, std::chrono::seconds grace) const;
 
   // Reads the keys of tokens again. If it throws, the former keys stay in use.
@@ -84,7 +86,7 @@ class Authenticator {
   std::mutex codesMutex_;  // protects codes_
   PairingCodes codes_;
   mutable std::mutex mutex_;               // protects all below; held only to copy or replace them
-  std::shared_ptr<const TokenKeys> keys_;  // that of pairing included; never null
+  std::shared_ptr<const TokenKeys> keys_;  // including the key for pairing; never null
   Time clock_ = &WallClock::now;
 };
 

@@ -87,12 +87,13 @@ messages::Result<scene::Role> PairingCodes::take(const std::string& code, const 
   if (++wrongInAll_ >= kWrongInAll) {
     codes_.clear();
     return wrong(
-        "the pairing code is wrong; too many wrong ones came, so that all codes have ended: ask for a "
+        "the pairing code is wrong; all codes have ended because too many wrong ones were sent: ask for a "
         "new one");
   }
   if (mine.count >= kWrongPerAddress)
-    return wrong(fmt::format("the pairing code is wrong, the {}th from your address: try again in a minute",
-                             kWrongPerAddress));
+    return wrong(
+        fmt::format("the pairing code is wrong; your address has sent {} wrong ones: try again in a minute",
+                    kWrongPerAddress));
   return wrong("the pairing code is wrong; codes have six digits and are valid for five minutes");
 }
 

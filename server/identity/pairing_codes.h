@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Six-digit codes by which a person proves to see the server or an owner's page.
+// Six-digit codes that prove that a person sees the output of the server or an owner's page.
 #pragma once
 
 #include <chrono>
@@ -25,11 +25,11 @@ struct PairingCode {
 class PairingCodes {
  public:
   static constexpr std::chrono::minutes kValid{5};
-  // Wrong codes of one address, after which it is locked out.
+  // Number of wrong codes after which an address is locked out.
   static constexpr int kWrongPerAddress = 5;
   static constexpr std::chrono::minutes kLockout{1};
-  // Wrong codes of all addresses together, after which all codes end. A guesser therefore succeeds with a
-  // probability of at most 20 x 3 / 1,000,000 before a person has to ask for a new code.
+  // Number of wrong codes from all addresses together after which all codes end. A guesser therefore succeeds
+  // with a probability of at most 20 x 3 / 1,000,000 before a person has to ask for a new code.
   static constexpr int kWrongInAll = 20;
 
   // Makes a code from random numbers of the system, and ends the former one of this role.

@@ -80,8 +80,8 @@ int writeFile(const fs::path& file, const std::string& content) {
   return failure;
 }
 
-// Makes the name of a new file survive a failure of the machine. Some file systems cannot do that; the file
-// is usable all the same.
+// Makes the name of a new file survive a failure of the machine. Errors are ignored, because some file
+// systems do not support it and the file is usable anyway.
 void syncDirectory(const fs::path& directory) {
   const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;

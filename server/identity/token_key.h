@@ -10,7 +10,7 @@
 
 namespace clothstream::identity {
 
-// Bytes that a secret of HS256 has at least.
+// Minimum size of a secret of HS256, in bytes.
 inline constexpr std::size_t kMinSecretBytes = 32;
 
 enum class Algorithm : std::uint8_t { es256, hs256 };
@@ -38,8 +38,8 @@ TokenKey readTokenKey(const std::filesystem::path& file);
 TokenKeys readTokenKeys(const std::filesystem::path& directory);
 
 // Writes a new key with mode 0600: a private key for a name that ends in .pem, a secret for .secret. The file
-// appears when it is complete, also if the process or the machine stops meanwhile. Throws std::runtime_error,
-// also if the file exists.
+// appears only when it is complete, even if the process or the machine stops before. Throws
+// std::runtime_error, also if the file exists.
 void makeTokenKey(const std::filesystem::path& file);
 
 // Random bytes of the operating system, in hexadecimal digits: two for each byte. Throws std::runtime_error.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <exception>
 #include <iterator>
+#include <memory>
 #include <mutex>
 #include <string_view>
 #include <thread>
@@ -55,7 +56,8 @@ struct MonitoringEndpoint::State {
   net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};  // until io.stop()
   tcp::acceptor acceptor;
   net::steady_timer acceptTimer{io}, probeTimer{io};
-  bool accepting = false, probing = false;  // accept() and probe() wait
+  std::weak_ptr<void> accepting;  // expired unless accept() or its timer waits
+  bool probing = false;           // probeTimer waits
   std::uint16_t port;
   std::thread thread;
 
@@ -80,7 +82,7 @@ struct MonitoringEndpoint::State {
   // also have ended accept() or probe().
   void run() {
     for (;;) try {
-        if (!accepting) accept();
+        if (accepting.expired()) accept();
         if (!probing) probe();
         io.run();
         return;
@@ -90,22 +92,19 @@ struct MonitoringEndpoint::State {
   }
 
   void accept() {
-    acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
-      accepting = false;
+    // Boost drops a handler whose operation has thrown, and `waits` with it.
+    auto waits = std::make_shared<int>();
+    accepting = waits;
+    acceptor.async_accept([this, waits](boost::system::error_code error, tcp::socket socket) mutable {
       if (error) {  // such as no free descriptor; an immediate retry would only spin
         acceptTimer.expires_after(kAcceptPause);
-        acceptTimer.async_wait([this](boost::system::error_code) {
-          accepting = false;
-          accept();
-        });
-        accepting = true;
+        acceptTimer.async_wait([this, waits = std::move(waits)](boost::system::error_code) { accept(); });
         return;
       }
       accept();  // first, so that it goes on if the connection fails
       if (context.connections < HttpContext::kMaxConnections)
         std::make_shared<HttpConnection>(std::move(socket), context)->read();
     });
-    accepting = true;
   }
 
   // Wakes the device thread, which otherwise sleeps while no scene runs.

@@ -6,7 +6,7 @@
 
 namespace clothstream::monitoring {
 
-// 0 for what the system does not say.
+// Values that the system does not report are 0.
 struct ProcessUsage {
   std::uint64_t residentBytes = 0;
   std::uint64_t openDescriptors = 0;

@@ -51,7 +51,7 @@ void addBudgetOptions(OptionTable& table, scene::BudgetLimits& budget) {
   table.number(
       "--max-load", budget.load, loads,
       "Seconds of the device's time a second that clients may take in all by creating scenes and changing "
-      "parameters, by estimate. 1 is all that the device has");
+      "parameters, by estimate. 1 means the whole time of the device");
   table.number("--max-scene-load", budget.sceneLoad, loads, "The same for one scene");
   table.number(
       "--max-tick-time", budget.tickSeconds, {.min = 0, .max = 3600, .type = "SECONDS"},
@@ -253,8 +253,7 @@ void addNetworkOptions(OptionTable& table, Parsed& parsed) {
                {.min = 0, .max = 1e6, .type = "MEGABYTES"},
                "The same of one address. Programs on this machine have no such limit");
   table.number("--metrics-port", options.metricsPort, kPort,
-               "Port of /metrics, /healthz and /readyz for operators. 0 picks a free port. By default there "
-               "is none");
+               "Port of /metrics, /healthz and /readyz for operators. 0 picks a free port. Off by default");
   table.text("--metrics-host", options.metricsHost, "ADDRESS", "Address to listen on with --metrics-port");
 }
 
@@ -306,7 +305,7 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
   table.number("--seconds", parsed.options.stopAfter,
                {.min = 0, .max = 1e9, .type = "SECONDS", .aboveMin = true}, "Stop after this time");
   table.number(
-      "--drain", parsed.options.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
+      "--drain", parsed.options.server.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
       "Seconds after SIGINT or SIGTERM within which the server ends, even if the device or the disk does "
       "not answer. A second signal ends it at once");
   parsed.stateDirectory = table.text(

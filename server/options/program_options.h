@@ -79,11 +79,10 @@ struct ProgramOptions {
   std::string logLevel = "info", logFormat = "text";
   double logRate = 100;  // lines per second of each level; 0 means no limit
   std::optional<std::chrono::nanoseconds> stopAfter;
-  std::filesystem::path stateDirectory;     // what the server keeps for its next start
-  bool keepsScenes = false;                 // the directory was named: scenes are kept there too
-  double stateLimitMb = 1000;               // megabytes of kept scenes; 0 means no limit
-  std::chrono::milliseconds drain{10'000};  // after a signal, until the process ends
-  std::vector<std::string> warnings;        // about environment variables, for the log
+  std::filesystem::path stateDirectory;  // what the server keeps for its next start
+  bool keepsScenes = false;              // the directory was named: scenes are kept there too
+  double stateLimitMb = 1000;            // megabytes of kept scenes; 0 means no limit
+  std::vector<std::string> warnings;     // about environment variables, for the log
 
   // Commands.
   step::StepOptions step;

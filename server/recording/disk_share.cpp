@@ -29,7 +29,7 @@ tl::expected<void, std::string> DiskShare::look() const {
   const std::filesystem::space_info space = std::filesystem::space(directory_, problem);
   if (!problem && space.available < limits_.minFreeBytes)
     return tl::unexpected(
-        fmt::format("the disk of the recordings has {:.0f} MB left, and {:.0f} MB stay free "
+        fmt::format("the disk of the recordings has {:.0f} MB left, and {:.0f} MB must stay free "
                     "(--keep-free)",
                     static_cast<double>(space.available) / kMegabyte,
                     static_cast<double>(limits_.minFreeBytes) / kMegabyte));

@@ -13,7 +13,7 @@
 namespace clothstream::recording {
 namespace {
 
-// Environment variable that changes the code of software Vulkan devices.
+// Value of an environment variable that changes the code of software Vulkan devices.
 std::string setting(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "default" : value;

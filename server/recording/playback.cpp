@@ -146,7 +146,7 @@ std::optional<Playback::Clock::time_point> Playback::step(scene::LiveScene& scen
   if (flows) flow(scene, now);
   if (here && (announcementDue_ || (flows && now >= nextAnnouncement_))) {
     nextAnnouncement_ = now + kAnnouncementPeriod;
-    tell(scene);
+    announcePlayback(scene);
   }
   if (!here) return std::nullopt;
   if (asleep_ || paused_ || !next_) return now + kLookAgain;
@@ -293,7 +293,7 @@ void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessag
   scene.subscribers.publish(published);
 }
 
-void Playback::tell(scene::LiveScene& scene) {
+void Playback::announcePlayback(scene::LiveScene& scene) {
   announcementDue_ = false;
   scene.subscribers.announce(scene::playbackMessage(*this));
 }

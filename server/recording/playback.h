@@ -65,7 +65,8 @@ class Playback final : public scene::FrameSource {
   void publish(scene::LiveScene& scene, RecordedStream::Next& next);
   void publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessage& timed);
   void reachEnd(scene::LiveScene& scene, Clock::time_point now);
-  void tell(scene::LiveScene& scene);
+  // Announces position and settings.
+  void announcePlayback(scene::LiveScene& scene);
   // Announces the parameters in effect at this frame.
   void announceParameters(scene::LiveScene& scene, const RecordedStream::TimedMessage& frame);
   void moveTo(double seconds);

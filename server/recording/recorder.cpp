@@ -105,20 +105,25 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const model::Scene& scene
   const std::lock_guard lock(beginning_);
   if (ended_) return;
   state_ = State::running;
-  put(Topic::description, description);
-  v1::RecordedScene recorded;
-  *recorded.mutable_scene() = messages::toMessage(scene);
-  put(Topic::scene, recorded);
-  saved(state);
-  if (&start != &state) put(start, true);
-  thread_ = std::thread(
-      [this, name = scene.name, metadata = metadataOf(options_.serverName, device, scene, description)] {
-        try {
-          run(name, metadata);
-        } catch (const std::exception& failure) {
-          fail(failure.what());
-        }
-      });
+  try {
+    put(Topic::description, description);
+    v1::RecordedScene recorded;
+    *recorded.mutable_scene() = messages::toMessage(scene);
+    put(Topic::scene, recorded);
+    saved(state);
+    if (&start != &state) put(start, true);
+    thread_ = std::thread(
+        [this, name = scene.name, metadata = metadataOf(options_.serverName, device, scene, description)] {
+          try {
+            run(name, metadata);
+          } catch (const std::exception& failure) {
+            fail(failure.what());
+          }
+        });
+  } catch (const std::exception& failure) {
+    // For example, there is no memory or no thread. The recording would otherwise run forever.
+    fail(failure.what());
+  }
 }
 
 void Recorder::ticked(const scene::AppliedTick& tick) {

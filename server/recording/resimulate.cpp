@@ -55,7 +55,7 @@ class Replay {
   Done take(v1::Checkpoint& message);
   Done take(const v1::RecordedTick& message);
   // Reports that a message cannot be read. The replay continues from the next state. States of releases
-  // before 0.3 do not contain the nodes that grabs hold, so that those with grabs are passed over.
+  // before 0.3 do not contain the nodes that grabs hold, so those with grabs are skipped.
   void lose(std::string reason);
 
  private:

@@ -123,7 +123,7 @@ tl::unexpected<std::string> failed(sqlite3* database, int code) {
   return tl::unexpected(std::move(text));
 }
 
-// Creates the file with mode 0600, which the log gets too.
+// Creates the file with mode 0600. SQLite gives its log the same mode.
 std::string createFile(const std::filesystem::path& file) {
   const int opened = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (opened < 0) return std::strerror(errno);
@@ -209,7 +209,7 @@ void Database::setUp(const DatabaseOptions& options) {
   check(run(database, "PRAGMA journal_mode = WAL"));
   check(run(database, "PRAGMA synchronous = FULL"));
   check(run(database, "PRAGMA wal_autocheckpoint = 256"));
-  // The log is cut to this size when its content has come to the database.
+  // The log is truncated to this size after its content was copied into the database.
   check(run(database, "PRAGMA journal_size_limit = 4194304"));
   if (options.maxBytes > 0)
     check(run(database, fmt::format("PRAGMA max_page_count = {}",

@@ -32,7 +32,8 @@ void warnOfDamage(const std::string& name, const std::filesystem::path& file, co
 v1::SavedSession parseSession(const std::string& name, const SceneContents& contents) {
   v1::SavedSession session;
   if (contents.session && !session.ParseFromString(*contents.session)) {
-    telemetry::log({name}, spdlog::level::err, "its participants and bans are not restored: damaged");
+    telemetry::log({name}, spdlog::level::err,
+                   "its participants and bans are not restored: their row is damaged");
     session.Clear();
   }
   return session;
@@ -202,8 +203,8 @@ std::optional<scene::SavedScene> SavedState::take(const model::Scene& start) {
   }
   if (isParsed)
     telemetry::log({start.name}, spdlog::level::info,
-                   "its definition is not that of the saved state: it starts from the beginning, with the "
-                   "bans of before");
+                   "its definition differs from that of the saved state: it starts from the beginning, and "
+                   "keeps its bans");
   saved.roster = toRoster(parseSession(start.name, contents));
   saved.roster.participants.clear();
   if (saved.roster.bans.empty() && saved.roster.refusedTokenHashes.empty()) return {};
@@ -252,16 +253,17 @@ scene::StoreStatus SavedState::status() const {
 }
 
 void SavedState::run() {
+  bool failed = false;
   for (bool last = false; !last;) {
     std::uint64_t asked = 0;
     {
       std::unique_lock lock(mutex_);
       changed_.wait_for(lock, options_.lookInterval,
-                        [&] { return stopping_ || asked_ > done_ || !removed_.empty(); });
+                        [&] { return stopping_ || asked_ > done_ || (!failed && !removed_.empty()); });
       last = stopping_;
       asked = asked_;
     }
-    bool failed = false;
+    failed = false;
     try {
       pass();
     } catch (const std::exception& failure) {
@@ -340,7 +342,8 @@ void SavedState::readSession(KeptScene& kept) {
     kept.version = version;
   }
   const scene::SavedRoster roster = live->roster.saved();
-  kept.hasRoster = !roster.participants.empty() || !roster.bans.empty() || !roster.refusedTokenHashes.empty();
+  kept.hasSession = !roster.participants.empty() || !roster.bans.empty() ||
+                    !roster.refusedTokenHashes.empty() || live->paused;
   v1::SavedSession message = toMessage(roster, kept.parameters);
   message.set_paused(live->paused);
   message.set_reset_requested(live->resetRequested);
@@ -352,8 +355,8 @@ void SavedState::readSession(KeptScene& kept) {
 }
 
 bool SavedState::write(const std::string& name, KeptScene& kept, const std::optional<Taken>& checkpoint) {
-  // A scene of the server has a row once it has run, or has a participant or a ban.
-  if (!kept.hasRow && !kept.created && !checkpoint && !kept.hasRoster) return true;
+  // A scene of the server has a row once it has run, is paused, or has a participant or a ban.
+  if (!kept.hasRow && !kept.created && !checkpoint && !kept.hasSession) return true;
   if (kept.hasRow && !checkpoint && !kept.waitingSession) return true;
   SceneContents contents{.session = kept.waitingSession, .created = kept.created};
   if (!kept.hasRow) {
@@ -416,7 +419,7 @@ bool SavedState::leaveOut(const std::string& name) {
                    "after a restart it starts from the beginning",
                    static_cast<double>(options_.maxBytes) / 1e6);
   const auto row = rows_.find(name);
-  // An old checkpoint would bring back a state that everybody has forgotten.
+  // An old checkpoint would restore an outdated state after a restart.
   if (row == rows_.end() || row->second.checkpointBytes == 0) return true;
   if (!recordResult(name, database_.removeCheckpoint(name))) return false;
   row->second.checkpointBytes = 0;
@@ -449,7 +452,7 @@ void SavedState::findFreeSpace() {
   const bool full = !problem && space.available < options_.minFreeBytes;
   if (full && !diskIsFull_)
     spdlog::warn(
-        "states of scenes are not saved: {} has {:.0f} MB left, and {:.0f} MB stay free (--keep-free)",
+        "states of scenes are not saved: {} has {:.0f} MB left, and {:.0f} MB must stay free (--keep-free)",
         options_.directory.string(), static_cast<double>(space.available) / 1e6,
         static_cast<double>(options_.minFreeBytes) / 1e6);
   if (!full && diskIsFull_) spdlog::info("states of scenes are saved again");

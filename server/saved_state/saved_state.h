@@ -34,18 +34,17 @@ struct SavedStateOptions {
   // Called by the writer before it looks at a scene of this name. For tests.
   std::function<void(const std::string&)> beforeWrite = {};
   // Interval of the checkpoints of a running scene, and interval at which participants and parameters are
-  // looked at. A checkpoint is thus at most 5 s old while a write takes less than 1.5 s.
+  // checked for changes. A checkpoint is thus at most 5 s old while a write takes less than 1.5 s.
   std::chrono::milliseconds checkpointInterval{3000}, lookInterval{500};
 };
 
-// Thread-safe. One thread writes. What waits for it is bounded: one checkpoint of each scene, of which the
-// newest counts.
+// Thread-safe. One thread writes. At most one checkpoint of each scene waits for it: the newest.
 class SavedState final : public scene::SceneStore {
  public:
   // Opens the database and reads its scenes. A damaged row costs only its scene, and is logged. Throws what
   // Database throws.
   explicit SavedState(SavedStateOptions options);
-  // Writes what waits. The scenes may have been destroyed before.
+  // Writes everything that waits. The scenes may have been destroyed before.
   ~SavedState() override;
   SavedState(const SavedState&) = delete;
   SavedState& operator=(const SavedState&) = delete;
@@ -74,8 +73,8 @@ class SavedState final : public scene::SceneStore {
     bool hasRow;                           // the database has the scene
     std::optional<std::uint64_t> version;  // of the parameters in `parameters`
     v1::Scene parameters;
-    bool hasRoster = false;  // participants, bans or refused tokens
-    std::string session;     // on the disk
+    bool hasSession = false;  // participants, bans, refused tokens, or a pause
+    std::string session;      // on the disk
     // Read from the scene, and not on the disk yet.
     std::optional<std::string> waitingSession;
   };
@@ -132,7 +131,7 @@ class SavedState final : public scene::SceneStore {
   std::set<std::string> toRemove_;  // removed scenes that the database still has
   std::set<std::string> leftOut_;
   bool logsNextFailure_ = true;  // of a whole pass
-  bool diskIsFull_ = false;      // at the newest look
+  bool diskIsFull_ = false;      // at the newest check
 
   std::thread thread_;
 };

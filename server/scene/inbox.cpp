@@ -11,6 +11,7 @@ void Inbox::postPoses(std::uint64_t participant, model::ParticipantPoses poses, 
   const std::lock_guard lock(mutex_);
   const auto last = std::ranges::find(inputs_.poses, participant, &Poses::participant);
   if (last == inputs_.poses.end()) {
+    if (inputs_.poses.size() >= kMaxPosters) forgetOneThatHasLeft();
     inputs_.poses.push_back({.participant = participant, .now = {std::move(poses), arrival, time}});
     return;
   }
@@ -27,6 +28,17 @@ void Inbox::postPoses(std::uint64_t participant, model::ParticipantPoses poses, 
     last->earlier.push_back(std::move(last->now));
   }
   last->now = {std::move(poses), arrival, time};
+}
+
+void Inbox::forgetOneThatHasLeft() {
+  const auto hasLeft = [](const Poses& poses) {
+    return poses.now.poses.colliders.empty() && poses.now.poses.grabs.empty();
+  };
+  auto newest = inputs_.poses.end();
+  for (auto poses = inputs_.poses.begin(); poses != inputs_.poses.end(); ++poses)
+    if (hasLeft(*poses) && (newest == inputs_.poses.end() || poses->participant > newest->participant))
+      newest = poses;
+  if (newest != inputs_.poses.end()) inputs_.poses.erase(newest);
 }
 
 bool Inbox::postChange(AcceptedChange change) {

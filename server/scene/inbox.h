@@ -49,7 +49,8 @@ struct Inputs {
   std::vector<Poses> poses;
 };
 
-// Thread-safe. Bounded: kMaxChanges changes, and for each participant one Poses with kMaxEarlierPoses.
+// Thread-safe. Holds at most kMaxChanges changes, and one Poses with kMaxEarlierPoses for each participant
+// that has posted since the newest drain(). Those who have left are kept up to kMaxPosters.
 class Inbox {
  public:
   static constexpr std::size_t kMaxChanges = 64;
@@ -57,6 +58,9 @@ class Inbox {
   static constexpr std::ptrdiff_t kMaxAttachmentPoses = 256;
   // Earlier poses of one participant in a tick; the oldest are dropped.
   static constexpr std::size_t kMaxEarlierPoses = 16;
+  // Participants with waiting poses beyond which one that has left is forgotten: the one who joined last,
+  // since no tick has placed its colliders. Much more than a scene has at a time.
+  static constexpr std::size_t kMaxPosters = 1024;
 
   // Replaces the poses that this participant posted since the last tick. Attachment poses are merged: the
   // newer pose of an attachment counts. Former poses are kept as `earlier` if `time` is known.
@@ -83,6 +87,9 @@ class Inbox {
   void drain(Inputs& out);
 
  private:
+  // The caller holds the lock.
+  void forgetOneThatHasLeft();
+
   mutable std::mutex mutex_;
   Inputs inputs_;
 };

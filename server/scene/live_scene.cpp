@@ -222,13 +222,20 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   if (!change) return tl::unexpected(std::move(change).error());
   model::Scene changed = definition_;
   model::applyChange(changed, *change);
-  if (const auto charged = charge_.charge("parameterChange", changed); !charged)
-    return tl::unexpected(charged.error());
-  v1::ParameterChange announced = message;
+  AcceptedChange accepted{participant, *change, message};
   if (std::ranges::any_of(change->cloths,
                           [](const model::ClothChange& cloth) { return cloth.material.has_value(); }))
-    *announced.mutable_cloths() = allParameters(changed).cloths();
-  if (!inbox.postChange({participant, *change, std::move(announced)})) {
+    *accepted.message.mutable_cloths() = allParameters(changed).cloths();
+  if (const auto charged = charge_.charge("parameterChange", changed); !charged)
+    return tl::unexpected(charged.error());
+  bool posted = false;
+  try {
+    posted = inbox.postChange(std::move(accepted));
+  } catch (...) {  // memory ran out
+    charge_.restore(definition_);
+    throw;
+  }
+  if (!posted) {
     charge_.restore(definition_);
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,

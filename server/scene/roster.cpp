@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <random>
 #include <tuple>
 #include <utility>
@@ -115,7 +116,18 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
       (!known->participant.away || now < known->placeExpires)) {
     if (request.attempt < known->attempt) return tl::unexpected(Refusal::late);
     known->attempt = request.attempt;
-    return resume(*known, request, mailbox, now);
+    try {
+      return resume(*known, request, mailbox, now);
+    } catch (...) {
+      // For example, memory ran out. A participant without a mailbox must count as disconnected: no session
+      // would ever remove it.
+      constexpr ReconnectGrace kGrace{};
+      subscribers_.remove(*mailbox);
+      known->participant.away = true;
+      known->posesExpire = std::max(known->posesExpire, now + kGrace.poses);
+      known->placeExpires = std::max(known->placeExpires, now + kGrace.place);
+      throw;
+    }
   }
   if (entries_.size() >= limit && !makeRoom(now)) return tl::unexpected(Refusal::full);
 
@@ -137,20 +149,29 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
                                    ? Role::viewer
                                : owns ? Role::owner
                                       : Role::participant};
-  if (journal_) journal_->joined(entry.participant.id, request.clientName, request.displayName);
-  // Announced before the new participant subscribes, because its Welcome already contains itself.
-  announce(Presence::joined, entry.participant);
-  subscribers_.add(mailbox, entry.participant.id);
   entries_.push_back(std::move(entry));
-  return admissionOf(entries_.back(), std::move(token), false);
+  try {
+    const Participant& joined = entries_.back().participant;
+    Admission admission = admissionOf(entries_.back(), std::move(token), false);
+    if (journal_) journal_->joined(joined.id, request.clientName, request.displayName);
+    // Announced before the new participant subscribes, because its Welcome already contains itself.
+    announce(Presence::joined, joined);
+    subscribers_.add(mailbox, joined.id);
+    return admission;
+  } catch (...) {
+    // For example, memory ran out. No session would ever remove this participant.
+    erase(std::prev(entries_.end()), LeaveReason::left, 0, now);
+    throw;
+  }
 }
 
 Roster::Admission Roster::resume(Entry& entry, const JoinRequest& request,
                                  const std::shared_ptr<Mailbox>& mailbox, Clock::time_point now) {
   if (const std::shared_ptr<Mailbox> former = subscribers_.find(entry.participant.id)) {
+    const SharedBytes last = delivery::error(
+        v1::ERROR_CODE_TAKEN_OVER, "another connection used this participant's token and took over", true);
     subscribers_.remove(*former);
-    former->close(delivery::error(v1::ERROR_CODE_TAKEN_OVER,
-                                  "another connection used this participant's token and took over", true));
+    former->close(last);
   }
   const bool wasAway = std::exchange(entry.participant.away, false);
   if (wasAway) announce(Presence::returned, entry.participant);
@@ -245,8 +266,10 @@ messages::Result<void> Roster::charge(const Entry& entry, std::size_t count) {
 }
 
 bool Roster::makeRoom(Clock::time_point now) {
+  // After a restart of the server, all participants have been away equally long.
   const auto longestAway = std::ranges::min_element(entries_, {}, [](const Entry& entry) {
-    return entry.participant.away ? entry.placeExpires : Clock::time_point::max();
+    return std::pair(entry.participant.away ? entry.placeExpires : Clock::time_point::max(),
+                     entry.participant.role);
   });
   if (longestAway == entries_.end() || !longestAway->participant.away) return false;
   erase(longestAway, LeaveReason::timedOut, 0, now);
@@ -459,7 +482,7 @@ messages::Result<void> Roster::remove(const Mailbox& by, const v1::RemovePartici
         v1::ERROR_CODE_INVALID_ARGUMENT,
         fmt::format(
             "removeParticipant.ban: participant {} has no subject, because it joined without a token, "
-            "so that a ban would not hold; remove it without a ban",
+            "so a ban would have no effect; remove it without a ban",
             message.participant_id())});
   for (const Entry& other : entries_)
     if (other.subject == subject)

@@ -129,7 +129,11 @@ class Roster {
   // and closes its former session; it is refused as late if that session has a higher attempt number. The
   // subject must be the same. A banned subject, or the token of a removed participant, is refused as removed.
   // Other requests get the next number of `ids`. If there are `limit` participants, the one that has been
-  // away longest is evicted; if none is away, the request is refused as full.
+  // away longest is evicted (in a tie, the one with the lowest role). If none is away, the request is refused
+  // as full.
+  //
+  // An exception, for example for a lack of memory, removes a new participant again. A participant that
+  // returned then counts as disconnected.
   [[nodiscard]] tl::expected<Admission, Refusal> join(const JoinRequest& request,
                                                       const std::shared_ptr<delivery::Mailbox>& mailbox,
                                                       std::atomic<std::uint64_t>& ids, std::size_t limit,
@@ -221,7 +225,8 @@ class Roster {
   messages::Result<Entries::iterator> target(const char* field, std::uint64_t id);
   Admission resume(Entry& entry, const JoinRequest& request,
                    const std::shared_ptr<delivery::Mailbox>& mailbox, Clock::time_point now);
-  // Evicts the participant that has been away longest. Returns false if all are connected.
+  // Evicts the participant that has been away longest; in a tie, the one with the lowest role. Returns false
+  // if all are connected.
   bool makeRoom(Clock::time_point now);
   // Returns the next entry. `by` is the participant that caused it, or 0.
   Entries::iterator erase(Entries::iterator entry, LeaveReason reason, std::uint64_t by,

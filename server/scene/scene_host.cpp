@@ -78,7 +78,7 @@ void SceneHost::continueFrom(const LiveScene::Restored& restored) {
     on.simulation.recordRestoreState(on.recorder, newestState_);
     on.simulation.recordRestoreGrabs(on.recorder, newestState_.held);
     on.device.wait(on.device.submit(on.recorder));
-    telemetry::log({live_.name()}, spdlog::level::info, "goes on after tick {}", tick_);
+    telemetry::log({live_.name()}, spdlog::level::info, "continues after tick {}", tick_);
   }
   if (restored.accepted) {
     model::Scene changed = *restored.accepted;
@@ -541,7 +541,7 @@ void SceneHost::rebuild(std::unique_ptr<SceneOnDevice> loaded, std::string_view 
   if (live_.journal) live_.journal->restored(tick_, newestState_);
   live_.subscribers.announce(
       delivery::notice(v1::NOTICE_KIND_DEVICE_REBUILT,
-                       fmt::format("{}; the scene goes on from {:.1f} s before", why,
+                       fmt::format("{}; the scene goes on from its state {:.1f} s earlier", why,
                                    static_cast<double>(tick_ - newestState_.tick) / rate_),
                        tick_));
 }

@@ -15,12 +15,12 @@ namespace clothstream::scene {
 SceneLoader::SceneLoader(codec::Workers& workers, std::function<void()> done)
     : workers_(workers), done_(std::move(done)) {}
 
-SceneLoader::~SceneLoader() {
-  abandon();
-}
-
-SceneLoader::Future SceneLoader::load(vulkan::Device& device, const model::Scene& scene) {
-  std::packaged_task<std::unique_ptr<SceneOnDevice>()> task([this, &device, scene, stop = stop_.get_token()] {
+SceneLoader::Future SceneLoader::load(vulkan::Device& device, const model::Scene& scene,
+                                      std::stop_token stop) {
+  // Shared, because the destructor of a task that a future waits for allocates memory, and post() may have
+  // found none.
+  using Task = std::packaged_task<std::unique_ptr<SceneOnDevice>()>;
+  const auto task = std::make_shared<Task>([this, &device, scene, stop = std::move(stop)] {
     if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
     const schedule::Clock::time_point before = schedule::Clock::now();
     auto loaded = std::make_unique<SceneOnDevice>(device, scene, workers_, stop);
@@ -28,21 +28,19 @@ SceneLoader::Future SceneLoader::load(vulkan::Device& device, const model::Scene
                    schedule::seconds(schedule::Clock::now() - before));
     return loaded;
   });
-  Future loaded = task.get_future();
-  boost::asio::post(thread_, [this, task = std::move(task)]() mutable {
-    task();
+  Future loaded = task->get_future();
+  boost::asio::post(thread_, [this, task] {
+    (*task)();
     done_();
   });
   return loaded;
 }
 
-void SceneLoader::abandon() {
-  stop_.request_stop();
+void SceneLoader::wait() {
   std::packaged_task<void()> last([] {});
   std::future<void> idle = last.get_future();
   boost::asio::post(thread_, std::move(last));
   idle.wait();
-  stop_ = {};
 }
 
 }  // namespace clothstream::scene

@@ -23,21 +23,21 @@ class SceneLoader {
   // `done` is called on the worker thread when a scene is loaded or has failed. `workers` must outlive the
   // loader.
   SceneLoader(codec::Workers& workers, std::function<void()> done);
-  ~SceneLoader();
+  // Waits for the worker thread.
+  ~SceneLoader() = default;
   SceneLoader(const SceneLoader&) = delete;
   SceneLoader& operator=(const SceneLoader&) = delete;
 
-  // The device must live until the future is ready or abandon() has returned. The future throws what the
-  // constructor of SceneOnDevice throws.
-  Future load(vulkan::Device& device, const model::Scene& scene);
+  // The device must live until the future is ready or wait() has returned. The future throws what the
+  // constructor of SceneOnDevice throws, and std::runtime_error soon after a request to stop.
+  Future load(vulkan::Device& device, const model::Scene& scene, std::stop_token stop);
 
-  // Stops loading; unfinished futures throw. Returns when the worker thread is idle.
-  void abandon();
+  // Returns when the worker thread is idle.
+  void wait();
 
  private:
   codec::Workers& workers_;
   const std::function<void()> done_;
-  std::stop_source stop_;
   boost::asio::thread_pool thread_{1};
 };
 

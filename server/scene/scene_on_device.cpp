@@ -12,8 +12,7 @@
 namespace clothstream::scene {
 namespace {
 
-// Kernel invocations of a slice before its time was measured, with 10 to 20 ns each on two processors and the
-// least that a slice may have.
+// Kernel invocations of a slice: first value (10 to 20 ns each on two processors), minimum, and maximum.
 constexpr double kFirstSlice = 1 << 19, kMinSlice = 1 << 12, kMaxSlice = 1e15;
 // A GPU is faster by at least this factor.
 constexpr double kGpuFactor = 64;

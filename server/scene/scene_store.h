@@ -57,9 +57,9 @@ class SceneStore {
   // when room is needed, they are deleted, the oldest first.
   virtual std::vector<SavedScene> takeCreated() = 0;
 
-  // Keeps a scene from now on. Participants, parameters and pauses are looked at by themselves; the caller
-  // gives the keeper to the scene. A scene that is destroyed stays kept. Returns null for a scene that the
-  // server starts with if a scene of this name that a peer created is kept; that one stays kept.
+  // Keeps a scene from now on. The store reads participants, parameters and pauses from the scene. The caller
+  // sets LiveScene::keeper to the result. A scene that is destroyed stays kept. Returns null for a scene that
+  // the server starts with if a scene of this name that a peer created is kept; that one stays kept.
   virtual std::shared_ptr<SceneKeeper> keep(const std::shared_ptr<LiveScene>& scene) = 0;
   // Forgets a scene, which was deleted.
   virtual void remove(const std::string& name) = 0;

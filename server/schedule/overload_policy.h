@@ -43,7 +43,7 @@ class OverloadPolicy {
   static constexpr double kSlow = 0.95;
   // Part of its share that the ticks of a scene may need, and part that they may need after a step up.
   static constexpr double kMostUse = 0.9, kMostUseAfterStepUp = 0.8;
-  // Factor by which twice the frames are expected to lengthen a tick at most.
+  // Largest factor by which doubling the frames is expected to lengthen a tick.
   static constexpr double kFrameGrowth = 1.25;
   // Streams do not fall below this rate, in frames/s.
   static constexpr std::uint32_t kLowestStreamRate = 10;

@@ -92,6 +92,7 @@ void Session::authenticate(const v1::AuthenticateRequest& request) {
   v1::ServerMessage reply;
   messages::Result<identity::Identity> identity =
       server_.authenticate(request, address_, now_, *reply.mutable_authenticate());
+  if (!identity && scene_ != nullptr) return refuse(identity.error());
   if (!identity) return fail(identity.error().code, identity.error().text);
   if (scene_ != nullptr && identity->verified &&
       (identity->subject != identity_->subject || !identity->reaches(scene_->name())))
@@ -119,8 +120,8 @@ void Session::receive(std::span<const std::byte> bytes) {
   now_ = now;
   requestId_ = 0;
   readPause_ = readRate_.pay(now, static_cast<double>(bytes.size()));
-  if (!allowed(messageRate_, "messages")) return;
   try {
+    if (!allowed(messageRate_, "messages")) return;
     const messages::Result<v1::ClientMessage> message = messages::parseClientMessage(bytes);
     if (!message) return refuse(message.error(), kMalformedCost);
     requestId_ = message->request_id();
@@ -128,7 +129,9 @@ void Session::receive(std::span<const std::byte> bytes) {
   } catch (const std::exception& failure) {
     // For example, memory ran out. That must end neither the endpoint's thread nor other sessions.
     spdlog::error("{}: a message failed: {}", peer_, failure.what());
-    fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED, "the server could not handle the message; try again later");
+    closeLocked(delivery::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                                "the server could not handle the message; try again later", true, requestId_),
+                DisconnectReason::lost);
   }
 }
 
@@ -172,13 +175,13 @@ void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) 
       return answer(pong);
     }
     case Body::kListScenes: {
-      if (!allowed(queryRate_, "questions")) return;
+      if (!allowed(queryRate_, "queries")) return;
       v1::ServerMessage list;
       *list.mutable_list_scenes() = server_.listScenes(*identity_);
       return answer(list);
     }
     case Body::kGetScene: {
-      if (!allowed(queryRate_, "questions")) return;
+      if (!allowed(queryRate_, "queries")) return;
       if (const auto may = server_.mayUse(*identity_, message.get_scene().name()); !may)
         return refuse(may.error());
       auto found = server_.getScene(message.get_scene(), kMaxAnswerBytes);

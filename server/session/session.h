@@ -98,7 +98,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void authenticate(const v1::AuthenticateRequest& request);
   // Sets the identity and counts the connection. Returns false, and ends the session, if there are too many.
   bool become(identity::Identity identity);
-  // Handles requests about identities and bans. Returns false if the message is none of these.
+  // Handles requests about identities and bans. Returns false for other messages.
   bool manage(const v1::ClientMessage& message);
   // Rights that the identity has in this scene.
   scene::Rights rightsIn(const scene::LiveScene& scene) const;

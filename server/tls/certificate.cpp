@@ -187,7 +187,7 @@ std::chrono::system_clock::time_point expiryOf(X509& certificate) {
   return std::chrono::system_clock::from_time_t(::timegm(&end));
 }
 
-// Whether the text may stand in a list of alternative names.
+// Returns whether the text is allowed in a list of alternative names.
 bool isDnsName(const std::string& name) {
   return !name.empty() && name.size() < 254 && std::ranges::all_of(name, [](unsigned char letter) {
     return std::isalnum(letter) || letter == '-' || letter == '.';
@@ -277,8 +277,7 @@ Certificate selfSigned(const fs::path& directory, const std::vector<std::string>
   const Key key = keyOf(keyText);
   if (!key)
     throw std::runtime_error(
-        fmt::format("{} has no private key: delete it to get a new one, which clients "
-                    "must be told of",
+        fmt::format("{} has no private key: delete it to get a new key; clients then need its fingerprint",
                     keyFile.string()));
   std::string chain = fs::exists(chainFile) ? readFile(chainFile) : "";
   const X509Certificate old = firstCertificate(chain);

@@ -15,12 +15,11 @@ struct Certificate {
   std::string key;
 };
 
-// Throws std::runtime_error with the file and its fault: unreadable, not PEM, or a key of another
+// Throws std::runtime_error that names the file and the problem: unreadable, not PEM, or a key of another
 // certificate.
 Certificate readCertificate(const std::filesystem::path& chain, const std::filesystem::path& key);
 
-// Whether accounts other than the file's owner may read a file with a private key. False if it does not
-// exist.
+// Returns whether accounts other than the owner of the file may read it. False if it does not exist.
 bool othersMayRead(const std::filesystem::path& key);
 
 // PEM text of a file with one or more certificates. Throws as readCertificate() does.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the endpoints need for TLS: the present certificate, replaced while connections continue.
+// TLS of the endpoints. The certificate can be replaced while connections stay open.
 #pragma once
 
 #include <ctime>
@@ -14,7 +14,7 @@
 
 namespace clothstream::tls {
 
-// A file without a name, in memory. Others read it by its path.
+// A file in memory, without a name in the file system. Readers open it by its path in /proc.
 class MemoryFile {
  public:
   MemoryFile();  // empty; throws std::system_error

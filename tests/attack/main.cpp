@@ -2,6 +2,7 @@
 // clothstream-attack: attacks a server that it starts, while an honest client watches a scene of it.
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -188,6 +189,7 @@ int main(int argc, char** argv) {
         if (each.name != perform) continue;
         // The attacker's own work must not slow down the server.
         ::setpriority(PRIO_PROCESS, 0, 19);
+        std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to connections that the server has closed
         fmt::print(
             "{}\n",
             each.perform({.grpc = grpc, .web = web, .time = std::chrono::seconds(seconds), .token = token}));

@@ -80,9 +80,8 @@ class Victim::Client {
     static constexpr auto kInterval = 5ms;
     links_ = load::makeWebLinks(address);
     participant_ = std::make_unique<load::Participant>(
-        *links_,
-        load::ParticipantOptions{
-            .scene = "", .name = "victim", .token = address.token, .decodes = false, .moves = false});
+        *links_, load::ParticipantOptions{
+                     .scene = "", .name = "victim", .token = address.token, .decodes = false, .moves = true});
     for (const auto end = SteadyClock::now() + kPatience; !participant_->joined();) {
       if (const auto why = participant_->ended())
         throw std::runtime_error("the victim cannot join: " + why->text);

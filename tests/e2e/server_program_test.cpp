@@ -73,7 +73,7 @@ TEST_F(ServerProgram, StopsAfterAStartDuringWhichItWasStopped) {
 }
 
 TEST_F(ServerProgram, PrintsDeviceScenesAndAddressesAndStreams) {
-  ServerProcess server(options());
+  ServerProcess server(options({"--drain", "9.5"}));
   EXPECT_THAT(server.lineWith("device"), HasSubstr("Vulkan"));
   EXPECT_THAT(server.lineWith("scenes"),
               testing::AllOf(HasSubstr("curtain (4096 vertices)"), HasSubstr("flag ("),
@@ -95,6 +95,8 @@ TEST_F(ServerProgram, PrintsDeviceScenesAndAddressesAndStreams) {
   EXPECT_FALSE(client.watch(viewer, [] { return false; }));
   ASSERT_FALSE(viewer.notices.empty());
   EXPECT_EQ(viewer.notices.back().kind(), v1::NOTICE_KIND_SERVER_STOPPING);
+  EXPECT_EQ(viewer.notices.back().ends_within_seconds(), 9.5f);
+  EXPECT_THAT(viewer.notices.back().text(), HasSubstr("within 9.5 s"));
   EXPECT_EQ(server.exitCode(), 0) << server.output();
   EXPECT_THAT(server.output().substr(server.output().rfind("scene small (ms)")), HasSubstr("joins 1"));
 }

@@ -3,10 +3,13 @@
 
 #include <chrono>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "server/endpoint/listen/address_rate.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -76,6 +79,15 @@ TEST(AdmissionTest, TicketMayOutliveTheAdmission) {
   auto ticket = admission->admit(address("192.0.2.1"), kNow);
   admission.reset();
   EXPECT_TRUE(ticket);
+}
+
+// An attacker with many addresses must not reset the limits of those who are busy.
+TEST(AddressRateTest, ManyAddressesDoNotResetABusyOne) {
+  AddressRate rate(10, 10);
+  ASSERT_TRUE(rate.take("busy", kNow, 10));
+  for (int i = 0; i < 8'000; ++i)
+    ASSERT_TRUE(rate.take(std::to_string(i), kNow + i * std::chrono::microseconds(100)));
+  EXPECT_FALSE(rate.take("busy", kNow + std::chrono::milliseconds(800), 9));
 }
 
 }  // namespace

@@ -140,7 +140,7 @@ void Mutator::change(Message& root, std::size_t room) {
 
 void Mutator::setField(Message& message, const FieldDescriptor* field, const Message& root) {
   const Reflection& reflection = *message.GetReflection();
-  if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return setValue(message, field, -1, root);
+  if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return setValue(message, field, -1);
   std::vector<const Message*> others;
   collectOf(root, field->message_type(), others);
   if (!others.empty() && oneIn(2)) {
@@ -149,23 +149,23 @@ void Mutator::setField(Message& message, const FieldDescriptor* field, const Mes
     copy->CopyFrom(*others[below(others.size())]);
     reflection.MutableMessage(&message, field)->CopyFrom(*copy);
   } else {
-    fill(*reflection.MutableMessage(&message, field), root, 0);
+    fill(*reflection.MutableMessage(&message, field), 0);
   }
 }
 
 // Sets some fields, so that an added message is not empty.
-void Mutator::fill(Message& message, const Message& root, int depth) {
+void Mutator::fill(Message& message, int depth) {
   const Descriptor& type = *message.GetDescriptor();
   for (int i = 0; i < type.field_count(); ++i) {
     const FieldDescriptor* field = type.field(i);
     if (!oneIn(2 + static_cast<std::size_t>(depth))) continue;
     if (field->is_repeated()) addElement(message, field);
     if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) {
-      setValue(message, field, field->is_repeated() ? 0 : -1, root);
+      setValue(message, field, field->is_repeated() ? 0 : -1);
     } else if (depth < 3) {
       fill(field->is_repeated() ? *message.GetReflection()->MutableRepeatedMessage(&message, field, 0)
                                 : *message.GetReflection()->MutableMessage(&message, field),
-           root, depth + 1);
+           depth + 1);
     }
   }
 }
@@ -182,9 +182,9 @@ void Mutator::changeRepeated(Message& message, const FieldDescriptor* field, con
       addElement(message, field);
       const bool isMessage = field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
       if (isMessage)
-        fill(*reflection.MutableRepeatedMessage(&message, field, size), root, 0);
+        fill(*reflection.MutableRepeatedMessage(&message, field, size), 0);
       else
-        setValue(message, field, size, root);
+        setValue(message, field, size);
       if (size > 0) reflection.SwapElements(&message, field, size, any());
       return;
     }
@@ -214,12 +214,12 @@ void Mutator::changeRepeated(Message& message, const FieldDescriptor* field, con
         copy->CopyFrom(*others[below(others.size())]);
         reflection.MutableRepeatedMessage(&message, field, any())->CopyFrom(*copy);
       } else {
-        setValue(message, field, any(), root);
+        setValue(message, field, any());
       }
   }
 }
 
-void Mutator::setValue(Message& message, const FieldDescriptor* field, int index, const Message& /*root*/) {
+void Mutator::setValue(Message& message, const FieldDescriptor* field, int index) {
   const Reflection& reflection = *message.GetReflection();
   const bool repeated = index >= 0;
   switch (field->cpp_type()) {

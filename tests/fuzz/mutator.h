@@ -41,9 +41,9 @@ class Mutator {
   void change(Message& root, std::size_t room);
   void setField(Message& message, const Field* field, const Message& root);
   // Sets element `index` of a repeated field, or the field if `index` is negative.
-  void setValue(Message& message, const Field* field, int index, const Message& root);
+  void setValue(Message& message, const Field* field, int index);
   void changeRepeated(Message& message, const Field* field, const Message& root, std::size_t room);
-  void fill(Message& message, const Message& root, int depth);
+  void fill(Message& message, int depth);
 
   template <typename Number>
   Number wholeNumber(Number present);

@@ -34,7 +34,7 @@ int main(int argc, char** argv) {
   app.add_option("--loss-seconds", options.lossSeconds, "Seconds between two losses of the device")
       ->check(CLI::Range(61.0, 100'000.0))
       ->capture_default_str();
-  app.add_flag("--goals", goals, "Check memory and frames too, which needs ten minutes on an idle machine");
+  app.add_flag("--goals", goals, "Check memory and frames too. Use ten minutes or more, on an idle machine");
   CLI11_PARSE(app, argc, argv);
   options.seconds = 60 * minutes;
   // A sample takes a little more than a second.

@@ -192,6 +192,7 @@ const kScratchBytes = Math.max(
   cs_cloth_settings.sizeof,
   cs_grab.sizeof,
   cs_grab_event.sizeof,
+  cs_pairing_code.sizeof,
   cs_participant.sizeof,
   cs_play_out_options.sizeof,
   cs_playback.sizeof,

@@ -75,7 +75,7 @@ export function expose(session: Session, view: View): { described(client: Client
       return session.client.participants();
     },
     get playback() {
-      return session.client?.playback();
+      return session.client.playback();
     },
     canvas: view.canvas,
     project: (point) => view.project(point),

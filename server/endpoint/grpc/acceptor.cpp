@@ -42,16 +42,15 @@ Acceptor::~Acceptor() {
 }
 
 void Acceptor::start() {
-  accept();
-  checkLater();
   thread_ = std::thread([this] { run(); });
 }
 
 // An exception, such as for a lack of memory, ends the acceptance of one connection and not the endpoint. It
-// may also have ended accept().
+// may also have ended accept() or checkLater().
 void Acceptor::run() {
   for (;;) try {
-      if (!accepting_ && acceptor_.is_open()) accept();
+      if (accepting_.expired()) accept();
+      checkLater();
       io_.run();
       return;
     } catch (const std::exception& failure) {
@@ -60,27 +59,26 @@ void Acceptor::run() {
 }
 
 void Acceptor::accept() {
-  acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
-    accepting_ = false;
+  // Boost drops a handler whose operation has thrown, and `waits` with it.
+  auto waits = std::make_shared<int>();
+  accepting_ = waits;
+  acceptor_.async_accept([this, waits](boost::system::error_code error, tcp::socket socket) mutable {
     if (!error) {
       accept();  // first, so that it goes on if accepted() throws
       return accepted(std::move(socket));
     }
     // For example, no descriptor is free. An immediate retry would only spin.
     pause_.expires_after(kAcceptPause);
-    pause_.async_wait([this](boost::system::error_code cancelled) {
-      accepting_ = false;
+    pause_.async_wait([this, waits = std::move(waits)](boost::system::error_code cancelled) {
       if (!cancelled) accept();
     });
-    accepting_ = true;
   });
-  accepting_ = true;
 }
 
 void Acceptor::accepted(tcp::socket socket) {
   boost::system::error_code error;
   const tcp::endpoint peer = socket.remote_endpoint(error);
-  if (error) return;  // it has gone already
+  if (error) return;  // the peer has disconnected
   if (connections_.size() >= maxConnections_) forgetEnded();
   auto ticket = admission_.admit(peer.address(), schedule::Clock::now());
   if (!ticket) return metrics_.refuse(ticket.error());
@@ -93,7 +91,11 @@ void Acceptor::accepted(tcp::socket socket) {
     return metrics_.refuse(telemetry::Refusal::connections);
   }
   grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
-  connection.fd = socket.release();
+  connection.fd = socket.release(error);
+  if (error) {
+    ::close(connections_.back().copy);
+    return connections_.pop_back();
+  }
   to_->HandleNewConnection(&connection);
 }
 

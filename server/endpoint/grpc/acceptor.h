@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Accepts the connections of a gRPC server, which itself has no limit of connections.
+// Accepts the connections of a gRPC server and limits their number, which gRPC cannot do.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ class Acceptor {
   Acceptor(const std::string& host, std::uint16_t port, const ConnectionLimits& limits,
            std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to,
            telemetry::ServerMetrics& metrics);
-  // Stops to accept; open connections stay.
+  // Stops accepting. Open connections stay open.
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;
@@ -38,7 +38,7 @@ class Acceptor {
   void start();
 
  private:
-  // A connection, whose descriptor gRPC owns. Ours is a copy, which shows when the connection has ended.
+  // A connection. gRPC owns its descriptor; `copy` is a duplicate that shows when the connection has ended.
   struct Connection {
     int copy;
     Admission::Ticket ticket;
@@ -56,7 +56,7 @@ class Acceptor {
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_{io_.get_executor()};
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer pause_{io_}, check_{io_};
-  bool accepting_ = false;  // accept() or its pause waits
+  std::weak_ptr<void> accepting_;  // expired unless accept() or its pause waits
   const boost::asio::ip::tcp::endpoint address_;
   const std::size_t maxConnections_;
   Admission admission_;

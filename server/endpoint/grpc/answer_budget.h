@@ -27,7 +27,7 @@ class AnswerBudget {
  private:
   const AnswerLimits limits_;
   std::size_t used_ = 0;
-  std::unordered_map<std::string, std::size_t> ofAddress_;  // without zeros
+  std::unordered_map<std::string, std::size_t> ofAddress_;  // no entry is 0
 };
 
 }  // namespace clothstream::endpoint

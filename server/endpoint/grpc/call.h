@@ -12,6 +12,7 @@
 
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/status.h>
+#include <spdlog/spdlog.h>
 
 #include "server/endpoint/grpc/answer_budget.h"
 #include "server/endpoint/grpc/call_rate.h"
@@ -61,7 +62,7 @@ class Call : public std::enable_shared_from_this<Call> {
   // Called when the endpoint closes. Ends the call with this status, unless it has a more specific one. Does
   // nothing before a client has made the call.
   void stop(const grpc::Status& status) {
-    if (isMade_) close(status);
+    if (isMade_) attempt([&] { close(status); });
   }
 
  protected:
@@ -75,7 +76,7 @@ class Call : public std::enable_shared_from_this<Call> {
     void done(bool ok) override {
       const std::shared_ptr<Call> self = call_.shared_from_this();
       --self->underway_;
-      (call_.*next_)(ok);
+      self->attempt([&] { (call_.*next_)(ok); });
       if (self->isOver_ && self->underway_ == 0) self->leave();
     }
 
@@ -85,6 +86,18 @@ class Call : public std::enable_shared_from_this<Call> {
   };
 
   virtual void close(const grpc::Status& status) = 0;
+
+  // Cancels the call if `work` throws, such as for a lack of memory: it would wait for an operation that has
+  // not begun.
+  template <typename Work>
+  void attempt(const Work& work) {
+    try {
+      work();
+    } catch (const std::exception& failure) {
+      spdlog::error("gRPC: a call is cancelled: {}", failure.what());
+      if (isMade_) context_.TryCancel();
+    }
+  }
 
   // Counts an operation that begins and returns its tag. `operation` must be a member of the call.
   void* begin(Operation& operation) {
@@ -112,8 +125,8 @@ class Call : public std::enable_shared_from_this<Call> {
   bool isMade_ = false, isOver_ = false;
 };
 
-// Waits for the next call of this kind. Without memory it tries again until there is some, because the
-// endpoint would accept no further call of this kind.
+// Waits for the next call of this kind. Retries while memory is short, because otherwise the endpoint would
+// accept no further call of this kind.
 template <typename Kind, typename... Arguments>
 void await(GrpcEndpointContext& endpoint, Arguments&&... arguments) {
   std::shared_ptr<Kind> call;

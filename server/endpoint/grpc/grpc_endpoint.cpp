@@ -43,7 +43,7 @@ constexpr int kPingTimeoutMs = 2000;
 constexpr int kMinClientPingIntervalMs = 1000;
 constexpr int kMaxIdleConnectionMs = 60'000;
 constexpr int kHandshakeTimeoutMs = 10'000;
-// Connections beyond the limit of streams, whose streams get an answer with the reason.
+// Number of connections beyond the limit of streams. Streams on them are refused with the reason.
 constexpr std::size_t kAnsweredBeyondLimit = 64;
 constexpr std::size_t kMaxMemory = std::size_t{256} << 20;
 constexpr int kMaxThreads = 16;
@@ -72,7 +72,7 @@ void configure(grpc::ServerBuilder& builder) {
   builder.SetResourceQuota(quota);
 }
 
-// Takes reflection from one server. gRPC adds it to every server of the process.
+// Removes reflection from one server. gRPC adds it to every server of the process.
 class WithoutReflection final : public grpc::ServerBuilderOption {
  public:
   void UpdateArguments(grpc::ChannelArguments*) override {}
@@ -81,13 +81,13 @@ class WithoutReflection final : public grpc::ServerBuilderOption {
   }
 };
 
-// Returns whether this gRPC has weaknesses by which a peer can end the process or exhaust its memory:
-// CVE-2023-1428, CVE-2023-33953, CVE-2023-4785 and CVE-2023-44487, the last of which 1.60 limits.
-bool hasWeaknesses() {
-  constexpr int kMendedMinor = 60;
+// Returns whether this gRPC has vulnerabilities by which a peer can end the process or exhaust its memory:
+// CVE-2023-1428, CVE-2023-33953, CVE-2023-4785 and CVE-2023-44487. Version 1.60 limits the last one.
+bool isVulnerable() {
+  constexpr int kFixedMinor = 60;
   int major = 0, minor = 0;
   return std::sscanf(grpc::Version().c_str(), "%d.%d", &major, &minor) != 2 ||
-         (major == 1 && minor < kMendedMinor);
+         (major == 1 && minor < kFixedMinor);
 }
 
 }  // namespace
@@ -128,7 +128,7 @@ struct GrpcEndpoint::State {
                                         .answerTimeout = options.answerTimeout});
     offerService(*context, service, slowCalls);
     offerHealth(*context, health);
-    if (hasWeaknesses() && !acceptor->isLoopback())
+    if (isVulnerable() && !acceptor->isLoopback())
       spdlog::warn(
           "gRPC {} has published weaknesses by which a peer can stop the server (SECURITY.md): listen on "
           "127.0.0.1, or build with gRPC 1.60 or newer",

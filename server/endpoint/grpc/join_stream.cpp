@@ -53,10 +53,15 @@ void JoinStream::onBegun(bool ok) {
   std::weak_ptr<JoinStream> weak = std::static_pointer_cast<JoinStream>(shared_from_this());
   auto wake = [&loop = *endpoint_.loop, weak, posted = std::make_shared<std::atomic<bool>>(false)] {
     if (posted->exchange(true)) return;
-    loop.post([weak, posted] {
+    try {
+      loop.post([weak, posted] {
+        posted->store(false);
+        if (const auto self = weak.lock()) self->attempt([&] { self->pump(); });
+      });
+    } catch (...) {
       posted->store(false);
-      if (const auto self = weak.lock()) self->pump();
-    });
+      throw;
+    }
   };
   session_ = session::Session::open(endpoint_.server,
                                     {.peer = "grpc " + context_.peer(),

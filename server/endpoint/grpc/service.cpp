@@ -76,9 +76,12 @@ void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::
   offer(
       endpoint, service, &Service::RequestGetScene,
       [&server, &slowCalls](const auto& request, const Identity& by, auto answer) {
-        boost::asio::post(slowCalls, [&server, request, by, answer = std::move(answer)] {
-          hosting::giveAnswer("getScene", answer, sceneOf(server, request, by));
-        });
+        auto wanted = answer.wanted();
+        boost::asio::post(slowCalls,
+                          [&server, request, by, wanted = std::move(wanted), answer = std::move(answer)] {
+                            if (!wanted()) return;  // the client has cancelled the call
+                            hosting::giveAnswer("getScene", answer, sceneOf(server, request, by));
+                          });
       },
       CallRate::kSceneCost);
   offer(

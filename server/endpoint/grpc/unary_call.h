@@ -78,18 +78,22 @@ class UnaryCall final : public Call {
                    loop->post([weak, answer = std::move(answer)]() mutable {
                      const auto self = weak.lock();
                      if (!self) return;
-                     if (answer) self->response_ = std::move(*answer);
-                     self->finish(answer ? grpc::Status::OK : statusOf(answer.error()));
+                     self->attempt([&] {
+                       if (answer) self->response_ = std::move(*answer);
+                       self->finish(answer ? grpc::Status::OK : statusOf(answer.error()));
+                     });
                    });
                  },
                  isWanted_));
   }
-  // The call is answered, or the client has cancelled it, or its deadline is over.
-  void onEnded(bool) { *isWanted_ = false; }
+  // The call is answered, or the client has cancelled it, or its deadline is over. A later answer is dropped.
+  void onEnded(bool) {
+    *isWanted_ = false;
+    over();
+  }
   void onFinished(bool) {
     endpoint_.answers.release(address_, bytes_);
     late_.Cancel();
-    over();
   }
   void onLate(bool expired) {
     if (expired) context_.TryCancel();

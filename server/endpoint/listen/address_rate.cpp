@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/listen/address_rate.h"
 
+#include <iterator>
+
 namespace clothstream::endpoint {
 namespace {
 
@@ -23,6 +25,10 @@ std::string addressKey(ip::address address) {
 }
 
 bool AddressRate::take(const std::string& key, schedule::Clock::time_point now, double cost) {
+  if (buckets_.size() > kMaxAddresses)
+    for (auto each = buckets_.begin(); each != buckets_.end();)
+      each =
+          each->second.isFull(now) ? buckets_.erase(each) : std::next(each);  // a full one is like a new one
   if (buckets_.size() > kMaxAddresses) buckets_.clear();
   return buckets_.try_emplace(key, perSecond_, burst_).first->second.take(now, cost);
 }

@@ -25,7 +25,7 @@ class AddressRate {
   bool take(const std::string& key, schedule::Clock::time_point now, double cost = 1);
 
  private:
-  // Beyond this number of addresses, counting starts again.
+  // Beyond this number of addresses that were active lately, counting starts again.
   static constexpr std::size_t kMaxAddresses = 4096;
 
   const double perSecond_, burst_;

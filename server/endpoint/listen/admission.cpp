@@ -55,12 +55,12 @@ tl::expected<Admission::Ticket, telemetry::Refusal> Admission::admit(const ip::a
     if (entry != counts.ofAddress.end() && entry->second >= counts.limits.connectionsPerAddress)
       return tl::unexpected(Refusal::connectionsOfAddress);
   }
-  // First, so that one address does not take the connections per second of the others.
+  // The limit of the address is checked first, so that one address does not use up the common rate.
   if (!key.empty() && !counts.rateOfAddress.take(key, now))
     return tl::unexpected(Refusal::connectionRateOfAddress);
   if (!counts.rate.take(now)) return tl::unexpected(Refusal::connectionRate);
+  if (!key.empty()) ++counts.ofAddress[key];  // first, because it may throw
   ++counts.connections;
-  if (!key.empty()) ++counts.ofAddress[key];
   return Ticket(counts_, std::move(key));
 }
 

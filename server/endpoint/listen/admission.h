@@ -17,7 +17,7 @@ namespace clothstream::endpoint {
 struct ConnectionLimits {
   std::size_t connections = 256;           // open at a time
   std::size_t connectionsPerAddress = 64;  // of one address
-  // New connections, with a burst of as many.
+  // Rates of new connections. The burst of each is the number of one second.
   double connectionsPerSecond = 200;
   double connectionsPerSecondOfAddress = 20;
 };

@@ -25,7 +25,7 @@ namespace clothstream::endpoint {
 
 class WebSocketStream;
 
-// Rate of HTTP requests of one address, with twice as many at once.
+// HTTP requests per second of one address. The burst is twice this number.
 inline constexpr double kRequestsPerSecond = 100;
 
 struct WebEndpointContext {

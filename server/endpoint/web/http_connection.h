@@ -34,7 +34,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   using Request = boost::beast::http::request<boost::beast::http::empty_body>;
   using Response = boost::beast::http::response<boost::beast::http::span_body<const char>>;
 
-  // With TLS: a client that begins without it gets a redirection.
+  // Only with TLS. A client that begins without it is redirected to https.
   void detectTls();
   void shakeHands();
   void read();

@@ -27,7 +27,7 @@ class Page {
   // the files exceed kMaxPageBytes.
   explicit Page(const std::filesystem::path& directory);
 
-  // Adds a file that is not in the directory; one with this path keeps its content.
+  // Adds a file that is not in the directory. Does nothing if there is a file with this path.
   void add(const std::string& path, std::string content);
 
   // `target` comes from a request: percent-encoded, with an optional query. A directory means its index.html.

@@ -22,6 +22,7 @@
 #include "server/endpoint/web/http_connection.h"
 #include "server/endpoint/web/web_socket_stream.h"
 #include "server/hosting/server_state.h"
+#include "server/schedule/retry.h"
 #include "server/tls/qr_code.h"
 
 namespace clothstream::endpoint {
@@ -73,7 +74,7 @@ struct WebEndpoint::State {
   net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};  // until io.stop()
   tcp::acceptor acceptor;
   net::steady_timer timer{io};
-  bool accepting = false;  // accept() or its timer waits
+  std::weak_ptr<void> accepting;  // expired unless accept() or its timer waits
   std::uint16_t port;
   std::thread thread;
 
@@ -95,7 +96,9 @@ struct WebEndpoint::State {
   }
 
   ~State() {
-    net::post(io, [this] { stop(); });
+    schedule::retryUntilDone(
+        [this] { net::post(io, [this] { stop(); }); },
+        [](const std::exception& failure) { spdlog::error("page: {}", failure.what()); });
     thread.join();
     // No wake may reach `io` during its destruction.
     for (const auto& session : context.streams) session->leave();
@@ -106,37 +109,37 @@ struct WebEndpoint::State {
   // also have ended accept().
   void run() {
     for (;;) try {
-        if (!accepting && !context.stopping) accept();
+        if (accepting.expired() && !context.stopping) accept();
         io.run();
         return;
       } catch (const std::exception& failure) {
         spdlog::error("page: {}", failure.what());
+        if (context.stopping) return;
       }
   }
 
   void accept() {
-    acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
-      accepting = false;
+    // Boost drops a handler whose operation has thrown, and `waits` with it.
+    auto waits = std::make_shared<int>();
+    accepting = waits;
+    acceptor.async_accept([this, waits](boost::system::error_code error, tcp::socket socket) mutable {
       if (context.stopping) return;
       if (error) {  // such as no free descriptor; an immediate retry would only spin
         timer.expires_after(kAcceptPause);
-        timer.async_wait([this](boost::system::error_code cancelled) {
-          accepting = false;
+        timer.async_wait([this, waits = std::move(waits)](boost::system::error_code cancelled) {
           if (!cancelled) accept();
         });
-        accepting = true;
         return;
       }
       accept();  // first, so that it goes on if serve() throws
       serve(std::move(socket));
     });
-    accepting = true;
   }
 
   void serve(tcp::socket socket) {
     boost::system::error_code error;
     const tcp::endpoint peer = socket.remote_endpoint(error);
-    if (error) return;  // it has gone already
+    if (error) return;  // the peer has disconnected
     auto ticket = admission.admit(peer.address(), schedule::Clock::now());
     if (!ticket) return context.server.state().metrics.refuse(ticket.error());
     sendFresh(socket);

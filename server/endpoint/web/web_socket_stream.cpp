@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <string_view>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/beast/http/rfc7230.hpp>
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "server/endpoint/listen/address_rate.h"
 #include "server/hosting/server_state.h"
@@ -58,6 +60,22 @@ ws::close_reason reasonOf(const session::Closing& closing) {
 
 }  // namespace
 
+template <class Step>
+void WebSocketStream::attempt(const Step& step) {
+  try {
+    step();
+  } catch (const std::exception& failure) {
+    spdlog::error("page: a stream ends: {}", failure.what());
+    end();
+  }
+}
+
+auto WebSocketStream::handler(void (WebSocketStream::*next)(beast::error_code)) {
+  return [self = shared_from_this(), next](beast::error_code error, std::size_t = 0) {
+    self->attempt([&] { (self.get()->*next)(error); });
+  };
+}
+
 WebSocketStream::WebSocketStream(WebStream&& stream, WebEndpointContext& endpoint,
                                  std::unique_ptr<ConnectionSlot> slot)
     : endpoint_(endpoint),
@@ -79,23 +97,26 @@ void WebSocketStream::accept(http::request<http::empty_body>&& request) {
     response.set(http::field::server, "clothstream");
     if (speaksOurs) response.set(http::field::sec_websocket_protocol, kSubprotocol);
   }));
-  socket_.async_accept(request_, [self = shared_from_this()](beast::error_code error) {
-    if (!error) self->open();
-  });
+  socket_.async_accept(request_, handler(&WebSocketStream::onAccepted));
 }
 
-void WebSocketStream::open() {
-  if (endpoint_.stopping) return;
+void WebSocketStream::onAccepted(beast::error_code error) {
+  if (error || endpoint_.stopping) return;
   endpoint_.streams.insert(shared_from_this());
   // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
   // would deadlock: the release of session::Session waits for that wake to return.
   auto wake = [&io = endpoint_.io, weak = weak_from_this(),
                posted = std::make_shared<std::atomic<bool>>(false)] {
     if (posted->exchange(true)) return;
-    boost::asio::post(io, [weak, posted] {
+    try {
+      boost::asio::post(io, [weak, posted] {
+        posted->store(false);
+        if (const auto self = weak.lock()) self->attempt([&] { self->pump(); });
+      });
+    } catch (...) {
       posted->store(false);
-      if (const auto self = weak.lock()) self->pump();
-    });
+      throw;
+    }
   };
   session_ =
       session::Session::open(endpoint_.server, arrivalOf(beast::get_lowest_layer(socket_)), std::move(wake));
@@ -104,8 +125,7 @@ void WebSocketStream::open() {
 }
 
 void WebSocketStream::read() {
-  socket_.async_read(
-      incoming_, [self = shared_from_this()](beast::error_code error, std::size_t) { self->onRead(error); });
+  socket_.async_read(incoming_, handler(&WebSocketStream::onRead));
 }
 
 void WebSocketStream::onRead(beast::error_code error) {
@@ -120,9 +140,11 @@ void WebSocketStream::onRead(beast::error_code error) {
   const schedule::Clock::duration pause = session_->readPause();
   if (pause <= schedule::Clock::duration::zero()) return read();
   pauseTimer_.expires_after(pause);
-  pauseTimer_.async_wait([self = shared_from_this()](beast::error_code cancelled) {
-    if (!cancelled && !self->closing_) self->read();
-  });
+  pauseTimer_.async_wait(handler(&WebSocketStream::onPauseEnded));
+}
+
+void WebSocketStream::onPauseEnded(beast::error_code cancelled) {
+  if (!cancelled && !closing_) read();
 }
 
 void WebSocketStream::pump() {
@@ -134,9 +156,8 @@ void WebSocketStream::pump() {
     outgoing_ = std::move(*message);
     writing_ = true;
     endpoint_.server.state().metrics.webBytes.add(outgoing_->size());
-    socket_.async_write(
-        boost::asio::buffer(outgoing_->data(), outgoing_->size()),
-        [self = shared_from_this()](beast::error_code error, std::size_t) { self->onWritten(error); });
+    socket_.async_write(boost::asio::buffer(outgoing_->data(), outgoing_->size()),
+                        handler(&WebSocketStream::onWritten));
   } else if (finished) {
     close(reasonOf(session::closingOf(outgoing_)));
   }
@@ -154,15 +175,21 @@ void WebSocketStream::close(const ws::close_reason& reason) {
   if (std::exchange(closing_, true)) return;
   leave();
   endSoon();
-  socket_.async_close(reason, [self = shared_from_this()](beast::error_code) { self->end(); });
+  socket_.async_close(reason, handler(&WebSocketStream::onClosed));
+}
+
+void WebSocketStream::onClosed(beast::error_code) {
+  end();
 }
 
 void WebSocketStream::endSoon() {
   if (std::exchange(ending_, true)) return;
   closingTimer_.expires_after(kClosingTimeout);
-  closingTimer_.async_wait([self = shared_from_this()](beast::error_code error) {
-    if (!error) self->end();
-  });
+  closingTimer_.async_wait(handler(&WebSocketStream::onClosingTimeout));
+}
+
+void WebSocketStream::onClosingTimeout(beast::error_code cancelled) {
+  if (!cancelled) end();
 }
 
 void WebSocketStream::end() {

@@ -34,14 +34,24 @@ class WebSocketStream : public std::enable_shared_from_this<WebSocketStream> {
   void leave() { session_.reset(); }
 
  private:
-  void open();
+  // Ends the stream if `step` throws, such as for a lack of memory: it would wait for an operation that has
+  // not begun.
+  template <class Step>
+  void attempt(const Step& step);
+  // Handler of an operation, which attempts `next` and keeps the stream alive until then.
+  auto handler(void (WebSocketStream::*next)(boost::beast::error_code));
+  // Opens the session.
+  void onAccepted(boost::beast::error_code error);
   void read();
   void onRead(boost::beast::error_code error);
+  void onPauseEnded(boost::beast::error_code cancelled);
   // Writes the next message unless a write is under way.
   void pump();
   void onWritten(boost::beast::error_code error);
   // Ends the stream after kClosingTimeout, even if the client does not answer.
   void endSoon();
+  void onClosingTimeout(boost::beast::error_code cancelled);
+  void onClosed(boost::beast::error_code error);
   void end();
 
   WebEndpointContext& endpoint_;

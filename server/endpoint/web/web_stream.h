@@ -75,7 +75,7 @@ class WebStream {
  private:
   using Tls = boost::beast::ssl_stream<boost::beast::tcp_stream>;
 
-  std::shared_ptr<boost::asio::ssl::context> context_;  // of tls_, although the server has a newer one
+  std::shared_ptr<boost::asio::ssl::context> context_;  // used by tls_; a reload may have replaced it
   std::unique_ptr<boost::beast::tcp_stream> plain_;     // without TLS
   std::unique_ptr<Tls> tls_;                            // with TLS
 };

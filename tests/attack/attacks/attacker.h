@@ -39,7 +39,7 @@ std::uint64_t flood(const Target& target, const std::function<void(int)>& call);
 std::string brief(std::string text);
 std::string answerOf(const grpc::Status& status);
 
-// Counts of equal answers, the most frequent first.
+// Counts of equal answers, in alphabetical order.
 class Answers {
  public:
   void add(const grpc::Status& status) {
@@ -85,7 +85,6 @@ class Joined {
     return open_;
   }
   bool open() const { return open_ && !ended_; }
-  std::uint64_t frames() const { return frames_; }
   std::string lastError() {
     const std::lock_guard lock(mutex_);
     return lastError_;
@@ -95,7 +94,6 @@ class Joined {
   void read() {
     v1::ServerMessage message;
     while (stream_->Read(&message)) {
-      if (message.has_frame()) ++frames_;
       if (!message.has_error()) continue;
       const std::lock_guard lock(mutex_);
       lastError_ = message.error().text();
@@ -107,7 +105,6 @@ class Joined {
   std::unique_ptr<grpc::ClientReaderWriter<v1::ClientMessage, v1::ServerMessage>> stream_;
   bool open_;
   std::atomic<bool> ended_{false};
-  std::atomic<std::uint64_t> frames_{0};
   std::mutex mutex_;
   std::string lastError_;
   std::jthread reader_;

@@ -81,7 +81,8 @@ std::string feedClient(const Target& target) {
     return Clock::now() > until;
   };
   while (Clock::now() < until) {
-    const auto client = GrpcClient::join(ServerAddress(fmt::format("127.0.0.1:{}", port)), options, {});
+    const auto client = GrpcClient::join(ServerAddress(fmt::format("127.0.0.1:{}", port)), options,
+                                         [](cs_client*, std::uint32_t) {});
     if (!client) end = "the client leaves: " + brief(client.error().text);
   }
   server->Shutdown(std::chrono::system_clock::now());

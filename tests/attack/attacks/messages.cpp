@@ -20,9 +20,7 @@ std::string floodChanges(const Target& target) {
   std::vector<std::unique_ptr<Joined>> joined;
   for (int i = 0; i < kFlooders; ++i) joined.push_back(std::make_unique<Joined>(*stub, ""));
   const std::uint64_t sent = flood(target, [&](int i) {
-    v1::ClientMessage change;
-    change.mutable_parameter_change()->mutable_wind()->mutable_value()->set_x(0.01f);
-    if (!joined[i]->send(change)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    if (!joined[i]->send(windOf(0.01f))) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   });
   const auto open = std::ranges::count_if(joined, [](const auto& each) { return each->open(); });
   return fmt::format("{} changes sent; {} of {} streams stay open", sent, open, joined.size());
@@ -43,10 +41,8 @@ std::string floodPauses(const Target& target) {
   return answers.text();
 }
 
-std::string floodPoses(const Target& target) {
-  const auto stub = stubOf(target);
-  std::vector<std::unique_ptr<Joined>> joined;
-  for (int i = 0; i < kFlooders; ++i) joined.push_back(std::make_unique<Joined>(*stub, "flag"));
+// As many colliders as a participant may have.
+v1::ClientMessage sixtyColliders() {
   v1::ClientMessage poses;
   for (std::uint32_t id = 1; id <= 60; ++id) {
     v1::ParticipantCollider& pose = *poses.mutable_collider_poses()->add_colliders();
@@ -55,6 +51,14 @@ std::string floodPoses(const Target& target) {
     pose.mutable_pose()->mutable_orientation()->set_w(1);
     pose.mutable_sphere()->set_radius(0.05f);
   }
+  return poses;
+}
+
+std::string floodPoses(const Target& target) {
+  const auto stub = stubOf(target);
+  std::vector<std::unique_ptr<Joined>> joined;
+  for (int i = 0; i < kFlooders; ++i) joined.push_back(std::make_unique<Joined>(*stub, "flag"));
+  const v1::ClientMessage poses = sixtyColliders();
   const std::uint64_t sent = flood(target, [&](int i) {
     if (!joined[i]->send(poses)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   });
@@ -106,19 +110,12 @@ std::string changeForUnreading(const Target& target) {
   return fmt::format("{} changes sent; {} of {} streams that read stay open", sent, open, readers.size());
 }
 
-// Colliders of many participants in the victim's own scene.
+// Colliders of many participants in another scene than the victim's.
 std::string fillWithColliders(const Target& target) {
   const auto stub = stubOf(target);
   std::vector<std::unique_ptr<Joined>> joined;
   for (int i = 0; i < 40; ++i) joined.push_back(std::make_unique<Joined>(*stub, "flag"));
-  v1::ClientMessage poses;
-  for (std::uint32_t id = 1; id <= 60; ++id) {
-    v1::ParticipantCollider& pose = *poses.mutable_collider_poses()->add_colliders();
-    pose.set_id(id);
-    pose.mutable_pose()->mutable_position()->set_y(0.01f * static_cast<float>(id));
-    pose.mutable_pose()->mutable_orientation()->set_w(1);
-    pose.mutable_sphere()->set_radius(0.05f);
-  }
+  const v1::ClientMessage poses = sixtyColliders();
   repeat(target, [&] {
     for (const auto& each : joined) each->send(poses);
     std::this_thread::sleep_for(std::chrono::milliseconds(100));

@@ -286,6 +286,24 @@ TEST(Inbox, KeepsOnlyTheNewestPosesOfAParticipant) {
   EXPECT_TRUE(inputs.poses.empty());
 }
 
+// No tick drains the inbox of a paused scene, in which participants come and go.
+TEST(Inbox, ForgetsTheNewestOfThoseWhoHaveLeft) {
+  Inbox inbox;
+  inbox.postPoses(2, {.colliders = {handAt(1, 0)}}, Clock::now());
+  constexpr std::uint64_t kNewest = Inbox::kMaxPosters + 100;
+  for (std::uint64_t participant = 3; participant <= kNewest; ++participant)
+    inbox.postPoses(participant, {}, Clock::now());
+  inbox.postPoses(1, {}, Clock::now());
+  Inputs inputs;
+  inbox.drain(inputs);
+  ASSERT_EQ(inputs.poses.size(), Inbox::kMaxPosters);
+  EXPECT_EQ(inputs.poses.front().participant, 2u);
+  EXPECT_EQ(inputs.poses.back().participant, 1u);
+  std::uint64_t newest = 0;
+  for (const Poses& poses : inputs.poses) newest = std::max(newest, poses.participant);
+  EXPECT_LE(newest, Inbox::kMaxPosters + 2);
+}
+
 TEST(Inbox, LimitsWaitingChanges) {
   Inbox inbox;
   std::size_t accepted = 0;
