@@ -620,6 +620,7 @@ struct Notice {
   static constexpr Field kText{2, WireType::kBytes};
   static constexpr Field kTick{3, WireType::kVarint};
   static constexpr Field kParticipantId{30, WireType::kVarint};
+  static constexpr Field kEndsWithinSeconds{61, WireType::kFixed32};
 };
 struct Error {
   static constexpr Field kCode{1, WireType::kVarint};

@@ -522,9 +522,10 @@ TEST_F(RosterTest, RestoredParticipantsOwnNothingBeforeTheyReturn) {
 TEST_F(RosterTest, RestoredParticipantThatMayOwnSucceedsWhenItReturns) {
   const Member owner = join(), other = join();
   Roster next(subscribers, inbox, nullptr);
-  next.restore(roster.saved(), {60s, 2s}, now);
-  limit = 2;
-  // A third participant takes the place of the owner.
+  SavedRoster saved = roster.saved();
+  std::erase_if(saved.participants,
+                [&](const auto& known) { return known.participant.id == owner.admission.id; });
+  next.restore(std::move(saved), {60s, 2s}, now);
   Member third, back;
   const auto came = next.join({.clientName = {},
                                .displayName = {},
@@ -539,6 +540,21 @@ TEST_F(RosterTest, RestoredParticipantThatMayOwnSucceedsWhenItReturns) {
       next.join({.clientName = {}, .displayName = {}, .token = other.admission.token, .subject = {}},
                 back.mailbox, ids, limit, now);
   ASSERT_TRUE(admission.has_value());
+  EXPECT_EQ(admission->role, Role::owner);
+}
+
+// All participants of an earlier run have been away equally long.
+TEST_F(RosterTest, OwnersAreEvictedLast) {
+  const Member owner = join(), other = join();
+  Roster next(subscribers, inbox, nullptr);
+  next.restore(roster.saved(), {60s, 2s}, now);
+  Member third, back;
+  ASSERT_TRUE(next.join({}, third.mailbox, ids, 2, now).has_value());
+  const auto admission =
+      next.join({.clientName = {}, .displayName = {}, .token = owner.admission.token, .subject = {}},
+                back.mailbox, ids, 2, now);
+  ASSERT_TRUE(admission.has_value());
+  EXPECT_TRUE(admission->resumed);
   EXPECT_EQ(admission->role, Role::owner);
 }
 
