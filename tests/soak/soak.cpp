@@ -191,19 +191,21 @@ class Soak {
   // Measures the server without participants, when it has returned to `before` or kPatience is over. Without
   // `before`, when it has stayed the same for five seconds.
   Sample restingServer(const std::optional<Sample>& before) {
+    // Threads and descriptors for calls, such as those of measure(), come and go.
+    const auto isMore = [](const Sample& now, const Sample& then) {
+      return now.descriptors > then.descriptors + kTolerated || now.threads > then.threads + kTolerated ||
+             now.scenes != then.scenes || now.participants > 0;
+    };
     const auto end = Clock::now() + kPatience;
-    Sample newest = measure();
-    for (auto same = Clock::now(); Clock::now() < end;) {
+    Sample newest = measure(), steady = newest;
+    for (auto since = Clock::now(); Clock::now() < end;) {
       std::this_thread::sleep_for(100ms);
-      const Sample now = measure();
-      if (now.descriptors != newest.descriptors || now.threads != newest.threads ||
-          now.scenes != newest.scenes || now.participants > 0)
-        same = Clock::now();
-      newest = now;
-      const bool returned = !before || (newest.descriptors <= before->descriptors + kTolerated &&
-                                        newest.threads <= before->threads + kTolerated &&
-                                        newest.scenes == before->scenes && newest.participants == 0);
-      if (returned && (before || Clock::now() - same > 5s)) break;
+      newest = measure();
+      if (isMore(newest, steady) || isMore(steady, newest)) {
+        steady = newest;
+        since = Clock::now();
+      }
+      if (before ? !isMore(newest, *before) : Clock::now() - since > 5s) break;
     }
     return newest;
   }
