@@ -6,11 +6,21 @@
 #include <utility>
 
 #include <boost/asio/post.hpp>
+#include <malloc.h>
 
 #include "server/schedule/clock.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::scene {
+namespace {
+
+// A driver needs tens of megabytes to compile kernels. The C library keeps such memory for the threads that
+// have used it, and so the server would grow with each loss of the device.
+void giveMemoryBack() {
+  ::malloc_trim(0);
+}
+
+}  // namespace
 
 SceneLoader::SceneLoader(codec::Workers& workers, std::function<void()> done)
     : workers_(workers), done_(std::move(done)) {}
@@ -32,6 +42,7 @@ SceneLoader::Future SceneLoader::load(vulkan::Device& device, const model::Scene
   boost::asio::post(thread_, [this, task] {
     (*task)();
     done_();
+    giveMemoryBack();
   });
   return loaded;
 }

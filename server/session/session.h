@@ -21,12 +21,16 @@
 #include "server/messages/field_error.h"
 #include "server/messages/limits.h"
 #include "server/scene/roles.h"
+#include "server/scene/roster.h"
 #include "server/schedule/clock.h"
 #include "server/schedule/token_bucket.h"
 #include "server/session/upload.h"
 
 namespace clothstream::delivery {
 class Mailbox;
+}
+namespace clothstream::messages {
+struct Joining;
 }
 namespace clothstream::scene {
 class LiveScene;
@@ -95,6 +99,8 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
 
   // All following functions need the lock.
   void dispatch(const v1::ClientMessage& message, Clock::time_point now);
+  // Handles the messages of a peer that has joined a scene.
+  void dispatchInScene(const v1::ClientMessage& message, Clock::time_point now);
   void authenticate(const v1::AuthenticateRequest& request);
   // Sets the identity and counts the connection. Returns false, and ends the session, if there are too many.
   bool become(identity::Identity identity);
@@ -103,6 +109,14 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Rights that the identity has in this scene.
   scene::Rights rightsIn(const scene::LiveScene& scene) const;
   void hello(const v1::Hello& message);
+  // The scene that the peer asks for. Null, and the session has ended, if the peer may not join it.
+  std::shared_ptr<scene::LiveScene> sceneOf(const v1::Hello& message, const messages::Joining& joining);
+  void failToJoin(scene::Roster::Refusal refusal, const scene::LiveScene& scene);
+  // `description` is the content id of the scene's description.
+  void welcome(const scene::Roster::Admission& admission, const messages::Joining& joining,
+               std::uint64_t description);
+  // Sends what a peer that joins must know besides the description: pause, work, playback, recording.
+  void tellPresentState(scene::LiveScene& scene);
   void poses(const v1::ColliderPoses& message, Clock::time_point now);
   void create(const v1::CreateSceneRequest& request);
   // Returns a function that answers the current message when its result is known.

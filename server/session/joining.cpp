@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: MIT
+// Identity of a peer, and its way into a scene.
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "proto/codec/packet_header.h"
+#include "server/delivery/mailbox.h"
+#include "server/hosting/server_state.h"
+#include "server/messages/client_message.h"
+#include "server/session/session.h"
+#include "server/telemetry/log.h"
+
+namespace clothstream::session {
+
+void Session::identify(const std::string& token) {
+  const std::lock_guard lock(mutex_);
+  if (mailbox_->closed()) return;
+  now_ = Clock::now();
+  messages::Result<identity::Identity> identity = server_.identify(token, address_.empty());
+  if (identity)
+    become(std::move(*identity));
+  else if (token.empty())
+    whyUnknown_ = identity.error().text;
+  else
+    fail(identity.error().code, identity.error().text);
+}
+
+bool Session::become(identity::Identity identity) {
+  // A new token of the same subject replaces the former one.
+  const bool same = identity_ && identity_->verified && identity_->subject == identity.subject;
+  if (!same) {
+    counted_.reset();
+    counted_ = server_.countConnection(identity);
+  }
+  if (!counted_) {
+    fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+         fmt::format("your token has {} open connections, its maximum (--max-connections-per-token)",
+                     server_.options.maxConnectionsPerToken));
+    return false;
+  }
+  identity_ = std::move(identity);
+  return true;
+}
+
+void Session::authenticate(const v1::AuthenticateRequest& request) {
+  v1::ServerMessage reply;
+  messages::Result<identity::Identity> identity =
+      server_.authenticate(request, address_, now_, *reply.mutable_authenticate());
+  if (!identity && scene_ != nullptr) return refuse(identity.error());
+  if (!identity) return fail(identity.error().code, identity.error().text);
+  if (scene_ != nullptr && identity->verified &&
+      (identity->subject != identity_->subject || !identity->reaches(scene_->name())))
+    return refuse({v1::ERROR_CODE_OUT_OF_ORDER,
+                   "authenticate: a stream in a scene accepts only tokens of the same subject and tenant "
+                   "that are valid for this scene"});
+  if (!become(std::move(*identity))) return;
+  if (scene_ != nullptr) scene_->roster.renew(*mailbox_, rightsIn(*scene_), now_);
+  answer(reply);
+}
+
+scene::Rights Session::rightsIn(const scene::LiveScene& scene) const {
+  using scene::Ownership;
+  if (identity_->role == scene::Role::viewer) return {.ownership = Ownership::never, .onlyViews = true};
+  if (hosting::SceneServer::State::isOfOtherTenant(*identity_, scene)) return {.ownership = Ownership::never};
+  if (identity_->isVerifiedOwner()) return {.ownership = Ownership::always};
+  const bool mayOwn = identity_->role == scene::Role::owner || server_.options.participantsMay.own;
+  return {.ownership = mayOwn ? Ownership::ifNone : Ownership::never};
+}
+
+std::shared_ptr<scene::LiveScene> Session::sceneOf(const v1::Hello& message,
+                                                   const messages::Joining& joining) {
+  const auto refused = [this](v1::ErrorCode code, std::string text) {
+    fail(code, std::move(text));
+    return nullptr;
+  };
+  if (const auto may = server_.mayUse(*identity_, joining.scene); !may)
+    return refused(server_.find(joining.scene) && identity_->reaches(joining.scene) ? v1::ERROR_CODE_REMOVED
+                                                                                    : may.error().code,
+                   may.error().text);
+  std::shared_ptr<scene::LiveScene> scene = server_.find(joining.scene);
+  if (!scene) {
+    const v1::Error error = server_.noSuchScene(joining.scene, *identity_);
+    return refused(error.code(), error.text());
+  }
+  if (const std::string why = scene->quarantined(); !why.empty())
+    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED, why);
+  // All subscribers share one stream, which has one codec.
+  if (std::ranges::find(message.codecs(), scene->codec()) == message.codecs().end())
+    return refused(
+        v1::ERROR_CODE_UNSUPPORTED_CODEC,
+        fmt::format("hello.codecs: must contain {}, the codec of '{}'", scene->codec(), scene->name()));
+  return scene;
+}
+
+void Session::failToJoin(scene::Roster::Refusal refusal, const scene::LiveScene& scene) {
+  using Refusal = scene::Roster::Refusal;
+  switch (refusal) {
+    case Refusal::closed:
+      return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just closed", scene.name()));
+    case Refusal::removed:
+      return fail(v1::ERROR_CODE_REMOVED, fmt::format("an owner removed you from '{}'", scene.name()));
+    case Refusal::late:
+      return fail(v1::ERROR_CODE_TAKEN_OVER, "this participant has a newer connection");
+    case Refusal::full:
+      server_.metrics.refuse(telemetry::Refusal::participants);
+      return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                  fmt::format("'{}' has {} participants, its maximum; try again later", scene.name(),
+                              scene.maxParticipants));
+  }
+}
+
+void Session::welcome(const scene::Roster::Admission& admission, const messages::Joining& joining,
+                      std::uint64_t description) {
+  v1::ServerMessage reply;
+  v1::Welcome& welcome = *reply.mutable_welcome();
+  welcome.set_protocol_version(joining.protocolVersion);
+  welcome.set_codec(scene_->codec());
+  welcome.set_scene(scene_->name());
+  welcome.set_participant_id(participant_);
+  welcome.set_server_name(server_.options.serverName);
+  welcome.set_device_name(server_.deviceNameOf(*scene_));
+  welcome.set_description_content_id(description);
+  welcome.set_role(scene::toMessage(admission.role));
+  welcome.set_resume_token(admission.token);
+  welcome.set_resumed(admission.resumed);
+  for (const scene::Participant& participant : admission.participants)
+    scene::write(participant, *welcome.add_participants());
+  welcome.set_hold_ms(static_cast<std::uint32_t>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(server_.options.reconnectGrace.place).count()));
+  answer(reply);
+}
+
+void Session::tellPresentState(scene::LiveScene& scene) {
+  if (scene.paused) mailbox_->announce(scene::pausedNotice(scene));
+  if (!scene.source && scene.work.load() != scene.allWork())
+    mailbox_->announce(scene::workNotice(scene, scene.tick));
+  if (scene.source) {
+    mailbox_->announce(scene::playbackMessage(*scene.source));
+    if (delivery::SharedBytes parameters = scene::parametersMessage(*scene.source, scene.tick))
+      mailbox_->announce(std::move(parameters));
+  }
+  if (scene.journal && scene.journal->active()) mailbox_->announce(scene::recordingNotice(scene.tick));
+}
+
+void Session::hello(const v1::Hello& message) {
+  if (scene_ != nullptr)
+    return fail(v1::ERROR_CODE_OUT_OF_ORDER,
+                fmt::format("this stream has joined '{}' already: open another one", scene_->name()));
+  v1::Hello request = message;
+  if (!identity_->displayName.empty()) request.set_display_name(identity_->displayName);
+  messages::Result<messages::Joining> joining = messages::toJoining(request, codec::kCodecs);
+  if (!joining) return fail(joining.error().code, joining.error().text);
+  if (joining->scene.empty()) joining->scene = identity_->scene;
+  const std::shared_ptr<scene::LiveScene> scene = sceneOf(message, *joining);
+  if (!scene) return;
+  auto admission = scene->roster.join({.clientName = joining->clientName,
+                                       .displayName = joining->displayName,
+                                       .role = scene::fromMessage(joining->role),
+                                       .token = message.resume_token(),
+                                       .subject = identity_->subject,
+                                       .rights = rightsIn(*scene),
+                                       .attempt = message.attempt()},
+                                      mailbox_, server_.participants, scene->maxParticipants, now_);
+  if (!admission) return failToJoin(admission.error(), *scene);
+  scene_ = scene;
+  participant_ = admission->id;
+  scene->metrics.joins.add();
+  const std::shared_ptr<const delivery::DescriptionChunks> description = scene->description();
+  const bool known = admission->resumed && message.description_content_id() == description->contentId();
+  welcome(*admission, *joining, description->contentId());
+  mailbox_->subscribe(known ? nullptr : description, scene->shape(), scene->metrics,
+                      {joining->quality, joining->temporalLayers});
+  tellPresentState(*scene);
+  server_.wake(*scene);
+  telemetry::log(
+      {scene->name(), participant_}, spdlog::level::info, "{} {} as participant {}, {} ({}); {} in it", peer_,
+      admission->resumed ? "came back" : "joined", participant_, scene::nameOf(admission->role),
+      joining->clientName.empty() ? "unnamed client" : joining->clientName, scene->subscribers.size());
+}
+
+}  // namespace clothstream::session
