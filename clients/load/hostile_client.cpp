@@ -21,8 +21,8 @@ constexpr int kRequestsAStep = 100;
 
 }  // namespace
 
-HostileClient::HostileClient(Links& links, std::string scene, std::size_t first)
-    : links_(links), scene_(std::move(scene)), kind_(first % kKinds) {}
+HostileClient::HostileClient(Links& links, std::string scene, std::size_t first, std::string token)
+    : links_(links), scene_(std::move(scene)), token_(std::move(token)), kind_(first % kKinds) {}
 
 HostileClient::~HostileClient() {
   drop();
@@ -56,6 +56,11 @@ void HostileClient::visit() {
   } else if (kind_ == kHuge) {
     link_->send(std::string(kHugeBytes, 'x'));
   } else {
+    if (!token_.empty()) {
+      v1::ClientMessage message;
+      message.mutable_authenticate()->set_token(token_);
+      link_->send(message.SerializeAsString());
+    }
     link_->send(hello());
   }
   if (kind_ == kNotFinite) {

@@ -18,8 +18,9 @@ namespace clothstream::load {
 // joining.
 class HostileClient final : private LinkListener {
  public:
-  // `first` is the index of the first kind, modulo the number of kinds.
-  HostileClient(Links& links, std::string scene, std::size_t first);
+  // `first` is the index of the first kind, modulo the number of kinds. `token` is sent before hello; empty:
+  // none.
+  HostileClient(Links& links, std::string scene, std::size_t first, std::string token = {});
   ~HostileClient();
   HostileClient(const HostileClient&) = delete;
   HostileClient& operator=(const HostileClient&) = delete;
@@ -36,7 +37,7 @@ class HostileClient final : private LinkListener {
   std::string hello() const;
 
   Links& links_;
-  const std::string scene_;
+  const std::string scene_, token_;
   std::size_t kind_;
   std::uint64_t visits_ = 0;
   std::chrono::steady_clock::time_point since_{};

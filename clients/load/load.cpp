@@ -33,7 +33,7 @@ class Load {
     report_.slow = options.slow;
     report_.hostileClients = options.hostileClients;
     for (std::uint32_t i = 0; i < options.hostileClients; ++i)
-      hostileClients_.push_back(std::make_unique<HostileClient>(links, options.scene, i));
+      hostileClients_.push_back(std::make_unique<HostileClient>(links, options.scene, i, options.token));
   }
 
   LoadReport run() {

@@ -14,7 +14,7 @@ namespace clothstream::load {
 
 struct LoadOptions {
   std::string scene;  // empty: the server's default
-  std::string token;  // of all participants; empty: none
+  std::string token;  // of all participants and hostile clients; empty: none
   std::uint32_t participants = 10;
   std::uint32_t decoders = 0;  // participants that decode; the others only acknowledge frames
   std::uint32_t viewers = 0;   // participants that send no poses; the last ones to join

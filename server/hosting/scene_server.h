@@ -91,7 +91,7 @@ struct ServerOptions {
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};
   // Keeps scenes beyond the end of the server; null: nothing is kept.
   std::shared_ptr<scene::SceneStore> store{};
-  // Time after stop() in which the program ends. Told to peers.
+  // Time after stop() within which the program ends. Sent to peers.
   std::chrono::milliseconds drain{10'000};
   // A peer that sends nothing for this long is disconnected.
   std::chrono::milliseconds silence{30'000};
