@@ -25,6 +25,20 @@ constexpr std::size_t kGrowth = 3;
 // An unknown field, which the parser keeps. In a group each one may take two bytes of input.
 constexpr std::size_t kUnknown = kGrowth * 16 + kBlock;
 
+WireFormatLite::WireType wireTypeOf(const FieldDescriptor& field) {
+  return WireFormatLite::WireTypeForFieldType(static_cast<WireFormatLite::FieldType>(field.type()));
+}
+
+// Null for a field that the parser keeps as an unknown one: its number is unknown, or its wire type is not
+// that of the field.
+const FieldDescriptor* knownField(const Descriptor& type, std::uint32_t tag) {
+  const FieldDescriptor* const field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
+  if (field == nullptr) return nullptr;
+  const WireFormatLite::WireType wireType = WireFormatLite::GetTagWireType(tag);
+  const bool isPacked = field->is_packable() && wireType == WireFormatLite::WIRETYPE_LENGTH_DELIMITED;
+  return isPacked || wireType == wireTypeOf(*field) ? field : nullptr;
+}
+
 std::size_t numberBytes(const FieldDescriptor& field) {
   switch (field.cpp_type()) {
     case FieldDescriptor::CPPTYPE_BOOL:
@@ -67,7 +81,7 @@ class Sum {
   }
 
   bool addField(const Descriptor& type, std::uint32_t tag, CodedInputStream& input, int depth) {
-    const FieldDescriptor* const field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
+    const FieldDescriptor* const field = knownField(type, tag);
     const bool hasLength = WireFormatLite::GetTagWireType(tag) == WireFormatLite::WIRETYPE_LENGTH_DELIMITED;
     if (field == nullptr || !hasLength) {
       const int before = input.CurrentPosition();
@@ -102,18 +116,14 @@ class Sum {
       size = std::min(size, input.BytesUntilLimit());
       // The last byte of a varint is below 128. Fixed-size elements have at least as many bytes in the input.
       const auto* const bytes = static_cast<const std::uint8_t*>(data);
-      elements += isVarint(field) ? static_cast<std::size_t>(std::count_if(
-                                        bytes, bytes + size, [](std::uint8_t byte) { return byte < 128; }))
-                                  : static_cast<std::size_t>(size) / numberBytes(field) + 1;
+      const bool isVarint = wireTypeOf(field) == WireFormatLite::WIRETYPE_VARINT;
+      elements += isVarint ? static_cast<std::size_t>(std::count_if(
+                                 bytes, bytes + size, [](std::uint8_t byte) { return byte < 128; }))
+                           : static_cast<std::size_t>(size) / numberBytes(field) + 1;
       input.Skip(size);
     }
     input.PopLimit(outer);
     return add(kBlock + kGrowth * elements * numberBytes(field));
-  }
-
-  static bool isVarint(const FieldDescriptor& field) {
-    return WireFormatLite::WireTypeForFieldType(static_cast<WireFormatLite::FieldType>(field.type())) ==
-           WireFormatLite::WIRETYPE_VARINT;
   }
 
   std::size_t limit_, size_ = 0;

@@ -56,6 +56,24 @@ TEST(ParsedSize, BoundsEveryKindOfSmallElement) {
   }
 }
 
+TEST(ParsedSize, BoundsFieldsWithAWrongWireType) {
+  for (int number = 1; number < 40; ++number)
+    for (const std::string& value :
+         {std::string("\0\1", 2), std::string("\2\3xyz"), std::string("\1\0\0\0\0\0\0\0\0", 9)}) {
+      const auto tag = static_cast<char>(number << 3 | value[0]);
+      std::string bytes;
+      for (int i = 0; i < 1'000; ++i) {
+        bytes += number < 16 ? std::string(1, tag)
+                             : std::string{static_cast<char>(tag | 0x80), static_cast<char>(number >> 4)};
+        bytes += value.substr(1);
+      }
+      v1::Scene message;
+      if (!message.ParseFromString(bytes)) continue;
+      ASSERT_TRUE(sizeOf(bytes)) << number;
+      EXPECT_GE(*sizeOf(bytes), message.SpaceUsedLong()) << number << " with wire type " << int{value[0]};
+    }
+}
+
 // 100 MB of empty pins took 3.9 GB when they were parsed.
 TEST(ParsedSize, RefusesAboveTheLimit) {
   v1::Scene message = smallScene();
