@@ -134,8 +134,8 @@ typedef struct cs_limits {
 } cs_limits;
 /* Fills in the version and the defaults. */
 void cs_default_limits(cs_limits* out) CS_NOEXCEPT;
-/* Replaces the limits for everything that arrives later. Fails, and changes nothing, if the version or a
- * number is not allowed. */
+/* Replaces the limits for everything that arrives later. Fails, and changes nothing, if `limits` is NULL, or
+ * if the version or a number is not allowed. */
 int cs_set_limits(cs_client* client, const cs_limits* limits) CS_NOEXCEPT;
 
 /* Processes one ServerMessage and returns a set of CS_EVENT bits. A malformed message leads to

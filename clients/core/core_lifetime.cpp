@@ -56,7 +56,7 @@ void cs_default_limits(cs_limits* out) noexcept {
 }
 
 int cs_set_limits(cs_client* client, const cs_limits* limits) noexcept {
-  const std::optional<Limits> allowed = Limits::from(*limits);
+  const std::optional<Limits> allowed = limits == nullptr ? std::nullopt : Limits::from(*limits);
   if (!allowed) return 0;
   client->client.setLimits(*allowed);
   return 1;

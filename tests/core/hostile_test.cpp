@@ -237,6 +237,7 @@ TEST(Hostile, FloodOfPresenceKeepsABoundedNumberOfParticipantsWithShortNames) {
 
 TEST(Hostile, RefusesLimitsThatAreNotAllowed) {
   ClientUnderTest client;
+  EXPECT_EQ(cs_set_limits(client.get(), nullptr), 0);
   for (const auto& change : std::vector<std::function<void(cs_limits&)>>{
            [](cs_limits& limits) { limits.version = 0; }, [](cs_limits& limits) { limits.max_vertices = 0; },
            [](cs_limits& limits) { limits.max_triangles = ~0u; },
