@@ -33,7 +33,7 @@ server/tls         | proto/tls
 server/discovery   | proto/discovery
 server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health
-server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting
+server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/hosting server/recording server/step server/scene server/model
 server/main.cpp    | server/options server/identity server/tls server/discovery server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
