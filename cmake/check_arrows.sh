@@ -36,9 +36,11 @@ server/endpoint/grpc | server/endpoint/listen server/tls server/session server/h
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/hosting server/recording server/step server/scene server/model
-server/main.cpp    | server/options server/identity server/tls server/discovery server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/telemetry server/vulkan
+server/program     | server/options server/identity server/tls server/discovery server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
+server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
+clients/core/touch | clients/core/core.h clients/core/wire
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
 clients/grpc       | clients/core proto/tls clothstream
 clients/library    | clients/core clients/grpc

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+#include "server/program/addresses.h"
+
+#include <fmt/format.h>
+
+#include "server/tls/certificate.h"
+
+namespace clothstream::program {
+
+std::string localAddress(const std::string& host, std::uint16_t port) {
+  if (host == "0.0.0.0") return fmt::format("127.0.0.1:{}", port);
+  if (host == "::") return fmt::format("[::1]:{}", port);
+  return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port)
+                                             : fmt::format("[{}]:{}", host, port);
+}
+
+std::string addressInNetwork(const ProgramOptions& options) {
+  if (isLoopback(options.host)) return {};
+  if (options.host != "0.0.0.0" && options.host != "::") return options.host;
+  for (const std::string& name : tls::namesOfThisMachine())
+    if (name.find('.') != std::string::npos && name.find_first_not_of("0123456789.") == std::string::npos &&
+        !name.starts_with("127."))
+      return name;
+  return {};
+}
+
+}  // namespace clothstream::program

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include "server/program/authentication.h"
+
+#include <cstdio>
+#include <exception>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/identity/pairing_codes.h"
+
+namespace clothstream::program {
+
+std::shared_ptr<identity::Authenticator> makeAuthenticator(const ProgramOptions& options) {
+  const bool asks = options.pairing || !options.tokenKeys.empty();
+  if (!asks && !isReachable(options)) return nullptr;
+  if (!asks && isLoopback(options.host))
+    spdlog::warn(
+        "--insecure: everyone who reaches {} through a program of this machine can join, and counts "
+        "as a program of this machine (docs/identity.md)",
+        options.publicNames.front());
+  else if (!asks)
+    spdlog::warn("--insecure: everyone who reaches {} can join, with the role {} (docs/identity.md)",
+                 options.host, scene::nameOf(options.anonymousRole));
+  if (asks && !isLoopback(options.host) && !options.tlsSelf && options.tlsCertificate.empty())
+    spdlog::warn("tokens and pairing codes travel without encryption: add --tls self or --tls-certificate");
+  return std::make_shared<identity::Authenticator>(
+      identity::AuthenticatorOptions{.keyDirectory = options.tokenKeys,
+                                     .audience = options.tokenAudience,
+                                     .pairing = options.pairing,
+                                     .stateDirectory = options.stateDirectory,
+                                     .anonymousRole = options.anonymousRole});
+}
+
+void reload(identity::Authenticator& authenticator) {
+  try {
+    authenticator.reload();
+    spdlog::info("the keys of tokens are read again");
+  } catch (const std::exception& failure) {
+    spdlog::error("the old keys of tokens stay in use: {}", failure.what());
+  }
+}
+
+void printPairingCode(identity::Authenticator& authenticator) {
+  const auto made = authenticator.makeCode(scene::Role::owner, identity::Clock::now());
+  if (!made) return;
+  fmt::print("pair    {} makes an owner for {} minutes; SIGUSR2 shows a new code\n", made->code,
+             identity::PairingCodes::kValid.count());
+  std::fflush(stdout);
+}
+
+}  // namespace clothstream::program

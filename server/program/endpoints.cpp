@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+#include "server/program/endpoints.h"
+
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <optional>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/discovery/announcement.h"
+#include "server/endpoint/grpc/grpc_endpoint.h"
+#include "server/endpoint/web/web_endpoint.h"
+#include "server/program/addresses.h"
+#include "server/program/authentication.h"
+#include "server/program/monitoring.h"
+#include "server/program/tls.h"
+#include "server/tls/qr_code.h"
+
+namespace clothstream::program {
+namespace {
+
+// Directory of the page in a build or an installation, relative to the program. Empty if it does not exist.
+std::filesystem::path pageNextToProgram() {
+  const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  for (const char* place : {"../web", "../share/clothstream/web"})
+    if (const auto page = programs / place; std::filesystem::exists(page / "index.html"))
+      return page.lexically_normal();
+  return {};
+}
+
+// Prints what a person needs to reach the page from another device: address, QR code and fingerprint.
+void printHomeAddresses(const ProgramOptions& options, std::uint16_t port, const std::string& fingerprint) {
+  fmt::print("key     {}\n", fingerprint);
+  const std::string host = addressInNetwork(options);
+  if (host.empty()) return;
+  const std::string address = fmt::format("https://{}/", localAddress(host, port));
+  fmt::print("type    {}\n{}", address, tls::qrCode(address));
+}
+
+// Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP if there is neither TLS nor an authenticator.
+// SIGHUP reloads the certificate and the keys of tokens, SIGUSR1 prints the report, SIGUSR2 a pairing code.
+// `tls` and `authenticator` may be null.
+void waitForStop(const Signals& signals, const ProgramOptions& options, tls::ServerTls* tls,
+                 identity::Authenticator* authenticator, const std::function<std::string()>& report) {
+  using Clock = std::chrono::steady_clock;
+  std::optional<Clock::time_point> end;
+  if (options.stopAfter) end = Clock::now() + *options.stopAfter;
+  while (!end || Clock::now() < *end) {
+    const int signal = end ? signals.wait(*end - Clock::now()) : signals.wait();
+    const bool reloads = tls != nullptr || authenticator != nullptr;
+    if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && !reloads)) return;
+    if (signal == SIGHUP && tls != nullptr) reload(*tls);
+    if (signal == SIGHUP && !options.tokenKeys.empty()) reload(*authenticator);
+    try {
+      if (signal == SIGUSR2 && options.pairing) printPairingCode(*authenticator);
+      if (signal != SIGUSR1) continue;
+      fmt::print("{}", report());
+      std::fflush(stdout);
+    } catch (const std::exception& failure) {  // such as a closed pipe or a lack of memory
+      spdlog::error("printing after a signal failed: {}", failure.what());
+    }
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const ProgramOptions& options,
+                                        const Signals& signals, StartGuard& start,
+                                        identity::Authenticator* authenticator,
+                                        monitoring::MonitoringEndpoint* monitoring, const std::string& intro,
+                                        const std::function<std::string()>& report) {
+  std::unique_ptr<EndGuard> guard;
+  const std::shared_ptr<tls::ServerTls> tls = openTls(options);
+  {
+    const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
+    if (page.empty())
+      spdlog::warn("no page found next to the program: build the target clothstream_page, or use --page DIR");
+    const endpoint::ConnectionLimits limits{
+        .connectionsPerAddress = options.maxConnectionsPerAddress,
+        .connectionsPerSecond = options.connectionsPerSecond,
+        .connectionsPerSecondOfAddress = options.connectionsPerSecondPerAddress};
+    const endpoint::WebEndpoint web(server, {.host = options.host,
+                                             .port = options.port,
+                                             .pageDirectory = page,
+                                             .maxConnections = options.maxConnections,
+                                             .connections = limits,
+                                             .publicNames = options.publicNames,
+                                             .tls = tls,
+                                             .hostInNetwork = addressInNetwork(options),
+                                             .showsFingerprint = options.tlsSelf,
+                                             .allowedOrigins = options.allowedOrigins});
+    const endpoint::GrpcEndpoint rpc(server, {.host = options.host,
+                                              .port = options.grpcPort,
+                                              .maxStreams = options.maxConnections,
+                                              .connections = limits,
+                                              .reflects = options.tokenKeys.empty() && !options.pairing,
+                                              .tls = tls});
+
+    fmt::print("{}page    http{}://{}/\ngRPC    {}{}\n", intro, tls ? "s" : "",
+               localAddress(options.host, web.port()), tls ? "https://" : "",
+               localAddress(options.host, rpc.port()));
+    if (options.tlsSelf) printHomeAddresses(options, web.port(), tls->fingerprint());
+    std::fflush(stdout);
+    if (options.pairing) printPairingCode(*authenticator);
+    const Monitored monitored(monitoring, server);
+    std::optional<discovery::Announcement> announcement;
+    if (options.announces)
+      announcement.emplace(
+          discovery::AnnouncedServer{.pagePort = web.port(),
+                                     .grpcPort = rpc.port(),
+                                     .encrypted = tls != nullptr,
+                                     .fingerprint = options.tlsSelf ? tls->fingerprint() : "",
+                                     .version = kServerName});
+    const std::optional<SteadyTime> stopAt = start.finish();
+    if (!stopAt) waitForStop(signals, options, tls.get(), authenticator, report);
+    spdlog::info("stopping");
+    guard = std::make_unique<EndGuard>(
+        signals, stopAt.value_or(std::chrono::steady_clock::now() + options.server.drain));
+    announcement.reset();
+    monitored.stopping();
+    server.stop();
+  }
+  fmt::print("{}", report());
+  return guard;
+}
+
+}  // namespace clothstream::program

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// `clothstream-server play`: a recording, served through both endpoints.
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/hosting/scene_server.h"
+#include "server/program/authentication.h"
+#include "server/program/commands.h"
+#include "server/program/endpoints.h"
+#include "server/program/guards.h"
+#include "server/program/monitoring.h"
+#include "server/recording/playback.h"
+
+namespace clothstream::program {
+
+int play(const ProgramOptions& options, const Signals& signals) {
+  StartGuard start(signals, options.server.drain);
+  const auto monitoring = openMonitoring(options);
+  auto recording = recording::RecordedStream::open(options.recording);
+  if (!recording) throw std::runtime_error(recording.error());
+  if (options.playback.from > recording->length())
+    throw std::runtime_error(fmt::format("--from: {} s is after the end of {}; use 0 to {:.3f}",
+                                         options.playback.from, options.recording, recording->length()));
+  if (recording->truncated())
+    spdlog::warn("{} is truncated or damaged at its end; the readable part is played", options.recording);
+  const std::string scene = recording->scene();
+  const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
+                                        recording->length(), scene, recording->device());
+  std::unique_ptr<EndGuard> guard;  // outlives the server
+  hosting::ServerOptions serverOptions = options.server;
+  serverOptions.authenticator = makeAuthenticator(options);
+  hosting::SceneServer server(
+      scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), serverOptions);
+  guard = openEndpoints(server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
+                        intro, [&] { return server.report(); });
+  return 0;
+}
+
+}  // namespace clothstream::program

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#include "server/program/scenes.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/messages/scene_file.h"
+#include "server/messages/scene_message.h"
+
+namespace clothstream::program {
+namespace {
+
+model::Scene loaded(messages::Result<model::Scene> scene) {
+  if (!scene) throw std::runtime_error(scene.error().text);
+  return std::move(*scene);
+}
+
+// The largest stream rate that divides the new simulation rate and is not above the scene's own.
+std::uint32_t streamRateFor(const model::Scene& scene, std::uint32_t rate) {
+  std::uint32_t streamRate = std::min(scene.streamRate, rate);
+  while (rate % streamRate != 0) --streamRate;
+  return streamRate;
+}
+
+}  // namespace
+
+model::Scene loadScene(const std::string& nameOrPath) {
+  return loaded(messages::loadScene(nameOrPath));
+}
+
+model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
+  if (options.rate) {
+    scene.streamRate = streamRateFor(scene, *options.rate);
+    scene.simulationRate = *options.rate;
+  }
+  scene.substeps = options.substeps.value_or(scene.substeps);
+  scene.stream.maxError = options.maxError.value_or(scene.stream.maxError);
+  scene.stream.normals = options.normals.value_or(scene.stream.normals);
+  scene.stream.coding = options.coding.value_or(scene.stream.coding);
+  if (options.temporalLayers)
+    scene.stream.temporalLayers = static_cast<std::uint8_t>(*options.temporalLayers);
+  if (options.qualities) scene.stream.qualities = static_cast<std::uint8_t>(*options.qualities);
+  auto checked = messages::toScene(messages::toMessage(scene));
+  if (!checked)
+    throw std::runtime_error(
+        fmt::format("scene '{}' with these options: {}", scene.name, checked.error().text));
+  return std::move(*checked);
+}
+
+std::vector<model::Scene> loadScenes(const ProgramOptions& options, std::vector<std::string>& builtIn) {
+  builtIn = messages::namedScenes();
+  std::vector<model::Scene> scenes;
+  for (const std::string& name : messages::namedScenes()) scenes.push_back(loadScene(name));
+  for (const std::filesystem::path& file : options.sceneFiles) {
+    model::Scene scene = loaded(messages::readSceneFile(file));
+    std::erase_if(scenes, [&](const model::Scene& other) { return other.name == scene.name; });
+    std::erase(builtIn, scene.name);
+    scenes.push_back(std::move(scene));
+  }
+  for (model::Scene& scene : scenes)
+    if (scene.name == options.server.defaultScene) scene = adjusted(std::move(scene), options);
+  return scenes;
+}
+
+}  // namespace clothstream::program

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// `clothstream-server serve`: scenes on a device, served through both endpoints.
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "server/hosting/scene_server.h"
+#include "server/model/scene.h"
+#include "server/program/authentication.h"
+#include "server/program/commands.h"
+#include "server/program/devices.h"
+#include "server/program/endpoints.h"
+#include "server/program/guards.h"
+#include "server/program/monitoring.h"
+#include "server/program/scenes.h"
+#include "server/recording/recordings.h"
+#include "server/saved_state/saved_state.h"
+
+namespace clothstream::program {
+namespace {
+
+std::uint64_t bytesOf(double megabytes) {
+  return static_cast<std::uint64_t>(megabytes * 1e6);
+}
+
+}  // namespace
+
+int serve(const ProgramOptions& options, const Signals& signals) {
+  StartGuard start(signals, options.server.drain);
+  const auto monitoring = openMonitoring(options);
+  std::vector<std::string> builtIn;
+  std::vector<model::Scene> scenes = loadScenes(options, builtIn);
+  std::string sceneList;
+  for (const model::Scene& scene : scenes)
+    sceneList +=
+        fmt::format("{}{} ({} vertices)", sceneList.empty() ? "" : ", ", scene.name, scene.nodeCount());
+
+  std::unique_ptr<EndGuard> guard;  // outlives everything that may not end
+  // Outlives the scenes, because it waits for their last records.
+  std::optional<recording::Recordings> recordings;
+  std::shared_ptr<saved_state::SavedState> savedState;
+  if (options.keepsScenes)
+    savedState = std::make_shared<saved_state::SavedState>(
+        saved_state::SavedStateOptions{.directory = options.stateDirectory,
+                                       .maxBytes = bytesOf(options.stateLimitMb),
+                                       .minFreeBytes = bytesOf(options.keepFreeMb)});
+  if (!options.recordDirectory.empty())
+    recordings.emplace(
+        recording::RecorderOptions{
+            .directory = options.recordDirectory,
+            .serverName = kServerName,
+            .maxBytes = bytesOf(options.recordLimitMb),
+            .disk = std::make_shared<recording::DiskShare>(
+                options.recordDirectory, recording::DiskLimits{.maxBytes = bytesOf(options.recordingsLimitMb),
+                                                               .minFreeBytes = bytesOf(options.keepFreeMb)})},
+        !options.recordsOnRequest);
+  const auto first = std::ranges::find(scenes, options.server.defaultScene, &model::Scene::name);
+  const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
+  hosting::ServerOptions serverOptions = options.server;
+  serverOptions.device = deviceOptions(options, nodes);
+  const std::shared_ptr<identity::Authenticator> authenticator = makeAuthenticator(options);
+  serverOptions.authenticator = authenticator;
+  serverOptions.journals = [&](const model::Scene& scene) {
+    return recordings ? recordings->add(scene.name) : nullptr;
+  };
+  serverOptions.store = savedState;
+  serverOptions.guestScenes = std::move(builtIn);
+  hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
+  const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
+  guard = openEndpoints(server, options, signals, start, authenticator.get(), monitoring.get(),
+                        fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList),
+                        report);
+  return 0;
+}
+
+}  // namespace clothstream::program

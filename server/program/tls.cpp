@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include "server/program/tls.h"
+
+#include <chrono>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+
+#include "server/tls/certificate.h"
+
+namespace clothstream::program {
+namespace {
+
+// Names and addresses that a certificate of the server's own has.
+std::vector<std::string> namesOf(const ProgramOptions& options) {
+  std::vector<std::string> names = tls::namesOfThisMachine();
+  for (const std::string& name : options.publicNames)
+    if (name != "*") names.push_back(name);
+  return names;
+}
+
+}  // namespace
+
+std::shared_ptr<tls::ServerTls> openTls(const ProgramOptions& options) {
+  std::string clientCa;
+  if (!options.tlsClientCa.empty()) clientCa = tls::readCertificates(options.tlsClientCa);
+  if (options.tlsSelf) {
+    if (options.stateDirectory.empty())
+      throw std::runtime_error("--tls self needs a directory for its key: use --state-dir DIR");
+    return std::make_shared<tls::ServerTls>(
+        [directory = options.stateDirectory / "tls", names = namesOf(options)] {
+          return tls::selfSigned(directory, names);
+        },
+        std::move(clientCa));
+  }
+  if (options.tlsCertificate.empty()) return nullptr;
+  if (tls::othersMayRead(options.tlsKey))
+    spdlog::warn("--tls-key: other accounts of this machine may read {}; use chmod 600",
+                 options.tlsKey.string());
+  return std::make_shared<tls::ServerTls>(
+      [chain = options.tlsCertificate, key = options.tlsKey] {
+        tls::Certificate certificate = tls::readCertificate(chain, key);
+        if (tls::expiryOf(certificate) < std::chrono::system_clock::now())
+          spdlog::warn("the certificate in {} has expired; clients will refuse it", chain.string());
+        return certificate;
+      },
+      std::move(clientCa));
+}
+
+void reload(tls::ServerTls& tls) {
+  try {
+    tls.reload();
+    spdlog::info("the certificate is read again");
+  } catch (const std::exception& failure) {
+    spdlog::error("the old certificate stays in use: {}", failure.what());
+  }
+}
+
+}  // namespace clothstream::program
