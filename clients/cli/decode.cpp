@@ -56,7 +56,7 @@ Expected<DecodeFigures> decodeFile(const DecodeOptions& options) {
   const codec::ClothLayout& cloth = layout.cloths[0];
   DecodeFigures figures{{cloth.columns, cloth.rows, recording->head().frames}};
   const auto decoder = codec::Decoder::make(layout);
-  if (!decoder) return makeError(kLost, "not enough memory for {} vertices", cloth.vertexCount);
+  if (!decoder) return makeError(kFailed, "not enough memory for {} vertices", cloth.vertexCount);
   auto out = orError(kNotWritten, files::MotionWriter::create(options.out, figures.shape));
   if (!out) return tl::unexpected(out.error());
   const float sign = recording->head().side == files::Side::back ? -1.0f : 1.0f;

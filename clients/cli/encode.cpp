@@ -172,7 +172,7 @@ Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
   const auto encoder = codec::Encoder::make(layout);
   const auto decoder = codec::Decoder::make(layout);
   if (!encoder || !decoder)
-    return makeError(kLost, "not enough memory for {} vertices", figures.shape.vertexCount());
+    return makeError(kFailed, "not enough memory for {} vertices", figures.shape.vertexCount());
   std::vector<std::byte> packet(encoder->packetBound());
   Progress progress("encode", figures.shape.frames);
   for (std::uint32_t frame = 0;;) {

@@ -17,6 +17,7 @@ enum ExitCode : int {
   kLost = 5,
   kNotWritten = 6,
   kUnreadable = 7,
+  kFailed = 8,
 };
 
 struct ExitMeaning {
@@ -24,16 +25,18 @@ struct ExitMeaning {
   const char* text;
 };
 
+// The table of docs/command-line.md has the same texts.
 inline constexpr ExitMeaning kExitMeanings[] = {
     {kOk, "success"},
     {kHashMismatch,
-     "--hash or load found a frame that differs from the server's, or encode one that breaks its promise"},
+     "--hash or load found a frame that differs from the server's, or encode one that is not as promised"},
     {kUsage, "wrong arguments"},
     {kUnreachable, "no server answers"},
-    {kRefused, "the server refuses (unknown scene, value not allowed)"},
+    {kRefused, "the server refuses: an unknown scene, a value that is not allowed"},
     {kLost, "the stream was lost"},
     {kNotWritten, "a file cannot be written, or writing was interrupted"},
-    {kUnreadable, "a file cannot be read or is damaged"},
+    {kUnreadable, "a file cannot be read, or its content is wrong"},
+    {kFailed, "clothstream itself failed, for example for a lack of memory"},
 };
 
 // Text for --help, in lines of at most 107 columns.

@@ -23,6 +23,7 @@ class LoadCommand {
   void check();
   // As the user wrote it.
   const std::string& address() const { return address_; }
+  bool usesWeb() const { return web_; }
   // SIGINT and SIGTERM must be blocked in every thread; they end the test early.
   ExitCode run(const ServerAddress& address) const;
 

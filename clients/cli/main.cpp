@@ -261,6 +261,11 @@ int run(int argc, char** argv) {
     sceneCommands.check();
     loadCommand.check();
     if (loadCommand.parsed()) address = loadCommand.address();
+    if (loadCommand.usesWeb() && !proof.code.empty())
+      throw CLI::ValidationError(
+          "--pair",
+          "does not work with --web, because pairing uses gRPC. First pair with \"clothstream list HOST:PORT "
+          "--pair CODE\", which keeps a token in ~/.local/state/clothstream/tokens; then use --token FILE");
     joinOptions.address = listOptions.address = setOptions.address = trust.addressOf(address);
     if (setCommand.parsed() && !changesAnything(setOptions))
       throw CLI::ValidationError("set", "nothing to change is given; see clothstream set --help");
@@ -294,6 +299,6 @@ int main(int argc, char** argv) {
     return run(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "clothstream: %s\n", error.what());
-    return kLost;
+    return kFailed;
   }
 }

@@ -101,6 +101,7 @@ void Mailbox::deliver(const PublishedFrame& frame) {
       adaptation_.made(frame.quality, frame.layer, frame.message->size(), frame.complete);
     else if (!frame.key || (shape_.qualities > 1 && frame.quality != chosenQuality()))
       return;
+    sinceKey_ = frame.key ? 0 : sinceKey_ + 1;
     if (!hold(frame) || !hasRoom()) return;
     endpointWaits_ = false;
   }
@@ -179,7 +180,7 @@ RequestedFrames Mailbox::requested(Clock::time_point now) {
     const auto bit = static_cast<std::uint8_t>(1u << quality);
     requested |= {.qualities = bit, .keyFrames = key ? bit : std::uint8_t{0}};
   };
-  if (!needsKey_) add(quality_, requestsKey_);
+  if (!needsKey_) add(quality_, requestsKey_ && sinceKey_ >= kMinKeyFrameDistance);
   if (needsKey_ ? endpointWaits_ && hasRoom() : chosenQuality() != quality_) add(chosenQuality(), true);
   return requested;
 }
@@ -219,6 +220,11 @@ void Mailbox::restart() {
   decodable_.reset();
   leavesOut_ = false;
   needsKey_ = true;
+}
+
+bool Mailbox::isRestarting() const {
+  const std::lock_guard lock(mutex_);
+  return needsKey_ && !decodable_;
 }
 
 void Mailbox::requestKeyFrame() {

@@ -55,6 +55,8 @@ class Mailbox {
   static constexpr std::size_t kMaxHeldBytes = 1024 * 1024;
   static constexpr std::size_t kMinWindow = 2;
   static constexpr std::size_t kMaxWindow = 24;
+  // Minimum distance, in frames, from one key frame to the next one that a requestKeyFrame() causes.
+  static constexpr std::uint32_t kMinKeyFrameDistance = 16;
 
   // `wake` is called, from any thread, when next() may have something or closed() became true. It must not
   // block.
@@ -84,7 +86,10 @@ class Mailbox {
   [[nodiscard]] bool acknowledge(std::uint64_t tick, Clock::time_point now);
   // The peer cannot continue decoding: it restarts with a key frame.
   void restart();
-  // The peer continues decoding and asks for a key frame soon.
+  // Returns whether the peer was sent no frame since restart(), or since it subscribed. The next frame is
+  // then a key frame, and another restart() changes nothing.
+  bool isRestarting() const;
+  // The peer continues decoding and asks for a key frame soon. One key frame answers all requests before it.
   void requestKeyFrame();
 
   // Accepts no more frames and announcements, and drops those that were not sent. `last` is the last message,
@@ -144,7 +149,8 @@ class Mailbox {
   OperatingPoint reported_;  // newest one sent to the peer
   bool streaming_ = false;   // the description is sent
   bool needsKey_ = true;
-  bool requestsKey_ = false;  // the peer asked for a key frame and continues without it
+  bool requestsKey_ = false;    // the peer asked for a key frame and continues without it
+  std::uint32_t sinceKey_ = 0;  // frames of quality_ since the newest key frame
   std::uint8_t quality_ = 0;
   // Tick of the newest frame of each layer that is held, or else was sent.
   std::array<std::optional<std::uint64_t>, codec::kMaxTemporalLayers> chain_;

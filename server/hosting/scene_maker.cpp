@@ -113,7 +113,11 @@ void SceneMaker::deleteUnused(std::chrono::milliseconds lifetime) {
     v1::DeleteSceneRequest request;
     request.set_name(scene->name());
     spdlog::info("{}: unused for {} s", scene->name(), schedule::seconds(lifetime));
-    attempt("deleteScene", [&] { return removeNow(request); });
+    // A peer that joins in this moment gets this text.
+    const std::string why = fmt::format(
+        "has expired, because it had no participants for {} s (--scene-lifetime): create it again",
+        schedule::seconds(lifetime));
+    attempt("deleteScene", [&] { return removeNow(request, why); });
   }
 }
 
@@ -179,7 +183,8 @@ tl::expected<void, v1::Error> SceneMaker::enqueue(const char* call, Work work, D
 
 tl::expected<void, v1::Error> SceneMaker::remove(v1::DeleteSceneRequest request, DeleteDone done) {
   return enqueue(
-      "deleteScene", [this, request = std::move(request)] { return removeNow(request); }, std::move(done));
+      "deleteScene", [this, request = std::move(request)] { return removeNow(request, "was deleted"); },
+      std::move(done));
 }
 
 tl::expected<std::shared_ptr<scene::Journal>, v1::Error> SceneMaker::journalOf(
@@ -354,8 +359,8 @@ void SceneMaker::undoCreation(const std::shared_ptr<scene::LiveScene>& scene) {
   });
 }
 
-tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
-    const v1::DeleteSceneRequest& request) {
+tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(const v1::DeleteSceneRequest& request,
+                                                                       const std::string& why) {
   const std::shared_ptr<scene::LiveScene> scene =
       request.name().empty() ? nullptr : server_.find(request.name());
   if (!scene) return tl::unexpected(SceneServer::State::noSuchScene(request.name()));
@@ -366,8 +371,8 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(
                     "with this one",
                     request.name()));
   const delivery::SharedBytes last =
-      delivery::notice(v1::NOTICE_KIND_SCENE_DELETED,
-                       fmt::format("the scene '{}' was deleted", scene->name()), scene->tick.load());
+      delivery::notice(v1::NOTICE_KIND_SCENE_DELETED, fmt::format("the scene '{}' {}", scene->name(), why),
+                       scene->tick.load());
   server_.erase(*scene);
   const auto finish = [&] {
     scene->roster.close(last);

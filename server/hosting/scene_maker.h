@@ -72,7 +72,9 @@ class SceneMaker {
                                                                      const std::string& scene) const;
   // Removes a scene that cannot be used, because its creation was cancelled or has failed.
   void undoCreation(const std::shared_ptr<scene::LiveScene>& scene);
-  tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request);
+  // The scene's participants get a notice: "the scene 'name' " and then `why`.
+  tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request,
+                                                             const std::string& why);
   tl::expected<v1::StartRecordingResponse, v1::Error> startNow(
       const v1::StartRecordingRequest& request) const;
   tl::expected<v1::StopRecordingResponse, v1::Error> stopNow(const v1::StopRecordingRequest& request) const;

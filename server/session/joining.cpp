@@ -100,7 +100,11 @@ void Session::failToJoin(scene::Roster::Refusal refusal, const scene::LiveScene&
   using Refusal = scene::Roster::Refusal;
   switch (refusal) {
     case Refusal::closed:
-      return fail(v1::ERROR_CODE_NOT_FOUND, fmt::format("'{}' was just closed", scene.name()));
+      if (std::string why = scene.quarantined(); !why.empty())
+        return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED, std::move(why));
+      return fail(v1::ERROR_CODE_NOT_FOUND,
+                  fmt::format("'{}' was just deleted, or has expired without participants: create it again",
+                              scene.name()));
     case Refusal::removed:
       return fail(v1::ERROR_CODE_REMOVED, fmt::format("an owner removed you from '{}'", scene.name()));
     case Refusal::late:

@@ -144,8 +144,10 @@ void Session::dispatchInScene(const v1::ClientMessage& message, Clock::time_poin
                             message.frame_ack().tick())});
       return;
     case Body::kKeyFrameRequest:
-      if (!allowed(keyFrameRate_, "key frame requests")) return;
-      return message.key_frame_request().early() ? mailbox_->requestKeyFrame() : mailbox_->restart();
+      // A key frame costs all subscribers of its quality. The mailbox limits early requests.
+      if (message.key_frame_request().early()) return mailbox_->requestKeyFrame();
+      if (!mailbox_->isRestarting() && allowed(keyFrameRate_, "key frame requests")) mailbox_->restart();
+      return;
     default:
       return refuse({v1::ERROR_CODE_MALFORMED_MESSAGE,
                      "the message has no body, or one that this server does not know"});

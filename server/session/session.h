@@ -161,7 +161,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
 
   TokenBucket poseRate_{480, 120};
   TokenBucket changeRate_{60, 30};
-  TokenBucket keyFrameRate_{10, 5};
+  TokenBucket keyFrameRate_{1, 3};
   TokenBucket pingRate_{20, 150};  // clients send many pings at the start
   TokenBucket queryRate_{20, 20};
   TokenBucket controlRate_{10, 10};

@@ -126,6 +126,7 @@ TEST_F(Load, RefusesInvalidArguments) {
                                                     {"--participants", "0"},
                                                     {"--seconds", "0"},
                                                     {"--server-pid", "4000000000"},
+                                                    {"--pair", "123456", "--web"},
                                                     {"--web", "host:port"}}) {
     const auto program = load(arguments);
     EXPECT_EQ(program->waitForEnd(kEnd), 2) << arguments[0];

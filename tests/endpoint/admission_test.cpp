@@ -51,6 +51,10 @@ TEST(AdmissionTest, LimitsConnectionsOfAnAddressButNotOfThisMachine) {
   EXPECT_TRUE(admit("2001:db8::1") && admit("2001:db8::2"));
   EXPECT_FALSE(admit("2001:db8::3")) << "the same first 64 bits";
   EXPECT_TRUE(admit("2001:db8:0:1::3"));
+  EXPECT_TRUE(admit("fe80::1%2") && admit("fe80::1%2"));
+  EXPECT_FALSE(admit("fe80::1%2"));
+  EXPECT_TRUE(admit("fe80::2%2")) << "another machine of the network";
+  EXPECT_TRUE(admit("fe80::1%3")) << "another network";
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(admit(i % 2 == 0 ? "127.0.0.1" : "::1"));
   open.clear();
   EXPECT_TRUE(admit("192.0.2.1"));

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/address_v4.hpp>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -26,6 +27,7 @@
 #include "grpc/health/v1/health.pb.h"
 #include "server/endpoint/grpc/answer_budget.h"
 #include "server/endpoint/grpc/call_rate.h"
+#include "server/endpoint/grpc/caller.h"
 #include "server/hosting/server_state.h"
 #include "server/tls/certificate.h"
 #include "tests/endpoint/rpc_client.h"
@@ -263,6 +265,10 @@ TEST(CallRateTest, LimitsCallsOfAnAddressWithoutItsPort) {
   EXPECT_EQ(callsAllowed("ipv4:192.0.2.2:50000"), kAtOnce);
   EXPECT_EQ(callsAllowed("ipv6:%5B2001:db8::1%5D:50000"), kAtOnce);
   EXPECT_EQ(callsAllowed("ipv6:%5B2001:db8::2%5D:50001"), 0) << "the same first 64 bits";
+  EXPECT_EQ(callsAllowed("ipv6:%5Bfe80::1%252%5D:50000"), kAtOnce);
+  EXPECT_EQ(callsAllowed("ipv6:%5Bfe80::1%252%5D:50001"), 0);
+  EXPECT_EQ(callsAllowed("ipv6:%5Bfe80::2%252%5D:50000"), kAtOnce) << "another machine of the network";
+  EXPECT_EQ(endpoint::addressOf("ipv6:%5Bfe80::1%252%5D:50000"), boost::asio::ip::make_address("fe80::1%2"));
   EXPECT_TRUE(rate.take("ipv4:192.0.2.1:50000", now + std::chrono::seconds(1)));
 }
 

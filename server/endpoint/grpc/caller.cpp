@@ -14,6 +14,7 @@ boost::asio::ip::address addressOf(const std::string& peer) {
   constexpr std::size_t kBracket = 3;  // %5B and %5D
   if (host.starts_with("%5B") && host.size() > 2 * kBracket)
     host = host.substr(kBracket, host.size() - 2 * kBracket);
+  if (const std::size_t scope = host.find("%25"); scope != std::string::npos) host.replace(scope, 3, "%");
   boost::system::error_code unknown;  // counts as a separate address
   return boost::asio::ip::make_address(host, unknown);
 }

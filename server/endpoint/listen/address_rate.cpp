@@ -20,7 +20,9 @@ std::string addressKey(ip::address address) {
     const auto bytes = address.to_v4().to_bytes();
     return {bytes.begin(), bytes.end()};
   }
-  const auto bytes = address.to_v6().to_bytes();
+  const ip::address_v6 v6 = address.to_v6();
+  const auto bytes = v6.to_bytes();
+  if (v6.is_link_local()) return std::string(bytes.begin(), bytes.end()) + std::to_string(v6.scope_id());
   return {bytes.begin(), bytes.begin() + kPrefixBytes};
 }
 

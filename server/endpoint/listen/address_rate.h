@@ -13,7 +13,9 @@
 namespace clothstream::endpoint {
 
 // Addresses with the same key share their limits: those of IPv6 with the same first 64 bits, because one peer
-// usually has all of them. Empty for the loopback addresses, which all programs of this machine share.
+// usually has all of them. Link-local addresses are separate, because all machines of a network share these
+// bits; their key includes the network (scope). Empty for the loopback addresses, which all programs of this
+// machine share.
 std::string addressKey(boost::asio::ip::address address);
 
 // Not thread-safe.

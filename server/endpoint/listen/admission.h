@@ -22,9 +22,8 @@ struct ConnectionLimits {
   double connectionsPerSecondOfAddress = 20;
 };
 
-// Thread-safe. Addresses of IPv6 count by their first 64 bits, because one peer usually has all addresses
-// that begin with them. All programs of this machine share the loopback addresses, which therefore have no
-// limit of their own.
+// Thread-safe. Addresses count by their key (addressKey). All programs of this machine share the loopback
+// addresses, which therefore have no limit of their own.
 class Admission {
  public:
   // Counts one connection while it lives. It may outlive the Admission.

@@ -264,20 +264,53 @@ TEST_F(MailboxTest, RestartBeginsWithAKeyFrame) {
   EXPECT_EQ(taken(frames), Ticks{5});
 }
 
+TEST_F(MailboxTest, RestartsAreMergedUntilTheKeyFrame) {
+  join();
+  EXPECT_TRUE(mailbox.isRestarting()) << "its first frame is a key frame";
+  std::vector<PublishedFrame> frames{frame(1, true)};
+  mailbox.deliver(frames[0]);
+  EXPECT_EQ(taken(frames), Ticks{1});
+  EXPECT_FALSE(mailbox.isRestarting());
+  mailbox.restart();
+  EXPECT_TRUE(mailbox.isRestarting());
+  mailbox.deliver(frames.emplace_back(frame(2)));
+  EXPECT_TRUE(mailbox.isRestarting());
+  mailbox.deliver(frames.emplace_back(frame(3, true)));
+  EXPECT_FALSE(mailbox.isRestarting());
+}
+
+TEST_F(MailboxTest, SlowReaderThatMustContinueWithAKeyFrameIsNotRestarting) {
+  join();
+  std::vector<PublishedFrame> frames{frame(1, true), frame(2)};
+  for (const PublishedFrame& each : frames) mailbox.deliver(each);
+  EXPECT_EQ(taken(frames), (Ticks{1, 2}));
+  for (std::uint64_t tick = 3; tick <= 6; ++tick) mailbox.deliver(frames.emplace_back(frame(tick)));
+  ASSERT_FALSE(wantsKeyFrame()) << "no room";
+  EXPECT_FALSE(mailbox.isRestarting()) << "a restart would make room";
+}
+
 TEST_F(MailboxTest, KeepsSendingFramesUntilTheRequestedKeyFrame) {
   join();
-  std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3)};
-  mailbox.deliver(frames[0]);
+  std::vector<PublishedFrame> frames;
+  std::uint64_t tick = 0;
+  const auto stream = [&](bool key) {
+    ++tick;
+    mailbox.deliver(frames.emplace_back(frame(tick, key)));
+    EXPECT_EQ(taken(frames), Ticks{tick});
+    EXPECT_TRUE(mailbox.acknowledge(tick, now));
+  };
+  stream(true);
   EXPECT_FALSE(wantsKeyFrame());
-  mailbox.requestKeyFrame();
+  for (std::uint32_t i = 0; i < Mailbox::kMinKeyFrameDistance; ++i) {
+    mailbox.requestKeyFrame();
+    EXPECT_FALSE(wantsKeyFrame()) << i << " frames after a key frame";
+    stream(false);
+  }
   EXPECT_TRUE(wantsKeyFrame());
-  mailbox.deliver(frames[1]);
+  stream(false);
   EXPECT_TRUE(wantsKeyFrame());
-  EXPECT_EQ(taken(frames), (Ticks{1, 2}));
-  ASSERT_TRUE(mailbox.acknowledge(2, now));
-  mailbox.deliver(frames.emplace_back(frame(4, true)));
+  stream(true);
   EXPECT_FALSE(wantsKeyFrame());
-  EXPECT_EQ(taken(frames), Ticks{4});
 }
 
 TEST_F(MailboxTest, LimitsControlMessages) {

@@ -2,11 +2,20 @@
 // Joining, frames, input and notices, as peers see them.
 #include <algorithm>
 #include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
 #include <set>
+#include <string_view>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/details/null_mutex.h>
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/spdlog.h>
 
 #include "server/model/material.h"
 #include "tests/serving/server_test.h"
@@ -485,6 +494,67 @@ TEST_F(JoinTest, StoppingServerNotifiesAllPeers) {
   }
   TestPeer tooLate(server());
   EXPECT_EQ(tooLate.readToTheEnd().notice().kind(), v1::NOTICE_KIND_SERVER_STOPPING);
+}
+
+// While it lives, it calls `action` with each line of the log, on the thread that logs it. No other thread
+// may log while it is created or destroyed.
+class LogTap {
+ public:
+  explicit LogTap(std::function<void(std::string_view)> action)
+      : sink_(std::make_shared<Sink>(std::move(action))) {
+    spdlog::default_logger()->sinks().push_back(sink_);
+  }
+  ~LogTap() { std::erase(spdlog::default_logger()->sinks(), sink_); }
+  LogTap(const LogTap&) = delete;
+  LogTap& operator=(const LogTap&) = delete;
+
+ private:
+  // Without a lock, because the action may write to the log.
+  class Sink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
+   public:
+    explicit Sink(std::function<void(std::string_view)> action) : action_(std::move(action)) {}
+
+   private:
+    void sink_it_(const spdlog::details::log_msg& line) override {
+      action_({line.payload.data(), line.payload.size()});
+    }
+    void flush_() override {}
+
+    const std::function<void(std::string_view)> action_;
+  };
+
+  const spdlog::sink_ptr sink_;
+};
+
+TEST_F(JoinTest, JoinOfAnExpiringSceneSaysWhyItEnds) {
+  std::promise<std::unique_ptr<TestPeer>> joined;
+  // The server writes this line after it has found the scene empty, and before it deletes the scene.
+  const LogTap tap([&](std::string_view line) {
+    if (!line.starts_with("idle: unused for")) return;
+    auto peer = std::make_unique<TestPeer>(server());
+    peer->hello("idle");
+    joined.set_value(std::move(peer));
+  });
+  ServerOptions options;
+  options.sceneLifetime = std::chrono::milliseconds(100);
+  START(options);
+  v1::CreateSceneRequest request;
+  request.set_named("small");
+  request.set_name("idle");
+  std::promise<bool> created;
+  server().createScene(request, [&](const auto& made) { created.set_value(made.has_value()); });
+  EXPECT_TRUE(created.get_future().get());
+  auto arrival = joined.get_future();
+  ASSERT_EQ(arrival.wait_for(TestPeer::kPatience), std::future_status::ready);
+  {
+    const std::unique_ptr<TestPeer> peer = arrival.get();
+    const v1::Notice last = peer->readToTheEnd().notice();
+    EXPECT_EQ(last.kind(), v1::NOTICE_KIND_SCENE_DELETED);
+    EXPECT_EQ(last.text(),
+              "the scene 'idle' has expired, because it had no participants for 0.1 s (--scene-lifetime): "
+              "create it again");
+  }
+  stop();
 }
 
 TEST_F(JoinTest, ReportShowsTheStagesOfATick) {

@@ -172,5 +172,29 @@ TEST_F(MisbehaviourTest, FloodOfKeyFrameRequestsGivesFewKeyFrames) {
             elapsed / seconds(SceneHost::kKeyFrameInterval) + 1);
 }
 
+TEST_F(MisbehaviourTest, OnePeerGetsAFewKeyFramesThenOneASecond) {
+  culprit->join();
+  v1::ClientMessage request;
+  request.mutable_key_frame_request();
+  // Whether the answer is a key frame, and not a refusal.
+  const auto getsKeyFrame = [&] {
+    culprit->send(request);
+    const Body answer = culprit->readUntil([&](const Body& message) {
+      return message.has_error() || (message.has_frame() && culprit->frames().back().key);
+    });
+    if (answer.has_error()) {
+      EXPECT_EQ(answer.error().code(), v1::ERROR_CODE_RATE_LIMITED);
+    }
+    return !answer.has_error();
+  };
+  int keyFrames = 0;
+  const auto start = Clock::now();
+  while (keyFrames < 30 && getsKeyFrame()) ++keyFrames;
+  EXPECT_GE(keyFrames, 3);
+  EXPECT_LE(keyFrames, 3 + seconds(Clock::now() - start));
+  culprit->readFrames(60);  // more than a second
+  EXPECT_TRUE(getsKeyFrame()) << "a refused peer recovers";
+}
+
 }  // namespace
 }  // namespace clothstream::session
