@@ -40,7 +40,7 @@ server/program     | server/options server/identity server/tls server/discovery 
 server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
-clients/core/touch | clients/core/core.h clients/core/wire
+clients/core/touch | clients/core/core.h
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
 clients/grpc       | clients/core proto/tls clothstream
 clients/library    | clients/core clients/grpc

@@ -421,6 +421,11 @@ std::span<const float> Client::playedNormals() const {
   return playOut_ && playOut_->shows() ? playOut_->normals(description_.layout) : normals();
 }
 
+std::uint64_t Client::shownTick() const {
+  if (playOut_) return playOut_->shows() ? playedTick_ : 0;
+  return decoder_ && decoder_->hasFrame() ? decoder_->tick() : 0;
+}
+
 const std::vector<Collider>& Client::playedColliders() const {
   return playOut_ && playOut_->shows() ? playOut_->colliders() : colliders();
 }

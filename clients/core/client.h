@@ -49,6 +49,9 @@ class Client {
   // Four numbers per joint: {x, y, z, radius}. Empty removes the hand.
   void setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs);
   void setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs);
+  // Among the positions that are shown.
+  std::optional<cs_cloth_point> nearestPoint(const Vec3& point, float maxDistance) const;
+  std::optional<cs_cloth_point> castRay(const Vec3& origin, const Vec3& direction, float maxDistance) const;
   void wantContacts(bool wants, std::uint64_t nowUs);
   void move(AttachmentPose attachment, std::uint64_t nowUs);
   void change(const ParameterChange& change);
@@ -109,6 +112,9 @@ class Client {
 
  private:
   void sendPoses(std::uint64_t nowUs);
+  // Tick of the frame that is shown; 0 before the first.
+  std::uint64_t shownTick() const;
+  std::optional<cs_cloth_point> seen(std::optional<cs_cloth_point> point) const;
   void sendHello();
   bool isConnected() const { return state_ != CS_STATE_RECONNECTING || welcomed_; }
   bool mayCollide() const;
@@ -172,6 +178,7 @@ class Client {
   double decodeMs_ = 0;
   cs_stage_statistics stages_{};  // members about the newest frame
   std::unique_ptr<PlayOut> playOut_;
+  std::uint64_t playedTick_ = 0;  // of the last play()
   std::vector<std::string> scenes_;
   TickEvents events_;
   SimulationReport report_;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/core/client.h"
+#include "clients/core/touch/pick.h"
 
 namespace clothstream::client {
 
@@ -25,8 +26,28 @@ void Client::setHand(std::uint32_t side, std::span<const float> joints, std::uin
 }
 
 void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
-  poses_.grabs.assign(grabs.begin(), grabs.end());
+  poses_.grabs.clear();
+  for (const cs_grab& grab : grabs) {
+    OwnGrab& own = poses_.grabs.emplace_back(OwnGrab{grab, std::nullopt});
+    if (grab.has_place == 1) own.place = triangleOf(grab.place.triangle, description_);
+  }
   sendPoses(nowUs);
+}
+
+std::optional<cs_cloth_point> Client::seen(std::optional<cs_cloth_point> point) const {
+  if (point) point->tick = shownTick();
+  return point;
+}
+
+std::optional<cs_cloth_point> Client::nearestPoint(const Vec3& point, float maxDistance) const {
+  return seen(client::nearestPoint({description_.triangles, playedPositions()},
+                                   {point[0], point[1], point[2]}, maxDistance));
+}
+
+std::optional<cs_cloth_point> Client::castRay(const Vec3& origin, const Vec3& direction,
+                                              float maxDistance) const {
+  return seen(client::castRay({description_.triangles, playedPositions()}, {origin[0], origin[1], origin[2]},
+                              {direction[0], direction[1], direction[2]}, maxDistance));
 }
 
 void Client::wantContacts(bool wants, std::uint64_t nowUs) {
@@ -69,7 +90,9 @@ bool Client::setPlayOut(const cs_play_out_options* options) {
 
 std::optional<cs_played> Client::play(std::uint64_t nowUs, std::uint64_t displayUs) {
   if (!playOut_) return std::nullopt;
-  return playOut_->play(clock_.serverTimeUs(nowUs), clock_.serverTimeUs(displayUs));
+  const cs_played played = playOut_->play(clock_.serverTimeUs(nowUs), clock_.serverTimeUs(displayUs));
+  playedTick_ = played.tick;
+  return played;
 }
 
 void Client::change(const ParameterChange& change) {

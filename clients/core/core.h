@@ -340,6 +340,15 @@ typedef struct cs_own_collider {
   float radius, length, size[3]; /* m; numbers that the shape does not have are ignored */
 } cs_own_collider;
 
+/* Point on a cloth as it is shown. */
+typedef struct cs_cloth_point {
+  uint32_t triangle;   /* its corners are the entries 3 * triangle to 3 * triangle + 2 of cs_triangles */
+  float second, third; /* barycentric coordinates of the second and third corner */
+  float position[3];   /* m */
+  float distance;      /* m, from the given point or from the origin of the ray */
+  uint64_t tick;       /* of the frame that is shown */
+} cs_cloth_point;
+
 /* Grab of this participant (Grab in session.proto). NaN means the server's default. */
 typedef struct cs_grab {
   uint32_t id; /* a new id takes hold; an id that is missing in the next call lets go */
@@ -348,6 +357,11 @@ typedef struct cs_grab {
   float radius, reach;  /* m */
   float max_force;      /* N */
   float slip_distance;  /* m */
+  /* 1: the grab takes hold of `place`, wherever the cloth has moved on the server by then, and draws it to
+   * `position` within 0.2 s; `reach` has no effect. 0: it takes what is near `position` on the server. Only
+   * triangle, coordinates and tick of the place are used, and only when the grab starts. */
+  uint32_t has_place;
+  cs_cloth_point place;
 } cs_grab;
 
 /* HandSide of session.proto. */
@@ -365,6 +379,10 @@ typedef struct cs_grab_event {
   uint32_t grab_id;
   uint32_t kind;     /* cs_grab_event_kind, or a newer kind */
   uint32_t vertices; /* number of vertices that the grab holds now */
+  /* Only when a grab with a place took hold: distance between its position and the place at that moment, m,
+   * and ticks since the frame in which the place was seen (0: unknown). */
+  float distance;
+  uint64_t ticks_since_seen;
 } cs_grab_event;
 
 /* ContactEventKind of session.proto. */
@@ -392,6 +410,15 @@ void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t
  * participant. Fails, and changes nothing, if the side or the count is not allowed. */
 int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count,
                 uint64_t now_us) CS_NOEXCEPT;
+/* Finds the point of a cloth that is nearest to a point, or the first one that a ray meets, among the
+ * positions that are shown: cs_played_positions if play-out is on, else cs_positions. The direction may have
+ * any length. Fails, and changes nothing, without such a point within max_distance metres, or if a number is
+ * not finite. */
+int cs_nearest_point(const cs_client* client, const float* point3, float max_distance,
+                     cs_cloth_point* out) CS_NOEXCEPT;
+int cs_cast_ray(const cs_client* client, const float* origin3, const float* direction3, float max_distance,
+                cs_cloth_point* out) CS_NOEXCEPT;
+
 /* Replaces the grabs of this participant. At most CS_MAX_GRABS are used; the rest is ignored. */
 void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
 /* Moves an attachment of the scene; it stays there. orientation4 may be NULL: no rotation. */
@@ -578,7 +605,8 @@ typedef struct cs_playback {
   int32_t loop, paused; /* 0 or 1 */
 } cs_playback;
 
-/* Requests an early key frame, so that a file can start with it. Frames before it are decoded as usual. */
+/* Requests an early key frame, so that a file can start with it. Frames before it are decoded as usual. It
+ * comes at least 16 frames after the key frame before it. */
 void cs_request_key_frame(cs_client* client, uint64_t now_us) CS_NOEXCEPT;
 
 /* Fails if the scene is not a recording, or its state is not known yet. */

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -11,6 +12,17 @@
 #include "clients/core/core_handle.h"
 
 using namespace clothstream::client;
+
+namespace {
+
+// Returns 0 and leaves *out unchanged without a point, else 1.
+int write(const std::optional<cs_cloth_point>& point, cs_cloth_point* out) {
+  if (!point) return 0;
+  *out = *point;
+  return 1;
+}
+
+}  // namespace
 
 void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) noexcept {
   std::array<cs_own_collider, CS_MAX_COLLIDERS> colliders{};
@@ -39,6 +51,18 @@ int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t 
 
 void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) noexcept {
   client->client.setGrabs(std::span(grabs, std::min(count, CS_MAX_GRABS)), now_us);
+}
+
+int cs_nearest_point(const cs_client* client, const float* point3, float max_distance,
+                     cs_cloth_point* out) noexcept {
+  return write(client->client.nearestPoint({point3[0], point3[1], point3[2]}, max_distance), out);
+}
+
+int cs_cast_ray(const cs_client* client, const float* origin3, const float* direction3, float max_distance,
+                cs_cloth_point* out) noexcept {
+  return write(client->client.castRay({origin3[0], origin3[1], origin3[2]},
+                                      {direction3[0], direction3[1], direction3[2]}, max_distance),
+               out);
 }
 
 void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,

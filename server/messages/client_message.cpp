@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "server/messages/grab_place.h"
 #include "server/messages/hands.h"
 #include "server/messages/limits.h"
 #include "server/messages/shapes.h"
@@ -48,7 +49,7 @@ void readColliders(Checks& checks, const Path& poses, const v1::ColliderPoses& m
     }
 }
 
-void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
+void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& message, const model::Scene& scene,
                model::ParticipantPoses& to) {
   checks.count(poses / "grabs", static_cast<std::size_t>(message.grabs_size()), 0,
                limits::kMaxParticipantGrabs);
@@ -64,6 +65,7 @@ void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& messa
       grab.maxForce = checks.number(path / "maxForce", from.max_force(), limits::kGrabForce);
     if (from.has_slip_distance())
       grab.slipDistance = checks.number(path / "slipDistance", from.slip_distance(), limits::kSlipDistance);
+    if (from.has_place()) grab.place = toGrabPlace(checks, path / "place", from.place(), scene);
     to.grabs.push_back(grab);
   }
 }
@@ -145,7 +147,7 @@ Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const 
   const Path path("colliderPoses");
   model::ParticipantPoses poses;
   readColliders(checks, path, message, poses);
-  readGrabs(checks, path, message, poses);
+  readGrabs(checks, path, message, scene, poses);
   readAttachments(checks, path, message, scene, poses);
   poses.wantsContacts = message.contact_events();
   return std::move(checks).result(std::move(poses));

@@ -19,6 +19,19 @@ struct ParticipantCollider {
   Shape shape = Sphere{};  // sphere, capsule or box
 };
 
+// Point of a cloth, on one of its triangles.
+struct ClothPoint {
+  std::uint32_t cloth = 0;      // index in the scene
+  std::uint32_t triangle = 0;   // index in the cloth (triangleAt())
+  float second = 0, third = 0;  // barycentric coordinates of the triangle's second and third node
+};
+
+// Point that a participant saw and takes hold of.
+struct GrabPlace {
+  ClothPoint point;
+  std::uint64_t seenTick = 0;  // tick of the frame that the participant saw
+};
+
 // Grab of a participant on cloth; session.proto describes Grab. Metres, newtons.
 struct Grab {
   std::uint32_t id = 0;  // unique for this participant; the same id is the same grab
@@ -26,6 +39,7 @@ struct Grab {
   float radius = 0.03f, reach = 0.1f;
   float maxForce = 20;
   float slipDistance = 0.1f;
+  std::optional<GrabPlace> place = {};  // absent: it grabs what is near its pose
 };
 
 struct AttachmentPose {

@@ -141,16 +141,22 @@ Mesh makeMesh(MeshShape shape, const Cancellation& cancellation) {
 
 std::vector<Triangle> clothTriangles(const Cloth& cloth) {
   if (cloth.mesh) return cloth.mesh->shape.triangles;
-  const std::uint32_t columns = cloth.grid.columns;
-  std::vector<Triangle> triangles;
-  triangles.reserve(std::size_t{2} * (cloth.grid.rows - 1) * (columns - 1));
-  for (std::uint32_t row = 0; row + 1 < cloth.grid.rows; ++row)
-    for (std::uint32_t column = 0; column + 1 < columns; ++column) {
-      const std::uint32_t a = row * columns + column, b = a + 1, e = a + columns, f = e + 1;
-      triangles.push_back({a, e, b});
-      triangles.push_back({b, e, f});
-    }
+  std::vector<Triangle> triangles(triangleCount(cloth));
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) triangles[i] = triangleAt(cloth, i);
   return triangles;
+}
+
+std::uint32_t triangleCount(const Cloth& cloth) {
+  if (cloth.mesh) return static_cast<std::uint32_t>(cloth.mesh->shape.triangles.size());
+  return 2 * (cloth.grid.rows - 1) * (cloth.grid.columns - 1);
+}
+
+Triangle triangleAt(const Cloth& cloth, std::uint32_t index) {
+  if (cloth.mesh) return cloth.mesh->shape.triangles[index];
+  const std::uint32_t columns = cloth.grid.columns, quad = index / 2;
+  const std::uint32_t a = quad / (columns - 1) * columns + quad % (columns - 1), b = a + 1;
+  const std::uint32_t e = a + columns, f = e + 1;
+  return index % 2 == 0 ? Triangle{a, e, b} : Triangle{b, e, f};
 }
 
 }  // namespace clothstream::model

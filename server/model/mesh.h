@@ -57,5 +57,8 @@ Mesh makeMesh(MeshShape shape, const Cancellation& cancellation = {});
 // Triangles of a grid or mesh, in the order in which forces and normals are accumulated. A grid's quad with
 // corners a b above e f is (a, e, b), (b, e, f).
 std::vector<Triangle> clothTriangles(const Cloth& cloth);
+std::uint32_t triangleCount(const Cloth& cloth);
+// Triangle `index` of them, less than triangleCount().
+Triangle triangleAt(const Cloth& cloth, std::uint32_t index);
 
 }  // namespace clothstream::model

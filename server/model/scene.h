@@ -136,6 +136,8 @@ struct Attachment {
 // Maximum speed of an attached node, m/s.
 inline constexpr float kMaxAttachmentSpeed = 30;
 
+// Time in which a grab draws its place to itself, seconds.
+inline constexpr double kGrabDrawSeconds = 0.2;
 // Fraction of a grabbed node's distance from its place that a substep corrects.
 inline constexpr float kGrabCorrectionFraction = 0.25f;
 

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -44,7 +46,7 @@ struct MonitoringEndpoint::State {
   enum class Phase : std::uint8_t { starting, serving, stopping };
 
   const std::string version;
-  const std::chrono::milliseconds deviceSilence;
+  const std::chrono::milliseconds deviceSilence, metricsLifetime;
 
   std::mutex mutex;  // protects the next two
   Phase phase = Phase::starting;
@@ -58,12 +60,15 @@ struct MonitoringEndpoint::State {
   net::steady_timer acceptTimer{io}, probeTimer{io};
   std::weak_ptr<void> accepting;  // expired unless accept() or its timer waits
   bool probing = false;           // probeTimer waits
+  std::string metricsText;        // the newest
+  std::optional<schedule::Clock::time_point> metricsBuilt;
   std::uint16_t port;
   std::thread thread;
 
   explicit State(const MonitoringOptions& options)
       : version(options.version),
         deviceSilence(options.deviceSilence),
+        metricsLifetime(options.metricsLifetime),
         context{.names = endpoint::HostNames(options.publicNames),
                 .answer = [this](std::string_view target) { return answer(target); }},
         acceptor(endpoint::listen(io, options.host, options.port, "--metrics-port")),
@@ -129,14 +134,21 @@ struct MonitoringEndpoint::State {
     return {.status = http::status::not_found, .body = "There are /metrics, /healthz and /readyz.\n"};
   }
 
-  Answer metrics() const {
+  Answer metrics() {
+    if (!metricsBuilt || schedule::Clock::now() - *metricsBuilt >= metricsLifetime) {
+      metricsText = buildMetrics();
+      metricsBuilt = schedule::Clock::now();
+    }
+    return {.contentType = "text/plain; version=0.0.4; charset=utf-8", .body = metricsText};
+  }
+
+  std::string buildMetrics() const {
     Families families = programFamilies(version, server != nullptr ? server->deviceInfo().name : "");
     if (server != nullptr) {
       append(families, serverFamilies(*server));
       append(families, sceneFamilies(server->state().scenesNow()));
     }
-    return {.contentType = "text/plain; version=0.0.4; charset=utf-8",
-            .body = prometheus::TextSerializer().Serialize(families)};
+    return prometheus::TextSerializer().Serialize(families);
   }
 
   Answer health() const {

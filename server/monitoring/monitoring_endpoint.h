@@ -24,6 +24,9 @@ struct MonitoringOptions {
   // The server is unhealthy if its device thread has not answered for this long. The thread is asked five
   // times in this time.
   std::chrono::milliseconds deviceSilence{5'000};
+  // Metrics that were built less than this time ago are served again, because building them takes locks of
+  // all scenes. 0: they are built for each request.
+  std::chrono::milliseconds metricsLifetime{200};
 };
 
 // Answers GET and HEAD for these paths, one request per connection:

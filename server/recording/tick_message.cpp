@@ -3,6 +3,9 @@
 #include "server/recording/tick_message.h"
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <variant>
 
 #include <fmt/format.h>
@@ -85,6 +88,11 @@ void writeGrab(const simulation::Grab& grab, v1::AppliedGrip& message) {
   message.set_reach(grab.reach);
   message.set_max_force(grab.maxForce);
   message.set_slip_distance(grab.slipDistance);
+  message.set_left_at_start(grab.leftAtStart);
+  message.set_left_at_end(grab.leftAtEnd);
+  if (!grab.place) return;
+  message.mutable_place_nodes()->Assign(grab.place->nodes.begin(), grab.place->nodes.end());
+  message.mutable_place_weights()->Assign(grab.place->weights.begin(), grab.place->weights.end());
 }
 
 // Reads numbers unchanged: quaternions are not normalised again. Remembers whether any number is impossible.
@@ -104,6 +112,11 @@ class Numbers {
     if (std::abs(pose.orientation.norm() - 1) > messages::limits::kUnitTolerance) good_ = false;
     return pose;
   }
+  std::uint32_t integer(std::uint32_t value, std::uint32_t end) {
+    if (value >= end) good_ = false;
+    return value;
+  }
+  void require(bool condition) { good_ = good_ && condition; }
   bool good() const { return good_; }
 
  private:
@@ -135,7 +148,20 @@ model::Shape shapeOf(Numbers& numbers, const v1::AppliedCollider& message, const
   return known ? scene.colliders[message.id()].shape : model::Shape{};
 }
 
-simulation::Grab grabOf(Numbers& numbers, const v1::AppliedGrip& message) {
+std::optional<simulation::WeightedNodes> placeOf(Numbers& numbers, const v1::AppliedGrip& message,
+                                                 std::uint32_t nodeCount) {
+  if (message.place_nodes().empty() && message.place_weights().empty()) return std::nullopt;
+  simulation::WeightedNodes place;
+  const bool complete = message.place_nodes_size() == 3 && message.place_weights_size() == 3;
+  numbers.require(complete);
+  for (int i = 0; complete && i < 3; ++i) {
+    place.nodes[static_cast<std::size_t>(i)] = numbers.integer(message.place_nodes(i), nodeCount);
+    place.weights[static_cast<std::size_t>(i)] = numbers.number(message.place_weights(i));
+  }
+  return place;
+}
+
+simulation::Grab grabOf(Numbers& numbers, const v1::AppliedGrip& message, std::uint32_t nodeCount) {
   if (message.state() == v1::APPLIED_GRIP_STATE_FREE) return {};
   return {.state = message.state() == v1::APPLIED_GRIP_STATE_TAKES ? simulation::Grab::State::takes
                                                                    : simulation::Grab::State::holds,
@@ -144,7 +170,10 @@ simulation::Grab grabOf(Numbers& numbers, const v1::AppliedGrip& message) {
           .radius = numbers.number(message.radius(), 0, kMaxSize),
           .reach = numbers.number(message.reach(), 0, kMaxSize),
           .maxForce = numbers.number(message.max_force()),
-          .slipDistance = numbers.number(message.slip_distance())};
+          .slipDistance = numbers.number(message.slip_distance()),
+          .place = placeOf(numbers, message, nodeCount),
+          .leftAtStart = numbers.number(message.left_at_start(), 0, 1),
+          .leftAtEnd = numbers.number(message.left_at_end(), 0, 1)};
 }
 
 }  // namespace
@@ -192,7 +221,8 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
                                 numbers.number(collider.friction())});
   }
   for (const v1::Pose& pose : message.attachments()) inputs.attachments.push_back(numbers.pose(pose));
-  for (const v1::AppliedGrip& grab : message.grips()) inputs.grabs.push_back(grabOf(numbers, grab));
+  for (const v1::AppliedGrip& grab : message.grips())
+    inputs.grabs.push_back(grabOf(numbers, grab, scene.nodeCount()));
   if (!numbers.good()) return wrong("one of its numbers is out of range");
   return inputs;
 }

@@ -3,6 +3,7 @@
 #include "server/reference/attachments.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace clothstream::reference {
@@ -60,14 +61,25 @@ void Attachments::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pos
     const Grab& grab = grabs[g];
     if (grab.state != Grab::State::takes) continue;
     status_[g] = {};
+    Vec3 begin = grab.start.position;
+    double reach = grab.reach;
+    if (grab.place) {
+      const std::span<const Vec3> positions = cloths[grab.place->cloth].positions();
+      begin.setZero();
+      for (std::size_t i = 0; i < 3; ++i) begin += grab.place->weights[i] * positions[grab.place->nodes[i]];
+      reach = 0;
+      for (const std::size_t node : grab.place->nodes)
+        reach = std::max(reach, (positions[node] - begin).norm());
+    }
+    status_[g].offset = begin - grab.start.position;
     const auto distance = [&](std::size_t c, std::size_t node) {
-      return (cloths[c].positions()[node] - grab.start.position).norm();
+      return (cloths[c].positions()[node] - begin).norm();
     };
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t c = 0; c < cloths.size(); ++c)
       for (std::size_t node = 0; node < held_[c].size(); ++node)
         if (cloths[c].inverseMasses()[node] > 0) nearest = std::min(nearest, distance(c, node));
-    if (nearest > std::max(grab.radius, grab.reach)) continue;
+    if (nearest > std::max(grab.radius, reach)) continue;
     const double within = std::max(grab.radius, nearest);
     for (std::size_t c = 0; c < cloths.size(); ++c)
       for (std::size_t node = 0; node < held_[c].size(); ++node) {
@@ -76,7 +88,7 @@ void Attachments::begin(std::vector<ReferenceCloth>& cloths, std::span<const Pos
         if (!isFree || cloths[c].inverseMasses()[node] == 0 || distance(c, node) > within) continue;
         // The first of several beginning grabs gets the node.
         if (held && held->grab < g && grabs[held->grab].state == Grab::State::takes) continue;
-        held = {g, grab.start.orientation.conjugate() * (cloths[c].positions()[node] - grab.start.position)};
+        held = {g, grab.start.orientation.conjugate() * (cloths[c].positions()[node] - begin)};
         ++status_[g].taken;
       }
   }
@@ -95,10 +107,15 @@ void Attachments::apply(std::vector<ReferenceCloth>& cloths, std::span<const Gra
       if (!held) continue;
       const Grab& grab = grabs[held->grab];
       const ColliderStep step = stepOf(grab.start, grab.end, substep, substeps, tickSeconds);
-      const Vec3 before = placeIn(step.before, held->place), after = placeIn(step.after, held->place);
+      const auto offsetAt = [&](double substepsDone) -> Vec3 {
+        const double progress = substepsDone / substeps;
+        return std::lerp(grab.leftAtStart, grab.leftAtEnd, progress) * status_[held->grab].offset;
+      };
+      const Vec3 before = placeIn(step.before, held->place) + offsetAt(substep);
+      const Vec3 after = placeIn(step.after, held->place) + offsetAt(substep + 1.0);
       Vec3& position = cloth.positions()[node];
       Vec3& velocity = cloth.velocities()[node];
-      const bool slips = (after - position).norm() > grab.slipDistance;
+      const bool slips = grab.leftAtEnd == 0 && (after - position).norm() > grab.slipDistance;
       if (grab.state == Grab::State::free || slips) {
         if (grab.state != Grab::State::free) ++status_[held->grab].slipped;
         held.reset();

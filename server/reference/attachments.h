@@ -2,6 +2,8 @@
 // Attachments, tethers and grabs, in double precision.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -22,6 +24,13 @@ struct Grab {
   double radius = 0.03, reach = 0.1;
   double maxForce = 20;
   double slipDistance = 0.1;
+  struct Place {
+    std::size_t cloth = 0;
+    std::array<std::size_t, 3> nodes = {};
+    std::array<double, 3> weights = {};
+  };
+  std::optional<Place> place = {};
+  double leftAtStart = 0, leftAtEnd = 0;
 };
 
 class Attachments {
@@ -40,6 +49,7 @@ class Attachments {
   // Status of each grab: nodes that it grabbed, and grabbed nodes that slipped away since.
   struct Status {
     std::uint32_t taken = 0, slipped = 0;
+    Vec3 offset = Vec3::Zero();  // from the grab's start to its place when it began
   };
   const std::vector<Status>& status() const { return status_; }
 

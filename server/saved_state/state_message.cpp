@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "server/messages/grab_place.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/vectors.h"
@@ -71,6 +72,8 @@ void write(const Slot& slot, v1::SavedGrab& message) {
   message.set_max_force(slot.now.maxForce);
   message.set_slip_distance(slot.now.slipDistance);
   if (slot.vertices) message.set_vertices(*slot.vertices);
+  if (slot.now.place) messages::write(*slot.now.place, *message.mutable_place());
+  message.set_age(slot.age);
 }
 
 Slot toSlot(const v1::SavedGrab& message) {
@@ -84,7 +87,8 @@ Slot toSlot(const v1::SavedGrab& message) {
                     .slipDistance = message.slip_distance()},
             .before = toPose(message.pose()),
             .phase = Slot::Phase::holds,
-            .number = message.number()};
+            .number = message.number(),
+            .age = message.age()};
   if (message.has_vertices()) slot.vertices = message.vertices();
   return slot;
 }
@@ -122,7 +126,12 @@ bool readGrabs(const v1::SavedCheckpoint& message, const model::Scene& scene,
   if (static_cast<std::size_t>(message.grabs_size()) > simulation::kMaxGrabs) return false;
   for (const v1::SavedGrab& grab : message.grabs()) {
     state.slots.push_back(toSlot(grab));
-    const Slot& slot = state.slots.back();
+    Slot& slot = state.slots.back();
+    if (grab.has_place()) {
+      messages::Checks checks;
+      slot.now.place = messages::toGrabPlace(checks, messages::Path("place"), grab.place(), scene);
+      if (checks.failed()) return false;
+    }
     const bool holds = slot.phase == Slot::Phase::holds;
     // The device must know what the grab holds.
     if (holds && (!isFinite(slot.now.pose) || state.slots.size() > held.grabs.size())) return false;

@@ -5,8 +5,27 @@
 #include <utility>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/model/mesh.h"
 
 namespace clothstream::scene {
+namespace {
+
+simulation::WeightedNodes nodesOf(const model::Scene& scene, const model::ClothPoint& point) {
+  std::uint32_t firstNode = 0;
+  for (std::uint32_t cloth = 0; cloth < point.cloth; ++cloth) firstNode += scene.cloths[cloth].nodeCount();
+  const model::Triangle triangle = model::triangleAt(scene.cloths[point.cloth], point.triangle);
+  return {.nodes = {firstNode + triangle[0], firstNode + triangle[1], firstNode + triangle[2]},
+          .weights = {1 - point.second - point.third, point.second, point.third}};
+}
+
+// Part of the distance between frame and place that is left this many ticks after the grab started. It falls
+// from 1 to 0 along a cubic whose slope is 0 at both ends.
+float distanceLeft(std::uint32_t age, double tickSeconds) {
+  const double part = age * tickSeconds / model::kGrabDrawSeconds;
+  return part >= 1 ? 0 : static_cast<float>(1 - part * part * (3 - 2 * part));
+}
+
+}  // namespace
 
 GrabsAndAttachments::GrabsAndAttachments(const model::Scene& scene) {
   std::size_t attachments = 0;
@@ -33,7 +52,9 @@ void GrabsAndAttachments::place(std::uint64_t participant, std::span<const model
   }
   for (const model::Grab& grab : grabs) {
     if (Slot* known = find(participant, grab.id)) {
+      const std::optional<model::GrabPlace> place = known->now.place;
       known->now = grab;
+      known->now.place = place;
       continue;
     }
     auto place = std::ranges::find(state_.slots, Slot::Phase::empty, &Slot::phase);
@@ -71,6 +92,13 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
             .reach = slot.now.reach,
             .maxForce = slot.now.maxForce,
             .slipDistance = slot.now.slipDistance};
+    if (takes) slot.age = 0;
+    if (slot.now.place) {
+      if (takes) grab.place = nodesOf(scene, slot.now.place->point);
+      grab.leftAtStart = distanceLeft(slot.age, scene.tickSeconds());
+      grab.leftAtEnd = distanceLeft(slot.age + 1, scene.tickSeconds());
+    }
+    ++slot.age;
     slot.before = slot.now.pose;
     slot.phase = Slot::Phase::holds;
   }
@@ -78,12 +106,13 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
 
 void GrabsAndAttachments::addEvents(std::span<const simulation::GrabStatus> grabs, v1::TickEvents& events) {
   const auto add = [&](std::uint64_t participant, std::uint32_t id, v1::GrabEventKind kind,
-                       std::uint32_t vertices) {
+                       std::uint32_t vertices) -> v1::GrabEvent& {
     v1::GrabEvent& event = *events.add_grabs();
     event.set_participant_id(participant);
     event.set_grab_id(id);
     event.set_kind(kind);
     event.set_vertices(vertices);
+    return event;
   };
   for (const auto& [participant, id] : released_) add(participant, id, v1::GRAB_EVENT_KIND_RELEASED, 0);
   for (std::size_t i = 0; i < grabs.size(); ++i) {
@@ -91,8 +120,14 @@ void GrabsAndAttachments::addEvents(std::span<const simulation::GrabStatus> grab
     if (slot.phase != Slot::Phase::holds) continue;
     const std::uint32_t vertices = grabs[i].taken - grabs[i].slipped;
     if (slot.vertices == vertices) continue;
-    add(slot.participant, slot.now.id,
-        slot.vertices ? v1::GRAB_EVENT_KIND_SLIPPED : v1::GRAB_EVENT_KIND_TAKEN, vertices);
+    if (slot.vertices) {
+      add(slot.participant, slot.now.id, v1::GRAB_EVENT_KIND_SLIPPED, vertices);
+    } else {
+      v1::GrabEvent& taken = add(slot.participant, slot.now.id, v1::GRAB_EVENT_KIND_TAKEN, vertices);
+      taken.set_distance(grabs[i].offset.norm());
+      const std::uint64_t seenTick = slot.now.place ? slot.now.place->seenTick : 0;
+      if (seenTick != 0 && seenTick < events.tick()) taken.set_ticks_since_seen(events.tick() - seenTick);
+    }
     slot.vertices = vertices;
   }
 }

@@ -29,7 +29,8 @@ class GrabsAndAttachments {
   // Writes grabs and attachments of the next tick, which ends at this simulated time in seconds.
   void advance(const model::Scene& scene, double endSeconds, simulation::TickInputs& inputs);
 
-  // Adds events for the grabs of the newest tick, which is complete. `grabs` is the simulation's result.
+  // Adds events for the grabs of tick `events.tick()`, which is the newest and complete. `grabs` is the simulation's
+  // result.
   void addEvents(std::span<const simulation::GrabStatus> grabs, v1::TickEvents& events);
 
   // Entry at the index of TickInputs::grabs.
@@ -41,6 +42,7 @@ class GrabsAndAttachments {
     std::uint64_t number = 0;  // of the grab, counted from 1; no two grabs have the same
     // Vertices held after the newest tick; nothing before the grab's first tick.
     std::optional<std::uint32_t> vertices = {};
+    std::uint32_t age = 0;  // ticks since the grab started
   };
   // Everything that a later tick depends on, after a complete tick.
   struct State {

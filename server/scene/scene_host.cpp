@@ -483,10 +483,10 @@ void SceneHost::writeReport(double deviceSeconds) {
 void SceneHost::announceEvents() {
   v1::ServerMessage message;
   v1::TickEvents& events = *message.mutable_tick_events();
+  events.set_tick(tick_);
   grabs_.addEvents(onDevice_->simulation.grabs(), events);
   contacts_.addEvents(tick_, scene_, colliders_, onDevice_->simulation.contacts(), events);
   if (events.grabs().empty() && events.contacts().empty()) return;
-  events.set_tick(tick_);
   live_.subscribers.announce(delivery::serialise(message));
 }
 

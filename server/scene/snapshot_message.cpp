@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/scene/snapshot_message.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <span>
@@ -13,42 +14,54 @@ namespace {
 using simulation::HeldNode;
 using simulation::HeldNodes;
 
-constexpr std::size_t kPlaceBytes = 12;
+constexpr std::size_t kVectorBytes = 12;
 
 void write(const HeldNodes& held, v1::HeldNodes& message) {
   std::string& places = *message.mutable_places();
-  places.resize(held.nodes.size() * kPlaceBytes);
+  places.resize(held.nodes.size() * kVectorBytes);
   char* to = places.data();
   for (const HeldNode& node : held.nodes) {
     message.add_nodes(node.node);
     message.add_grabs(node.grab);
-    std::memcpy(to, node.place.data(), kPlaceBytes);
-    to += kPlaceBytes;
+    std::memcpy(to, node.place.data(), kVectorBytes);
+    to += kVectorBytes;
   }
   for (const simulation::GrabStatus& grab : held.grabs) {
     message.add_taken(grab.taken);
     message.add_slipped(grab.slipped);
   }
+  const bool anyPlace = std::ranges::any_of(
+      held.grabs, [](const simulation::GrabStatus& grab) { return grab.offset != model::Vec3::Zero(); });
+  if (!anyPlace) return;
+  for (const simulation::GrabStatus& grab : held.grabs)
+    message.mutable_offsets()->append(reinterpret_cast<const char*>(grab.offset.data()), kVectorBytes);
 }
 
 tl::expected<HeldNodes, std::string> toHeldNodes(const v1::HeldNodes& message, std::uint32_t nodeCount) {
   const auto wrong = [] { return tl::unexpected(std::string("holds nodes that do not fit its scene")); };
   const auto nodes = static_cast<std::size_t>(message.nodes_size());
-  if (message.grabs_size() != message.nodes_size() || message.places().size() != nodes * kPlaceBytes ||
+  if (message.grabs_size() != message.nodes_size() || message.places().size() != nodes * kVectorBytes ||
       nodes > nodeCount || message.slipped_size() != message.taken_size() ||
       static_cast<std::size_t>(message.taken_size()) > simulation::kMaxGrabs)
     return wrong();
   HeldNodes held;
   const char* from = message.places().data();
-  for (int i = 0; i < message.nodes_size(); ++i, from += kPlaceBytes) {
+  for (int i = 0; i < message.nodes_size(); ++i, from += kVectorBytes) {
     HeldNode node{.node = message.nodes(i), .grab = message.grabs(i)};
     if (node.node >= nodeCount || node.grab >= static_cast<std::uint32_t>(message.taken_size()))
       return wrong();
-    std::memcpy(node.place.data(), from, kPlaceBytes);
+    std::memcpy(node.place.data(), from, kVectorBytes);
     held.nodes.push_back(node);
   }
-  for (int i = 0; i < message.taken_size(); ++i)
-    held.grabs.push_back({.taken = message.taken(i), .slipped = message.slipped(i)});
+  const std::string& offsets = message.offsets();
+  const auto grabs = static_cast<std::size_t>(message.taken_size());
+  if (!offsets.empty() && offsets.size() != grabs * kVectorBytes) return wrong();
+  for (std::size_t i = 0; i < grabs; ++i) {
+    simulation::GrabStatus& grab = held.grabs.emplace_back();
+    grab.taken = message.taken(static_cast<int>(i));
+    grab.slipped = message.slipped(static_cast<int>(i));
+    if (!offsets.empty()) std::memcpy(grab.offset.data(), offsets.data() + i * kVectorBytes, kVectorBytes);
+  }
   return held;
 }
 

@@ -492,7 +492,7 @@ std::vector<GrabStatus> ClothSimulation::grabs() const {
   std::vector<GrabStatus> grabs;
   if (pipeline_->attachments)
     for (const shared::GrabReport& report : pipeline_->attachments->report())
-      grabs.push_back({report.grabbed, report.slipped});
+      grabs.push_back(statusOf(report));
   return grabs;
 }
 

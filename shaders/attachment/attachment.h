@@ -39,10 +39,11 @@ struct TetherRecord {
 // Values of GrabRecord::state.
 const float kReleasedGrab = 0;  // releases all of its nodes
 const float kActiveGrab = 1;
-const float kBeginningGrab = 2;  // grabs nodes at this tick's start
+const float kBeginningGrab = 2;         // grabs nodes at this tick's start
+const float kBeginningGrabAtPlace = 3;  // the same, near a point of the cloth instead of its position
 
 // A grab during one tick.
-#define CLOTHSTREAM_GRAB_TEXELS 5
+#define CLOTHSTREAM_GRAB_TEXELS 7
 struct GrabRecord {
   vec3 position;           // at the tick's start
   float squaredSlip;       // m^2; a node slips away beyond this squared distance
@@ -50,9 +51,13 @@ struct GrabRecord {
   float force;             // N, at most
   vec4 orientation;        // unit quaternion at the tick's start
   vec4 orientationChange;  // difference of the quaternions during the tick
-  float state;             // kReleasedGrab, kActiveGrab or kBeginningGrab
+  float state;             // one of the values above
   float squaredRadius;     // m^2
   float squaredReach;      // m^2
+  float left;              // part of GrabReport::offset that is left at the tick's start
+  vec3 nodes;              // of kBeginningGrabAtPlace: its point is the weighted mean of three nodes
+  float leftChange;        // change of `left` during the tick
+  vec3 weights;
   float reserved;
 };
 
@@ -67,7 +72,9 @@ struct GrabReport {
   uint32_t nearest;  // bits of the squared distance of the nearest node when the grab began
   uint32_t grabbed;  // nodes that it grabbed
   uint32_t slipped;  // grabbed nodes that slipped away
-  uint32_t reserved;
+  uint32_t reserved0;
+  vec3 offset;  // from the grab's position to its point when it began, m; 0 without a point
+  float reserved1;
 };
 
 struct AimPush {
@@ -98,8 +105,9 @@ static_assert(sizeof(AttachedRecord) == CLOTHSTREAM_ATTACHED_TEXELS * sizeof(vec
               offsetof(AttachedRecord, place) == 16);
 static_assert(sizeof(FrameRecord) == CLOTHSTREAM_FRAME_TEXELS * sizeof(vec4) && sizeof(TetherRecord) == 16);
 static_assert(sizeof(GrabRecord) == CLOTHSTREAM_GRAB_TEXELS * sizeof(vec4) &&
-              offsetof(GrabRecord, orientation) == 32 && offsetof(GrabRecord, state) == 64);
-static_assert(sizeof(GrabbedNode) == 16 && sizeof(GrabReport) == 16);
+              offsetof(GrabRecord, orientation) == 32 && offsetof(GrabRecord, state) == 64 &&
+              offsetof(GrabRecord, weights) == 96);
+static_assert(sizeof(GrabbedNode) == 16 && sizeof(GrabReport) == 32 && offsetof(GrabReport, offset) == 16);
 }  // namespace clothstream::shared
 #else
 
@@ -126,8 +134,11 @@ GrabRecord grabAt(samplerBuffer table, uint number) {
   vec4 start = texelFetch(table, first);
   vec4 motion = texelFetch(table, first + 1);
   vec4 state = texelFetch(table, first + 4);
+  vec4 nodes = texelFetch(table, first + 5);
+  vec4 weights = texelFetch(table, first + 6);
   return GrabRecord(CLOTHSTREAM_VECTOR(start), CLOTHSTREAM_VECTOR(motion), texelFetch(table, first + 2),
-                    texelFetch(table, first + 3), CLOTHSTREAM_FLOATS(state));
+                    texelFetch(table, first + 3), CLOTHSTREAM_FLOATS(state), CLOTHSTREAM_VECTOR(nodes),
+                    CLOTHSTREAM_VECTOR(weights));
 }
 
 #endif

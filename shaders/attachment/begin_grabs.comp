@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Beginning grabs grab the nodes within their radius. Without such a node they grab the nearest node within
-// reach.
+// Beginning grabs grab the nodes within their radius of the point at which they begin. Without such a node
+// they grab the nearest node within reach.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -27,11 +27,14 @@ void take(uint node) {
   GrabbedNode taken = GrabbedNode(vec3(0.0), 0.0);
   for (uint grab = 0; grab < push.grabCount && taken.grabber == 0.0; ++grab) {
     GrabRecord record = grabAt(grabs, grab);
-    vec3 away = fromGrab(record, position.xyz);
+    if (!begins(record)) {
+      continue;
+    }
+    precise vec3 away = position.xyz - beginOf(record, positions);
     float squared = dotProduct(away, away);
     float nearest = uintBitsToFloat(reports[grab].nearest);
     bool isNear = squared <= record.squaredRadius || (nearest > record.squaredRadius && squared == nearest);
-    if (record.state == kBeginningGrab && isNear) {
+    if (isNear) {
       taken = GrabbedNode(rotateBack(record.orientation, away), float(grab + 1));
       atomicAdd(reports[grab].grabbed, 1);
     }
@@ -40,6 +43,13 @@ void take(uint node) {
 }
 
 void main() {
+  for (uint grab = gl_GlobalInvocationID.x; grab < push.grabCount; grab += invocations()) {
+    GrabRecord record = grabAt(grabs, grab);
+    if (begins(record)) {
+      precise vec3 offset = beginOf(record, positions) - record.position;
+      reports[grab].offset = offset;
+    }
+  }
   for (uint node = gl_GlobalInvocationID.x; node < push.nodeCount; node += invocations()) {
     take(node);
   }

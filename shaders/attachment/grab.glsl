@@ -18,10 +18,24 @@ uint invocations() {
   return gl_NumWorkGroups.x * gl_WorkGroupSize.x;
 }
 
-// Vector from the place where a grab begins to a node.
-vec3 fromGrab(GrabRecord grab, vec3 position) {
-  precise vec3 away = position - grab.position;
-  return away;
+bool begins(GrabRecord grab) {
+  return grab.state >= kBeginningGrab;
+}
+
+// Node `corner` of the point at which a grab begins.
+vec3 nodeOfPoint(GrabRecord grab, int corner, samplerBuffer positions) {
+  return texelFetch(positions, int(grab.nodes[corner])).xyz;
+}
+
+// Point at which a grab begins.
+vec3 beginOf(GrabRecord grab, samplerBuffer positions) {
+  if (grab.state != kBeginningGrabAtPlace) {
+    return grab.position;
+  }
+  precise vec3 point = grab.weights.x * nodeOfPoint(grab, 0, positions) +
+                       grab.weights.y * nodeOfPoint(grab, 1, positions) +
+                       grab.weights.z * nodeOfPoint(grab, 2, positions);
+  return point;
 }
 
 #endif

@@ -55,16 +55,17 @@ State tie(State node, TetherEnd tether) {
   return State(position, velocity);
 }
 
-vec3 placeAt(GrabRecord grab, vec3 inGrab, float progress) {
+vec3 placeAt(GrabRecord grab, vec3 offset, vec3 inGrab, float progress) {
   vec4 orientation = orientationAt(grab.orientation, grab.orientationChange, progress);
-  precise vec3 place = grab.position + progress * grab.motion + rotate(orientation, inGrab);
+  precise float left = grab.left + progress * grab.leftChange;
+  precise vec3 place = grab.position + progress * grab.motion + left * offset + rotate(orientation, inGrab);
   return place;
 }
 
 // Gives a node the velocity of its place in the grab, plus a velocity towards that place, limited by the
 // grab's force.
 State pull(State node, float inverseMass, uint number, GrabRecord grab, vec3 inGrab, vec3 after) {
-  vec3 before = placeAt(grab, inGrab, push.progressBefore);
+  vec3 before = placeAt(grab, reports[number].offset, inGrab, push.progressBefore);
   precise vec3 carried = push.substepRate * (after - before);
   precise vec3 lag = push.substepRate * (after - node.position);
   precise vec3 wanted = (1.0 - push.caughtUp) * (carried - node.velocity) + push.caughtUp * lag;
@@ -110,7 +111,7 @@ void pullNode(uint index) {
   if (kGrabs && taken.grabber > 0.0) {
     uint number = uint(taken.grabber) - 1;
     GrabRecord grab = grabAt(grabs, number);
-    vec3 place = placeAt(grab, taken.place, push.progressAfter);
+    vec3 place = placeAt(grab, reports[number].offset, taken.place, push.progressAfter);
     precise vec3 out_ = place - node.position;
     bool isReleased = grab.state == kReleasedGrab;
     bool slips = dotProduct(out_, out_) > grab.squaredSlip;

@@ -117,7 +117,9 @@ TEST(Grabs, AreSentWithCollidersAndOmitDefaults) {
                .radius = kNan,
                .reach = 0.5f,
                .max_force = kNan,
-               .slip_distance = kNan};
+               .slip_distance = kNan,
+               .has_place = 0,
+               .place = {}};
   cs_set_grabs(joined.client.get(), &grab, 1, 2);
   const v1::ColliderPoses both = joined.sent().collider_poses();
   EXPECT_THAT(both.colliders(), SizeIs(1));
@@ -129,6 +131,7 @@ TEST(Grabs, AreSentWithCollidersAndOmitDefaults) {
   EXPECT_EQ(both.grabs(0).reach(), 0.5f);
   EXPECT_FALSE(both.grabs(0).has_max_force());
   EXPECT_FALSE(both.grabs(0).has_slip_distance());
+  EXPECT_FALSE(both.grabs(0).has_place());
   // A change of colliders does not release the grab.
   cs_set_colliders(joined.client.get(), sphere, 1, 3);
   EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(1));
@@ -145,6 +148,8 @@ TEST(Grabs, EventsAreReported) {
   event.set_grab_id(2);
   event.set_kind(v1::GRAB_EVENT_KIND_SLIPPED);
   event.set_vertices(11);
+  event.set_distance(0.25f);
+  event.set_ticks_since_seen(12);
   EXPECT_EQ(joined.client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_GRABS));
   ASSERT_EQ(cs_grab_event_count(joined.client.get()), 1u);
   cs_grab_event received;
@@ -153,6 +158,8 @@ TEST(Grabs, EventsAreReported) {
   EXPECT_EQ(received.grab_id, 2u);
   EXPECT_EQ(received.kind, static_cast<std::uint32_t>(CS_GRAB_SLIPPED));
   EXPECT_EQ(received.vertices, 11u);
+  EXPECT_EQ(received.distance, 0.25f);
+  EXPECT_EQ(received.ticks_since_seen, 12u);
   EXPECT_EQ(cs_get_grab_event(joined.client.get(), 1, &received), 0);
 }
 

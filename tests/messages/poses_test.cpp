@@ -43,7 +43,12 @@ Result<std::vector<model::ParticipantCollider>> collidersOf(const v1::ColliderPo
 
 TEST(ToPoses, ReturnsGrabsWithDefaultsAndAttachmentsByIndex) {
   v1::ColliderPoses message;
-  message.add_grabs()->set_id(3);
+  v1::Grab& placed = *message.add_grabs();
+  placed.set_id(3);
+  placed.mutable_place()->set_cloth(1);
+  placed.mutable_place()->set_triangle(1);
+  placed.mutable_place()->set_second(0.25f);
+  placed.mutable_place()->set_seen_tick(70);
   v1::Grab& strong = *message.add_grabs();
   strong.set_id(4);
   strong.mutable_pose()->mutable_position()->set_y(2);
@@ -61,6 +66,12 @@ TEST(ToPoses, ReturnsGrabsWithDefaultsAndAttachmentsByIndex) {
   EXPECT_EQ(poses->grabs[0].reach, 0.1f);
   EXPECT_EQ(poses->grabs[0].maxForce, 20);
   EXPECT_EQ(poses->grabs[0].slipDistance, 0.1f);
+  ASSERT_TRUE(poses->grabs[0].place.has_value());
+  EXPECT_EQ(poses->grabs[0].place->point.cloth, 1u);
+  EXPECT_EQ(poses->grabs[0].place->point.triangle, 1u);
+  EXPECT_EQ(poses->grabs[0].place->point.second, 0.25f);
+  EXPECT_EQ(poses->grabs[0].place->seenTick, 70u);
+  EXPECT_FALSE(poses->grabs[1].place.has_value());
   EXPECT_EQ(poses->grabs[1].pose.position, model::Vec3(0, 2, 0));
   EXPECT_EQ(poses->grabs[1].radius, 0.5f);
   EXPECT_EQ(poses->grabs[1].reach, 0);
@@ -93,6 +104,24 @@ TEST(ToPoses, RefusesInvalidGrabsAndAttachmentsWithTheirPath) {
               StartsWith("colliderPoses.grabs[0].maxForce = nan:"));
   EXPECT_THAT(error([](M& m) { m.mutable_grabs(0)->set_slip_distance(-1); }),
               StartsWith("colliderPoses.grabs[0].slipDistance = -1:"));
+  const auto placeError = [&](auto spoil) {
+    return error([&](M& m) { spoil(*m.mutable_grabs(1)->mutable_place()); });
+  };
+  using P = v1::GrabPlace;
+  EXPECT_EQ(placeError([](P&) {}), "no error");
+  EXPECT_THAT(placeError([](P& p) { p.set_cloth(2); }),
+              StartsWith("colliderPoses.grabs[1].place.cloth = 2: must be"));
+  EXPECT_THAT(placeError([](P& p) { p.set_triangle(1u << 31); }),
+              StartsWith("colliderPoses.grabs[1].place.triangle = 2147483648: must be"));
+  EXPECT_THAT(placeError([](P& p) { p.set_second(kNan); }),
+              StartsWith("colliderPoses.grabs[1].place.second = nan:"));
+  EXPECT_THAT(placeError([](P& p) { p.set_third(-0.1f); }),
+              StartsWith("colliderPoses.grabs[1].place.third = -0.1:"));
+  EXPECT_THAT(placeError([](P& p) {
+                p.set_second(0.6f);
+                p.set_third(0.6f);
+              }),
+              StartsWith("colliderPoses.grabs[1].place = second + third = 1.2: must be at most 1"));
   EXPECT_THAT(error([](M& m) {
                 for (std::uint32_t id = 3; id <= 11; ++id) m.add_grabs()->set_id(id);
               }),

@@ -51,8 +51,8 @@ class MonitoringTest : public SmallServer {
     endpoint::WebEndpointOptions webOptions;
     webOptions.port = 0;
     web_ = std::make_unique<endpoint::WebEndpoint>(server(), webOptions);
-    monitoring_ = std::make_unique<monitoring::MonitoringEndpoint>(
-        monitoring::MonitoringOptions{.version = "1.2.3", .deviceSilence = silence()});
+    monitoring_ = std::make_unique<monitoring::MonitoringEndpoint>(monitoring::MonitoringOptions{
+        .version = "1.2.3", .deviceSilence = silence(), .metricsLifetime = 0ms});
     monitoring_->started(server());
   }
   void TearDown() override {
@@ -322,6 +322,18 @@ TEST(MonitoringStart, AnswersBeforeThereIsAServer) {
   const Exposition read(get(endpoint, "/metrics").body());
   EXPECT_EQ(read.value("clothstream_build_info", {{"version", "1.2.3"}, {"device", ""}}), 1);
   EXPECT_GT(read.value("clothstream_process_resident_memory_bytes"), 1'000'000);
+}
+
+TEST(MonitoringStart, ServesRecentMetricsAgain) {
+  const auto descriptors = [](const monitoring::MonitoringEndpoint& endpoint) {
+    return Exposition(get(endpoint, "/metrics").body()).value("clothstream_process_open_descriptors");
+  };
+  const monitoring::MonitoringEndpoint keeping({.metricsLifetime = 1h}), building({.metricsLifetime = 0ms});
+  const double before = descriptors(keeping), beforeToo = descriptors(building);
+  std::vector<std::ifstream> files;
+  for (int i = 0; i < 10; ++i) files.emplace_back("/proc/self/status");
+  EXPECT_EQ(descriptors(keeping), before);
+  EXPECT_GE(descriptors(building), beforeToo + 5);
 }
 
 TEST(MonitoringStart, NamesPortAndOptionWhenThePortIsInUse) {

@@ -60,7 +60,10 @@ class SceneJournalTest : public tests::GpuTest {
   void grab(bool holds) {
     model::ParticipantPoses poses;
     if (holds)
-      poses.grabs.push_back({.id = 1, .pose = {.position = {0, -0.5f, 0}}, .radius = 0.2f, .reach = 0.5f});
+      poses.grabs.push_back({.id = 1,
+                             .pose = {.position = {0, -0.5f, 0.2f}},
+                             .radius = 0.2f,
+                             .place = model::GrabPlace{.point = {.triangle = 80, .second = 0.5f}}});
     live->inbox.postPoses(3, poses, now);
   }
   // Kinds of all notices from now on that a participant of the scene receives.

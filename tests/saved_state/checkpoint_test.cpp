@@ -85,10 +85,11 @@ class FailingJournal final : public scene::Journal {
 class CheckpointTest : public tests::GpuTest {};
 class EverySolver : public CheckpointTest, public ::testing::WithParamInterface<SolverKind> {};
 
-// The checkpoint of tick 30 is taken while two grabs hold and a change of solver is eased.
+// The checkpoint of tick 30 is taken while two grabs hold, one of them draws its place to itself, and a
+// change of solver is eased.
 TEST_P(EverySolver, ContinuesFromACheckpointToTheBit) {
   const model::Scene scene = tests::busyScene(GetParam());
-  const auto tick = [](HostedScene& hosted) { tests::busyTick(hosted, 15, 22); };
+  const auto tick = [](HostedScene& hosted) { tests::busyTick(hosted, 25, 22); };
   const auto keeper = std::make_shared<TickKeeper>(30);
   HostedScene whole(scene, 1, [&](scene::LiveScene& live) { live.keeper = keeper; });
   for (int number = 1; number <= 60; ++number) tick(whole);
@@ -270,6 +271,8 @@ TEST_F(CheckpointTest, RefusesWhatDoesNotFitTheScene) {
           [](v1::SavedCheckpoint& m) { m.mutable_state()->mutable_held()->mutable_places()->pop_back(); });
   refuses("grab", [](v1::SavedCheckpoint& m) { m.mutable_grabs()->RemoveLast(); });
   refuses("more grabs", [](v1::SavedCheckpoint& m) { *m.add_grabs() = m.grabs(0); });
+  refuses("place", [](v1::SavedCheckpoint& m) { m.mutable_grabs(0)->mutable_place()->set_triangle(5000); });
+  refuses("offsets", [](v1::SavedCheckpoint& m) { m.mutable_state()->mutable_held()->set_offsets("short"); });
   refuses("attachment", [](v1::SavedCheckpoint& m) { m.mutable_attachments(0)->set_attachment(1); });
   refuses("pose", [](v1::SavedCheckpoint& m) { m.mutable_scene_colliders(0)->Clear(); });
   refuses("colliders", [](v1::SavedCheckpoint& m) { m.mutable_scene_colliders()->RemoveLast(); });

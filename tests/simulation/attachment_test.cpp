@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Attachments, tethers and grabs.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -31,6 +32,15 @@ model::Pose moved(const Vec3& by, float degrees = 0, const Vec3& axis = Vec3::Un
 
 Grab taking(const Vec3& at, float radius) {
   return {.state = Grab::State::takes, .start = moved(at), .end = moved(at), .radius = radius};
+}
+
+// Takes the point between these nodes of a scene.
+Grab takingPlace(const Vec3& hand, float radius, const std::array<std::uint32_t, 3>& nodes) {
+  Grab grab = taking(hand, radius);
+  grab.place = {.nodes = nodes, .weights = {0.5f, 0.3f, 0.2f}};
+  grab.leftAtStart = 1;
+  grab.leftAtEnd = 0.99f;
+  return grab;
 }
 
 // The same grab, which moves to another place in the next tick.
@@ -77,7 +87,8 @@ TEST_F(Attachments, MatchTheReferenceWithEverySolver) {
     std::mt19937 random(seed++);
     const NodeState start = randomState(scene, random, 0.002f, 0.1f);
     inputs.grabs = {taking(start.positions[100], 0.031f),
-                    taking(start.positions[230] + Vec3(0, 0.02f, 0), 0.001f)};
+                    taking(start.positions[230] + Vec3(0, 0.02f, 0), 0.001f),
+                    takingPlace(start.positions[50] + Vec3(0.1f, 0.2f, 0.3f), 0.015f, {50, 67, 51})};
     inputs.grabs[0].end = {inputs.grabs[0].start.position + Vec3(0, 0.001f, 0.002f),
                            turned(2, Vec3(3, 1, 2))};
     inputs.grabs[1].maxForce = 0.05f;
@@ -89,12 +100,15 @@ TEST_F(Attachments, MatchTheReferenceWithEverySolver) {
     setState(reference, start);
     reference.tick(referenceInputs(inputs));
     const std::vector<simulation::GrabStatus> grabs = running.grabs();
-    ASSERT_EQ(grabs.size(), 2u);
-    for (std::size_t i = 0; i < 2; ++i) {
+    ASSERT_EQ(grabs.size(), 3u);
+    for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(grabs[i].taken, reference.attachments().status()[i].taken);
       EXPECT_EQ(grabs[i].slipped, reference.attachments().status()[i].slipped);
       EXPECT_GT(grabs[i].taken, 0u);
+      EXPECT_LT((grabs[i].offset.cast<double>() - reference.attachments().status()[i].offset).norm(),
+                8 * kRounding * 4);
     }
+    EXPECT_GT(grabs[2].offset.norm(), 0.3f);
     const double h = scene.substepSeconds(), extent = 4;
     // A constraint takes its whole error of length back in a substep: as a place does.
     const double place = 16 * kRounding * extent / h;
@@ -201,6 +215,53 @@ TEST_F(Attachments, GrabsTakeNodesWithinRadiusOrTheNearestWithinReach) {
   EXPECT_EQ(taken(taking(rest[40], 0.029f)), 9u);
   EXPECT_EQ(taken(taking(rest[40] + Vec3(0, 0, 0.09f), 0.03f)), 1u);
   EXPECT_EQ(taken(taking(rest[40] + Vec3(0, 0, 0.11f), 0.03f)), 0u);
+}
+
+TEST_F(Attachments, GrabsTakeTheirPlaceWhereverItIs) {
+  model::Scene scene = dust(9, 9);  // 2 cm apart
+  const std::vector<Vec3> rest = model::restPositions(scene.cloths[0]);
+  const std::array<std::uint32_t, 3> corners{40, 49, 41};
+  const Vec3 point = 0.5f * rest[40] + 0.3f * rest[49] + 0.2f * rest[41];
+  const auto taken = [&](const Grab& grab) {
+    Running running(scene);
+    simulation::TickInputs inputs = inputsOf(scene);
+    inputs.grabs = {grab};
+    running.tick(inputs);
+    return running.grabs()[0];
+  };
+  const Vec3 hand = point + Vec3(3, -2, 1);
+  // The nearest node of the triangle, if none is within the radius.
+  EXPECT_EQ(taken(takingPlace(hand, 0.001f, corners)).taken, 1u);
+  EXPECT_EQ(taken(takingPlace(hand, 0.019f, corners)).taken, 3u);
+  EXPECT_LT((taken(takingPlace(hand, 0.001f, corners)).offset - (point - hand)).norm(), 4 * kRounding * 4);
+  // Nothing is within reach of a place whose nodes are all pinned, although other nodes are near the hand.
+  scene.cloths[0].pins = {{.firstRow = 4, .lastRow = 5, .firstColumn = 4, .lastColumn = 5}};
+  EXPECT_EQ(taken(takingPlace(rest[0], 0.001f, corners)).taken, 0u);
+}
+
+TEST_F(Attachments, AGrabDrawsItsPlaceToTheHandAndLetsNothingSlipMeanwhile) {
+  const model::Scene scene = dust(9, 9);
+  const std::vector<Vec3> rest = model::restPositions(scene.cloths[0]);
+  Running running(scene);
+  simulation::TickInputs inputs = inputsOf(scene);
+  const Vec3 hand = rest[40] + Vec3(0, 0, 0.5f);
+  constexpr int kTicks = 10;
+  const auto left = [](int ticks) { return std::max(0.0f, 1 - static_cast<float>(ticks) / kTicks); };
+  inputs.grabs = {takingPlace(hand, 0.001f, {40, 49, 41})};
+  inputs.grabs[0].place->weights = {1, 0, 0};
+  for (int tick = 0; tick < 20; ++tick) {
+    inputs.grabs[0].leftAtStart = left(tick);
+    inputs.grabs[0].leftAtEnd = left(tick + 1);
+    running.tick(inputs);
+    EXPECT_EQ(running.grabs()[0].slipped, 0u) << tick;
+    const Vec3 place = hand + left(tick + 1) * (rest[40] - hand);
+    // The node starts at rest and follows with a correction of a quarter a substep: at first it lags by a
+    // substep's way times four.
+    EXPECT_LT((running.state().positions[40] - place).norm(), 4 * 0.5 / kTicks / scene.substeps + 1e-3)
+        << tick;
+    inputs.grabs = {onTheWay(inputs.grabs[0], hand)};
+  }
+  EXPECT_LT((running.state().positions[40] - hand).norm(), 1e-4);
 }
 
 TEST_F(Attachments, GrabbedNodesFollowTheHand) {

@@ -79,14 +79,23 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
                                 reference::toPose(collider.end), double{collider.friction}});
   for (const model::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
-  for (const simulation::Grab& grab : inputs.grabs)
+  for (const simulation::Grab& grab : inputs.grabs) {
     result.grabs.push_back({.state = static_cast<reference::Grab::State>(grab.state),
                             .start = reference::toPose(grab.start),
                             .end = reference::toPose(grab.end),
                             .radius = double{grab.radius},
                             .reach = double{grab.reach},
                             .maxForce = double{grab.maxForce},
-                            .slipDistance = double{grab.slipDistance}});
+                            .slipDistance = double{grab.slipDistance},
+                            .leftAtStart = double{grab.leftAtStart},
+                            .leftAtEnd = double{grab.leftAtEnd}});
+    if (!grab.place) continue;
+    reference::Grab::Place& place = result.grabs.back().place.emplace();
+    for (std::size_t i = 0; i < 3; ++i) {
+      place.nodes[i] = grab.place->nodes[i];
+      place.weights[i] = double{grab.place->weights[i]};
+    }
+  }
   return result;
 }
 

@@ -49,8 +49,9 @@ void addGiven(Writer& message, field::Field floatField, float value) {
   if (!std::isnan(value)) message.add_float(floatField.number, value);
 }
 
-void addGrab(Writer& poses, const cs_grab& grab) {
+void addGrab(Writer& poses, const OwnGrab& own) {
   using F = field::Grab;
+  const cs_grab& grab = own.given;
   Writer message(poses, field::ColliderPoses::kGrabs.number);
   message.add_uint32(F::kId.number, grab.id);
   addPose(message, F::kPose, grab.position, grab.orientation);
@@ -58,6 +59,14 @@ void addGrab(Writer& poses, const cs_grab& grab) {
   addGiven(message, F::kReach, grab.reach);
   addGiven(message, F::kMaxForce, grab.max_force);
   addGiven(message, F::kSlipDistance, grab.slip_distance);
+  if (!own.place) return;
+  using P = field::GrabPlace;
+  Writer place(message, F::kPlace.number);
+  place.add_uint32(P::kCloth.number, own.place->cloth);
+  place.add_uint32(P::kTriangle.number, own.place->triangle);
+  place.add_float(P::kSecond.number, grab.place.second);
+  place.add_float(P::kThird.number, grab.place.third);
+  place.add_uint64(P::kSeenTick.number, grab.place.tick);
 }
 
 void addHand(Writer& poses, std::uint32_t side, const std::vector<float>& joints) {
@@ -141,7 +150,7 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
       addShape(collider, from);
     }
     message.add_uint64(F::kClientTimeUs.number, clientTimeUs);
-    for (const cs_grab& grab : poses.grabs) addGrab(message, grab);
+    for (const OwnGrab& grab : poses.grabs) addGrab(message, grab);
     for (const AttachmentPose& put : poses.attachments) {
       Writer attachment(message, F::kAttachments.number);
       attachment.add_string(field::AttachmentPose::kName.number, put.name.data(), put.name.size());

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/core/wire/description.h"
 #include "clients/core/wire/parameter_change.h"
 #include "clients/core/wire/server_message.h"
 
@@ -48,11 +49,16 @@ struct AttachmentPose {
   std::array<float, 4> orientation{};  // x y z w; all zero means no rotation
 };
 
+struct OwnGrab {
+  cs_grab given{};
+  std::optional<ClothTriangle> place;  // absent: the grab has no place
+};
+
 // Input of this participant.
 struct Poses {
   std::vector<cs_own_collider> colliders;  // the id of each is its index
   std::vector<float> leftHand, rightHand;  // {x, y, z, radius} per joint; empty: none
-  std::vector<cs_grab> grabs;
+  std::vector<OwnGrab> grabs;
   std::vector<AttachmentPose> attachments;
   bool wantsContacts = false;
 };

@@ -317,6 +317,16 @@ tl::expected<Description, std::string> readDescription(Bytes message, const Limi
   return description;
 }
 
+std::optional<ClothTriangle> triangleOf(std::uint32_t index, const Description& description) {
+  for (std::size_t i = 0; i < description.cloths.size(); ++i) {
+    const Cloth& cloth = description.cloths[i];
+    const std::uint32_t first = cloth.firstIndex / 3, count = cloth.indexCount / 3;
+    if (index >= first && index - first < count)
+      return ClothTriangle{static_cast<std::uint32_t>(i), index - first};
+  }
+  return std::nullopt;
+}
+
 const Hull* hullOf(const Collider& collider, const Description& description) {
   if (collider.shape != CS_SHAPE_HULL || collider.participantId != 0) return nullptr;
   const auto found = description.hulls.find(collider.name);

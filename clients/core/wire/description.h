@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -58,6 +59,14 @@ struct Description {
 // positions in the message, not with the counts that it states, and stays within the limits. The error names
 // the field, its value and the allowed values.
 [[nodiscard]] tl::expected<Description, std::string> readDescription(Bytes message, const Limits& limits);
+
+// Index of a cloth, and of one of its triangles in it.
+struct ClothTriangle {
+  std::uint32_t cloth = 0, triangle = 0;
+};
+
+// Returns the triangle with this index among all of the description, or nullopt for a larger index.
+std::optional<ClothTriangle> triangleOf(std::uint32_t index, const Description& description);
 
 // Returns nullptr if the collider is not a hull of this description.
 const Hull* hullOf(const Collider& collider, const Description& description);

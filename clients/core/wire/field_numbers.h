@@ -534,6 +534,14 @@ struct Grab {
   static constexpr Field kReach{4, WireType::kFixed32};
   static constexpr Field kMaxForce{5, WireType::kFixed32};
   static constexpr Field kSlipDistance{6, WireType::kFixed32};
+  static constexpr Field kPlace{7, WireType::kBytes};
+};
+struct GrabPlace {
+  static constexpr Field kCloth{1, WireType::kVarint};
+  static constexpr Field kTriangle{2, WireType::kVarint};
+  static constexpr Field kSecond{3, WireType::kFixed32};
+  static constexpr Field kThird{4, WireType::kFixed32};
+  static constexpr Field kSeenTick{5, WireType::kVarint};
 };
 struct AttachmentPose {
   static constexpr Field kName{1, WireType::kBytes};
@@ -607,6 +615,8 @@ struct GrabEvent {
   static constexpr Field kGrabId{2, WireType::kVarint};
   static constexpr Field kKind{3, WireType::kVarint};
   static constexpr Field kVertices{4, WireType::kVarint};
+  static constexpr Field kDistance{5, WireType::kFixed32};
+  static constexpr Field kTicksSinceSeen{6, WireType::kVarint};
 };
 struct Ping {
   static constexpr Field kClientTimeUs{1, WireType::kVarint};

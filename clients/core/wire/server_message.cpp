@@ -329,6 +329,10 @@ bool readGrabEvent(Bytes message, cs_grab_event& out) {
         return set(out.kind, reader.get_uint32());
       case F::kVertices.tag:
         return set(out.vertices, reader.get_uint32());
+      case F::kDistance.tag:
+        return setFinite(out.distance, reader);
+      case F::kTicksSinceSeen.tag:
+        return set(out.ticks_since_seen, reader.get_uint64());
       default:
         return skip(reader);
     }

@@ -6,6 +6,7 @@ import {
   CS_CLOTH_SETTINGS_VERSION,
   cs_cloth,
   cs_cloth_parameters,
+  cs_cloth_point,
   cs_cloth_report,
   cs_cloth_settings,
   cs_collider,
@@ -180,6 +181,20 @@ export interface Playback {
   paused: boolean;
 }
 
+// Point of a cloth as it is shown. The core knows the rest of it.
+export interface ClothPoint {
+  position: Vec3;
+  distance: number; // from the origin of the ray, m
+  place: Uint8Array; // cs_cloth_point
+}
+
+// Grab of the cloth at a place, which is drawn to the position.
+export interface Grab {
+  id: number;
+  position: Vec3;
+  place: Uint8Array;
+}
+
 // Bytes of the memory that the core writes structs to: enough for each of them.
 const kScratchBytes = Math.max(
   cs_statistics.sizeof,
@@ -188,6 +203,7 @@ const kScratchBytes = Math.max(
   cs_collider.sizeof,
   cs_environment.sizeof,
   cs_cloth_parameters.sizeof,
+  cs_cloth_point.sizeof,
   cs_cloth_report.sizeof,
   cs_cloth_settings.sizeof,
   cs_grab.sizeof,
@@ -197,6 +213,8 @@ const kScratchBytes = Math.max(
   cs_play_out_options.sizeof,
   cs_playback.sizeof,
 );
+
+const kFarthestPoint = 1e4; // m
 
 // A joining participant: displayed name, requested role, and whether frames are played out smoothly with a delay.
 export interface Identity {
@@ -582,8 +600,24 @@ export class Client {
     return events.filter(({ participant, vertices }) => participant === own && vertices === 0).map(({ grab }) => grab);
   }
 
+  // Finds the first point of a cloth that a ray meets. The direction has length 1.
+  castRay(origin: Vec3, direction: Vec3): ClothPoint | undefined {
+    const found = this.core.with([origin, direction], (from, along) =>
+      this.core.exports.cs_cast_ray(this.handle, from!, along!, kFarthestPoint, this.scratch),
+    );
+    if (found === 0) return undefined;
+    const view = this.core.view();
+    const float = (offset: number) => view.getFloat32(this.scratch + offset, true);
+    const at = cs_cloth_point.position;
+    return {
+      position: [float(at), float(at + 4), float(at + 8)],
+      distance: float(cs_cloth_point.distance),
+      place: this.core.bytes(this.scratch, cs_cloth_point.sizeof).slice(),
+    };
+  }
+
   // Sets this participant's grab on the cloth; undefined releases it. A new id starts a new grab.
-  setGrab(grab: { id: number; position: Vec3 } | undefined): void {
+  setGrab(grab: Grab | undefined): void {
     const view = this.core.view();
     if (grab) {
       const set = (offset: number, values: readonly number[]) =>
@@ -593,6 +627,8 @@ export class Client {
       set(cs_grab.orientation, [0, 0, 0, 0]); // not rotated
       // NaN: the server's default.
       for (const offset of [cs_grab.radius, cs_grab.reach, cs_grab.max_force, cs_grab.slip_distance]) set(offset, [NaN]);
+      view.setUint32(this.scratch + cs_grab.has_place, 1, true);
+      this.core.bytes(this.scratch + cs_grab.place, cs_cloth_point.sizeof).set(grab.place);
     }
     this.core.exports.cs_set_grabs(this.handle, this.scratch, grab ? 1 : 0, nowUs());
   }

@@ -2,15 +2,17 @@
 // Drags a collider or the cloth by mouse, pen, finger or keys.
 
 import * as THREE from "three";
-import type { Vec3 } from "./client";
+import type { ClothPoint, Grab, Vec3 } from "./client";
 import type { View } from "./view";
 
 // New position of a collider, or of a grab on the cloth. An undefined grab releases the cloth.
 export type DragTarget =
   | { kind: "collider"; collider: string; position: Vec3 }
-  | { kind: "grab"; grab: { id: number; position: Vec3 } | undefined };
+  | { kind: "grab"; grab: Grab | undefined };
 
-type Held = { collider: string } | { grab: number };
+// A grab keeps the place that it took: it is needed again after a reconnect.
+type Held = { collider: string } | { grab: number; place: Uint8Array };
+type Hit = { point: THREE.Vector3; collider: string } | { point: THREE.Vector3; place: Uint8Array };
 
 export class Drag {
   // False while nothing can be dragged.
@@ -24,9 +26,11 @@ export class Drag {
   private pointer: number | undefined;
   private grabs = 0;
 
-  // `grabbed` receives the name of each collider that the user starts to drag.
+  // `castRay` finds the cloth under the pointer. `grabbed` receives the name of each collider that the user starts to
+  // drag.
   constructor(
     private readonly view: View,
+    private readonly castRay: (origin: Vec3, direction: Vec3) => ClothPoint | undefined,
     private readonly grabbed: (collider: string) => void,
   ) {
     const canvas = view.canvas;
@@ -46,7 +50,7 @@ export class Drag {
     const position: Vec3 = [this.wanted.x, this.wanted.y, this.wanted.z];
     this.wanted = undefined;
     if ("collider" in this.held) return { kind: "collider", collider: this.held.collider, position };
-    return { kind: "grab", grab: { id: this.held.grab, position } };
+    return { kind: "grab", grab: { id: this.held.grab, position, place: this.held.place } };
   }
 
   // Ends a grab that slipped off the cloth.
@@ -76,8 +80,7 @@ export class Drag {
     this.view.canvas.setPointerCapture(event.pointerId);
     this.view.canvas.focus();
     this.view.canvas.style.cursor = "grabbing";
-    // A collider is dragged by its centre, the cloth by the point under the pointer.
-    const centre = hit.collider ? hit.object.position : hit.point;
+    const centre = hit.point;
     const facing = this.view.camera.getWorldDirection(new THREE.Vector3());
     this.plane.setFromNormalAndCoplanarPoint(facing, centre);
     // The pointer keeps its offset from the dragged point.
@@ -86,11 +89,11 @@ export class Drag {
     this.pointer = event.pointerId;
     this.released = false;
     this.wanted = centre.clone();
-    if (hit.collider) {
+    if ("collider" in hit) {
       this.held = { collider: hit.collider };
       this.grabbed(hit.collider);
     } else {
-      this.held = { grab: ++this.grabs };
+      this.held = { grab: ++this.grabs, place: hit.place };
     }
   }
 
@@ -115,15 +118,17 @@ export class Drag {
     }
   }
 
-  // Finds the nearest collider of the scene or cloth under the pointer.
-  private pick(): { object: THREE.Object3D; point: THREE.Vector3; collider: string | undefined } | undefined {
+  // Finds the nearest collider of the scene or cloth under the pointer. A collider is dragged by its centre.
+  private pick(): Hit | undefined {
     if (!this.enabled) return undefined;
-    const cloths = this.view.clothMeshes;
-    const hit = this.raycaster
-      .intersectObjects<THREE.Object3D>([...this.view.colliders, ...cloths], false)
-      .find(({ object }) => object.name !== "" || cloths.includes(object as THREE.Mesh));
-    if (!hit) return undefined;
-    return { object: hit.object, point: hit.point, collider: hit.object.name || undefined };
+    const collider = this.raycaster
+      .intersectObjects<THREE.Object3D>([...this.view.colliders], false)
+      .find(({ object }) => object.name !== "");
+    const { origin, direction } = this.raycaster.ray;
+    const cloth = this.castRay([origin.x, origin.y, origin.z], [direction.x, direction.y, direction.z]);
+    if (cloth && (!collider || cloth.distance < collider.distance))
+      return { point: new THREE.Vector3(...cloth.position), place: cloth.place };
+    return collider && { point: collider.object.position, collider: collider.object.name };
   }
 
   private aim(event: PointerEvent): void {

@@ -70,8 +70,17 @@ export const cs_own_collider = {
   length: 36,
   size: 40,
 } as const;
+export const cs_cloth_point = {
+  sizeof: 40,
+  triangle: 0,
+  second: 4,
+  third: 8,
+  position: 12,
+  distance: 24,
+  tick: 32,
+} as const;
 export const cs_grab = {
-  sizeof: 48,
+  sizeof: 96,
   id: 0,
   position: 4,
   orientation: 16,
@@ -79,13 +88,17 @@ export const cs_grab = {
   reach: 36,
   max_force: 40,
   slip_distance: 44,
+  has_place: 48,
+  place: 56,
 } as const;
 export const cs_grab_event = {
-  sizeof: 24,
+  sizeof: 32,
   participant_id: 0,
   grab_id: 8,
   kind: 12,
   vertices: 16,
+  distance: 20,
+  ticks_since_seen: 24,
 } as const;
 export const cs_contact_event = {
   sizeof: 32,

@@ -41,7 +41,11 @@ async function start(): Promise<void> {
   void showAddress();
   const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
   const reports = new ClothReports();
-  const drag = new Drag(view, (collider) => (controls.collider = collider));
+  const drag: Drag = new Drag(
+    view,
+    (origin, direction) => (session.state.kind === "live" ? session.client.castRay(origin, direction) : undefined),
+    (collider) => (controls.collider = collider),
+  );
   listenToKeys(view, drag, controls);
   const player = new Player();
 

@@ -62,6 +62,7 @@ export interface CoreExports {
   cs_participant_id(client: Pointer): bigint;
   cs_grab_event_count(client: Pointer): number;
   cs_get_grab_event(client: Pointer, index: number, out: Pointer): number;
+  cs_cast_ray(client: Pointer, origin3: Pointer, direction3: Pointer, maxDistance: number, out: Pointer): number;
   cs_set_grabs(client: Pointer, grabs: Pointer, count: number, nowUs: bigint): void;
   cs_set_environment(client: Pointer, gravity3: Pointer, wind3: Pointer, airDensity: Pointer): void;
   cs_set_gust(client: Pointer, strength: number, seconds: number): void;

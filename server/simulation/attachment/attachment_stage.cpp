@@ -21,15 +21,16 @@ using vulkan::BufferPurpose;
 using vulkan::kStorage;
 using vulkan::kTexels;
 
+constexpr float kNoSlip = 1e18f;  // m, more than any distance in the world; its square is finite
 constexpr std::size_t kGrabBytes = kMaxGrabs * sizeof(shared::GrabRecord);
 constexpr std::size_t kReportBytes = kMaxGrabs * sizeof(shared::GrabReport);
 
-float stateOf(Grab::State state) {
-  switch (state) {
+float stateOf(const Grab& grab) {
+  switch (grab.state) {
     case Grab::State::holds:
       return shared::kActiveGrab;
     case Grab::State::takes:
-      return shared::kBeginningGrab;
+      return grab.place ? shared::kBeginningGrabAtPlace : shared::kBeginningGrab;
     default:
       return shared::kReleasedGrab;
   }
@@ -42,19 +43,30 @@ shared::GrabRecord recordOf(const Grab& grab) {
   const Eigen::Vector4f from = grab.start.orientation.coeffs();
   const Eigen::Vector4f to = grab.end.orientation.coeffs();
   const Eigen::Vector4f turn = (from.dot(to) < 0 ? Eigen::Vector4f(-to) : to) - from;
+  const WeightedNodes place = grab.place.value_or(WeightedNodes{});
+  const float slip = grab.leftAtEnd > 0 ? kNoSlip : grab.slipDistance;
   return {.position = vectorOf(start),
-          .squaredSlip = grab.slipDistance * grab.slipDistance,
+          .squaredSlip = slip * slip,
           .motion = vectorOf(motion),
           .force = grab.maxForce,
           .orientation = texel(grab.start.orientation),
           .orientationChange = {turn.x(), turn.y(), turn.z(), turn.w()},
-          .state = stateOf(grab.state),
+          .state = stateOf(grab),
           .squaredRadius = grab.radius * grab.radius,
           .squaredReach = grab.reach * grab.reach,
+          .left = grab.leftAtStart,
+          .nodes = {static_cast<float>(place.nodes[0]), static_cast<float>(place.nodes[1]),
+                    static_cast<float>(place.nodes[2])},
+          .leftChange = grab.leftAtEnd - grab.leftAtStart,
+          .weights = {place.weights[0], place.weights[1], place.weights[2]},
           .reserved = 0};
 }
 
 }  // namespace
+
+GrabStatus statusOf(const shared::GrabReport& report) {
+  return {report.grabbed, report.slipped, {report.offset.x, report.offset.y, report.offset.z}};
+}
 
 AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables,
                                  const StateBuffers& state, std::uint32_t nodeCount,
@@ -224,7 +236,7 @@ HeldNodes AttachmentStage::collect() const {
   for (std::uint32_t i = 0; i < savedGrabs_; ++i) {
     shared::GrabReport report;
     std::memcpy(&report, bytes.data() + grabbed_.bytes() + i * sizeof(report), sizeof(report));
-    held.grabs.push_back({.taken = report.grabbed, .slipped = report.slipped});
+    held.grabs.push_back(statusOf(report));
   }
   for (std::uint32_t i = 0; i < nodeCount_; ++i) {
     shared::GrabbedNode node;
@@ -256,8 +268,12 @@ void AttachmentStage::recordRestore(vulkan::Recorder& recorder, const HeldNodes&
     std::memcpy(bytes.data() + node.node * sizeof(record), &record, sizeof(record));
   }
   for (std::size_t i = 0; i < held.grabs.size(); ++i) {
-    const shared::GrabReport report{
-        .nearest = 0, .grabbed = held.grabs[i].taken, .slipped = held.grabs[i].slipped, .reserved = 0};
+    const shared::GrabReport report{.nearest = 0,
+                                    .grabbed = held.grabs[i].taken,
+                                    .slipped = held.grabs[i].slipped,
+                                    .reserved0 = 0,
+                                    .offset = vectorOf(held.grabs[i].offset),
+                                    .reserved1 = 0};
     std::memcpy(bytes.data() + grabbed_.bytes() + i * sizeof(report), &report, sizeof(report));
   }
   recorder.copy(heldUpload_, grabbed_, grabbed_.bytes());

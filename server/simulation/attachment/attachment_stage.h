@@ -20,6 +20,8 @@
 
 namespace clothstream::simulation {
 
+GrabStatus statusOf(const shared::GrabReport& report);
+
 // Belongs to the device's thread.
 //
 // A tick:   recordInputs -> barrier -> recordAim -> substeps, each with recordSubstep at its end ->

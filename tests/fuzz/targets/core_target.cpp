@@ -209,6 +209,10 @@ void Program::call(const CoreInput::Call& call) {
         grab.reach = numbers.next();
         grab.max_force = numbers.next();
         grab.slip_distance = numbers.next();
+        grab.has_place = index % 2;
+        const auto point = numbers.array<3>(), direction = numbers.array<3>();
+        if (cs_nearest_point(client(), point.data(), grab.reach, &grab.place) == 0)
+          cs_cast_ray(client(), point.data(), direction.data(), grab.reach, &grab.place);
       }
       return cs_set_grabs(client(), grabs.data(), static_cast<std::uint32_t>(grabs.size()), now_);
     }

@@ -23,7 +23,7 @@ inline model::Scene busyScene(model::SolverKind solver) {
 }
 
 // Runs one tick with its inputs, which depend on its number alone. The second grab begins after tick
-// `secondGrab`. The solver changes in the tick after `otherSolver`.
+// `secondGrab`, and draws a place to itself for 0.2 s. The solver changes in the tick after `otherSolver`.
 inline void busyTick(HostedScene& hosted, std::uint64_t secondGrab = 100, std::uint64_t otherSolver = 190) {
   const std::uint64_t tick = hosted.host.tick();
   const auto at = [](float x, float y, float z) {
@@ -33,7 +33,10 @@ inline void busyTick(HostedScene& hosted, std::uint64_t secondGrab = 100, std::u
   model::ParticipantPoses poses{.colliders = {handAt(1, swing, -0.6f, 0.1f)},
                                 .grabs = {{.id = 1, .pose = at(0.2f + swing, -0.9f, swing), .radius = 0.25f}},
                                 .attachments = {{.attachment = 0, .pose = at(-swing, 0, 0)}}};
-  if (tick > secondGrab) poses.grabs.push_back({.id = 2, .pose = at(-0.2f, -0.8f, swing), .radius = 0.2f});
+  if (tick > secondGrab) {
+    const model::GrabPlace place{.point = {.cloth = 0, .triangle = 150, .second = 0.2f, .third = 0.3f}};
+    poses.grabs.push_back({.id = 2, .pose = at(-0.2f, -0.8f, swing), .radius = 0.2f, .place = place});
+  }
   hosted.live.inbox.postPoses(7, poses, hosted.now);
   if (tick == otherSolver) {
     model::Solver other;

@@ -274,6 +274,43 @@ TEST_F(SceneHostTest, AnnouncesGrabEvents) {
   EXPECT_EQ(nothing.grabs(0).vertices(), 0u);
 }
 
+// The cloth is 0.4 m from the hand by the time the server hears of the grab. A grab without a place finds
+// nothing.
+TEST_F(SceneHostTest, DrawsTheSeenPlaceToTheHandWithinAFifthOfASecond) {
+  HostedScene hosted;
+  hosted.ticks(20);
+  constexpr std::uint32_t kNode = 10 * 11 + 5;           // in the lowest row
+  constexpr std::uint32_t kTriangle = 2 * (9 * 10 + 5);  // its second corner is that node
+  const auto place = [&] { return Eigen::Map<const Vec3>(hosted.decoder->positions().data() + 3 * kNode); };
+  const Vec3 seen = place();
+  const Vec3 hand = seen + Vec3(0, 0, 0.4f);
+  model::Grab grab{.id = 3, .pose = {hand, model::Quaternion::Identity()}, .radius = 0.05f};
+  hosted.live.inbox.postPoses(7, {.grabs = {grab}}, hosted.now);
+  hosted.announced.clear();
+  hosted.tick();
+  ASSERT_FALSE(hosted.announced.empty());
+  EXPECT_EQ(hosted.announced.back().tick_events().grabs(0).vertices(), 0u);
+
+  grab.id = 4;
+  grab.place = model::GrabPlace{.point = {.triangle = kTriangle, .second = 1}, .seenTick = 12};
+  hosted.live.inbox.postPoses(7, {.grabs = {grab}}, hosted.now);
+  hosted.announced.clear();
+  hosted.ticks(1);
+  ASSERT_FALSE(hosted.announced.empty());
+  const v1::TickEvents& events = hosted.announced.back().tick_events();
+  const v1::GrabEvent& taken = events.grabs(events.grabs_size() - 1);
+  EXPECT_EQ(taken.grab_id(), 4u);
+  EXPECT_EQ(taken.kind(), v1::GRAB_EVENT_KIND_TAKEN);
+  EXPECT_GT(taken.vertices(), 0u);
+  EXPECT_NEAR(taken.distance(), 0.4, 0.05);  // the cloth has moved a little since
+  EXPECT_EQ(taken.ticks_since_seen(), 10u);
+  hosted.announced.clear();
+  hosted.ticks(7);  // 0.2 s with the first one
+  EXPECT_LT((place() - hand).norm(), 0.05f);
+  for (const v1::ServerMessage& message : hosted.announced)
+    EXPECT_EQ(message.tick_events().grabs_size(), 0) << "slipped";
+}
+
 // A hand is in the sheet for ten ticks and then moves away. The scene's ball does not touch the sheet.
 TEST_F(SceneHostTest, AnnouncesContactsIfRequested) {
   model::Scene scene = smallScene();

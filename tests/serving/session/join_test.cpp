@@ -14,7 +14,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <spdlog/details/null_mutex.h>
-#include <spdlog/sinks/base_sink.h>
+#include <spdlog/sinks/sink.h>
 #include <spdlog/spdlog.h>
 
 #include "server/model/material.h"
@@ -510,16 +510,18 @@ class LogTap {
 
  private:
   // Without a lock, because the action may write to the log.
-  class Sink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
+  class Sink final : public spdlog::sinks::sink {
    public:
     explicit Sink(std::function<void(std::string_view)> action) : action_(std::move(action)) {}
 
-   private:
-    void sink_it_(const spdlog::details::log_msg& line) override {
+    void log(const spdlog::details::log_msg& line) override {
       action_({line.payload.data(), line.payload.size()});
     }
-    void flush_() override {}
+    void flush() override {}
+    void set_pattern(const std::string&) override {}
+    void set_formatter(std::unique_ptr<spdlog::formatter>) override {}
 
+   private:
     const std::function<void(std::string_view)> action_;
   };
 
