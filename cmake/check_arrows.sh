@@ -10,6 +10,7 @@ proto/parameters   |
 proto/text         |
 proto/tls          |
 proto/discovery    |
+proto/hands        |
 server/model       | proto/parameters
 server/vulkan      |
 proto/codec        |
@@ -18,7 +19,7 @@ server/reference   | server/model
 server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
 server/meshes      | server/model
-server/messages    | server/model server/meshes server/telemetry proto/parameters proto/text clothstream
+server/messages    | server/model server/meshes server/telemetry proto/hands proto/parameters proto/text clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
 server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
@@ -40,7 +41,7 @@ server/program     | server/options server/identity server/tls server/discovery 
 server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
-clients/core/touch | clients/core/core.h
+clients/core/touch | clients/core/core.h clients/core/wire proto/codec proto/hands
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
 clients/grpc       | clients/core proto/tls clothstream
 clients/library    | clients/core clients/grpc

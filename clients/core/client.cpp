@@ -194,6 +194,8 @@ std::uint32_t Client::described(Bytes content) {
   if (!resumed_) statistics_.forgetTicks();
   report_ = {};
   if (playOut_) playOut_->begin(description_);
+  if (contact_) contact_->begin(description_);
+  shown_ = {};
   hello_.contentId = welcome_.contentId;
   const bool returned = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
@@ -414,10 +416,12 @@ std::span<const float> Client::normals() const {
 }
 
 std::span<const float> Client::playedPositions() const {
+  if (!shown_.empty()) return shown_;
   return playOut_ && playOut_->shows() ? playOut_->positions() : positions();
 }
 
 std::span<const float> Client::playedNormals() const {
+  if (!shown_.empty()) return contact_->normals(description_.layout);
   return playOut_ && playOut_->shows() ? playOut_->normals(description_.layout) : normals();
 }
 

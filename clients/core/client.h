@@ -17,6 +17,8 @@
 #include "clients/core/stream/play_out.h"
 #include "clients/core/stream/reconnection.h"
 #include "clients/core/stream/server_clock.h"
+#include "clients/core/touch/contact.h"
+#include "clients/core/touch/own_capsules.h"
 #include "clients/core/wire/client_message.h"
 #include "clients/core/wire/description.h"
 #include "clients/core/wire/limits.h"
@@ -64,6 +66,9 @@ class Client {
   void requestEarlyKeyFrame(std::uint64_t nowUs);
   // nullptr turns play-out off. Returns false if the options are not allowed.
   bool setPlayOut(const cs_play_out_options* options);
+  void setLocalContact(bool on);
+  // Length of the largest correction of the last play(), m.
+  float largestCorrection() const { return contact_ ? contact_->largest() : 0; }
   // nullopt if play-out is off.
   std::optional<cs_played> play(std::uint64_t nowUs, std::uint64_t displayUs);
 
@@ -114,6 +119,7 @@ class Client {
   void sendPoses(std::uint64_t nowUs);
   // Tick of the frame that is shown; 0 before the first.
   std::uint64_t shownTick() const;
+  void correct(const cs_played& played, std::uint64_t displayUs);
   std::optional<cs_cloth_point> seen(std::optional<cs_cloth_point> point) const;
   void sendHello();
   bool isConnected() const { return state_ != CS_STATE_RECONNECTING || welcomed_; }
@@ -178,7 +184,10 @@ class Client {
   double decodeMs_ = 0;
   cs_stage_statistics stages_{};  // members about the newest frame
   std::unique_ptr<PlayOut> playOut_;
-  std::uint64_t playedTick_ = 0;  // of the last play()
+  std::unique_ptr<Contact> contact_;  // present if local contact is on
+  CapsuleHistory ownCapsules_;        // used if local contact is on
+  std::span<const float> shown_;      // positions that contact has corrected; empty if there are none
+  std::uint64_t playedTick_ = 0;      // of the last play()
   std::vector<std::string> scenes_;
   TickEvents events_;
   SimulationReport report_;

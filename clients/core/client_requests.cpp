@@ -72,6 +72,7 @@ bool Client::mayCollide() const {
 
 void Client::sendPoses(std::uint64_t nowUs) {
   posed_ = true;
+  if (contact_) ownCapsules_.add(ownCapsules(poses_), nowUs);
   if (state_ == CS_STATE_FAILED || !isConnected()) return;
   const std::uint64_t serverUs = clock_.serverTimeUs(nowUs);
   if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs, serverUs);
@@ -90,9 +91,32 @@ bool Client::setPlayOut(const cs_play_out_options* options) {
 
 std::optional<cs_played> Client::play(std::uint64_t nowUs, std::uint64_t displayUs) {
   if (!playOut_) return std::nullopt;
+  shown_ = {};
   const cs_played played = playOut_->play(clock_.serverTimeUs(nowUs), clock_.serverTimeUs(displayUs));
   playedTick_ = played.tick;
+  if (contact_) correct(played, displayUs);
   return played;
+}
+
+void Client::setLocalContact(bool on) {
+  shown_ = {};
+  ownCapsules_ = {};
+  contact_ = on ? std::make_unique<Contact>() : nullptr;
+  if (contact_ && described()) contact_->begin(description_);
+}
+
+// The frame states where the server saw the capsules. If they are not recognised, they are taken as they were
+// when the frame was simulated, less the way of the message to the server.
+void Client::correct(const cs_played& played, std::uint64_t displayUs) {
+  if (ownCapsules_.empty() || !mayCollide() || played.server_time_us == 0 || !playOut_->shows()) return;
+  const double ageUs =
+      since(played.server_time_us, clock_.serverTimeUs(displayUs)) + 500 * clock_.roundTripMs();
+  const auto age = static_cast<std::uint64_t>(std::clamp(ageUs, 0.0, static_cast<double>(displayUs)));
+  const OwnCapsules sent = ownCapsules_.at(displayUs - age);
+  const OwnCapsules answered = capsulesOf(playedColliders(), welcome_.participantId, sent).value_or(sent);
+  const std::span<const float> positions = playOut_->positions();
+  const std::span<const float> shown = contact_->apply(positions, answered, ownCapsules_.newest(), displayUs);
+  if (contact_->largest() > 0) shown_ = shown;
 }
 
 void Client::change(const ParameterChange& change) {

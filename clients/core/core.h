@@ -307,6 +307,14 @@ void cs_default_play_out(cs_play_out_options* out) CS_NOEXCEPT;
  * call, server_time_us never goes back unless a clock jumps. The newest frame is held until the delay is
  * known. out may be NULL. Fails if play-out is off. */
 int cs_play_out(cs_client* client, uint64_t now_us, uint64_t display_time_us, cs_played* out) CS_NOEXCEPT;
+/* Turns local contact on or off. Default: off. The server answers to this participant's hand a round trip and
+ * the delay of play-out late. With local contact, cs_play_out moves the cloth out of the way of the newest
+ * hand, spheres and capsules meanwhile, and returns it as the answer comes: by at most 0.35 m/s besides the
+ * motion of the hand. Boxes have no local contact. Nothing changes while play-out is off, or for viewers. It
+ * takes about 70 bytes per vertex and 50 per triangle. */
+void cs_set_local_contact(cs_client* client, int on) CS_NOEXCEPT;
+/* Length of the largest correction by the last cs_play_out, m; 0 without one. */
+float cs_local_correction(const cs_client* client) CS_NOEXCEPT;
 /* Positions and unit normals that the last cs_play_out chose: 3 floats per vertex. Normals are interpolated
  * like positions if the server sends them, else computed from these positions; the first call does that work.
  * Valid until the next cs_play_out or cs_receive. */

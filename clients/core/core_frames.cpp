@@ -128,6 +128,14 @@ int cs_play_out(cs_client* client, uint64_t now_us, uint64_t display_time_us, cs
   return 1;
 }
 
+void cs_set_local_contact(cs_client* client, int on) noexcept {
+  client->client.setLocalContact(on != 0);
+}
+
+float cs_local_correction(const cs_client* client) noexcept {
+  return client->client.largestCorrection();
+}
+
 const float* cs_played_positions(const cs_client* client) noexcept {
   return client->client.playedPositions().data();
 }

@@ -7,25 +7,14 @@
 
 #include <fmt/format.h>
 
+#include "proto/hands/bones.h"
 #include "server/messages/limits.h"
 
 namespace clothstream::messages {
 namespace {
 
-// Joints in the order of OpenXR. The order of WebXR starts with the wrist.
-constexpr std::size_t kJoints = 26, kJointsWithoutPalm = 25;
-constexpr std::size_t kWrist = 1, kIndexProximal = 7, kMiddleMetacarpal = 11, kMiddleProximal = 12,
-                      kLittleProximal = 22;
-
-struct Bone {
-  std::size_t from, to;
-};
-// Bones of the thumb; of index, middle, ring and little finger; from the wrist.
-constexpr std::array<Bone, kHandBones> kBones{{{2, 3},   {3, 4},   {4, 5},   {6, 7},
-                                               {7, 8},   {8, 9},   {9, 10},  {11, 12},
-                                               {12, 13}, {13, 14}, {14, 15}, {16, 17},
-                                               {17, 18}, {18, 19}, {19, 20}, {21, 22},
-                                               {22, 23}, {23, 24}, {24, 25}, {kWrist, kMiddleMetacarpal}}};
+using hands::kJoints, hands::kJointsWithoutPalm, hands::kWrist;
+constexpr std::size_t kIndexProximal = 7, kMiddleProximal = 12, kLittleProximal = 22;
 constexpr std::size_t kThumbBones = 3;
 
 struct Joints {
@@ -90,7 +79,7 @@ std::vector<model::ParticipantCollider> toBones(Checks& checks, const Path& path
   const std::uint32_t firstId = kFirstBoneId + (message.side() == v1::HAND_SIDE_RIGHT ? 32 : 0);
   std::vector<model::ParticipantCollider> bones;
   for (std::size_t i = 0; i < kHandBones; ++i) {
-    const auto [from, to] = kBones[i];
+    const auto [from, to] = hands::kBones[i];
     const model::Vec3 bone = at[to] - at[from];
     model::ParticipantCollider& capsule = bones.emplace_back();
     capsule.id = firstId + static_cast<std::uint32_t>(i);

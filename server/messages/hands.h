@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clothstream/v1/session.pb.h"
+#include "proto/hands/bones.h"
 #include "server/messages/validation.h"
 #include "server/model/input.h"
 
@@ -14,7 +15,7 @@ namespace clothstream::messages {
 
 // Number of capsules per hand: three bones of the thumb, four of each finger (the first one is in the
 // palm), and one from the wrist to the middle finger.
-inline constexpr std::size_t kHandBones = 20;
+inline constexpr std::size_t kHandBones = hands::kBones.size();
 // Id of the first bone of the left hand. Ids of the right hand start 32 higher.
 inline constexpr std::uint32_t kFirstBoneId = 0x80000000;
 

@@ -210,6 +210,7 @@ void Program::call(const CoreInput::Call& call) {
         grab.max_force = numbers.next();
         grab.slip_distance = numbers.next();
         grab.has_place = index % 2;
+        cs_set_local_contact(client(), static_cast<int>(index % 3));
         const auto point = numbers.array<3>(), direction = numbers.array<3>();
         if (cs_nearest_point(client(), point.data(), grab.reach, &grab.place) == 0)
           cs_cast_ray(client(), point.data(), direction.data(), grab.reach, &grab.place);

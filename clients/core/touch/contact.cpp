@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: MIT
+#include "clients/core/touch/contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "proto/codec/vertex_normals.h"
+
+namespace clothstream::client {
+namespace {
+
+constexpr float kShortestWay = 1e-3f;  // m in the window
+
+// Smallest box around points.
+struct Box {
+  Vector least{kFar, kFar, kFar}, most{-kFar, -kFar, -kFar};
+
+  void add(const Capsule& capsule, float margin) {
+    for (const Vector& point : {capsule.from, capsule.to}) add(point, capsule.radius + margin);
+  }
+  bool empty() const { return least.x > most.x; }
+  void add(const Vector& point, float margin) {
+    least = {std::min(least.x, point.x - margin), std::min(least.y, point.y - margin),
+             std::min(least.z, point.z - margin)};
+    most = {std::max(most.x, point.x + margin), std::max(most.y, point.y + margin),
+            std::max(most.z, point.z + margin)};
+  }
+  bool contains(const Vector& point) const {
+    return point.x >= least.x && point.x <= most.x && point.y >= least.y && point.y <= most.y &&
+           point.z >= least.z && point.z <= most.z;
+  }
+
+ private:
+  static constexpr float kFar = std::numeric_limits<float>::max();
+};
+
+// Part of the segment at which it is nearest to a point.
+float nearestPart(const Capsule& capsule, const Vector& point) {
+  const Vector along = capsule.to - capsule.from;
+  const float squared = dot(along, along);
+  return squared > 0 ? std::clamp(dot(along, point - capsule.from) / squared, 0.0f, 1.0f) : 0;
+}
+
+// Any vector of length 1 across another one.
+Vector across(const Vector& vector) {
+  const Vector axis = std::abs(vector.y) < 0.9f * length(vector) ? Vector{0, 1, 0} : Vector{1, 0, 0};
+  const Vector found = cross(vector, axis);
+  const float size = length(found);
+  return size > 0 ? (1 / size) * found : Vector{0, 1, 0};
+}
+
+// Direction from the segment to a point; a direction across the segment for a point on it.
+Vector sideOf(const Capsule& capsule, const Vector& fromSegment, float distance) {
+  return distance > 1e-6f ? (1 / distance) * fromSegment : across(capsule.to - capsule.from);
+}
+
+Vector withoutPart(const Vector& vector, const Vector& direction) {
+  return vector - dot(vector, direction) * direction;
+}
+
+// Longest way of an end of a capsule.
+float travel(const OwnCapsules& from, const OwnCapsules& to) {
+  float longest = 0;
+  for (std::size_t i = 0; i < kOwnCapsules; ++i)
+    if (from[i].present() && to[i].present())
+      longest = std::max({longest, length(to[i].from - from[i].from), length(to[i].to - from[i].to)});
+  return longest;
+}
+
+// 0 below `from`, 1 above `to`, linear between them.
+float ramp(float value, float from, float to) {
+  return std::clamp((value - from) / (to - from), 0.0f, 1.0f);
+}
+
+}  // namespace
+
+void Contact::begin(const Description& description) {
+  const std::vector<std::uint32_t>& triangles = description.triangles;
+  const std::size_t vertices = description.restPositions.size() / 3;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> ends;
+  ends.reserve(2 * triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); i += 3)
+    for (const auto& [a, b] : {std::pair{0, 1}, {1, 2}, {2, 0}}) {
+      const std::uint32_t from = triangles[i + static_cast<std::size_t>(a)];
+      const std::uint32_t to = triangles[i + static_cast<std::size_t>(b)];
+      ends.emplace_back(from, to);
+      ends.emplace_back(to, from);
+    }
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+
+  *this = {};
+  reach_.assign(vertices, 0);
+  firstEdge_.assign(vertices + 1, 0);
+  edges_.reserve(ends.size());
+  for (const auto& [from, to] : ends) {
+    const float size = length(vectorAt(description.restPositions.data(), from) -
+                              vectorAt(description.restPositions.data(), to));
+    // No point of a triangle is farther from its nearest corner than the longest edge over the root of three.
+    reach_[from] = std::max(reach_[from], size / std::sqrt(3.0f));
+    edges_.push_back({to, size});
+    ++firstEdge_[from + 1];
+  }
+  if (!reach_.empty()) farthestReach_ = *std::max_element(reach_.begin(), reach_.end());
+  for (std::size_t i = 0; i < vertices; ++i) firstEdge_[i + 1] += firstEdge_[i];
+  corrections_.assign(vertices, {});
+  lastCorrections_.assign(vertices, {});
+  sizes_.assign(vertices, 0);
+}
+
+std::span<const float> Contact::apply(std::span<const float> played, const OwnCapsules& answered,
+                                      const OwnCapsules& newest, std::uint64_t nowUs) {
+  largest_ = 0;
+  if (played.size() != 3 * reach_.size()) return played;
+  const float seconds = nowUs > shownUs_ ? static_cast<float>(nowUs - shownUs_) * 1e-6f : 0;
+  const float most = std::max(travel(now_, newest), travel(answered_, answered)) + kBlendSpeed * seconds;
+  shownUs_ = nowUs;
+  hasNormals_ = false;
+  now_ = newest;
+  answered_ = answered;
+  lastCorrections_.swap(corrections_);
+  lastCorrected_.swap(corrected_);
+  for (const std::uint32_t vertex : corrected_) corrections_[vertex] = {};
+  for (const std::uint32_t vertex : lastCorrected_) sizes_[vertex] = 0;
+  corrected_.clear();
+
+  Box sweep, end;
+  for (std::size_t i = 0; i < kOwnCapsules; ++i) {
+    if (!now_[i].present()) continue;
+    end.add(now_[i], farthestReach_);
+    sweep.add(now_[i], farthestReach_);
+    if (answered_[i].present()) sweep.add(answered_[i], farthestReach_);
+  }
+  if (end.empty() && lastCorrected_.empty()) return played;
+  for (std::uint32_t vertex = 0; vertex < reach_.size(); ++vertex) {
+    const Vector at = vectorAt(played.data(), vertex);
+    if (!sweep.contains(at)) continue;
+    const Vector correction = swept(vertex, at);
+    if (dot(correction, correction) > 0) correct(vertex, correction);
+  }
+  spread();
+  // Vertices that the others took with them may have come into a capsule.
+  for (std::uint32_t vertex = 0; vertex < reach_.size(); ++vertex) {
+    const Vector at = vectorAt(played.data(), vertex) + corrections_[vertex];
+    if (!end.contains(at)) continue;
+    const Vector push = keptOutside(vertex, at) - at;
+    if (dot(push, push) > 0) correct(vertex, corrections_[vertex] + push);
+  }
+  blend(most);
+  shown_.assign(played.begin(), played.end());
+  for (const std::uint32_t vertex : corrected_) {
+    const Vector& correction = corrections_[vertex];
+    shown_[3 * vertex] += correction.x;
+    shown_[3 * vertex + 1] += correction.y;
+    shown_[3 * vertex + 2] += correction.z;
+    largest_ = std::max(largest_, sizes_[vertex]);
+  }
+  return largest_ > 0 ? std::span<const float>(shown_) : played;
+}
+
+std::span<const float> Contact::normals(const codec::StreamLayout& layout) {
+  if (!std::exchange(hasNormals_, true)) {
+    normals_.resize(shown_.size());
+    codec::computeVertexNormals(layout, shown_.data(), normals_.data());
+  }
+  return normals_;
+}
+
+float Contact::keptDistance(float radius, std::uint32_t vertex) const {
+  return std::sqrt(radius * radius + reach_[vertex] * reach_[vertex]);
+}
+
+Vector Contact::swept(std::uint32_t vertex, const Vector& played) const {
+  Vector largest;
+  float largestSize = 0;
+  for (std::size_t i = 0; i < kOwnCapsules; ++i) {
+    const Capsule& start = answered_[i];
+    const Capsule& end = now_[i];
+    if (!start.present() || !end.present()) continue;
+    const float kept = keptDistance(end.radius, vertex);
+    // The point of the segment that comes nearest to the vertex on its way.
+    float part = nearestPart(start, played);
+    Vector from, way;
+    float length_ = 0, along = 0;
+    for (int round = 0; round < 2; ++round) {
+      from = start.at(part);
+      way = end.at(part) - from;
+      length_ = length(way);
+      if (!(length_ > kShortestWay)) break;
+      along = dot(played - from, way) / length_;
+      const float progress = std::clamp(along / length_, 0.0f, 1.0f);
+      part = nearestPart({start.from + progress * (end.from - start.from),
+                          start.to + progress * (end.to - start.to), end.radius},
+                         played);
+    }
+    if (!(length_ > kShortestWay)) continue;
+    from = start.at(part);
+    way = end.at(part) - from;
+    length_ = length(way);
+    const Vector direction = (1 / length_) * way;
+    along = dot(played - from, direction);
+    const float beside = length(withoutPart(played - from, direction));
+    if (!(beside < kept)) continue;
+    const float front = length_ + std::sqrt(kept * kept - beside * beside);
+    // Not what is behind the capsule, and less at the rim of what it sweeps, so that nothing jumps there.
+    const float share = ramp(along, -0.2f * kept, 0.3f * kept) * ramp(kept - beside, 0, 0.3f * kept);
+    const float size = share * (front - along);
+    if (!(size > largestSize)) continue;
+    largestSize = size;
+    largest = size * direction;
+  }
+  return largest;
+}
+
+void Contact::correct(std::uint32_t vertex, const Vector& correction) {
+  if (sizes_[vertex] == 0) corrected_.push_back(vertex);
+  corrections_[vertex] = correction;
+  sizes_[vertex] = length(correction);
+}
+
+// Goes from the largest correction to smaller ones, as Dijkstra's algorithm does: a vertex is final when it
+// is taken.
+void Contact::spread() {
+  queue_.clear();
+  for (const std::uint32_t vertex : corrected_) queue_.emplace_back(sizes_[vertex], vertex);
+  std::make_heap(queue_.begin(), queue_.end());
+  while (!queue_.empty()) {
+    const auto [size, vertex] = queue_.front();
+    std::pop_heap(queue_.begin(), queue_.end());
+    queue_.pop_back();
+    if (size < sizes_[vertex]) continue;
+    for (std::uint32_t i = firstEdge_[vertex]; i < firstEdge_[vertex + 1]; ++i) {
+      const float left = size - kSlope * edges_[i].length;
+      const std::uint32_t to = edges_[i].to;
+      if (!(left > sizes_[to]) || left < 1e-5f) continue;
+      correct(to, (left / size) * corrections_[vertex]);
+      queue_.emplace_back(sizes_[to], to);
+      std::push_heap(queue_.begin(), queue_.end());
+    }
+  }
+}
+
+void Contact::blend(float most) {
+  const auto limit = [&](std::uint32_t vertex) {
+    const Vector change = corrections_[vertex] - lastCorrections_[vertex];
+    if (const float size = length(change); size > most)
+      correct(vertex, lastCorrections_[vertex] + (most / size) * change);
+  };
+  for (const std::uint32_t vertex : lastCorrected_) limit(vertex);
+  for (std::size_t i = 0; i < corrected_.size(); ++i) limit(corrected_[i]);
+}
+
+// The second round repairs what the first one pushed from one capsule into another. A corrected vertex goes
+// on in its direction, so that it stays on the side of those around it.
+Vector Contact::keptOutside(std::uint32_t vertex, const Vector& shown) const {
+  Vector at = shown;
+  for (int round = 0; round < 2; ++round)
+    for (const Capsule& capsule : now_) {
+      if (!capsule.present()) continue;
+      const Vector nearest = capsule.at(nearestPart(capsule, at));
+      const Vector away = at - nearest;
+      const float kept = keptDistance(capsule.radius, vertex), distance = length(away);
+      if (!(distance < kept)) continue;
+      const Vector side =
+          sizes_[vertex] > 0 ? (1 / sizes_[vertex]) * corrections_[vertex] : sideOf(capsule, away, distance);
+      const Vector beside = withoutPart(away, side);
+      at = nearest + beside + std::sqrt(std::max(0.0f, kept * kept - dot(beside, beside))) * side;
+    }
+  return at;
+}
+
+}  // namespace clothstream::client
