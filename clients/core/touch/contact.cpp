@@ -11,7 +11,8 @@
 namespace clothstream::client {
 namespace {
 
-constexpr float kShortestWay = 1e-3f;  // m in the window
+// Ways that count, m. A longer one is a jump.
+constexpr float kShortestWay = 1e-3f, kLongestWay = 3;
 
 // Smallest box around points.
 struct Box {
@@ -151,10 +152,10 @@ std::span<const float> Contact::apply(std::span<const float> played, const OwnCa
   blend(most);
   shown_.assign(played.begin(), played.end());
   for (const std::uint32_t vertex : corrected_) {
-    const Vector& correction = corrections_[vertex];
-    shown_[3 * vertex] += correction.x;
-    shown_[3 * vertex + 1] += correction.y;
-    shown_[3 * vertex + 2] += correction.z;
+    const Vector at = vectorAt(played.data(), vertex) + corrections_[vertex];
+    shown_[3 * vertex] = at.x;
+    shown_[3 * vertex + 1] = at.y;
+    shown_[3 * vertex + 2] = at.z;
     largest_ = std::max(largest_, sizes_[vertex]);
   }
   return largest_ > 0 ? std::span<const float>(shown_) : played;
@@ -181,29 +182,24 @@ Vector Contact::swept(std::uint32_t vertex, const Vector& played) const {
     if (!start.present() || !end.present()) continue;
     const float kept = keptDistance(end.radius, vertex);
     // The point of the segment that comes nearest to the vertex on its way.
-    float part = nearestPart(start, played);
+    float part = nearestPart(start, played), gone = 0;
     Vector from, way;
-    float length_ = 0, along = 0;
-    for (int round = 0; round < 2; ++round) {
+    for (int round = 0; round < 3; ++round) {
       from = start.at(part);
       way = end.at(part) - from;
-      length_ = length(way);
-      if (!(length_ > kShortestWay)) break;
-      along = dot(played - from, way) / length_;
-      const float progress = std::clamp(along / length_, 0.0f, 1.0f);
+      gone = length(way);
+      if (!(gone > kShortestWay && gone < kLongestWay) || round == 2) break;
+      const float progress = std::clamp(dot(played - from, way) / (gone * gone), 0.0f, 1.0f);
       part = nearestPart({start.from + progress * (end.from - start.from),
                           start.to + progress * (end.to - start.to), end.radius},
                          played);
     }
-    if (!(length_ > kShortestWay)) continue;
-    from = start.at(part);
-    way = end.at(part) - from;
-    length_ = length(way);
-    const Vector direction = (1 / length_) * way;
-    along = dot(played - from, direction);
+    if (!(gone > kShortestWay && gone < kLongestWay)) continue;
+    const Vector direction = (1 / gone) * way;
+    const float along = dot(played - from, direction);
     const float beside = length(withoutPart(played - from, direction));
     if (!(beside < kept)) continue;
-    const float front = length_ + std::sqrt(kept * kept - beside * beside);
+    const float front = gone + std::sqrt(kept * kept - beside * beside);
     // Not what is behind the capsule, and less at the rim of what it sweeps, so that nothing jumps there.
     const float share = ramp(along, -0.2f * kept, 0.3f * kept) * ramp(kept - beside, 0, 0.3f * kept);
     const float size = share * (front - along);
