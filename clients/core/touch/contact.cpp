@@ -14,6 +14,8 @@ namespace {
 // Ways that count, m. A longer one is a jump.
 constexpr float kShortestWay = 1e-3f, kLongestWay = 3;
 
+constexpr float kBucket = 5e-4f, kLeast = 1e-5f;  // m
+
 // Smallest box around points.
 struct Box {
   Vector least{kFar, kFar, kFar}, most{-kFar, -kFar, -kFar};
@@ -203,7 +205,7 @@ Vector Contact::swept(std::uint32_t vertex, const Vector& played) const {
     // Not what is behind the capsule, and less at the rim of what it sweeps, so that nothing jumps there.
     const float share = ramp(along, -0.2f * kept, 0.3f * kept) * ramp(kept - beside, 0, 0.3f * kept);
     const float size = share * (front - along);
-    if (!(size > largestSize)) continue;
+    if (!(size > largestSize && size < kLongestWay)) continue;
     largestSize = size;
     largest = size * direction;
   }
@@ -216,25 +218,32 @@ void Contact::correct(std::uint32_t vertex, const Vector& correction) {
   sizes_[vertex] = length(correction);
 }
 
-// Goes from the largest correction to smaller ones, as Dijkstra's algorithm does: a vertex is final when it
-// is taken.
+// Goes from large corrections to small ones, as Dijkstra's algorithm does, in buckets of kBucket. A vertex
+// that grows within its bucket is taken again.
 void Contact::spread() {
-  queue_.clear();
-  for (const std::uint32_t vertex : corrected_) queue_.emplace_back(sizes_[vertex], vertex);
-  std::make_heap(queue_.begin(), queue_.end());
-  while (!queue_.empty()) {
-    const auto [size, vertex] = queue_.front();
-    std::pop_heap(queue_.begin(), queue_.end());
-    queue_.pop_back();
-    if (size < sizes_[vertex]) continue;
-    for (std::uint32_t i = firstEdge_[vertex]; i < firstEdge_[vertex + 1]; ++i) {
-      const float left = size - kSlope * edges_[i].length;
-      const std::uint32_t to = edges_[i].to;
-      if (!(left > sizes_[to]) || left < 1e-5f) continue;
-      correct(to, (left / size) * corrections_[vertex]);
-      queue_.emplace_back(sizes_[to], to);
-      std::push_heap(queue_.begin(), queue_.end());
+  const auto bucketOf = [&](std::uint32_t vertex) {
+    return static_cast<std::size_t>(sizes_[vertex] / kBucket);
+  };
+  const auto put = [&](std::uint32_t vertex) {
+    const std::size_t bucket = bucketOf(vertex);
+    if (bucket >= buckets_.size()) buckets_.resize(bucket + 1);
+    buckets_[bucket].push_back(vertex);
+  };
+  for (const std::uint32_t vertex : corrected_) put(vertex);
+  for (std::size_t bucket = buckets_.size(); bucket-- > 0;) {
+    for (std::size_t i = 0; i < buckets_[bucket].size(); ++i) {
+      const std::uint32_t vertex = buckets_[bucket][i];
+      if (bucketOf(vertex) != bucket) continue;
+      const float size = sizes_[vertex];
+      for (std::uint32_t edge = firstEdge_[vertex]; edge < firstEdge_[vertex + 1]; ++edge) {
+        const float left = size - kSlope * edges_[edge].length;
+        const std::uint32_t to = edges_[edge].to;
+        if (!(left > sizes_[to] + kLeast)) continue;
+        correct(to, (left / size) * corrections_[vertex]);
+        put(to);
+      }
     }
+    buckets_[bucket].clear();
   }
 }
 

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "clients/core/touch/own_capsules.h"
@@ -66,7 +65,7 @@ class Contact {
   std::vector<std::uint32_t> corrected_;  // vertices whose correction is not 0
   std::vector<Vector> lastCorrections_;
   std::vector<std::uint32_t> lastCorrected_;
-  std::vector<std::pair<float, std::uint32_t>> queue_;
+  std::vector<std::vector<std::uint32_t>> buckets_;  // of spread(); empty between calls
   std::vector<float> shown_, normals_;
   bool hasNormals_ = false;
   float largest_ = 0;
