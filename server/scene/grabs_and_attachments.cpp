@@ -147,6 +147,7 @@ void GrabsAndAttachments::goBack(std::span<const Slot> then, simulation::HeldNod
                       then[i].number == slot.number;
     if (same) {
       kept[i] = true;
+      slot.age = then[i].age;
       if (slot.vertices != then[i].vertices) slot.vertices.reset();
     } else if (slot.phase == Slot::Phase::holds) {
       slot.phase = Slot::Phase::takes;

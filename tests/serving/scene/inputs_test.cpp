@@ -219,6 +219,27 @@ TEST(GrabsAndAttachments, GrabsThatStillHoldAfterGoingBackKeepWhatTheyHeld) {
   EXPECT_EQ(tick.grabs[1].state, State::takes);
 }
 
+TEST(GrabsAndAttachments, AGrabThatGoesBackDrawsItsPlaceFromThereOn) {
+  const model::Scene scene = sceneWithAttachments();
+  GrabsAndAttachments grabs(scene);
+  simulation::TickInputs tick;
+  const model::Grab grab{.id = 1, .place = model::GrabPlace{.point = {.triangle = 1}}};
+  grabs.place(7, std::vector{grab}, {});
+  grabs.advance(scene, 0.01, tick);
+  EXPECT_TRUE(tick.grabs[0].place.has_value());
+  EXPECT_EQ(tick.grabs[0].leftAtStart, 1);
+  const float left = tick.grabs[0].leftAtEnd;
+  EXPECT_LT(left, 1);
+  const std::vector<GrabsAndAttachments::Slot> then = grabs.state().slots;
+  for (int i = 0; i < 30; ++i) grabs.advance(scene, 0.02, tick);
+  EXPECT_EQ(tick.grabs[0].leftAtEnd, 0);
+  EXPECT_FALSE(tick.grabs[0].place.has_value());
+  simulation::HeldNodes held{.nodes = {{.node = 2, .grab = 0}}, .grabs = {{.taken = 1}}};
+  grabs.goBack(then, held);
+  grabs.advance(scene, 0.03, tick);
+  EXPECT_EQ(tick.grabs[0].leftAtStart, left);
+}
+
 TEST(GrabsAndAttachments, GrabStartsHoldsAndReleases) {
   using State = simulation::Grab::State;
   const model::Scene scene = sceneWithBall();
