@@ -29,8 +29,8 @@ class GrabsAndAttachments {
   // Writes grabs and attachments of the next tick, which ends at this simulated time in seconds.
   void advance(const model::Scene& scene, double endSeconds, simulation::TickInputs& inputs);
 
-  // Adds events for the grabs of tick `events.tick()`, which is the newest and complete. `grabs` is the simulation's
-  // result.
+  // Adds events for the grabs of tick `events.tick()`, which is the newest and complete. `grabs` is the
+  // simulation's result.
   void addEvents(std::span<const simulation::GrabStatus> grabs, v1::TickEvents& events);
 
   // Entry at the index of TickInputs::grabs.
