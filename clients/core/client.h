@@ -68,7 +68,7 @@ class Client {
   bool setPlayOut(const cs_play_out_options* options);
   void setLocalContact(bool on);
   // Length of the largest correction of the last play(), m.
-  float largestCorrection() const { return contact_ ? contact_->largest() : 0; }
+  float largestCorrection() const { return shown_.empty() ? 0 : contact_->largest(); }
   // nullopt if play-out is off.
   std::optional<cs_played> play(std::uint64_t nowUs, std::uint64_t displayUs);
 

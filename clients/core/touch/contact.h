@@ -35,8 +35,8 @@ class Contact {
   float largest() const { return largest_; }
 
  private:
-  static constexpr float kSlope =
-      0.3f;  // change of the correction from vertex to vertex, per length of their edge
+  // Change of the correction from vertex to vertex, per length of their edge.
+  static constexpr float kSlope = 0.3f;
   static constexpr float kBlendSpeed = 0.35f;  // m/s
 
   struct Edge {
