@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writes src/layout.ts: sizes and offsets of the structs of clients/core/core.h in WebAssembly memory. The wasm32
+// Writes client/src/layout.ts: sizes and offsets of the structs of clients/core/core.h in WebAssembly memory. The wasm32
 // compiler computes them. Usage: node generate_layout.mjs CLANG [--check]. With --check it writes nothing, and fails
 // if layout.ts is out of date.
 import { execFileSync } from "node:child_process";
@@ -14,7 +14,7 @@ if (!compiler || (mode && mode !== "--check")) {
   process.exit(2);
 }
 const headerPath = fileURLToPath(new URL("../core/core.h", import.meta.url));
-const layoutPath = fileURLToPath(new URL("src/layout.ts", import.meta.url));
+const layoutPath = fileURLToPath(new URL("client/src/layout.ts", import.meta.url));
 
 // Struct names with the names of their members.
 function structs(header) {

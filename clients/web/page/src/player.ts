@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Timeline of a recording: pause, seek, speed and loop, which act for every participant.
 
-import type { Client, Playback } from "./client";
+import type { Client, Playback } from "@clothstream/client";
 import { element, write } from "./hud";
 
 // Period of seek requests while the user drags the timeline. The server accepts ten requests per second.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The cloths in the panel: material, solver and simulation report of each.
 
-import { Solvers, type Client, type ClothReport } from "./client";
+import { Solvers, type Client, type ClothReport } from "@clothstream/client";
 import { element, write } from "./hud";
 
 const kFigures = ["nodes", "strain max", "strain p99", "strain mean", "constraints", "iterations", "residual", "energy", "penetration"] as const;

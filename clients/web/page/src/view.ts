@@ -3,9 +3,8 @@
 
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { Shape, type Client, type Vec3 } from "./client";
-import { ClothMesh } from "./cloth_mesh";
-import { ColliderMeshes, reachOf, type ColliderMesh } from "./collider_meshes";
+import { Shape, type Client, type Vec3 } from "@clothstream/client";
+import { ClothMesh, ColliderMeshes, reachOf, type ColliderMesh } from "@clothstream/three";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
 

@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: MIT
 // How this page proves who it is: asks for a pairing code or a token, keeps the token, and shows codes to owners.
 
-import { Roles, type Client, type PairingCode } from "./client";
+import { Roles, type Client, type PairingCode, type Proof, type TokenStore } from "@clothstream/client";
 import { element, write } from "./hud";
 
 const kStorageKey = "clothstream.token";
 
-// Token that pairing has given for this server; "" without one. A browser may refuse to store anything.
-export function keptToken(): string {
-  try {
-    return window.localStorage.getItem(kStorageKey) ?? "";
-  } catch {
-    return "";
-  }
-}
-
-export function keepToken(token: string): void {
-  try {
-    if (token) window.localStorage.setItem(kStorageKey, token);
-    else window.localStorage.removeItem(kStorageKey);
-  } catch {
-    // The page then asks again the next time.
-  }
-}
+// Token that pairing has given for this server. A browser may refuse to store anything; the page then asks again.
+export const browserTokens: TokenStore = {
+  kept() {
+    try {
+      return window.localStorage.getItem(kStorageKey) ?? "";
+    } catch {
+      return "";
+    }
+  },
+  keep(token) {
+    try {
+      if (token) window.localStorage.setItem(kStorageKey, token);
+      else window.localStorage.removeItem(kStorageKey);
+    } catch {
+      // Asked again the next time.
+    }
+  },
+};
 
 // Proof in typed text: six digits are a code, anything else is a token.
-export type Proof = { token: string } | { code: string };
 export function proofIn(text: string): Proof {
   const typed = text.replace(/\s+/g, "");
   return /^\d{6}$/.test(typed) ? { code: typed } : { token: typed };

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
-import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Statistics, Vec3 } from "./client";
-import type { Session, SessionState } from "./session";
+import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Statistics, Vec3 } from "@clothstream/client";
 import type { View } from "./view";
 
 export interface Probe {

@@ -2,18 +2,16 @@
 // Starts the page: core, view, session, panel, and the drawing loop.
 
 import { ClothReports } from "./cloth_reports";
-import { Roles } from "./client";
+import { CoreModule, Roles, Session } from "@clothstream/client";
 import { Controls } from "./controls";
 import { Drag } from "./drag";
 import { element, Hud } from "./hud";
-import { PairingPanel, ProofForm } from "./identity";
+import { browserTokens, PairingPanel, ProofForm } from "./identity";
 import { listenToKeys } from "./keys";
 import { Player } from "./player";
 import { expose } from "./probe";
-import { Session } from "./session";
 import { showAddress } from "./share";
 import { View } from "./view";
-import { CoreModule } from "./wasm";
 
 const kFiguresPeriodMs = 250;
 
@@ -64,7 +62,7 @@ async function start(): Promise<void> {
     session.client.createPairingCode();
     session.flush();
   });
-  const session: Session = new Session(core, address.href, scene, identity, {
+  const session: Session = new Session(core, address.href, scene, identity, browserTokens, {
     stateChanged: () => {
       hud.showState(session.state);
       proof.show(session.state.kind === "asking" ? session.state.reason : undefined);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The control panel: scene, wind, gusts, gravity, stiffness, damping and collider. Changes are sent once per frame.
 
-import { Shape, type Client, type ClothParameters, type Environment, type Spring, type Vec3 } from "./client";
+import { Shape, type Client, type ClothParameters, type Environment, type Spring, type Vec3 } from "@clothstream/client";
 import { element } from "./hud";
 
 const kStill: Vec3 = [0, 0, 0];

@@ -2,7 +2,7 @@
 // Colliders as three.js meshes, one per collider in the order of shownColliders().
 
 import * as THREE from "three";
-import { Shape, type Client, type Collider } from "./client";
+import { Shape, type Client, type Collider } from "@clothstream/client";
 
 export type ColliderMesh = THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Text over the picture: connection state, figures of the stream, participants, errors and notices.
 
-import { Roles, type Client } from "./client";
-import type { SessionState } from "./session";
+import { Roles, type Client, type SessionState } from "@clothstream/client";
 
 const kNoticeMs = 6000;
 

@@ -2,7 +2,7 @@
 // One cloth as a three.js mesh. Vertices are uploaded from the core's memory without a copy, except at seams.
 
 import * as THREE from "three";
-import type { ClothLayout, Drawing } from "./client";
+import type { ClothLayout, Drawing } from "@clothstream/client";
 import { type DrawnVertices, separateSeams } from "./seams";
 
 // Madder, indigo, ochre, moss, plum and linen. Their brightness differs too, for colour-blind viewers.

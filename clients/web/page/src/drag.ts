@@ -2,7 +2,7 @@
 // Drags a collider or the cloth by mouse, pen, finger or keys.
 
 import * as THREE from "three";
-import type { ClothPoint, Grab, Vec3 } from "./client";
+import type { ClothPoint, Grab, Vec3 } from "@clothstream/client";
 import type { View } from "./view";
 
 // New position of a collider, or of a grab on the cloth. An undefined grab releases the cloth.

@@ -2,7 +2,6 @@
 // Membership in a scene across several connections. The client core decides when to connect, and as which participant.
 
 import { Client, ClientEvent, ClientState, kUnauthenticated, kWrongPairingCode, type Identity } from "./client";
-import { keepToken, keptToken, type Proof } from "./identity";
 import { StreamSocket } from "./socket";
 import type { CoreModule } from "./wasm";
 
@@ -12,6 +11,15 @@ export type SessionState =
   | { kind: "reconnecting"; reason: string; attemptAt: number } // on the clock of performance.now()
   | { kind: "asking"; reason: string } // the server requires a token or a pairing code
   | { kind: "failed"; reason: string };
+
+// What a person gives to a server that asks for it.
+export type Proof = { token: string } | { code: string };
+
+// Where the token of a server is kept between visits; "" means none.
+export interface TokenStore {
+  kept(): string;
+  keep(token: string): void;
+}
 
 export interface SessionListener {
   stateChanged(): void;
@@ -39,11 +47,12 @@ export class Session {
     url: string,
     scene: string,
     private readonly identity: Identity,
+    private readonly tokens: TokenStore,
     private readonly listener: SessionListener,
   ) {
     this.scene = scene;
     this.client = new Client(core, scene, identity);
-    this.client.setToken(keptToken());
+    this.client.setToken(this.tokens.kept());
     this.socket = new StreamSocket(url, {
       opened: () => this.flush(),
       message: (bytes) => this.receive(bytes),
@@ -122,7 +131,7 @@ export class Session {
     if (events & ClientEvent.participants) this.listener.participantsChanged(client);
     if (events & ClientEvent.scenes) this.listener.scenesListed(client.scenes());
     if (events & ClientEvent.grabs) this.listener.grabsLost(client);
-    if (events & ClientEvent.token) keepToken(client.token);
+    if (events & ClientEvent.token) this.tokens.keep(client.token);
     if (events & ClientEvent.pairingCode) this.listener.pairingCodeMade(client);
     if (events & ClientEvent.notice) this.listener.notice(client.noticeText);
     if (events & ClientEvent.error) {
@@ -131,7 +140,7 @@ export class Session {
     }
     if (this.state.kind !== "live" && client.state === ClientState.joined) {
       // A token that a person has typed works: keep it.
-      if (client.token) keepToken(client.token);
+      if (client.token) this.tokens.keep(client.token);
       this.enter({ kind: "live" });
     }
   }
@@ -147,7 +156,7 @@ export class Session {
     this.socket.close();
     const reason = client.errorText;
     const asks = client.errorCode === kUnauthenticated || client.errorCode === kWrongPairingCode;
-    if (client.errorCode === kUnauthenticated && client.token === keptToken()) keepToken("");
+    if (client.errorCode === kUnauthenticated && client.token === this.tokens.kept()) this.tokens.keep("");
     this.enter(asks ? { kind: "asking", reason } : { kind: "failed", reason });
   }
 

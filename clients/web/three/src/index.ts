@@ -1,0 +1,5 @@
+// SPDX-License-Identifier: MIT
+// What the package offers.
+
+export * from "./cloth_mesh";
+export * from "./collider_meshes";
