@@ -10,11 +10,17 @@
 
 namespace clothstream::client {
 
-Client::Client(Hello hello) : hello_(std::move(hello)) {
+// Request ids of a mirror differ from those of the client that it follows.
+constexpr std::uint64_t kFirstMirrorId = std::uint64_t{1} << 31;
+
+Client::Client(Hello hello, Kind kind)
+    : kind_(kind), hello_(std::move(hello)), newest_(kind == Kind::mirror),
+      lastRequestId_(kind == Kind::mirror ? kFirstMirrorId : 0) {
   sendHello();
 }
 
 void Client::sendHello() {
+  if (kind_ == Kind::mirror) return;
   std::string hello;
   std::string proof;
   if (!proof_.token.empty() || !proof_.pairingCode.empty())
@@ -60,7 +66,7 @@ std::uint64_t Client::connectAtUs() const {
   return welcomed_ ? lastHeardUs_ + Reconnection::kSilenceUs : connectAtUs_;
 }
 
-std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
+std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded* decoded) {
   if (state_ == CS_STATE_FAILED) return 0;
   const std::optional<ServerMessage> message = readServerMessage(bytes);
   if (!message) return failMalformed("ServerMessage");
@@ -71,7 +77,7 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs) {
     case Body::chunk:
       return chunkReceived(message->body);
     case Body::frame:
-      return frameReceived(message->body, nowUs);
+      return frameReceived(message->body, nowUs, decoded);
     case Body::pong:
       return pongReceived(message->body, nowUs);
     case Body::notice:
@@ -106,7 +112,7 @@ void Client::update(std::uint64_t nowUs) {
   const std::uint64_t pauseUs = nowUs - std::exchange(updatedUs_, nowUs);
   if (pauseUs > Reconnection::kLongestStepUs)
     lastHeardUs_ = std::min(nowUs, lastHeardUs_ + pauseUs - Reconnection::kLongestStepUs);
-  if (!welcomed_ || state_ == CS_STATE_FAILED || !clock_.pingDue(nowUs)) return;
+  if (kind_ == Kind::mirror || !welcomed_ || state_ == CS_STATE_FAILED || !clock_.pingDue(nowUs)) return;
   std::string ping;
   writePing(ping, ++lastRequestId_, nowUs);
   send(std::move(ping));
@@ -129,7 +135,7 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
                 decodedCodecs() + ".");
   const bool returned = state_ == CS_STATE_RECONNECTING;
   // Whether the server resumed the participant and its description is still the one that this client has.
-  const bool known = returned && welcome->resumed && decoder_ && hello_.contentId != 0 &&
+  const bool known = returned && welcome->resumed && described() && hello_.contentId != 0 &&
                      welcome->contentId == hello_.contentId;
   welcome_ = std::move(*welcome);
   welcomed_ = true;
@@ -185,10 +191,9 @@ std::uint32_t Client::described(Bytes content) {
   auto description = readDescription(content, limits_);
   if (!description)
     return fail("The server's description of the scene is wrong: " + description.error() + ".");
-  auto decoder = codec::Decoder::make(description->layout);
-  if (!decoder) return fail("The server's description of the scene is wrong: its layout is not possible.");
+  if (!newest_.begin(description->layout))
+    return fail("The server's description of the scene is wrong: its layout is not possible.");
   description_ = std::move(*description);
-  decoder_ = std::move(decoder);
   keyFrameRequest_.answered();
   // After a resume the ticks continue, so frames missed during the outage count as dropped.
   if (!resumed_) statistics_.forgetTicks();
@@ -202,21 +207,21 @@ std::uint32_t Client::described(Bytes content) {
   return returned ? CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED : CS_EVENT_DESCRIPTION;
 }
 
-std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs) {
+std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs, const cs_decoded* decoded) {
   if (!readFrame(body, frame_)) return failMalformed("Frame");
   if (state_ != CS_STATE_JOINED) return fail("The server sent a frame before the description.");
   description_.colliders.resize(frame_.colliders.size());
   for (std::size_t i = 0; i < frame_.colliders.size(); ++i) {
     if (!readCollider(frame_.colliders[i], description_.colliders[i])) return failMalformed("ColliderState");
   }
-  const std::uint32_t events = packetReceived(nowUs);
+  const std::uint32_t events = packetReceived(nowUs, decoded);
   if (!frame_.report || (events & CS_EVENT_FRAME) == 0) return events;
   if (!readReport(*frame_.report, report_)) return failMalformed("SimulationReport");
-  reportTick_ = decoder_->tick();
+  reportTick_ = newest_.tick();
   return events | CS_EVENT_REPORT;
 }
 
-std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
+std::uint32_t Client::packetReceived(std::uint64_t nowUs, const cs_decoded* given) {
   const auto packet = std::as_bytes(std::span(frame_.packet.data(), frame_.packet.size()));
   const auto parsed = codec::parsePacket(packet);
   // Frames that the server omits are not lost. At a change of layers or of the divisor, the larger distance
@@ -227,30 +232,29 @@ std::uint32_t Client::packetReceived(std::uint64_t nowUs) {
       nowUs);
   formerPoint_ = point_;
   frameDivisor_ = frame_.divisor;
-  switch (decode(packet)) {
-    case codec::DecodeResult::ok:
-      break;
-    case codec::DecodeResult::stale:
-      return 0;
-    case codec::DecodeResult::malformed:
-    case codec::DecodeResult::wrongEpoch:
-    case codec::DecodeResult::missingReference:
-      statistics_.refused();
-      requestKeyFrame(nowUs);
-      return 0;
+  const bool isMirror = kind_ == Kind::mirror;
+  const cs_decoding decoding = !isMirror ? decode(packet)
+                               : parsed  ? newest_.take(given, parsed->header.tick)
+                                         : CS_DECODING_REFUSED;
+  if (decoding == CS_DECODING_SKIPPED) return 0;
+  if (decoding == CS_DECODING_REFUSED) {
+    statistics_.refused();
+    if (!isMirror) requestKeyFrame(nowUs);
+    return 0;
   }
+  if (isMirror) decodeMs_ = given->decode_ms;
   const DecodedFrame decoded{
-      .tick = decoder_->tick(),
+      .tick = newest_.tick(),
       .key = parsed->header.kind == codec::PacketKind::key,
-      .hashMatches = decoder_->reconstructionHash() == frame_.reconstructionHash,
+      .hashMatches = newest_.hash() == frame_.reconstructionHash,
       .vertexCount = description_.layout.vertexCount(),
       .packetBytes = packet.size(),
   };
   statistics_.decoded(decoded, nowUs);
   if (decoded.key) keyFrameRequest_.answered();
   // A key frame makes the client's state equal to the server's again.
-  if (!decoded.hashMatches) requestKeyFrame(nowUs);
-  if (acknowledgement_.due(nowUs)) outbox_.setAck(decoded.tick);
+  if (!isMirror && !decoded.hashMatches) requestKeyFrame(nowUs);
+  if (!isMirror && acknowledgement_.due(nowUs)) outbox_.setAck(decoded.tick);
   timeFrame(decoded.key, nowUs);
   return CS_EVENT_FRAME;
 }
@@ -266,19 +270,19 @@ void Client::timeFrame(bool key, std::uint64_t nowUs) {
   if (!playOut_) return;
   const bool sendsNormals = description_.layout.normals != codec::NormalMode::none;
   const auto decodeUs = static_cast<std::uint64_t>(1000 * decodeMs_);
-  playOut_->add({.tick = decoder_->tick(),
+  playOut_->add({.tick = newest_.tick(),
                  .timeUs = frame_.tickTimeUs,
                  .key = key,
-                 .positions = decoder_->positions(),
-                 .normals = sendsNormals ? decoder_->normals() : std::span<const float>(),
+                 .positions = newest_.positions(),
+                 .normals = sendsNormals ? newest_.normals() : std::span<const float>(),
                  .colliders = description_.colliders},
                 clock_.known() ? arrivedUs + decodeUs : 0);
 }
 
-codec::DecodeResult Client::decode(std::span<const std::byte> packet) {
-  if (!nowUs_) return decoder_->decode(packet);
+cs_decoding Client::decode(std::span<const std::byte> packet) {
+  if (!nowUs_) return newest_.decode(packet);
   const std::uint64_t start = nowUs_();
-  const codec::DecodeResult result = decoder_->decode(packet);
+  const cs_decoding result = newest_.decode(packet);
   decodeMs_ = static_cast<double>(nowUs_() - start) / 1000;
   return result;
 }
@@ -293,6 +297,7 @@ void Client::requestKeyFrame(std::uint64_t nowUs, bool early) {
 std::uint32_t Client::pongReceived(Bytes body, std::uint64_t nowUs) {
   const std::optional<Pong> pong = readPong(body);
   if (!pong) return failMalformed("Pong");
+  if (kind_ == Kind::mirror) clock_.pingSent(pong->clientTimeUs);
   clock_.pongReceived(*pong, nowUs);
   return 0;
 }
@@ -406,12 +411,12 @@ const std::string* Client::nextOutgoing() {
 }
 
 std::span<const float> Client::positions() const {
-  if (decoder_ && decoder_->hasFrame()) return decoder_->positions();
+  if (newest_.present()) return newest_.positions();
   return description_.restPositions;
 }
 
 std::span<const float> Client::normals() const {
-  if (decoder_ && decoder_->hasFrame()) return decoder_->normals();
+  if (newest_.present()) return newest_.normals();
   return description_.restNormals;
 }
 
@@ -427,7 +432,7 @@ std::span<const float> Client::playedNormals() const {
 
 std::uint64_t Client::shownTick() const {
   if (playOut_) return playOut_->shows() ? playedTick_ : 0;
-  return decoder_ && decoder_->hasFrame() ? decoder_->tick() : 0;
+  return newest_.present() ? newest_.tick() : 0;
 }
 
 const std::vector<Collider>& Client::playedColliders() const {
@@ -443,7 +448,7 @@ cs_stage_statistics Client::stages() const {
 }
 
 std::uint64_t Client::reconstructionHash() const {
-  return decoder_ && decoder_->hasFrame() ? decoder_->reconstructionHash() : 0;
+  return newest_.present() ? newest_.hash() : 0;
 }
 
 std::uint32_t Client::fail(std::string text) {

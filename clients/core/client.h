@@ -13,6 +13,7 @@
 #include "clients/core/stream/content_assembly.h"
 #include "clients/core/stream/frame_feedback.h"
 #include "clients/core/stream/frame_statistics.h"
+#include "clients/core/stream/newest_frame.h"
 #include "clients/core/stream/outbox.h"
 #include "clients/core/stream/play_out.h"
 #include "clients/core/stream/reconnection.h"
@@ -23,16 +24,16 @@
 #include "clients/core/wire/description.h"
 #include "clients/core/wire/limits.h"
 #include "clients/core/wire/server_message.h"
-#include "proto/codec/decoder.h"
 
 namespace clothstream::client {
 
 class Client {
  public:
-  explicit Client(Hello hello);
+  enum class Kind { whole, mirror };
+  explicit Client(Hello hello, Kind kind = Kind::whole);
 
-  // Returns a set of CS_EVENT bits.
-  std::uint32_t receive(Bytes message, std::uint64_t nowUs);
+  // Returns a set of CS_EVENT bits. A mirror needs what the other client decoded.
+  std::uint32_t receive(Bytes message, std::uint64_t nowUs, const cs_decoded* decoded = nullptr);
   void update(std::uint64_t nowUs);
   void connecting(std::uint64_t nowUs);
   void disconnected(std::uint64_t nowUs);
@@ -86,7 +87,7 @@ class Client {
   const Welcome& welcome() const { return welcome_; }
   // Empty before the first description.
   const Description& description() const { return description_; }
-  bool described() const { return decoder_ != nullptr; }
+  bool described() const { return newest_.begun(); }
   const FrameStatistics& statistics() const { return statistics_; }
   const ServerClock& clock() const { return clock_; }
   // Quality and layers that the server sends now; no layers before the description.
@@ -128,10 +129,10 @@ class Client {
   std::uint32_t presenceReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t chunkReceived(Bytes body);
   std::uint32_t described(Bytes content);
-  std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs);
-  std::uint32_t packetReceived(std::uint64_t nowUs);
+  std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs, const cs_decoded* decoded);
+  std::uint32_t packetReceived(std::uint64_t nowUs, const cs_decoded* decoded);
   void timeFrame(bool key, std::uint64_t nowUs);
-  codec::DecodeResult decode(std::span<const std::byte> packet);
+  cs_decoding decode(std::span<const std::byte> packet);
   void requestKeyFrame(std::uint64_t nowUs, bool early = false);
   std::uint32_t pongReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t eventsReceived(Bytes body);
@@ -150,6 +151,7 @@ class Client {
   std::uint32_t failMalformed(const char* what);
   void send(std::string message);
 
+  Kind kind_;
   cs_state state_ = CS_STATE_JOINING;
   bool welcomed_ = false;  // whether Welcome has arrived on the current connection
   bool resumed_ = false;
@@ -168,7 +170,7 @@ class Client {
   Limits limits_;
   ContentAssembly assembly_;
   Description description_;
-  std::unique_ptr<codec::Decoder> decoder_;
+  NewestFrame newest_;
   Frame frame_;
   OperatingPoint point_, formerPoint_;  // current one, and that of the newest frame
   std::uint32_t frameDivisor_ = 1;      // of the newest frame

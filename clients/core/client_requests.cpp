@@ -85,7 +85,7 @@ void Client::sendPoses(std::uint64_t nowUs) {
 bool Client::setPlayOut(const cs_play_out_options* options) {
   if (options && !isAllowed(*options)) return false;
   playOut_ = options ? std::make_unique<PlayOut>(*options) : nullptr;
-  if (playOut_ && decoder_) playOut_->begin(description_);
+  if (playOut_ && described()) playOut_->begin(description_);
   return true;
 }
 

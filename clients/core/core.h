@@ -28,7 +28,7 @@
  *
  * Units are SI unless a comment or a name says otherwise. Coordinates are right-handed with +Y up, in metres.
  *
- * Sections: lifetime, frames, play-out, input, parameters, participants, recording, statistics.
+ * Sections: lifetime, frames, play-out, mirror, input, parameters, participants, recording, statistics.
  */
 #ifndef CLOTHSTREAM_CLIENTS_CORE_CORE_H
 #define CLOTHSTREAM_CLIENTS_CORE_CORE_H
@@ -229,6 +229,8 @@ uint32_t cs_vertex_count(const cs_client* client) CS_NOEXCEPT;
  * of the rest state. */
 const float* cs_positions(const cs_client* client) CS_NOEXCEPT;
 const float* cs_normals(const cs_client* client) CS_NOEXCEPT;
+/* Returns 1 if the server sends normals, else 0: then they are computed from the positions. */
+int cs_sends_normals(const cs_client* client) CS_NOEXCEPT;
 /* Hash of the newest decoded frame, for comparison with the server's; 0 before the first frame. */
 uint64_t cs_reconstruction_hash(const cs_client* client) CS_NOEXCEPT;
 
@@ -326,6 +328,44 @@ const float* cs_played_normals(const cs_client* client) CS_NOEXCEPT;
 uint32_t cs_played_collider_count(const cs_client* client) CS_NOEXCEPT;
 /* Fails if the index is out of range. The name is valid until the next cs_play_out or cs_receive. */
 int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider* out) CS_NOEXCEPT;
+
+/* ---------------------------------------------------------------------------------------------------------------
+ * Mirror: one participant in two threads. On one thread, a client has the connection and decodes. On the other
+ * thread, which draws, its mirror has everything else: play-out, local contact, input, parameters, statistics.
+ * Both may be in different modules of WebAssembly, without shared memory.
+ *
+ * The program passes the client's messages and its calls of cs_connecting and cs_disconnected to the mirror in
+ * the same order, and sends what cs_next_outgoing of the mirror returns after what the client itself sends. A
+ * mirror sends no Hello, pings, acknowledgements, and no requests for key frames except cs_request_key_frame;
+ * cs_update and cs_connect_at of a mirror have no use. Token and pairing code are set on the client. Times are
+ * of the same clock for both.
+ */
+
+typedef enum cs_decoding {
+  CS_DECODING_DONE = 0,    /* the client decoded the frame */
+  CS_DECODING_REFUSED = 1, /* the client could not decode it */
+  CS_DECODING_SKIPPED = 2  /* the program does not pass the result on, or the frame was older than its state */
+} cs_decoding;
+
+/* What the client made of a message with a frame. */
+#define CS_DECODED_VERSION 1u
+typedef struct cs_decoded {
+  uint32_t version;             /* CS_DECODED_VERSION */
+  uint32_t decoding;            /* cs_decoding; the members below are read only for CS_DECODING_DONE */
+  const float* positions;       /* cs_positions: 3 floats for each of vertex_count vertices */
+  const float* normals;         /* cs_normals if the server sends normals; else ignored, may be NULL */
+  uint32_t vertex_count;        /* cs_vertex_count of the client */
+  uint64_t reconstruction_hash; /* cs_reconstruction_hash of the client */
+  double decode_ms;             /* time that decoding took; 0: not measured */
+} cs_decoded;
+
+/* Like cs_create_as, for the mirror of a client with the same arguments. */
+cs_client* cs_create_mirror(const char* scene, const char* client_name, const char* display_name,
+                            uint32_t role) CS_NOEXCEPT;
+/* Like cs_receive, for a mirror. `decoded` may be NULL for messages other than frames; a frame is then skipped.
+ * A frame with an unknown version or another number of vertices is skipped too. */
+uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t bytes,
+                            const cs_decoded* decoded, uint64_t now_us) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
  * Input: colliders, hands, grabs and attachments of this participant, and events of grabs and contacts.

@@ -34,6 +34,10 @@ const float* cs_normals(const cs_client* client) noexcept {
   return client->client.normals().data();
 }
 
+int cs_sends_normals(const cs_client* client) noexcept {
+  return client->client.description().layout.normals != clothstream::codec::NormalMode::none ? 1 : 0;
+}
+
 uint64_t cs_reconstruction_hash(const cs_client* client) noexcept {
   return client->client.reconstructionHash();
 }

@@ -10,21 +10,40 @@
 
 using namespace clothstream::client;
 
+namespace {
+
+cs_client* create(const char* scene, const char* clientName, const char* displayName, std::uint32_t role,
+                  Client::Kind kind) {
+  assert(scene && clientName && displayName);
+  // NOLINTNEXTLINE(bugprone-unhandled-exception-at-new): out of memory ends the program.
+  return new cs_client{Client({.scene = scene,
+                               .clientName = clientName,
+                               .displayName = displayName,
+                               .role = role,
+                               .wanted = {},
+                               .token = {},
+                               .contentId = 0},
+                              kind)};
+}
+
+Bytes bytesOf(const std::uint8_t* message, std::size_t bytes) {
+  return {reinterpret_cast<const char*>(message), bytes};
+}
+
+}  // namespace
+
 cs_client* cs_create(const char* scene, const char* client_name) noexcept {
   return cs_create_as(scene, client_name, "", CS_ROLE_UNSPECIFIED);
 }
 
 cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name,
                         uint32_t role) noexcept {
-  assert(scene && client_name && display_name);
-  // NOLINTNEXTLINE(bugprone-unhandled-exception-at-new): out of memory ends the program.
-  return new cs_client{Client({.scene = scene,
-                               .clientName = client_name,
-                               .displayName = display_name,
-                               .role = role,
-                               .wanted = {},
-                               .token = {},
-                               .contentId = 0})};
+  return create(scene, client_name, display_name, role, Client::Kind::whole);
+}
+
+cs_client* cs_create_mirror(const char* scene, const char* client_name, const char* display_name,
+                            uint32_t role) noexcept {
+  return create(scene, client_name, display_name, role, Client::Kind::mirror);
 }
 
 void cs_destroy(cs_client* client) noexcept {
@@ -63,7 +82,12 @@ int cs_set_limits(cs_client* client, const cs_limits* limits) noexcept {
 }
 
 uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uint64_t now_us) noexcept {
-  return client->client.receive(Bytes(reinterpret_cast<const char*>(message), bytes), now_us);
+  return client->client.receive(bytesOf(message, bytes), now_us);
+}
+
+uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t bytes, const cs_decoded* decoded,
+                            uint64_t now_us) noexcept {
+  return mirror->client.receive(bytesOf(message, bytes), now_us, decoded);
 }
 
 void cs_update(cs_client* client, uint64_t now_us) noexcept {

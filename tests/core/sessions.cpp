@@ -67,6 +67,8 @@ std::uint64_t hashOfOutgoing(cs_client* client) {
   return hash;
 }
 
+}  // namespace
+
 Observation observe(cs_client* client, std::uint32_t events) {
   cs_statistics statistics;
   cs_get_statistics(client, 0, &statistics);
@@ -88,8 +90,6 @@ Observation observe(cs_client* client, std::uint32_t events) {
           .outgoingHash = hashOfOutgoing(client),
           .errorText = cs_error_text(client)};
 }
-
-}  // namespace
 
 Session goldenSession(const std::string& name) {
   for (const codec::GoldenStream& stream : codec::readGoldenStreams()) {
@@ -144,13 +144,17 @@ std::vector<Session> recordedSessions() {
   return sessions;
 }
 
-std::vector<Observation> replay(const Session& session) {
-  ClientUnderTest client;
+void playOutForReplay(cs_client* client) {
   cs_play_out_options options;
   cs_default_play_out(&options);
   options.delay_ms = kPlayOutDelayMs;
-  cs_set_play_out(client.get(), &options);
+  cs_set_play_out(client, &options);
+}
+
+std::vector<Observation> replay(const Session& session) {
   std::vector<Observation> observations;
+  ClientUnderTest client;
+  playOutForReplay(client.get());
   for (std::size_t i = 0; i < session.messages.size(); ++i) {
     const std::uint32_t events = client.receive(session.messages[i], i * kStepUs);
     cs_update(client.get(), i * kStepUs);

@@ -40,6 +40,9 @@ Session goldenSession(const std::string& stream);
 inline constexpr std::uint64_t kStepUs = 14'000;
 inline constexpr double kPlayOutDelayMs = 45;
 std::vector<Observation> replay(const Session& session);
+void playOutForReplay(cs_client* client);
+// State after the last message. Takes the outgoing messages.
+Observation observe(cs_client* client, std::uint32_t events);
 
 // Encodes numbers for a description.
 template <typename T>

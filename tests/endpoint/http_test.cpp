@@ -85,6 +85,8 @@ TEST_F(HttpEndpoint, AnswersSeveralRequestsOnOneConnection) {
 TEST_F(HttpEndpoint, ForbidsFramesOfThePage) {
   const Response page = get("/");
   EXPECT_EQ(std::string(page["Content-Security-Policy"]), "frame-ancestors 'none'");
+  EXPECT_EQ(std::string(page["Cross-Origin-Opener-Policy"]), "same-origin");
+  EXPECT_EQ(std::string(page["Cross-Origin-Embedder-Policy"]), "require-corp");
   EXPECT_EQ(std::string(page["X-Frame-Options"]), "DENY");
 }
 

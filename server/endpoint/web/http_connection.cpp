@@ -187,6 +187,9 @@ HttpConnection::Response HttpConnection::answerFile(const Request& request, cons
   // Another page that shows this one in a frame could make a person click on it without seeing it.
   response.set("Content-Security-Policy", "frame-ancestors 'none'");
   response.set("X-Frame-Options", "DENY");
+  // Isolates the page, so that its threads may share memory.
+  response.set("Cross-Origin-Opener-Policy", "same-origin");
+  response.set("Cross-Origin-Embedder-Policy", "require-corp");
   response.keep_alive(request.keep_alive());
   if (!known) response.body() = {file.content.data(), file.content.size()};
   return response;

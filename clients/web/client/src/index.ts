@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the package offers.
 
-export * from "./client";
+export { Client } from "./client";
 export * from "./session";
-export { CoreModule } from "./wasm";
+export type { Proof } from "./thread_messages";
+export * from "./types";

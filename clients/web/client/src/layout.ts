@@ -5,6 +5,7 @@
 export const CS_LIMITS_VERSION = 1;
 export const CS_PLAY_OUT_OPTIONS_VERSION = 1;
 export const CS_PLAYED_VERSION = 1;
+export const CS_DECODED_VERSION = 1;
 export const CS_CLOTH_SETTINGS_VERSION = 1;
 export const CS_STAGE_STATISTICS_VERSION = 1;
 export const CS_CLOTH_REPORT_VERSION = 1;
@@ -60,6 +61,16 @@ export const cs_played = {
   tick: 8,
   server_time_us: 16,
   fraction: 24,
+} as const;
+export const cs_decoded = {
+  sizeof: 40,
+  version: 0,
+  decoding: 4,
+  positions: 8,
+  normals: 12,
+  vertex_count: 16,
+  reconstruction_hash: 24,
+  decode_ms: 32,
 } as const;
 export const cs_own_collider = {
   sizeof: 52,

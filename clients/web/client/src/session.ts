@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Membership in a scene across several connections. The client core decides when to connect, and as which participant.
+// Membership in a scene across several connections. A worker has the connection and decodes; this thread has the mirror
+// that the program reads, draws and writes to.
 
-import { Client, ClientEvent, ClientState, kUnauthenticated, kWrongPairingCode, type Identity } from "./client";
-import { StreamSocket } from "./socket";
-import type { CoreModule } from "./wasm";
+import { Client, type DecodedFrame } from "./client";
+import { FrameRing } from "./frame_ring";
+import { microseconds } from "./handle";
+import type { FromWorker, Proof, ToWorker } from "./thread_messages";
+import { ClientEvent, ClientState, kUnauthenticated, kWrongPairingCode, type Identity } from "./types";
+import { CoreModule } from "./wasm";
 
 export type SessionState =
   | { kind: "connecting" }
@@ -12,132 +16,179 @@ export type SessionState =
   | { kind: "asking"; reason: string } // the server requires a token or a pairing code
   | { kind: "failed"; reason: string };
 
-// What a person gives to a server that asks for it.
-export type Proof = { token: string } | { code: string };
-
 // Where the token of a server is kept between visits; "" means none.
 export interface TokenStore {
   kept(): string;
   keep(token: string): void;
 }
 
+// Events of a session. All are optional.
 export interface SessionListener {
-  stateChanged(): void;
-  described(client: Client): void;
-  parametersChanged(client: Client): void;
-  participantsChanged(client: Client): void;
-  scenesListed(scenes: string[]): void;
-  grabsLost(client: Client): void;
-  notice(text: string): void;
-  pairingCodeMade(client: Client): void;
+  stateChanged?(): void;
+  described?(client: Client): void;
+  parametersChanged?(client: Client): void;
+  participantsChanged?(client: Client): void;
+  scenesListed?(scenes: string[]): void;
+  grabsChanged?(client: Client): void;
+  notice?(text: string): void;
+  pairingCodeMade?(client: Client): void;
   // The server refused a request; the session continues.
-  refused(client: Client): void;
+  refused?(client: Client): void;
 }
 
-const kPeriodMs = 50;
+export interface SessionOptions {
+  url: string; // of the server's stream, wss://…/stream or ws://…/stream
+  scene?: string; // "": the server's default scene
+  identity?: Identity;
+  program?: string; // name of the program, for other participants
+  tokens?: TokenStore; // default: nothing is kept
+  quality?: number; // best quality wanted, 0 (finest, the default) to 3
+  temporalLayers?: number; // 1 to 3; 0, the default: all
+  // Addresses of the package's own files, where a bundler does not find them.
+  wasmUrl?: string | URL;
+  makeWorker?: () => Worker;
+  listener?: SessionListener;
+}
+
+const kNoTokens: TokenStore = { kept: () => "", keep: () => undefined };
 
 export class Session {
   state: SessionState = { kind: "connecting" };
   client: Client;
-  private readonly socket: StreamSocket;
-  private scene: string;
+  private number = 0; // of the session in the worker
+  private connection = 0;
+  private ring: FrameRing | undefined;
+  private readonly listener: SessionListener;
+  private readonly tokens: TokenStore;
 
-  constructor(
+  // Loads the client core, and joins the scene.
+  static async open(options: SessionOptions): Promise<Session> {
+    const url = options.wasmUrl ?? new URL("./clothstream_core.wasm", import.meta.url);
+    const module = await CoreModule.compile(url);
+    return new Session(options, module, await CoreModule.start(module));
+  }
+
+  private readonly worker: Worker;
+
+  private constructor(
+    private readonly options: SessionOptions,
+    private readonly module: WebAssembly.Module,
     private readonly core: CoreModule,
-    url: string,
-    scene: string,
-    private readonly identity: Identity,
-    private readonly tokens: TokenStore,
-    private readonly listener: SessionListener,
   ) {
-    this.scene = scene;
-    this.client = new Client(core, scene, identity);
-    this.client.setToken(this.tokens.kept());
-    this.socket = new StreamSocket(url, {
-      opened: () => this.flush(),
-      message: (bytes) => this.receive(bytes),
-      lost: (reason) => this.lose(reason),
-    });
-    window.setInterval(() => this.tick(), kPeriodMs);
-    window.addEventListener("online", () => {
-      if (this.state.kind === "reconnecting") this.connect();
-    });
+    this.listener = options.listener ?? {};
+    this.tokens = options.tokens ?? kNoTokens;
+    this.worker = options.makeWorker?.() ?? new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.handle(data);
+    this.worker.onerror = (event) => this.enter({ kind: "failed", reason: `The worker of the client stopped: ${event.message}` });
+    this.client = this.begin(options.scene ?? "", { token: this.tokens.kept() });
+    window.addEventListener("online", this.reconnect);
     // Closing the socket leaves the scene at once. Otherwise the server would keep the participant's place for a while.
-    window.addEventListener("pagehide", () => this.socket.close());
-    this.connect();
+    window.addEventListener("pagehide", this.leave);
+    window.addEventListener("pageshow", this.comeBack);
+  }
+
+  // Leaves the scene for good.
+  close(): void {
+    window.removeEventListener("online", this.reconnect);
+    window.removeEventListener("pagehide", this.leave);
+    window.removeEventListener("pageshow", this.comeBack);
+    this.worker.terminate();
+    this.client.destroy();
   }
 
   // Joins a scene. Joining the current scene again starts a new session.
   join(scene: string): void {
-    const { token } = this.client;
-    this.begin(scene);
-    this.client.setToken(token);
-    this.enter({ kind: "connecting" });
-    this.connect();
+    this.restart(scene, { token: this.client.token });
   }
 
   // Joins with what a person has given.
   prove(proof: Proof): void {
-    this.begin(this.scene);
-    if ("code" in proof) this.client.setPairingCode(proof.code);
-    else this.client.setToken(proof.token);
-    this.enter({ kind: "connecting" });
-    this.connect();
+    this.restart(this.scene, proof);
   }
 
   // Connects at once instead of at the scheduled time.
-  reconnect(): void {
-    if (this.state.kind === "reconnecting") this.connect();
-  }
+  readonly reconnect = (): void => {
+    if (this.state.kind === "reconnecting") this.post({ kind: "reconnect" });
+  };
 
-  // Sends queued messages while the socket is open.
+  // Sends what the program has set since the last call. Call after changes; once per drawn frame is enough.
   flush(): void {
-    while (this.socket.isOpen) {
-      const message = this.client.nextOutgoing();
-      if (!message) return;
-      this.socket.send(message);
-    }
+    for (let message = this.client.nextOutgoing(); message; message = this.client.nextOutgoing())
+      this.post({ kind: "send", connection: this.connection, message }, [message.buffer]);
   }
 
-  private begin(scene: string): void {
-    this.scene = scene;
+  private scene = "";
+
+  private readonly leave = (): void => this.post({ kind: "stop" });
+  // The browser shows a page again that it had put aside.
+  private readonly comeBack = (event: PageTransitionEvent): void => {
+    if (event.persisted) this.restart(this.scene, { token: this.client.token });
+  };
+
+  private restart(scene: string, proof: Proof): void {
     this.client.destroy();
-    this.client = new Client(this.core, scene, this.identity);
+    this.client = this.begin(scene, proof);
+    this.enter({ kind: "connecting" });
   }
 
-  private connect(): void {
-    this.client.connecting();
-    this.client.listScenes();
-    this.socket.open();
+  private begin(scene: string, proof: Proof): Client {
+    const { url, program = "", identity = { name: "", role: 0 }, quality = 0, temporalLayers = 0 } = this.options;
+    this.scene = scene;
+    this.ring = undefined;
+    const client = new Client(this.core, "mirror", scene, program, identity);
+    if ("token" in proof) client.setToken(proof.token);
+    client.frames.playOut();
+    client.frames.keepClothInFrontOfHands(true);
+    this.post({
+      kind: "start",
+      session: ++this.number,
+      module: this.module,
+      url,
+      scene,
+      program,
+      identity,
+      proof,
+      quality,
+      temporalLayers,
+      pageOrigin: performance.timeOrigin,
+      shares: globalThis.crossOriginIsolated,
+    });
+    return client;
   }
 
-  private tick(): void {
-    if (this.state.kind === "failed" || this.state.kind === "asking") return;
-    this.client.update();
-    this.flush();
-    if (performance.now() < this.client.connectAtMs) return;
-    if (!this.socket.inUse) return this.connect();
-    this.socket.close();
-    this.lose("The server does not answer.");
+  private post(message: ToWorker, transfer: Transferable[] = []): void {
+    this.worker.postMessage(message, transfer);
   }
 
-  private receive(bytes: ArrayBuffer): void {
-    const client = this.client;
-    const events = client.receive(bytes);
-    if (events & ClientEvent.returned) client.listScenes();
-    this.flush();
-    if (events & ClientEvent.description) this.listener.described(client);
-    if (events & (ClientEvent.description | ClientEvent.parameters)) this.listener.parametersChanged(client);
-    if (events & ClientEvent.participants) this.listener.participantsChanged(client);
-    if (events & ClientEvent.scenes) this.listener.scenesListed(client.scenes());
-    if (events & ClientEvent.grabs) this.listener.grabsLost(client);
-    if (events & ClientEvent.token) this.tokens.keep(client.token);
-    if (events & ClientEvent.pairingCode) this.listener.pairingCodeMade(client);
-    if (events & ClientEvent.notice) this.listener.notice(client.noticeText);
-    if (events & ClientEvent.error) {
-      if (client.state === ClientState.failed) this.fail(client);
-      else this.listener.refused(client);
+  private handle(message: FromWorker): void {
+    if (message.session !== this.number) return;
+    switch (message.kind) {
+      case "connecting":
+        this.connection = message.connection;
+        this.client.connecting(microseconds(message.atMs));
+        this.client.listScenes();
+        return this.flush();
+      case "lost":
+        this.client.disconnected(microseconds(message.atMs));
+        return this.enter({ kind: "reconnecting", reason: message.reason, attemptAt: message.attemptAtMs });
+      case "ring":
+        this.ring = new FrameRing(message.memory);
+        return;
+      case "message":
+        return this.receive(message);
+      case "broken":
+        return this.enter({ kind: "failed", reason: `The client core did not start: ${message.reason}` });
     }
+  }
+
+  private receive({ message, arrivedMs, decoding, frame }: FromWorker & { kind: "message" }): void {
+    const { client, listener } = this;
+    let decoded: DecodedFrame | undefined;
+    if (frame) decoded = { ...frame, values: frame.buffer ? new Float32Array(frame.buffer) : this.ring!.oldest() };
+    const events = client.receiveDecoded(new Uint8Array(message), decoding, decoded, microseconds(arrivedMs));
+    if (frame?.buffer) this.post({ kind: "recycle", buffer: frame.buffer }, [frame.buffer]);
+    else if (frame) this.ring!.take();
+    if (events & ~ClientEvent.frame) this.report(client, listener, events);
     if (this.state.kind !== "live" && client.state === ClientState.joined) {
       // A token that a person has typed works: keep it.
       if (client.token) this.tokens.keep(client.token);
@@ -145,15 +196,25 @@ export class Session {
     }
   }
 
-  private lose(reason: string): void {
-    this.client.disconnected();
-    this.enter({ kind: "reconnecting", reason, attemptAt: this.client.connectAtMs });
-    if (performance.now() >= this.client.connectAtMs) this.connect();
+  private report(client: Client, listener: SessionListener, events: number): void {
+    if (events & ClientEvent.returned) client.listScenes();
+    this.flush();
+    if (events & ClientEvent.description) listener.described?.(client);
+    if (events & (ClientEvent.description | ClientEvent.parameters)) listener.parametersChanged?.(client);
+    if (events & ClientEvent.participants) listener.participantsChanged?.(client);
+    if (events & ClientEvent.scenes) listener.scenesListed?.(client.scenes());
+    if (events & ClientEvent.grabs) listener.grabsChanged?.(client);
+    if (events & ClientEvent.token) this.tokens.keep(client.token);
+    if (events & ClientEvent.pairingCode) listener.pairingCodeMade?.(client);
+    if (events & ClientEvent.notice) listener.notice?.(client.noticeText);
+    if (events & ClientEvent.error) {
+      if (client.state === ClientState.failed) this.fail(client);
+      else listener.refused?.(client);
+    }
   }
 
   // Stops, because the same request would be refused again. The user must give a proof, or choose another scene.
   private fail(client: Client): void {
-    this.socket.close();
     const reason = client.errorText;
     const asks = client.errorCode === kUnauthenticated || client.errorCode === kWrongPairingCode;
     if (client.errorCode === kUnauthenticated && client.token === this.tokens.kept()) this.tokens.keep("");
@@ -162,6 +223,6 @@ export class Session {
 
   private enter(state: SessionState): void {
     this.state = state;
-    this.listener.stateChanged();
+    this.listener.stateChanged?.();
   }
 }

@@ -21,6 +21,21 @@ export interface CoreExports {
   cs_connect_at(client: Pointer): bigint;
   cs_participant_count(client: Pointer): number;
   cs_get_participant(client: Pointer, index: number, out: Pointer): number;
+  cs_create_mirror(scene: Pointer, clientName: Pointer, displayName: Pointer, role: number): Pointer;
+  cs_receive_decoded(mirror: Pointer, message: Pointer, bytes: number, decoded: Pointer, nowUs: bigint): number;
+  cs_sends_normals(client: Pointer): number;
+  cs_reconstruction_hash(client: Pointer): bigint;
+  cs_want(client: Pointer, quality: number, temporalLayers: number): void;
+  cs_get_role(client: Pointer): number;
+  cs_set_role(client: Pointer, participant: bigint, role: number): void;
+  cs_remove_participant(client: Pointer, participant: bigint): void;
+  cs_ban_participant(client: Pointer, participant: bigint): void;
+  cs_get_stage_statistics(client: Pointer, out: Pointer): number;
+  cs_set_local_contact(client: Pointer, on: number): void;
+  cs_local_correction(client: Pointer): number;
+  cs_nearest_point(client: Pointer, point3: Pointer, maxDistance: number, out: Pointer): number;
+  cs_set_shapes(client: Pointer, colliders: Pointer, count: number, nowUs: bigint): void;
+  cs_set_hand(client: Pointer, side: number, joints: Pointer, count: number, nowUs: bigint): number;
   cs_destroy(client: Pointer): void;
   cs_receive(client: Pointer, message: Pointer, bytes: number, nowUs: bigint): number;
   cs_update(client: Pointer, nowUs: bigint): void;
@@ -84,24 +99,34 @@ export interface CoreExports {
 
 const kNull: Pointer = 0;
 
-// Any call may grow the memory, which detaches every view. Create a new view for each access.
+// Any call may grow the memory, which detaches every view. Get a new view for each access.
 export class CoreModule {
   private readonly decoder = new TextDecoder();
   private readonly encoder = new TextEncoder();
 
-  private constructor(readonly exports: CoreExports) {}
+  private data: DataView;
 
-  static async load(url: string): Promise<CoreModule> {
+  private constructor(readonly exports: CoreExports) {
+    this.data = new DataView(exports.memory.buffer);
+  }
+
+  // Compiles the module, which several threads may then start.
+  static async compile(url: string | URL): Promise<WebAssembly.Module> {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`${url} could not be loaded: ${response.status} ${response.statusText}`);
-    const { instance } = await WebAssembly.instantiate(await response.arrayBuffer());
+    return WebAssembly.compile(await response.arrayBuffer());
+  }
+
+  static async start(module: WebAssembly.Module): Promise<CoreModule> {
+    const instance = await WebAssembly.instantiate(module);
     const exports = instance.exports as unknown as CoreExports;
     exports._initialize();
     return new CoreModule(exports);
   }
 
   view(): DataView {
-    return new DataView(this.exports.memory.buffer);
+    if (this.data.buffer !== this.exports.memory.buffer) this.data = new DataView(this.exports.memory.buffer);
+    return this.data;
   }
 
   bytes(pointer: Pointer, count: number): Uint8Array<ArrayBuffer> {

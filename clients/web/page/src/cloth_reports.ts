@@ -26,8 +26,8 @@ export class ClothReports {
     this.chosen.clear();
     this.chosenMaterials.clear();
     this.list.replaceChildren();
-    this.cards = client.cloths().map(({ name, vertexCount }, index) => {
-      const card = this.addCard(name, index, client.materials());
+    this.cards = client.frames.cloths().map(({ name, vertexCount }, index) => {
+      const card = this.addCard(name, index, client.parameters.materials());
       write(card.figures.get("nodes")!, vertexCount.toLocaleString("en"));
       return card;
     });
@@ -37,8 +37,8 @@ export class ClothReports {
   // Shows the current material and solver of each cloth.
   showSolvers(client: Client): void {
     this.cards.forEach(({ material, solver }, index) => {
-      material.value = client.material(index);
-      const kind = client.solver(index);
+      material.value = client.parameters.material(index);
+      const kind = client.parameters.solver(index);
       if (!Solvers.has(kind) && solver.querySelector(`option[value="${kind}"]`) === null)
         solver.append(new Option(`solver ${kind}`, String(kind)));
       solver.value = String(kind);
@@ -48,7 +48,7 @@ export class ClothReports {
   // Shows the newest report of each cloth.
   showReports(client: Client): void {
     this.cards.forEach(({ figures }, index) => {
-      const report = client.report(index);
+      const report = client.parameters.report(index);
       if (!report) return;
       for (const [figure, text] of texts(report)) write(figures.get(figure)!, text);
       write(this.deviceMs, `${report.deviceMs.toFixed(1)} ms per tick`);
@@ -57,8 +57,8 @@ export class ClothReports {
 
   // Sends choices to the client. Call once per drawn frame.
   apply(client: Client): void {
-    for (const [cloth, material] of this.chosenMaterials) client.setMaterial(cloth, material);
-    for (const [cloth, solver] of this.chosen) client.setSolver(cloth, solver);
+    for (const [cloth, material] of this.chosenMaterials) client.parameters.setMaterial(cloth, material);
+    for (const [cloth, solver] of this.chosen) client.parameters.setSolver(cloth, solver);
     this.chosenMaterials.clear();
     this.chosen.clear();
   }

@@ -56,10 +56,10 @@ export class Controls {
   describe(client: Client): void {
     for (const slider of this.sliders) slider.forget();
     this.rebase(client);
-    const environment = client.environment();
+    const environment = client.parameters.environment();
     this.windDirection = direction(environment?.wind ?? kStill, kDefaultWind);
     this.gravityDirection = direction(environment?.gravity ?? kStill, kDown);
-    const names = client.colliders().filter(({ participantId }) => participantId === 0n).map(({ name }) => name);
+    const names = client.frames.colliders().filter(({ participantId }) => participantId === 0n).map(({ name }) => name);
     this.choice.replaceChildren(...names.map((name) => new Option(name)));
     element("collider-row").hidden = names.length < 2;
     this.scenes.value = client.sceneName;
@@ -74,10 +74,10 @@ export class Controls {
 
   // Shows the current parameters.
   show(client: Client): void {
-    const environment = client.environment();
+    const environment = client.parameters.environment();
     if (environment) this.showEnvironment(environment);
     if (this.materialsOf(client).some((material, index) => material !== this.materials[index])) this.rebase(client);
-    const cloth = client.clothParameters()[0];
+    const cloth = client.parameters.clothParameters()[0];
     const base = this.base[0];
     if (cloth && base) {
       const factor = base.structural[0] > 0 ? cloth.structural[0] / base.structural[0] : 1;
@@ -95,27 +95,27 @@ export class Controls {
     const stiffness = this.stiffness.take();
     const damping = this.damping.take();
     const radius = this.radius.take();
-    if (wind !== undefined) client.setEnvironment({ wind: scaled(this.windDirection, wind) });
-    if (gust !== undefined) client.setGust(gust, client.environment()?.gustSeconds ?? kGustSeconds);
-    if (gravity !== undefined) client.setEnvironment({ gravity: scaled(this.gravityDirection, gravity) });
+    if (wind !== undefined) client.parameters.setEnvironment({ wind: scaled(this.windDirection, wind) });
+    if (gust !== undefined) client.parameters.setGust(gust, client.parameters.environment()?.gustSeconds ?? kGustSeconds);
+    if (gravity !== undefined) client.parameters.setEnvironment({ gravity: scaled(this.gravityDirection, gravity) });
     if (stiffness !== undefined) {
-      client.cloths().forEach(({ name }, index) => {
+      client.frames.cloths().forEach(({ name }, index) => {
         const base = this.base[index];
-        if (base) client.setCloth(name, stiffened(base, 2 ** stiffness));
+        if (base) client.parameters.setCloth(name, stiffened(base, 2 ** stiffness));
       });
     }
-    if (damping !== undefined) client.setCloth("", { damping });
-    if (radius !== undefined && this.collider) client.setCollider(this.collider, { radius });
+    if (damping !== undefined) client.parameters.setCloth("", { damping });
+    if (radius !== undefined && this.collider) client.parameters.setCollider(this.collider, { radius });
     this.showRadius(client);
   }
 
   private rebase(client: Client): void {
-    this.base = client.clothParameters();
+    this.base = client.parameters.clothParameters();
     this.materials = this.materialsOf(client);
   }
 
   private materialsOf(client: Client): string[] {
-    return client.cloths().map((_, index) => client.material(index));
+    return client.frames.cloths().map((_, index) => client.parameters.material(index));
   }
 
   private showEnvironment(environment: Environment): void {
@@ -125,7 +125,7 @@ export class Controls {
   }
 
   private showRadius(client: Client): void {
-    const collider = client.colliders().find(({ name, participantId }) => participantId === 0n && name === this.collider);
+    const collider = client.frames.colliders().find(({ name, participantId }) => participantId === 0n && name === this.collider);
     const round = collider?.shape === Shape.sphere || collider?.shape === Shape.capsule;
     element("radius-row").hidden = !round;
     if (collider && round) this.radius.show(collider.radius);

@@ -68,7 +68,7 @@ export class Hud {
 
   // Disconnected participants stay in the list during their reconnect grace.
   showParticipants(client: Client): void {
-    const items = client.participants().map(({ name, role, away, self }) => {
+    const items = client.people.participants().map(({ name, role, away, self }) => {
       const item = document.createElement("li");
       const who = document.createElement("span");
       who.textContent = self ? `${name} (you)` : name;
@@ -82,14 +82,14 @@ export class Hud {
   }
 
   showFigures(client: Client): void {
-    const statistics = client.statistics();
+    const statistics = client.frames.statistics();
     const fps = statistics.framesPerSecond.toFixed(0);
-    this.figure("fps", client.frameDivisor > 1 ? `${fps} of ${client.streamRate}, overloaded` : fps);
+    this.figure("fps", client.frames.divisor > 1 ? `${fps} of ${client.frames.streamRate}, overloaded` : fps);
     this.figure("kbit", statistics.kbitPerSecond.toFixed(0));
     this.figure("bits", statistics.bitsPerVertex.toFixed(1));
     this.figure("round-trip", `${statistics.roundTripMs.toFixed(1)} ms`);
     this.figure("dropped", String(statistics.dropped));
-    this.figure("vertices", client.vertexCount.toLocaleString("en"));
+    this.figure("vertices", client.frames.vertexCount.toLocaleString("en"));
   }
 
   private figure(name: string, value: string): void {

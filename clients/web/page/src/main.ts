@@ -2,7 +2,7 @@
 // Starts the page: core, view, session, panel, and the drawing loop.
 
 import { ClothReports } from "./cloth_reports";
-import { CoreModule, Roles, Session } from "@clothstream/client";
+import { Roles, Session, type SessionListener } from "@clothstream/client";
 import { Controls } from "./controls";
 import { Drag } from "./drag";
 import { element, Hud } from "./hud";
@@ -31,17 +31,12 @@ async function start(): Promise<void> {
     console.error(error);
     return;
   }
-  const core = await CoreModule.load("clothstream_core.wasm").catch((error: unknown) => {
-    hud.showFatal(`The client core did not start: ${error instanceof Error ? error.message : String(error)}`);
-    throw error;
-  });
-
   void showAddress();
   const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
   const reports = new ClothReports();
   const drag: Drag = new Drag(
     view,
-    (origin, direction) => (session.state.kind === "live" ? session.client.castRay(origin, direction) : undefined),
+    (origin, direction) => (session.state.kind === "live" ? session.client.frames.castRay(origin, direction) : undefined),
     (collider) => (controls.collider = collider),
   );
   listenToKeys(view, drag, controls);
@@ -54,21 +49,21 @@ async function start(): Promise<void> {
   const scene = query.get("scene") ?? "";
   const role = query.get("role");
   const wanted = [...Roles].find(([, name]) => name === role)?.[0];
-  const identity = { name: query.get("name") ?? "", role: wanted ?? 0, smooth: query.has("smooth") };
+  const identity = { name: query.get("name") ?? "", role: wanted ?? 0 };
   if (role !== null && wanted === undefined)
     hud.showNotice(`"${role}" is not a role; use ${[...Roles.values()].join(", ")}.`);
   const proof = new ProofForm((given) => session.prove(given));
   const pairing = new PairingPanel(() => {
-    session.client.createPairingCode();
+    session.client.people.createPairingCode();
     session.flush();
   });
-  const session: Session = new Session(core, address.href, scene, identity, browserTokens, {
+  const listener: SessionListener = {
     stateChanged: () => {
       hud.showState(session.state);
       proof.show(session.state.kind === "asking" ? session.state.reason : undefined);
     },
     pairingCodeMade: (client) => {
-      const made = client.pairingCode();
+      const made = client.people.pairingCode();
       if (made) pairing.showCode(made);
     },
     described: (client) => {
@@ -87,13 +82,27 @@ async function start(): Promise<void> {
       pairing.showFor(client);
     },
     scenesListed: (scenes) => controls.listScenes(scenes, session.client.sceneName),
-    grabsLost: (client) => client.lostGrabs().forEach((grab) => drag.slipped(grab)),
+    grabsChanged: (client) =>
+        client.input.grabEvents().forEach(({ grab, vertices }) => {
+          if (vertices === 0) drag.slipped(grab);
+        }),
     notice: (text) => hud.showNotice(text),
     refused: (client) => {
       hud.showNotice(client.errorText);
       controls.refused(client);
       reports.showSolvers(client);
     },
+  };
+  const session: Session = await Session.open({
+    url: address.href,
+    scene,
+    identity,
+    program: "clothstream page",
+    tokens: browserTokens,
+    listener,
+  }).catch((error: unknown) => {
+    hud.showFatal(`The client core did not start: ${error instanceof Error ? error.message : String(error)}`);
+    throw error;
   });
   const probe = expose(session, view);
 
@@ -114,8 +123,8 @@ async function start(): Promise<void> {
       controls.apply(client);
       reports.apply(client);
       const target = drag.take();
-      if (target?.kind === "collider") client.setCollider(target.collider, { position: target.position });
-      if (target?.kind === "grab") client.setGrab(target.grab);
+      if (target?.kind === "collider") client.parameters.setCollider(target.collider, { position: target.position });
+      if (target?.kind === "grab") client.input.setGrabs(target.grab ? [target.grab] : []);
       session.flush();
     }
     if (now - figuresAt >= kFiguresPeriodMs) {

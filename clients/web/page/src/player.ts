@@ -21,7 +21,7 @@ export class Player {
   private dragged = false;
 
   constructor() {
-    this.pause.addEventListener("click", () => this.client?.pause(!this.playback?.paused));
+    this.pause.addEventListener("click", () => this.client?.playback.pause(!this.playback?.paused));
     this.timeline.addEventListener("input", () => {
       this.dragged = true;
       this.seeks = this.timeline.valueAsNumber;
@@ -30,8 +30,8 @@ export class Player {
       this.dragged = false;
       this.seek(this.timeline.valueAsNumber);
     });
-    this.speed.addEventListener("change", () => this.client?.setSpeed(Number(this.speed.value)));
-    this.loop.addEventListener("change", () => this.client?.setLoop(this.loop.checked));
+    this.speed.addEventListener("change", () => this.client?.playback.setSpeed(Number(this.speed.value)));
+    this.loop.addEventListener("change", () => this.client?.playback.setLoop(this.loop.checked));
   }
 
   // Whether the scene is a recording.
@@ -42,7 +42,7 @@ export class Player {
   // Updates the timeline. Call once per drawn frame.
   draw(client: Client | undefined): void {
     this.client = client;
-    this.playback = client?.playback();
+    this.playback = client?.playback.state();
     this.card.hidden = !this.playback;
     document.body.toggleAttribute("data-recording", this.plays);
     if (!this.playback) return;
@@ -62,7 +62,7 @@ export class Player {
   private seek(seconds: number): void {
     this.seeks = undefined;
     this.soughtAt = performance.now();
-    this.client?.seek(Math.min(seconds, this.playback?.length ?? 0));
+    this.client?.playback.seek(Math.min(seconds, this.playback?.length ?? 0));
   }
 
   // Another client may choose a speed that is not in the list.

@@ -43,42 +43,42 @@ export function expose(session: Session, view: View): { described(client: Client
       return session.state.kind;
     },
     get statistics() {
-      return session.client.statistics();
+      return session.client.frames.statistics();
     },
     get positions() {
-      return session.client.positions().slice();
+      return session.client.frames.positions().slice();
     },
     get restPositions() {
       return restPositions?.slice();
     },
     get normals() {
-      return session.client.normals().slice();
+      return session.client.frames.normals().slice();
     },
     get drawn() {
       return view.clothMeshes.map((mesh) => new Float32Array(mesh.geometry.getAttribute("position").array));
     },
     get cloths() {
-      return session.client.cloths();
+      return session.client.frames.cloths();
     },
     get reports() {
       const { client } = session;
-      return client.cloths().map((_, index) => client.report(index));
+      return client.frames.cloths().map((_, index) => client.parameters.report(index));
     },
     get colliders() {
-      return session.client.colliders();
+      return session.client.frames.colliders();
     },
     get drawnColliders() {
       return view.colliders.map(({ position }) => position.toArray());
     },
     get participants() {
-      return session.client.participants();
+      return session.client.people.participants();
     },
     get playback() {
-      return session.client.playback();
+      return session.client.playback.state();
     },
     canvas: view.canvas,
     project: (point) => view.project(point),
     shadowOf: (point) => view.shadowOf(point),
   };
-  return { described: (client) => void (restPositions = client.positions().slice()) };
+  return { described: (client) => void (restPositions = client.frames.positions().slice()) };
 }

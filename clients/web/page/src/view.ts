@@ -54,18 +54,18 @@ export class View {
       this.studio.scene.remove(cloth.mesh);
       cloth.dispose();
     }
-    this.vertexCount = client.vertexCount;
-    const layouts = client.cloths();
-    const drawings = layouts.map((_, number) => client.drawing(number));
-    const rest = client.positions();
-    const triangles = client.triangles();
+    this.vertexCount = client.frames.vertexCount;
+    const layouts = client.frames.cloths();
+    const drawings = layouts.map((_, number) => client.frames.drawing(number));
+    const rest = client.frames.positions();
+    const triangles = client.frames.triangles();
     this.cloths = layouts.map((layout, number) => new ClothMesh(layout, drawings[number]!, rest, triangles, number));
     for (const cloth of this.cloths) this.studio.scene.add(cloth.mesh);
 
     this.bounds.makeEmpty();
     for (const cloth of this.cloths) this.bounds.union(cloth.reach());
     this.colliderMeshes.describe();
-    for (const collider of client.colliders()) {
+    for (const collider of client.frames.colliders()) {
       if (collider.shape === Shape.plane) continue;
       const centre = new THREE.Vector3(...collider.position);
       const reach = reachOf(client, collider);
@@ -77,8 +77,10 @@ export class View {
   // Draws the frame for a time of performance.now(). Reads the core's memory only during the call.
   draw(client: Client | undefined, now: number): void {
     // A joining client has no vertices yet. The last frame of the previous client stays until the description arrives.
-    if (client && client.vertexCount === this.vertexCount) {
-      const { positions, normals } = client.shownAt(now);
+    if (client && client.frames.vertexCount === this.vertexCount) {
+      client.frames.showAt(now);
+      const normals = client.frames.shownNormals();
+      const positions = client.frames.shownPositions();
       for (const cloth of this.cloths) cloth.update(positions, normals);
       this.colliderMeshes.place(client);
     }

@@ -22,7 +22,7 @@ export class ColliderMeshes {
   }
 
   place(client: Client): void {
-    const colliders = client.shownColliders();
+    const colliders = client.frames.shownColliders();
     while (this.meshes.length > colliders.length) this.remove(this.meshes.pop()!);
     colliders.forEach((collider, index) => {
       const look = lookOf(collider);
@@ -57,7 +57,7 @@ export function reachOf(client: Client, collider: Collider): number {
     case Shape.box:
       return Math.hypot(...collider.size) / 2;
     case Shape.hull: {
-      const { vertices } = client.hull(collider);
+      const { vertices } = client.frames.hull(collider);
       let reach = 0;
       for (let i = 0; i < vertices.length; i += 3) reach = Math.max(reach, Math.hypot(...vertices.subarray(i, i + 3)));
       return reach;
@@ -97,7 +97,7 @@ function geometryOf(client: Client, collider: Collider): THREE.BufferGeometry {
 }
 
 function hullGeometry(client: Client, collider: Collider): THREE.BufferGeometry {
-  const { vertices, triangles } = client.hull(collider);
+  const { vertices, triangles } = client.frames.hull(collider);
   const indexed = new THREE.BufferGeometry();
   indexed.setAttribute("position", new THREE.BufferAttribute(vertices, 3));
   indexed.setIndex(new THREE.BufferAttribute(triangles, 1));

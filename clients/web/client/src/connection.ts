@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+// The client with the connection: receives, decodes, acknowledges and reconnects, in a worker.
+
+import { Client, Decoding } from "./client";
+import { microseconds } from "./handle";
+import { copyParts, FrameRing } from "./frame_ring";
+import { StreamSocket } from "./socket";
+import type { FromWorker, SentFrame, Start, ToWorker } from "./thread_messages";
+import { ClientEvent, ClientState } from "./types";
+import { CoreModule } from "./wasm";
+
+const kPeriodMs = 50;
+// Buffers that wait for use, when frames are transferred.
+const kMaxBuffers = 4;
+
+export interface Port {
+  postMessage(message: FromWorker, transfer: Transferable[]): void;
+}
+
+type Distributive<T, Key extends PropertyKey> = T extends unknown ? Omit<T, Key> : never;
+
+export class Connection {
+  private readonly client: Client;
+  private readonly socket: StreamSocket;
+  private readonly timer: ReturnType<typeof setInterval>;
+  private readonly clockOffsetMs: number; // from the clock of this thread to that of the page
+  private number = 0; // of the connection
+  private ring: FrameRing | undefined;
+  private buffers: ArrayBuffer[] = [];
+  private waiting: Uint8Array<ArrayBuffer>[] = []; // messages of the page for the connection that is opening
+
+  static async start(port: Port, options: Start): Promise<Connection> {
+    return new Connection(port, options, await CoreModule.start(options.module));
+  }
+
+  private constructor(
+    private readonly port: Port,
+    private readonly options: Start,
+    core: CoreModule,
+  ) {
+    this.clockOffsetMs = performance.timeOrigin - options.pageOrigin;
+    this.client = new Client(core, "whole", options.scene, options.program, options.identity);
+    this.client.want(options.quality, options.temporalLayers);
+    if ("code" in options.proof) this.client.setPairingCode(options.proof.code);
+    else this.client.setToken(options.proof.token);
+    this.socket = new StreamSocket(options.url, {
+      opened: () => this.flush(),
+      message: (bytes) => this.receive(bytes),
+      lost: (reason) => this.lose(reason),
+    });
+    this.timer = setInterval(() => this.tick(), kPeriodMs);
+    this.connect();
+  }
+
+  handle(message: Exclude<ToWorker, Start>): void {
+    switch (message.kind) {
+      case "send":
+        if (message.connection !== this.number) return;
+        this.waiting.push(message.message);
+        this.flush();
+        return;
+      case "reconnect":
+        if (!this.socket.isOpen) this.connect();
+        return;
+      case "recycle":
+        if (this.buffers.length < kMaxBuffers) this.buffers.push(message.buffer);
+        return;
+      case "stop":
+        return this.stop();
+    }
+  }
+
+  // Leaves the scene.
+  stop(): void {
+    clearInterval(this.timer);
+    this.socket.close();
+    this.client.destroy();
+  }
+
+  private now(): number {
+    return performance.now() + this.clockOffsetMs;
+  }
+
+  private post(message: Distributive<FromWorker, "session">, transfer: Transferable[] = []): void {
+    this.port.postMessage({ ...message, session: this.options.session }, transfer);
+  }
+
+  private connect(): void {
+    const atMs = this.now();
+    this.waiting = [];
+    this.client.connecting(microseconds(atMs));
+    this.post({ kind: "connecting", connection: ++this.number, atMs });
+    this.socket.open();
+  }
+
+  private lose(reason: string): void {
+    const atMs = this.now();
+    this.client.disconnected(microseconds(atMs));
+    this.post({ kind: "lost", atMs, reason, attemptAtMs: this.client.connectAtMs });
+    if (atMs >= this.client.connectAtMs) this.connect();
+  }
+
+  private tick(): void {
+    const atMs = this.now();
+    if (this.client.state === ClientState.failed) return;
+    this.client.update(microseconds(atMs));
+    this.flush();
+    if (atMs < this.client.connectAtMs) return;
+    if (!this.socket.inUse) return this.connect();
+    this.socket.close();
+    this.lose("The server does not answer.");
+  }
+
+  // Sends what waits, while the socket is open: Hello first, then the messages of the page.
+  private flush(): void {
+    if (!this.socket.isOpen) return;
+    for (let message = this.client.nextOutgoing(); message; message = this.client.nextOutgoing()) this.socket.send(message);
+    for (const message of this.waiting) this.socket.send(message);
+    this.waiting = [];
+  }
+
+  private receive(bytes: ArrayBuffer): void {
+    const arrivedMs = this.now();
+    const before = this.client.frames.decodeErrors;
+    const events = this.client.receive(new Uint8Array(bytes), microseconds(arrivedMs));
+    const decodeMs = this.now() - arrivedMs;
+    this.flush();
+    if (events & ClientEvent.description) this.prepare();
+    const frame = events & ClientEvent.frame ? this.pass(decodeMs) : undefined;
+    const refused = this.client.frames.decodeErrors > before;
+    const decoding = frame ? Decoding.done : refused ? Decoding.refused : Decoding.skipped;
+    const transfer = frame?.buffer ? [bytes, frame.buffer] : [bytes];
+    this.post({ kind: "message", message: bytes, arrivedMs, decoding, frame }, transfer);
+    if (this.client.state === ClientState.failed) this.socket.close();
+  }
+
+  // Makes room for the frames of a new description.
+  private prepare(): void {
+    this.buffers = [];
+    if (!this.options.shares) return;
+    this.ring = new FrameRing((this.client.frames.sendsNormals ? 6 : 3) * this.client.frames.vertexCount);
+    this.post({ kind: "ring", memory: this.ring.memory });
+  }
+
+  // Hands the newest frame to the page. Undefined if the page has no time for it.
+  private pass(decodeMs: number): SentFrame | undefined {
+    const { frames } = this.client;
+    const parts = frames.sendsNormals ? [frames.positions(), frames.normals()] : [frames.positions()];
+    const frame = { buffer: undefined, hasNormals: frames.sendsNormals, hash: frames.hash, decodeMs };
+    if (this.ring) return this.ring.write(parts) ? frame : undefined;
+    const bytes = parts.reduce((sum, part) => sum + part.byteLength, 0);
+    const kept = this.buffers.pop();
+    const buffer = kept?.byteLength === bytes ? kept : new ArrayBuffer(bytes);
+    copyParts(parts, new Float32Array(buffer));
+    return { ...frame, buffer };
+  }
+}

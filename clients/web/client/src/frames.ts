@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+// The geometry of the newest frame and of the frame that is shown, and points of it. Returned views point into the
+// core's memory, and are valid until the next call.
+
+import { CS_STAGE_STATISTICS_VERSION, cs_cloth, cs_cloth_point, cs_collider, cs_stage_statistics, cs_statistics, cs_submesh } from "./layout";
+import { microseconds, nowUs, quaternion, vec3, type CoreHandle } from "./handle";
+import type { ClothLayout, ClothPoint, Collider, Drawing, Hull, Stages, Statistics, Vec3 } from "./types";
+
+const kFarthestPoint = 1e4; // m
+
+export class Frames {
+  private playsOut = false;
+
+  constructor(private readonly handle: CoreHandle) {}
+
+  // Plays frames out evenly, with a small delay. Without, the newest frame is shown.
+  playOut(): void {
+    const { exports } = this.handle.core;
+    exports.cs_default_play_out(this.handle.scratch);
+    if (exports.cs_set_play_out(this.handle.pointer, this.handle.scratch) === 0)
+      throw new Error("The client core is of another release than this package");
+    this.playsOut = true;
+  }
+
+  // Keeps the shown cloth in front of this participant's hands and colliders while the server's answer is under way.
+  // Needs play-out.
+  keepClothInFrontOfHands(on: boolean): void {
+    this.handle.core.exports.cs_set_local_contact(this.handle.pointer, on ? 1 : 0);
+  }
+  // Length of the largest correction in the frame that is shown, m.
+  get localCorrection(): number {
+    return this.handle.core.exports.cs_local_correction(this.handle.pointer);
+  }
+
+  // Whether the server sends normals. Otherwise they are computed from the positions.
+  get sendsNormals(): boolean {
+    return this.handle.core.exports.cs_sends_normals(this.handle.pointer) !== 0;
+  }
+  // Hash of the newest decoded frame.
+  get hash(): bigint {
+    return BigInt.asUintN(64, this.handle.core.exports.cs_reconstruction_hash(this.handle.pointer));
+  }
+  // Packets that the decoder refused.
+  get decodeErrors(): number {
+    const { core, pointer, scratch } = this.handle;
+    core.exports.cs_get_statistics(pointer, 0n, scratch);
+    return Number(core.view().getBigUint64(scratch + cs_statistics.decode_errors, true));
+  }
+
+  // Frames per second of the stream.
+  get streamRate(): number {
+    return this.handle.core.exports.cs_stream_rate(this.handle.pointer);
+  }
+  // n if the server sends only each n-th frame, because its device is overloaded; else 1.
+  get divisor(): number {
+    return this.handle.core.exports.cs_frame_divisor(this.handle.pointer);
+  }
+  get vertexCount(): number {
+    return this.handle.core.exports.cs_vertex_count(this.handle.pointer);
+  }
+
+  // 3 floats per vertex. Rest positions before the first frame.
+  positions(): Float32Array {
+    return this.handle.core.floats(this.handle.core.exports.cs_positions(this.handle.pointer), 3 * this.vertexCount);
+  }
+
+  normals(): Float32Array {
+    return this.handle.core.floats(this.handle.core.exports.cs_normals(this.handle.pointer), 3 * this.vertexCount);
+  }
+
+  // Chooses what to show at a time of performance.now(): the newest frame, or the result of play-out.
+  showAt(displayMs: number): void {
+    if (!this.playsOut) return;
+    this.handle.core.exports.cs_play_out(this.handle.pointer, nowUs(), microseconds(displayMs), 0);
+  }
+
+  // Positions that the last showAt() chose.
+  shownPositions(): Float32Array {
+    if (!this.playsOut) return this.positions();
+    return this.handle.core.floats(this.handle.core.exports.cs_played_positions(this.handle.pointer), 3 * this.vertexCount);
+  }
+
+  // Normals of these positions. The first call after showAt() may have to compute them, and detaches views.
+  shownNormals(): Float32Array {
+    if (!this.playsOut) return this.normals();
+    return this.handle.core.floats(this.handle.core.exports.cs_played_normals(this.handle.pointer), 3 * this.vertexCount);
+  }
+
+  triangles(): Uint32Array {
+    const pointer = this.handle.core.exports.cs_triangles(this.handle.pointer, this.handle.scratch);
+    return this.handle.core.indices(pointer, this.handle.core.view().getUint32(this.handle.scratch, true));
+  }
+
+  cloths(): ClothLayout[] {
+    return this.handle.list(this.handle.core.exports.cs_cloth_count(this.handle.pointer), this.handle.core.exports.cs_get_cloth, (view, at) => ({
+      name: this.handle.core.text(view.getUint32(at + cs_cloth.name, true)),
+      firstVertex: view.getUint32(at + cs_cloth.first_vertex, true),
+      vertexCount: view.getUint32(at + cs_cloth.vertex_count, true),
+      rows: view.getUint32(at + cs_cloth.rows, true),
+      columns: view.getUint32(at + cs_cloth.columns, true),
+      firstIndex: view.getUint32(at + cs_cloth.first_index, true),
+      indexCount: view.getUint32(at + cs_cloth.index_count, true),
+    }));
+  }
+
+  // Copies the texture coordinates and submeshes of a cloth.
+  drawing(cloth: number): Drawing {
+    const { exports } = this.handle.core;
+    const uvs = exports.cs_uvs(this.handle.pointer, cloth, this.handle.scratch);
+    const uvCount = this.handle.core.view().getUint32(this.handle.scratch, true);
+    const uvIndices = exports.cs_uv_indices(this.handle.pointer, cloth, this.handle.scratch);
+    const indexCount = this.handle.core.view().getUint32(this.handle.scratch, true);
+    const submesh = (client: number, index: number, out: number) => exports.cs_get_submesh(client, cloth, index, out);
+    return {
+      uvs: this.handle.core.floats(uvs, 2 * uvCount).slice(),
+      uvIndices: this.handle.core.indices(uvIndices, indexCount).slice(),
+      submeshes: this.handle.list(exports.cs_submesh_count(this.handle.pointer, cloth), submesh, (view, at) => ({
+        name: this.handle.core.text(view.getUint32(at + cs_submesh.name, true)),
+        firstIndex: view.getUint32(at + cs_submesh.first_index, true),
+        indexCount: view.getUint32(at + cs_submesh.index_count, true),
+      })),
+    };
+  }
+
+  // Colliders of the newest frame.
+  colliders(): Collider[] {
+    const { cs_collider_count, cs_get_collider } = this.handle.core.exports;
+    return this.readColliders(cs_collider_count(this.handle.pointer), cs_get_collider);
+  }
+
+  // Colliders at the time of the last showAt().
+  shownColliders(): Collider[] {
+    if (!this.playsOut) return this.colliders();
+    const { cs_played_collider_count, cs_get_played_collider } = this.handle.core.exports;
+    return this.readColliders(cs_played_collider_count(this.handle.pointer), cs_get_played_collider);
+  }
+
+  private readColliders(
+    count: number,
+    get: (client: number, index: number, out: number) => number,
+  ): Collider[] {
+    return this.handle.list(count, get, (view, at, index) => ({
+      index,
+      name: this.handle.core.text(view.getUint32(at + cs_collider.name, true)),
+      shape: view.getUint32(at + cs_collider.shape, true),
+      position: vec3(view, at + cs_collider.position),
+      orientation: quaternion(view, at + cs_collider.orientation),
+      radius: view.getFloat32(at + cs_collider.radius, true),
+      length: view.getFloat32(at + cs_collider.length, true),
+      size: vec3(view, at + cs_collider.size),
+      participantId: view.getBigUint64(at + cs_collider.participant_id, true),
+    }));
+  }
+
+  // Copies the geometry of a hull collider.
+  hull(collider: Collider): Hull {
+    const { cs_get_hull } = this.handle.core.exports;
+    const [vertexCount, triangles, indexCount] = [this.handle.scratch, this.handle.scratch + 4, this.handle.scratch + 8];
+    const vertices = cs_get_hull(this.handle.pointer, collider.index, vertexCount, triangles, indexCount);
+    const view = this.handle.core.view();
+    return {
+      vertices: this.handle.core.floats(vertices, 3 * view.getUint32(vertexCount, true)).slice(),
+      triangles: this.handle.core.indices(view.getUint32(triangles, true), view.getUint32(indexCount, true)).slice(),
+    };
+  }
+
+  // Finds the first point of a cloth that a ray meets. The direction has length 1.
+  castRay(origin: Vec3, direction: Vec3): ClothPoint | undefined {
+    const found = this.handle.core.with([origin, direction], (from, along) =>
+      this.handle.core.exports.cs_cast_ray(this.handle.pointer, from!, along!, kFarthestPoint, this.handle.scratch),
+    );
+    if (found === 0) return undefined;
+    const view = this.handle.core.view();
+    const float = (offset: number) => view.getFloat32(this.handle.scratch + offset, true);
+    const at = cs_cloth_point.position;
+    return {
+      position: [float(at), float(at + 4), float(at + 8)],
+      distance: float(cs_cloth_point.distance),
+      place: this.handle.core.bytes(this.handle.scratch, cs_cloth_point.sizeof).slice(),
+    };
+  }
+
+  // Times of the newest frame and of play-out.
+  stages(): Stages | undefined {
+    const { scratch, pointer, core } = this.handle;
+    core.view().setUint32(scratch + cs_stage_statistics.version, CS_STAGE_STATISTICS_VERSION, true);
+    if (core.exports.cs_get_stage_statistics(pointer, scratch) === 0) return undefined;
+    const view = core.view();
+    const real = (offset: number) => view.getFloat64(scratch + offset, true);
+    return {
+      framesWaiting: view.getUint32(scratch + cs_stage_statistics.frames_waiting, true),
+      lateFrames: Number(view.getBigUint64(scratch + cs_stage_statistics.late_frames, true)),
+      ledOnMs: real(cs_stage_statistics.led_on_ms),
+      heldMs: real(cs_stage_statistics.held_ms),
+      delayMs: real(cs_stage_statistics.delay_ms),
+      wantedDelayMs: real(cs_stage_statistics.wanted_delay_ms),
+      serverMs: real(cs_stage_statistics.server_ms),
+      networkMs: real(cs_stage_statistics.network_ms),
+      decodeMs: real(cs_stage_statistics.decode_ms),
+      displayableMs: real(cs_stage_statistics.displayable_ms),
+    };
+  }
+
+  statistics(): Statistics {
+    this.handle.core.exports.cs_get_statistics(this.handle.pointer, nowUs(), this.handle.scratch);
+    const view = this.handle.core.view();
+    const count = (offset: number) => Number(view.getBigUint64(this.handle.scratch + offset, true));
+    const real = (offset: number) => view.getFloat64(this.handle.scratch + offset, true);
+    return {
+      tick: count(cs_statistics.tick),
+      frames: count(cs_statistics.frames),
+      keyFrames: count(cs_statistics.key_frames),
+      dropped: count(cs_statistics.dropped),
+      decodeErrors: count(cs_statistics.decode_errors),
+      bytes: count(cs_statistics.bytes),
+      hashMismatches: count(cs_statistics.hash_mismatches),
+      framesPerSecond: real(cs_statistics.frames_per_second),
+      kbitPerSecond: real(cs_statistics.kbit_per_second),
+      bitsPerVertex: real(cs_statistics.bits_per_vertex),
+      roundTripMs: real(cs_statistics.round_trip_ms),
+    };
+  }
+}

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+// Colliders, hands and grabs of this participant.
+
+import { cs_cloth_point, cs_grab, cs_grab_event, cs_own_collider } from "./layout";
+import { nowUs, type CoreHandle } from "./handle";
+import { HandSide, kMaxColliders, kMaxGrabs, type Grab, type GrabEvent, type OwnCollider } from "./types";
+
+const kJointFloats = 4; // x, y, z, radius
+const kHandJoints = 25; // of WebXR
+
+export class Input {
+  // Arrays of structs for a call: as large as the largest of them.
+  private readonly array: number;
+
+  constructor(private readonly handle: CoreHandle) {
+    this.array = handle.core.allocate(
+      Math.max(kMaxColliders * cs_own_collider.sizeof, kMaxGrabs * cs_grab.sizeof, kHandJoints * kJointFloats * 4),
+    );
+  }
+
+  // Events of this participant's grabs in the newest ClientEvent.grabs.
+  grabEvents(): GrabEvent[] {
+    const { core, pointer } = this.handle;
+    const own = core.exports.cs_participant_id(pointer);
+    const events = this.handle.list(core.exports.cs_grab_event_count(pointer), core.exports.cs_get_grab_event, (view, at) => ({
+      participant: view.getBigUint64(at + cs_grab_event.participant_id, true),
+      grab: view.getUint32(at + cs_grab_event.grab_id, true),
+      vertices: view.getUint32(at + cs_grab_event.vertices, true),
+      distance: view.getFloat32(at + cs_grab_event.distance, true),
+      ticksSinceSeen: Number(view.getBigUint64(at + cs_grab_event.ticks_since_seen, true)),
+    }));
+    return events.filter(({ participant }) => participant === own);
+  }
+
+  // Sets all grabs of this participant; a missing one releases. A new id starts a new grab.
+  setGrabs(grabs: readonly Grab[]): void {
+    const { core, pointer } = this.handle;
+    const view = core.view();
+    grabs.slice(0, kMaxGrabs).forEach((grab, index) => {
+      const at = this.array + index * cs_grab.sizeof;
+      view.setUint32(at + cs_grab.id, grab.id, true);
+      writeFloats(view, at + cs_grab.position, grab.position);
+      writeFloats(view, at + cs_grab.orientation, grab.orientation ?? kNoRotation);
+      // NaN: the server's default.
+      for (const offset of [cs_grab.radius, cs_grab.reach, cs_grab.max_force, cs_grab.slip_distance])
+        view.setFloat32(at + offset, NaN, true);
+      view.setUint32(at + cs_grab.has_place, 1, true);
+      core.bytes(at + cs_grab.place, cs_cloth_point.sizeof).set(grab.place);
+    });
+    core.exports.cs_set_grabs(pointer, this.array, Math.min(grabs.length, kMaxGrabs), nowUs());
+  }
+
+  // Replaces the colliders of this participant, except its hands.
+  setColliders(colliders: readonly OwnCollider[]): void {
+    const { core, pointer } = this.handle;
+    const view = core.view();
+    colliders.slice(0, kMaxColliders).forEach((collider, index) => {
+      const at = this.array + index * cs_own_collider.sizeof;
+      view.setUint32(at + cs_own_collider.shape, collider.shape, true);
+      writeFloats(view, at + cs_own_collider.position, collider.position);
+      writeFloats(view, at + cs_own_collider.orientation, collider.orientation ?? kNoRotation);
+      view.setFloat32(at + cs_own_collider.radius, collider.radius ?? 0, true);
+      view.setFloat32(at + cs_own_collider.length, collider.length ?? 0, true);
+      writeFloats(view, at + cs_own_collider.size, collider.size ?? kNoSize);
+    });
+    core.exports.cs_set_shapes(pointer, this.array, Math.min(colliders.length, kMaxColliders), nowUs());
+  }
+
+  // Replaces one tracked hand by 25 joints in the order of XRHand: x, y, z, radius of each. Undefined removes it.
+  setHand(side: HandSide, joints: Float32Array | undefined): void {
+    const { core, pointer } = this.handle;
+    if (joints) core.floats(this.array, kHandJoints * kJointFloats).set(joints);
+    core.exports.cs_set_hand(pointer, side, this.array, joints ? kHandJoints : 0, nowUs());
+  }
+
+  destroy(): void {
+    this.handle.core.exports.free(this.array);
+  }
+}
+
+const kNoRotation = [0, 0, 0, 0] as const;
+const kNoSize = [0, 0, 0] as const;
+
+function writeFloats(view: DataView, at: number, values: readonly number[]): void {
+  for (let i = 0; i < values.length; ++i) view.setFloat32(at + 4 * i, values[i]!, true);
+}

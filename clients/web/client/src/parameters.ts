@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+// Environment, materials, solvers and reports of the cloths.
+
+import { CS_CLOTH_REPORT_VERSION, CS_CLOTH_SETTINGS_VERSION, cs_cloth_parameters, cs_cloth_report, cs_cloth_settings, cs_environment } from "./layout";
+import { spring, vec3, type CoreHandle } from "./handle";
+import type { ClothParameters, ClothReport, Environment, Vec3 } from "./types";
+
+export class Parameters {
+  constructor(private readonly handle: CoreHandle) {}
+
+  // Current environment; undefined before the description.
+  environment(): Environment | undefined {
+    if (this.handle.core.exports.cs_get_environment(this.handle.pointer, this.handle.scratch) === 0) return undefined;
+    const view = this.handle.core.view();
+    return {
+      gravity: vec3(view, this.handle.scratch + cs_environment.gravity),
+      wind: vec3(view, this.handle.scratch + cs_environment.wind),
+      airDensity: view.getFloat32(this.handle.scratch + cs_environment.air_density, true),
+      gustStrength: view.getFloat32(this.handle.scratch + cs_environment.gust_strength, true),
+      gustSeconds: view.getFloat32(this.handle.scratch + cs_environment.gust_seconds, true),
+    };
+  }
+
+  // Current parameters of each cloth.
+  clothParameters(): ClothParameters[] {
+    const count = this.handle.core.exports.cs_cloth_count(this.handle.pointer);
+    return this.handle.list(count, this.handle.core.exports.cs_get_cloth_parameters, (view, at) => ({
+      structural: spring(view, at + cs_cloth_parameters.structural),
+      shear: spring(view, at + cs_cloth_parameters.shear),
+      bend: spring(view, at + cs_cloth_parameters.bend),
+      damping: view.getFloat32(at + cs_cloth_parameters.damping, true),
+    }));
+  }
+
+  // Solver of a cloth as a cs_solver.
+  solver(cloth: number): number {
+    this.handle.core.view().setUint32(this.handle.scratch + cs_cloth_settings.version, CS_CLOTH_SETTINGS_VERSION, true);
+    if (this.handle.core.exports.cs_get_cloth_settings(this.handle.pointer, cloth, this.handle.scratch) === 0) return 0;
+    return this.handle.core.view().getUint32(this.handle.scratch + cs_cloth_settings.solver, true);
+  }
+
+  // Selects a solver. The cloth keeps the settings that it last had for this solver, or the defaults.
+  setSolver(cloth: string, solver: number): void {
+    this.handle.core.exports.cs_keep_cloth_settings(this.handle.scratch);
+    this.handle.core.view().setUint32(this.handle.scratch + cs_cloth_settings.solver, solver, true);
+    this.handle.core.with([cloth], (name) => this.handle.core.exports.cs_change_cloth(this.handle.pointer, name!, this.handle.scratch));
+  }
+
+  // Names of the available materials. material() is the material of a cloth, or "".
+  materials(): string[] {
+    const count = this.handle.core.exports.cs_material_count(this.handle.pointer);
+    return Array.from({ length: count }, (_, index) => this.handle.core.text(this.handle.core.exports.cs_material(this.handle.pointer, index)));
+  }
+
+  material(cloth: number): string {
+    return this.handle.core.text(this.handle.core.exports.cs_cloth_material(this.handle.pointer, cloth));
+  }
+
+  setMaterial(cloth: string, material: string): void {
+    this.handle.core.with([cloth, material], (name, chosen) => this.handle.core.exports.cs_set_material(this.handle.pointer, name!, chosen!));
+  }
+
+  setGust(strength: number, seconds: number): void {
+    this.handle.core.exports.cs_set_gust(this.handle.pointer, strength, seconds);
+  }
+
+  // Newest report of a cloth; undefined before the first.
+  report(cloth: number): ClothReport | undefined {
+    this.handle.core.view().setUint32(this.handle.scratch + cs_cloth_report.version, CS_CLOTH_REPORT_VERSION, true);
+    if (this.handle.core.exports.cs_get_cloth_report(this.handle.pointer, cloth, this.handle.scratch) === 0) return undefined;
+    const view = this.handle.core.view();
+    const real = (offset: number) => view.getFloat32(this.handle.scratch + offset, true);
+    return {
+      activeConstraints: view.getUint32(this.handle.scratch + cs_cloth_report.active_constraints, true),
+      iterations: view.getUint32(this.handle.scratch + cs_cloth_report.iterations, true),
+      residual: real(cs_cloth_report.residual),
+      strainMax: real(cs_cloth_report.strain_max),
+      strainP99: real(cs_cloth_report.strain_p99),
+      strainMean: real(cs_cloth_report.strain_mean),
+      kineticEnergy: real(cs_cloth_report.kinetic_energy),
+      elasticEnergy: real(cs_cloth_report.elastic_energy),
+      gravityEnergy: real(cs_cloth_report.gravity_energy),
+      penetration: real(cs_cloth_report.penetration),
+      deviceMs: real(cs_cloth_report.device_ms),
+      tick: Number(view.getBigUint64(this.handle.scratch + cs_cloth_report.tick, true)),
+    };
+  }
+
+  setEnvironment(change: { gravity?: Vec3; wind?: Vec3 }): void {
+    this.handle.core.with([change.gravity, change.wind], (gravity, wind) =>
+      this.handle.core.exports.cs_set_environment(this.handle.pointer, gravity!, wind!, 0),
+    );
+  }
+
+  // Changes a cloth. An empty name means every cloth.
+  setCloth(cloth: string, change: Partial<ClothParameters>): void {
+    const damping = change.damping === undefined ? undefined : [change.damping];
+    this.handle.core.with([cloth, change.structural, change.shear, change.bend, damping], (name, structural, shear, bend, rate) =>
+      this.handle.core.exports.cs_set_cloth(this.handle.pointer, name!, structural!, shear!, bend!, rate!),
+    );
+  }
+
+  setCollider(collider: string, change: { position?: Vec3; radius?: number }): void {
+    const radius = change.radius === undefined ? undefined : [change.radius];
+    this.handle.core.with([collider, change.position, radius], (name, position, size) =>
+      this.handle.core.exports.cs_set_collider(this.handle.pointer, name!, position!, size!),
+    );
+  }
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// Messages between the thread of the connection, which is a worker, and the thread of the page. Times are milliseconds
+// of performance.now() of the page.
+
+import type { Decoding } from "./client";
+import type { Identity } from "./types";
+
+// Proof of identity: what a person gives, or a kept token ("" for none).
+export type Proof = { token: string } | { code: string };
+
+export interface Start {
+  kind: "start";
+  session: number; // repeated by all answers; a new start ends the session before it
+  module: WebAssembly.Module;
+  url: string;
+  scene: string;
+  program: string;
+  identity: Identity;
+  proof: Proof;
+  quality: number;
+  temporalLayers: number;
+  pageOrigin: number; // performance.timeOrigin of the page
+  shares: boolean; // whether frames go through shared memory
+}
+
+export type ToWorker =
+  | Start
+  // Message for the connection of this number; dropped when that has ended.
+  | { kind: "send"; connection: number; message: Uint8Array<ArrayBuffer> }
+  // Connects at once instead of at the scheduled time.
+  | { kind: "reconnect" }
+  // Ends the session.
+  | { kind: "stop" }
+  // A buffer of a frame that may be used again.
+  | { kind: "recycle"; buffer: ArrayBuffer };
+
+export type FromWorker = { session: number } & (
+  | { kind: "connecting"; connection: number; atMs: number }
+  | { kind: "lost"; atMs: number; reason: string; attemptAtMs: number }
+  // Memory of a FrameRing for the frames that follow.
+  | { kind: "ring"; memory: SharedArrayBuffer }
+  | { kind: "message"; message: ArrayBuffer; arrivedMs: number; decoding: Decoding; frame: SentFrame | undefined }
+  // The worker cannot go on.
+  | { kind: "broken"; reason: string }
+);
+
+// Frame beside its message: in the ring if there is no buffer.
+export interface SentFrame {
+  buffer: ArrayBuffer | undefined;
+  hasNormals: boolean;
+  hash: bigint;
+  decodeMs: number;
+}
