@@ -164,19 +164,29 @@ export class Frames {
     };
   }
 
-  // Finds the first point of a cloth that a ray meets. The direction has length 1.
+  // Finds the first point of the shown cloth that a ray meets. The direction has length 1.
   castRay(origin: Vec3, direction: Vec3): ClothPoint | undefined {
-    const found = this.handle.core.with([origin, direction], (from, along) =>
-      this.handle.core.exports.cs_cast_ray(this.handle.pointer, from!, along!, kFarthestPoint, this.handle.scratch),
+    const { core, pointer, scratch } = this.handle;
+    const found = core.with([origin, direction], (from, along) =>
+      core.exports.cs_cast_ray(pointer, from!, along!, kFarthestPoint, scratch),
     );
-    if (found === 0) return undefined;
-    const view = this.handle.core.view();
-    const float = (offset: number) => view.getFloat32(this.handle.scratch + offset, true);
-    const at = cs_cloth_point.position;
+    return found ? this.point() : undefined;
+  }
+
+  // Finds the point of the shown cloth that is nearest to a point, within a distance in metres.
+  nearestPoint(point: Vec3, maxDistance: number): ClothPoint | undefined {
+    const { core, pointer, scratch } = this.handle;
+    const found = core.with([point], (at) => core.exports.cs_nearest_point(pointer, at!, maxDistance, scratch));
+    return found ? this.point() : undefined;
+  }
+
+  private point(): ClothPoint {
+    const { core, scratch } = this.handle;
+    const view = core.view();
     return {
-      position: [float(at), float(at + 4), float(at + 8)],
-      distance: float(cs_cloth_point.distance),
-      place: this.handle.core.bytes(this.handle.scratch, cs_cloth_point.sizeof).slice(),
+      position: vec3(view, scratch + cs_cloth_point.position),
+      distance: view.getFloat32(scratch + cs_cloth_point.distance, true),
+      place: core.bytes(scratch, cs_cloth_point.sizeof).slice(),
     };
   }
 

@@ -3,3 +3,9 @@
 
 export * from "./cloth_mesh";
 export * from "./collider_meshes";
+export { Body } from "./xr/body";
+export { Figures } from "./xr/figures";
+export { Grabber, type GrabPose, type Touchable } from "./xr/grabber";
+export { chooseRate, Immersion, type ImmersionListener, type Mode } from "./xr/immersion";
+export { Limb } from "./xr/limb";
+export { Placement, TwoHandMove } from "./xr/placement";

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// The user of a headset as colliders and grabs of the scene: hands, controllers and head.
+
+import * as THREE from "three";
+import { HandSide, Shape, type Grab, type Input, type OwnCollider } from "@clothstream/client";
+import type { Touchable } from "./grabber";
+import { Limb } from "./limb";
+
+const kHeadRadius = 0.11; // m of the room
+const kControllerRadius = 0.045;
+const kMostLimbs = 8;
+
+export class Body {
+  readonly head = new THREE.Vector3();
+  headPresent = false;
+  private readonly limbs = new Map<string, Limb>();
+  private readonly sides = { left: false, right: false }; // hands that the server has
+  private collides = false; // whether the server has colliders
+  private grabs = 0; // number of grabs that the server has
+  private readonly limbOf = new Map<XRInputSource, Limb>();
+
+  // Inputs that are there or were a moment ago.
+  *present(): Iterable<Limb> {
+    for (const limb of this.limbs.values()) if (limb.present) yield limb;
+  }
+
+  // Listens to presses of a session. Pinches and triggers are `select`, grips are `squeeze`.
+  attach(session: XRSession): void {
+    const press = ({ inputSource }: XRInputSourceEvent) => this.limb(inputSource)?.press();
+    const release = ({ inputSource }: XRInputSourceEvent) => this.limb(inputSource)?.release();
+    session.addEventListener("selectstart", press);
+    session.addEventListener("selectend", release);
+    session.addEventListener("squeezestart", press);
+    session.addEventListener("squeezeend", release);
+  }
+
+  // Reads all poses. `toScene` leads from the reference space to the scene.
+  update(frame: XRFrame, space: XRReferenceSpace, session: XRSession, toScene: THREE.Matrix4, nowMs: number): void {
+    const viewer = frame.getViewerPose(space);
+    this.headPresent = viewer !== undefined && viewer !== null;
+    if (viewer) {
+      const { x, y, z } = viewer.transform.position;
+      this.head.set(x, y, z).applyMatrix4(toScene);
+    }
+    this.limbOf.clear();
+    for (const source of session.inputSources) this.limb(source);
+    for (const limb of this.limbs.values()) limb.update(frame, space, sourceOf(this.limbOf, limb), toScene, nowMs);
+  }
+
+  // Takes hold of the cloth with each input that was pressed since the last frame.
+  grab(cloth: Touchable): void {
+    for (const limb of this.present()) {
+      if (limb.isNew) limb.grabber.take(limb.pose, cloth);
+      limb.isNew = false;
+    }
+  }
+
+  slipped(grab: number): void {
+    for (const limb of this.limbs.values()) limb.grabber.slipped(grab);
+  }
+
+  // Sends colliders, hands and grabs. `scale` is metres of the room per metre of the scene.
+  send(input: Input, scale: number): void {
+    const colliders: OwnCollider[] = [];
+    const grabs: Grab[] = [];
+    if (this.headPresent) colliders.push(sphere(this.head, kHeadRadius / scale));
+    const hands = { left: false, right: false };
+    for (const limb of this.present()) {
+      const grab = limb.grabber.grab(limb.pose);
+      if (grab) grabs.push(grab);
+      if (!limb.isHand) {
+        if (limb.side !== "none") colliders.push(sphere(limb.pose.point, kControllerRadius / scale));
+      } else if (limb.side !== "none") {
+        hands[limb.side] = true;
+        input.setHand(kSides[limb.side], limb.hand.joints);
+      }
+    }
+    for (const side of ["left", "right"] as const) {
+      if (this.sides[side] && !hands[side]) input.setHand(kSides[side], undefined);
+      this.sides[side] = hands[side];
+    }
+    if (colliders.length > 0 || this.collides) input.setColliders(colliders);
+    this.collides = colliders.length > 0;
+    if (grabs.length > 0 || this.grabs > 0) input.setGrabs(grabs);
+    this.grabs = grabs.length;
+  }
+
+  // Removes everything from the scene, at the end of a session.
+  leave(input: Input): void {
+    this.limbs.clear();
+    this.headPresent = false;
+    this.send(input, 1);
+  }
+
+  private limb(source: XRInputSource): Limb | undefined {
+    const isHand = source.hand !== undefined && source.hand !== null;
+    const key = `${source.handedness} ${isHand ? "hand" : source.targetRayMode}`;
+    let limb = this.limbs.get(key);
+    if (!limb) {
+      if (this.limbs.size >= kMostLimbs) return undefined;
+      limb = new Limb(source.handedness, isHand);
+      this.limbs.set(key, limb);
+    }
+    this.limbOf.set(source, limb);
+    return limb;
+  }
+}
+
+const kSides = { left: HandSide.left, right: HandSide.right };
+
+function sphere(position: THREE.Vector3, radius: number): OwnCollider {
+  return { shape: Shape.sphere, position: position.toArray(), radius };
+}
+
+function sourceOf(limbOf: ReadonlyMap<XRInputSource, Limb>, wanted: Limb): XRInputSource | undefined {
+  for (const [source, limb] of limbOf) if (limb === wanted) return source;
+  return undefined;
+}
