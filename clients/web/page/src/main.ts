@@ -2,13 +2,15 @@
 // Starts the page: core, view, session, panel, and the drawing loop.
 
 import { ClothReports } from "./cloth_reports";
-import { Roles, Session, type SessionListener } from "@clothstream/client";
+import { Roles, Session, type SessionListener, type Vec3 } from "@clothstream/client";
 import { Controls } from "./controls";
 import { Drag } from "./drag";
+import { HeadsetPage } from "./headset_page";
 import { element, Hud } from "./hud";
 import { browserTokens, PairingPanel, ProofForm } from "./identity";
 import { listenToKeys } from "./keys";
 import { Player } from "./player";
+import { Pusher, type Tool } from "./pusher";
 import { expose } from "./probe";
 import { showAddress } from "./share";
 import { View } from "./view";
@@ -34,9 +36,16 @@ async function start(): Promise<void> {
   void showAddress();
   const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
   const reports = new ClothReports();
+  const castRay = (origin: Vec3, direction: Vec3) =>
+    session.state.kind === "live" ? session.client.frames.castRay(origin, direction) : undefined;
+  // Before Drag, so that its presses come first.
+  const pusher = new Pusher(view, castRay);
+  const tools = document.querySelectorAll<HTMLInputElement>('input[name="tool"]');
+  for (const tool of tools) tool.addEventListener("change", () => (pusher.tool = tool.value as Tool));
+  let pushed = false; // whether the server has a collider of the pointer
   const drag: Drag = new Drag(
     view,
-    (origin, direction) => (session.state.kind === "live" ? session.client.frames.castRay(origin, direction) : undefined),
+    castRay,
     (collider) => (controls.collider = collider),
   );
   listenToKeys(view, drag, controls);
@@ -84,7 +93,10 @@ async function start(): Promise<void> {
     scenesListed: (scenes) => controls.listScenes(scenes, session.client.sceneName),
     grabsChanged: (client) =>
         client.input.grabEvents().forEach(({ grab, vertices }) => {
-          if (vertices === 0) drag.slipped(grab);
+          if (vertices === 0) {
+            drag.slipped(grab);
+            headset.slipped(grab);
+          }
         }),
     notice: (text) => hud.showNotice(text),
     refused: (client) => {
@@ -104,7 +116,6 @@ async function start(): Promise<void> {
     hud.showFatal(`The client core did not start: ${error instanceof Error ? error.message : String(error)}`);
     throw error;
   });
-  const probe = expose(session, view);
 
   function chooseScene(name: string): void {
     const url = new URL(window.location.href);
@@ -114,17 +125,26 @@ async function start(): Promise<void> {
     session.join(name);
   }
 
+  const headset: HeadsetPage = new HeadsetPage(view, session, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) });
+  const probe = expose(session, view, headset.headset);
+
   let figuresAt = 0;
-  function draw(now: number): void {
+  function draw(now: number, frame?: XRFrame): void {
     const client = session.state.kind === "live" ? session.client : undefined;
+    if (frame) headset.draw(frame, now, client);
     player.draw(client);
-    drag.enabled = !player.plays;
+    drag.enabled = !player.plays && pusher.tool === "hand";
     if (client) {
       controls.apply(client);
       reports.apply(client);
       const target = drag.take();
       if (target?.kind === "collider") client.parameters.setCollider(target.collider, { position: target.position });
       if (target?.kind === "grab") client.input.setGrabs(target.grab ? [target.grab] : []);
+      if (!frame) {
+        const colliders = pusher.update(now);
+        if (colliders.length > 0 || pushed) client.input.setColliders(colliders);
+        pushed = colliders.length > 0;
+      }
       session.flush();
     }
     if (now - figuresAt >= kFiguresPeriodMs) {
@@ -134,11 +154,16 @@ async function start(): Promise<void> {
         reports.showReports(client);
       }
       hud.showState(session.state);
+      headset.show();
     }
-    view.draw(session.client, now);
-    requestAnimationFrame(draw);
+    view.draw(session.client, displayTime(now, frame));
   }
-  requestAnimationFrame(draw);
+  view.renderer.setAnimationLoop(draw);
+}
+
+// Time at which the frame will be seen. A headset may predict it.
+function displayTime(now: number, frame: XRFrame | undefined): number {
+  return frame?.predictedDisplayTime ?? now;
 }
 
 void start();

@@ -2,6 +2,7 @@
 // `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
 import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Statistics, Vec3 } from "@clothstream/client";
+import type { Doing, Headset } from "@clothstream/three";
 import type { View } from "./view";
 
 export interface Probe {
@@ -22,11 +23,24 @@ export interface Probe {
   readonly participants: Participant[];
   // Defined if the scene is a recording.
   readonly playback: Playback | undefined;
+  // Length of the largest correction by local contact, m.
+  readonly localCorrection: number;
+  readonly headset: HeadsetProbe;
   readonly canvas: HTMLCanvasElement;
   // Projects a point of the scene to CSS pixels of the page.
   project(point: Vec3): [number, number];
   // Position of the point's shadow on the floor, cast by the key light.
   shadowOf(point: Vec3): Vec3;
+}
+
+// The headset of this page.
+export interface HeadsetProbe {
+  readonly mode: string | undefined; // of the session
+  readonly doing: Doing;
+  readonly frames: number; // drawn in sessions
+  readonly placement: number[]; // matrix from scene to room, column by column
+  // Hands, controllers and rays that are there. Joints: x, y, z, radius of each, in the scene.
+  readonly limbs: { side: string; isHand: boolean; holds: boolean; joints: number[]; point: Vec3 }[];
 }
 
 declare global {
@@ -36,7 +50,7 @@ declare global {
 }
 
 // Call described() of the result for each description, before its first frame.
-export function expose(session: Session, view: View): { described(client: Client): void } {
+export function expose(session: Session, view: View, headset: Headset): { described(client: Client): void } {
   let restPositions: Float32Array | undefined;
   window.clothstream = {
     get state() {
@@ -75,6 +89,24 @@ export function expose(session: Session, view: View): { described(client: Client
     },
     get playback() {
       return session.client.playback.state();
+    },
+    get localCorrection() {
+      return session.client.frames.localCorrection;
+    },
+    get headset() {
+      return {
+        mode: headset.mode,
+        doing: headset.doing,
+        frames: headset.frameCount,
+        placement: headset.placement.matrix.toArray(),
+        limbs: Array.from(headset.body.present(), ({ side, isHand, grabber, hand, pose }) => ({
+          side,
+          isHand,
+          holds: grabber.holds,
+          joints: isHand ? [...hand.joints] : [],
+          point: pose.point.toArray(),
+        })),
+      };
     },
     canvas: view.canvas,
     project: (point) => view.project(point),

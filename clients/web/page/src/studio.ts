@@ -33,6 +33,13 @@ export class Studio {
     return this.key.position.clone().sub(this.key.target.position).normalize();
   }
 
+  // Hides floor, fog and background, so that the real room is seen.
+  passThrough(on: boolean): void {
+    this.floor.visible = !on;
+    this.scene.background = on ? null : new THREE.Color(kBackground);
+    this.scene.fog = on ? null : this.fog;
+  }
+
   fit(bounds: THREE.Box3, floorHeight: number): void {
     const centre = bounds.getCenter(new THREE.Vector3());
     const radius = bounds.getBoundingSphere(new THREE.Sphere()).radius;

@@ -16,7 +16,7 @@ const kTurnStep = Math.PI / 36;
 export class View {
   readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
   readonly orbit: OrbitControls;
-  private readonly renderer: THREE.WebGLRenderer;
+  readonly renderer: THREE.WebGLRenderer;
   private readonly studio = new Studio();
   private readonly colliderMeshes = new ColliderMeshes(this.studio.scene);
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
@@ -38,6 +38,20 @@ export class View {
     this.fit();
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
+  }
+
+  get scene(): THREE.Scene {
+    return this.studio.scene;
+  }
+
+  // Box of the cloths and colliders, on the floor.
+  get box(): THREE.Box3 {
+    return this.bounds;
+  }
+
+  // Hides the drawn room, so that the real one is seen.
+  passThrough(on: boolean): void {
+    this.studio.passThrough(on);
   }
 
   get colliders(): readonly ColliderMesh[] {
@@ -84,7 +98,7 @@ export class View {
       for (const cloth of this.cloths) cloth.update(positions, normals);
       this.colliderMeshes.place(client);
     }
-    this.orbit.update();
+    if (!this.renderer.xr.isPresenting) this.orbit.update();
     this.renderer.render(this.studio.scene, this.camera);
   }
 
@@ -164,9 +178,9 @@ export class View {
     this.reset();
   }
 
-  private resize(): void {
+  resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
-    if (clientWidth === 0 || clientHeight === 0) return;
+    if (clientWidth === 0 || clientHeight === 0 || this.renderer.xr.isPresenting) return;
     const ratio = Math.min(window.devicePixelRatio, 2);
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(clientWidth, clientHeight, false);
