@@ -3,12 +3,13 @@
 
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
-import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
+import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { networkInterfaces, tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { kChromium, launchBrowser, kPicture, luminance, openPage, takePicture, takePixels, untilFrames, untilState } from "./browser.mjs";
 import { makeLink } from "./link.mjs";
+import { writeHangingSheet } from "./scenes.mjs";
 import { startServer } from "./server.mjs";
 
 const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
@@ -71,15 +72,6 @@ function untilAtRest(page) {
     window.seenSphere = { frames: statistics.frames, position: colliders[0].position.join() };
     return window.seenSphere.position === seen?.position;
   });
-}
-
-// Writes the scene "swing" with a rod at rest, so that a late page still finds the cloth where it was drawn.
-async function writeHangingSheet(folder) {
-  const swing = JSON.parse(await readFile(new URL("../../server/scenes/swing.json", import.meta.url), "utf8"));
-  delete swing.cloths[0].attachments[0].motion;
-  const file = join(folder, "hanging.json");
-  await writeFile(file, JSON.stringify({ ...swing, name: "hanging" }));
-  return file;
 }
 
 let folder;

@@ -39,6 +39,8 @@ export interface HeadsetProbe {
   readonly doing: Doing;
   readonly frames: number; // drawn in sessions
   readonly placement: number[]; // matrix from scene to room, column by column
+  // What the panel in space does: the one function of the probe that changes something.
+  choose(doing: Doing): void;
   // Hands, controllers and rays that are there. Joints: x, y, z, radius of each, in the scene.
   readonly limbs: { side: string; isHand: boolean; holds: boolean; joints: number[]; point: Vec3 }[];
 }
@@ -99,6 +101,7 @@ export function expose(session: Session, view: View, headset: Headset): { descri
         doing: headset.doing,
         frames: headset.frameCount,
         placement: headset.placement.matrix.toArray(),
+        choose: (doing: Doing) => headset.do(doing),
         limbs: Array.from(headset.body.present(), ({ side, isHand, grabber, hand, pose }) => ({
           side,
           isHand,

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// Pages with an emulated headset (iwer), and its poses.
+
+import { readFile } from "node:fs/promises";
+import { fileURLToPath } from "node:url";
+
+const packageFile = (name) => fileURLToPath(new URL(`../../clients/web/node_modules/${name}`, import.meta.url));
+const kRuntime = packageFile("iwer/build/iwer.min.js");
+const kRoom = packageFile("@iwer/sem/build/iwer-sem.min.js");
+const kCapture = packageFile("@iwer/sem/captures/office_small.json");
+
+// Opens a page whose browser has a headset. `room` adds a real room with surfaces. Each page has a context of its own.
+export async function openHeadset(browser, url, { room = false, input = "hand" } = {}) {
+  const context = await browser.newContext({ viewport: { width: 640, height: 360 } });
+  await context.addInitScript({ path: kRuntime });
+  if (room) {
+    await context.addInitScript({ path: kRoom });
+    await context.addInitScript(`window.captured = ${await readFile(kCapture, "utf8")}`);
+  }
+  await context.addInitScript((primary) => {
+    const { XRDevice, metaQuest3 } = window.IWER;
+    const device = new XRDevice(metaQuest3);
+    // Chromium has an empty navigator.xr, which has to be replaced.
+    device.installRuntime({ forceInstall: true });
+    device.primaryInputMode = primary;
+    // One eye: half the time to draw.
+    device.stereoEnabled = false;
+    device.position.set(0, 1.6, 0);
+    if (window.captured) {
+      device.installSEM(window.IWER_SEM.SyntheticEnvironmentModule);
+      device.sem.loadEnvironment(window.captured);
+    }
+    window.device = device;
+  }, input);
+  const page = await context.newPage();
+  page.setDefaultTimeout(60_000);
+  page.errors = [];
+  page.on("pageerror", (error) => page.errors.push(String(error)));
+  await page.goto(url);
+  return page;
+}
+
+// Enters a mode by its button, and waits until frames are drawn.
+export async function enter(page, mode) {
+  const before = await page.evaluate(() => window.clothstream.headset.frames);
+  await page.click(`#enter-${mode}`);
+  await page.waitForFunction((count) => window.clothstream.headset.frames > count + 3, before);
+}
+
+// Moves a hand or controller to a place in the room, at once or by at most `step` metres per drawn frame: a busy machine
+// draws few of them. `kind` is hands or controllers. Returns what `watch`, a function of the page, returned after each
+// frame.
+export function moveTo(page, kind, side, place, step = Infinity, watch = "() => 0") {
+  return page.evaluate(
+    async ([inputs, which, goal, most, source]) => {
+      const look = eval(`(${source})`);
+      const { position } = window.device[inputs][which];
+      const start = [position.x, position.y, position.z];
+      const steps = Math.max(1, Math.ceil(Math.hypot(...goal.map((to, axis) => to - start[axis])) / most));
+      const seen = [];
+      for (let i = 1; i <= steps; ++i) {
+        position.set(...start.map((from, axis) => from + ((goal[axis] - from) * i) / steps));
+        const { frames } = window.clothstream.headset;
+        while (window.clothstream.headset.frames < frames + 2) await new Promise((done) => setTimeout(done, 4));
+        seen.push(look());
+      }
+      return seen;
+    },
+    [kind, side, place, step, String(watch)],
+  );
+}
+
+// Point of the scene in the room.
+export async function toRoom(page, [x, y, z]) {
+  const m = await page.evaluate(() => window.clothstream.headset.placement);
+  return [0, 1, 2].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row]);
+}
+
+export function untilSession(page, mode) {
+  return page.waitForFunction((wanted) => (window.clothstream.headset.mode ?? "none") === wanted, mode);
+}

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+// The page in emulated headsets, with a real server: hands, controllers, grabs, pass-through, lost connections, two users.
+
+import assert from "node:assert/strict";
+import { existsSync } from "node:fs";
+import { mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { kChromium, launchBrowser, takePicture, untilFrames, untilState } from "./browser.mjs";
+import { enter, moveTo, openHeadset, toRoom, untilSession } from "./headset.mjs";
+import { writeHangingSheet } from "./scenes.mjs";
+import { startServer } from "./server.mjs";
+
+const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
+if (!existsSync(kChromium)) {
+  console.log(`skipped: there is no ${kChromium} (apt install chromium)`);
+  process.exit(kSkipped);
+}
+
+const kRows = 40;
+const kColumns = 32;
+// A vertex of the scene "swing" away from its rod.
+const kTouched = 28 * kColumns + 16;
+
+// Way of a hand from one drawn frame to the next, m.
+const kStep = 0.02;
+
+let folder;
+let server;
+let browser;
+before(async () => {
+  folder = await mkdtemp(join(tmpdir(), "clothstream-headset-"));
+  server = await startServer(0, ["--scene-file", await writeHangingSheet(folder), "--scene", "hanging"]);
+  browser = await launchBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await server?.stop();
+  if (folder) await rm(folder, { recursive: true });
+});
+
+async function withHeadset(options, use) {
+  const page = await openHeadset(browser, (options.url ?? server.url) + (options.query ?? ""), options);
+  try {
+    await untilState(page, "live");
+    await untilFrames(page, 10);
+    await use(page);
+    assert.deepEqual(page.errors, []);
+  } finally {
+    await page.context().close();
+  }
+}
+
+const vertex = (page, index) => page.evaluate((at) => Array.from(window.clothstream.positions.slice(3 * at, 3 * at + 3)), index);
+const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+
+// Offset from the pose of an emulated hand to the point where its fingers meet, in the room.
+async function pinchOffset(page, side) {
+  const { position, point } = await page.evaluate((which) => {
+    const { x, y, z } = window.device.hands[which].position;
+    const limb = window.clothstream.headset.limbs.find((one) => one.side === which && one.isHand);
+    return { position: [x, y, z], point: limb.point };
+  }, side);
+  const there = await toRoom(page, point);
+  return there.map((value, axis) => value - position[axis]);
+}
+
+// Brings the fingers of a hand to a point of the scene, with an offset in the room.
+async function reach(page, side, point, [dx, dy, dz] = [0, 0, 0], step = undefined, watch = undefined) {
+  const offset = await pinchOffset(page, side);
+  const [x, y, z] = await toRoom(page, point);
+  return moveTo(page, "hands", side, [x + dx - offset[0], y + dy - offset[1], z + dz - offset[2]], step, watch);
+}
+
+// Deepest place of a drawn vertex in a joint of the own hand, metres. Runs in the page.
+function deepest() {
+  const { drawn, headset } = window.clothstream;
+  let most = 0;
+  for (const { joints } of headset.limbs) {
+    for (let j = 0; j < joints.length; j += 4) {
+      for (let i = 0; i < drawn[0].length; i += 3) {
+        const away = Math.hypot(drawn[0][i] - joints[j], drawn[0][i + 1] - joints[j + 1], drawn[0][i + 2] - joints[j + 2]);
+        most = Math.max(most, joints[j + 3] - away);
+      }
+    }
+  }
+  return most;
+}
+
+test("a hand pushes the cloth, and is never drawn inside it", () =>
+  withHeadset({}, async (page) => {
+    await enter(page, "vr");
+    const start = await vertex(page, kTouched);
+    await reach(page, "right", start, [0, 0, 0.2]);
+    await untilFrames(page, 5);
+    const depths = await reach(page, "right", start, [0, 0, -0.15], kStep, deepest);
+    await takePicture(page, "vr_push");
+    await untilFrames(page, 20);
+    const pushed = await vertex(page, kTouched);
+    assert.ok(pushed[2] < start[2] - 0.05, `the touched vertex went from z = ${start[2]} to ${pushed[2]}`);
+    assert.ok(depths.length > 3, `${depths.length} frames`);
+    assert.ok(Math.max(...depths) < 0.005, `a vertex is drawn ${1000 * Math.max(...depths)} mm inside the hand`);
+    // Of the server's frame, where the hand is as the server knows it.
+    const inside = await page.evaluate(() => {
+      const { positions, colliders } = window.clothstream;
+      let most = 0;
+      for (const { participantId, shape, position, orientation, radius, length } of colliders) {
+        if (participantId === 0n || shape !== 1) continue;
+        const [x, y, z, w] = orientation;
+        const axis = [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)];
+        for (let i = 0; i < positions.length; i += 3) {
+          const way = [0, 1, 2].map((k) => positions[i + k] - position[k]);
+          const along = Math.max(-length / 2, Math.min(length / 2, way[0] * axis[0] + way[1] * axis[1] + way[2] * axis[2]));
+          most = Math.max(most, radius - Math.hypot(...way.map((value, k) => value - along * axis[k])));
+        }
+      }
+      return most;
+    });
+    assert.ok(inside < 0.003, `a vertex is ${1000 * inside} mm inside the hand`);
+  }));
+
+test("a pinch takes hold of the cloth and lifts it", () =>
+  withHeadset({}, async (page) => {
+    await enter(page, "vr");
+    const low = (kRows - 1) * kColumns + 16;
+    const start = await vertex(page, low);
+    await reach(page, "right", start, [0, 0, 0.02]);
+    await page.evaluate(() => window.device.hands.right.updatePinchValue(1));
+    await page.waitForFunction(() => window.clothstream.headset.limbs.some(({ holds }) => holds));
+    await reach(page, "right", start, [0, 0.3, 0.1], kStep);
+    await untilFrames(page, 40);
+    const lifted = await vertex(page, low);
+    assert.ok(lifted[1] > start[1] + 0.2, `the held vertex went from y = ${start[1]} to ${lifted[1]}`);
+    await takePicture(page, "vr_lift");
+    await page.evaluate(() => window.device.hands.right.updatePinchValue(0));
+    await page.waitForFunction(([index, height]) => window.clothstream.positions[3 * index + 1] < height, [low, lifted[1] - 0.1]);
+  }));
+
+test("a controller takes hold of the cloth by its ray", () =>
+  withHeadset({ input: "controller" }, async (page) => {
+    await enter(page, "vr");
+    const target = await vertex(page, kTouched);
+    const [x, y, z] = await toRoom(page, target);
+    // The ray of the controller leads forwards.
+    await moveTo(page, "controllers", "right", [x, y, z + 0.4]);
+    await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 1));
+    await page.waitForFunction(() => window.clothstream.headset.limbs.some(({ holds }) => holds));
+    const before = await page.evaluate(() => Array.from(window.clothstream.positions));
+    await moveTo(page, "controllers", "right", [x, y + 0.25, z + 0.5], kStep);
+    await untilFrames(page, 40);
+    const after = await page.evaluate(() => Array.from(window.clothstream.positions));
+    const raised = Math.max(...after.map((value, i) => (i % 3 === 1 ? value - before[i] : 0)));
+    assert.ok(raised > 0.1, `the highest rise is ${raised} m`);
+    await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 0));
+    await page.waitForFunction(() => window.clothstream.headset.limbs.every(({ holds }) => !holds));
+  }));
+
+test("a lost hand keeps its pose for a moment, then goes, and comes back", () =>
+  withHeadset({}, async (page) => {
+    await enter(page, "vr");
+    const capsules = () => page.evaluate(() => window.clothstream.colliders.filter(({ participantId, shape }) => participantId !== 0n && shape === 1).length);
+    await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 41);
+    const held = await page.evaluate(async () => {
+      const isThere = () => window.clothstream.headset.limbs.some(({ side }) => side === "left");
+      const began = performance.now();
+      window.device.hands.left.connected = false;
+      while (isThere()) await new Promise((done) => setTimeout(done, 5));
+      return performance.now() - began;
+    });
+    // A frame of the emulator takes up to 100 ms, or longer on a busy machine.
+    assert.ok(held >= 300, `the hand stayed for ${held} ms`);
+    await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 21);
+    await page.evaluate(() => (window.device.hands.left.connected = true));
+    await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 41);
+    assert.equal(await capsules(), 40);
+    // Controllers instead of hands, and back.
+    await page.evaluate(() => (window.device.primaryInputMode = "controller"));
+    await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 3);
+    await page.evaluate(() => (window.device.primaryInputMode = "hand"));
+    await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 41);
+  }));
+
+test("a session ends, and another one begins", () =>
+  withHeadset({}, async (page) => {
+    const own = (count) =>
+      page.waitForFunction((wanted) => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === wanted, count);
+    for (let session = 0; session < 2; ++session) {
+      await enter(page, "vr");
+      await own(41);
+      // The headset is taken off, and put on again.
+      await page.evaluate(() => window.device.updateVisibilityState("hidden"));
+      await page.waitForTimeout(300);
+      await page.evaluate(() => window.device.updateVisibilityState("visible"));
+      const { frames } = await page.evaluate(() => window.clothstream.headset);
+      await page.waitForFunction((before) => window.clothstream.headset.frames > before, frames);
+      await page.evaluate(() => window.device.activeSession.end());
+      await untilSession(page, "none");
+      await own(0);
+      await untilState(page, "live");
+    }
+    await takePicture(page, "after_vr");
+  }));
+
+test("the connection returns while the user stays in VR", async () => {
+  let other = await startServer(0, ["--scene", "curtain"]);
+  try {
+    await withHeadset({ url: other.url }, async (page) => {
+      await enter(page, "vr");
+      await other.stop();
+      await untilState(page, "reconnecting");
+      const { mode, frames } = await page.evaluate(() => window.clothstream.headset);
+      assert.equal(mode, "immersive-vr");
+      await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
+      other = await startServer(other.port, ["--scene", "curtain"]);
+      await untilState(page, "live");
+      await untilFrames(page, 10);
+      assert.equal(await page.evaluate(() => window.clothstream.headset.mode), "immersive-vr");
+      await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 41);
+    });
+  } finally {
+    await other.stop();
+  }
+});
+
+test("pass-through: the scene is put on a real surface", () =>
+  withHeadset({ room: true, input: "controller" }, async (page) => {
+    await enter(page, "ar");
+    await page.waitForFunction(() => window.clothstream.headset.doing === "place");
+    // The user looks down at the floor before them.
+    await page.evaluate(() => {
+      const half = -Math.PI / 7;
+      window.device.quaternion.set(Math.sin(half), 0, 0, Math.cos(half));
+    });
+    const { frames } = await page.evaluate(() => window.clothstream.headset);
+    await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
+    await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 1));
+    await page.waitForFunction(() => window.clothstream.headset.doing === "touch");
+    await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 0));
+    await takePicture(page, "ar_placed");
+    const placement = await page.evaluate(() => window.clothstream.headset.placement);
+    // The user may turn away: the scene stays.
+    await page.evaluate(() => window.device.quaternion.set(0, 0, 0, 1));
+    await page.waitForTimeout(500);
+    const later = await page.evaluate(() => window.clothstream.headset.placement);
+    for (let i = 0; i < 16; ++i) assert.ok(Math.abs(placement[i] - later[i]) < 1e-3, `element ${i}: ${placement[i]} and ${later[i]}`);
+    // Both hands move, turn and scale it.
+    await page.evaluate(() => {
+      const { left, right } = window.device.controllers;
+      left.position.set(-0.2, 0.3, 1);
+      right.position.set(0.2, 0.3, 1);
+      left.updateButtonValue("squeeze", 1);
+      right.updateButtonValue("squeeze", 1);
+    });
+    const seen = await page.evaluate(() => window.clothstream.headset.frames);
+    await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, seen);
+    await moveTo(page, "controllers", "right", [0.6, 0.3, 1]);
+    await page.waitForFunction((scale) => {
+      const m = window.clothstream.headset.placement;
+      return Math.abs(Math.hypot(m[0], m[1], m[2]) - scale) < 0.05;
+    }, 2);
+  }));
+
+// Both headsets have an origin and a direction of their own: the second one is turned by a quarter and moved.
+test("two headsets see each other, and agree on one placement by two points", () =>
+  withHeadset({ query: "?name=Ada" }, (first) =>
+    withHeadset({ query: "?name=Ben" }, async (second) => {
+      await enter(first, "vr");
+      await enter(second, "vr");
+      for (const page of [first, second])
+        await page.waitForFunction(() => new Set(window.clothstream.colliders.map(({ participantId }) => participantId)).size === 2);
+      const names = await first.evaluate(() => window.clothstream.participants.map(({ name }) => name));
+      assert.deepEqual(names.sort(), ["Ada", "Ben"]);
+
+      const points = [[0.4, 0.9, -0.3], [-0.5, 0.9, -0.6]];
+      const there = ([x, y, z]) => [z + 0.7, y - 0.1, -x + 0.2]; // from the first room to the second
+      for (const [page, place] of [[first, (point) => point], [second, there]]) {
+        await page.evaluate(() => window.clothstream.headset.choose("points"));
+        for (const point of points) {
+          const offset = await pinchOffset(page, "right");
+          const at = place(point);
+          await moveTo(page, "hands", "right", at.map((value, axis) => value - offset[axis]));
+          // Fingers of a pinch meet a little elsewhere: the pose follows them.
+          await page.evaluate(() => window.device.hands.right.setPinchValueImmediate(1));
+          await page.waitForTimeout(300);
+          await page.evaluate(() => window.device.hands.right.setPinchValueImmediate(0));
+          await page.waitForTimeout(300);
+        }
+        await page.waitForFunction(() => window.clothstream.headset.doing === "touch");
+      }
+      for (const point of [[0, 0, 0], [1, 1, 1], [-1, 2, 0.5]]) {
+        const seen = there(await toRoom(first, point));
+        const also = await toRoom(second, point);
+        assert.ok(distance(seen, also) < 0.01, `${point} is at ${seen} and ${also}`);
+      }
+    }),
+  ));
