@@ -111,6 +111,8 @@ void PoseHistory::placeAt(Track& track, Clock::time_point time) {
 void PoseHistory::place(
     Clock::time_point time,
     const std::function<void(std::uint64_t participant, const model::ParticipantPoses&)>& place) {
+  // If memory runs out in add(), a track may have lost its poses.
+  std::erase_if(tracks_, [](const Track& track) { return track.entries.empty(); });
   for (Track& track : tracks_) {
     if (track.settled) continue;
     prune(track, time);
