@@ -97,15 +97,17 @@ std::future<void> DeviceThread::post(std::packaged_task<void()> task) {
 }
 
 std::future<void> DeviceThread::add(std::shared_ptr<scene::LiveScene> scene) {
-  std::promise<void> added;
-  std::future<void> whenAdded = added.get_future();
-  post(std::packaged_task<void()>([this, scene = std::move(scene), added = std::move(added)]() mutable {
+  // Shared, because the destructor of a promise that a future waits for allocates memory, and post() may have
+  // found none.
+  const auto added = std::make_shared<std::promise<void>>();
+  std::future<void> whenAdded = added->get_future();
+  post(std::packaged_task<void()>([this, scene = std::move(scene), added]() mutable {
     try {
       if (!device_) throw std::runtime_error("there is no device");
       runs_.push_back(std::make_unique<Run>(std::move(scene)));
-      runs_.back()->whenAdded = std::move(added);
+      runs_.back()->whenAdded = std::move(*added);
     } catch (...) {
-      added.set_exception(std::current_exception());
+      added->set_exception(std::current_exception());
     }
   }));
   return whenAdded;

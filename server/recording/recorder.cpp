@@ -3,6 +3,7 @@
 #include "server/recording/recorder.h"
 
 #include <chrono>
+#include <cstdio>
 #include <ctime>
 #include <exception>
 #include <utility>
@@ -87,10 +88,8 @@ Recorder::State Recorder::finish() {
   }
   if (thread_.joinable()) thread_.join();
   const std::lock_guard lock(mutex_);
-  if (std::exchange(file_, nullptr)) {
-    std::error_code none;
-    std::filesystem::remove(path_, none);
-  }
+  if (std::exchange(file_, nullptr))
+    std::remove(path_.c_str());  // needs no memory: the destructor calls this
   return state_;
 }
 
@@ -242,7 +241,6 @@ void Recorder::run(const std::string& sceneName, const Metadata& metadata) {
 Written Recorder::writeAll(RecordingWriter& writer) {
   std::vector<Waiting> taken;
   SteadyClock::time_point due = SteadyClock::time_point::max();  // time to close the chunk
-  v1::ServerMessage message;
   for (;;) {
     bool ends = false;
     {
@@ -266,6 +264,7 @@ Written Recorder::writeAll(RecordingWriter& writer) {
         written = writer.write(own->topic, waiting.time, own->bytes);
       } else {
         const delivery::SharedBytes& bytes = std::get<delivery::SharedBytes>(waiting.what);
+        v1::ServerMessage message;
         if (message.ParseFromArray(bytes->data(), static_cast<int>(bytes->size())))
           written = writer.write(waiting.time, message);
       }
@@ -283,7 +282,7 @@ Written Recorder::writeAll(RecordingWriter& writer) {
   }
 }
 
-void Recorder::fail(const std::string& reason) {
+void Recorder::fail(std::string_view reason) {
   spdlog::error("a recording stopped; its scene continues: {}", reason);
   const std::lock_guard lock(mutex_);
   state_ = State::failed;

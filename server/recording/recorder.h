@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <variant>
 #include <vector>
@@ -90,7 +91,7 @@ class Recorder final : public scene::Journal {
   void run(const std::string& sceneName, const Metadata& metadata);
   // Writes until the recording ends, or until an error, which it returns.
   [[nodiscard]] Written writeAll(RecordingWriter& writer);
-  void fail(const std::string& reason);
+  void fail(std::string_view reason);
 
   const RecorderOptions options_;
   const RecordingClock clock_;

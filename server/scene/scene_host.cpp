@@ -11,6 +11,7 @@
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/description.h"
 #include "server/model/wind.h"
+#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::scene {
@@ -113,7 +114,12 @@ void SceneHost::saveLast() {
 }
 
 SceneHost::~SceneHost() {
-  if (live_.journal) live_.journal->end();
+  if (!live_.journal) return;
+  schedule::retryUntilDone([this] { live_.journal->end(); },
+                           [this](const std::exception& failure) {
+                             telemetry::log({live_.name()}, spdlog::level::err,
+                                            "its recording does not end: {}; trying again", failure.what());
+                           });
 }
 
 void SceneHost::begin(Clock::time_point now) {
