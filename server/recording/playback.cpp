@@ -216,8 +216,10 @@ void Playback::flow(scene::LiveScene& scene, Clock::time_point now) {
     if (dueAt > now) return;
     if (now - dueAt > kMaxLateness) origin_ += now - dueAt - kMaxLateness;
     if (std::holds_alternative<RecordedStream::End>(*next_)) return reachEnd(scene, now);
-    publish(scene, *next_);
-    next_.reset();
+    // Publishing changes the message, so one that fails is left out. Clients miss it as they miss a lost
+    // frame.
+    RecordedStream::Next next = *std::exchange(next_, std::nullopt);
+    publish(scene, next);
   }
   next_ = recording_.next();
 }
