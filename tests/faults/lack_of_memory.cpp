@@ -9,9 +9,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <new>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include <execinfo.h>
 #include <link.h>
@@ -20,15 +22,16 @@
 namespace clothstream::tests {
 namespace {
 
-using Name = std::array<char, 16>;
+using Name = std::array<std::uint64_t, 2>;
 
-// The failures that are in force. Threads read them while `inForce` is true, and nothing changes them then.
+// The failures that are in force. `mutex` guards all but the first two, which every allocation reads.
 struct InForce {
   std::atomic<bool> inForce{false};
-  Name thread{};
+  std::array<std::atomic<std::uint64_t>, 2> thread{};
+  std::mutex mutex;
   Failures failures;
   std::chrono::steady_clock::time_point end{};
-  std::atomic<std::uint64_t> allocations{0}, failed{0}, random{0};
+  std::uint64_t allocations = 0, failed = 0, random = 0;
 };
 InForce state;
 
@@ -38,36 +41,49 @@ thread_local bool deciding = false;
 struct Range {
   std::uintptr_t begin = 0, end = 0;
 };
-std::array<Range, 64> excluded;
-std::size_t excludedCount = 0;
+// Code of the excluded modules that were loaded at the time of these counts. Guarded by `mutex`.
+struct Excluded {
+  std::array<Range, 64> ranges;
+  std::size_t count = 0;
+  unsigned long long loaded = 0, unloaded = 0;
+};
+Excluded excluded;
 
 // Programs that end the process when an allocation fails: drivers, validation layers and gRPC.
 constexpr std::array<std::string_view, 7> kExcluded{"libLLVM", "libvulkan", "VkLayer",   "libgrpc",
                                                     "libgpr.", "libabsl_",  "libgallium"};
 
+// A server that rebuilds its device loads the driver again, often at another address.
 void findExcluded() {
-  excludedCount = 0;
+  bool isFirst = true;
+  auto add = [&](const dl_phdr_info& module) {
+    if (std::exchange(isFirst, false)) {
+      if (module.dlpi_adds == excluded.loaded && module.dlpi_subs == excluded.unloaded) return 1;
+      excluded.loaded = module.dlpi_adds;
+      excluded.unloaded = module.dlpi_subs;
+      excluded.count = 0;
+    }
+    const std::string_view name = module.dlpi_name;
+    if (std::ranges::none_of(kExcluded, [&](auto part) { return name.find(part) != name.npos; })) return 0;
+    for (int i = 0; i < module.dlpi_phnum; ++i) {
+      const auto& part = module.dlpi_phdr[i];
+      if (part.p_type != PT_LOAD || (part.p_flags & PF_X) == 0) continue;
+      if (excluded.count == excluded.ranges.size()) std::abort();
+      excluded.ranges[excluded.count++] = {module.dlpi_addr + part.p_vaddr,
+                                           module.dlpi_addr + part.p_vaddr + part.p_memsz};
+    }
+    return 0;
+  };
   ::dl_iterate_phdr(
-      [](dl_phdr_info* module, std::size_t, void*) {
-        const std::string_view name = module->dlpi_name;
-        if (std::ranges::none_of(kExcluded, [&](auto part) { return name.find(part) != name.npos; }))
-          return 0;
-        for (int i = 0; i < module->dlpi_phnum; ++i) {
-          const auto& part = module->dlpi_phdr[i];
-          if (part.p_type != PT_LOAD || (part.p_flags & PF_X) == 0) continue;
-          if (excludedCount == excluded.size()) std::abort();
-          excluded[excludedCount++] = {module->dlpi_addr + part.p_vaddr,
-                                       module->dlpi_addr + part.p_vaddr + part.p_memsz};
-        }
-        return 0;
-      },
-      nullptr);
+      [](dl_phdr_info* module, std::size_t, void* to) { return (*static_cast<decltype(add)*>(to))(*module); },
+      &add);
 }
 
 bool isExcluded() {
+  findExcluded();
   std::array<void*, 96> frames{};
   const int count = ::backtrace(frames.data(), static_cast<int>(frames.size()));
-  const auto ranges = std::span(excluded).first(excludedCount);
+  const auto ranges = std::span(excluded.ranges).first(excluded.count);
   return std::any_of(frames.begin(), frames.begin() + count, [&](void* frame) {
     const auto at = reinterpret_cast<std::uintptr_t>(frame);
     return std::ranges::any_of(ranges,
@@ -83,18 +99,29 @@ double random(std::uint64_t step) {
   return static_cast<double>((value ^ value >> 31) >> 11) * 0x1p-53;
 }
 
-bool fails(std::size_t bytes) {
-  if (!state.inForce.load(std::memory_order_acquire) || deciding || bytes < state.failures.leastBytes)
-    return false;
+Name nameOfThisThread() {
   Name name{};
   ::prctl(PR_GET_NAME, name.data());
-  if (name != state.thread || state.failed >= state.failures.count ||
-      std::chrono::steady_clock::now() >= state.end)
+  return name;
+}
+
+bool decide(std::size_t bytes) {
+  const Name name = nameOfThisThread();
+  if (name[0] != state.thread[0] || name[1] != state.thread[1]) return false;
+  const std::lock_guard lock(state.mutex);
+  const Failures& failures = state.failures;
+  if (!state.inForce || bytes < failures.leastBytes || state.failed >= failures.count ||
+      std::chrono::steady_clock::now() >= state.end || isExcluded() || state.allocations++ < failures.from ||
+      random(failures.seed + ++state.random) >= failures.probability)
     return false;
+  ++state.failed;
+  return true;
+}
+
+bool fails(std::size_t bytes) {
+  if (!state.inForce || deciding) return false;
   deciding = true;
-  bool result = !isExcluded() && state.allocations++ >= state.failures.from &&
-                random(state.failures.seed + ++state.random) < state.failures.probability;
-  if (result) result = state.failed++ < state.failures.count;
+  const bool result = decide(bytes);
   deciding = false;
   return result;
 }
@@ -102,9 +129,7 @@ bool fails(std::size_t bytes) {
 }  // namespace
 
 std::string threadName() {
-  Name name{};
-  ::prctl(PR_GET_NAME, name.data());
-  return name.data();
+  return reinterpret_cast<const char*>(nameOfThisThread().data());
 }
 
 void setThreadName(const std::string& name) {
@@ -127,35 +152,49 @@ void renameThread(int id, const std::string& name) {
 }
 
 LackOfMemory::LackOfMemory(const std::string& thread, const Failures& failures) {
-  findExcluded();
+  const std::lock_guard lock(state.mutex);
   isExcluded();  // the first call loads a library
-  state.thread = {};
-  std::copy_n(thread.begin(), std::min(thread.size(), state.thread.size() - 1), state.thread.begin());
+  Name name{};
+  std::memcpy(name.data(), thread.data(), std::min(thread.size(), sizeof name - 1));
+  std::ranges::copy(name, state.thread.begin());
   state.failures = failures;
   state.end = std::chrono::steady_clock::now() + failures.time;
   state.allocations = state.failed = state.random = 0;
-  state.inForce.store(true, std::memory_order_release);
+  state.inForce = true;
 }
 
 LackOfMemory::~LackOfMemory() {
+  const std::lock_guard lock(state.mutex);
   state.inForce = false;
 }
 
 std::uint64_t LackOfMemory::failed() const {
-  return std::min<std::uint64_t>(state.failed, state.failures.count);
+  const std::lock_guard lock(state.mutex);
+  return state.failed;
 }
 
 bool LackOfMemory::isOver() const {
-  return failed() == state.failures.count || std::chrono::steady_clock::now() >= state.end;
+  const std::lock_guard lock(state.mutex);
+  return state.failed == state.failures.count || std::chrono::steady_clock::now() >= state.end;
 }
 
 }  // namespace clothstream::tests
 
-// The sanitizers have allocators that check more than these.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// protobuf leaks the members of a message whose copy is interrupted.
+#if defined(__SANITIZE_ADDRESS__)
+extern "C" int __lsan_is_turned_off() {
+  return 1;
+}
+#endif
+
+// The thread sanitizer replaces these operators itself. The address sanitizer checks malloc() and free().
+#if !defined(__SANITIZE_THREAD__)
+void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept {
+  return clothstream::tests::fails(bytes) ? nullptr : std::malloc(std::max<std::size_t>(bytes, 1));
+}
+
 void* operator new(std::size_t bytes) {
-  if (clothstream::tests::fails(bytes)) throw std::bad_alloc();
-  if (void* memory = std::malloc(std::max<std::size_t>(bytes, 1))) return memory;
+  if (void* memory = ::operator new(bytes, std::nothrow)) return memory;
   throw std::bad_alloc();
 }
 

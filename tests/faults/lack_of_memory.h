@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -55,5 +56,28 @@ class LackOfMemory {
   // Whether no more allocations fail.
   bool isOver() const;
 };
+
+// Calls `work` with what `prepare` returns, and lets allocations in `work` fail: the first one, then only the
+// second one, and so on until all succeed. `count` of them fail in a row. `check` gets the object each time.
+// Only the calling thread runs short of memory. Returns how many allocations `work` makes.
+template <class Prepare, class Work, class Check>
+std::uint64_t failEachAllocation(std::uint64_t count, const Prepare& prepare, const Work& work,
+                                 const Check& check) {
+  for (std::uint64_t from = 0;; ++from) {
+    auto object = prepare();
+    bool failed = false;
+    {
+      const ThreadName name("failing");
+      const LackOfMemory lack("failing", {.from = from, .count = count, .time = std::chrono::hours(1)});
+      try {
+        work(object);
+      } catch (const std::bad_alloc&) {
+      }
+      failed = lack.failed() > 0;
+    }
+    check(object);
+    if (!failed) return from;
+  }
+}
 
 }  // namespace clothstream::tests
