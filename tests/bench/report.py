@@ -146,7 +146,8 @@ TABLES = {
     "offload": ("offload", [], ["vertices", "stream, ms", "kbit/s", "substeps", "mass-spring, ms", "XPBD, ms",
                                 "mass-spring with 10", "XPBD with 10", "even with mass-spring", "with XPBD"], offload),
 }
-# Suites that are not part of clothstream-bench.
+# Suites that are not part of clothstream-bench. Their rows are kept in RESULTS, for plots.
+RESULTS = ROOT / "tests" / "bench" / "results"
 PROGRAMS = {"offload": ["node", "tests/bench/offload/offload.mjs"]}
 
 
@@ -209,6 +210,9 @@ def report(program, suites):
                 sys.exit(output.stderr.strip())
             # Log lines of a suite may precede the rows.
             results[key] = json.loads(output.stdout[output.stdout.index("[\n"):])
+            if suite in PROGRAMS:
+                RESULTS.mkdir(exist_ok=True)
+                (RESULTS / f"{suite}.json").write_text(json.dumps(results[key], indent=2) + "\n")
         rows = results[key]
         device = next((row[key] for row in rows for key in ("device", "engine") if key in row), "no device")
         table = (f"`{shown}`; {device}, {processor()}; commit {made}; "

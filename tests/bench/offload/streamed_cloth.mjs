@@ -44,8 +44,7 @@ export class StreamedCloth {
     module.free(name);
     this.send(kStartUs);
     of.before.map(of.bytes).forEach((message) => this.receive(message, kStartUs));
-    module.cs_update(this.client, kStartUs === 0 ? 0n : BigInt(kStartUs));
-    this.send(kStartUs);
+    this.send(kStartUs); // a ping among them
     this.receive(pong(kStartUs), kStartUs);
     this.playOut();
   }
