@@ -93,7 +93,7 @@ class MassSpring final : public Solver {
     Triple along{}, bend{}, falling{}, rising{};
   };
 
-  // What the loop over a row needs.
+  // State and constants of the loop over a row.
   struct Row {
     Pointers positions, velocities;    // of its first node
     Pointers fromAbove, fromFarAbove;  // forces of the rows above, then on the rows below
