@@ -12,7 +12,7 @@ const kDelayMs = 5 + 500 / 72;
 const kBetween = 2; // cs_shown
 
 // Offsets of members of a struct of core.h.
-const layout = readFileSync(new URL("../../../clients/web/src/layout.ts", import.meta.url), "utf8");
+const layout = readFileSync(new URL("../../../clients/web/client/src/layout.ts", import.meta.url), "utf8");
 function offsetsOf(struct) {
   const body = layout.match(new RegExp(`const ${struct} = \\{([^}]*)\\}`))[1];
   return Object.fromEntries([...body.matchAll(/(\w+): (\d+)/g)].map(([, name, at]) => [name, Number(at)]));
@@ -20,6 +20,7 @@ function offsetsOf(struct) {
 const kOptions = offsetsOf("cs_play_out_options");
 const kPlayed = offsetsOf("cs_played");
 const kStatistics = offsetsOf("cs_statistics");
+const kPlayedVersion = Number(layout.match(/CS_PLAYED_VERSION = (\d+)/)[1]);
 
 function varint(value) {
   const bytes = [];
@@ -81,7 +82,7 @@ export class StreamedCloth {
     const nowUs = kStartUs + Math.round((index * 1e6) / this.of.rate) + kArrivalUs;
     this.receive(this.frames[index], nowUs);
     this.send(nowUs);
-    this.view().setUint32(kPlayed.version, 1, true);
+    this.view().setUint32(kPlayed.version, kPlayedVersion, true);
     if (this.module.cs_play_out(this.client, BigInt(nowUs), BigInt(nowUs), this.scratch) !== 1)
       throw new Error("nothing is played");
     this.shown = this.view().getUint32(kPlayed.shown, true);
