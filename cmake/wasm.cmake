@@ -24,25 +24,37 @@ list(REMOVE_ITEM wasmExports cs_set_clock)
 list(APPEND wasmExports malloc free)
 list(TRANSFORM wasmExports PREPEND -Wl,--export=)
 
-# clothstream_wasm_module(FOLDER PROPERTY flags...) builds FOLDER/clothstream_core.wasm and stores its path in PROPERTY.
-function(clothstream_wasm_module folder property)
-  get_property(decoderSources GLOBAL PROPERTY CLOTHSTREAM_DECODER_SOURCES)
+set_property(GLOBAL PROPERTY CLOTHSTREAM_WASM_FLAGS ${wasmFlags})
+
+# clothstream_link_wasm(MODULE SOURCES file... FLAGS flag... EXPORTS linker flag...) builds the file MODULE. Objects go to
+# its folder.
+function(clothstream_link_wasm module)
+  cmake_parse_arguments(ARG "" "" "SOURCES;FLAGS;EXPORTS" ${ARGN})
+  get_property(flags GLOBAL PROPERTY CLOTHSTREAM_WASM_FLAGS)
+  get_filename_component(folder ${module} DIRECTORY)
+  get_filename_component(moduleName ${module} NAME)
   set(objects)
-  foreach(source IN LISTS CLOTHSTREAM_CLIENT_CORE_SOURCES decoderSources ITEMS
-      ${PROJECT_SOURCE_DIR}/clients/core/wasm/runtime.cpp)
+  foreach(source IN LISTS ARG_SOURCES)
     get_filename_component(name ${source} NAME)
     set(object ${folder}/${name}.o)
     add_custom_command(OUTPUT ${object}
       COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
-      COMMAND ${CMAKE_CXX_COMPILER_LAUNCHER} ${WASM_CXX} ${wasmFlags} ${ARGN} -MMD -MF ${object}.d -c -o ${object} ${source}
+      COMMAND ${CMAKE_CXX_COMPILER_LAUNCHER} ${WASM_CXX} ${flags} ${ARG_FLAGS} -MMD -MF ${object}.d -c -o ${object} ${source}
       DEPENDS ${source} DEPFILE ${object}.d COMMENT "Compiling ${name} to WebAssembly" VERBATIM)
     list(APPEND objects ${object})
   endforeach()
-  set(module ${folder}/clothstream_core.wasm)
   add_custom_command(OUTPUT ${module}
     COMMAND ${WASM_CXX} --target=wasm32-wasi -mexec-model=reactor -O3 -Wl,--strip-all -Wl,--gc-sections
-      -Wl,-z,stack-size=262144 ${wasmExports} -o ${module} ${objects}
-    DEPENDS ${objects} COMMENT "Linking the client core as WebAssembly" VERBATIM)
+      -Wl,-z,stack-size=262144 ${ARG_EXPORTS} -o ${module} ${objects}
+    DEPENDS ${objects} COMMENT "Linking ${moduleName}" VERBATIM)
+endfunction()
+
+# clothstream_wasm_module(FOLDER PROPERTY flags...) builds FOLDER/clothstream_core.wasm and stores its path in PROPERTY.
+function(clothstream_wasm_module folder property)
+  get_property(decoderSources GLOBAL PROPERTY CLOTHSTREAM_DECODER_SOURCES)
+  set(module ${folder}/clothstream_core.wasm)
+  clothstream_link_wasm(${module} FLAGS ${ARGN} EXPORTS ${wasmExports}
+    SOURCES ${CLOTHSTREAM_CLIENT_CORE_SOURCES} ${decoderSources} ${PROJECT_SOURCE_DIR}/clients/core/wasm/runtime.cpp)
   set_property(GLOBAL PROPERTY ${property} ${module})
 endfunction()
 

@@ -113,6 +113,13 @@ def curtain(rows):
              r["lateTicks"], number(r["bitsPerVertex"], 2)] for r in rows]
 
 
+def offload(rows):
+    return [[number(r["vertices"]), number(r["streamMs"], 2), number(r["kbitPerSecond"], 2), r["substeps"],
+             number(r["massSpringMs"], 2), number(r["xpbdMs"], 2), number(r["massSpringFewMs"], 2),
+             number(r["xpbdFewMs"], 2), number(r["massSpringEvenSubsteps"], 2), number(r["xpbdEvenSubsteps"], 2)]
+            for r in rows]
+
+
 # Name of the table: suite, arguments, columns, function from rows to cells.
 TABLES = {
     "mass_spring": ("mass_spring", [], ["grid", "ns a node and substep", "million node-steps/s", "times the floor",
@@ -136,7 +143,12 @@ TABLES = {
     "curtain": ("curtain", ["--software-threads", "0"], ["nodes", "tick, ms, median / p99",
                                                          "pose to packet, ms, median / p99", "frames of ticks",
                                                          "late ticks", "bits a vertex"], curtain),
+    "offload": ("offload", [], ["vertices", "stream, ms", "kbit/s", "substeps", "mass-spring, ms", "XPBD, ms",
+                                "mass-spring with 10", "XPBD with 10", "even with mass-spring", "with XPBD"], offload),
 }
+# Suites that are not part of clothstream-bench. Their rows are kept in RESULTS, for plots.
+RESULTS = ROOT / "tests" / "bench" / "results"
+PROGRAMS = {"offload": ["node", "tests/bench/offload/offload.mjs"]}
 
 
 def pages():
@@ -189,16 +201,21 @@ def report(program, suites):
             continue
         command = [suite, *arguments]
         key = tuple(command)
+        shown = "./dev bench offload" if suite in PROGRAMS else "clothstream-bench " + " ".join(command)
         if key not in results:
-            print("clothstream-bench " + " ".join(command), flush=True)
-            output = subprocess.run([program, *command, "--json"], cwd=ROOT, capture_output=True, text=True)
+            print(shown, flush=True)
+            called = PROGRAMS.get(suite, [program, *command])
+            output = subprocess.run([*called, "--json"], cwd=ROOT, capture_output=True, text=True)
             if output.returncode:
                 sys.exit(output.stderr.strip())
             # Log lines of a suite may precede the rows.
             results[key] = json.loads(output.stdout[output.stdout.index("[\n"):])
+            if suite in PROGRAMS:
+                RESULTS.mkdir(exist_ok=True)
+                (RESULTS / f"{suite}.json").write_text(json.dumps(results[key], indent=2) + "\n")
         rows = results[key]
-        device = next((row["device"] for row in rows if "device" in row), "no device")
-        table = (f"`clothstream-bench {' '.join(command)}`; {device}, {processor()}; commit {made}; "
+        device = next((row[key] for row in rows for key in ("device", "engine") if key in row), "no device")
+        table = (f"`{shown}`; {device}, {processor()}; commit {made}; "
                  f"{datetime.date.today():%-d %B %Y}\n\n" + header(name)
                  + "".join("| " + " | ".join(map(str, row)) + " |\n" for row in cells(rows)))
         replace(name, table)

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -12,8 +11,8 @@
 #include "clients/files/motion_file.h"
 #include "server/messages/scene_file.h"
 #include "server/model/mesh.h"
-#include "server/model/stability.h"
 #include "tests/bench/cloth_motion.h"
+#include "tests/bench/resized.h"
 #include "tests/bench/simulated.h"
 
 namespace clothstream::bench {
@@ -53,28 +52,6 @@ BenchMotion played(const Named& named, const Settings& settings) {
           }};
 }
 
-// Changes the cloth to size x size nodes, held at the same places, with collision balls in proportion to its
-// meshes.
-void resize(model::Cloth& cloth, std::uint32_t size) {
-  const auto coarser = [&] {
-    return std::max(model::spacing(cloth.grid).column, model::spacing(cloth.grid).row);
-  };
-  const float before = coarser();
-  const auto scaled = [size](std::uint32_t place, std::uint32_t nodes) {
-    return static_cast<std::uint32_t>(std::lround(1.0 * place * (size - 1) / (nodes - 1)));
-  };
-  for (model::GridRange& pins : cloth.pins) {
-    for (std::uint32_t* row : {&pins.firstRow, &pins.lastRow, &pins.rowStep})
-      *row = scaled(*row, cloth.grid.rows);
-    for (std::uint32_t* column : {&pins.firstColumn, &pins.lastColumn, &pins.columnStep})
-      *column = scaled(*column, cloth.grid.columns);
-    pins.rowStep = std::max(pins.rowStep, 1u);
-    pins.columnStep = std::max(pins.columnStep, 1u);
-  }
-  cloth.grid.rows = cloth.grid.columns = size;
-  if (cloth.selfCollision) cloth.selfCollision->radius *= coarser() / before;
-}
-
 model::Scene sceneOf(const Named& named, const Settings& settings) {
   auto loaded = messages::loadScene(named.scene);
   if (!loaded) throw std::runtime_error(fmt::format("unknown scene {}", named.scene));
@@ -83,10 +60,7 @@ model::Scene sceneOf(const Named& named, const Settings& settings) {
   scene.environment.gust.strength *= named.gust;
   model::Cloth& cloth = scene.cloths.front();
   if (!cloth.mesh) resize(cloth, settings.size.value_or(kDefaultSize));
-  const std::uint32_t substeps = model::stableSubsteps(scene);
-  if (substeps == 0)
-    throw std::runtime_error(fmt::format("{} has no stable time step at this size", named.name));
-  scene.substeps = std::max(scene.substeps, substeps);
+  raiseSubsteps(scene);
   return scene;
 }
 
