@@ -7,7 +7,7 @@
 
 namespace clothstream::fuzz {
 
-inline constexpr meshes::MeshLimits kFuzzedMeshLimits{
+inline const meshes::MeshLimits kFuzzedMeshLimits{
     .maxVertices = 16'384, .maxCoordinate = 1000, .minEdge = 1e-4f, .maxNodeSprings = 1024};
 
 // Promise: triangles of a built mesh name existing nodes, and vertices lead to all nodes.
