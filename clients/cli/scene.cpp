@@ -52,6 +52,16 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
   create_->add_option("--name", options_.name, "Name of the new scene; default: the name in the file");
   create_->add_option("--max-participants", options_.maxParticipants,
                       "Most participants at a time; default: the server's limit");
+  create_
+      ->add_flag(
+          "--repair", options_.repair,
+          "Repair the meshes of the file instead of refusing them: divide polygons, drop faces without an "
+          "area and duplicates, split edges, turn faces")
+      ->excludes("--named");
+  create_
+      ->add_flag("--fit", options_.fit,
+                 "Scale meshes of the file that are not within the world to 2 m, and move them to their pose")
+      ->excludes("--named");
   takesAddress(create_);
   delete_ = command("delete", "Delete a scene that was created; its participants are notified");
   pause_ = command("pause", "Pause a scene");
@@ -95,6 +105,11 @@ ExitCode SceneCommands::create() const {
     auto scene = readScene(options_.file);
     if (!scene) return printError(kUsage, scene.error());
     create.scene = std::move(*scene);
+    for (v1::Cloth& cloth : *create.scene.mutable_cloths()) {
+      if (!cloth.has_mesh()) continue;
+      if (options_.repair) cloth.mutable_mesh()->set_repair(true);
+      if (options_.fit) cloth.mutable_mesh()->set_fit(true);
+    }
   }
   if (isatty(STDERR_FILENO) != 0)
     create.progress = [](std::size_t sent, std::size_t all) {
@@ -103,7 +118,10 @@ ExitCode SceneCommands::create() const {
     };
   const auto created = createScene(options_.address, create);
   if (!created) return printError(created.error());
-  fmt::print("{}\n", printable(*created));
+  for (const v1::MeshRepair& repair : created->repairs())
+    for (const std::string& sentence : repair.sentences())
+      fmt::print(stderr, "{}: {}\n", printable(repair.cloth()), printable(sentence));
+  fmt::print("{}\n", printable(created->scene().name()));
   return kOk;
 }
 

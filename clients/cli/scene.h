@@ -20,6 +20,7 @@ struct SceneOptions {
   std::string named;                  // create: built-in scene instead of a file
   std::string name;                   // scene; create: new name of the scene
   std::uint32_t maxParticipants = 0;  // create; 0: the server's limit
+  bool repair = false, fit = false;   // create
   double seek = 0;                    // s
   double speed = 1;
   bool loop = false;

@@ -3,6 +3,7 @@
 #include "clients/grpc/scene_control.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "clients/grpc/channel.h"
 
@@ -39,8 +40,8 @@ tl::expected<void, Failure> nothingOf(tl::expected<v1::SceneSummary, Failure> sc
 
 }  // namespace
 
-tl::expected<std::string, Failure> createScene(const ServerAddress& address,
-                                               const CreateSceneOptions& options) {
+tl::expected<v1::CreateSceneResponse, Failure> createScene(const ServerAddress& address,
+                                                           const CreateSceneOptions& options) {
   const auto stub = v1::ClothStream::NewStub(makeChannel(address));
   grpc::ClientContext context;
   authorize(context, address);
@@ -66,7 +67,7 @@ tl::expected<std::string, Failure> createScene(const ServerAddress& address,
   stream->WritesDone();
   if (answer.has_create_scene() || answer.has_error()) context.TryCancel();
   const grpc::Status status = stream->Finish();
-  if (answer.has_create_scene()) return answer.create_scene().scene().name();
+  if (answer.has_create_scene()) return std::move(*answer.mutable_create_scene());
   if (answer.has_error())
     return tl::unexpected(Failure{Failure::Kind::refused,
                                   "The server at " + address.address + " refuses: " + answer.error().text()});

@@ -26,9 +26,10 @@ struct CreateSceneOptions {
   std::function<void(std::size_t, std::size_t)> progress;
 };
 
-// Returns the name of the new scene. `address` must come from completeAddress().
-[[nodiscard]] tl::expected<std::string, Failure> createScene(const ServerAddress& address,
-                                                             const CreateSceneOptions& options);
+// Returns the summary of the new scene and what was repaired in its meshes. `address` must come from
+// completeAddress().
+[[nodiscard]] tl::expected<v1::CreateSceneResponse, Failure> createScene(const ServerAddress& address,
+                                                                         const CreateSceneOptions& options);
 
 [[nodiscard]] tl::expected<void, Failure> deleteScene(const ServerAddress& address, const std::string& name);
 

@@ -242,14 +242,15 @@ tl::expected<model::Scene, v1::Error> SceneMaker::checked(messages::Result<model
 
 tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
                                                                const std::string& uploaded,
-                                                               const model::Cancellation& cancellation) {
+                                                               const model::Cancellation& cancellation,
+                                                               std::vector<v1::MeshRepair>& repairs) {
   const messages::SceneLimits limits{.nodes = server_.options.maxSceneNodes,
                                      .springs = server_.options.maxSceneSprings,
                                      .attachments = server_.options.maxSceneAttachments,
                                      .cancellation = cancellation};
   switch (request.source_case()) {
     case v1::CreateSceneRequest::kScene:
-      return checked(messages::toScene(request.scene(), {}, limits));
+      return checked(messages::toScene(request.scene(), {}, limits, &repairs));
     case v1::CreateSceneRequest::kUploadedContentId: {
       v1::Scene message;
       if (!messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)),
@@ -264,7 +265,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
         return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
                        "createScene: the uploaded content is not a Scene message");
       cancellation.check();
-      return checked(messages::toScene(message, {}, limits));
+      return checked(messages::toScene(message, {}, limits, &repairs));
     }
     case v1::CreateSceneRequest::kNamed:
       if (const std::shared_ptr<scene::LiveScene> live = server_.find(request.named())) return live->start();
@@ -280,7 +281,8 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
 tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
     const v1::CreateSceneRequest& request, const std::string& uploaded, const std::string& tenant,
     const model::Cancellation& cancellation) {
-  auto definition = definitionOf(request, uploaded, cancellation);
+  std::vector<v1::MeshRepair> repairs;
+  auto definition = definitionOf(request, uploaded, cancellation, repairs);
   if (!definition) return tl::unexpected(std::move(definition).error());
   if (!request.name().empty()) {
     messages::Checks checks;
@@ -344,6 +346,7 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
   telemetry::log({scene->name()}, spdlog::level::info, "created, {} vertices", scene->start().nodeCount());
   v1::CreateSceneResponse response;
   *response.mutable_scene() = summaryOf(*scene);
+  response.mutable_repairs()->Assign(repairs.begin(), repairs.end());
   return response;
 }
 

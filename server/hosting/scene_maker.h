@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/thread_pool.hpp>
@@ -66,7 +67,8 @@ class SceneMaker {
                                                              const model::Cancellation& cancellation);
   tl::expected<model::Scene, v1::Error> definitionOf(const v1::CreateSceneRequest& request,
                                                      const std::string& uploaded,
-                                                     const model::Cancellation& cancellation);
+                                                     const model::Cancellation& cancellation,
+                                                     std::vector<v1::MeshRepair>& repairs);
   tl::expected<model::Scene, v1::Error> checked(messages::Result<model::Scene> scene);
   tl::expected<std::shared_ptr<scene::Journal>, v1::Error> journalOf(const std::string& call,
                                                                      const std::string& scene) const;

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Reads glTF 2.0 with tinygltf. Checks accessors and nodes.
+// Reads glTF 2.0 with tinygltf. Checks nodes and extensions.
 #include "server/meshes/gltf_file.h"
 
-#include <cstring>
 #include <limits>
-#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 #include <tiny_gltf.h>
+
+#include "server/meshes/gltf_container.h"
+#include "server/meshes/gltf_primitive.h"
 
 namespace clothstream::meshes {
 namespace {
@@ -16,97 +18,11 @@ using Affine = Eigen::Affine3d;
 template <typename T>
 using Expected = tl::expected<T, std::string>;
 
-// Elements of an accessor in its buffer. The bounds are checked.
-struct Elements {
-  const unsigned char* first = nullptr;
-  std::size_t stride = 0, count = 0;
-  int componentType = 0;
-
-  template <typename T>
-  T at(std::size_t index, std::size_t component) const {
-    T value;
-    std::memcpy(&value, first + index * stride + component * sizeof(T), sizeof(T));
-    return value;
-  }
-};
-
 template <typename Things>
-auto* find(const Things& things, int index) {
+auto* at(const Things& things, int index) {
   return index >= 0 && static_cast<std::size_t>(index) < things.size()
              ? &things[static_cast<std::size_t>(index)]
              : nullptr;
-}
-
-Expected<Elements> elementsOf(const tinygltf::Model& model, int index, int type) {
-  const tinygltf::Accessor* accessor = find(model.accessors, index);
-  if (!accessor) return tl::unexpected(fmt::format("accessor {} does not exist", index));
-  const auto refuse = [&](std::string_view what) {
-    return tl::unexpected(fmt::format("accessor {} {}", index, what));
-  };
-  if (accessor->sparse.isSparse)
-    return refuse("is sparse, which is not supported: export it without sparse accessors");
-  if (accessor->type != type) return refuse("has the wrong number of components");
-  const tinygltf::BufferView* view = find(model.bufferViews, accessor->bufferView);
-  const tinygltf::Buffer* buffer = view ? find(model.buffers, view->buffer) : nullptr;
-  if (!buffer) return refuse("has no buffer");
-  const int stride = accessor->ByteStride(*view);
-  const std::int64_t size =
-      std::int64_t{tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(accessor->componentType))} *
-      tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor->type));
-  if (stride <= 0 || size <= 0) return refuse("has a component type or stride that glTF does not have");
-  const std::size_t bytes = buffer->data.size();
-  const bool viewFits = view->byteOffset <= bytes && view->byteLength <= bytes - view->byteOffset;
-  const bool startFits = viewFits && accessor->byteOffset <= view->byteLength;
-  const std::size_t room = startFits ? view->byteLength - accessor->byteOffset : 0;
-  const auto step = static_cast<std::size_t>(stride), last = static_cast<std::size_t>(size);
-  if (accessor->count == 0 || last > room || accessor->count - 1 > (room - last) / step)
-    return refuse(
-        fmt::format("has {} elements, which its buffer of {} bytes does not hold", accessor->count, bytes));
-  return Elements{buffer->data.data() + view->byteOffset + accessor->byteOffset, step, accessor->count,
-                  accessor->componentType};
-}
-
-Expected<std::vector<std::uint32_t>> readIndices(const tinygltf::Model& model,
-                                                 const tinygltf::Primitive& primitive,
-                                                 std::size_t vertexCount) {
-  std::vector<std::uint32_t> indices;
-  if (primitive.indices < 0) {
-    for (std::uint32_t i = 0; i < vertexCount; ++i) indices.push_back(i);
-    return indices;
-  }
-  const auto elements = elementsOf(model, primitive.indices, TINYGLTF_TYPE_SCALAR);
-  if (!elements) return tl::unexpected(elements.error());
-  indices.reserve(elements->count);
-  for (std::size_t i = 0; i < elements->count; ++i) {
-    switch (elements->componentType) {
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-        indices.push_back(elements->at<std::uint8_t>(i, 0));
-        break;
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-        indices.push_back(elements->at<std::uint16_t>(i, 0));
-        break;
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-        indices.push_back(elements->at<std::uint32_t>(i, 0));
-        break;
-      default:
-        return tl::unexpected(
-            fmt::format("accessor {} has indices that are not unsigned integers", primitive.indices));
-    }
-  }
-  return indices;
-}
-
-std::optional<model::Uv> readUv(const Elements& elements, std::size_t i) {
-  switch (elements.componentType) {
-    case TINYGLTF_COMPONENT_TYPE_FLOAT:
-      return model::Uv(elements.at<float>(i, 0), elements.at<float>(i, 1));
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return model::Uv(elements.at<std::uint8_t>(i, 0), elements.at<std::uint8_t>(i, 1)) / 255.0f;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return model::Uv(elements.at<std::uint16_t>(i, 0), elements.at<std::uint16_t>(i, 1)) / 65535.0f;
-    default:
-      return std::nullopt;
-  }
 }
 
 Affine localTransform(const tinygltf::Node& node) {
@@ -126,10 +42,11 @@ Affine localTransform(const tinygltf::Node& node) {
 
 class Gatherer {
  public:
-  explicit Gatherer(const tinygltf::Model& model) : model_(model), visited_(model.nodes.size(), false) {}
+  Gatherer(const tinygltf::Model& model, std::uint64_t maxVertices)
+      : model_(model), maxVertices_(maxVertices), visited_(model.nodes.size(), false) {}
 
   Expected<MeshSource> gather() {
-    const tinygltf::Scene* scene = find(model_.scenes, std::max(0, model_.defaultScene));
+    const tinygltf::Scene* scene = at(model_.scenes, std::max(0, model_.defaultScene));
     if (scene) {
       for (const int node : scene->nodes)
         if (auto done = addTree(node); !done) return tl::unexpected(done.error());
@@ -150,14 +67,14 @@ class Gatherer {
     while (!open.empty()) {
       const auto [index, parent] = open.back();
       open.pop_back();
-      const tinygltf::Node* node = find(model_.nodes, index);
+      const tinygltf::Node* node = at(model_.nodes, index);
       if (!node) return tl::unexpected(fmt::format("node {} does not exist", index));
       if (visited_[static_cast<std::size_t>(index)])
         return tl::unexpected(fmt::format("node {} has two parents or is its own ancestor", index));
       visited_[static_cast<std::size_t>(index)] = true;
       const Affine transform = parent * localTransform(*node);
       if (node->mesh >= 0) {
-        const tinygltf::Mesh* mesh = find(model_.meshes, node->mesh);
+        const tinygltf::Mesh* mesh = at(model_.meshes, node->mesh);
         if (!mesh) return tl::unexpected(fmt::format("mesh {} does not exist", node->mesh));
         if (auto done = addMesh(*mesh, transform); !done) return done;
       }
@@ -177,55 +94,21 @@ class Gatherer {
 
   Expected<void> addPrimitive(const tinygltf::Mesh& mesh, const tinygltf::Primitive& primitive,
                               const Affine& transform) {
-    if (primitive.mode != TINYGLTF_MODE_TRIANGLES && primitive.mode != -1)
-      return tl::unexpected(std::string("is not made of triangles: export it as triangles"));
-    const auto position = primitive.attributes.find("POSITION");
-    if (position == primitive.attributes.end()) return tl::unexpected(std::string("has no POSITION"));
-    const auto vertices = elementsOf(model_, position->second, TINYGLTF_TYPE_VEC3);
-    if (!vertices) return tl::unexpected(vertices.error());
-    if (vertices->componentType != TINYGLTF_COMPONENT_TYPE_FLOAT)
-      return tl::unexpected(std::string("has positions that are not floats: export it without compression"));
-    const auto indices = readIndices(model_, primitive, vertices->count);
-    if (!indices) return tl::unexpected(indices.error());
-    if (indices->size() % 3 != 0)
-      return tl::unexpected(fmt::format("has {} indices, which is not a multiple of three", indices->size()));
-
-    const auto firstVertex = source_.vertices.size();
-    const auto firstUv = source_.uvs.size();
-    if (firstVertex + vertices->count > std::numeric_limits<std::uint32_t>::max())
-      return tl::unexpected(std::string("has too many vertices"));
-    for (std::size_t i = 0; i < vertices->count; ++i)
-      source_.vertices.push_back(
-          (transform *
-           Eigen::Vector3d(vertices->at<float>(i, 0), vertices->at<float>(i, 1), vertices->at<float>(i, 2)))
-              .cast<float>());
-    if (auto done = addUvs(primitive, vertices->count); !done) return done;
-    const tinygltf::Material* material = find(model_.materials, primitive.material);
+    const std::size_t firstVertex = source_.vertices.size(), firstUv = source_.uvs.size();
+    const Expected<GltfPrimitive> read = readPrimitive(
+        model_, primitive,
+        {.vertices = maxVertices_ - firstVertex, .triangles = 2 * maxVertices_ - source_.faces.size()});
+    if (!read) return tl::unexpected(read.error());
+    for (const model::Vec3& vertex : read->positions)
+      source_.vertices.push_back((transform * vertex.cast<double>()).cast<float>());
+    everyPartHasUvs_ = everyPartHasUvs_ && !read->uvs.empty();
+    // v runs downwards in glTF and upwards here.
+    for (const model::Uv& uv : read->uvs) source_.uvs.emplace_back(uv.x(), 1 - uv.y());
+    const tinygltf::Material* material = at(model_.materials, primitive.material);
     source_.parts.push_back(
         {material && !material->name.empty() ? material->name : mesh.name, source_.faces.size()});
-    addFaces(*indices, static_cast<std::uint32_t>(firstVertex), static_cast<std::uint32_t>(firstUv),
+    addFaces(read->indices, static_cast<std::uint32_t>(firstVertex), static_cast<std::uint32_t>(firstUv),
              transform.linear().determinant() < 0);
-    return {};
-  }
-
-  Expected<void> addUvs(const tinygltf::Primitive& primitive, std::size_t vertexCount) {
-    const auto attribute = primitive.attributes.find("TEXCOORD_0");
-    if (attribute == primitive.attributes.end()) {
-      everyPartHasUvs_ = false;
-      return {};
-    }
-    const auto elements = elementsOf(model_, attribute->second, TINYGLTF_TYPE_VEC2);
-    if (!elements) return tl::unexpected(elements.error());
-    if (elements->count != vertexCount)
-      return tl::unexpected(
-          fmt::format("has {} texture coordinates for {} vertices", elements->count, vertexCount));
-    for (std::size_t i = 0; i < elements->count; ++i) {
-      const auto uv = readUv(*elements, i);
-      if (!uv)
-        return tl::unexpected(std::string("has texture coordinates of a type that glTF does not have"));
-      // v runs downwards in glTF and upwards here.
-      source_.uvs.emplace_back(uv->x(), 1 - uv->y());
-    }
     return {};
   }
 
@@ -245,31 +128,48 @@ class Gatherer {
   }
 
   const tinygltf::Model& model_;
+  std::uint64_t maxVertices_;
   std::vector<bool> visited_;
   MeshSource source_;
   bool everyPartHasUvs_ = true;
 };
 
+std::optional<std::string> unsupportedExtension(const std::string& name) {
+  if (name == kMeshoptExtension) return meshoptError();
+  if (name == kDracoExtension || name == kQuantizationExtension || name == "KHR_texture_transform" ||
+      name.starts_with("KHR_materials") || name.starts_with("KHR_texture_") || name.starts_with("KHR_lights"))
+    return std::nullopt;
+  return fmt::format("needs the extension {}, which is not supported: export it without that extension",
+                     name);
+}
+
 }  // namespace
 
-tl::expected<MeshSource, std::string> readGltf(const std::filesystem::path& path, bool binary) {
+tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::filesystem::path& folder,
+                                               bool binary, std::uint64_t maxVertices) {
   tinygltf::TinyGLTF loader;
   // Images are not needed, so they are not decoded.
   loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
                            int, void*) { return true; },
                         nullptr);
+  const Expected<std::string> prepared = prepareGltf(std::move(bytes), binary);
+  if (!prepared) return tl::unexpected(prepared.error());
   tinygltf::Model model;
   std::string error, warning;
-  const bool read = binary ? loader.LoadBinaryFromFile(&model, &error, &warning, path.string())
-                           : loader.LoadASCIIFromFile(&model, &error, &warning, path.string());
+  const auto size = static_cast<unsigned>(prepared->size());
+  const bool read =
+      binary ? loader.LoadBinaryFromMemory(&model, &error, &warning,
+                                           reinterpret_cast<const unsigned char*>(prepared->data()), size,
+                                           folder.string())
+             : loader.LoadASCIIFromString(&model, &error, &warning, prepared->data(), size, folder.string());
   while (!error.empty() && error.back() == '\n') error.pop_back();
+  if (!read || !model.asset.version.starts_with("2."))
+    if (auto unsupported = unsupportedGltf(*prepared, binary)) return tl::unexpected(std::move(*unsupported));
   if (!read)
     return tl::unexpected(fmt::format("is not glTF 2.0: {}", error.empty() ? "cannot be parsed" : error));
   for (const std::string& extension : model.extensionsRequired)
-    if (extension != "KHR_texture_transform" && !extension.starts_with("KHR_materials"))
-      return tl::unexpected(fmt::format(
-          "needs the extension {}, which is not supported: export it without that extension", extension));
-  return Gatherer(model).gather();
+    if (auto problem = unsupportedExtension(extension)) return tl::unexpected(std::move(*problem));
+  return Gatherer(model, maxVertices).gather();
 }
 
 }  // namespace clothstream::meshes

@@ -2,6 +2,7 @@
 // Reads glTF 2.0 files.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -11,7 +12,10 @@
 
 namespace clothstream::meshes {
 
-// mesh_file.h describes the result. `binary` means .glb.
-[[nodiscard]] tl::expected<MeshSource, std::string> readGltf(const std::filesystem::path& path, bool binary);
+// Reads the bytes of a .gltf file, or of a .glb file if `binary`. Buffers in other files are in `folder`.
+// mesh_file.h describes the result.
+[[nodiscard]] tl::expected<MeshSource, std::string> readGltf(std::string bytes,
+                                                             const std::filesystem::path& folder, bool binary,
+                                                             std::uint64_t maxVertices);
 
 }  // namespace clothstream::meshes

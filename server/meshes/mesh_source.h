@@ -2,21 +2,30 @@
 // Unchecked mesh from a file or message, and its conversion to the mesh of a cloth.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include <tl/expected.hpp>
 
+#include "server/meshes/repairs.h"
 #include "server/model/mesh.h"
 
 namespace clothstream::meshes {
 
 struct SourceFace {
-  std::uint32_t cornerCount = 3;  // 3 or 4
-  // In order around the face, counter-clockwise seen from the front.
+  std::uint32_t cornerCount = 3;
+  // Corners of a triangle or quad, in order around the face, counter-clockwise seen from the front. A face
+  // with any other number of corners has them in MeshSource::corners, from index `vertices[0]` on.
   std::array<std::uint32_t, 4> vertices = {};
   std::array<std::uint32_t, 4> uvs = {};  // used if the source has texture coordinates
+
+  bool isInline() const { return cornerCount == 3 || cornerCount == 4; }
+};
+
+struct SourceCorner {
+  std::uint32_t vertex = 0, uv = 0;
 };
 
 // Mesh with the numbering of its source.
@@ -24,6 +33,7 @@ struct MeshSource {
   std::vector<model::Vec3> vertices;
   std::vector<model::Uv> uvs;  // empty: neither the source nor its faces have any
   std::vector<SourceFace> faces;
+  std::vector<SourceCorner> corners;  // of faces that are neither triangles nor quads
   // Indices of triangles that form a quad with the next face, ascending.
   std::vector<std::size_t> halves;
   struct Part {
@@ -32,6 +42,12 @@ struct MeshSource {
   };
   std::vector<Part>
       parts;  // in the order of their faces, the first starts at face 0; empty: one part without name
+
+  // Corner of a face, less than its cornerCount.
+  SourceCorner cornerOf(const SourceFace& face, std::uint32_t corner) const {
+    return face.isInline() ? SourceCorner{face.vertices[corner], face.uvs[corner]}
+                           : corners[face.vertices[0] + corner];
+  }
 };
 
 struct MeshLimits {
@@ -46,19 +62,28 @@ struct MeshOptions {
   model::Pose pose = {};
   float scale = 1;         // metres per unit of the source; applied before the pose
   float weldDistance = 0;  // m; vertices closer than this become one node; 0: none
+  bool repair = false;     // repairs what repair.h lists, instead of refusing it
+  bool fit = false;        // a mesh that is too large, too small or too far away becomes kFittedSize large
 };
 
 struct BuiltMesh {
   model::Mesh mesh;
   // Node of each vertex of the source; kNoNode if it has no face.
   std::vector<std::uint32_t> nodeOfVertex;
+  // For each node, another node that the repair made from the same vertices, or kNoNode. Empty: there are
+  // none.
+  std::vector<std::uint32_t> nextCopy;
+  Repairs repairs;
 };
 inline constexpr std::uint32_t kNoNode = ~0u;
 
-// Scales, places and welds the vertices, splits quads along their shorter diagonal, and checks the
-// requirements of MeshShape. Nodes are ordered along a space-filling curve, so that neighbours on the cloth
-// are neighbours in memory. A mesh that is already in this order keeps it. Vertices without a face are left
-// out. Errors use the indices of the source, counted from 0, and say what to do. Throws model::Cancelled.
+// Scales, places and welds the vertices, repairs the faces if the options say so, splits quads along their
+// shorter diagonal, and checks the requirements of MeshShape. Nodes are ordered along a space-filling curve,
+// so that neighbours on the cloth are neighbours in memory. A mesh that is already in this order keeps it.
+// Vertices without a face are left out. The same source and options give the same mesh. Errors use the
+// indices of the source, counted from 0, and say what to do, and whether `repair` or `fit` would help. Takes
+// time in proportion to n log n, and memory in proportion to n, for n vertices and corners of faces. Throws
+// model::Cancelled.
 [[nodiscard]] tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source,
                                                              const MeshOptions& options,
                                                              const MeshLimits& limits);

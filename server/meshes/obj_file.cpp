@@ -73,7 +73,6 @@ class ObjReader {
     };
     std::string warning, error;
     const bool read = tinyobj::LoadObjWithCallback(stream, callbacks, this, nullptr, &warning, &error);
-    if (!problem_.empty()) return tl::unexpected(std::move(problem_));
     if (!read) return tl::unexpected(fmt::format("is not OBJ: {}", error));
     if (!everyCornerHasUv_) source_.uvs.clear();
     return std::move(source_);
@@ -90,20 +89,18 @@ class ObjReader {
   }
 
   void face(std::span<const tinyobj::index_t> corners) {
-    if (!problem_.empty()) return;
-    const std::size_t number = source_.faces.size();
-    if (corners.size() != 3 && corners.size() != 4) {
-      problem_ = fmt::format("face {} has {} corners; faces must have 3 or 4: triangulate it when you export",
-                             number, corners.size());
-      return;
-    }
-    if (!partOpen_) source_.parts.push_back({material_.empty() ? object_ : material_, number});
+    if (!partOpen_) source_.parts.push_back({material_.empty() ? object_ : material_, source_.faces.size()});
     partOpen_ = true;
     SourceFace& face = source_.faces.emplace_back();
     face.cornerCount = static_cast<std::uint32_t>(corners.size());
+    if (!face.isInline()) face.vertices[0] = static_cast<std::uint32_t>(source_.corners.size());
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      face.vertices[i] = absolute(corners[i].vertex_index, source_.vertices.size());
-      face.uvs[i] = absolute(corners[i].texcoord_index, source_.uvs.size());
+      const SourceCorner corner{absolute(corners[i].vertex_index, source_.vertices.size()),
+                                absolute(corners[i].texcoord_index, source_.uvs.size())};
+      if (face.isInline())
+        face.vertices[i] = corner.vertex, face.uvs[i] = corner.uv;
+      else
+        source_.corners.push_back(corner);
       everyCornerHasUv_ = everyCornerHasUv_ && corners[i].texcoord_index != 0;
     }
   }
@@ -117,7 +114,7 @@ class ObjReader {
   }
 
   MeshSource source_;
-  std::string object_, material_, problem_;
+  std::string object_, material_;
   bool partOpen_ = false, everyCornerHasUv_ = true;
 };
 

@@ -2,7 +2,8 @@
 // Converts meshes that messages contain or name.
 #include "server/messages/mesh_message.h"
 
-#include <numeric>
+#include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -12,8 +13,8 @@
 namespace clothstream::messages {
 namespace {
 
-meshes::MeshLimits meshLimits(const model::Cancellation& cancellation) {
-  return {.maxVertices = limits::kMaxNodes,
+meshes::MeshLimits meshLimits(std::uint64_t maxNodes, const model::Cancellation& cancellation) {
+  return {.maxVertices = std::min(maxNodes, limits::kMaxNodes),
           .maxCoordinate = static_cast<float>(limits::kPosition.max),
           .minEdge = static_cast<float>(limits::kMinSpacing),
           .maxNodeSprings = limits::kMaxNodeSprings,
@@ -92,16 +93,35 @@ meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& 
   return {};
 }
 
+v1::MeshRepair toMessage(const std::string& cloth, const meshes::Repairs& repairs) {
+  v1::MeshRepair message;
+  message.set_cloth(cloth);
+  message.set_triangulated_faces(repairs.triangulatedFaces);
+  message.set_dropped_faces(repairs.droppedFaces);
+  message.set_dropped_duplicates(repairs.droppedDuplicates);
+  message.set_split_edges(repairs.splitEdges);
+  message.set_split_vertices(repairs.splitVertices);
+  message.set_added_vertices(repairs.addedVertices);
+  message.set_turned_triangles(repairs.turnedTriangles);
+  message.set_cut_edges(repairs.cutEdges);
+  message.set_fitted_scale(static_cast<float>(repairs.fittedScale));
+  for (std::string& sentence : repairs.sentences()) message.add_sentences(std::move(sentence));
+  return message;
+}
+
 }  // namespace
 
-std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                                       const MeshReader& readMesh, const model::Cancellation& cancellation,
-                                       model::Cloth& cloth) {
+VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
+                        const MeshReader& readMesh, std::uint64_t maxNodes,
+                        const model::Cancellation& cancellation, model::Cloth& cloth,
+                        std::vector<v1::MeshRepair>& repairs) {
   const v1::Mesh& mesh = message.mesh();
   const Path at = path / "mesh";
   meshes::MeshOptions options{.pose = toPose(checks, at / "pose", mesh.pose()),
                               .scale = 1,
-                              .weldDistance = limits::kDefaultWeldDistance};
+                              .weldDistance = limits::kDefaultWeldDistance,
+                              .repair = mesh.repair(),
+                              .fit = mesh.fit()};
   if (mesh.has_scale()) options.scale = checks.number(at / "scale", mesh.scale(), limits::kScale);
   if (mesh.has_weld_distance())
     options.weldDistance = checks.number(at / "weldDistance", mesh.weld_distance(), limits::kWeldDistance);
@@ -109,13 +129,14 @@ std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v
   const meshes::MeshSource source =
       mesh.file().empty() ? toSource(checks, at, mesh) : readSource(checks, at, mesh, readMesh);
   if (checks.failed()) return {};
-  auto built = meshes::buildMesh(source, options, meshLimits(cancellation));
+  auto built = meshes::buildMesh(source, options, meshLimits(maxNodes, cancellation));
   if (!built) {
     checks.fail(at, mesh.file().empty() ? "" : '"' + mesh.file() + '"', built.error());
     return {};
   }
+  if (!built->repairs.isEmpty()) repairs.push_back(toMessage(message.name(), built->repairs));
   cloth.mesh = std::make_shared<const model::Mesh>(std::move(built->mesh));
-  return std::move(built->nodeOfVertex);
+  return {std::move(built->nodeOfVertex), std::move(built->nextCopy)};
 }
 
 void write(const model::Mesh& mesh, v1::Mesh& message) {

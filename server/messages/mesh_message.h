@@ -19,13 +19,23 @@ namespace clothstream::messages {
 // Reads the mesh file that a scene names. The error names the file and the problem.
 using MeshReader = std::function<tl::expected<meshes::MeshSource, std::string>(const std::string& file)>;
 
-// Sets the mesh of the cloth. Returns the node of each vertex of the message, or meshes::kNoNode. Refuses a
-// file name if there is no reader. Throws model::Cancelled.
-std::vector<std::uint32_t> toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                                       const MeshReader& readMesh, const model::Cancellation& cancellation,
-                                       model::Cloth& cloth);
+// Nodes of the vertices of a mesh.
+struct VertexNodes {
+  // Node of each vertex of the message or file, or meshes::kNoNode.
+  std::vector<std::uint32_t> nodeOfVertex;
+  // meshes::BuiltMesh::nextCopy.
+  std::vector<std::uint32_t> nextCopy;
+};
 
-// Writes the mesh itself, not the name of its file: in world space, welded, in the order of its nodes.
+// Sets the mesh of the cloth. Refuses a file name if there is no reader, and more than `maxNodes` nodes. Adds
+// to `repairs` if something was repaired. Throws model::Cancelled.
+VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
+                        const MeshReader& readMesh, std::uint64_t maxNodes,
+                        const model::Cancellation& cancellation, model::Cloth& cloth,
+                        std::vector<v1::MeshRepair>& repairs);
+
+// Writes the mesh itself, not the name of its file: in world space, welded and repaired, in the order of its
+// nodes.
 void write(const model::Mesh& mesh, v1::Mesh& message);
 
 }  // namespace clothstream::messages

@@ -28,12 +28,13 @@ std::vector<std::string> namedScenes() {
   return names;
 }
 
-Result<model::Scene> loadScene(const std::string& nameOrPath) {
+Result<model::Scene> loadScene(const std::string& nameOrPath, std::vector<v1::MeshRepair>* repairs) {
   const auto scenes = embeddedScenes();
   const auto scene = std::ranges::find(scenes, nameOrPath, &EmbeddedScene::name);
   if (scene != scenes.end())
-    return parseScene(scene->json, fmt::format("scene {}", nameOrPath), readEmbeddedMesh);
-  return readSceneFile(nameOrPath).map_error([](FieldError error) {
+    return parseScene(scene->json, fmt::format("scene {}", nameOrPath), readEmbeddedMesh, limits::kMaxNodes,
+                      repairs);
+  return readSceneFile(nameOrPath, repairs).map_error([](FieldError error) {
     if (error.code == v1::ERROR_CODE_NOT_FOUND)
       error.text +=
           fmt::format(", and no scene of that name; named scenes are {}", fmt::join(namedScenes(), ", "));

@@ -46,7 +46,7 @@ model::Region toRegion(Checks& checks, const Path& path, const v1::Region& messa
 }
 
 std::uint32_t toNode(Checks& checks, const Path& path, std::uint32_t vertex, const model::Cloth& cloth,
-                     std::span<const std::uint32_t> nodeOfVertex) {
+                     const std::vector<std::uint32_t>& nodeOfVertex) {
   if (!cloth.mesh) return checks.integer(path, vertex, 0, cloth.grid.nodeCount() - 1);
   checks.integer(path, vertex, 0, static_cast<std::uint32_t>(nodeOfVertex.size()) - 1);
   if (checks.failed()) return 0;
@@ -59,14 +59,14 @@ std::uint32_t toNode(Checks& checks, const Path& path, std::uint32_t vertex, con
 }  // namespace
 
 NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& named,
-                          const model::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex) {
+                          const model::Cloth& cloth, const VertexNodes& nodes) {
   NodeSelection selection;
   checks.count(path / named.rangesField, static_cast<std::size_t>(named.ranges.size()), 0, limits::kMaxPins);
   checks.count(path / named.regionsField, static_cast<std::size_t>(named.regions.size()), 0,
                limits::kMaxPins);
   // More entries than vertices would name a vertex twice.
   checks.count(path / named.verticesField, static_cast<std::size_t>(named.vertices.size()), 0,
-               cloth.mesh ? nodeOfVertex.size() : cloth.grid.nodeCount());
+               cloth.mesh ? nodes.nodeOfVertex.size() : cloth.grid.nodeCount());
   if (cloth.mesh && !named.ranges.empty())
     checks.fail(path / named.rangesField, "",
                 fmt::format("must be absent for a mesh; use \"{}\" or \"{}\"", named.verticesField,
@@ -74,11 +74,13 @@ NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& na
   // A node is listed once, because several vertices of a mesh may have the same node.
   std::vector<bool> listed(named.vertices.empty() || checks.failed() ? 0 : cloth.nodeCount());
   for (int i = 0; i < named.vertices.size() && !checks.failed(); ++i) {
-    const std::uint32_t node =
-        toNode(checks, path.at(named.verticesField, i), named.vertices[i], cloth, nodeOfVertex);
-    if (checks.failed() || listed[node]) continue;
-    listed[node] = true;
-    selection.vertices.push_back(node);
+    std::uint32_t node =
+        toNode(checks, path.at(named.verticesField, i), named.vertices[i], cloth, nodes.nodeOfVertex);
+    while (!checks.failed() && node != meshes::kNoNode && !listed[node]) {
+      listed[node] = true;
+      selection.vertices.push_back(node);
+      node = nodes.nextCopy.empty() ? meshes::kNoNode : nodes.nextCopy[node];
+    }
   }
   for (int i = 0; i < named.ranges.size() && !checks.failed(); ++i)
     selection.ranges.push_back(toRange(checks, path.at(named.rangesField, i), named.ranges[i], cloth.grid));

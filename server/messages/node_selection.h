@@ -3,11 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string_view>
 #include <vector>
 
 #include "clothstream/v1/scene.pb.h"
+#include "server/messages/mesh_message.h"
 #include "server/messages/validation.h"
 #include "server/model/scene.h"
 
@@ -27,9 +27,10 @@ struct NamedNodes {
   const google::protobuf::RepeatedPtrField<v1::Region>& regions;
 };
 
-// The shape of the cloth must be set. `nodeOfVertex` is the result of toMeshCloth(), empty for grids.
+// The shape of the cloth must be set. `nodes` is the result of toMeshCloth(), empty for grids. A vertex that
+// a repair has divided selects all of its nodes.
 NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& named,
-                          const model::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex);
+                          const model::Cloth& cloth, const VertexNodes& nodes);
 
 void write(const model::GridRange& range, v1::GridRange& message);
 void write(const model::Region& region, v1::Region& message);

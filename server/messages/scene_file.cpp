@@ -37,7 +37,7 @@ std::optional<std::string> syntaxError(std::string_view json) {
 }  // namespace
 
 Result<model::Scene> parseScene(std::string_view json, std::string_view source, const MeshReader& readMesh,
-                                std::uint64_t maxNodes) {
+                                std::uint64_t maxNodes, std::vector<v1::MeshRepair>* repairs) {
   if (const auto error = syntaxError(json)) return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source, *error);
   v1::Scene message;
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &message);
@@ -45,12 +45,12 @@ Result<model::Scene> parseScene(std::string_view json, std::string_view source, 
     return refuse(
         v1::ERROR_CODE_MALFORMED_MESSAGE, source,
         fmt::format("not a scene: {}", std::string_view(status.message().data(), status.message().size())));
-  return toScene(message, readMesh, {.nodes = maxNodes}).map_error([&](const FieldError& error) {
+  return toScene(message, readMesh, {.nodes = maxNodes}, repairs).map_error([&](const FieldError& error) {
     return FieldError{error.code, fmt::format("{}: {}", source, error.text)};
   });
 }
 
-Result<model::Scene> readSceneFile(const std::filesystem::path& path) {
+Result<model::Scene> readSceneFile(const std::filesystem::path& path, std::vector<v1::MeshRepair>* repairs) {
   const std::string source = path.string();
   std::error_code error;
   const auto kind = std::filesystem::status(path, error).type();
@@ -70,9 +70,11 @@ Result<model::Scene> readSceneFile(const std::filesystem::path& path) {
   if (text.size() > limits::kMaxSceneFileBytes)
     return refuse(v1::ERROR_CODE_RESOURCE_EXHAUSTED, source,
                   fmt::format("is too large: must have at most {} bytes", limits::kMaxSceneFileBytes));
-  return parseScene(text, source, [&](const std::string& mesh) {
-    return meshes::readMeshFile(path.parent_path() / mesh, limits::kMaxMeshFileBytes);
-  });
+  const auto readMesh = [&](const std::string& mesh) {
+    return meshes::readMeshFile(path.parent_path() / mesh,
+                                {.bytes = limits::kMaxMeshFileBytes, .vertices = limits::kMaxNodes});
+  };
+  return parseScene(text, source, readMesh, limits::kMaxNodes, repairs);
 }
 
 std::string toJson(const model::Scene& scene) {

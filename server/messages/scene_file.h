@@ -16,13 +16,15 @@
 namespace clothstream::messages {
 
 // Error texts start with `source`, such as a file name. Unknown fields are errors. Mesh files are refused if
-// there is no reader. `maxNodes` as for toScene().
+// there is no reader. `maxNodes` and `repairs` as for toScene().
 [[nodiscard]] Result<model::Scene> parseScene(std::string_view json, std::string_view source,
                                               const MeshReader& readMesh = {},
-                                              std::uint64_t maxNodes = limits::kMaxNodes);
+                                              std::uint64_t maxNodes = limits::kMaxNodes,
+                                              std::vector<v1::MeshRepair>* repairs = nullptr);
 
 // Reads a file of at most limits::kMaxSceneFileBytes. Paths of meshes are relative to the file.
-[[nodiscard]] Result<model::Scene> readSceneFile(const std::filesystem::path& path);
+[[nodiscard]] Result<model::Scene> readSceneFile(const std::filesystem::path& path,
+                                                 std::vector<v1::MeshRepair>* repairs = nullptr);
 
 // Writes every field. parseScene() of the result returns the same scene.
 std::string toJson(const model::Scene& scene);
@@ -31,6 +33,7 @@ std::string toJson(const model::Scene& scene);
 std::vector<std::string> namedScenes();
 
 // Loads the built-in scene with that name, or the file with that path.
-[[nodiscard]] Result<model::Scene> loadScene(const std::string& nameOrPath);
+[[nodiscard]] Result<model::Scene> loadScene(const std::string& nameOrPath,
+                                             std::vector<v1::MeshRepair>* repairs = nullptr);
 
 }  // namespace clothstream::messages

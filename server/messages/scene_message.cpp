@@ -138,27 +138,26 @@ void readConstraint(Checks& checks, const Path& path, const v1::ConstraintSolver
 }
 
 // Returns the result of toMeshCloth(); empty for a grid.
-std::vector<std::uint32_t> toShape(Checks& checks, const Path& path, const v1::Cloth& message,
-                                   const MeshReader& readMesh, const model::Cancellation& cancellation,
-                                   model::Cloth& cloth) {
+VertexNodes toShape(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
+                    const SceneLimits& most, model::Cloth& cloth, std::vector<v1::MeshRepair>& repairs) {
   switch (message.shape_case()) {
     case v1::Cloth::kGrid:
       cloth.grid = toGrid(checks, path / "grid", message.grid());
       break;
     case v1::Cloth::kMesh:
-      return toMeshCloth(checks, path, message, readMesh, cancellation, cloth);
+      return toMeshCloth(checks, path, message, readMesh, most.nodes, most.cancellation, cloth, repairs);
     case v1::Cloth::SHAPE_NOT_SET:
       checks.fail(path, "", "has no shape; must have \"grid\" or \"mesh\"");
   }
   return {};
 }
 
-void readPins(Checks& checks, const Path& path, const v1::Cloth& message,
-              std::span<const std::uint32_t> nodeOfVertex, model::Cloth& cloth) {
+void readPins(Checks& checks, const Path& path, const v1::Cloth& message, const VertexNodes& nodes,
+              model::Cloth& cloth) {
   NodeSelection pins = toSelection(checks, path,
                                    {"pins", "pinnedVertices", "pinnedRegions", message.pins(),
                                     message.pinned_vertices(), message.pinned_regions()},
-                                   cloth, nodeOfVertex);
+                                   cloth, nodes);
   cloth.pins = std::move(pins.ranges);
   cloth.pinnedVertices = std::move(pins.vertices);
   cloth.pinnedRegions = std::move(pins.regions);
@@ -187,13 +186,13 @@ model::Motion toMotion(Checks& checks, const Path& path, const v1::Motion& messa
 }
 
 model::Attachment toAttachment(Checks& checks, const Path& path, const v1::Attachment& message,
-                               const model::Cloth& cloth, std::span<const std::uint32_t> nodeOfVertex) {
+                               const model::Cloth& cloth, const VertexNodes& vertexNodes) {
   model::Attachment attachment;
   attachment.name = checks.name(path / "name", message.name());
   NodeSelection nodes =
       toSelection(checks, path,
                   {"ranges", "vertices", "regions", message.ranges(), message.vertices(), message.regions()},
-                  cloth, nodeOfVertex);
+                  cloth, vertexNodes);
   attachment.ranges = std::move(nodes.ranges);
   attachment.vertices = std::move(nodes.vertices);
   attachment.regions = std::move(nodes.regions);
@@ -227,13 +226,13 @@ void checkAttached(Checks& checks, const Path& path, const model::Cloth& cloth) 
   }
 }
 
-void readAttachments(Checks& checks, const Path& path, const v1::Cloth& message,
-                     std::span<const std::uint32_t> nodeOfVertex, model::Cloth& cloth) {
+void readAttachments(Checks& checks, const Path& path, const v1::Cloth& message, const VertexNodes& nodes,
+                     model::Cloth& cloth) {
   checks.count(path / "attachments", static_cast<std::size_t>(message.attachments_size()), 0,
                limits::kMaxAttachments);
   for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i)
     cloth.attachments.push_back(
-        toAttachment(checks, path.at("attachments", i), message.attachments(i), cloth, nodeOfVertex));
+        toAttachment(checks, path.at("attachments", i), message.attachments(i), cloth, nodes));
 }
 
 // Self-collision and tethers with their defaults, if the message has them.
@@ -267,14 +266,13 @@ void readMass(Checks& checks, const Path& path, const v1::Cloth& message, model:
 }
 
 model::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
-                     const model::Cancellation& cancellation) {
+                     const SceneLimits& most, std::vector<v1::MeshRepair>& repairs) {
   model::Cloth cloth;
   cloth.name = checks.name(path / "name", message.name());
-  const std::vector<std::uint32_t> nodeOfVertex =
-      toShape(checks, path, message, readMesh, cancellation, cloth);
+  const VertexNodes nodes = toShape(checks, path, message, readMesh, most, cloth, repairs);
   if (checks.failed()) return cloth;
-  readPins(checks, path, message, nodeOfVertex, cloth);
-  readAttachments(checks, path, message, nodeOfVertex, cloth);
+  readPins(checks, path, message, nodes, cloth);
+  readAttachments(checks, path, message, nodes, cloth);
   if (checks.failed()) return cloth;
   addParts(checks, path, message, cloth);
   cloth.mass = static_cast<float>(double{limits::kDefaultArealMass} * model::areaOf(cloth));
@@ -426,7 +424,9 @@ void checkSize(Checks& checks, const model::Scene& scene, const SceneLimits& mos
     nodes += cloth.nodeCount();
     springs += model::springCount(cloth);
   }
-  if (nodes > limits::kMaxNodes) checks.failSize(Path("cloths"), tooManyNodes(nodes, limits::kMaxNodes));
+  // Files of meshes and repairs may give more nodes than the message states.
+  const std::uint64_t mostNodes = std::min(most.nodes, limits::kMaxNodes);
+  if (nodes > mostNodes) checks.failSize(Path("cloths"), tooManyNodes(nodes, mostNodes));
   if (springs > most.springs)
     checks.failSize(Path("cloths"),
                     fmt::format("have {} springs in all; must have at most {}", springs, most.springs));
@@ -550,7 +550,9 @@ std::optional<std::string> instability(const model::Scene& scene, const model::S
       limits::kMaxSubsteps);
 }
 
-Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh, const SceneLimits& most) {
+Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh, const SceneLimits& most,
+                             std::vector<v1::MeshRepair>* repairs) {
+  std::vector<v1::MeshRepair> unasked;
   Checks checks;
   const Path root;
   model::Scene scene;
@@ -569,8 +571,8 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
                limits::kMaxColliders);
   for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i)
-    scene.cloths.push_back(
-        toCloth(checks, root.at("cloths", i), message.cloths(i), readMesh, most.cancellation));
+    scene.cloths.push_back(toCloth(checks, root.at("cloths", i), message.cloths(i), readMesh, most,
+                                   repairs ? *repairs : unasked));
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
     scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());

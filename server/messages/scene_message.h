@@ -33,9 +33,12 @@ struct SceneLimits {
 // Applies the defaults of scene.proto and checks everything: ranges, unique names, pins inside their grid,
 // meshes, rates, the number of nodes, and that the integrator is stable with these substeps. Refuses mesh
 // files if there is no reader. Refuses more nodes than the limit, or vertices of meshes before they are
-// welded, at once; everything else takes time and memory in proportion to them. Throws model::Cancelled.
+// welded, at once; everything else takes time and memory in proportion to them and to the triangles. A repair
+// adds at most as many nodes as the limit allows. Adds what was repaired to `repairs`, one element per cloth.
+// Throws model::Cancelled.
 [[nodiscard]] Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh = {},
-                                           const SceneLimits& most = {});
+                                           const SceneLimits& most = {},
+                                           std::vector<v1::MeshRepair>* repairs = nullptr);
 
 // Sets every field, defaults included, and writes whole meshes. toScene() of the result returns the same
 // scene.

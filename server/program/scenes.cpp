@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
@@ -15,8 +16,13 @@
 namespace clothstream::program {
 namespace {
 
-model::Scene loaded(messages::Result<model::Scene> scene) {
+using Repairs = std::vector<v1::MeshRepair>;
+
+model::Scene loaded(messages::Result<model::Scene> scene, const Repairs& repairs) {
   if (!scene) throw std::runtime_error(scene.error().text);
+  for (const v1::MeshRepair& repair : repairs)
+    for (const std::string& sentence : repair.sentences())
+      spdlog::info("{}: cloth '{}': {}", scene->name, repair.cloth(), sentence);
   return std::move(*scene);
 }
 
@@ -30,7 +36,8 @@ std::uint32_t streamRateFor(const model::Scene& scene, std::uint32_t rate) {
 }  // namespace
 
 model::Scene loadScene(const std::string& nameOrPath) {
-  return loaded(messages::loadScene(nameOrPath));
+  Repairs repairs;
+  return loaded(messages::loadScene(nameOrPath, &repairs), repairs);
 }
 
 model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
@@ -57,7 +64,8 @@ std::vector<model::Scene> loadScenes(const ProgramOptions& options, std::vector<
   std::vector<model::Scene> scenes;
   for (const std::string& name : messages::namedScenes()) scenes.push_back(loadScene(name));
   for (const std::filesystem::path& file : options.sceneFiles) {
-    model::Scene scene = loaded(messages::readSceneFile(file));
+    Repairs repairs;
+    model::Scene scene = loaded(messages::readSceneFile(file, &repairs), repairs);
     std::erase_if(scenes, [&](const model::Scene& other) { return other.name == scene.name; });
     std::erase(builtIn, scene.name);
     scenes.push_back(std::move(scene));

@@ -17,7 +17,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-constexpr std::uint64_t kMaxBytes = 1'000'000;
+constexpr FileLimits kFileLimits{.bytes = 1'000'000, .vertices = 1000};
 
 class MeshFile : public testing::Test {
  protected:
@@ -55,7 +55,7 @@ v 2 0 0
 usemtl silk
 f 2/1 -1/2 3/3
 )"),
-                                   kMaxBytes);
+                                   kFileLimits);
   ASSERT_TRUE(source) << source.error();
   ASSERT_EQ(source->vertices.size(), 5u);
   EXPECT_EQ(source->vertices[2], Vec3(1, 1, 0.5f));
@@ -83,21 +83,39 @@ TEST_F(MeshFile, RefusesInvalidObjHereOrInBuildMesh) {
        {std::pair("v 0 0 0\nv 1 nan 0\n", "line 2 is \"v 1 nan 0\""), std::pair("v 0 0 inf\n", "line 1"),
         std::pair("  v nan 0 0\n", "line 1"), std::pair("v\t0 nan 0\n", "line 1"),
         std::pair("v 0 0 0\nv 1e2147483648 0 0\n", "line 2 is \"v 1e2147483648 0 0\": an exponent"),
-        std::pair("v 0 0 0\n vt 0 1e-999999999\n", "line 2"), std::pair("vn 1E+2147483648 0 0\n", "line 1"),
-        std::pair("v 0 0 0\nv 1 0 0\nf 1 2\n", "face 0 has 2 corners"),
-        std::pair("v 0 0 0\nf 1 1 1 1 1\n", "face 0 has 5 corners; faces must have 3 or 4")}) {
+        std::pair("v 0 0 0\n vt 0 1e-999999999\n", "line 2"),
+        std::pair("vn 1E+2147483648 0 0\n", "line 1")}) {
     const auto source = parseObj(text);
     ASSERT_FALSE(source) << text;
     EXPECT_THAT(source.error(), HasSubstr(says));
   }
-  for (const char* text : {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
-                           "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -9\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n"}) {
-    const auto source = parseObj(text);
-    ASSERT_TRUE(source) << text;
+  constexpr const char* kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (const auto& [face, says] :
+       {std::pair("f 1 2 4\n", "face 0 names vertex"), std::pair("f 0 1 2\n", "face 0 names vertex"),
+        std::pair("f 1 2 -9\n", "face 0 names vertex"), std::pair("f a b c\n", "face 0 names vertex"),
+        std::pair("f 1 2\n",
+                  "face 0 has 2 corners; faces must have 3 or 4: triangulate it when you export, or set"),
+        std::pair("f 1 2 3\nf 1 1 1 1 1\n", "face 1 has 5 corners; faces must have 3 or 4"),
+        std::pair("f 1 2 3 2 9\n", "face 0 names vertex 8; there are 3")}) {
+    const auto source = parseObj(std::string(kTriangle) + face);
+    ASSERT_TRUE(source) << face;
     const auto built = buildMesh(*source, {}, {.maxVertices = 10, .maxCoordinate = 10, .minEdge = 0.001f});
-    ASSERT_FALSE(built) << text;
-    EXPECT_THAT(built.error(), HasSubstr("face 0 names vertex")) << text;
+    ASSERT_FALSE(built) << face;
+    EXPECT_THAT(built.error(), HasSubstr(says)) << face;
   }
+}
+
+TEST_F(MeshFile, KeepsPolygonsOfObj) {
+  const auto source =
+      parseObj("v 0 0 0\nvt 0 0\nvt 1 0\nf 1/1 2/2 3/1 4/2 5/1\nf 1/1 2/2 3/1\nf 6/1 5/2 4/1 3/2 2/1 1/2\n");
+  ASSERT_TRUE(source) << source.error();
+  ASSERT_EQ(source->faces.size(), 3u);
+  EXPECT_EQ(source->faces[0].cornerCount, 5u);
+  EXPECT_EQ(source->corners.size(), 11u);
+  EXPECT_EQ(source->cornerOf(source->faces[0], 4).vertex, 4u);
+  EXPECT_EQ(source->cornerOf(source->faces[1], 1).uv, 1u);
+  EXPECT_EQ(source->cornerOf(source->faces[2], 0).vertex, 5u);
+  EXPECT_EQ(source->cornerOf(source->faces[2], 5).uv, 1u);
 }
 
 // Quad as two triangles. The buffer holds floats, then 16-bit indices. Nodes translate and mirror the quad.
@@ -146,7 +164,7 @@ void expectSheet(const tl::expected<MeshSource, std::string>& source) {
 
 TEST_F(MeshFile, ReadsTransformedTrianglesOfTheGltfScene) {
   write("sheet.bin", sheetBuffer());
-  expectSheet(readMeshFile(write("sheet.gltf", kGltf), kMaxBytes));
+  expectSheet(readMeshFile(write("sheet.gltf", kGltf), kFileLimits));
 }
 
 TEST_F(MeshFile, ReadsGlb) {
@@ -161,9 +179,9 @@ TEST_F(MeshFile, ReadsGlb) {
   word(0x46546C67), word(2), word(12 + 8 + json.size() + 8 + buffer.size());
   word(json.size()), word(0x4E4F534A), bytes += json;
   word(buffer.size()), word(0x004E4942), bytes += buffer;
-  expectSheet(readMeshFile(write("sheet.glb", bytes), kMaxBytes));
+  expectSheet(readMeshFile(write("sheet.glb", bytes), kFileLimits));
   for (const std::size_t kept : {0ul, 11ul, 40ul, bytes.size() - 50}) {
-    const auto cut = readMeshFile(write("cut.glb", bytes.substr(0, kept)), kMaxBytes);
+    const auto cut = readMeshFile(write("cut.glb", bytes.substr(0, kept)), kFileLimits);
     EXPECT_FALSE(cut) << kept;
   }
 }
@@ -183,18 +201,95 @@ TEST_F(MeshFile, RefusesInvalidGltf) {
            std::tuple("\"indices\": 2,", "\"indices\": 2, \"mode\": 1,", "not made of triangles"),
            std::tuple("\"count\": 6", "\"count\": 5", "not a multiple of three"),
            std::tuple("\"POSITION\": 0", "\"NORMAL\": 0", "has no POSITION"),
-           std::tuple("\"asset\"", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"asset\"",
-                      "KHR_draco_mesh_compression"),
+           std::tuple("\"asset\"", "\"extensionsRequired\": [\"VENDOR_own\"], \"asset\"",
+                      "needs the extension VENDOR_own, which is not supported: export it without"),
+           std::tuple("\"count\": 4, \"type\": \"VEC3\"", "\"count\": 3, \"type\": \"VEC3\"",
+                      "has 4 texture coordinates for 3 vertices"),
        }) {
-    const auto source = readMeshFile(write("bad.gltf", replaced(kGltf, from, to)), kMaxBytes);
+    const auto source = readMeshFile(write("bad.gltf", replaced(kGltf, from, to)), kFileLimits);
     ASSERT_FALSE(source) << to;
     EXPECT_THAT(source.error(), AllOf(StartsWith(folder_.string()), HasSubstr(says))) << to;
   }
 }
 
+TEST_F(MeshFile, NamesFormatsThatAreNotSupported) {
+  write("sheet.bin", sheetBuffer());
+  const std::string view = "{\"buffer\": 0, \"byteOffset\": 80, \"byteLength\": 12";
+  const auto meshopt =
+      "is compressed with EXT_meshopt_compression, which is not supported: export it without";
+  for (const auto& [json, says] : {
+           std::pair(replaced(kGltf, "\"2.0\"", "\"1.0\""),
+                     "is glTF 1.0, which is not supported: convert it"),
+           std::pair(
+               std::string(R"({"asset": {}, "meshes": {"sheet": {"primitives": []}}, "accessors": {}})"),
+               "is glTF 1.0, which is not supported"),
+           std::pair(replaced(kGltf, "\"asset\"",
+                              "\"extensionsRequired\": [\"EXT_meshopt_compression\"], \"asset\""),
+                     meshopt),
+           // The buffer that is decoded to has no bytes.
+           std::pair(replaced(replaced(kGltf, "\"asset\"",
+                                       "\"extensionsUsed\": [\"EXT_meshopt_compression\"], \"asset\""),
+                              "\"uri\": \"sheet.bin\", ", ""),
+                     meshopt),
+           std::pair(replaced(kGltf, view,
+                              view + ", \"extensions\": {\"EXT_meshopt_compression\": {\"buffer\": 0}}"),
+                     meshopt),
+       }) {
+    const auto source = readMeshFile(write("other.gltf", json), kFileLimits);
+    ASSERT_FALSE(source) << json;
+    EXPECT_THAT(source.error(), HasSubstr(says)) << json;
+  }
+  std::string old = "glTF";
+  for (const std::uint32_t word : {1u, 24u, 4u, 0u}) old.append(reinterpret_cast<const char*>(&word), 4);
+  EXPECT_THAT(readMeshFile(write("old.glb", old + "{}  "), kFileLimits).error(), HasSubstr("is glTF 1.0"));
+}
+
+// Positions as normalised 16-bit integers, and texture coordinates as bytes.
+TEST_F(MeshFile, ReadsQuantizedGltf) {
+  std::string bytes;
+  const auto append = [&](auto value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
+  for (const auto& [x, y] : {std::pair(0, 0), std::pair(1, 0), std::pair(1, 1), std::pair(0, 1)}) {
+    for (const int value : {x, y, 0}) append(static_cast<std::int16_t>(-32767 * value));
+    for (const int value : {x, y}) append(static_cast<std::uint8_t>(255 * value));
+  }
+  for (const int index : {0, 1, 2, 0, 2, 3}) append(static_cast<std::uint16_t>(index));
+  write("small.bin", bytes);
+  const auto source = readMeshFile(write("small.gltf", R"({
+    "asset": {"version": "2.0"}, "extensionsRequired": ["KHR_mesh_quantization"],
+    "scenes": [{"nodes": [0]}], "nodes": [{"scale": [4, 4, 4], "mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2}]}],
+    "buffers": [{"uri": "small.bin", "byteLength": 44}],
+    "bufferViews": [{"buffer": 0, "byteLength": 32, "byteStride": 8}, {"buffer": 0, "byteOffset": 32, "byteLength": 12}],
+    "accessors": [
+      {"bufferView": 0, "componentType": 5122, "normalized": true, "count": 4, "type": "VEC3"},
+      {"bufferView": 0, "byteOffset": 6, "componentType": 5121, "normalized": true, "count": 4, "type": "VEC2"},
+      {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}]})"),
+                                   kFileLimits);
+  ASSERT_TRUE(source) << source.error();
+  EXPECT_EQ(source->vertices[2], Vec3(-4, -4, 0));
+  EXPECT_EQ(source->uvs[2], model::Uv(1, 0));
+}
+
+// A node for each of many instances of one mesh.
+TEST_F(MeshFile, RefusesMoreVerticesThanAllowedBeforeTheyAreRead) {
+  write("sheet.bin", sheetBuffer());
+  std::string nodes, list;
+  for (int i = 0; i < 251; ++i) {
+    nodes += R"({"mesh": 0},)";
+    list += std::to_string(i) + ",";
+  }
+  nodes.pop_back(), list.pop_back();
+  std::string json = replaced(kGltf, "\"nodes\": [0]", "\"nodes\": [" + list + "]");
+  json = replaced(json, R"({"translation": [1, 2, 3], "children": [1]}, {"scale": [-2, 1, 1], "mesh": 0})",
+                  nodes);
+  const auto source = readMeshFile(write("many.gltf", json), kFileLimits);
+  ASSERT_FALSE(source);
+  EXPECT_THAT(source.error(), HasSubstr("has 4 vertices; at most 0 more are allowed: simplify it"));
+}
+
 TEST_F(MeshFile, NamesFilesThatAreNotMeshes) {
   const auto expectRefused = [&](const std::filesystem::path& path, const char* says) {
-    const auto source = readMeshFile(path, 100);
+    const auto source = readMeshFile(path, {.bytes = 100, .vertices = 1000});
     ASSERT_FALSE(source) << path;
     EXPECT_THAT(source.error(), AllOf(StartsWith(path.string()), HasSubstr(says)));
   };

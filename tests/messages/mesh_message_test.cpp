@@ -181,6 +181,85 @@ TEST(MeshMessage, RefusesMeshesThatDoNotFitADescription) {
               HasSubstr("bytes of positions, triangles and texture coordinates; a client"));
 }
 
+// Two triangles and a flap on their common edge, which is pinned; the flap faces another way.
+v1::Scene flapScene() {
+  v1::Scene message = smallScene();
+  v1::Cloth& cloth = *message.mutable_cloths(0);
+  cloth.clear_pins();
+  v1::Mesh& mesh = *cloth.mutable_mesh();
+  for (const float x : {0.f, 0.f, 0.f, 0.f, 1.f, 0.f, 1.f, 0.f, 0.f, -1.f, 0.f, 0.f, 0.f, 0.f, 1.f})
+    mesh.add_positions(x);
+  for (const std::uint32_t i : {0u, 2u, 1u, 0u, 1u, 3u, 0u, 1u, 4u}) mesh.add_triangles(i);
+  cloth.add_pinned_vertices(0);
+  cloth.add_pinned_vertices(1);
+  return message;
+}
+
+TEST(MeshMessage, IsRepairedOnRequestAndSaysWhat) {
+  v1::Scene message = flapScene();
+  const Result<model::Scene> refused = toScene(message);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("or set \"repair\""));
+  message.mutable_cloths(0)->mutable_mesh()->set_repair(true);
+  std::vector<v1::MeshRepair> repairs;
+  const Result<model::Scene> scene = toScene(message, {}, {}, &repairs);
+  ASSERT_TRUE(scene) << scene.error().text;
+  ASSERT_EQ(repairs.size(), 1u);
+  EXPECT_EQ(repairs[0].cloth(), scene->cloths[0].name);
+  EXPECT_EQ(repairs[0].split_edges(), 1u);
+  EXPECT_EQ(repairs[0].added_vertices(), 2u);
+  EXPECT_EQ(repairs[0].sentences_size(), 2);
+  // All copies of the pinned vertices are pinned.
+  EXPECT_EQ(scene->cloths[0].nodeCount(), 7u);
+  EXPECT_EQ(scene->cloths[0].pinnedVertices.size(), 4u);
+}
+
+TEST(MeshMessage, KeepsARepairedMeshWhenSaved) {
+  v1::Scene message = flapScene();
+  message.mutable_cloths(0)->mutable_mesh()->set_repair(true);
+  message.mutable_cloths(0)->mutable_mesh()->set_fit(true);
+  message.mutable_cloths(0)->mutable_mesh()->set_scale(5000);
+  const Result<model::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  const v1::Scene saved = toMessage(*scene);
+  EXPECT_FALSE(saved.cloths(0).mesh().repair());
+  std::vector<v1::MeshRepair> repairs;
+  const Result<model::Scene> again = toScene(saved, {}, {}, &repairs);
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_TRUE(repairs.empty());
+  EXPECT_EQ(again->cloths[0].mesh->shape.positions, scene->cloths[0].mesh->shape.positions);
+  EXPECT_EQ(again->cloths[0].mesh->shape.triangles, scene->cloths[0].mesh->shape.triangles);
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(toMessage(*again), saved));
+}
+
+TEST(MeshMessage, IsScaledOnlyOnRequest) {
+  v1::Scene message = meshScene();
+  v1::Mesh& mesh = *message.mutable_cloths(0)->mutable_mesh();
+  for (const float scale : {5000.f, 1e-5f}) {
+    mesh.set_scale(scale);
+    mesh.set_fit(false);
+    const Result<model::Scene> refused = toScene(message);
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().text, HasSubstr("or set \"fit\", which makes it 2 m large"));
+    mesh.set_fit(true);
+    std::vector<v1::MeshRepair> repairs;
+    const Result<model::Scene> scene = toScene(message, {}, {}, &repairs);
+    ASSERT_TRUE(scene) << scene.error().text;
+    ASSERT_EQ(repairs.size(), 1u);
+    EXPECT_NEAR(repairs[0].fitted_scale() * scale, 2.0 / 9, 1e-5);  // its box is 9 m, with the unused vertex
+    EXPECT_THAT(repairs[0].sentences(0), HasSubstr("to 2 x 2 x 2 m"));
+  }
+}
+
+TEST(MeshMessage, RefusesMoreNodesAfterARepairThanAllowed) {
+  v1::Scene message = flapScene();
+  message.mutable_cloths(0)->mutable_mesh()->set_repair(true);
+  EXPECT_TRUE(toScene(message, {}, {.nodes = 7}));
+  const Result<model::Scene> scene = toScene(message, {}, {.nodes = 6});
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().text, HasSubstr("has more than 6 vertices once its edges are split"));
+}
+
 struct BadCase {
   const char* says;
   std::function<void(v1::Cloth&, v1::Mesh&)> spoil;

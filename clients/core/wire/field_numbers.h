@@ -160,6 +160,21 @@ struct Mesh {
   static constexpr Field kPose{8, WireType::kBytes};
   static constexpr Field kScale{9, WireType::kFixed32};
   static constexpr Field kWeldDistance{10, WireType::kFixed32};
+  static constexpr Field kRepair{70, WireType::kVarint};
+  static constexpr Field kFit{71, WireType::kVarint};
+};
+struct MeshRepair {
+  static constexpr Field kCloth{1, WireType::kBytes};
+  static constexpr Field kTriangulatedFaces{2, WireType::kVarint};
+  static constexpr Field kDroppedFaces{3, WireType::kVarint};
+  static constexpr Field kDroppedDuplicates{4, WireType::kVarint};
+  static constexpr Field kSplitEdges{5, WireType::kVarint};
+  static constexpr Field kSplitVertices{6, WireType::kVarint};
+  static constexpr Field kAddedVertices{7, WireType::kVarint};
+  static constexpr Field kTurnedTriangles{8, WireType::kVarint};
+  static constexpr Field kCutEdges{9, WireType::kVarint};
+  static constexpr Field kFittedScale{10, WireType::kFixed32};
+  static constexpr Field kSentences{11, WireType::kBytes};
 };
 struct Submesh {
   static constexpr Field kName{1, WireType::kBytes};
@@ -675,6 +690,7 @@ struct CreateSceneRequest {
 };
 struct CreateSceneResponse {
   static constexpr Field kScene{1, WireType::kBytes};
+  static constexpr Field kRepairs{70, WireType::kBytes};
 };
 struct DeleteSceneRequest {
   static constexpr Field kName{1, WireType::kBytes};

@@ -8,12 +8,12 @@
 namespace clothstream::fuzz {
 namespace {
 
-constexpr std::uint64_t kMaxBytes = 1 << 20;
+constexpr meshes::FileLimits kLimits{.bytes = 1 << 20, .vertices = 16'384};
 
 void run(std::span<const std::byte> input) {
   const bool binary = textOf(input).starts_with("glTF");
   const TemporaryFile file(binary ? ".glb" : ".gltf", input);
-  if (const auto source = meshes::readMeshFile(file.path(), kMaxBytes)) buildAndCheck(*source);
+  if (const auto source = meshes::readMeshFile(file.path(), kLimits)) buildAndCheck(*source);
 }
 
 }  // namespace

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+#include "server/meshes/gltf_container.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "server/meshes/gltf_primitive.h"
+
+namespace clothstream::meshes {
+namespace {
+
+using nlohmann::json;
+
+// A .glb file is a header (magic, version, length) and chunks (length, type, bytes), of which the first is
+// JSON.
+constexpr std::size_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
+constexpr int kMaxDepth = 100;  // writing JSON needs stack for each level
+
+std::uint32_t wordAt(std::string_view bytes, std::size_t at) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, bytes.data() + at, sizeof(word));
+  return word;
+}
+
+void putWord(std::string& bytes, std::size_t at, std::size_t value) {
+  const auto word = static_cast<std::uint32_t>(value);
+  std::memcpy(bytes.data() + at, &word, sizeof(word));
+}
+
+// Empty if the header is broken.
+std::string_view jsonOf(std::string_view bytes, bool binary) {
+  if (!binary) return bytes;
+  constexpr std::size_t kFirst = kHeaderBytes + kChunkHeaderBytes;
+  if (bytes.size() < kFirst) return {};
+  const std::uint32_t length = wordAt(bytes, kHeaderBytes);
+  return length <= bytes.size() - kFirst ? bytes.substr(kFirst, length) : std::string_view();
+}
+
+// Discarded if the text is not JSON, or nested too deeply.
+json parsed(std::string_view text) {
+  bool isTooDeep = false;
+  json root = json::parse(
+      text,
+      [&](int depth, json::parse_event_t, json&) {
+        isTooDeep = isTooDeep || depth > kMaxDepth;
+        return !isTooDeep;
+      },
+      false);
+  return isTooDeep ? json(json::value_t::discarded) : root;
+}
+
+// Null if the value is not an object, or has no such member.
+const json& member(const json& value, const char* name) {
+  static const json kNull;
+  if (!value.is_object()) return kNull;
+  const auto found = value.find(name);
+  return found != value.end() ? *found : kNull;
+}
+
+std::string versionError(std::string_view version) {
+  return fmt::format(
+      "is glTF {}, which is not supported: convert it to glTF 2.0, or export it again as glTF 2.0", version);
+}
+
+// Gives the accessor of the primitive's indices a buffer view if it has none.
+void addView(const json& primitive, json& accessors) {
+  const json& view = member(member(member(primitive, "extensions"), kDracoExtension), "bufferView");
+  const json& indices = member(primitive, "indices");
+  if (!view.is_number_unsigned() || !indices.is_number_unsigned() || !accessors.is_array()) return;
+  const std::uint64_t index = indices.get<std::uint64_t>();
+  if (index >= accessors.size() || !accessors[index].is_object()) return;
+  accessors[index].emplace("bufferView", view);
+}
+
+std::string withJson(const std::string& bytes, bool binary, std::string text) {
+  if (!binary) return text;
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  const std::size_t rest = kHeaderBytes + kChunkHeaderBytes + jsonOf(bytes, true).size();
+  std::string changed = bytes.substr(0, kHeaderBytes + kChunkHeaderBytes) + text + bytes.substr(rest);
+  putWord(changed, kHeaderBytes, text.size());
+  // What is behind the stated length stays there.
+  putWord(changed, kHeaderBytes - 4, wordAt(bytes, kHeaderBytes - 4) + changed.size() - bytes.size());
+  return changed;
+}
+
+}  // namespace
+
+std::optional<std::string> unsupportedGltf(const std::string& bytes, bool binary) {
+  if (binary && bytes.size() >= kHeaderBytes && bytes.starts_with("glTF") && wordAt(bytes, 4) == 1)
+    return versionError("1.0");
+  const json root = parsed(jsonOf(bytes, binary));
+  const json& version = member(member(root, "asset"), "version");
+  // Lists of glTF 1.0 are objects.
+  const bool isOld = member(root, "meshes").is_object() || member(root, "accessors").is_object();
+  if (version.is_string() && version.get_ref<const std::string&>().starts_with("1."))
+    return versionError(version.get_ref<const std::string&>().substr(0, 8));
+  if (isOld) return versionError("1.0");
+  for (const char* list : {"extensionsRequired", "extensionsUsed"})
+    for (const json& extension : member(root, list))
+      if (extension == kMeshoptExtension) return meshoptError();
+  return std::nullopt;
+}
+
+tl::expected<std::string, std::string> prepareGltf(std::string bytes, bool binary) {
+  const std::string_view text = jsonOf(bytes, binary);
+  if (text.find(kDracoExtension) == text.npos) return bytes;
+  json root = parsed(text);
+  if (root.is_discarded())
+    return tl::unexpected(
+        fmt::format("is not glTF 2.0: its JSON is broken, or nested more than {} levels deep", kMaxDepth));
+  if (!root.is_object() || !root.contains("accessors")) return bytes;
+  json& accessors = root["accessors"];
+  for (const json& mesh : member(root, "meshes"))
+    for (const json& primitive : member(mesh, "primitives")) addView(primitive, accessors);
+  return withJson(bytes, binary, root.dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
+}  // namespace clothstream::meshes

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// The JSON of .gltf and .glb files, before tinygltf reads it.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <tl/expected.hpp>
+
+namespace clothstream::meshes {
+
+// What a file needs that is not supported, and what to do: glTF 1.0, or meshopt compression. Nothing if the
+// reason why it cannot be read is another one. `bytes` is the whole file; `binary` means .glb.
+std::optional<std::string> unsupportedGltf(const std::string& bytes, bool binary);
+
+// The bytes of a file with compressed primitives as tinygltf accepts them: it refuses accessors of indices
+// without a buffer view, so these get the one with the compressed data. Files without such primitives are
+// returned unchanged.
+[[nodiscard]] tl::expected<std::string, std::string> prepareGltf(std::string bytes, bool binary);
+
+}  // namespace clothstream::meshes

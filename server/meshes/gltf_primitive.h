@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Geometry of a primitive of a glTF file.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <tiny_gltf.h>
+#include <tl/expected.hpp>
+
+#include "server/model/mesh.h"
+
+namespace clothstream::meshes {
+
+inline constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
+inline constexpr const char* kMeshoptExtension = "EXT_meshopt_compression";
+inline constexpr const char* kQuantizationExtension = "KHR_mesh_quantization";
+
+// What to do with a file that is compressed with meshopt.
+std::string meshoptError();
+
+struct GltfPrimitive {
+  std::vector<model::Vec3> positions;  // without the transform of a node
+  std::vector<model::Uv> uvs;  // TEXCOORD_0, as many as positions, v downwards; empty if there are none
+  std::vector<std::uint32_t> indices;  // three per triangle; of any vertices
+};
+
+struct PrimitiveLimits {
+  std::uint64_t vertices = 0, triangles = 0;
+};
+
+// Reads the triangles of a primitive, which may be compressed with Draco. Larger ones are refused before
+// anything is allocated for them.
+[[nodiscard]] tl::expected<GltfPrimitive, std::string> readPrimitive(const tinygltf::Model& model,
+                                                                     const tinygltf::Primitive& primitive,
+                                                                     const PrimitiveLimits& limits);
+
+}  // namespace clothstream::meshes
