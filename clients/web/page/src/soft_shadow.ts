@@ -43,7 +43,7 @@ float softShadow(sampler2D shadowMap, vec3 coord) {
   float blockerDepth = 0.0;
   for (int i = 0; i < ${kSearchSamples}; ++i) {
     vec2 offset = ${(kUvPerDepth * kSearchDepth).toFixed(6)} * diskSample(i, ${kSearchSamples}, turn);
-    float depth = unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset));
+    float depth = texture2D(shadowMap, coord.xy + offset).r;
     if (depth < coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset)) {
       blockers += 1.0;
       blockerDepth += depth;
@@ -54,23 +54,26 @@ float softShadow(sampler2D shadowMap, vec3 coord) {
   float lit = 0.0;
   for (int i = 0; i < ${kFilterSamples}; ++i) {
     vec2 offset = radius * diskSample(i, ${kFilterSamples}, turn);
-    float depth = unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset));
+    float depth = texture2D(shadowMap, coord.xy + offset).r;
     lit += step(coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset), depth);
   }
   return lit / ${kFilterSamples}.0;
 }
 `;
 
-// Replaces three.js's filter for PCFShadowMap. Call before any material is compiled.
+// Replaces the comparison of three.js's BasicShadowMap, whose maps have plain depths. Call before any material is
+// compiled, and set the renderer's shadowMap.type to BasicShadowMap.
 export function useSoftShadows(): void {
-  const filter = "#if defined( SHADOWMAP_TYPE_PCF )";
-  const lookUp = "float getShadow(";
+  const compared = "shadow = step( shadowCoord.z, depth );";
+  const lookUp = "float getShadow( sampler2D shadowMap";
   const chunk = THREE.ShaderChunk.shadowmap_pars_fragment;
-  if (!chunk.includes(filter) || !chunk.includes(lookUp))
+  const at = chunk.lastIndexOf(lookUp);
+  if (at < 0 || chunk.split(compared).length !== 2)
     throw new Error("This version of three.js is not supported; use the version in package.json");
-  THREE.ShaderChunk.shadowmap_pars_fragment = chunk
-    .replace(lookUp, kShadowFunction + lookUp)
-    .replace(filter, `${filter}\nshadow = softShadow( shadowMap, shadowCoord.xyz );\n#elif defined( SHADOWMAP_TYPE_PCF_OF_THREE )`);
+  THREE.ShaderChunk.shadowmap_pars_fragment = (chunk.slice(0, at) + kShadowFunction + chunk.slice(at)).replace(
+    compared,
+    "shadow = softShadow( shadowMap, shadowCoord.xyz );",
+  );
 }
 
 // Aims `light` at a sphere from `direction`. The shadow map leaves room for cloth that swings out of the sphere.
