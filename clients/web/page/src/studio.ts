@@ -52,7 +52,7 @@ const kEvening: Scheme = {
     lamp: 0xffe9c8,
     outside: 0x17181c,
   },
-  sky: { above: 0x6a6a70, level: 0x62656f, below: 0x4a4038, key: 0xffe2bd, keyStrength: 3, rim: 0x8fb0e8, rimStrength: 1.6 },
+  sky: { above: 0x787880, level: 0x70737e, below: 0x5a5046, key: 0xffe2bd, keyStrength: 3, rim: 0x8fb0e8, rimStrength: 1.6 },
 };
 
 export class Studio {

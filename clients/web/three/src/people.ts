@@ -166,9 +166,9 @@ class Figures {
   addVisor(head: Collider): void {
     const { radius } = head;
     this.place.quaternion.set(...head.orientation);
-    this.place.position.set(0, 0.12 * radius, -0.42 * radius).applyQuaternion(this.place.quaternion);
+    this.place.position.set(0, 0.12 * radius, -0.4 * radius).applyQuaternion(this.place.quaternion);
     this.place.position.add(this.end1.set(...head.position));
-    this.put(this.balls, kVisorColour, 0.86 * radius, 0.42 * radius, 0.7 * radius);
+    this.put(this.balls, kVisorColour, radius, 0.4 * radius, 0.72 * radius);
   }
 
   private put(instances: Instances, colour: THREE.Color, x: number, y: number, z: number): void {
