@@ -21,7 +21,7 @@ interface Scheme {
 
 const kDay: Scheme = {
   key: 0xfff3e2,
-  keyStrength: 4,
+  keyStrength: 4.6,
   rim: 0xcfe0f5,
   rimStrength: 0.7,
   room: {
@@ -34,7 +34,7 @@ const kDay: Scheme = {
     lamp: 0xfffaf0,
     outside: 0xcfc9be,
   },
-  sky: { above: 0xa9aaac, level: 0x8f8c86, below: 0x6b5a46, key: 0xfff3e2, keyStrength: 3, rim: 0xcfe2fa, rimStrength: 2 },
+  sky: { above: 0x8e9196, level: 0x787570, below: 0x66553f, key: 0xfff3e2, keyStrength: 3, rim: 0xcfe2fa, rimStrength: 2 },
 };
 
 const kEvening: Scheme = {
