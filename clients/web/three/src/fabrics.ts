@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// What each material of the server looks like.
+// Appearance of each material of the server.
 
 import type { Pattern } from "./weave";
 
 export interface Fabric {
   pattern: Pattern;
   pitch: number; // distance of neighbouring threads, m; larger than real ones, so that a headset resolves them
-  colour?: number; // sRGB; absent: the fabric is dyed, and each cloth has a colour of its own
+  colour?: number; // sRGB; absent: the fabric is dyed, in a different colour for each cloth
   weft: number; // brightness of the weft compared with the warp; above 1 the weft is also paler
   variation: number; // spread of the brightness of threads, as a fraction
   reverse: number; // brightness of the back compared with the front

@@ -162,7 +162,7 @@ class Figures {
     }
   }
 
-  // A dark visor on the front of a head, which looks along -Z of its own frame.
+  // A dark visor on the front of a head, which looks along -Z of the collider's frame.
   addVisor(head: Collider): void {
     const { radius } = head;
     this.place.quaternion.set(...head.orientation);
