@@ -42,7 +42,8 @@ export class Room {
     const reach = (axis: "x" | "z") => Math.max(bounds.max[axis] - middle[axis], middle[axis] - bounds.min[axis]);
     const width = Math.max(kWidth, 2.6 * reach("x") + 3);
     const depth = Math.max(kWidth, 2.6 * reach("z") + 3);
-    const height = Math.max(kHeight, 1.25 * (bounds.max.y - floorHeight) + 0.4);
+    // High enough for the default view, which is farther away and higher for wide scenes.
+    const height = Math.max(kHeight, 1.25 * (bounds.max.y - floorHeight) + 0.4, 0.3 * Math.max(width, depth));
     this.group.position.set(middle.x, floorHeight, middle.z);
 
     const size = kFloorReach * Math.max(width, depth);

@@ -81,8 +81,7 @@ export function useSoftShadows(): void {
   const lookUp = "float getShadow( sampler2D shadowMap";
   const chunk = THREE.ShaderChunk.shadowmap_pars_fragment;
   const at = chunk.lastIndexOf(lookUp);
-  if (at < 0 || chunk.split(compared).length !== 2)
-    throw new Error(kUnsupported);
+  if (at < 0 || chunk.split(compared).length !== 2) throw new Error(kUnsupported);
   offsetBothSides();
   THREE.ShaderChunk.shadowmap_pars_fragment = (chunk.slice(0, at) + kShadowFunction + chunk.slice(at)).replace(
     compared,
@@ -103,7 +102,7 @@ function offsetBothSides(): void {
   );
 }
 
-// Cheap shadows need a seventh of the samples: for headsets and phones. Takes effect in the next frame.
+// Cheap shadows need a sixth of the samples: for headsets and phones. Takes effect in the next frame.
 export function setCheapShadows(light: THREE.DirectionalLight, cheap: boolean): void {
   light.shadow.radius = cheap ? 0 : 1;
 }
