@@ -39,7 +39,7 @@ struct ProgramOptions {
 
   // Scenes, participants and device. `defaultScene` is also the scene of `step`; `device` is also the device
   // of `step` and `resimulate`.
-  hosting::ServerOptions server{.device = {}, .defaultScene = "curtain", .serverName = kServerName};
+  hosting::ServerOptions server{.device = {}, .defaultScene = "veil", .serverName = kServerName};
   std::vector<std::filesystem::path> sceneFiles;
   // Overrides for the default scene; unset keeps the scene's own value.
   std::optional<std::uint32_t> rate, substeps;

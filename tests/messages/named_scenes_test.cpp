@@ -64,7 +64,8 @@ TEST(NamedScenes, AreAllListed) {
                                                      "solver_xpbd",
                                                      "sphere_drop",
                                                      "swing",
-                                                     "tablecloth"}));
+                                                     "tablecloth",
+                                                     "veil"}));
 }
 
 TEST(NamedScenes, SphereDropComesToRestOnTheSphere) {

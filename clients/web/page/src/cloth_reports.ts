@@ -13,6 +13,8 @@ interface Card {
   figures: Map<Figure, HTMLElement>;
 }
 
+const kImplicitEuler = 5; // CS_SOLVER_IMPLICIT_EULER
+
 export class ClothReports {
   private readonly list = element("cloths");
   private readonly deviceMs = element("device-ms");
@@ -57,7 +59,12 @@ export class ClothReports {
 
   // Sends choices to the client. Call once per drawn frame.
   apply(client: Client): void {
-    for (const [cloth, material] of this.chosenMaterials) client.parameters.setMaterial(cloth, material);
+    for (const [cloth, material] of this.chosenMaterials) {
+      const solver = client.parameters.solver(client.frames.cloths().findIndex(({ name }) => name === cloth));
+      client.parameters.setMaterial(cloth, material);
+      // A material selects XPBD. Implicit Euler holds any material with fewer substeps, so a cloth that has it keeps it.
+      if (solver === kImplicitEuler) client.parameters.setSolver(cloth, solver);
+    }
     for (const [cloth, solver] of this.chosen) client.parameters.setSolver(cloth, solver);
     this.chosenMaterials.clear();
     this.chosen.clear();

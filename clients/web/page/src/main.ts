@@ -14,6 +14,7 @@ import { Pusher, type Tool } from "./pusher";
 import { expose } from "./probe";
 import { showAddress } from "./share";
 import { View } from "./view";
+import { chosenDetail } from "./detail";
 
 const kFiguresPeriodMs = 250;
 
@@ -24,7 +25,7 @@ async function start(): Promise<void> {
   });
   let view: View;
   try {
-    view = new View(element<HTMLCanvasElement>("canvas"));
+    view = new View(element<HTMLCanvasElement>("canvas"), chosenDetail());
   } catch (error) {
     hud.showFatal(
       "This page needs WebGL 2, which this browser does not provide. " +
@@ -85,8 +86,10 @@ async function start(): Promise<void> {
     parametersChanged: (client) => {
       controls.show(client);
       reports.showSolvers(client);
+      view.dress(client);
     },
     participantsChanged: (client) => {
+      view.name(client);
       hud.showParticipants(client);
       pairing.showFor(client);
     },

@@ -18,7 +18,9 @@ export interface Probe {
   // Newest report of each cloth, undefined before the first.
   readonly reports: (ClothReport | undefined)[];
   readonly colliders: Collider[];
-  // Drawn positions of the colliders.
+  // Names of other participants that are drawn, and the places of their labels.
+  readonly people: View["shownPeople"];
+  // Drawn positions of the scene's colliders.
   readonly drawnColliders: Vec3[];
   readonly participants: Participant[];
   // Defined if the scene is a recording.
@@ -82,6 +84,9 @@ export function expose(session: Session, view: View, headset: Headset): { descri
     },
     get colliders() {
       return session.client.frames.colliders();
+    },
+    get people() {
+      return view.shownPeople;
     },
     get drawnColliders() {
       return view.colliders.map(({ position }) => position.toArray());

@@ -16,6 +16,9 @@ const kSearchDepth = 0.25;
 // Samples that search for blockers, and samples that average the shadow.
 const kSearchSamples = 12;
 const kFilterSamples = 18;
+// Samples of a cheap shadow, which is equally soft everywhere, and the radius of their disk in texels.
+const kCheapSamples = 5;
+const kCheapRadius = 3.5;
 
 const kDepthPerWidth = kWidth / (kFar - kNear);
 // Largest slope of a surface, and tolerance for its curvature within the reach of a sample.
@@ -29,7 +32,18 @@ vec2 diskSample(int index, int count, float turn) {
   return sqrt((float(index) + 0.5) / float(count)) * vec2(cos(angle), sin(angle));
 }
 
-float softShadow(sampler2D shadowMap, vec3 coord) {
+// Part of a disk of the map that does not shade the surface.
+float litPart(sampler2D shadowMap, vec3 coord, vec2 slope, float turn, float radius, int samples) {
+  float lit = 0.0;
+  for (int i = 0; i < samples; ++i) {
+    vec2 offset = radius * diskSample(i, samples, turn);
+    float depth = texture2D(shadowMap, coord.xy + offset).r;
+    lit += step(coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset), depth);
+  }
+  return lit / float(samples);
+}
+
+float softShadow(sampler2D shadowMap, vec3 coord, bool cheap) {
   // Slope of depth along the surface in map coordinates. It prevents inclined surfaces from shading themselves.
   vec3 dx = dFdx(coord);
   vec3 dy = dFdy(coord);
@@ -39,11 +53,12 @@ float softShadow(sampler2D shadowMap, vec3 coord) {
 
   // Interleaved gradient noise rotates the disk per pixel. It turns bands of few samples into noise.
   float turn = 6.2831853 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+  if (cheap) return litPart(shadowMap, coord, slope, turn, ${(kCheapRadius / kTexels).toFixed(6)}, ${kCheapSamples});
   float blockers = 0.0;
   float blockerDepth = 0.0;
   for (int i = 0; i < ${kSearchSamples}; ++i) {
     vec2 offset = ${(kUvPerDepth * kSearchDepth).toFixed(6)} * diskSample(i, ${kSearchSamples}, turn);
-    float depth = unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset));
+    float depth = texture2D(shadowMap, coord.xy + offset).r;
     if (depth < coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset)) {
       blockers += 1.0;
       blockerDepth += depth;
@@ -51,26 +66,45 @@ float softShadow(sampler2D shadowMap, vec3 coord) {
   }
   if (blockers == 0.0) return 1.0;
   float radius = max(${kUvPerDepth.toFixed(6)} * (coord.z - blockerDepth / blockers), ${(1.5 / kTexels).toFixed(6)});
-  float lit = 0.0;
-  for (int i = 0; i < ${kFilterSamples}; ++i) {
-    vec2 offset = radius * diskSample(i, ${kFilterSamples}, turn);
-    float depth = unpackRGBAToDepth(texture2D(shadowMap, coord.xy + offset));
-    lit += step(coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset), depth);
-  }
-  return lit / ${kFilterSamples}.0;
+  float lit = litPart(shadowMap, coord, slope, turn, radius, ${kFilterSamples});
+  // Few blockers: the shadow fades out, so that pixels whose search finds none do not stand out.
+  return mix(1.0, lit, min(1.0, blockers / 3.0));
 }
 `;
 
-// Replaces three.js's filter for PCFShadowMap. Call before any material is compiled.
+const kUnsupported = "This version of three.js is not supported; use the version in package.json";
+
+// Replaces the comparison of three.js's BasicShadowMap, whose maps have plain depths. Call before any material is
+// compiled, and set the renderer's shadowMap.type to BasicShadowMap.
 export function useSoftShadows(): void {
-  const filter = "#if defined( SHADOWMAP_TYPE_PCF )";
-  const lookUp = "float getShadow(";
+  const compared = "shadow = step( shadowCoord.z, depth );";
+  const lookUp = "float getShadow( sampler2D shadowMap";
   const chunk = THREE.ShaderChunk.shadowmap_pars_fragment;
-  if (!chunk.includes(filter) || !chunk.includes(lookUp))
-    throw new Error("This version of three.js is not supported; use the version in package.json");
-  THREE.ShaderChunk.shadowmap_pars_fragment = chunk
-    .replace(lookUp, kShadowFunction + lookUp)
-    .replace(filter, `${filter}\nshadow = softShadow( shadowMap, shadowCoord.xyz );\n#elif defined( SHADOWMAP_TYPE_PCF_OF_THREE )`);
+  const at = chunk.lastIndexOf(lookUp);
+  if (at < 0 || chunk.split(compared).length !== 2) throw new Error(kUnsupported);
+  offsetBothSides();
+  THREE.ShaderChunk.shadowmap_pars_fragment = (chunk.slice(0, at) + kShadowFunction + chunk.slice(at)).replace(
+    compared,
+    "shadow = softShadow( shadowMap, shadowCoord.xyz, shadowRadius == 0.0 );",
+  );
+}
+
+// Moves the point for which a shadow is looked up towards the light on both sides of a surface. three.js moves it along the
+// normal, so a cloth whose front faces away from the light would shade its lit back.
+function offsetBothSides(): void {
+  const offset = "worldPosition + vec4( shadowWorldNormal * directionalLightShadows[ i ].shadowNormalBias, 0 )";
+  const chunk = THREE.ShaderChunk.shadowmap_vertex;
+  if (!chunk.includes(offset)) throw new Error(kUnsupported);
+  const away = "vec3( directionalShadowMatrix[ i ][ 0 ].z, directionalShadowMatrix[ i ][ 1 ].z, directionalShadowMatrix[ i ][ 2 ].z )";
+  THREE.ShaderChunk.shadowmap_vertex = chunk.replace(
+    "shadowWorldNormal * directionalLightShadows",
+    `faceforward( shadowWorldNormal, ${away}, shadowWorldNormal ) * directionalLightShadows`,
+  );
+}
+
+// Cheap shadows need a sixth of the samples: for headsets and phones. Takes effect in the next frame.
+export function setCheapShadows(light: THREE.DirectionalLight, cheap: boolean): void {
+  light.shadow.radius = cheap ? 0 : 1;
 }
 
 // Aims `light` at a sphere from `direction`. The shadow map leaves room for cloth that swings out of the sphere.

@@ -1,56 +1,140 @@
 // SPDX-License-Identifier: MIT
-// Surroundings of the cloths: lights, shadow, floor and background, fitted to the size of the scene.
+// Surroundings of the cloths: room, lights, shadow and background, fitted to the scene and to the preferred colour scheme.
 
 import * as THREE from "three";
-import { aimSoftLight } from "./soft_shadow";
+import type { Detail } from "@clothstream/three";
+import { Room, type RoomColours } from "./room";
+import { Sky, type SkyColours } from "./sky";
+import { aimSoftLight, setCheapShadows } from "./soft_shadow";
 
-const kBackground = 0x1b1c20;
-const kKeyDirection = new THREE.Vector3(0.8, 1.0, 0.65);
+const kKeyDirection = new THREE.Vector3(0.8, 1.0, 0.65).normalize();
+const kRimDirection = new THREE.Vector3(-0.8, 0.5, -0.7).normalize();
+
+interface Scheme {
+  key: number;
+  keyStrength: number;
+  rim: number;
+  rimStrength: number;
+  room: RoomColours;
+  sky: SkyColours;
+}
+
+const kDay: Scheme = {
+  key: 0xfff3e2,
+  keyStrength: 4.6,
+  rim: 0xcfe0f5,
+  rimStrength: 0.7,
+  room: {
+    wall: 0xf6ecda,
+    ceiling: 0xfaf3e6,
+    trim: 0xfffaf0,
+    floor: 0xffffff,
+    sky: 0xbcd8f3,
+    skyBelow: 0xf4f6f4,
+    lamp: 0xfffaf0,
+    outside: 0xcfc9be,
+  },
+  sky: { above: 0x8e9196, level: 0x787570, below: 0x66553f, key: 0xfff3e2, keyStrength: 3, rim: 0xcfe2fa, rimStrength: 2 },
+};
+
+const kEvening: Scheme = {
+  key: 0xffe2bd,
+  keyStrength: 3.3,
+  rim: 0x8fb0e8,
+  rimStrength: 1,
+  room: {
+    wall: 0x35373f,
+    ceiling: 0x2a2c32,
+    trim: 0x4a4c54,
+    floor: 0x6e6259,
+    sky: 0x20324f,
+    skyBelow: 0x6b7f9e,
+    lamp: 0xffe9c8,
+    outside: 0x17181c,
+  },
+  sky: { above: 0x787880, level: 0x70737e, below: 0x5a5046, key: 0xffe2bd, keyStrength: 3, rim: 0x8fb0e8, rimStrength: 1.6 },
+};
 
 export class Studio {
   readonly scene = new THREE.Scene();
-  private readonly key = new THREE.DirectionalLight(0xfff1df, 3.0);
-  private readonly rim = new THREE.DirectionalLight(0xb4c4de, 0.7);
-  private readonly floor: THREE.Mesh<THREE.CircleGeometry, THREE.MeshStandardMaterial>;
-  private readonly fog = new THREE.Fog(kBackground);
+  private readonly room = new Room();
+  private readonly key = new THREE.DirectionalLight();
+  private readonly rim = new THREE.DirectionalLight();
+  private readonly ambient = new THREE.LightProbe();
+  private readonly fog = new THREE.Fog(0);
+  private readonly background = new THREE.Color();
+  // Shows the shadow of the cloths on the real floor while the room is hidden.
+  private readonly catcher = new THREE.Mesh(new THREE.CircleGeometry(1, 48), new THREE.ShadowMaterial({ opacity: 0.4 }));
+  private readonly dark = window.matchMedia("(prefers-color-scheme: dark)");
+  private readonly bounds = new THREE.Box3();
+  private floorHeight = 0;
+  private reflected: THREE.WebGLRenderTarget | undefined;
 
-  constructor() {
-    this.scene.background = new THREE.Color(kBackground);
-    this.scene.fog = this.fog;
-    this.scene.add(new THREE.HemisphereLight(0xe9ecf2, 0xa39a93, 2.3));
+  constructor(
+    private readonly renderer: THREE.WebGLRenderer,
+    private readonly detail: Detail,
+    private readonly reflectionsChanged: (reflections: THREE.Texture) => void,
+  ) {
+    this.catcher.rotation.x = -Math.PI / 2;
+    this.catcher.receiveShadow = true;
+    this.scene.add(this.key, this.key.target, this.rim, this.rim.target, this.ambient, this.room.group, this.catcher);
+    this.passThrough(false);
+    this.light();
+    this.dark.addEventListener("change", () => {
+      this.light();
+      this.fit(this.bounds, this.floorHeight);
+    });
+  }
 
-    this.scene.add(this.key, this.key.target, this.rim, this.rim.target);
+  // Hides room, background and fog, so that the real room is seen. Shadows still fall on its floor.
+  passThrough(on: boolean): void {
+    this.room.group.visible = !on;
+    this.catcher.visible = on;
+    this.scene.background = on ? null : this.background;
+    this.scene.fog = on ? null : this.fog;
+  }
 
-    const material = new THREE.MeshStandardMaterial({ color: 0x27282b, roughness: 0.95 });
-    this.floor = new THREE.Mesh(new THREE.CircleGeometry(1, 96), material);
-    this.floor.rotation.x = -Math.PI / 2;
-    this.floor.receiveShadow = true;
-    this.scene.add(this.floor);
+  // Shadows that need fewer samples, for headsets and phones.
+  set cheapShadows(cheap: boolean) {
+    setCheapShadows(this.key, cheap);
   }
 
   // Unit vector from the scene to the key light.
   get lightDirection(): THREE.Vector3 {
-    return this.key.position.clone().sub(this.key.target.position).normalize();
-  }
-
-  // Hides floor, fog and background, so that the real room is seen.
-  passThrough(on: boolean): void {
-    this.floor.visible = !on;
-    this.scene.background = on ? null : new THREE.Color(kBackground);
-    this.scene.fog = on ? null : this.fog;
+    return kKeyDirection.clone();
   }
 
   fit(bounds: THREE.Box3, floorHeight: number): void {
-    const centre = bounds.getCenter(new THREE.Vector3());
-    const radius = bounds.getBoundingSphere(new THREE.Sphere()).radius;
+    this.bounds.copy(bounds);
+    this.floorHeight = floorHeight;
+    const sphere = bounds.getBoundingSphere(new THREE.Sphere());
+    const diagonal = this.room.fit(bounds, floorHeight, kKeyDirection, this.scheme.room);
+    this.fog.near = 1.3 * diagonal;
+    this.fog.far = 4 * diagonal;
+    this.catcher.position.set(sphere.center.x, floorHeight, sphere.center.z);
+    this.catcher.scale.setScalar(3 * sphere.radius);
+    aimSoftLight(this.key, sphere, kKeyDirection);
+    this.rim.target.position.copy(sphere.center);
+    this.rim.position.copy(kRimDirection).multiplyScalar(4 * sphere.radius).add(sphere.center);
+  }
 
-    this.floor.position.y = floorHeight;
-    this.floor.scale.setScalar(20 * radius);
-    this.fog.near = 3.5 * radius;
-    this.fog.far = 17 * radius;
+  private get scheme(): Scheme {
+    return this.dark.matches ? kEvening : kDay;
+  }
 
-    aimSoftLight(this.key, new THREE.Sphere(centre, radius), kKeyDirection);
-    this.rim.target.position.copy(centre);
-    this.rim.position.set(-0.8, 0.5, -0.7).normalize().multiplyScalar(4 * radius).add(centre);
+  private light(): void {
+    const { key, keyStrength, rim, rimStrength, room, sky: colours } = this.scheme;
+    this.key.color.set(key);
+    this.key.intensity = keyStrength;
+    this.rim.color.set(rim);
+    this.rim.intensity = rimStrength;
+    const sky = new Sky(colours, kKeyDirection, kRimDirection);
+    this.ambient.sh.copy(sky.probe());
+    this.fog.color.set(room.outside);
+    this.background.set(room.outside);
+    if (this.detail === "reduced") return;
+    this.reflected?.dispose();
+    this.reflected = sky.reflections(this.renderer);
+    this.reflectionsChanged(this.reflected.texture);
   }
 }

@@ -4,7 +4,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Shape, type Client, type Vec3 } from "@clothstream/client";
-import { ClothMesh, ColliderMeshes, reachOf, type ColliderMesh } from "@clothstream/three";
+import { ClothMesh, ColliderMeshes, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
 
@@ -17,21 +17,28 @@ export class View {
   readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
   readonly orbit: OrbitControls;
   readonly renderer: THREE.WebGLRenderer;
-  private readonly studio = new Studio();
-  private readonly colliderMeshes = new ColliderMeshes(this.studio.scene);
+  private readonly studio: Studio;
+  private readonly colliderMeshes = new ColliderMeshes();
+  private readonly people = new People();
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private cloths: ClothMesh[] = [];
   private vertexCount = 0;
+  private readonly eye = new THREE.Vector3();
   private floorHeight = 0;
 
   // Throws if the browser does not provide WebGL 2.
-  constructor(readonly canvas: HTMLCanvasElement) {
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    private readonly detail: Detail,
+  ) {
     useSoftShadows();
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    this.renderer.shadowMap.type = THREE.BasicShadowMap;
     this.renderer.toneMapping = THREE.AgXToneMapping;
-    this.renderer.toneMappingExposure = 1.15;
+    this.renderer.toneMappingExposure = 1.35;
+    this.studio = new Studio(this.renderer, detail, (reflections) => this.colliderMeshes.reflect(reflections));
+    this.studio.scene.add(this.colliderMeshes.group, this.people.group);
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.enableDamping = true;
     this.orbit.dampingFactor = 0.12;
@@ -58,6 +65,11 @@ export class View {
     return this.colliderMeshes.meshes;
   }
 
+  // Names of other participants that are shown, and the places of their labels.
+  get shownPeople(): People["shown"] {
+    return this.people.shown;
+  }
+
   get clothMeshes(): THREE.Mesh[] {
     return this.cloths.map((cloth) => cloth.mesh);
   }
@@ -73,7 +85,10 @@ export class View {
     const drawings = layouts.map((_, number) => client.frames.drawing(number));
     const rest = client.frames.positions();
     const triangles = client.frames.triangles();
-    this.cloths = layouts.map((layout, number) => new ClothMesh(layout, drawings[number]!, rest, triangles, number));
+    this.cloths = layouts.map((layout, number) => {
+      const look = { number, material: client.parameters.material(number), detail: this.detail };
+      return new ClothMesh(layout, drawings[number]!, rest, triangles, look);
+    });
     for (const cloth of this.cloths) this.studio.scene.add(cloth.mesh);
 
     this.bounds.makeEmpty();
@@ -88,6 +103,16 @@ export class View {
     this.fit();
   }
 
+  // Shows the current materials of the cloths. Call when parameters change.
+  dress(client: Client): void {
+    this.cloths.forEach((cloth, number) => cloth.dress(client.parameters.material(number)));
+  }
+
+  // Shows the names of the participants. Call when they change.
+  name(client: Client): void {
+    this.people.name(client.people.participants());
+  }
+
   // Draws the frame for a time of performance.now(). Reads the core's memory only during the call.
   draw(client: Client | undefined, now: number): void {
     // A joining client has no vertices yet. The last frame of the previous client stays until the description arrives.
@@ -97,8 +122,12 @@ export class View {
       const positions = client.frames.shownPositions();
       for (const cloth of this.cloths) cloth.update(positions, normals);
       this.colliderMeshes.place(client);
+      const { isPresenting } = this.renderer.xr;
+      const eye = isPresenting ? this.renderer.xr.getCamera() : this.camera;
+      this.people.place(client.frames.shownColliders(), this.studio.scene.worldToLocal(eye.getWorldPosition(this.eye)), !isPresenting);
     }
     if (!this.renderer.xr.isPresenting) this.orbit.update();
+    this.studio.cheapShadows = this.detail === "reduced" || this.renderer.xr.isPresenting;
     this.renderer.render(this.studio.scene, this.camera);
   }
 
@@ -181,7 +210,7 @@ export class View {
   resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
     if (clientWidth === 0 || clientHeight === 0 || this.renderer.xr.isPresenting) return;
-    const ratio = Math.min(window.devicePixelRatio, 2);
+    const ratio = Math.min(window.devicePixelRatio, this.detail === "full" ? 2 : 1.25);
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;

@@ -3,22 +3,30 @@
 
 import * as THREE from "three";
 import type { ClothLayout, Drawing } from "@clothstream/client";
+import { type Detail, fabricMaterial } from "./fabric_material";
+import { fabricOf } from "./fabrics";
 import { type DrawnVertices, separateSeams } from "./seams";
 
 // Madder, indigo, ochre, moss, plum and linen. Their brightness differs too, for colour-blind viewers.
-const kColours = [0x8a3433, 0x2a567a, 0xb5843c, 0x55714a, 0x745684, 0xb5a98f];
+const kColours = [0x84161f, 0x1c4f7c, 0xb87f22, 0x47693a, 0x6a3f80, 0xb5a98c];
 
-// Width of one tile of the weave, two threads, in metres.
-const kWeaveTile = 0.012;
 // Expected motion of a cloth, as a fraction of its size.
 const kSwing = 0.3;
-const kWeaveTexels = 32;
+
+// How a cloth is drawn. `number` selects the colour of dyed fabrics; `material` is a name of the server, or "".
+export interface ClothLook {
+  number: number;
+  material: string;
+  detail: Detail;
+}
 
 export class ClothMesh {
   readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.MeshPhysicalMaterial[]>;
   private readonly positions: THREE.BufferAttribute;
   private readonly normals: THREE.BufferAttribute;
   private readonly drawn: DrawnVertices;
+  private readonly parts: number;
+  private readonly woven: boolean;
 
   // `restPositions` and `triangles` belong to the whole scene and are copied.
   constructor(
@@ -26,7 +34,7 @@ export class ClothMesh {
     drawing: Drawing,
     restPositions: Float32Array,
     triangles: Uint32Array,
-    number: number,
+    private readonly look: ClothLook,
   ) {
     const corners = triangles
       .subarray(layout.firstIndex, layout.firstIndex + layout.indexCount)
@@ -40,18 +48,27 @@ export class ClothMesh {
     geometry.setAttribute("position", this.positions);
     geometry.setAttribute("normal", this.normals);
     geometry.setIndex(new THREE.BufferAttribute(this.drawn.indices, 1));
-    const uvs = this.threadCoordinates(drawing, rest);
+    const uvs = this.metricCoordinates(drawing, rest);
+    this.woven = uvs !== undefined;
     if (uvs) geometry.setAttribute("uv", new THREE.BufferAttribute(uvs, 2));
 
     const parts = drawing.submeshes.length > 0 ? drawing.submeshes : [layout];
     parts.forEach((part, index) => geometry.addGroup(part.firstIndex - layout.firstIndex, part.indexCount, index));
-    const materials = parts.map((_, index) => fabric(kColours[(number + 2 * index) % kColours.length]!, uvs !== undefined));
-    this.mesh = new THREE.Mesh(geometry, materials);
+    this.parts = parts.length;
+    this.mesh = new THREE.Mesh(geometry, []);
+    this.makeMaterials();
     this.mesh.castShadow = true;
     this.mesh.receiveShadow = true;
     // Vertices move every frame. Updating the bounds would cost more than it saves in drawing and picking.
     this.mesh.frustumCulled = false;
     geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), Infinity);
+  }
+
+  // Shows another material of the server.
+  dress(material: string): void {
+    if (material === this.look.material) return;
+    this.look.material = material;
+    this.makeMaterials();
   }
 
   // The arrays belong to the whole scene and to the core's memory. They are read when the frame is drawn.
@@ -66,13 +83,13 @@ export class ClothMesh {
     }
   }
 
-  // Box in which the cloth will mostly stay: its start, extended downwards and to both sides.
+  // Box in which the cloth will mostly stay: its start, extended downwards, and to both sides if it hangs.
   reach(): THREE.Box3 {
     const box = new THREE.Box3().setFromBufferAttribute(this.positions);
     const size = box.getSize(new THREE.Vector3());
     const swing = kSwing * Math.max(size.x, size.y, size.z);
     box.min.y -= swing;
-    return box.expandByVector(new THREE.Vector3(0, 0, swing / 2));
+    return box.expandByVector(new THREE.Vector3(0, 0, size.y > swing ? swing / 2 : 0));
   }
 
   dispose(): void {
@@ -80,14 +97,22 @@ export class ClothMesh {
     for (const material of this.mesh.material) material.dispose();
   }
 
-  // Texture coordinates in units of threads, so that all cloths have threads of equal size. Undefined for a mesh
-  // without coordinates.
-  private threadCoordinates(drawing: Drawing, rest: Float32Array): Float32Array | undefined {
-    if (this.layout.rows > 1 && this.layout.columns > 1) return gridThreads(this.layout, rest);
+  private makeMaterials(): void {
+    const { number, material, detail } = this.look;
+    const fabric = fabricOf(material);
+    const dye = (part: number) => kColours[(number + 2 * part) % kColours.length]!;
+    for (const old of this.mesh.material) old.dispose();
+    this.mesh.material = Array.from({ length: this.parts }, (_, part) => fabricMaterial(fabric, dye(part), this.woven, detail));
+  }
+
+  // Texture coordinates in metres, so that all cloths have threads of equal size. Undefined for a mesh without
+  // coordinates.
+  private metricCoordinates(drawing: Drawing, rest: Float32Array): Float32Array | undefined {
+    if (this.layout.rows > 1 && this.layout.columns > 1) return gridCoordinates(this.layout, rest);
     if (drawing.uvs.length === 0) return undefined;
     const uvs = new Float32Array(2 * this.drawn.count);
     this.drawn.uvs.forEach((uv, vertex) => uvs.set(drawing.uvs.subarray(2 * uv, 2 * uv + 2), 2 * vertex));
-    const scale = metresPerUv(this.drawn.indices, rest, uvs) / kWeaveTile;
+    const scale = metresPerUv(this.drawn.indices, rest, uvs);
     return uvs.map((coordinate) => coordinate * scale);
   }
 
@@ -105,23 +130,6 @@ export class ClothMesh {
   }
 }
 
-function fabric(colourOfThreads: number, woven: boolean): THREE.MeshPhysicalMaterial {
-  const colour = new THREE.Color(colourOfThreads);
-  const material = new THREE.MeshPhysicalMaterial({
-    color: colour,
-    roughness: 0.82,
-    sheen: 0.35,
-    sheenRoughness: 0.45,
-    sheenColor: colour.clone().lerp(new THREE.Color(0xffffff), 0.35),
-    side: THREE.DoubleSide,
-  });
-  if (woven) {
-    material.normalMap = weaveNormals();
-    material.normalScale.setScalar(0.22);
-  }
-  return material;
-}
-
 // Metres of cloth per unit of texture coordinates, from the areas of all triangles.
 function metresPerUv(indices: Uint32Array, rest: Float32Array, uvs: Float32Array): number {
   const corner = (k: number) => new THREE.Vector3().fromArray(rest, 3 * indices[k]!);
@@ -136,47 +144,15 @@ function metresPerUv(indices: Uint32Array, rest: Float32Array, uvs: Float32Array
   return texture > 0 ? Math.sqrt(cloth / texture) : 0;
 }
 
-function gridThreads(layout: ClothLayout, rest: Float32Array): Float32Array {
+function gridCoordinates(layout: ClothLayout, rest: Float32Array): Float32Array {
   const vertex = (row: number, column: number) =>
     new THREE.Vector3().fromArray(rest, 3 * (row * layout.columns + column));
-  const width = vertex(0, 0).distanceTo(vertex(0, layout.columns - 1)) / kWeaveTile;
-  const height = vertex(0, 0).distanceTo(vertex(layout.rows - 1, 0)) / kWeaveTile;
+  const width = vertex(0, 0).distanceTo(vertex(0, layout.columns - 1));
+  const height = vertex(0, 0).distanceTo(vertex(layout.rows - 1, 0));
   const coordinates = new Float32Array(2 * layout.vertexCount);
   for (let i = 0; i < layout.vertexCount; ++i) {
     coordinates[2 * i] = ((i % layout.columns) / (layout.columns - 1)) * width;
     coordinates[2 * i + 1] = -(Math.floor(i / layout.columns) / (layout.rows - 1)) * height;
   }
   return coordinates;
-}
-
-let weave: THREE.DataTexture | undefined;
-
-// Normal map of a plain weave: round threads that pass over and under each other.
-function weaveNormals(): THREE.DataTexture {
-  if (weave) return weave;
-  const height = (x: number, y: number) => {
-    const warp = Math.abs(Math.sin(Math.PI * x)) + 0.5 * Math.cos(Math.PI * y) * (Math.floor(x) % 2 ? 1 : -1);
-    const weft = Math.abs(Math.sin(Math.PI * y)) + 0.5 * Math.cos(Math.PI * x) * (Math.floor(y) % 2 ? -1 : 1);
-    return 0.3 * Math.max(warp, weft);
-  };
-  const texels = new Uint8Array(4 * kWeaveTexels * kWeaveTexels);
-  const normal = new THREE.Vector3();
-  const step = 2 / kWeaveTexels;
-  for (let row = 0; row < kWeaveTexels; ++row) {
-    for (let column = 0; column < kWeaveTexels; ++column) {
-      const x = (column + 0.5) * step;
-      const y = (row + 0.5) * step;
-      normal.set((height(x - step, y) - height(x + step, y)) / (2 * step), (height(x, y - step) - height(x, y + step)) / (2 * step), 1);
-      normal.normalize().addScalar(1).multiplyScalar(127.5);
-      texels.set([normal.x, normal.y, normal.z, 255], 4 * (row * kWeaveTexels + column));
-    }
-  }
-  weave = new THREE.DataTexture(texels, kWeaveTexels, kWeaveTexels);
-  weave.wrapS = weave.wrapT = THREE.RepeatWrapping;
-  weave.magFilter = THREE.LinearFilter;
-  weave.minFilter = THREE.LinearMipmapLinearFilter;
-  weave.generateMipmaps = true;
-  weave.anisotropy = 8;
-  weave.needsUpdate = true;
-  return weave;
 }

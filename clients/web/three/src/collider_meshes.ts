@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Colliders as three.js meshes, one per collider in the order of shownColliders().
+// Colliders of the scene as three.js meshes, one per collider in the order of shownColliders(). Those of participants are
+// drawn by People.
 
 import * as THREE from "three";
 import { Shape, type Client, type Collider } from "@clothstream/client";
@@ -11,10 +12,25 @@ const kShrink = 0.985;
 // Half the edge of the drawn part of a plane, metres.
 const kPlaneReach = 4;
 
-export class ColliderMeshes {
-  readonly meshes: ColliderMesh[] = [];
+// Glazed ceramic, oiled wood, floor, plaster and stone.
+const kLooks: Record<Shape, THREE.MeshStandardMaterialParameters> = {
+  [Shape.sphere]: { color: 0xd5cdbd, roughness: 0.16, envMapIntensity: 0.5 },
+  [Shape.capsule]: { color: 0x6e4a2f, roughness: 0.45, envMapIntensity: 0.4 },
+  [Shape.plane]: { color: 0xb7b0a4, roughness: 0.8, envMapIntensity: 0 },
+  [Shape.box]: { color: 0xcfc8bb, roughness: 0.8, envMapIntensity: 0 },
+  [Shape.hull]: { color: 0x9a958c, roughness: 0.6, envMapIntensity: 0.2 },
+};
 
-  constructor(private readonly scene: THREE.Scene) {}
+export class ColliderMeshes {
+  readonly group = new THREE.Group();
+  readonly meshes: ColliderMesh[] = [];
+  private reflections: THREE.Texture | null = null;
+
+  // Sets the map that smooth colliders reflect.
+  reflect(reflections: THREE.Texture): void {
+    this.reflections = reflections;
+    for (const { material } of this.meshes) material.envMap = reflections;
+  }
 
   // Removes all meshes, because a new description brings new hulls.
   describe(): void {
@@ -22,7 +38,7 @@ export class ColliderMeshes {
   }
 
   place(client: Client): void {
-    const colliders = client.frames.shownColliders();
+    const colliders = client.frames.shownColliders().filter(({ participantId }) => participantId === 0n);
     while (this.meshes.length > colliders.length) this.remove(this.meshes.pop()!);
     colliders.forEach((collider, index) => {
       const look = lookOf(collider);
@@ -30,16 +46,17 @@ export class ColliderMeshes {
       if (mesh?.userData["look"] !== look) {
         if (mesh) this.remove(mesh);
         mesh = this.meshes[index] = makeMesh(client, collider, look);
-        this.scene.add(mesh);
+        mesh.material.envMap = this.reflections;
+        this.group.add(mesh);
       }
-      mesh.name = collider.participantId === 0n ? collider.name : "";
+      mesh.name = collider.name;
       mesh.position.set(...collider.position);
       mesh.quaternion.set(...collider.orientation);
     });
   }
 
   private remove(mesh: ColliderMesh): void {
-    this.scene.remove(mesh);
+    this.group.remove(mesh);
     mesh.geometry.dispose();
     mesh.material.dispose();
   }
@@ -71,7 +88,7 @@ function lookOf({ shape, name, radius, length, size }: Collider): string {
 }
 
 function makeMesh(client: Client, collider: Collider, look: string): ColliderMesh {
-  const material = new THREE.MeshStandardMaterial({ color: 0xd9d4c8, roughness: 0.35 });
+  const material = new THREE.MeshStandardMaterial(kLooks[collider.shape]);
   const mesh = new THREE.Mesh(geometryOf(client, collider), material);
   mesh.castShadow = collider.shape !== Shape.plane;
   mesh.receiveShadow = true;

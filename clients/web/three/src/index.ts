@@ -3,6 +3,10 @@
 
 export * from "./cloth_mesh";
 export * from "./collider_meshes";
+export { type Detail, tiled } from "./fabric_material";
+export { fabricNames, fabricOf, type Fabric } from "./fabrics";
+export * from "./people";
+export { hash, noise } from "./weave";
 export { Body } from "./xr/body";
 export { CanvasPanel, type PanelRow } from "./xr/canvas_panel";
 export { Figures } from "./xr/figures";
