@@ -10,4 +10,4 @@ export * from "./types";
 export { sceneBytes, type MeshScene } from "./scene_bytes";
 export { kClothParameters, kSettings, type ClothParameter, type NumberRange } from "./tables";
 export type { ClothChange, ClothSettings, SolverSettings } from "./cloth_settings";
-export type { Answer, Ban, SceneSummary } from "./scene_requests";
+export type { Answer, Ban, SceneRequests, SceneSummary } from "./scene_requests";
