@@ -14,7 +14,9 @@ namespace clothstream::client {
 constexpr std::uint64_t kFirstMirrorId = std::uint64_t{1} << 31;
 
 Client::Client(Hello hello, Kind kind)
-    : kind_(kind), hello_(std::move(hello)), newest_(kind == Kind::mirror),
+    : kind_(kind),
+      hello_(std::move(hello)),
+      newest_(kind == Kind::mirror),
       lastRequestId_(kind == Kind::mirror ? kFirstMirrorId : 0) {
   sendHello();
 }
@@ -44,6 +46,7 @@ void Client::connecting(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
   if (welcomed_) disconnected(nowUs);
   outbox_.clear();
+  forgetRequests();
   assembly_ = {};
   keyFrameRequest_ = {};
   ++hello_.attempt;
@@ -56,6 +59,7 @@ void Client::disconnected(std::uint64_t nowUs) {
   if (!hello_.token.empty()) state_ = CS_STATE_RECONNECTING;
   welcomed_ = false;
   outbox_.clear();
+  forgetRequests();
   std::uint64_t seed = 0;
   for (const char byte : hello_.token) seed = seed * 257 + static_cast<unsigned char>(byte);
   connectAtUs_ = reconnection_.lost(nowUs, std::uint64_t{1000} * welcome_.graceMs, seed);
@@ -79,13 +83,13 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
     case Body::frame:
       return frameReceived(message->body, nowUs, decoded);
     case Body::pong:
-      return pongReceived(message->body, nowUs);
+      return pongReceived(message->body, message->requestId, nowUs);
     case Body::notice:
       return noticeReceived(message->body);
     case Body::parameterChanged:
       return parametersReceived(message->body);
     case Body::error:
-      return errorReceived(message->body);
+      return errorReceived(message->body, message->requestId);
     case Body::tickEvents:
       return eventsReceived(message->body);
     case Body::presence:
@@ -100,6 +104,15 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
       return tokenReceived(message->body);
     case Body::createPairingCode:
       return pairingCodeReceived(message->body);
+    case Body::getScene:
+    case Body::createScene:
+    case Body::deleteScene:
+    case Body::controlScene:
+    case Body::startRecording:
+    case Body::stopRecording:
+    case Body::listBans:
+    case Body::liftBan:
+      return answerReceived(*message);
     case Body::none:
       return 0;
   }
@@ -112,6 +125,7 @@ void Client::update(std::uint64_t nowUs) {
   const std::uint64_t pauseUs = nowUs - std::exchange(updatedUs_, nowUs);
   if (pauseUs > Reconnection::kLongestStepUs)
     lastHeardUs_ = std::min(nowUs, lastHeardUs_ + pauseUs - Reconnection::kLongestStepUs);
+  upload_.update(nowUs);
   if (kind_ == Kind::mirror || !welcomed_ || state_ == CS_STATE_FAILED || !clock_.pingDue(nowUs)) return;
   std::string ping;
   writePing(ping, ++lastRequestId_, nowUs);
@@ -294,9 +308,13 @@ void Client::requestKeyFrame(std::uint64_t nowUs, bool early) {
   send(std::move(request));
 }
 
-std::uint32_t Client::pongReceived(Bytes body, std::uint64_t nowUs) {
+std::uint32_t Client::pongReceived(Bytes body, std::uint64_t requestId, std::uint64_t nowUs) {
   const std::optional<Pong> pong = readPong(body);
   if (!pong) return failMalformed("Pong");
+  if (pong->clientTimeUs == 0) {  // the ping was part of an upload
+    upload_.pongReceived(requestId);
+    return 0;
+  }
   if (kind_ == Kind::mirror) clock_.pingSent(pong->clientTimeUs);
   clock_.pongReceived(*pong, nowUs);
   return 0;
@@ -332,9 +350,26 @@ std::uint32_t Client::parametersReceived(Bytes body) {
   return CS_EVENT_PARAMETERS;
 }
 
-std::uint32_t Client::errorReceived(Bytes body) {
+std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId) {
   std::optional<ServerError> error = readError(body);
   if (!error) return failMalformed("Error");
+  if (!error->fatal) {
+    // Pieces that were under way when the server refused an upload are refused as well.
+    if (requestId != 0 && requestId == endedUploadId_) return 0;
+    if (const std::optional<cs_request> request = requests_.take(requestId)) {
+      if (requestId == upload_.requestId()) {
+        endedUploadId_ = requestId;
+        upload_.end();
+      }
+      answer_ = {.requestId = requestId,
+                 .request = *request,
+                 .error = error->code,
+                 .errorText = std::move(error->text),
+                 .name = {},
+                 .bytes = 0};
+      return CS_EVENT_ANSWER;
+    }
+  }
   errorCode_ = error->code;
   // The client may try again if only the connection was cut off, or if a reconnect found the server full.
   const bool temporary =
@@ -405,6 +440,7 @@ std::optional<cs_playback> Client::playback(std::uint64_t nowUs) const {
 
 const std::string* Client::nextOutgoing() {
   const std::string* message = outbox_.next();
+  if (!message && isConnected()) message = upload_.next(lastRequestId_);
   // Attachments stay where they were moved, so each pose is sent once.
   if (outbox_.poses().empty() && isConnected() && mayCollide()) poses_.attachments.clear();
   return message;
@@ -455,6 +491,7 @@ std::uint32_t Client::fail(std::string text) {
   state_ = CS_STATE_FAILED;
   errorText_ = std::move(text);
   outbox_.clear();
+  forgetRequests();
   return CS_EVENT_ERROR;
 }
 

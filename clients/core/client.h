@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/core/core.h"
@@ -15,14 +16,17 @@
 #include "clients/core/stream/frame_statistics.h"
 #include "clients/core/stream/newest_frame.h"
 #include "clients/core/stream/outbox.h"
+#include "clients/core/stream/pending_requests.h"
 #include "clients/core/stream/play_out.h"
 #include "clients/core/stream/reconnection.h"
 #include "clients/core/stream/server_clock.h"
+#include "clients/core/stream/upload.h"
 #include "clients/core/touch/contact.h"
 #include "clients/core/touch/own_capsules.h"
 #include "clients/core/wire/client_message.h"
 #include "clients/core/wire/description.h"
 #include "clients/core/wire/limits.h"
+#include "clients/core/wire/scene_request.h"
 #include "clients/core/wire/server_message.h"
 
 namespace clothstream::client {
@@ -64,6 +68,16 @@ class Client {
   void remove(std::uint64_t participant, bool ban);
   void createPairingCode(std::uint32_t role);
   void control(const SceneControl& control);
+  // Requests about scenes return their id, or 0 if they cannot be sent. An empty scene is the joined one.
+  std::uint64_t createScene(std::string_view scene, std::string_view name, std::uint32_t maxParticipants);
+  std::uint64_t copyScene(std::string_view source, std::string_view name, std::uint32_t maxParticipants);
+  std::uint64_t deleteScene(std::string_view scene);
+  std::uint64_t controlScene(std::string_view scene, const SceneControl& control);
+  std::uint64_t startRecording(std::string_view scene, std::string_view file);
+  std::uint64_t stopRecording(std::string_view scene);
+  std::uint64_t requestDefinition(std::string_view scene);
+  std::uint64_t listBans(std::string_view scene);
+  std::uint64_t liftBan(std::string_view scene, std::string_view subject);
   void requestEarlyKeyFrame(std::uint64_t nowUs);
   // nullptr turns play-out off. Returns false if the options are not allowed.
   bool setPlayOut(const cs_play_out_options* options);
@@ -97,7 +111,12 @@ class Client {
   // State of the recording at this time.
   std::optional<cs_playback> playback(std::uint64_t nowUs) const;
   double decodeMs() const { return decodeMs_; }
-  const std::vector<std::string>& scenes() const { return scenes_; }
+  const std::vector<SceneSummary>& scenes() const { return scenes_; }
+  // No request id before the first answer.
+  const Answer& answer() const { return answer_; }
+  const Upload& upload() const { return upload_; }
+  const std::string& definition() const { return definition_; }
+  const std::vector<Ban>& bans() const { return bans_; }
 
   // Newest frame, or the rest state before the first frame.
   std::span<const float> positions() const;
@@ -134,15 +153,22 @@ class Client {
   void timeFrame(bool key, std::uint64_t nowUs);
   cs_decoding decode(std::span<const std::byte> packet);
   void requestKeyFrame(std::uint64_t nowUs, bool early = false);
-  std::uint32_t pongReceived(Bytes body, std::uint64_t nowUs);
+  std::uint32_t pongReceived(Bytes body, std::uint64_t requestId, std::uint64_t nowUs);
   std::uint32_t eventsReceived(Bytes body);
   std::uint32_t noticeReceived(Bytes body);
   std::uint32_t parametersReceived(Bytes body);
-  std::uint32_t errorReceived(Bytes body);
+  std::uint32_t errorReceived(Bytes body, std::uint64_t requestId);
   std::uint32_t scenesReceived(Bytes body);
   std::uint32_t tokenReceived(Bytes body);
   std::uint32_t pairingCodeReceived(Bytes body);
   std::uint32_t operatingPointReceived(Bytes body);
+  // Sends a request that `write(message, id)` serialises. Returns its id, or 0.
+  template <typename Write>
+  std::uint64_t request(cs_request kind, Write write);
+  std::string_view orJoined(std::string_view scene) const;
+  std::uint32_t answerReceived(const ServerMessage& message);
+  bool readAnswer(const ServerMessage& message);
+  void forgetRequests();
   // Ticks from one frame to the next at this operating point.
   std::uint32_t ticksPerFrame(const OperatingPoint& point) const;
   std::uint32_t playbackReceived(Bytes body, std::uint64_t nowUs);
@@ -190,7 +216,13 @@ class Client {
   CapsuleHistory ownCapsules_;        // used if local contact is on
   std::span<const float> shown_;      // positions that contact has corrected; empty if there are none
   std::uint64_t playedTick_ = 0;      // of the last play()
-  std::vector<std::string> scenes_;
+  std::vector<SceneSummary> scenes_;
+  PendingRequests requests_;
+  Answer answer_;
+  Upload upload_;
+  std::uint64_t endedUploadId_ = 0;  // request of the last upload that the server refused
+  std::string definition_;
+  std::vector<Ban> bans_;
   TickEvents events_;
   SimulationReport report_;
   std::uint64_t reportTick_ = 0;

@@ -28,7 +28,7 @@
  *
  * Units are SI unless a comment or a name says otherwise. Coordinates are right-handed with +Y up, in metres.
  *
- * Sections: lifetime, frames, play-out, mirror, input, parameters, participants, recording, statistics.
+ * Sections: lifetime, scenes, frames, play-out, mirror, input, parameters, participants, recording, statistics.
  */
 #ifndef CLOTHSTREAM_CLIENTS_CORE_CORE_H
 #define CLOTHSTREAM_CLIENTS_CORE_CORE_H
@@ -65,21 +65,22 @@ typedef enum cs_state {
 
 /* Bits that cs_receive returns: what changed. */
 enum {
-  CS_EVENT_FRAME = 1,           /* new positions */
-  CS_EVENT_DESCRIPTION = 2,     /* new cloths, vertex counts and triangles */
-  CS_EVENT_NOTICE = 4,          /* cs_notice_text */
-  CS_EVENT_ERROR = 8,           /* cs_error_text; fatal if the state is CS_STATE_FAILED */
-  CS_EVENT_PARAMETERS = 16,     /* a parameter changed */
-  CS_EVENT_SCENES = 32,         /* the answer to cs_list_scenes */
-  CS_EVENT_REPORT = 64,         /* cs_get_cloth_report */
-  CS_EVENT_GRABS = 128,         /* cs_grab_event_count */
-  CS_EVENT_CONTACTS = 256,      /* cs_contact_event_count */
-  CS_EVENT_PARTICIPANTS = 512,  /* cs_participant_count */
-  CS_EVENT_PRESENCE = 1024,     /* cs_get_presence: why the participants changed */
-  CS_EVENT_RETURNED = 2048,     /* joined again after a lost connection; see cs_resumed */
-  CS_EVENT_PLAYBACK = 4096,     /* cs_get_playback */
-  CS_EVENT_TOKEN = 8192,        /* pairing has given a token: keep cs_token */
-  CS_EVENT_PAIRING_CODE = 16384 /* cs_get_pairing_code */
+  CS_EVENT_FRAME = 1,            /* new positions */
+  CS_EVENT_DESCRIPTION = 2,      /* new cloths, vertex counts and triangles */
+  CS_EVENT_NOTICE = 4,           /* cs_notice_text */
+  CS_EVENT_ERROR = 8,            /* cs_error_text; fatal if the state is CS_STATE_FAILED */
+  CS_EVENT_PARAMETERS = 16,      /* a parameter changed */
+  CS_EVENT_SCENES = 32,          /* the answer to cs_list_scenes */
+  CS_EVENT_REPORT = 64,          /* cs_get_cloth_report */
+  CS_EVENT_GRABS = 128,          /* cs_grab_event_count */
+  CS_EVENT_CONTACTS = 256,       /* cs_contact_event_count */
+  CS_EVENT_PARTICIPANTS = 512,   /* cs_participant_count */
+  CS_EVENT_PRESENCE = 1024,      /* cs_get_presence: why the participants changed */
+  CS_EVENT_RETURNED = 2048,      /* joined again after a lost connection; see cs_resumed */
+  CS_EVENT_PLAYBACK = 4096,      /* cs_get_playback */
+  CS_EVENT_TOKEN = 8192,         /* pairing has given a token: keep cs_token */
+  CS_EVENT_PAIRING_CODE = 16384, /* cs_get_pairing_code */
+  CS_EVENT_ANSWER = 32768        /* cs_get_answer: a request about scenes succeeded or failed */
 };
 
 /* Values of cs_error_code after which the program asks its user for a token or a pairing code. */
@@ -175,12 +176,103 @@ const char* cs_server_name(const cs_client* client) CS_NOEXCEPT;
 const char* cs_device_name(const cs_client* client) CS_NOEXCEPT;
 const char* cs_scene_name(const cs_client* client) CS_NOEXCEPT;
 
-/* Requests the names of the server's scenes. The answer comes with CS_EVENT_SCENES. */
+/* ---------------------------------------------------------------------------------------------------------------
+ * Scenes: list the server's scenes, make, control, record and delete them.
+ *
+ * A function that returns a uint64_t sends a request and returns its id. It returns 0, and sends nothing, if
+ * the state is not CS_STATE_JOINED or 64 requests wait. CS_EVENT_ANSWER reports the answer, also if the
+ * server refuses the request; CS_EVENT_ERROR does not follow then. A lost connection ends all requests
+ * without an answer, because the client cannot know whether the server has carried them out. A scene named
+ * "" is the one that the client has joined.
+ */
+
+typedef struct cs_scene_summary {
+  const char *name, *description;
+  uint32_t vertex_count, cloth_count;      /* of all cloths */
+  uint32_t participants, max_participants; /* connected ones; and including those that are away */
+  int32_t running;                         /* 1 if it is simulated now */
+  int32_t paused;                          /* 1 if its clock is stopped */
+  int32_t created;                         /* 1 if a client made it; only then it can be deleted */
+  int32_t recorded;                        /* 1 if the server records it to a file */
+  int32_t is_recording;                    /* 1 if it is a recording that is played */
+} cs_scene_summary;
+
+/* Requests the list of the server's scenes. The answer comes with CS_EVENT_SCENES. */
 void cs_list_scenes(cs_client* client) CS_NOEXCEPT;
 /* Number of scenes in the last answer. */
 uint32_t cs_scene_count(const cs_client* client) CS_NOEXCEPT;
 /* Returns the name of a scene; "" if the index is out of range. */
 const char* cs_scene(const cs_client* client, uint32_t index) CS_NOEXCEPT;
+/* Fails if the index is out of range. */
+int cs_get_scene(const cs_client* client, uint32_t index, cs_scene_summary* out) CS_NOEXCEPT;
+
+typedef enum cs_request {
+  CS_REQUEST_CREATE_SCENE = 1,
+  CS_REQUEST_DELETE_SCENE = 2,
+  CS_REQUEST_CONTROL_SCENE = 3,
+  CS_REQUEST_START_RECORDING = 4,
+  CS_REQUEST_STOP_RECORDING = 5,
+  CS_REQUEST_GET_SCENE = 6,
+  CS_REQUEST_LIST_BANS = 7,
+  CS_REQUEST_LIFT_BAN = 8
+} cs_request;
+
+#define CS_ANSWER_VERSION 1u
+typedef struct cs_answer {
+  uint32_t version;       /* CS_ANSWER_VERSION */
+  uint32_t request;       /* cs_request */
+  uint64_t request_id;    /* id that the function returned */
+  uint32_t error;         /* ErrorCode (session.proto); 0 if the request succeeded */
+  const char* error_text; /* what was wrong and what is allowed; "" if the request succeeded */
+  /* Name of the scene (create, control) or of the file (start and stop recording); else "". */
+  const char* name;
+  uint64_t bytes; /* size of the file (stop recording); else 0 */
+} cs_answer;
+/* The newest answer. Fails before the first, or if `out->version` is unknown. */
+int cs_get_answer(const cs_client* client, cs_answer* out) CS_NOEXCEPT;
+
+#define CS_MAX_SCENE_BYTES 268435456u
+/* Creates a scene from a serialised Scene (scene.proto). A scene of more than 60 KiB is uploaded in pieces
+ * first, for which cs_update must be called. name: name of the new scene; "" means the one in the definition.
+ * max_participants: 0 means the server's limit. The bytes are copied. Also returns 0 if another upload is
+ * under way, or if `bytes` is 0 or above CS_MAX_SCENE_BYTES. */
+uint64_t cs_create_scene(cs_client* client, const uint8_t* scene, size_t bytes, const char* name,
+                         uint32_t max_participants) CS_NOEXCEPT;
+/* Creates a scene as a copy of another scene of the server or of a built-in scene. */
+uint64_t cs_copy_scene(cs_client* client, const char* source, const char* name,
+                       uint32_t max_participants) CS_NOEXCEPT;
+/* Progress of the upload of cs_create_scene: bytes that the server has received, and all bytes. Fails if no
+ * upload is under way. */
+int cs_get_upload(const cs_client* client, uint64_t* sent_bytes, uint64_t* bytes) CS_NOEXCEPT;
+/* Deletes a scene that a client made. All participants of it are removed. */
+uint64_t cs_delete_scene(cs_client* client, const char* scene) CS_NOEXCEPT;
+/* Puts all cloths back to their start. Parameters stay. A recording returns to its start. */
+uint64_t cs_reset_scene(cs_client* client, const char* scene) CS_NOEXCEPT;
+/* Stops or restarts the clock of a scene. */
+uint64_t cs_pause_scene(cs_client* client, const char* scene, int paused) CS_NOEXCEPT;
+/* Starts a recording on the server. file: 1 to 64 characters out of [A-Za-z0-9_-], without an extension; ""
+ * means that the server chooses. The answer names the file. */
+uint64_t cs_start_recording(cs_client* client, const char* scene, const char* file) CS_NOEXCEPT;
+/* Ends the recording of a scene. The answer has the name and size of the file. */
+uint64_t cs_stop_recording(cs_client* client, const char* scene) CS_NOEXCEPT;
+/* Requests the definition of a scene with its current parameters, at most 1 MiB. */
+uint64_t cs_request_definition(cs_client* client, const char* scene) CS_NOEXCEPT;
+/* The serialised Scene of the last answer, and its size in *bytes; NULL and 0 before the first. */
+const uint8_t* cs_definition(const cs_client* client, size_t* bytes) CS_NOEXCEPT;
+
+/* A subject that may not join a scene (docs/identity.md). */
+typedef struct cs_ban {
+  const char* subject;
+  const char* display_name; /* name when the ban began; may be "" */
+  const char* tenant;       /* may be "" */
+} cs_ban;
+/* Requests for owners: list the bans of a scene, and lift the ban of a subject. */
+uint64_t cs_list_bans(cs_client* client, const char* scene) CS_NOEXCEPT;
+uint64_t cs_lift_ban(cs_client* client, const char* scene, const char* subject) CS_NOEXCEPT;
+/* Number of bans in the last answer. */
+uint32_t cs_ban_count(const cs_client* client) CS_NOEXCEPT;
+/* Fails if the index is out of range. */
+int cs_get_ban(const cs_client* client, uint32_t index, cs_ban* out) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
  * Frames: what the scene contains and the geometry of the newest frame.
@@ -336,7 +428,8 @@ int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider*
  *
  * The program passes the client's messages and its calls of cs_connecting and cs_disconnected to the mirror in
  * the same order, and sends what cs_next_outgoing of the mirror returns after what the client itself sends. A
- * mirror sends no Hello, pings, acknowledgements, and no requests for key frames except cs_request_key_frame;
+ * mirror sends no Hello, acknowledgements, and no requests for key frames except cs_request_key_frame. It sends
+ * pings only during an upload (cs_create_scene), for which cs_update of the mirror must be called; otherwise
  * cs_update and cs_connect_at of a mirror have no use. Token and pairing code are set on the client. Times are
  * of the same clock for both.
  */

@@ -147,16 +147,3 @@ const char* cs_device_name(const cs_client* client) noexcept {
 const char* cs_scene_name(const cs_client* client) noexcept {
   return client->client.welcome().scene.c_str();
 }
-
-void cs_list_scenes(cs_client* client) noexcept {
-  client->client.listScenes();
-}
-
-uint32_t cs_scene_count(const cs_client* client) noexcept {
-  return static_cast<std::uint32_t>(client->client.scenes().size());
-}
-
-const char* cs_scene(const cs_client* client, uint32_t index) noexcept {
-  const std::string* scene = at(client->client.scenes(), index);
-  return scene ? scene->c_str() : "";
-}

@@ -34,7 +34,10 @@ std::vector<std::string> session() {
   change.mutable_gravity()->mutable_value()->set_y(-1);
   change.add_cloths()->mutable_bend()->set_stiffness(1);
   messages.push_back(message.SerializeAsString());
-  message.mutable_list_scenes()->add_scenes()->set_name("curtain");
+  v1::SceneSummary& summary = *message.mutable_list_scenes()->add_scenes();
+  summary.set_name("curtain");
+  summary.set_description("A curtain");
+  summary.set_vertex_count(10);
   messages.push_back(message.SerializeAsString());
   messages.push_back(ScriptedServer::error(v1::ERROR_CODE_INVALID_ARGUMENT, "no", false));
   return messages;

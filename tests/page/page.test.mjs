@@ -359,6 +359,7 @@ test("a slider works by keyboard, and other pages follow", () =>
     withPage({}, async (second) => {
       await untilState(first, "live");
       await untilState(second, "live");
+      await first.click("#tab-air");
       await first.focus("#wind");
       for (let i = 0; i < 20; ++i) await first.keyboard.press("ArrowRight");
       await second.waitForFunction(() => document.getElementById("wind-value").textContent === "2.0 m/s");
@@ -374,11 +375,12 @@ test("the panel changes the solver of a cloth and shows its report", () =>
     withPage({ query: "?scene=flag" }, async (second) => {
       await untilState(first, "live");
       await untilState(second, "live");
-      const figure = (page, name) => page.textContent(`#cloths [data-figure="${name}"]`);
+      await first.click("#tab-cloth");
+      const figure = (page, name) => page.textContent(`#report [data-figure="${name}"]`);
       // The panel updates four times per second.
       const untilFigure = (page, name, pattern) =>
         page.waitForFunction(
-          ([key, source]) => RegExp(source).test(document.querySelector(`#cloths [data-figure="${key}"]`)?.textContent),
+          ([key, source]) => RegExp(source).test(document.querySelector(`#report [data-figure="${key}"]`)?.textContent),
           [name, pattern.source],
         );
       await untilFigure(first, "constraints", /^none$/);
@@ -390,18 +392,19 @@ test("the panel changes the solver of a cloth and shows its report", () =>
       assert.ok(before.kineticEnergy >= 0 && before.elasticEnergy > 0 && before.deviceMs > 0);
       assert.equal(before.activeConstraints, 0);
 
-      await first.selectOption("#solver-0", "2");
-      await second.waitForFunction(() => document.getElementById("solver-0").value === "2");
+      await first.selectOption("#solver", "2");
+      await second.waitForFunction(() => document.getElementById("solver").value === "2");
       await first.waitForFunction(() => window.clothstream.reports[0].activeConstraints > 0);
       await first.waitForFunction((p99) => window.clothstream.reports[0].strainP99 < p99, before.strainP99);
       const after = await first.evaluate(() => window.clothstream.reports[0]);
       assert.ok(after.iterations > 0 && after.residual > 0);
       await untilFigure(first, "constraints", /^[\d,]+$/);
       assert.match(await figure(first, "strain max"), /^-?\d+\.\d\d %$/);
-      await first.locator("#cloths").scrollIntoViewIfNeeded();
+      await first.locator("#report").scrollIntoViewIfNeeded();
       await takePicture(first, "report");
-      await second.selectOption("#solver-0", "1");
-      await first.waitForFunction(() => document.getElementById("solver-0").value === "1");
+      await second.click("#tab-cloth");
+      await second.selectOption("#solver", "1");
+      await first.waitForFunction(() => document.getElementById("solver").value === "1");
     }),
   ));
 
@@ -416,11 +419,10 @@ test("an unknown scene shows the server's error, and a button joins the default 
     await page.waitForSelector("#banner", { state: "hidden" });
   }));
 
-test("the scene chooser joins another scene", () =>
+test("the list of scenes joins another scene", () =>
   withPage({}, async (page) => {
     await untilState(page, "live");
-    await page.waitForFunction(() => document.querySelector('#scene option[value="flag"]'));
-    await page.selectOption("#scene", "flag");
+    await page.click('[data-scene="flag"]');
     await page.waitForFunction(() => document.getElementById("scene-name").textContent === "flag");
     await untilState(page, "live");
     assert.match(page.url(), /\?scene=flag$/);
@@ -454,7 +456,9 @@ test("participants are listed, and a disconnected one returns with its id", asyn
       await ada.waitForFunction(() => window.clothstream.participants.length === 2);
       assert.deepEqual(await ada.evaluate(here), ["Ada 3", "Ben 1"]);
       assert.deepEqual(await ben.evaluate(here), ["Ada 3", "Ben 1"]);
-      assert.deepEqual(await ben.locator("#participants li").allInnerTexts(), ["Ada\nowner", "Ben (you)\nviewer"]);
+      assert.deepEqual(await ben.locator("#participants .who").allTextContents(), ["Ada", "Ben (you)"]);
+      assert.deepEqual(await ben.locator("#participants select").evaluateAll((all) => all.map(({ value }) => value)), ["3", "1"]);
+      await ada.click("#tab-people");
       await takePicture(ada, "participants");
       const id = await ben.evaluate(() => String(window.clothstream.participants[1].id));
 
@@ -502,7 +506,7 @@ test("the page shows its address for other devices", async (t) => {
     const page = await context.newPage();
     await page.goto(home.url.replace("http:", "https:"));
     await untilState(page, "live");
-    await page.click("#share summary");
+    await page.click("#tab-people");
     await page.waitForFunction(() => document.getElementById("share-code").naturalWidth > 0);
     assert.match(await page.textContent("#share-address"), new RegExp(`^https://[0-9.]+:${home.port}/$`));
     const { address, fingerprint } = await (await page.request.get(`${home.url.replace("http:", "https:")}address.json`)).json();
@@ -535,6 +539,7 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
     await page.click("#proof button");
     await untilState(page, "live");
     assert.ok(await page.isHidden("#proof"));
+    await page.click("#tab-people");
     await page.click("#pairing");
     await page.waitForSelector("#pairing-code:not([hidden])");
     await takePicture(page, "pairing");
@@ -551,6 +556,7 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
     await guest.fill("#proof-input", shown[1] + shown[2]);
     await guest.press("#proof-input", "Enter");
     await untilState(guest, "live");
+    await guest.click("#tab-people");
     assert.ok(await guest.isHidden("#pairing"), "participants make no codes");
     await guest.context().close();
     await context.close();
@@ -570,7 +576,9 @@ function answerAddressWithPage() {
 test("an address that is not JSON is not shown", () =>
   withPage({ prepare: answerAddressWithPage }, async (page) => {
     await untilState(page, "live");
+    await page.click("#tab-people");
     assert.ok(await page.isHidden("#share"));
+    assert.ok(await page.isVisible("#share-none"));
   }));
 
 test("a browser without WebGL shows what is missing", () =>

@@ -36,7 +36,8 @@ test("a recording has a timeline and no controls of the simulation", async () =>
   assert.ok(length > 1);
   assert.deepEqual([paused, loop, speed], [false, true, 1]);
   await page.locator("#player").waitFor({ state: "visible" });
-  assert.equal(await page.locator("#wind").isVisible(), false);
+  for (const tab of ["cloth", "air"]) assert.equal(await page.locator(`#tab-${tab}`).isVisible(), false);
+  await page.click("#tab-view");
   assert.equal(await page.locator("#reset").isVisible(), true);
   const before = (await playback()).position;
   await until((then) => window.clothstream.playback.position !== then, before);

@@ -223,6 +223,7 @@ void writeControlScene(std::string& out, std::uint64_t requestId, std::string_vi
     using F = field::ControlSceneRequest;
     request.add_bytes(F::kName.number, scene.data(), scene.size());
     if (control.paused) request.add_bool(F::kPaused.number, *control.paused);
+    if (control.reset) request.add_bool(F::kReset.number, true);
     if (control.seek) request.add_double(F::kSeek.number, *control.seek);
     if (control.speed) request.add_double(F::kSpeed.number, *control.speed);
     if (control.loop) request.add_bool(F::kLoop.number, *control.loop);

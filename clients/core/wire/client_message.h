@@ -79,6 +79,7 @@ struct SceneControl {
   std::optional<bool> paused{};
   std::optional<double> seek{}, speed{};
   std::optional<bool> loop{};
+  bool reset = false;
 };
 void writeControlScene(std::string& out, std::uint64_t requestId, std::string_view scene,
                        const SceneControl& control);

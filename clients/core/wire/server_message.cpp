@@ -80,13 +80,17 @@ bool readParticipant(Bytes message, Participant& out) {
 }
 
 Body bodyOf(std::uint32_t tag) {
-  constexpr std::array kKnown{Body::welcome,      Body::chunk,
-                              Body::frame,        Body::pong,
-                              Body::notice,       Body::parameterChanged,
-                              Body::error,        Body::tickEvents,
-                              Body::listScenes,   Body::presence,
-                              Body::playback,     Body::operatingPoint,
-                              Body::authenticate, Body::createPairingCode};
+  constexpr std::array kKnown{Body::welcome,        Body::chunk,
+                              Body::frame,          Body::pong,
+                              Body::notice,         Body::parameterChanged,
+                              Body::error,          Body::tickEvents,
+                              Body::listScenes,     Body::presence,
+                              Body::playback,       Body::operatingPoint,
+                              Body::authenticate,   Body::createPairingCode,
+                              Body::getScene,       Body::createScene,
+                              Body::deleteScene,    Body::controlScene,
+                              Body::startRecording, Body::stopRecording,
+                              Body::listBans,       Body::liftBan};
   for (const Body body : kKnown) {
     if (tag == bytes(static_cast<std::uint32_t>(body))) return body;
   }
@@ -97,9 +101,11 @@ Body bodyOf(std::uint32_t tag) {
 
 std::optional<ServerMessage> readServerMessage(Bytes bytes) {
   return readMessage<ServerMessage>(bytes, [](ServerMessage& message, std::uint32_t tag, Reader& reader) {
+    if (tag == field::ServerMessage::kRequestId.tag) return set(message.requestId, reader.get_uint64());
     const Body body = bodyOf(tag);
     if (body == Body::none) return skip(reader);
-    message = {body, reader.get_view()};
+    message.kind = body;
+    message.body = reader.get_view();
     return true;
   });
 }
@@ -376,19 +382,6 @@ bool readTickEvents(Bytes message, TickEvents& events) {
       return events.contacts.size() < kMaxEvents &&
              readContactEvent(reader.get_view(), events.contacts.emplace_back());
     return skip(reader);
-  });
-}
-
-std::optional<std::vector<std::string>> readScenes(Bytes message) {
-  using F = field::ListScenesResponse;
-  using Names = std::vector<std::string>;
-  return readMessage<Names>(message, [](Names& names, std::uint32_t tag, Reader& reader) {
-    if (tag != F::kScenes.tag) return skip(reader);
-    if (names.size() == kMaxScenes) return false;
-    std::string& name = names.emplace_back();
-    return readFields(reader.get_view(), [&](std::uint32_t summaryTag, Reader& summary) {
-      return summaryTag == field::SceneSummary::kName.tag ? setText(name, summary) : skip(summary);
-    });
   });
 }
 

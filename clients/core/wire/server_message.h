@@ -32,12 +32,21 @@ enum class Body : std::uint32_t {
   operatingPoint = field::ServerMessage::kOperatingPoint.number,
   authenticate = field::ServerMessage::kAuthenticate.number,
   createPairingCode = field::ServerMessage::kCreatePairingCode.number,
+  getScene = field::ServerMessage::kGetScene.number,
+  createScene = field::ServerMessage::kCreateScene.number,
+  deleteScene = field::ServerMessage::kDeleteScene.number,
+  controlScene = field::ServerMessage::kControlScene.number,
+  startRecording = field::ServerMessage::kStartRecording.number,
+  stopRecording = field::ServerMessage::kStopRecording.number,
+  listBans = field::ServerMessage::kListBans.number,
+  liftBan = field::ServerMessage::kLiftBan.number,
 };
 
 // An unknown kind of body is `none`.
 struct ServerMessage {
   Body kind = Body::none;
   Bytes body;
+  std::uint64_t requestId = 0;  // 0: not an answer
 };
 
 struct Participant {
@@ -153,12 +162,9 @@ struct TickEvents {
 [[nodiscard]] std::optional<std::string> readToken(Bytes message);
 [[nodiscard]] std::optional<PairingCode> readPairingCode(Bytes message);
 [[nodiscard]] bool readTickEvents(Bytes message, TickEvents& events);
-// Returns the names of the scenes.
-[[nodiscard]] std::optional<std::vector<std::string>> readScenes(Bytes message);
 // Reuses the memory of `out`.
 [[nodiscard]] bool readReport(Bytes message, SimulationReport& out);
 
-inline constexpr std::size_t kMaxScenes = 65536;
 inline constexpr std::size_t kMaxEvents = 65536;  // per kind
 
 }  // namespace clothstream::client

@@ -72,6 +72,7 @@ class Program {
     readGeometry();
     readLists();
     readNumbers();
+    readAnswers();
   }
 
  private:
@@ -127,6 +128,8 @@ class Program {
   void readColliders();
   void readLists();
   void readNumbers();
+  void requestScene(std::uint32_t index, const char* text);
+  void readAnswers();
 
   const CoreInput& input_;
   const std::unique_ptr<cs_client, decltype(&cs_destroy)> client_{cs_create("curtain", "fuzz"), &cs_destroy};
@@ -311,6 +314,18 @@ void Program::call(const CoreInput::Call& call) {
     }
     case 39:
       return readNumbers();
+    case 40: {
+      v1::Scene definition;
+      definition.set_description(std::string(index % kMaxDescriptionBytes, 's'));
+      const std::string scene = definition.SerializeAsString();
+      cs_create_scene(client(), reinterpret_cast<const std::uint8_t*>(scene.data()), scene.size(), text,
+                      index % 64);
+      return;
+    }
+    case 41:
+      return requestScene(index, text);
+    case 42:
+      return readAnswers();
     default:
       now_ += index % 60'000 * kMs;
   }
@@ -397,6 +412,48 @@ void Program::readLists() {
   cs_get_playback(client(), now_, &playback);
   cs_environment environment;
   cs_get_environment(client(), &environment);
+}
+
+void Program::requestScene(std::uint32_t index, const char* text) {
+  using Request = std::uint64_t (*)(cs_client*, const char*);
+  constexpr std::array<Request, 6> kRequests{
+      cs_delete_scene,
+      cs_reset_scene,
+      cs_stop_recording,
+      cs_request_definition,
+      cs_list_bans,
+      [](cs_client* client, const char* scene) { return cs_copy_scene(client, scene, scene, 1); }};
+  kRequests[index % kRequests.size()](client(), text);
+  cs_pause_scene(client(), text, static_cast<int>(index % 2));
+  cs_start_recording(client(), text, text);
+  cs_lift_ban(client(), text, text);
+}
+
+void Program::readAnswers() {
+  cs_answer answer;
+  answer.version = CS_ANSWER_VERSION;
+  if (cs_get_answer(client(), &answer) != 0) {
+    require(answer.request_id != 0 && answer.request >= CS_REQUEST_CREATE_SCENE, "answers name a request");
+    expectText(answer.error_text);
+    expectText(answer.name);
+  }
+  cs_scene_summary scene;
+  for (std::uint32_t i = 0; cs_get_scene(client(), i, &scene) != 0; ++i) {
+    expectText(scene.name);
+    expectText(scene.description);
+  }
+  cs_ban ban;
+  for (std::uint32_t i = 0; cs_get_ban(client(), i, &ban) != 0; ++i) {
+    expectText(ban.subject);
+    expectText(ban.display_name);
+    expectText(ban.tenant);
+  }
+  std::size_t bytes = 0;
+  const std::uint8_t* definition = cs_definition(client(), &bytes);
+  require((definition == nullptr) == (bytes == 0), "a definition has bytes");
+  std::uint64_t sent = 0, all = 0;
+  if (cs_get_upload(client(), &sent, &all) != 0)
+    require(sent <= all && all <= CS_MAX_SCENE_BYTES, "an upload sends no more than it has");
 }
 
 void Program::readNumbers() {

@@ -8,6 +8,8 @@ import { Input } from "./input";
 import { Parameters } from "./parameters";
 import { People } from "./people";
 import { PlaybackControl } from "./playback";
+import { SceneRequests } from "./scene_requests";
+import { Settings } from "./cloth_settings";
 import { ClientState, type Identity } from "./types";
 import type { CoreModule } from "./wasm";
 
@@ -32,6 +34,8 @@ export class Client {
   readonly parameters: Parameters;
   readonly people: People;
   readonly playback: PlaybackControl;
+  readonly requests: SceneRequests;
+  readonly settings: Settings;
   private readonly handle: CoreHandle;
   private readonly inbox: Buffer;
   private readonly decoded: Buffer;
@@ -56,6 +60,8 @@ export class Client {
     this.parameters = new Parameters(this.handle);
     this.people = new People(this.handle);
     this.playback = new PlaybackControl(this.handle);
+    this.requests = new SceneRequests(this.handle);
+    this.settings = new Settings(this.handle);
   }
 
   destroy(): void {
@@ -153,13 +159,9 @@ export class Client {
     return this.core.text(this.core.exports.cs_scene_name(this.handle.pointer));
   }
 
-  // Requests the names of the server's scenes. ClientEvent.scenes follows.
+  // Requests the list of the server's scenes. ClientEvent.scenes follows; see requests.scenes().
   listScenes(): void {
     this.core.exports.cs_list_scenes(this.handle.pointer);
-  }
-  scenes(): string[] {
-    const count = this.core.exports.cs_scene_count(this.handle.pointer);
-    return Array.from({ length: count }, (_, index) => this.core.text(this.core.exports.cs_scene(this.handle.pointer, index)));
   }
 }
 

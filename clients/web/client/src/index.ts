@@ -7,3 +7,7 @@ export { Frames } from "./frames";
 export { Input } from "./input";
 export type { Proof } from "./thread_messages";
 export * from "./types";
+export { sceneBytes, type MeshScene } from "./scene_bytes";
+export { kClothParameters, kSettings, type ClothParameter, type NumberRange } from "./tables";
+export type { ClothChange, ClothSettings, SolverSettings } from "./cloth_settings";
+export type { Answer, Ban, SceneRequests, SceneSummary } from "./scene_requests";

@@ -28,7 +28,9 @@ export interface SessionListener {
   described?(client: Client): void;
   parametersChanged?(client: Client): void;
   participantsChanged?(client: Client): void;
-  scenesListed?(scenes: string[]): void;
+  scenesListed?(client: Client): void;
+  // A request of client.requests succeeded or failed.
+  answered?(client: Client): void;
   grabsChanged?(client: Client): void;
   notice?(text: string): void;
   pairingCodeMade?(client: Client): void;
@@ -202,7 +204,8 @@ export class Session {
     if (events & ClientEvent.description) listener.described?.(client);
     if (events & (ClientEvent.description | ClientEvent.parameters)) listener.parametersChanged?.(client);
     if (events & ClientEvent.participants) listener.participantsChanged?.(client);
-    if (events & ClientEvent.scenes) listener.scenesListed?.(client.scenes());
+    if (events & ClientEvent.scenes) listener.scenesListed?.(client);
+    if (events & ClientEvent.answer) listener.answered?.(client);
     if (events & ClientEvent.grabs) listener.grabsChanged?.(client);
     if (events & ClientEvent.token) this.tokens.keep(client.token);
     if (events & ClientEvent.pairingCode) listener.pairingCodeMade?.(client);

@@ -24,6 +24,7 @@ export const ClientEvent = {
   returned: 2048,
   token: 8192,
   pairingCode: 16384,
+  answer: 32768,
 } as const;
 
 // Values of Client.errorCode after which a person must give a token or a pairing code.

@@ -95,6 +95,20 @@ export interface CoreExports {
   cs_list_scenes(client: Pointer): void;
   cs_scene_count(client: Pointer): number;
   cs_scene(client: Pointer, index: number): Pointer;
+  cs_get_scene(client: Pointer, index: number, out: Pointer): number;
+  cs_get_answer(client: Pointer, out: Pointer): number;
+  cs_create_scene(client: Pointer, scene: Pointer, bytes: number, name: Pointer, maxParticipants: number): bigint;
+  cs_copy_scene(client: Pointer, source: Pointer, name: Pointer, maxParticipants: number): bigint;
+  cs_get_upload(client: Pointer, sentBytes: Pointer, bytes: Pointer): number;
+  cs_delete_scene(client: Pointer, scene: Pointer): bigint;
+  cs_reset_scene(client: Pointer, scene: Pointer): bigint;
+  cs_pause_scene(client: Pointer, scene: Pointer, paused: number): bigint;
+  cs_start_recording(client: Pointer, scene: Pointer, file: Pointer): bigint;
+  cs_stop_recording(client: Pointer, scene: Pointer): bigint;
+  cs_list_bans(client: Pointer, scene: Pointer): bigint;
+  cs_lift_ban(client: Pointer, scene: Pointer, subject: Pointer): bigint;
+  cs_ban_count(client: Pointer): number;
+  cs_get_ban(client: Pointer, index: number, out: Pointer): number;
 }
 
 const kNull: Pointer = 0;

@@ -1,46 +1,35 @@
 // SPDX-License-Identifier: MIT
-// The control panel: scene, wind, gusts, gravity, stiffness, damping and collider. Changes are sent once per frame.
+// Air, gravity, stiffness of all springs, and the collider. Changes are sent once per drawn frame.
 
 import { Shape, type Client, type ClothParameters, type Environment, type Spring, type Vec3 } from "@clothstream/client";
-import { element } from "./hud";
+import { element } from "./panel/dom";
+import { vectorOf, windOf } from "./panel/wind";
 
 const kStill: Vec3 = [0, 0, 0];
-// Directions for scenes without wind or gravity: away from the default camera, and down.
-const kDefaultWind: Vec3 = [0, 0, -1];
+// Direction for scenes without gravity.
 const kDown: Vec3 = [0, -1, 0];
-const kGustSeconds = 2; // default of scene.proto
-
-export interface ControlsListener {
-  sceneChosen(scene: string): void;
-  viewReset(): void;
-}
 
 export class Controls {
-  private readonly scenes = element<HTMLSelectElement>("scene");
   private readonly choice = element<HTMLSelectElement>("collider");
   private readonly wind = new Slider("wind", (value) => `${value.toFixed(1)} m/s`);
+  private readonly heading = new Slider("wind-heading", (value) => `${value.toFixed(0)}°`);
+  private readonly rise = new Slider("wind-rise", (value) => `${value.toFixed(0)}°`);
   private readonly gust = new Slider("gust", (value) => `${value.toFixed(1)} m/s`);
+  private readonly gustSeconds = new Slider("gust-seconds", (value) => `${value.toFixed(1)} s`);
+  private readonly density = new Slider("density", (value) => `${value.toFixed(2)} kg/m³`);
   private readonly gravity = new Slider("gravity", (value) => `${value.toFixed(2)} m/s²`);
   // The slider holds the binary logarithm of the factor.
   private readonly stiffness = new Slider("stiffness", (value) => `× ${(2 ** value).toFixed(2)}`);
-  private readonly damping = new Slider("damping", (value) => `${value.toFixed(2)} /s`);
   private readonly radius = new Slider("radius", (value) => `${value.toFixed(2)} m`);
-  private readonly sliders = [this.wind, this.gust, this.gravity, this.stiffness, this.damping, this.radius];
-  private windDirection = kDefaultWind;
+  private readonly windSliders = [this.wind, this.heading, this.rise];
+  private readonly sliders = [...this.windSliders, this.gust, this.gustSeconds, this.density, this.gravity, this.stiffness, this.radius];
   private gravityDirection = kDown;
   // Parameters that the stiffness factor multiplies: from the description, or from a change of material.
   private base: ClothParameters[] = [];
   private materials: string[] = [];
 
-  constructor(listener: ControlsListener) {
-    this.scenes.addEventListener("change", () => listener.sceneChosen(this.scenes.value));
+  constructor() {
     this.choice.addEventListener("change", () => this.radius.forget());
-    element("reset").addEventListener("click", () => listener.viewReset());
-    if (window.matchMedia("(max-width: 640px)").matches) element<HTMLDetailsElement>("panel").open = false;
-  }
-
-  listScenes(scenes: string[], current: string): void {
-    this.scenes.replaceChildren(...scenes.map((scene) => new Option(scene, scene, false, scene === current)));
   }
 
   // Name of the collider that keys and the radius act on; "" without colliders.
@@ -57,12 +46,10 @@ export class Controls {
     for (const slider of this.sliders) slider.forget();
     this.rebase(client);
     const environment = client.parameters.environment();
-    this.windDirection = direction(environment?.wind ?? kStill, kDefaultWind);
     this.gravityDirection = direction(environment?.gravity ?? kStill, kDown);
     const names = client.frames.colliders().filter(({ participantId }) => participantId === 0n).map(({ name }) => name);
     this.choice.replaceChildren(...names.map((name) => new Option(name)));
     element("collider-row").hidden = names.length < 2;
-    this.scenes.value = client.sceneName;
     this.show(client);
   }
 
@@ -82,21 +69,22 @@ export class Controls {
     if (cloth && base) {
       const factor = base.structural[0] > 0 ? cloth.structural[0] / base.structural[0] : 1;
       this.stiffness.show(factor > 0 ? Math.log2(factor) : 0);
-      this.damping.show(cloth.damping);
     }
     this.showRadius(client);
   }
 
   // Sends changes to the client. Call once per drawn frame.
   apply(client: Client): void {
-    const wind = this.wind.take();
+    const wind = this.takeWind();
     const gust = this.gust.take();
+    const gustSeconds = this.gustSeconds.take();
+    const airDensity = this.density.take();
     const gravity = this.gravity.take();
     const stiffness = this.stiffness.take();
-    const damping = this.damping.take();
     const radius = this.radius.take();
-    if (wind !== undefined) client.parameters.setEnvironment({ wind: scaled(this.windDirection, wind) });
-    if (gust !== undefined) client.parameters.setGust(gust, client.parameters.environment()?.gustSeconds ?? kGustSeconds);
+    if (wind) client.parameters.setEnvironment({ wind });
+    if (gust !== undefined || gustSeconds !== undefined) client.parameters.setGust(this.gust.value, this.gustSeconds.value);
+    if (airDensity !== undefined) client.settings.changeAir({ airDensity });
     if (gravity !== undefined) client.parameters.setEnvironment({ gravity: scaled(this.gravityDirection, gravity) });
     if (stiffness !== undefined) {
       client.frames.cloths().forEach(({ name }, index) => {
@@ -104,7 +92,6 @@ export class Controls {
         if (base) client.parameters.setCloth(name, stiffened(base, 2 ** stiffness));
       });
     }
-    if (damping !== undefined) client.parameters.setCloth("", { damping });
     if (radius !== undefined && this.collider) client.parameters.setCollider(this.collider, { radius });
     this.showRadius(client);
   }
@@ -118,9 +105,29 @@ export class Controls {
     return client.frames.cloths().map((_, index) => client.parameters.material(index));
   }
 
+  // The direction of a wind that is switched off is kept, to be used when it is switched on.
+  private takeWind(): Vec3 | undefined {
+    const changes = this.windSliders.map((slider) => slider.take());
+    if (changes.every((change) => change === undefined)) return undefined;
+    const wind = { speed: this.wind.value, heading: this.heading.value, rise: this.rise.value };
+    return vectorOf(wind);
+  }
+
   private showEnvironment(environment: Environment): void {
-    this.wind.show(Math.hypot(...environment.wind));
+    const wind = windOf(environment.wind);
+    this.wind.show(wind.speed);
+    if (wind.speed > 0) {
+      this.heading.show(wind.heading);
+      this.rise.show(wind.rise);
+    } else {
+      this.heading.forget();
+      this.rise.forget();
+      this.heading.writeValue();
+      this.rise.writeValue();
+    }
     this.gust.show(environment.gustStrength);
+    this.gustSeconds.show(environment.gustSeconds);
+    this.density.show(environment.airDensity);
     this.gravity.show(Math.hypot(...environment.gravity));
   }
 
@@ -148,8 +155,12 @@ class Slider {
     this.output = element(`${id}-value`);
     this.input.addEventListener("input", () => {
       this.changed = true;
-      this.write();
+      this.writeValue();
     });
+  }
+
+  get value(): number {
+    return this.input.valueAsNumber;
   }
 
   // Returns the value to send if the user changed it since the last call.
@@ -168,7 +179,7 @@ class Slider {
     if (value > Number(this.input.max)) this.input.max = String(Math.ceil(value));
     if (Math.abs(this.input.valueAsNumber - value) < step / 2 && this.output.textContent) return;
     this.input.valueAsNumber = value;
-    this.write();
+    this.writeValue();
   }
 
   // Forgets unsent and unconfirmed values, because the slider now controls something else or a change was refused.
@@ -177,7 +188,7 @@ class Slider {
     this.sent = undefined;
   }
 
-  private write(): void {
+  writeValue(): void {
     const text = this.format(this.input.valueAsNumber);
     this.output.textContent = text;
     this.input.setAttribute("aria-valuetext", text);

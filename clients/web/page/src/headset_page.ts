@@ -3,7 +3,7 @@
 
 import { Roles, type Client, type Session } from "@clothstream/client";
 import { CanvasPanel, Headset, Immersion, type Doing, type Mode, type PanelRow } from "@clothstream/three";
-import { element, write } from "./hud";
+import { element, write } from "./panel/dom";
 import type { View } from "./view";
 
 const kMostScenes = 6;
@@ -60,7 +60,7 @@ export class HeadsetPage {
   show(): void {
     if (!this.headset.session) return;
     const { client, state } = this.session;
-    this.scenes = client.scenes();
+    this.scenes = client.requests.scenes().map(({ name }) => name);
     const rows: PanelRow[] = [{ text: statusText(this.session) }];
     const hint = kHints[this.headset.doing];
     if (hint) rows.push({ text: hint });

@@ -2,7 +2,7 @@
 // How this page proves who it is: asks for a pairing code or a token, keeps the token, and shows codes to owners.
 
 import { Roles, type Client, type PairingCode, type Proof, type TokenStore } from "@clothstream/client";
-import { element, write } from "./hud";
+import { element, write } from "./panel/dom";
 
 const kStorageKey = "clothstream.token";
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Starts the page: core, view, session, panel, and the drawing loop.
 
-import { ClothReports } from "./cloth_reports";
-import { Roles, Session, type SessionListener, type Vec3 } from "@clothstream/client";
-import { Controls } from "./controls";
+import { Roles, Session, type SessionListener, type SessionOptions, type Vec3 } from "@clothstream/client";
 import { Drag } from "./drag";
 import { HeadsetPage } from "./headset_page";
-import { element, Hud } from "./hud";
+import { Hud } from "./hud";
 import { browserTokens, PairingPanel, ProofForm } from "./identity";
 import { listenToKeys } from "./keys";
+import { element } from "./panel/dom";
+import { Panel } from "./panel/panel";
 import { Player } from "./player";
 import { Pusher, type Tool } from "./pusher";
 import { expose } from "./probe";
@@ -35,8 +35,6 @@ async function start(): Promise<void> {
     return;
   }
   void showAddress();
-  const controls = new Controls({ sceneChosen: chooseScene, viewReset: () => view.reset() });
-  const reports = new ClothReports();
   const castRay = (origin: Vec3, direction: Vec3) =>
     session.state.kind === "live" ? session.client.frames.castRay(origin, direction) : undefined;
   // Before Drag, so that its presses come first.
@@ -47,9 +45,8 @@ async function start(): Promise<void> {
   const drag: Drag = new Drag(
     view,
     castRay,
-    (collider) => (controls.collider = collider),
+    (collider) => (panel.controls.collider = collider),
   );
-  listenToKeys(view, drag, controls);
   const player = new Player();
 
   const address = new URL("stream", window.location.href);
@@ -70,6 +67,7 @@ async function start(): Promise<void> {
   const listener: SessionListener = {
     stateChanged: () => {
       hud.showState(session.state);
+      panel.stateChanged();
       proof.show(session.state.kind === "asking" ? session.state.reason : undefined);
     },
     pairingCodeMade: (client) => {
@@ -80,20 +78,19 @@ async function start(): Promise<void> {
       hud.showScene(client);
       probe.described(client);
       view.describe(client);
-      controls.describe(client);
-      reports.describe(client);
+      panel.described(client);
     },
     parametersChanged: (client) => {
-      controls.show(client);
-      reports.showSolvers(client);
+      panel.parametersChanged(client);
       view.dress(client);
     },
     participantsChanged: (client) => {
       view.name(client);
-      hud.showParticipants(client);
+      panel.participantsChanged(client);
       pairing.showFor(client);
     },
-    scenesListed: (scenes) => controls.listScenes(scenes, session.client.sceneName),
+    scenesListed: (client) => panel.scenesListed(client),
+    answered: (client) => panel.answered(client),
     grabsChanged: (client) =>
         client.input.grabEvents().forEach(({ grab, vertices }) => {
           if (vertices === 0) {
@@ -101,24 +98,37 @@ async function start(): Promise<void> {
             headset.slipped(grab);
           }
         }),
-    notice: (text) => hud.showNotice(text),
+    notice: (text) => {
+      hud.showNotice(text);
+      panel.noticed();
+    },
     refused: (client) => {
       hud.showNotice(client.errorText);
-      controls.refused(client);
-      reports.showSolvers(client);
+      panel.refused(client);
     },
   };
-  const session: Session = await Session.open({
+  const options: SessionOptions = {
     url: address.href,
     scene,
     identity,
     program: "clothstream page",
     tokens: browserTokens,
+    quality: limit("quality", 3),
+    temporalLayers: limit("layers", 3),
     listener,
-  }).catch((error: unknown) => {
+  };
+  const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset() });
+  listenToKeys(view, drag, panel.controls);
+  const session: Session = await Session.open(options).catch((error: unknown) => {
     hud.showFatal(`The client core did not start: ${error instanceof Error ? error.message : String(error)}`);
     throw error;
   });
+
+  // Number in the address, 0 to `most`; 0 if there is none.
+  function limit(name: string, most: number): number {
+    const value = Number(query.get(name));
+    return Number.isInteger(value) && value >= 0 && value <= most ? value : 0;
+  }
 
   function chooseScene(name: string): void {
     const url = new URL(window.location.href);
@@ -137,9 +147,8 @@ async function start(): Promise<void> {
     if (frame) headset.draw(frame, now, client);
     player.draw(client);
     drag.enabled = !player.plays && pusher.tool === "hand";
+    panel.apply(client);
     if (client) {
-      controls.apply(client);
-      reports.apply(client);
       const target = drag.take();
       if (target?.kind === "collider") client.parameters.setCollider(target.collider, { position: target.position });
       if (target?.kind === "grab") client.input.setGrabs(target.grab ? [target.grab] : []);
@@ -152,10 +161,7 @@ async function start(): Promise<void> {
     }
     if (now - figuresAt >= kFiguresPeriodMs) {
       figuresAt = now;
-      if (client) {
-        hud.showFigures(client);
-        reports.showReports(client);
-      }
+      panel.refresh(client, now);
       hud.showState(session.state);
       headset.show();
     }

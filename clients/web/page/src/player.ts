@@ -2,7 +2,7 @@
 // Timeline of a recording: pause, seek, speed and loop, which act for every participant.
 
 import type { Client, Playback } from "@clothstream/client";
-import { element, write } from "./hud";
+import { element, write } from "./panel/dom";
 
 // Period of seek requests while the user drags the timeline. The server accepts ten requests per second.
 const kSeekPeriodMs = 200;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Shows the address of this server for other devices, with its QR code and the fingerprint of its key.
 
-import { element, write } from "./hud";
+import { element, write } from "./panel/dom";
 
 // Stays hidden if other devices cannot reach the server, or another server delivers this page.
 export async function showAddress(): Promise<void> {
@@ -19,4 +19,5 @@ export async function showAddress(): Promise<void> {
   write(key, `The browser warns of an unknown certificate. Its public key must have this SHA-256 fingerprint: ${fingerprint}`);
   key.hidden = !fingerprint;
   element("share").hidden = false;
+  element("share-none").hidden = true;
 }

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// Writes the definition of a scene with one cloth from a mesh, as a serialised Scene of scene.proto.
+
+import { ClothFields, ColliderFields, MeshFields, PoseFields, SceneFields, Vec3Fields } from "./tables";
+
+export interface MeshScene {
+  name: string; // 1 to 64 characters out of [a-z0-9_-]; also the name of the cloth
+  description: string;
+  positions: Float32Array; // 3 per vertex, in units of `scale`
+  triangles: Uint32Array; // 3 vertex indices each
+  uvs?: Float32Array; // 2 per vertex
+  scale: number; // metres per unit
+  position: readonly [number, number, number]; // of the mesh in the scene, m
+  material: string; // "" means none
+  massPerArea?: number; // kg/m^2; undefined: that of the material
+  pinned: readonly number[]; // vertex indices
+  selfCollision: boolean;
+  floor: boolean; // a plane at y = 0
+}
+
+// Each part is bytes. A message is the concatenation of its fields.
+type Part = Uint8Array;
+
+export function sceneBytes(scene: MeshScene): Uint8Array {
+  const mesh = joined([
+    bytes(MeshFields.positions, view(scene.positions)),
+    bytes(MeshFields.triangles, packed(scene.triangles)),
+    ...(scene.uvs ? [bytes(MeshFields.uvs, view(scene.uvs))] : []),
+    bytes(MeshFields.pose, bytes(PoseFields.position, vec3(scene.position))),
+    float(MeshFields.scale, scene.scale),
+  ]);
+  const cloth = joined([
+    text(ClothFields.name, scene.name),
+    bytes(ClothFields.mesh, mesh),
+    ...(scene.pinned.length > 0 ? [bytes(ClothFields.pinnedVertices, packed(scene.pinned))] : []),
+    ...(scene.selfCollision ? [bytes(ClothFields.selfCollision, new Uint8Array())] : []),
+    ...(scene.material ? [text(ClothFields.material, scene.material)] : []),
+    ...(scene.massPerArea === undefined ? [] : [float(ClothFields.arealMass, scene.massPerArea)]),
+  ]);
+  const floor = joined([text(ColliderFields.name, "floor"), bytes(ColliderFields.plane, new Uint8Array())]);
+  return joined([
+    text(SceneFields.name, scene.name),
+    text(SceneFields.description, scene.description),
+    bytes(SceneFields.cloths, cloth),
+    ...(scene.floor ? [bytes(SceneFields.colliders, floor)] : []),
+  ]);
+}
+
+function vec3([x, y, z]: readonly [number, number, number]): Part {
+  return joined([float(Vec3Fields.x, x), float(Vec3Fields.y, y), float(Vec3Fields.z, z)]);
+}
+
+function text(field: number, value: string): Part {
+  return bytes(field, new TextEncoder().encode(value));
+}
+
+function bytes(field: number, value: Uint8Array): Part {
+  return joined([packed([8 * field + 2, value.length]), value]);
+}
+
+function float(field: number, value: number): Part {
+  const part = new Uint8Array(4);
+  new DataView(part.buffer).setFloat32(0, value, true);
+  return joined([packed([8 * field + 5]), part]);
+}
+
+// Floats of little-endian machines, which are all that have browsers.
+function view(values: Float32Array): Part {
+  return new Uint8Array(values.buffer, values.byteOffset, values.byteLength);
+}
+
+// Varints, one after the other.
+export function packed(values: ArrayLike<number>): Part {
+  const out = new Uint8Array(5 * values.length);
+  let end = 0;
+  for (let i = 0; i < values.length; ++i) {
+    let value = values[i]!;
+    for (; value >= 0x80; value = Math.floor(value / 0x80)) out[end++] = (value % 0x80) + 0x80;
+    out[end++] = value;
+  }
+  return out.subarray(0, end);
+}
+
+function joined(parts: readonly Part[]): Part {
+  const out = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+  let end = 0;
+  for (const part of parts) {
+    out.set(part, end);
+    end += part.length;
+  }
+  return out;
+}

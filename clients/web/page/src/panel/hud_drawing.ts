@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// Draws the figures with small plots into any canvas, also into a texture. It touches no element of the page.
+
+import { kStages, type Channel, type HudHistory } from "./hud_history";
+
+export interface HudTheme {
+  text: string;
+  quiet: string;
+  line: string;
+  accent: string;
+  bad: string;
+  stages: readonly string[]; // one colour for each of kStages
+  font: string; // family
+}
+
+// Size of the drawing in its own units. Scale the context to fill another size.
+export const kHudWidth = 352;
+export const kHudHeight = 214;
+
+interface Cell {
+  label: string;
+  unit: string;
+  channel: Channel;
+  digits: number;
+  sums?: boolean; // shows the sum over the whole time
+}
+
+const kCells: readonly Cell[] = [
+  { label: "display", unit: "/s", channel: "displayRate", digits: 0 },
+  { label: "stream", unit: "/s", channel: "streamRate", digits: 0 },
+  { label: "frame age", unit: "ms", channel: "frameAge", digits: 0 },
+  { label: "round trip", unit: "ms", channel: "roundTrip", digits: 1 },
+  { label: "network", unit: "kbit/s", channel: "kbit", digits: 0 },
+  { label: "precision", unit: "bit/vertex", channel: "bitsPerVertex", digits: 1 },
+  { label: "dropped in a minute", unit: "", channel: "drops", digits: 0, sums: true },
+];
+const kStageLabels = ["up", "server", "down", "decode", "play-out"];
+
+const kColumns = 4;
+const kCellWidth = kHudWidth / kColumns;
+const kCellHeight = 58;
+const kGap = 8;
+
+// Draws over what is there: clear the canvas before.
+export function drawHud(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme): void {
+  context.textBaseline = "alphabetic";
+  context.lineJoin = "round";
+  kCells.forEach((cell, index) => {
+    const wide = index === kCells.length - 1 ? 2 : 1;
+    const x = (index % kColumns) * kCellWidth;
+    drawCell(context, history, theme, cell, x, Math.floor(index / kColumns) * (kCellHeight + kGap), wide * kCellWidth - kGap);
+  });
+  drawStages(context, history, theme, 2 * (kCellHeight + kGap));
+}
+
+// The figures as a sentence, for people who do not see the picture.
+export function hudText(history: HudHistory): string {
+  if (history.length === 0) return "No figures yet.";
+  const figures = kCells.map((cell) => `${cell.label} ${textOf(history, cell)} ${cell.unit}`.trim());
+  const stages = kStages.map((stage, index) => `${kStageLabels[index]} ${history.at(stage).toFixed(1)}`);
+  return `${figures.join(", ")}; pose to picture ${history.latency().toFixed(1)} ms: ${stages.join(", ")}.`;
+}
+
+function textOf(history: HudHistory, { channel, digits, sums }: Cell): string {
+  return (sums ? history.sum(channel) : history.at(channel)).toFixed(digits);
+}
+
+function drawCell(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme, cell: Cell, x: number, y: number, width: number): void {
+  context.font = `10px ${theme.font}`;
+  context.fillStyle = theme.quiet;
+  context.fillText(cell.label, x, y + 10);
+  const text = textOf(history, cell);
+  context.font = `600 15px ${theme.font}`;
+  context.fillStyle = cell.sums && history.sum(cell.channel) > 0 ? theme.bad : theme.text;
+  context.fillText(text, x, y + 27);
+  const end = x + context.measureText(text).width + 4;
+  context.font = `10px ${theme.font}`;
+  context.fillStyle = theme.quiet;
+  context.fillText(cell.unit, end, y + 27);
+  const most = Math.max(history.largest(cell.channel), 1e-6);
+  const floor = y + kCellHeight;
+  context.strokeStyle = theme.line;
+  context.lineWidth = 1;
+  context.beginPath();
+  context.moveTo(x, floor - 0.5);
+  context.lineTo(x + width, floor - 0.5);
+  context.stroke();
+  context.strokeStyle = theme.accent;
+  context.lineWidth = 1.25;
+  context.beginPath();
+  for (let ago = 0; ago < history.length; ++ago) {
+    const right = x + width * (1 - ago / (history.capacity - 1));
+    const top = floor - 1 - ((kCellHeight - 34) * history.at(cell.channel, ago)) / most;
+    if (ago === 0) context.moveTo(right, top);
+    else context.lineTo(right, top);
+  }
+  context.stroke();
+}
+
+// Stages from a pose to its picture as areas on top of each other.
+function drawStages(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme, y: number): void {
+  context.font = `10px ${theme.font}`;
+  context.fillStyle = theme.quiet;
+  context.fillText("pose to picture", 0, y + 11);
+  const end = context.measureText("pose to picture").width + 6;
+  context.font = `600 12px ${theme.font}`;
+  context.fillStyle = theme.text;
+  context.fillText(`${history.latency().toFixed(1)} ms`, end, y + 11);
+  context.font = `10px ${theme.font}`;
+  let x = 0;
+  kStages.forEach((stage, index) => {
+    const label = `${kStageLabels[index]} ${history.at(stage).toFixed(0)}`;
+    context.fillStyle = theme.stages[index]!;
+    context.fillRect(x, y + 20, 7, 7);
+    context.fillStyle = theme.quiet;
+    context.fillText(label, x + 11, y + 27);
+    x += context.measureText(label).width + 22;
+  });
+  let most = 1;
+  for (let ago = 0; ago < history.length; ++ago) most = Math.max(most, history.latency(ago));
+  const floor = kHudHeight;
+  const height = kHudHeight - y - 34;
+  // From the top layer down, so that each area covers the lower part of the one before it.
+  for (let stage = kStages.length - 1; stage >= 0; --stage) {
+    context.fillStyle = theme.stages[stage]!;
+    context.beginPath();
+    context.moveTo(kHudWidth, floor);
+    for (let ago = 0; ago < history.length; ++ago) {
+      let sum = 0;
+      for (let lower = 0; lower <= stage; ++lower) sum += history.at(kStages[lower]!, ago);
+      context.lineTo(kHudWidth * (1 - ago / (history.capacity - 1)), floor - (height * sum) / most);
+    }
+    context.lineTo(kHudWidth * (1 - Math.max(0, history.length - 1) / (history.capacity - 1)), floor);
+    context.fill();
+  }
+}
