@@ -28,7 +28,8 @@
  *
  * Units are SI unless a comment or a name says otherwise. Coordinates are right-handed with +Y up, in metres.
  *
- * Sections: lifetime, scenes, frames, play-out, mirror, input, parameters, participants, recording, statistics.
+ * Sections: lifetime, scenes, frames, play-out, mirror, input, parameters, participants, recording,
+ * statistics.
  */
 #ifndef CLOTHSTREAM_CLIENTS_CORE_CORE_H
 #define CLOTHSTREAM_CLIENTS_CORE_CORE_H
@@ -422,22 +423,22 @@ uint32_t cs_played_collider_count(const cs_client* client) CS_NOEXCEPT;
 int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider* out) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
- * Mirror: one participant in two threads. On one thread, a client has the connection and decodes. On the other
- * thread, which draws, its mirror has everything else: play-out, local contact, input, parameters, statistics.
- * Both may be in different modules of WebAssembly, without shared memory.
+ * Mirror: one participant in two threads. On one thread, a client has the connection and decodes. On the
+ * other thread, which draws, its mirror has everything else: play-out, local contact, input, parameters,
+ * statistics. Both may be in different modules of WebAssembly, without shared memory.
  *
- * The program passes the client's messages and its calls of cs_connecting and cs_disconnected to the mirror in
- * the same order, and sends what cs_next_outgoing of the mirror returns after what the client itself sends. A
- * mirror sends no Hello, acknowledgements, and no requests for key frames except cs_request_key_frame. It sends
- * pings only during an upload (cs_create_scene), for which cs_update of the mirror must be called; otherwise
- * cs_update and cs_connect_at of a mirror have no use. Token and pairing code are set on the client. Times are
- * of the same clock for both.
+ * The program passes the client's messages and its calls of cs_connecting and cs_disconnected to the mirror
+ * in the same order, and sends what cs_next_outgoing of the mirror returns after what the client itself
+ * sends. A mirror sends no Hello, acknowledgements, and no requests for key frames except
+ * cs_request_key_frame. It sends pings only during an upload (cs_create_scene), for which cs_update of the
+ * mirror must be called; otherwise cs_update and cs_connect_at of a mirror have no use. Token and pairing
+ * code are set on the client. Times are of the same clock for both.
  */
 
 typedef enum cs_decoding {
   CS_DECODING_DONE = 0,    /* the client decoded the frame */
   CS_DECODING_REFUSED = 1, /* the client could not decode it */
-  CS_DECODING_SKIPPED = 2  /* the program does not pass the result on, or the frame was older than its state */
+  CS_DECODING_SKIPPED = 2 /* the program does not pass the result on, or the frame was older than its state */
 } cs_decoding;
 
 /* What the client made of a message with a frame. */
@@ -455,8 +456,8 @@ typedef struct cs_decoded {
 /* Like cs_create_as, for the mirror of a client with the same arguments. */
 cs_client* cs_create_mirror(const char* scene, const char* client_name, const char* display_name,
                             uint32_t role) CS_NOEXCEPT;
-/* Like cs_receive, for a mirror. `decoded` may be NULL for messages other than frames; a frame is then skipped.
- * A frame with an unknown version or another number of vertices is skipped too. */
+/* Like cs_receive, for a mirror. `decoded` may be NULL for messages other than frames; a frame is then
+ * skipped. A frame with an unknown version or another number of vertices is skipped too. */
 uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t bytes,
                             const cs_decoded* decoded, uint64_t now_us) CS_NOEXCEPT;
 

@@ -85,8 +85,8 @@ uint32_t cs_receive(cs_client* client, const uint8_t* message, size_t bytes, uin
   return client->client.receive(bytesOf(message, bytes), now_us);
 }
 
-uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t bytes, const cs_decoded* decoded,
-                            uint64_t now_us) noexcept {
+uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t bytes,
+                            const cs_decoded* decoded, uint64_t now_us) noexcept {
   return mirror->client.receive(bytesOf(message, bytes), now_us, decoded);
 }
 

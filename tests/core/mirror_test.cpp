@@ -29,9 +29,9 @@ class Pair {
     events = client.receive(message, nowUs);
     const bool isFrame = (events & CS_EVENT_FRAME) != 0;
     cs_decoded decoded = lastDecoded();
-    decoded.decoding = isFrame && forwards_                          ? CS_DECODING_DONE
+    decoded.decoding = isFrame && forwards_                         ? CS_DECODING_DONE
                        : client.statistics().decode_errors > errors ? CS_DECODING_REFUSED
-                                                                     : CS_DECODING_SKIPPED;
+                                                                    : CS_DECODING_SKIPPED;
     return pass(message, &decoded, nowUs);
   }
   std::uint32_t pass(const std::string& message, const cs_decoded* decoded, std::uint64_t nowUs = 0) {

@@ -73,6 +73,13 @@ async function reach(page, side, point, [dx, dy, dz] = [0, 0, 0], step = undefin
   return moveTo(page, "hands", side, [x + dx - offset[0], y + dy - offset[1], z + dz - offset[2]], step, watch);
 }
 
+// Closes (1) or opens (0) the fingers of the right hand, and waits until the page has seen it.
+async function pinch(page, value) {
+  await page.evaluate((goal) => window.device.hands.right.updatePinchValue(goal), value);
+  const { frames } = await page.evaluate(() => window.clothstream.headset);
+  await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
+}
+
 // Deepest place of a drawn vertex in a joint of the own hand, metres. Runs in the page.
 function deepest() {
   const { drawn, headset } = window.clothstream;
@@ -126,7 +133,7 @@ test("a pinch takes hold of the cloth and lifts it", () =>
     const low = (kRows - 1) * kColumns + 16;
     const start = await vertex(page, low);
     await reach(page, "right", start, [0, 0, 0.02]);
-    await page.evaluate(() => window.device.hands.right.updatePinchValue(1));
+    await pinch(page, 1);
     await page.waitForFunction(() => window.clothstream.headset.limbs.some(({ holds }) => holds));
     await reach(page, "right", start, [0, 0.3, 0.1], kStep);
     await untilFrames(page, 40);
@@ -275,16 +282,16 @@ test("two headsets see each other, and agree on one placement by two points", ()
       const points = [[0.4, 0.9, -0.3], [-0.5, 0.9, -0.6]];
       const there = ([x, y, z]) => [z + 0.7, y - 0.1, -x + 0.2]; // from the first room to the second
       for (const [page, place] of [[first, (point) => point], [second, there]]) {
+        // Fingers of a pinch meet a little elsewhere than those of an open hand.
+        await pinch(page, 1);
+        const offset = await pinchOffset(page, "right");
+        await pinch(page, 0);
         await page.evaluate(() => window.clothstream.headset.choose("points"));
         for (const point of points) {
-          const offset = await pinchOffset(page, "right");
           const at = place(point);
           await moveTo(page, "hands", "right", at.map((value, axis) => value - offset[axis]));
-          // Fingers of a pinch meet a little elsewhere: the pose follows them.
-          await page.evaluate(() => window.device.hands.right.setPinchValueImmediate(1));
-          await page.waitForTimeout(300);
-          await page.evaluate(() => window.device.hands.right.setPinchValueImmediate(0));
-          await page.waitForTimeout(300);
+          await pinch(page, 1);
+          await pinch(page, 0);
         }
         await page.waitForFunction(() => window.clothstream.headset.doing === "touch");
       }
