@@ -18,7 +18,6 @@ if (!existsSync(kChromium)) {
   process.exit(kSkipped);
 }
 
-const kRows = 40;
 const kColumns = 32;
 // A vertex of the scene "swing" away from its rod.
 const kTouched = 28 * kColumns + 16;
@@ -125,23 +124,6 @@ test("a hand pushes the cloth, and is never drawn inside it", () =>
       return most;
     });
     assert.ok(inside < 0.003, `a vertex is ${1000 * inside} mm inside the hand`);
-  }));
-
-test("a pinch takes hold of the cloth and lifts it", () =>
-  withHeadset({}, async (page) => {
-    await enter(page, "vr");
-    const low = (kRows - 1) * kColumns + 16;
-    const start = await vertex(page, low);
-    await reach(page, "right", start, [0, 0, 0.02]);
-    await pinch(page, 1);
-    await page.waitForFunction(() => window.clothstream.headset.limbs.some(({ holds }) => holds));
-    await reach(page, "right", start, [0, 0.3, 0.1], kStep);
-    await untilFrames(page, 40);
-    const lifted = await vertex(page, low);
-    assert.ok(lifted[1] > start[1] + 0.2, `the held vertex went from y = ${start[1]} to ${lifted[1]}`);
-    await takePicture(page, "vr_lift");
-    await page.evaluate(() => window.device.hands.right.updatePinchValue(0));
-    await page.waitForFunction(([index, height]) => window.clothstream.positions[3 * index + 1] < height, [low, lifted[1] - 0.1]);
   }));
 
 test("a controller takes hold of the cloth by its ray", () =>
