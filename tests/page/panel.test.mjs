@@ -125,6 +125,7 @@ test("a file dropped on the picture becomes a scene whose pins hold; it is pause
     await page.click("#scene-delete");
     await page.click("#confirm-yes");
     await untilScene(page, "sphere_drop");
+    await untilText(page, "#scene-result", /^grandma_s_tablecloth is deleted\.$/);
     await page.waitForFunction(() => !document.querySelector('[data-scene="grandma_s_tablecloth"]'));
   }));
 

@@ -3,7 +3,8 @@
 
 import type { Answer, Client, SceneRequests, Session } from "@clothstream/client";
 
-export type Outcome = { ok: true; answer: Answer } | { ok: false; error: string };
+// `lost`: the connection ended before the answer, so the server may have carried the request out.
+export type Outcome = { ok: true; answer: Answer } | { ok: false; error: string; lost?: true };
 
 const kUploadPeriodMs = 50;
 
@@ -48,7 +49,7 @@ export class Requests {
 
   // Ends all requests, because the connection to the scene is lost.
   lost(): void {
-    for (const done of this.waiting.values()) done({ ok: false, error: "The connection was lost before the server answered." });
+    for (const done of this.waiting.values()) done({ ok: false, error: "The connection was lost before the server answered.", lost: true });
     this.waiting.clear();
   }
 }

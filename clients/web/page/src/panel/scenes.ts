@@ -24,6 +24,7 @@ export class Scenes {
   };
   private joined: SceneSummary | undefined;
   private shownList = "";
+  private deleted = ""; // scene that the server was asked to delete; the next list shows whether it is gone
 
   constructor(
     private readonly requests: Requests,
@@ -44,6 +45,10 @@ export class Scenes {
       const focused = document.activeElement?.getAttribute("data-scene");
       this.list.replaceChildren(...scenes.map((scene) => this.item(scene, scene.name === client.sceneName)));
       if (focused) this.list.querySelector<HTMLElement>(`[data-scene="${CSS.escape(focused)}"]`)?.focus();
+    }
+    if (this.deleted && scenes.length > 0 && !scenes.some(({ name }) => name === this.deleted)) {
+      this.say(`${this.deleted} is deleted.`, "done");
+      this.deleted = "";
     }
     this.joined = scenes.find(({ name }) => name === client.sceneName);
     this.showActions(client.people.role);
@@ -106,14 +111,20 @@ export class Scenes {
     const leave = others > 0 ? ` ${others} other ${others === 1 ? "person leaves" : "people leave"} it.` : "";
     if (!(await confirmed(`Delete the scene ${scene.name}? This cannot be undone.${leave}`, "Delete"))) return;
     const outcome = await this.requests.ask((requests) => requests.delete(scene.name));
-    this.report(outcome, `${scene.name} is deleted.`);
-    if (outcome.ok) this.listener.sceneChosen("");
+    // The server ends the streams of the scene, often before its answer arrives.
+    if (!outcome.ok && !outcome.lost) return this.report(outcome, "");
+    this.deleted = scene.name;
+    this.listener.sceneChosen("");
   }
 
   private report(outcome: Outcome, done: string): void {
-    write(this.result, outcome.ok ? done : outcome.error);
-    this.result.dataset["kind"] = outcome.ok ? "done" : "error";
-    this.result.hidden = false;
+    this.say(outcome.ok ? done : outcome.error, outcome.ok ? "done" : "error");
     this.listener.listWanted();
+  }
+
+  private say(text: string, kind: "done" | "error"): void {
+    write(this.result, text);
+    this.result.dataset["kind"] = kind;
+    this.result.hidden = false;
   }
 }
