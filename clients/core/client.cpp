@@ -366,7 +366,8 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId) {
                  .error = error->code,
                  .errorText = std::move(error->text),
                  .name = {},
-                 .bytes = 0};
+                 .bytes = 0,
+                 .repairs = {}};
       return CS_EVENT_ANSWER;
     }
   }

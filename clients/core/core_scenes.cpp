@@ -50,7 +50,8 @@ int cs_get_answer(const cs_client* client, cs_answer* out) noexcept {
           .error = answer.error,
           .error_text = answer.errorText.c_str(),
           .name = answer.name.c_str(),
-          .bytes = answer.bytes};
+          .bytes = answer.bytes,
+          .repairs = answer.repairs.c_str()};
   return 1;
 }
 

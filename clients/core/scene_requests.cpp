@@ -140,7 +140,8 @@ std::uint32_t Client::answerReceived(const ServerMessage& message) {
              .error = 0,
              .errorText = {},
              .name = {},
-             .bytes = 0};
+             .bytes = 0,
+             .repairs = {}};
   if (message.requestId == upload_.requestId()) upload_.end();
   if (!readAnswer(message)) return failMalformed("answer");
   return CS_EVENT_ANSWER;
@@ -149,8 +150,13 @@ std::uint32_t Client::answerReceived(const ServerMessage& message) {
 bool Client::readAnswer(const ServerMessage& message) {
   switch (message.kind) {
     case Body::createScene:
-    case Body::controlScene:
-      return assign(answer_.name, readSceneAnswer(message.body));
+    case Body::controlScene: {
+      std::optional<SceneAnswer> scene = readSceneAnswer(message.body);
+      if (!scene) return false;
+      answer_.name = std::move(scene->name);
+      answer_.repairs = std::move(scene->repairs);
+      return true;
+    }
     case Body::startRecording:
       return assign(answer_.name, readStartedRecording(message.body));
     case Body::stopRecording: {

@@ -256,6 +256,32 @@ TEST(CreateScene, SmallSceneIsOneMessage) {
   EXPECT_EQ(joined.client.receive(made.SerializeAsString()), kAnswer);
   EXPECT_EQ(answerOf(joined.client).request, CS_REQUEST_CREATE_SCENE);
   EXPECT_STREQ(answerOf(joined.client).name, "mine");
+  EXPECT_STREQ(answerOf(joined.client).repairs, "");
+}
+
+TEST(CreateScene, AnswerListsRepairs) {
+  JoinedClient joined;
+  v1::ServerMessage made = answerTo(create(joined.client, sceneOf(10), "mine"));
+  v1::MeshRepair& repair = *made.mutable_create_scene()->add_repairs();
+  repair.add_sentences("2 faces without an area were dropped.");
+  repair.add_sentences("3 triangles were turned.");
+  EXPECT_EQ(joined.client.receive(made.SerializeAsString()), kAnswer);
+  EXPECT_STREQ(answerOf(joined.client).repairs,
+               "2 faces without an area were dropped.\n3 triangles were turned.");
+  // A new answer has none.
+  v1::ServerMessage reset = answerTo(cs_reset_scene(joined.client.get(), ""));
+  reset.mutable_control_scene();
+  joined.client.receive(reset.SerializeAsString());
+  EXPECT_STREQ(answerOf(joined.client).repairs, "");
+}
+
+TEST(CreateScene, RefusesRepairsWithoutEnd) {
+  JoinedClient joined;
+  v1::ServerMessage made = answerTo(create(joined.client, sceneOf(10), "mine"));
+  for (int i = 0; i < 100; ++i)
+    made.mutable_create_scene()->add_repairs()->add_sentences(std::string(4000, 'x'));
+  joined.client.receive(made.SerializeAsString());
+  EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_FAILED);
 }
 
 TEST(CreateScene, RefusesEmptyAndHugeScenes) {

@@ -161,6 +161,16 @@ test("files and names that do not work are explained", () =>
     await page.click("#create-send");
     await untilText(page, "#create-error", /sphere_drop/);
     assert.ok(await page.isEnabled("#create-send"));
+
+    // A mesh that cannot be cloth, as three faces share an edge, is repaired on request, and the panel says how.
+    await dropFile(page, "book.obj", Buffer.from("v 0 0 0\nv 0 1 0\nv 1 0 0\nv -1 0 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n"));
+    await page.waitForFunction(() => document.getElementById("create-name").value === "book");
+    await page.click("#create-send");
+    await untilText(page, "#create-error", /edge/);
+    await page.check("#create-repair");
+    await page.click("#create-send");
+    await untilScene(page, "book");
+    assert.match(await page.textContent("#scene-result"), /^book is ready\. .*edge/);
   }));
 
 test("the list of scenes tells what they are, and a click joins one", () =>

@@ -173,6 +173,10 @@ function fieldsOf(bytes) {
   };
   while (at < bytes.length) {
     const tag = varint();
+    if ((tag & 7) === 0) {
+      fields.push([tag >> 3, varint()]);
+      continue;
+    }
     const size = (tag & 7) === 2 ? varint() : 4;
     fields.push([tag >> 3, bytes.subarray(at, at + size)]);
     at += size;
@@ -191,6 +195,7 @@ test("a scene has its cloth, mesh, pins and floor", () => {
     material: "cotton",
     massPerArea: 0.25,
     pinned: [0, 300],
+    repair: true,
     selfCollision: true,
     floor: true,
   });
@@ -203,6 +208,7 @@ test("a scene has its cloth, mesh, pins and floor", () => {
   const mesh = new Map(fieldsOf(cloth.get(14)));
   assert.equal(mesh.get(2).length, 4 * 27);
   assert.deepEqual([...mesh.get(3)], [0, 3, 1]);
+  assert.equal(mesh.get(70), 1);
   assert.equal(Buffer.from(mesh.get(9)).readFloatLE(0), 0.5);
   assert.equal(new Map(fieldsOf(fields.get(9))).get(4).length, 0);
   assert.deepEqual([...packed([0, 127, 128, 2 ** 31])], [0, 127, 128, 1, 128, 128, 128, 128, 8]);

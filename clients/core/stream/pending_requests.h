@@ -20,6 +20,7 @@ struct Answer {
   std::string errorText;
   std::string name;  // scene or file
   std::uint64_t bytes = 0;
+  std::string repairs;
 };
 
 class PendingRequests {

@@ -61,6 +61,18 @@ bool readSummary(Bytes message, SceneSummary& out) {
   });
 }
 
+// Appends the sentences of a MeshRepair.
+bool readRepairs(Bytes message, std::string& out) {
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag != field::MeshRepair::kSentences.tag) return skip(reader);
+    std::string sentence;
+    if (!setShortText(sentence, reader)) return false;
+    if (!out.empty()) out += '\n';
+    out += sentence;
+    return out.size() <= kMaxRepairBytes;
+  });
+}
+
 bool readBan(Bytes message, Ban& out) {
   using F = field::Ban;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
@@ -148,14 +160,17 @@ std::optional<std::vector<SceneSummary>> readScenes(Bytes message) {
   });
 }
 
-std::optional<std::string> readSceneAnswer(Bytes message) {
-  static_assert(field::CreateSceneResponse::kScene.tag == field::ControlSceneResponse::kScene.tag);
-  SceneSummary summary;
-  const bool read = readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    return tag == field::CreateSceneResponse::kScene.tag ? readSummary(reader.get_view(), summary)
-                                                         : skip(reader);
+std::optional<SceneAnswer> readSceneAnswer(Bytes message) {
+  using F = field::CreateSceneResponse;
+  static_assert(F::kScene.tag == field::ControlSceneResponse::kScene.tag);
+  return readMessage<SceneAnswer>(message, [](SceneAnswer& answer, std::uint32_t tag, Reader& reader) {
+    if (tag == F::kRepairs.tag) return readRepairs(reader.get_view(), answer.repairs);
+    if (tag != F::kScene.tag) return skip(reader);
+    SceneSummary summary;
+    if (!readSummary(reader.get_view(), summary)) return false;
+    answer.name = std::move(summary.name);
+    return true;
   });
-  return read ? std::optional(std::move(summary.name)) : std::nullopt;
 }
 
 std::optional<std::string> readStartedRecording(Bytes message) {

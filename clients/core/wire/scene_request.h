@@ -58,12 +58,17 @@ inline constexpr std::size_t kMaxScenes = 65536;
 inline constexpr std::size_t kMaxSceneTextBytes = 4096;  // of each name and description
 inline constexpr std::size_t kMaxBans = 4096;
 inline constexpr std::size_t kMaxDefinitionBytes = 1 << 20;
+inline constexpr std::size_t kMaxRepairBytes = 1 << 18;  // of all sentences
 
 // The functions return nullopt if the message is not well formed, a text is not UTF-8, or a limit above is
 // exceeded.
 [[nodiscard]] std::optional<std::vector<SceneSummary>> readScenes(Bytes message);
-// Reads the name of the scene in a CreateSceneResponse or ControlSceneResponse.
-[[nodiscard]] std::optional<std::string> readSceneAnswer(Bytes message);
+struct SceneAnswer {
+  std::string name;
+  std::string repairs;  // one sentence a line
+};
+// Reads a CreateSceneResponse or ControlSceneResponse.
+[[nodiscard]] std::optional<SceneAnswer> readSceneAnswer(Bytes message);
 [[nodiscard]] std::optional<std::string> readStartedRecording(Bytes message);
 [[nodiscard]] std::optional<StoppedRecording> readStoppedRecording(Bytes message);
 // Returns the serialised Scene of a GetSceneResponse.

@@ -436,6 +436,7 @@ void Program::readAnswers() {
     require(answer.request_id != 0 && answer.request >= CS_REQUEST_CREATE_SCENE, "answers name a request");
     expectText(answer.error_text);
     expectText(answer.name);
+    expectText(answer.repairs);
   }
   cs_scene_summary scene;
   for (std::uint32_t i = 0; cs_get_scene(client(), i, &scene) != 0; ++i) {

@@ -34,7 +34,7 @@ export const cs_scene_summary = {
   is_recording: 40,
 } as const;
 export const cs_answer = {
-  sizeof: 40,
+  sizeof: 48,
   version: 0,
   request: 4,
   request_id: 8,
@@ -42,6 +42,7 @@ export const cs_answer = {
   error_text: 20,
   name: 24,
   bytes: 32,
+  repairs: 40,
 } as const;
 export const cs_ban = {
   sizeof: 12,

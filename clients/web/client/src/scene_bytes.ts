@@ -14,6 +14,7 @@ export interface MeshScene {
   material: string; // "" means none
   massPerArea?: number; // kg/m^2; undefined: that of the material
   pinned: readonly number[]; // vertex indices
+  repair: boolean; // whether the server repairs a mesh that it would refuse (docs/meshes.md)
   selfCollision: boolean;
   floor: boolean; // a plane at y = 0
 }
@@ -28,6 +29,7 @@ export function sceneBytes(scene: MeshScene): Uint8Array {
     ...(scene.uvs ? [bytes(MeshFields.uvs, view(scene.uvs))] : []),
     bytes(MeshFields.pose, bytes(PoseFields.position, vec3(scene.position))),
     float(MeshFields.scale, scene.scale),
+    ...(scene.repair ? [flag(MeshFields.repair)] : []),
   ]);
   const cloth = joined([
     text(ClothFields.name, scene.name),
@@ -62,6 +64,10 @@ function float(field: number, value: number): Part {
   const part = new Uint8Array(4);
   new DataView(part.buffer).setFloat32(0, value, true);
   return joined([packed([8 * field + 5]), part]);
+}
+
+function flag(field: number): Part {
+  return packed([8 * field, 1]);
 }
 
 // Floats of little-endian machines, which are all that have browsers.

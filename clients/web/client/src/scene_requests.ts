@@ -26,6 +26,7 @@ export interface Answer {
   errorText: string;
   name: string; // of the scene or file
   bytes: number; // of the file that a recording has written
+  repairs: string; // what was repaired in the mesh of a new scene, one sentence a line
 }
 
 export interface Ban {
@@ -76,6 +77,7 @@ export class SceneRequests {
       errorText: this.core.text(view.getUint32(this.scratch + cs_answer.error_text, true)),
       name: this.core.text(view.getUint32(this.scratch + cs_answer.name, true)),
       bytes: Number(view.getBigUint64(this.scratch + cs_answer.bytes, true)),
+      repairs: this.core.text(view.getUint32(this.scratch + cs_answer.repairs, true)),
     };
   }
 

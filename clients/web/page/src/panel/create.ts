@@ -23,10 +23,10 @@ export class Create {
   private mesh: FileMesh | undefined;
   private fileName = "";
 
-  // `made` receives the name of the new scene.
+  // `made` receives the name of the new scene, and what was repaired in its mesh.
   constructor(
     private readonly requests: Requests,
-    private readonly made: (scene: string) => void,
+    private readonly made: (scene: string, repairs: string) => void,
   ) {
     this.file.addEventListener("change", () => {
       const [file] = this.file.files ?? [];
@@ -128,6 +128,7 @@ export class Create {
       material: this.material.value,
       ...(this.mass.value ? { massPerArea: this.mass.valueAsNumber } : {}),
       pinned,
+      repair: element<HTMLInputElement>("create-repair").checked,
       selfCollision: element<HTMLInputElement>("create-self").checked,
       floor: element<HTMLInputElement>("create-floor").checked,
     });
@@ -143,7 +144,7 @@ export class Create {
     element("create-fields").hidden = true;
     this.form.reset();
     this.mesh = undefined;
-    this.made(outcome.answer.name);
+    this.made(outcome.answer.name, outcome.answer.repairs);
   }
 
   private fail(text: string): void {

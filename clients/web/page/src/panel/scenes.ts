@@ -36,6 +36,12 @@ export class Scenes {
     this.buttons.delete.addEventListener("click", () => void this.delete());
   }
 
+  // A scene was made from a file.
+  made(scene: string, repairs: string): void {
+    this.say([`${scene} is ready.`, ...repairs.split("\n")].join(" ").trim(), "done");
+    this.listener.sceneChosen(scene);
+  }
+
   // Shows the newest list, and the state of the joined scene.
   show(client: Client): void {
     const scenes = client.requests.scenes();
