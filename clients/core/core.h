@@ -228,7 +228,7 @@ typedef struct cs_answer {
   /* Name of the scene (create, control) or of the file (start and stop recording); else "". */
   const char* name;
   uint64_t bytes; /* size of the file (stop recording); else 0 */
-  /* What was repaired in the meshes of a new scene (`Mesh.repair` of scene.proto), one sentence a line; else
+  /* Repairs of the meshes of a new scene (`Mesh.repair` of scene.proto), one sentence a line; else
    * "". */
   const char* repairs;
 } cs_answer;

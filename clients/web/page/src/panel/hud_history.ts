@@ -39,7 +39,7 @@ export class HudHistory {
     ++this.count;
   }
 
-  // Value `ago` samples before the newest one; 0 if there is none.
+  // Value `ago` samples before the newest one; 0 before the first sample.
   at(channel: Channel, ago = 0): number {
     if (ago >= this.length) return 0;
     return this.values[channel][(this.count - 1 - ago) % this.capacity]!;

@@ -13,7 +13,7 @@ export class Requests {
 
   constructor(private readonly session: () => Session) {}
 
-  // Sends a request. Resolves with the answer, or with why there is none.
+  // Sends a request. Resolves with the answer, or with the reason why none came.
   ask(send: (requests: SceneRequests) => bigint): Promise<Outcome> {
     const session = this.session();
     if (session.state.kind !== "live") return Promise.resolve({ ok: false, error: "The page is not connected to a scene." });
