@@ -18,6 +18,7 @@ if (!existsSync(kChromium)) {
   process.exit(kSkipped);
 }
 
+const kRows = 40;
 const kColumns = 32;
 // A vertex of the scene "swing" away from its rod.
 const kTouched = 28 * kColumns + 16;
@@ -124,6 +125,38 @@ test("a hand pushes the cloth, and is never drawn inside it", () =>
       return most;
     });
     assert.ok(inside < 0.003, `a vertex is ${1000 * inside} mm inside the hand`);
+  }));
+
+// The fingers push the lower edge away while they close. The hand holds what was near, where it was.
+test("a pinch takes hold of the cloth and lifts it", () =>
+  withHeadset({}, async (page) => {
+    await enter(page, "vr");
+    const low = (kRows - 1) * kColumns + 16;
+    const start = await vertex(page, low);
+    // A hand that jumps into the cloth would strike it away.
+    await reach(page, "right", start, [0, 0, 0.25]);
+    await reach(page, "right", start, [0, 0, 0.02], kStep);
+    await pinch(page, 1);
+    await page.waitForFunction(() => window.clothstream.headset.limbs.some(({ holds }) => holds));
+    const highest = (at) => page.evaluate((first) => Math.max(...Array.from({ length: 32 }, (_, i) => window.clothstream.positions[3 * (first + i) + 1])), at);
+    const edge = (kRows - 1) * kColumns;
+    const before = await highest(edge);
+    const { x, y, z } = await page.evaluate(() => {
+      const { x, y, z } = window.device.hands.right.position;
+      return { x, y, z };
+    });
+    await moveTo(page, "hands", "right", [x, y + 0.3, z + 0.1], kStep);
+    await untilFrames(page, 40);
+    const lifted = await highest(edge);
+    assert.ok(lifted > before + 0.2, `the lower edge went from y = ${before} to ${lifted}`);
+    await takePicture(page, "vr_lift");
+    await pinch(page, 0);
+    // The open hand no longer carries the cloth.
+    await moveTo(page, "hands", "right", [x, y, z + 0.5], kStep);
+    await page.waitForFunction(
+      ([first, height]) => Math.max(...Array.from({ length: 32 }, (_, i) => window.clothstream.positions[3 * (first + i) + 1])) < height,
+      [edge, lifted - 0.1],
+    );
   }));
 
 test("a controller takes hold of the cloth by its ray", () =>

@@ -4,8 +4,9 @@
 import * as THREE from "three";
 import type { ClothPoint, Grab, Vec3 } from "@clothstream/client";
 
-// Largest distance from a hand to the cloth that it takes hold of, m.
-const kReach = 0.06;
+// Largest distance from a hand to the cloth that it takes hold of, m: the default of Grab.reach in session.proto. The
+// fingers themselves keep the cloth 5 to 6 cm away from where they meet.
+const kReach = 0.1;
 
 // What a grabber needs of the shown cloth (Frames).
 export interface Touchable {
