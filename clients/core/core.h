@@ -430,12 +430,13 @@ int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider*
  * other thread, which draws, its mirror has everything else: play-out, local contact, input, parameters,
  * statistics. Both may be in different modules of WebAssembly, without shared memory.
  *
- * The program passes the client's messages and its calls of cs_connecting and cs_disconnected to the mirror
- * in the same order, and sends what cs_next_outgoing of the mirror returns after what the client itself
- * sends. A mirror sends no Hello, acknowledgements, and no requests for key frames except
- * cs_request_key_frame. It sends pings only during an upload (cs_create_scene), for which cs_update of the
- * mirror must be called; otherwise cs_update and cs_connect_at of a mirror have no use. Token and pairing
- * code are set on the client. Times are of the same clock for both.
+ * The program passes all messages of the server to the client, and then to the mirror. It repeats its calls
+ * of cs_connecting and cs_disconnected for the mirror, in the same order. It sends the messages of the client
+ * first, and then those that cs_next_outgoing of the mirror returns. A mirror sends no Hello,
+ * acknowledgements, and no requests for key frames except cs_request_key_frame. It sends pings only during an
+ * upload (cs_create_scene), for which cs_update of the mirror must be called; otherwise cs_update and
+ * cs_connect_at of a mirror have no use. Token and pairing code are set on the client. Times are of the same
+ * clock for both.
  */
 
 typedef enum cs_decoding {
@@ -444,7 +445,7 @@ typedef enum cs_decoding {
   CS_DECODING_SKIPPED = 2 /* the program does not pass the result on, or the frame was older than its state */
 } cs_decoding;
 
-/* What the client made of a message with a frame. */
+/* Result of the client for a message with a frame. */
 #define CS_DECODED_VERSION 1u
 typedef struct cs_decoded {
   uint32_t version;             /* CS_DECODED_VERSION */

@@ -34,9 +34,9 @@ struct DracoMesh {
   std::vector<std::uint32_t> indices;  // of points, three per face; they exist
 };
 
-// Decodes a buffer of version 2.2. The sizes in the buffer are read first, and larger ones than requested are
-// refused before anything is allocated for them, so that a buffer costs memory and time in proportion to its
-// own bytes and to the requested points and faces. The error says what is wrong.
+// Decodes a buffer of version 2.2. The sizes in the buffer are read first. Larger ones than requested are
+// refused before anything is allocated for them. So a buffer costs memory and time in proportion to its own
+// bytes and to the requested points and faces. The error says what is wrong.
 [[nodiscard]] tl::expected<DracoMesh, std::string> decodeDraco(std::span<const std::byte> bytes,
                                                                const DracoRequest& request);
 

@@ -83,7 +83,7 @@ std::string withJson(const std::string& bytes, bool binary, std::string text) {
   const std::size_t rest = kHeaderBytes + kChunkHeaderBytes + jsonOf(bytes, true).size();
   std::string changed = bytes.substr(0, kHeaderBytes + kChunkHeaderBytes) + text + bytes.substr(rest);
   putWord(changed, kHeaderBytes, text.size());
-  // What is behind the stated length stays there.
+  // Bytes after the stated length stay where they are.
   putWord(changed, kHeaderBytes - 4, wordAt(bytes, kHeaderBytes - 4) + changed.size() - bytes.size());
   return changed;
 }

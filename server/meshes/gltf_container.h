@@ -9,8 +9,8 @@
 
 namespace clothstream::meshes {
 
-// What a file needs that is not supported, and what to do: glTF 1.0, or meshopt compression. Nothing if the
-// reason why it cannot be read is another one. `bytes` is the whole file; `binary` means .glb.
+// Says that a file needs glTF 1.0 or meshopt compression, which are not supported, and what to do. Returns
+// nothing if it cannot be read for another reason. `bytes` is the whole file; `binary` means .glb.
 std::optional<std::string> unsupportedGltf(const std::string& bytes, bool binary);
 
 // The bytes of a file with compressed primitives as tinygltf accepts them: it refuses accessors of indices

@@ -17,7 +17,7 @@ inline constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
 inline constexpr const char* kMeshoptExtension = "EXT_meshopt_compression";
 inline constexpr const char* kQuantizationExtension = "KHR_mesh_quantization";
 
-// What to do with a file that is compressed with meshopt.
+// Says what to do with a file that is compressed with meshopt.
 std::string meshoptError();
 
 struct GltfPrimitive {

@@ -19,7 +19,7 @@ struct Repairs {
   std::uint32_t addedVertices = 0;      // copies of these
   std::uint32_t turnedTriangles = 0;
   std::uint32_t cutEdges = 0;  // edges across which no turning gives both triangles the same front
-  // Of MeshOptions::fit. The scale is 0 if the mesh was neither scaled nor moved.
+  // Result of MeshOptions::fit. The scale is 0 if the mesh was neither scaled nor moved.
   double fittedScale = 0;
   model::Vec3 sizeBefore = model::Vec3::Zero(),
               sizeAfter = model::Vec3::Zero();  // m, along the axes of the mesh

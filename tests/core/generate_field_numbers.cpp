@@ -4,9 +4,7 @@
 // date.
 #include <cctype>
 #include <cstdlib>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <string>
 #include <string_view>
 
@@ -14,6 +12,7 @@
 #include <google/protobuf/wire_format_lite.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "tests/core/generated_file.h"
 
 namespace {
 
@@ -130,23 +129,5 @@ std::string header() {
 }  // namespace
 
 int main(int count, char** arguments) {
-  const bool check = count == 3 && std::string_view(arguments[1]) == "--check";
-  if (count != 2 && !check) {
-    std::cerr << "Usage: generate_field_numbers [--check] FILE\n";
-    return 2;
-  }
-  const std::string path = arguments[count - 1];
-  const std::string expected = header();
-  if (!check) {
-    std::ofstream out(path, std::ios::binary);
-    out << expected << std::flush;
-    if (out) return 0;
-    std::cerr << "generate_field_numbers: " << path << " cannot be written\n";
-    return 1;
-  }
-  std::ifstream in(path, std::ios::binary);
-  const std::string committed{std::istreambuf_iterator<char>(in), {}};
-  if (committed == expected) return 0;
-  std::cerr << path << " is out of date. Run: " << arguments[0] << " " << path << "\n";
-  return 1;
+  return clothstream::writeOrCheck(count, arguments, "generate_field_numbers", &header);
 }

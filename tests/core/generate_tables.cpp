@@ -3,9 +3,6 @@
 // page needs to write a Scene. Usage: generate_tables [--check] FILE. With --check it writes nothing, and
 // fails if FILE is out of date.
 #include <cstddef>
-#include <fstream>
-#include <iostream>
-#include <iterator>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -16,6 +13,7 @@
 #include "clothstream/v1/scene.pb.h"
 #include "proto/parameters/cloth_parameters.h"
 #include "proto/parameters/settings.h"
+#include "tests/core/generated_file.h"
 
 namespace {
 
@@ -112,23 +110,5 @@ std::string file() {
 }  // namespace
 
 int main(int count, char** arguments) {
-  const bool check = count == 3 && std::string_view(arguments[1]) == "--check";
-  if (count != 2 && !check) {
-    std::cerr << "Usage: generate_tables [--check] FILE\n";
-    return 2;
-  }
-  const std::string path = arguments[count - 1];
-  const std::string expected = file();
-  if (!check) {
-    std::ofstream out(path, std::ios::binary);
-    out << expected << std::flush;
-    if (out) return 0;
-    std::cerr << "generate_tables: " << path << " cannot be written\n";
-    return 1;
-  }
-  std::ifstream in(path, std::ios::binary);
-  const std::string committed{std::istreambuf_iterator<char>(in), {}};
-  if (committed == expected) return 0;
-  std::cerr << path << " is out of date. Run: " << arguments[0] << " " << path << "\n";
-  return 1;
+  return clothstream::writeOrCheck(count, arguments, "generate_tables", &file);
 }

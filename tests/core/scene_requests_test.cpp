@@ -192,7 +192,7 @@ TEST(SceneRequests, FatalErrorEndsTheClient) {
   EXPECT_EQ(cs_get_state(joined.client.get()), CS_STATE_FAILED);
 }
 
-TEST(SceneRequests, IgnoresAnswersThatNobodyWaitsFor) {
+TEST(SceneRequests, IgnoresAnswersWithoutRequest) {
   JoinedClient joined;
   v1::ServerMessage message = answerTo(99);
   message.mutable_delete_scene();

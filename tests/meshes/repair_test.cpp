@@ -388,7 +388,7 @@ TEST(RepairedMesh, IsTheSameForTheSameFile) {
   EXPECT_EQ(once.nextCopy, again.nextCopy);
 }
 
-// Random faces on few vertices have every defect. What is left obeys all rules, and repairing it changes
+// Random faces on few vertices have every defect. The result obeys all rules, and a second repair changes
 // nothing.
 TEST(RepairedMesh, ObeysEveryRuleForRandomFaces) {
   for (std::uint32_t seed = 0; seed < 3000; ++seed) {

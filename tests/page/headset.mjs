@@ -9,7 +9,7 @@ const kRuntime = packageFile("iwer/build/iwer.min.js");
 const kRoom = packageFile("@iwer/sem/build/iwer-sem.min.js");
 const kCapture = packageFile("@iwer/sem/captures/office_small.json");
 
-// Opens a page whose browser has a headset. `room` adds a real room with surfaces. Each page has a context of its own.
+// Opens a page whose browser has a headset. `room` adds a real room with surfaces. Pages do not share a context.
 export async function openHeadset(browser, url, { room = false, input = "hand" } = {}) {
   const context = await browser.newContext({ viewport: { width: 640, height: 360 } });
   await context.addInitScript({ path: kRuntime });

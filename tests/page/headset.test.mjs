@@ -108,7 +108,7 @@ test("a hand pushes the cloth, and is never drawn inside it", () =>
     assert.ok(pushed[2] < start[2] - 0.05, `the touched vertex went from z = ${start[2]} to ${pushed[2]}`);
     assert.ok(depths.length > 3, `${depths.length} frames`);
     assert.ok(Math.max(...depths) < 0.005, `a vertex is drawn ${1000 * Math.max(...depths)} mm inside the hand`);
-    // Of the server's frame, where the hand is as the server knows it.
+    // In the server's frame the hand is where the server knows it.
     const inside = await page.evaluate(() => {
       const { positions, colliders } = window.clothstream;
       let most = 0;
@@ -178,6 +178,37 @@ test("a controller takes hold of the cloth by its ray", () =>
     await page.waitForFunction(() => window.clothstream.headset.limbs.every(({ holds }) => !holds));
   }));
 
+// Rows are 5 cm high below a title, and the panel stands to the left of the user (headset_page.ts, canvas_panel.ts).
+test("the panel in space joins another scene, and the user stays in VR", () =>
+  withHeadset({ input: "controller" }, async (page) => {
+    await enter(page, "vr");
+    await page.waitForFunction(() => window.clothstream.headset.limbs.length === 2);
+    const row = 4; // after the state, two ways to place, and the present scene
+    await page.evaluate((index) => {
+      const place = [-0.55, 1.25, -0.55];
+      const turn = Math.atan2(0.55, 0.55) / 2;
+      const tilt = -Math.atan2(0.25, Math.hypot(0.55, 0.55)) / 2;
+      const [sy, cy, sx, cx] = [Math.sin(turn), Math.cos(turn), Math.sin(tilt), Math.cos(tilt)];
+      const [x, y, z, w] = [cy * sx, sy * cx, -sy * sx, cy * cx];
+      const along = (vx, vy, vz) => {
+        const [tx, ty, tz] = [2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)];
+        return [vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx];
+      };
+      const offset = along(0, 0.393 - 0.018 - 0.05 * (index + 1.5), 0.3);
+      const controller = window.device.controllers.right;
+      controller.position.set(...place.map((value, axis) => value + offset[axis]));
+      controller.quaternion.set(x, y, z, w);
+    }, row);
+    const { frames } = await page.evaluate(() => window.clothstream.headset);
+    await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
+    await takePicture(page, "vr_panel");
+    await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 1));
+    await page.waitForFunction(() => window.clothstream.cloths[0]?.name !== "sheet" && window.clothstream.state === "live");
+    await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 0));
+    await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 3);
+    assert.equal(await page.evaluate(() => window.clothstream.headset.mode), "immersive-vr");
+  }));
+
 test("a lost hand keeps its pose for a moment, then goes, and comes back", () =>
   withHeadset({}, async (page) => {
     await enter(page, "vr");
@@ -214,7 +245,7 @@ test("a session ends, and another one begins", () =>
       await own(41);
       // The headset is taken off, and put on again.
       await page.evaluate(() => window.device.updateVisibilityState("hidden"));
-      await page.waitForTimeout(300);
+      await own(0);
       await page.evaluate(() => window.device.updateVisibilityState("visible"));
       const { frames } = await page.evaluate(() => window.clothstream.headset);
       await page.waitForFunction((before) => window.clothstream.headset.frames > before, frames);
@@ -261,6 +292,7 @@ test("pass-through: the scene is put on a real surface", () =>
     await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 1));
     await page.waitForFunction(() => window.clothstream.headset.doing === "touch");
     await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 0));
+    await page.waitForFunction(() => window.clothstream.headset.isAnchored);
     await takePicture(page, "ar_placed");
     const placement = await page.evaluate(() => window.clothstream.headset.placement);
     // The user may turn away: the scene stays.

@@ -317,7 +317,7 @@ test("figures are hidden at first, and stay when no frame comes", () =>
     assert.ok(await page.isHidden("#hud"));
   }));
 
-test("quality and frame rate are asked for anew, and kept in the address", () =>
+test("a change of quality or frame rate joins again, and stays in the address", () =>
   withPage("", { viewport: kDesktop }, async (page) => {
     await page.click("#tab-view");
     await page.selectOption("#quality", "2");

@@ -13,7 +13,7 @@ import { Settings } from "./cloth_settings";
 import { ClientState, type Identity } from "./types";
 import type { CoreModule } from "./wasm";
 
-// What became of a message in the client that a mirror follows (cs_decoding).
+// Result of decoding in the client that a mirror follows (cs_decoding).
 export enum Decoding {
   done = 0,
   refused = 1,

@@ -56,7 +56,7 @@ export class People {
   remove(participant: bigint): void {
     this.handle.core.exports.cs_remove_participant(this.handle.pointer, participant);
   }
-  // Also keeps the person out of the scene who has this participant's token.
+  // Removes the participant. Nobody can return to the scene with the same token.
   ban(participant: bigint): void {
     this.handle.core.exports.cs_ban_participant(this.handle.pointer, participant);
   }

@@ -70,7 +70,7 @@ function flag(field: number): Part {
   return packed([8 * field, 1]);
 }
 
-// Floats of little-endian machines, which are all that have browsers.
+// Bytes of the floats. All machines with a browser are little-endian, like the format.
 function view(values: Float32Array): Part {
   return new Uint8Array(values.buffer, values.byteOffset, values.byteLength);
 }

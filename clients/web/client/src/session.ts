@@ -128,7 +128,9 @@ export class Session {
   };
 
   private restart(scene: string, proof: Proof): void {
-    this.client.destroy();
+    // The caller, for example a listener, may use the client until it returns.
+    const old = this.client;
+    queueMicrotask(() => old.destroy());
     this.client = this.begin(scene, proof);
     this.enter({ kind: "connecting" });
   }
@@ -179,7 +181,7 @@ export class Session {
       case "message":
         return this.receive(message);
       case "broken":
-        return this.enter({ kind: "failed", reason: `The client core did not start: ${message.reason}` });
+        return this.enter({ kind: "failed", reason: `The client core stopped: ${message.reason}` });
     }
   }
 

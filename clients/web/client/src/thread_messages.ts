@@ -44,7 +44,7 @@ export type FromWorker = { session: number } & (
   | { kind: "broken"; reason: string }
 );
 
-// Frame beside its message: in the ring if there is no buffer.
+// Decoded frame that belongs to a message. It is in the ring if there is no buffer.
 export interface SentFrame {
   buffer: ArrayBuffer | undefined;
   hasNormals: boolean;

@@ -191,7 +191,7 @@ export interface Grab {
   place: Uint8Array;
 }
 
-// What happened to a grab of this participant.
+// Change of a grab of this participant.
 export interface GrabEvent {
   grab: number;
   vertices: number; // held now; 0: it slipped or was released

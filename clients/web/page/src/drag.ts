@@ -3,6 +3,7 @@
 
 import * as THREE from "three";
 import type { ClothPoint, Grab, Vec3 } from "@clothstream/client";
+import { newGrabId } from "@clothstream/three";
 import type { View } from "./view";
 
 // New position of a collider, or of a grab on the cloth. An undefined grab releases the cloth.
@@ -24,7 +25,6 @@ export class Drag {
   private wanted: THREE.Vector3 | undefined;
   private released = false;
   private pointer: number | undefined;
-  private grabs = 0;
 
   // `castRay` finds the cloth under the pointer. `grabbed` receives the name of each collider that the user starts to
   // drag.
@@ -93,7 +93,7 @@ export class Drag {
       this.held = { collider: hit.collider };
       this.grabbed(hit.collider);
     } else {
-      this.held = { grab: ++this.grabs, place: hit.place };
+      this.held = { grab: newGrabId(), place: hit.place };
     }
   }
 

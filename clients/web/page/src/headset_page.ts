@@ -8,8 +8,12 @@ import type { View } from "./view";
 
 const kMostScenes = 6;
 const kMostPeople = 3;
-// Place of the panel in the room: to the left of the user's first look, in metres.
+const kEyes = 1.5; // m
+// Place of the panel: to the left of the user's first look, in metres from the user's feet.
 const kPanelPlace = { x: -0.55, y: 1.25, z: -0.55 };
+// It faces the user's eyes.
+const kPanelTurn = Math.atan2(-kPanelPlace.x, -kPanelPlace.z);
+const kPanelTilt = -Math.atan2(kEyes - kPanelPlace.y, Math.hypot(kPanelPlace.x, kPanelPlace.z));
 
 export interface HeadsetPageListener {
   sceneChosen(scene: string): void;
@@ -27,11 +31,18 @@ export class HeadsetPage {
     private readonly listener: HeadsetPageListener,
   ) {
     this.headset = new Headset(
-      { renderer: view.renderer, scene: view.scene, bounds: () => view.box, passThrough: (on) => view.passThrough(on) },
+      {
+        renderer: view.renderer,
+        scene: view.scene,
+        bounds: () => view.box,
+        change: (change) => {
+          change(session.client.input);
+          session.flush();
+        },
+        passThrough: (on) => view.passThrough(on),
+      },
       {
         left: () => {
-          this.headset.body.leave(session.client.input);
-          session.flush();
           view.resize();
           view.reset();
         },
@@ -40,9 +51,9 @@ export class HeadsetPage {
         doingChanged: () => this.show(),
       },
     );
-    this.headset.room.add(this.panel.mesh);
+    this.headset.seat.add(this.panel.mesh);
     this.panel.mesh.position.set(kPanelPlace.x, kPanelPlace.y, kPanelPlace.z);
-    this.panel.mesh.lookAt(0, 1.5, 0);
+    this.panel.mesh.rotation.set(kPanelTilt, kPanelTurn, 0, "YXZ");
     void this.offer();
   }
 

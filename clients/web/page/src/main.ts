@@ -35,18 +35,6 @@ async function start(): Promise<void> {
     return;
   }
   void showAddress();
-  const castRay = (origin: Vec3, direction: Vec3) =>
-    session.state.kind === "live" ? session.client.frames.castRay(origin, direction) : undefined;
-  // Before Drag, so that its presses come first.
-  const pusher = new Pusher(view, castRay);
-  const tools = document.querySelectorAll<HTMLInputElement>('input[name="tool"]');
-  for (const tool of tools) tool.addEventListener("change", () => (pusher.tool = tool.value as Tool));
-  let pushed = false; // whether the server has a collider of the pointer
-  const drag: Drag = new Drag(
-    view,
-    castRay,
-    (collider) => (panel.controls.collider = collider),
-  );
   const player = new Player();
 
   const address = new URL("stream", window.location.href);
@@ -91,13 +79,13 @@ async function start(): Promise<void> {
     },
     scenesListed: (client) => panel.scenesListed(client),
     answered: (client) => panel.answered(client),
-    grabsChanged: (client) =>
-        client.input.grabEvents().forEach(({ grab, vertices }) => {
-          if (vertices === 0) {
-            drag.slipped(grab);
-            headset.slipped(grab);
-          }
-        }),
+    grabsChanged: (client) => {
+      for (const { grab, vertices } of client.input.grabEvents()) {
+        if (vertices > 0) continue;
+        drag.slipped(grab);
+        headset.slipped(grab);
+      }
+    },
     notice: (text) => {
       hud.showNotice(text);
       panel.noticed();
@@ -118,13 +106,25 @@ async function start(): Promise<void> {
     listener,
   };
   const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset() });
-  listenToKeys(view, drag, panel.controls);
   const session: Session = await Session.open(options).catch((error: unknown) => {
     hud.showFatal(`The client core did not start: ${error instanceof Error ? error.message : String(error)}`);
     throw error;
   });
 
-  // Number in the address, 0 to `most`; 0 if there is none.
+  const castRay = (origin: Vec3, direction: Vec3) =>
+    session.state.kind === "live" ? session.client.frames.castRay(origin, direction) : undefined;
+  // Before Drag, so that its presses come first.
+  const pusher = new Pusher(view, castRay);
+  const tools = document.querySelectorAll<HTMLInputElement>('input[name="tool"]');
+  for (const tool of tools) tool.addEventListener("change", () => (pusher.tool = tool.value as Tool));
+  const drag: Drag = new Drag(
+    view,
+    castRay,
+    (collider) => (panel.controls.collider = collider),
+  );
+  listenToKeys(view, drag, panel.controls);
+
+  // Number of the query, 0 to `most`. Returns 0 without a valid one.
   function limit(name: string, most: number): number {
     const value = Number(query.get(name));
     return Number.isInteger(value) && value >= 0 && value <= most ? value : 0;
@@ -135,6 +135,7 @@ async function start(): Promise<void> {
     if (name) url.searchParams.set("scene", name);
     else url.searchParams.delete("scene");
     window.history.replaceState(null, "", url);
+    headset.headset.body.letGo();
     session.join(name);
   }
 
@@ -152,11 +153,7 @@ async function start(): Promise<void> {
       const target = drag.take();
       if (target?.kind === "collider") client.parameters.setCollider(target.collider, { position: target.position });
       if (target?.kind === "grab") client.input.setGrabs(target.grab ? [target.grab] : []);
-      if (!frame) {
-        const colliders = pusher.update(now);
-        if (colliders.length > 0 || pushed) client.input.setColliders(colliders);
-        pushed = colliders.length > 0;
-      }
+      if (!frame) pusher.send(client.input, now);
       session.flush();
     }
     if (now - figuresAt >= kFiguresPeriodMs) {

@@ -40,8 +40,9 @@ export interface HeadsetProbe {
   readonly mode: string | undefined; // of the session
   readonly doing: Doing;
   readonly frames: number; // drawn in sessions
+  readonly isAnchored: boolean;
   readonly placement: number[]; // matrix from scene to room, column by column
-  // What the panel in space does: the one function of the probe that changes something.
+  // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
   choose(doing: Doing): void;
   // Hands, controllers and rays that are there. Joints: x, y, z, radius of each, in the scene.
   readonly limbs: { side: string; isHand: boolean; holds: boolean; joints: number[]; point: Vec3 }[];
@@ -105,6 +106,7 @@ export function expose(session: Session, view: View, headset: Headset): { descri
         mode: headset.mode,
         doing: headset.doing,
         frames: headset.frameCount,
+        isAnchored: headset.isAnchored,
         placement: headset.placement.matrix.toArray(),
         choose: (doing: Doing) => headset.do(doing),
         limbs: Array.from(headset.body.present(), ({ side, isHand, grabber, hand, pose }) => ({

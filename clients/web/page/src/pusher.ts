@@ -2,7 +2,7 @@
 // A ball or a box of the user, moved by mouse or finger: it follows the pointer along the cloth, and a press pushes it in.
 
 import * as THREE from "three";
-import { Shape, type ClothPoint, type OwnCollider, type Vec3 } from "@clothstream/client";
+import { Shape, type ClothPoint, type Input, type OwnCollider, type Vec3 } from "@clothstream/client";
 import type { View } from "./view";
 
 export type Tool = "hand" | "ball" | "box";
@@ -25,6 +25,7 @@ export class Pusher {
   private pushes = false;
   private placed = false; // whether the collider is in the scene
   private drawnAt = 0; // ms
+  private sent = false; // whether the server has the collider
 
   // `castRay` finds the cloth under the pointer.
   constructor(
@@ -57,8 +58,15 @@ export class Pusher {
     this.mesh.geometry = tool === "box" ? new THREE.BoxGeometry(2, 2, 2) : new THREE.SphereGeometry(1, 48, 32);
   }
 
-  // The collider as it is now; none while the pointer is elsewhere. Call once per drawn frame.
-  update(nowMs: number): OwnCollider[] {
+  // Moves the collider and sends it, or its removal. Call once per drawn frame.
+  send(input: Input, nowMs: number): void {
+    const colliders = this.update(nowMs);
+    if (colliders.length > 0 || this.sent) input.setColliders(colliders);
+    this.sent = colliders.length > 0;
+  }
+
+  // The collider as it is now; none while the pointer is elsewhere.
+  private update(nowMs: number): OwnCollider[] {
     const seconds = Math.min(kLongestStep, (nowMs - this.drawnAt) / 1000);
     this.drawnAt = nowMs;
     this.mesh.visible = this.isOver && this.chosen !== "hand";

@@ -121,10 +121,11 @@ export class View {
       const normals = client.frames.shownNormals();
       const positions = client.frames.shownPositions();
       for (const cloth of this.cloths) cloth.update(positions, normals);
-      this.colliderMeshes.place(client);
+      const colliders = client.frames.shownColliders();
+      this.colliderMeshes.place(client, colliders);
       const { isPresenting } = this.renderer.xr;
       const eye = isPresenting ? this.renderer.xr.getCamera() : this.camera;
-      this.people.place(client.frames.shownColliders(), this.studio.scene.worldToLocal(eye.getWorldPosition(this.eye)), !isPresenting);
+      this.people.place(colliders, this.studio.scene.worldToLocal(eye.getWorldPosition(this.eye)), !isPresenting);
     }
     if (!this.renderer.xr.isPresenting) this.orbit.update();
     this.studio.cheapShadows = this.detail === "reduced" || this.renderer.xr.isPresenting;
@@ -215,5 +216,7 @@ export class View {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
+    // The new size has cleared the picture.
+    this.renderer.render(this.studio.scene, this.camera);
   }
 }

@@ -37,8 +37,9 @@ export class ColliderMeshes {
     for (const mesh of this.meshes.splice(0)) this.remove(mesh);
   }
 
-  place(client: Client): void {
-    const colliders = client.frames.shownColliders().filter(({ participantId }) => participantId === 0n);
+  // `shown` are all colliders that are shown.
+  place(client: Client, shown: readonly Collider[]): void {
+    const colliders = shown.filter(({ participantId }) => participantId === 0n);
     while (this.meshes.length > colliders.length) this.remove(this.meshes.pop()!);
     colliders.forEach((collider, index) => {
       const look = lookOf(collider);

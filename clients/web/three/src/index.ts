@@ -10,7 +10,7 @@ export { hash, noise } from "./weave";
 export { Body } from "./xr/body";
 export { CanvasPanel, type PanelRow } from "./xr/canvas_panel";
 export { Figures } from "./xr/figures";
-export { Grabber, type GrabPose, type Touchable } from "./xr/grabber";
+export { Grabber, newGrabId, type GrabPose, type Touchable } from "./xr/grabber";
 export { chooseRate, Immersion, type ImmersionListener, type Mode } from "./xr/immersion";
 export { Headset, type Doing, type HeadsetHost, type HeadsetListener } from "./xr/headset";
 export { Limb } from "./xr/limb";

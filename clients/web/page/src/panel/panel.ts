@@ -39,7 +39,7 @@ export class Panel {
   ) {
     this.requests = new Requests(session);
     this.scenes = new Scenes(this.requests, { sceneChosen: (scene) => listener.sceneChosen(scene), listWanted: () => this.wantList() });
-    this.people = new People(this.requests, () => session().flush());
+    this.people = new People(this.requests, session);
     this.create = new Create(this.requests, (scene, repairs) => this.scenes.made(scene, repairs));
     this.tabs = new Tabs((tab) => this.shown(tab));
     element("reset").addEventListener("click", () => listener.viewReset());

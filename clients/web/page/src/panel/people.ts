@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // People of the scene with their roles. Owners change roles, remove and ban.
 
-import { Roles, type Client, type Participant } from "@clothstream/client";
+import { Roles, type Client, type Participant, type Session } from "@clothstream/client";
 import { confirmed, disable, element, make } from "./dom";
 import type { Requests } from "./requests";
 
@@ -11,18 +11,15 @@ const kOnlyOwners = "Only owners change roles and remove people.";
 export class People {
   private readonly list = element("participants");
   private readonly bans = element("bans");
-  private client: Client | undefined;
   private shownList = "";
 
-  // `flush` sends what was asked of the client.
   constructor(
     private readonly requests: Requests,
-    private readonly flush: () => void,
+    private readonly session: () => Session,
   ) {}
 
   // Disconnected people stay in the list during their reconnect grace.
   show(client: Client): void {
-    this.client = client;
     const people = client.people.participants();
     const isOwner = client.people.role === kOwner;
     element("people-why").hidden = isOwner;
@@ -36,10 +33,10 @@ export class People {
 
   // Lists the people that may not come back. Others than owners see no list.
   async showBans(): Promise<void> {
-    if (this.client?.people.role !== kOwner) return void (element("bans-row").hidden = true);
+    if (this.session().client.people.role !== kOwner) return void (element("bans-row").hidden = true);
     const outcome = await this.requests.ask((requests) => requests.listBans(""));
-    if (!outcome.ok || !this.client) return;
-    const bans = this.client.requests.bans();
+    if (!outcome.ok) return;
+    const bans = this.session().client.requests.bans();
     element("bans-row").hidden = bans.length === 0;
     this.bans.replaceChildren(
       ...bans.map(({ subject, displayName }) => {
@@ -85,9 +82,9 @@ export class People {
   }
 
   private send(change: (people: Client["people"]) => void): void {
-    if (!this.client) return;
-    change(this.client.people);
-    this.flush();
+    const session = this.session();
+    change(session.client.people);
+    session.flush();
     window.setTimeout(() => void this.showBans(), 500);
   }
 }

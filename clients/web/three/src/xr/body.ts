@@ -3,7 +3,7 @@
 
 import * as THREE from "three";
 import { HandSide, Shape, type Grab, type Input, type OwnCollider } from "@clothstream/client";
-import type { Touchable } from "./grabber";
+import { kReach, type Touchable } from "./grabber";
 import { Limb } from "./limb";
 
 const kHeadRadius = 0.11; // m of the room
@@ -12,7 +12,10 @@ const kMostLimbs = 8;
 
 export class Body {
   readonly head = new THREE.Vector3();
+  private readonly look = new THREE.Quaternion(); // of the head
+  private readonly turn = new THREE.Quaternion(); // from the room to the scene
   headPresent = false;
+  private readonly rotation = new THREE.Matrix4();
   private readonly limbs = new Map<string, Limb>();
   private readonly sides = { left: false, right: false }; // hands that the server has
   private collides = false; // whether the server has colliders
@@ -41,6 +44,9 @@ export class Body {
     if (viewer) {
       const { x, y, z } = viewer.transform.position;
       this.head.set(x, y, z).applyMatrix4(toScene);
+      const { orientation } = viewer.transform;
+      this.look.set(orientation.x, orientation.y, orientation.z, orientation.w);
+      this.look.premultiply(this.turn.setFromRotationMatrix(this.rotation.extractRotation(toScene)));
     }
     this.limbOf.clear();
     for (const source of session.inputSources) this.limb(source);
@@ -48,11 +54,17 @@ export class Body {
   }
 
   // Takes hold of the cloth with each input that was pressed since the last frame.
-  grab(cloth: Touchable): void {
+  // `scale` is metres of the room per metre of the scene.
+  grab(cloth: Touchable, scale: number): void {
     for (const limb of this.present()) {
-      if (limb.isNew) limb.grabber.take(limb.pose, cloth);
+      if (limb.isNew) limb.grabber.take(limb.pose, cloth, kReach / scale);
       limb.isNew = false;
     }
+  }
+
+  // Lets go of all cloth, for example because another scene follows.
+  letGo(): void {
+    for (const limb of this.limbs.values()) limb.grabber.release();
   }
 
   slipped(grab: number): void {
@@ -63,7 +75,7 @@ export class Body {
   send(input: Input, scale: number): void {
     const colliders: OwnCollider[] = [];
     const grabs: Grab[] = [];
-    if (this.headPresent) colliders.push(sphere(this.head, kHeadRadius / scale));
+    if (this.headPresent) colliders.push({ ...sphere(this.head, kHeadRadius / scale), orientation: [this.look.x, this.look.y, this.look.z, this.look.w] });
     const hands = { left: false, right: false };
     for (const limb of this.present()) {
       const grab = limb.grabber.grab(limb.pose);

@@ -82,7 +82,8 @@ export class CanvasPanel {
     this.mesh.material.dispose();
   }
 
-  // Row under the ray of a limb; the number of rows if it is beside all rows, -1 if it is beside the panel.
+  // Index of the row that the ray of a limb meets. The number of rows if it meets the panel but no row, and -1 if it misses
+  // the panel.
   private rowUnder(limb: Limb): number {
     if (!this.mesh.visible || !limb.pose.ray) return -1;
     this.point.copy(limb.pose.ray.origin).applyMatrix4(this.toPanel);
@@ -112,7 +113,7 @@ export class CanvasPanel {
   }
 
   private draw(): void {
-    const state = JSON.stringify([this.title, this.rows, this.hovered]);
+    const state = JSON.stringify([this.title, this.hovered, this.rows, this.rows.map(({ action }) => action !== undefined)]);
     if (state === this.drawn) return;
     this.drawn = state;
     const { context, canvas } = this;

@@ -4,11 +4,11 @@
 import * as THREE from "three";
 import type { ClothPoint, Grab, Vec3 } from "@clothstream/client";
 
-// Largest distance from a hand to the cloth that it takes hold of, m: the default of Grab.reach in session.proto. The
+// Largest distance from a hand to the cloth that it takes hold of, m of the room: the default of Grab.reach in session.proto. The
 // fingers themselves keep the cloth 5 to 6 cm away from where they meet.
-const kReach = 0.1;
+export const kReach = 0.1;
 
-// What a grabber needs of the shown cloth (Frames).
+// Finds points of the shown cloth. Frames of the client package is one.
 export interface Touchable {
   nearestPoint(point: Vec3, maxDistance: number): ClothPoint | undefined;
   castRay(origin: Vec3, direction: Vec3): ClothPoint | undefined;
@@ -21,8 +21,12 @@ export interface GrabPose {
   ray: THREE.Ray | undefined; // with which the user points
 }
 
-// Ids of grabs are unique for the participant.
 let lastId = 0;
+
+// Id for a new grab. All grabs of a participant share these ids, whatever they are made with.
+export function newGrabId(): number {
+  return ++lastId;
+}
 
 export class Grabber {
   private id = 0; // 0: holds nothing
@@ -37,14 +41,14 @@ export class Grabber {
     return this.id !== 0;
   }
 
-  // Takes hold of the cloth near the hand, or else under the ray. Returns whether there is any.
-  take(pose: GrabPose, cloth: Touchable): boolean {
+  // Takes hold of the cloth within `reach` of the hand, or else under the ray. Returns whether there is any.
+  take(pose: GrabPose, cloth: Touchable, reach: number): boolean {
     this.release();
-    const near = cloth.nearestPoint(pose.point.toArray(), kReach);
+    const near = cloth.nearestPoint(pose.point.toArray(), reach);
     const far = near || !pose.ray ? undefined : cloth.castRay(pose.ray.origin.toArray(), pose.ray.direction.toArray());
     const found = near ?? far;
     if (!found) return false;
-    this.id = ++lastId;
+    this.id = newGrabId();
     this.place = found.place;
     this.distance = far?.distance;
     this.start.copy(pose.orientation).invert();

@@ -2,9 +2,10 @@
 // A user with a headset in the scene: enters and leaves, places the scene in the room, and touches the cloth.
 
 import * as THREE from "three";
-import type { Client } from "@clothstream/client";
+import type { Client, Input } from "@clothstream/client";
 import { Body } from "./body";
 import { Figures } from "./figures";
+import { kReach } from "./grabber";
 import { HitTest } from "./hit_test";
 import { Immersion, type Mode } from "./immersion";
 import type { Limb } from "./limb";
@@ -20,6 +21,8 @@ export interface HeadsetHost {
   readonly scene: THREE.Scene;
   // Box of the cloths and colliders in the scene, whose lower face lies on the floor.
   bounds(): THREE.Box3;
+  // Changes the input of the present client and sends it, also while no frames come.
+  change(change: (input: Input) => void): void;
   // The real room is seen instead of the drawn one.
   passThrough(on: boolean): void;
 }
@@ -31,7 +34,7 @@ export interface HeadsetListener {
   pressed?(limb: Limb): boolean;
   // Poses are read, and presses not yet used.
   updated?(): void;
-  // What the user does with the next presses.
+  // The next presses do something else now.
   doingChanged?(doing: Doing): void;
 }
 
@@ -44,6 +47,8 @@ export class Headset {
   readonly body = new Body();
   // Objects in room coordinates.
   readonly room = new THREE.Group();
+  // Objects that stand where the user stood when the scene was placed, and look the same way.
+  readonly seat = new THREE.Group();
   doing: Doing = "touch";
   private readonly figures = new Figures();
   private readonly hitTest = new HitTest();
@@ -60,9 +65,13 @@ export class Headset {
     this.immersion = new Immersion(host.renderer, {
       entered: (mode, session) => this.entered(mode, session),
       left: () => this.left(),
+      // Without frames, hands would stay in the scene and hold the cloth.
+      visibilityChanged: (visible) => {
+        if (!visible) this.host.change((input) => this.body.leave(input));
+      },
     });
     this.room.matrixAutoUpdate = false;
-    this.room.add(this.hitTest.reticle);
+    this.room.add(this.hitTest.reticle, this.seat);
     host.scene.add(this.room, this.figures.group);
     this.room.visible = this.figures.group.visible = false;
   }
@@ -72,6 +81,10 @@ export class Headset {
   }
   get session(): XRSession | undefined {
     return this.immersion.session;
+  }
+  // Whether an anchor of the device keeps the scene in its place.
+  get isAnchored(): boolean {
+    return this.hitTest.isAnchored;
   }
   // Frames of headsets that update() has seen.
   get frameCount(): number {
@@ -105,23 +118,24 @@ export class Headset {
     const space = this.host.renderer.xr.getReferenceSpace();
     if (!session || !space) return;
     ++this.frames;
+    if (session.visibilityState === "hidden") return;
     if (!this.placed) this.placeInFront(frame, space);
     this.body.update(frame, space, session, this.placement.inverse, nowMs);
     this.listener.updated?.();
-    this.handlePresses(frame, space);
+    this.handlePresses(frame, space, client);
     const anchor = this.doing === "place" ? undefined : this.hitTest.anchored(frame, space);
     if (anchor) this.place(() => this.placement.moveTo(this.foot(), anchor));
     if (client) {
-      this.body.grab(client.frames);
+      this.body.grab(client.frames, this.placement.scale);
       this.body.send(client.input, this.placement.scale);
     }
     this.figures.place(this.body, this.placement.scale);
   }
 
-  private handlePresses(frame: XRFrame, space: XRReferenceSpace): void {
-    for (const limb of this.body.present()) if (limb.isNew && this.takes(limb)) limb.isNew = false;
+  private handlePresses(frame: XRFrame, space: XRReferenceSpace, client: Client | undefined): void {
+    if (this.doing === "place") this.hitTest.update(frame, space);
+    for (const limb of this.body.present()) if (limb.isNew && this.takes(limb, client)) limb.isNew = false;
     if (this.doing === "place") {
-      this.hitTest.update(frame, space);
       if (this.hitTest.reticle.visible) {
         const at = new THREE.Vector3().setFromMatrixPosition(this.hitTest.reticle.matrix);
         this.place(() => this.placement.moveTo(this.foot(), at));
@@ -131,12 +145,16 @@ export class Headset {
   }
 
   // Whether a press is used for something other than the cloth.
-  private takes(limb: Limb): boolean {
-    if (this.listener.pressed?.(limb)) return true;
+  private takes(limb: Limb, client: Client | undefined): boolean {
+    // What a hand touches comes before what it points at.
+    const reach = kReach / this.placement.scale;
+    const touches = this.doing === "touch" && client?.frames.nearestPoint(limb.pose.point.toArray(), reach) !== undefined;
+    if (!touches && this.listener.pressed?.(limb)) return true;
     if (this.doing === "touch") return false;
     if (this.doing === "place") {
-      if (this.hitTest.place()) this.do("touch");
-      return true;
+      const isPlaced = this.hitTest.place() !== undefined;
+      if (isPlaced) this.do("touch");
+      return isPlaced;
     }
     const point = limb.pose.point.clone().applyMatrix4(this.placement.matrix);
     if (!this.firstPoint) {
@@ -190,8 +208,11 @@ export class Headset {
     const bounds = this.host.bounds();
     const front = new THREE.Vector3((bounds.min.x + bounds.max.x) / 2, bounds.min.y, bounds.max.z);
     const at = new THREE.Vector3(position.x, 0, position.z).addScaledVector(look, kArmLength);
+    const turn = Math.atan2(-look.x, -look.z);
+    this.seat.position.set(position.x, 0, position.z);
+    this.seat.rotation.y = turn;
     this.place(() => {
-      this.placement.set(new THREE.Vector3(), Math.atan2(-look.x, -look.z), 1);
+      this.placement.set(new THREE.Vector3(), turn, 1);
       this.placement.moveTo(front, at);
     });
   }
@@ -230,6 +251,7 @@ export class Headset {
   }
 
   private left(): void {
+    this.host.change((input) => this.body.leave(input));
     this.hitTest.end();
     this.figures.clear();
     this.move = undefined;

@@ -11,6 +11,7 @@ export class HitTest {
   private hit: XRHitTestResult | undefined;
   private anchor: XRAnchor | undefined;
   private readonly matrix = new THREE.Matrix4();
+  private placings = 0; // counts places and ends: an answer for an earlier one comes too late
 
   constructor() {
     const geometry = new THREE.RingGeometry(0.09, 0.11, 48).rotateX(-Math.PI / 2);
@@ -23,8 +24,11 @@ export class HitTest {
   // Starts to look for surfaces in front of the head. Does nothing if the device finds none.
   async begin(session: XRSession): Promise<void> {
     if (!session.requestHitTestSource || !session.enabledFeatures?.includes("hit-test")) return;
+    const placing = this.placings;
     const space = await session.requestReferenceSpace("viewer");
-    this.source = await session.requestHitTestSource({ space });
+    const source = await session.requestHitTestSource({ space });
+    if (placing === this.placings) this.source = source;
+    else source?.cancel();
   }
 
   // Whether a surface may be found.
@@ -32,7 +36,11 @@ export class HitTest {
     return this.source !== undefined;
   }
 
-  // Looks for a surface; call once per frame while the user places the scene.
+  get isAnchored(): boolean {
+    return this.anchor !== undefined;
+  }
+
+  // Looks for a surface; call once per frame while the user places the scene, before place().
   update(frame: XRFrame, space: XRReferenceSpace): void {
     this.hit = this.source && frame.getHitTestResults(this.source)[0];
     const pose = this.hit?.getPose(space);
@@ -45,10 +53,14 @@ export class HitTest {
     if (!this.reticle.visible || !this.hit) return undefined;
     const point = new THREE.Vector3().setFromMatrixPosition(this.reticle.matrix);
     this.dropAnchor();
+    const placing = this.placings;
     // Without anchors the scene stays where it is in the reference space.
     void this.hit
       .createAnchor?.()
-      ?.then((anchor) => (this.anchor = anchor))
+      ?.then((anchor) => {
+        if (placing === this.placings) this.anchor = anchor;
+        else anchor.delete();
+      })
       .catch(() => undefined);
     return point;
   }
@@ -62,6 +74,7 @@ export class HitTest {
 
   // The user has moved the scene by hand: the anchor no longer holds.
   dropAnchor(): void {
+    ++this.placings;
     this.anchor?.delete();
     this.anchor = undefined;
   }
@@ -74,7 +87,7 @@ export class HitTest {
   end(): void {
     this.source?.cancel();
     this.source = undefined;
-    this.anchor = undefined;
+    this.dropAnchor();
     this.hide();
   }
 }

@@ -8,11 +8,11 @@ export type Mode = "immersive-vr" | "immersive-ar";
 export interface ImmersionListener {
   entered?(mode: Mode, session: XRSession): void;
   left?(): void;
-  // The user looks elsewhere, or takes the headset off: nothing is drawn for a while.
+  // The user takes the headset off, or puts it on again.
   visibilityChanged?(visible: boolean): void;
 }
 
-const kFoveation = 0.5; // 0 is none, 1 the most
+const kFoveation = 0.5; // 0 (none) to 1
 
 export class Immersion {
   session: XRSession | undefined;
@@ -47,18 +47,20 @@ export class Immersion {
     this.session = session;
     this.mode = mode;
     session.addEventListener("end", () => this.ended(session));
-    session.addEventListener("visibilitychange", () => this.listener.visibilityChanged?.(session.visibilityState === "visible"));
+    session.addEventListener("visibilitychange", () => this.listener.visibilityChanged?.(session.visibilityState !== "hidden"));
     try {
       await this.renderer.xr.setSession(session);
     } catch (error) {
       await session.end().catch(() => undefined);
       throw error;
     }
+    // The user may have left meanwhile.
+    if (this.session !== session) return;
+    this.listener.entered?.(mode, session);
     this.renderer.xr.setFoveation(kFoveation);
     const chosen = chooseRate(session.supportedFrameRates, rate);
     // A device may refuse, for example to save its battery.
     if (chosen !== undefined) await session.updateTargetFrameRate(chosen).catch(() => undefined);
-    this.listener.entered?.(mode, session);
   }
 
   async leave(): Promise<void> {

@@ -13,7 +13,7 @@ const kLargestRadius = 0.1; // m
 export class TrackedHand {
   // x, y, z and radius of each joint in the order of XRHand, metres of the scene.
   readonly joints = new Float32Array(4 * kJoints);
-  // Of the wrist, in the scene.
+  // Orientation of the wrist in the scene.
   readonly orientation = new THREE.Quaternion();
   private readonly poses = new Float32Array(16 * kJoints);
   private readonly radii = new Float32Array(kJoints);
