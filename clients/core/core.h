@@ -432,7 +432,8 @@ int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider*
  *
  * The program passes all messages of the server to the client, and then to the mirror. It repeats its calls
  * of cs_connecting and cs_disconnected for the mirror, in the same order. It sends the messages of the client
- * first, and then those that cs_next_outgoing of the mirror returns. A mirror sends no Hello,
+ * first, and then those that cs_next_outgoing of the mirror returns. It ignores errors and answers that the
+ * client reports and that do not end it: they belong to requests of the mirror. A mirror sends no Hello,
  * acknowledgements, and no requests for key frames except cs_request_key_frame. It sends pings only during an
  * upload (cs_create_scene), for which cs_update of the mirror must be called; otherwise cs_update and
  * cs_connect_at of a mirror have no use. Token and pairing code are set on the client. Times are of the same

@@ -570,9 +570,17 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checks.count(root / "cloths", static_cast<std::size_t>(message.cloths_size()), 1, limits::kMaxCloths);
   checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
                limits::kMaxColliders);
-  for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i)
-    scene.cloths.push_back(toCloth(checks, root.at("cloths", i), message.cloths(i), readMesh, most,
-                                   repairs ? *repairs : unasked));
+  const std::uint64_t mostNodes = std::min(most.nodes, limits::kMaxNodes);
+  std::uint64_t nodes = 0;
+  for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i) {
+    const v1::Cloth& cloth = message.cloths(i);
+    // A repair adds nodes that the message does not state: at most those that earlier cloths have left.
+    SceneLimits left = most;
+    if (cloth.mesh().repair()) left.nodes = mostNodes - nodes;
+    scene.cloths.push_back(
+        toCloth(checks, root.at("cloths", i), cloth, readMesh, left, repairs ? *repairs : unasked));
+    nodes = std::min(mostNodes, nodes + scene.cloths.back().nodeCount());
+  }
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
     scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());

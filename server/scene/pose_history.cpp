@@ -42,7 +42,12 @@ void move(std::vector<Posed>& now, const std::vector<Posed>& from, const std::ve
 
 void PoseHistory::add(Poses&& poses) {
   auto track = std::ranges::find(tracks_, poses.participant, &Track::participant);
-  if (track == tracks_.end()) track = tracks_.insert(track, {.participant = poses.participant});
+  if (track == tracks_.end()) {
+    // Has room for its first entry, so that no track stays empty if memory runs out.
+    Track added{.participant = poses.participant};
+    added.entries.reserve(1);
+    track = tracks_.insert(track, std::move(added));
+  }
   track->attachments = std::move(poses.now.poses.attachments);
   track->wantsContacts = poses.now.poses.wantsContacts;
   track->settled = false;
@@ -111,8 +116,6 @@ void PoseHistory::placeAt(Track& track, Clock::time_point time) {
 void PoseHistory::place(
     Clock::time_point time,
     const std::function<void(std::uint64_t participant, const model::ParticipantPoses&)>& place) {
-  // If memory runs out in add(), a track may have lost its poses.
-  std::erase_if(tracks_, [](const Track& track) { return track.entries.empty(); });
   for (Track& track : tracks_) {
     if (track.settled) continue;
     prune(track, time);

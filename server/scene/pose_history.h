@@ -51,7 +51,7 @@ class PoseHistory {
   };
   struct Track {
     std::uint64_t participant = 0;
-    std::vector<Entry> entries = {};  // times ascend; empty only if memory ran out in add()
+    std::vector<Entry> entries = {};  // never empty after add(); times ascend
     std::vector<model::AttachmentPose> attachments = {};
     bool wantsContacts = false;
     bool settled = false;  // nothing changes until more poses arrive

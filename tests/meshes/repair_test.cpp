@@ -140,7 +140,7 @@ TEST(RepairedMesh, KeepsTheAreaAndFrontOfAnyPolygon) {
   }
 }
 
-TEST(RepairedMesh, DividesPolygonsInNearlyQuadraticTimeAndRefusesLargeOnes) {
+TEST(RepairedMesh, DividesConcavePolygonsOfUpTo1000Corners) {
   const auto comb = [](std::uint32_t n) {
     std::vector<Vec3> corners;
     std::vector<std::uint32_t> face;

@@ -260,6 +260,19 @@ TEST(MeshMessage, RefusesMoreNodesAfterARepairThanAllowed) {
   EXPECT_THAT(scene.error().text, HasSubstr("has more than 6 vertices once its edges are split"));
 }
 
+TEST(MeshMessage, RepairedClothsShareTheLimitOfNodes) {
+  v1::Scene message = flapScene();
+  message.mutable_cloths(0)->mutable_mesh()->set_repair(true);
+  v1::Cloth& second = *message.add_cloths();
+  second = message.cloths(0);
+  second.set_name("second");
+  EXPECT_TRUE(toScene(message, {}, {.nodes = 14}));
+  const Result<model::Scene> scene = toScene(message, {}, {.nodes = 13});
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().text,
+              HasSubstr("cloths[1].mesh: has more than 6 vertices once its edges are split"));
+}
+
 struct BadCase {
   const char* says;
   std::function<void(v1::Cloth&, v1::Mesh&)> spoil;
