@@ -245,6 +245,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
                                                                const model::Cancellation& cancellation,
                                                                std::vector<v1::MeshRepair>& repairs) {
   const messages::SceneLimits limits{.nodes = server_.options.maxSceneNodes,
+                                     .nodeSprings = server_.options.maxNodeSprings,
                                      .springs = server_.options.maxSceneSprings,
                                      .attachments = server_.options.maxSceneAttachments,
                                      .cancellation = cancellation};
@@ -253,15 +254,18 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
       return checked(messages::toScene(request.scene(), {}, limits, &repairs));
     case v1::CreateSceneRequest::kUploadedContentId: {
       v1::Scene message;
-      if (!messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)),
-                                messages::limits::kMaxParsedBytes))
-        return refused(
-            v1::ERROR_CODE_MALFORMED_MESSAGE,
-            fmt::format("createScene: the uploaded content is not a Scene message, or would need more than "
-                        "{} bytes of memory: send fewer elements",
-                        messages::limits::kMaxParsedBytes));
+      const std::size_t most = server_.options.maxParsedBytes;
+      const auto size =
+          messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)), most);
+      if (!size && size.error() == messages::SizeError::tooLarge) {
+        server_.metrics.refuse(telemetry::Refusal::sceneSize);
+        return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                       fmt::format("createScene: the uploaded Scene message would take more than {} bytes of "
+                                   "memory (--max-parsed-memory): send fewer elements",
+                                   most));
+      }
       cancellation.check();
-      if (!message.ParseFromString(uploaded))
+      if (!size || !message.ParseFromString(uploaded))
         return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
                        "createScene: the uploaded content is not a Scene message");
       cancellation.check();
@@ -328,11 +332,14 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
     return refused(charged.error().code, std::move(charged.error().text));
   }
   server_.keep(scene);
+  v1::CreateSceneResponse response;
   try {
     std::future<void> added = server_.device.add(scene);
     while (added.wait_for(kLoadingCheck) != std::future_status::ready) cancellation.check();
     added.get();
     cancellation.check();
+    *response.mutable_scene() = summaryOf(*scene);
+    response.mutable_repairs()->Assign(repairs.begin(), repairs.end());
     server_.insert(scene);
   } catch (const model::Cancelled&) {
     undoCreation(scene);
@@ -344,9 +351,6 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
   }
   server_.flushStore(*scene);
   telemetry::log({scene->name()}, spdlog::level::info, "created, {} vertices", scene->start().nodeCount());
-  v1::CreateSceneResponse response;
-  *response.mutable_scene() = summaryOf(*scene);
-  response.mutable_repairs()->Assign(repairs.begin(), repairs.end());
   return response;
 }
 

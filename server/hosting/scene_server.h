@@ -68,9 +68,12 @@ struct ServerOptions {
   std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
   // Scenes that peers may create, in addition to those that the server starts with.
   std::uint32_t maxCreatedScenes = 16;
-  // Nodes, springs and attachments of a scene that a peer creates.
+  // Nodes, springs and attachments of a scene that a peer creates, and springs of one node of its meshes.
   std::uint64_t maxSceneNodes = 262'144, maxSceneSprings = 4'194'304;
+  std::uint32_t maxNodeSprings = messages::limits::kMaxNodeSprings;
   std::uint32_t maxSceneAttachments = messages::limits::kMaxAttachments;
+  // Memory of the message of an uploaded scene once it is parsed.
+  std::size_t maxParsedBytes = messages::limits::kMaxParsedBytes;
   // Creating a scene ends with an error after this time.
   std::chrono::milliseconds maxCreationTime{60'000};
   // A created scene is deleted when it has had no participant for this long; 0: never.

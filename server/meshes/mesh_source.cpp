@@ -20,23 +20,26 @@ namespace {
 
 using model::Triangle;
 using model::Vec3;
-using Problem = std::optional<std::string>;
+using Problem = std::optional<MeshError>;
 
 Problem checkSizes(const MeshSource& source, const MeshOptions& options, const MeshLimits& limits) {
-  if (source.vertices.empty()) return "has no vertices; a cloth needs at least one triangle";
-  if (source.faces.empty()) return "has no faces; a cloth needs at least one triangle";
+  if (source.vertices.empty()) return MeshError("has no vertices; a cloth needs at least one triangle");
+  if (source.faces.empty()) return MeshError("has no faces; a cloth needs at least one triangle");
   if (source.vertices.size() > limits.maxVertices)
-    return fmt::format("has {} vertices; at most {} are allowed: simplify it", source.vertices.size(),
-                       limits.maxVertices);
+    return MeshError(fmt::format("has {} vertices; at most {} are allowed: simplify it",
+                                 source.vertices.size(), limits.maxVertices),
+                     true);
   if (source.faces.size() > 2 * limits.maxVertices)
-    return fmt::format("has {} faces; at most {} are allowed: simplify it", source.faces.size(),
-                       2 * limits.maxVertices);
+    return MeshError(fmt::format("has {} faces; at most {} are allowed: simplify it", source.faces.size(),
+                                 2 * limits.maxVertices),
+                     true);
   if (!options.repair) return std::nullopt;
   std::uint64_t triangles = 0;
   for (const SourceFace& face : source.faces) triangles += std::max(face.cornerCount, 2u) - 2;
   if (triangles > 2 * limits.maxVertices)
-    return fmt::format("has polygons that become {} triangles; at most {} are allowed: simplify it",
-                       triangles, 2 * limits.maxVertices);
+    return MeshError(fmt::format("has polygons that become {} triangles; at most {} are allowed: simplify it",
+                                 triangles, 2 * limits.maxVertices),
+                     true);
   return std::nullopt;
 }
 
@@ -196,8 +199,9 @@ Problem checkSprings(const model::Mesh& mesh, const std::vector<std::uint32_t>& 
   for (const model::SpringLink& link : mesh.links)
     for (const std::uint32_t node : {link.a, link.b})
       if (++springs[node] > maxNodeSprings)
-        return fmt::format("vertex {} has more than {} springs: divide the faces around it",
-                           vertexOfNode[node], maxNodeSprings);
+        return MeshError(fmt::format("vertex {} has more than {} springs: divide the faces around it",
+                                     vertexOfNode[node], maxNodeSprings),
+                         true);
   return std::nullopt;
 }
 
@@ -220,7 +224,7 @@ std::vector<model::Submesh> submeshes(const MeshSource& source,
 
 // Builds the mesh of a source whose faces are triangles and quads. `names` has the vertex of each node that
 // errors name.
-tl::expected<BuiltMesh, std::string> build(const MeshSource& source, const std::vector<Vec3>& placed,
+tl::expected<BuiltMesh, MeshError> build(const MeshSource& source, const std::vector<Vec3>& placed,
                                            Numbering numbering, const std::vector<std::uint32_t>& names,
                                            const MeshLimits& limits) {
   limits.cancellation.check();
@@ -247,13 +251,13 @@ tl::expected<BuiltMesh, std::string> build(const MeshSource& source, const std::
   return built;
 }
 
-tl::expected<BuiltMesh, std::string> buildRepaired(const MeshSource& source, const std::vector<Vec3>& placed,
+tl::expected<BuiltMesh, MeshError> buildRepaired(const MeshSource& source, const std::vector<Vec3>& placed,
                                                    float weldDistance, const MeshLimits& limits,
                                                    Repairs& repairs) {
   // Nodes that are closer than the shortest edge would leave faces that are refused.
   const std::vector<std::uint32_t> welded = weld(placed, std::max(weldDistance, limits.minEdge));
   limits.cancellation.check();
-  const tl::expected<RepairedMesh, std::string> repaired =
+  const tl::expected<RepairedMesh, MeshError> repaired =
       repairMesh(source, placed, welded, limits, repairs);
   if (!repaired) return tl::unexpected(repaired.error());
   limits.cancellation.check();
@@ -278,7 +282,7 @@ tl::expected<BuiltMesh, std::string> buildRepaired(const MeshSource& source, con
 
 }  // namespace
 
-tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source, const MeshOptions& options,
+tl::expected<BuiltMesh, MeshError> buildMesh(const MeshSource& source, const MeshOptions& options,
                                                const MeshLimits& limits) {
   Problem problem = checkSizes(source, options, limits);
   if (!problem) problem = checkNumbers(source);
@@ -287,9 +291,9 @@ tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source, const M
   if (problem) return tl::unexpected(std::move(*problem));
   Repairs repairs;
   const auto placed = place(source, options, limits, repairs);
-  if (!placed) return tl::unexpected(placed.error());
+  if (!placed) return tl::unexpected(MeshError(placed.error()));
   limits.cancellation.check();
-  tl::expected<BuiltMesh, std::string> built;
+  tl::expected<BuiltMesh, MeshError> built;
   if (options.repair) {
     built = buildRepaired(source, *placed, options.weldDistance, limits, repairs);
   } else {

@@ -58,6 +58,15 @@ struct MeshLimits {
   model::Cancellation cancellation = {};
 };
 
+// Why a mesh is refused, and what to do.
+struct MeshError {
+  // NOLINTNEXTLINE(google-explicit-constructor): most errors are no more than a text
+  MeshError(std::string error, bool beyondALimit = false) : text(std::move(error)), isTooLarge(beyondALimit) {}
+
+  std::string text;
+  bool isTooLarge;  // it exceeds maxVertices or maxNodeSprings
+};
+
 struct MeshOptions {
   model::Pose pose = {};
   float scale = 1;         // metres per unit of the source; applied before the pose
@@ -84,8 +93,8 @@ inline constexpr std::uint32_t kNoNode = ~0u;
 // indices of the source, counted from 0, and say what to do, and whether `repair` or `fit` would help. Takes
 // time in proportion to n log n, and memory in proportion to n, for n vertices and corners of faces. Throws
 // model::Cancelled.
-[[nodiscard]] tl::expected<BuiltMesh, std::string> buildMesh(const MeshSource& source,
-                                                             const MeshOptions& options,
-                                                             const MeshLimits& limits);
+[[nodiscard]] tl::expected<BuiltMesh, MeshError> buildMesh(const MeshSource& source,
+                                                           const MeshOptions& options,
+                                                           const MeshLimits& limits);
 
 }  // namespace clothstream::meshes

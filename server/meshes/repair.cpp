@@ -168,17 +168,17 @@ MeshSource toSource(const MeshSource& before, const std::vector<SheetTriangle>& 
 
 }  // namespace
 
-tl::expected<RepairedMesh, std::string> repairMesh(const MeshSource& source, const std::vector<Vec3>& placed,
+tl::expected<RepairedMesh, MeshError> repairMesh(const MeshSource& source, const std::vector<Vec3>& placed,
                                                    const std::vector<std::uint32_t>& welded,
                                                    const MeshLimits& limits, Repairs& repairs) {
   TriangleMaker maker(source, placed, welded, repairs);
-  if (auto problem = maker.make(limits.cancellation)) return tl::unexpected(std::move(*problem));
+  if (auto problem = maker.make(limits.cancellation)) return tl::unexpected(MeshError(std::move(*problem)));
   std::vector<SheetTriangle> triangles = std::move(maker.triangles());
   dropDuplicates(triangles, repairs);
   if (triangles.empty())
     return tl::unexpected(
-        std::string("has no face with an area, so nothing is left after the repair: set the "
-                    "scale, or check the file"));
+        MeshError("has no face with an area, so nothing is left after the repair: set the "
+                  "scale, or check the file"));
   limits.cancellation.check();
   RepairedMesh repaired;
   repaired.placed = placed;
@@ -186,9 +186,10 @@ tl::expected<RepairedMesh, std::string> repairMesh(const MeshSource& source, con
   std::iota(repaired.origin.begin(), repaired.origin.end(), 0u);
   if (!separateSheets(triangles, repaired.placed, repaired.origin, limits.maxVertices, limits.cancellation,
                       repairs))
-    return tl::unexpected(
+    return tl::unexpected(MeshError(
         fmt::format("has more than {} vertices once its edges are split; at most {} are allowed: simplify it",
-                    limits.maxVertices, limits.maxVertices));
+                    limits.maxVertices, limits.maxVertices),
+        true));
   repaired.source = toSource(source, triangles);
   return repaired;
 }

@@ -37,7 +37,7 @@ struct RepairedMesh {
 // The order of faces, parts and texture coordinates is kept. Returns an error that says what to do if no face
 // is left, if a polygon cannot be divided, or if there would be more vertices than the limit. Adds to
 // `repairs`.
-[[nodiscard]] tl::expected<RepairedMesh, std::string> repairMesh(const MeshSource& source,
+[[nodiscard]] tl::expected<RepairedMesh, MeshError> repairMesh(const MeshSource& source,
                                                                  const std::vector<model::Vec3>& placed,
                                                                  const std::vector<std::uint32_t>& welded,
                                                                  const MeshLimits& limits, Repairs& repairs);

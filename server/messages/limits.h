@@ -76,7 +76,7 @@ inline constexpr std::size_t kMaxParticipantColliders = 60;  // includes the bon
 inline constexpr std::size_t kMaxParticipantGrabs = 10;
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
-inline constexpr std::size_t kMaxParsedBytes = 128 * 1024 * 1024;  // of a content, in memory
+inline constexpr std::size_t kMaxParsedBytes = 128'000'000;  // of a content, in memory
 // Geometry of all cloths in a description. The remaining bytes of the content are for everything else.
 inline constexpr std::size_t kMaxGeometryBytes = kMaxContentBytes - 8 * 1024 * 1024;
 

@@ -13,12 +13,12 @@
 namespace clothstream::messages {
 namespace {
 
-meshes::MeshLimits meshLimits(std::uint64_t maxNodes, const model::Cancellation& cancellation) {
-  return {.maxVertices = std::min(maxNodes, limits::kMaxNodes),
+meshes::MeshLimits meshLimits(const SceneLimits& most) {
+  return {.maxVertices = std::min(most.nodes, limits::kMaxNodes),
           .maxCoordinate = static_cast<float>(limits::kPosition.max),
           .minEdge = static_cast<float>(limits::kMinSpacing),
-          .maxNodeSprings = limits::kMaxNodeSprings,
-          .cancellation = cancellation};
+          .maxNodeSprings = most.nodeSprings,
+          .cancellation = most.cancellation};
 }
 
 void checkWhole(Checks& checks, const Path& path, int size, int each) {
@@ -112,8 +112,7 @@ v1::MeshRepair toMessage(const std::string& cloth, const meshes::Repairs& repair
 }  // namespace
 
 VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                        const MeshReader& readMesh, std::uint64_t maxNodes,
-                        const model::Cancellation& cancellation, model::Cloth& cloth,
+                        const MeshReader& readMesh, const SceneLimits& most, model::Cloth& cloth,
                         std::vector<v1::MeshRepair>& repairs) {
   const v1::Mesh& mesh = message.mesh();
   const Path at = path / "mesh";
@@ -129,9 +128,13 @@ VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& messa
   const meshes::MeshSource source =
       mesh.file().empty() ? toSource(checks, at, mesh) : readSource(checks, at, mesh, readMesh);
   if (checks.failed()) return {};
-  auto built = meshes::buildMesh(source, options, meshLimits(maxNodes, cancellation));
+  auto built = meshes::buildMesh(source, options, meshLimits(most));
   if (!built) {
-    checks.fail(at, mesh.file().empty() ? "" : '"' + mesh.file() + '"', built.error());
+    const std::string shown = mesh.file().empty() ? "" : '"' + mesh.file() + '"';
+    if (built.error().isTooLarge)
+      checks.failSize(at, built.error().text, shown);
+    else
+      checks.fail(at, shown, built.error().text);
     return {};
   }
   if (!built->repairs.isEmpty()) repairs.push_back(toMessage(message.name(), built->repairs));

@@ -11,6 +11,7 @@
 
 #include "clothstream/v1/scene.pb.h"
 #include "server/meshes/mesh_source.h"
+#include "server/messages/scene_limits.h"
 #include "server/messages/validation.h"
 #include "server/model/scene.h"
 
@@ -27,11 +28,10 @@ struct VertexNodes {
   std::vector<std::uint32_t> nextCopy;
 };
 
-// Sets the mesh of the cloth. Refuses a file name if there is no reader, and more than `maxNodes` nodes. Adds
-// to `repairs` if something was repaired. Throws model::Cancelled.
+// Sets the mesh of the cloth. Refuses a file name if there is no reader, and more nodes, or springs of a node,
+// than `most`. Adds to `repairs` if something was repaired. Throws model::Cancelled.
 VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                        const MeshReader& readMesh, std::uint64_t maxNodes,
-                        const model::Cancellation& cancellation, model::Cloth& cloth,
+                        const MeshReader& readMesh, const SceneLimits& most, model::Cloth& cloth,
                         std::vector<v1::MeshRepair>& repairs);
 
 // Writes the mesh itself, not the name of its file: in world space, welded and repaired, in the order of its

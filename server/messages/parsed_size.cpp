@@ -57,6 +57,7 @@ class Sum {
   explicit Sum(std::size_t limit) : limit_(limit) {}
 
   std::size_t size() const { return size_; }
+  bool isTooLarge() const { return isTooLarge_; }
   bool addMessage(const Descriptor& type, CodedInputStream& input, int depth) {
     if (depth > kMaxDepth || !add(sizeOf(type))) return false;
     while (const std::uint32_t tag = input.ReadTag())
@@ -66,7 +67,8 @@ class Sum {
 
  private:
   bool add(std::size_t bytes) {
-    if (bytes > limit_ - size_) return false;
+    isTooLarge_ = bytes > limit_ - size_;
+    if (isTooLarge_) return false;
     size_ += bytes;
     return true;
   }
@@ -127,17 +129,19 @@ class Sum {
   }
 
   std::size_t limit_, size_ = 0;
+  bool isTooLarge_ = false;
   std::unordered_map<const Descriptor*, std::size_t> sizes_;
 };
 
 }  // namespace
 
-std::optional<std::size_t> parsedSize(const Descriptor& type, std::span<const std::byte> bytes,
-                                      std::size_t limit) {
+tl::expected<std::size_t, SizeError> parsedSize(const Descriptor& type, std::span<const std::byte> bytes,
+                                                std::size_t limit) {
   CodedInputStream input(reinterpret_cast<const std::uint8_t*>(bytes.data()), static_cast<int>(bytes.size()));
   input.PushLimit(static_cast<int>(bytes.size()));
   Sum sum(limit);
-  if (!sum.addMessage(type, input, 0)) return std::nullopt;
+  if (!sum.addMessage(type, input, 0))
+    return tl::unexpected(sum.isTooLarge() ? SizeError::tooLarge : SizeError::malformed);
   return sum.size();
 }
 

@@ -3,18 +3,24 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
+#include <cstdint>
 #include <span>
 
 #include <google/protobuf/descriptor.h>
+#include <tl/expected.hpp>
 
 namespace clothstream::messages {
 
+enum class SizeError : std::uint8_t {
+  malformed,  // not such a message, or nested deeper than the parser permits
+  tooLarge,   // the bound exceeds the limit
+};
+
 // Upper bound in bytes of the memory that a parsed message of this type needs, its input not included. A few
 // bytes of input can become a hundred in memory, such as an empty element of a repeated field. Reads the
-// input once and allocates almost nothing. Returns nothing if the bound exceeds `limit`, if `bytes` is not
-// such a message, or if it is nested deeper than the parser permits.
-[[nodiscard]] std::optional<std::size_t> parsedSize(const google::protobuf::Descriptor& type,
-                                                    std::span<const std::byte> bytes, std::size_t limit);
+// input once, up to the first error, and allocates almost nothing.
+[[nodiscard]] tl::expected<std::size_t, SizeError> parsedSize(const google::protobuf::Descriptor& type,
+                                                              std::span<const std::byte> bytes,
+                                                              std::size_t limit);
 
 }  // namespace clothstream::messages

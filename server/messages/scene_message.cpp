@@ -145,7 +145,7 @@ VertexNodes toShape(Checks& checks, const Path& path, const v1::Cloth& message, 
       cloth.grid = toGrid(checks, path / "grid", message.grid());
       break;
     case v1::Cloth::kMesh:
-      return toMeshCloth(checks, path, message, readMesh, most.nodes, most.cancellation, cloth, repairs);
+      return toMeshCloth(checks, path, message, readMesh, most, cloth, repairs);
     case v1::Cloth::SHAPE_NOT_SET:
       checks.fail(path, "", "has no shape; must have \"grid\" or \"mesh\"");
   }

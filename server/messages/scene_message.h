@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,23 +11,14 @@
 #include "clothstream/v1/scene.pb.h"
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/field_error.h"
-#include "server/messages/limits.h"
 #include "server/messages/mesh_message.h"
+#include "server/messages/scene_limits.h"
 #include "server/messages/validation.h"
-#include "server/model/cancellation.h"
 #include "server/model/material.h"
 #include "server/model/scene.h"
 #include "server/model/stability.h"
 
 namespace clothstream::messages {
-
-// Limits of a scene, in addition to those of limits.h.
-struct SceneLimits {
-  std::uint64_t nodes = limits::kMaxNodes;
-  std::uint64_t springs = std::numeric_limits<std::uint64_t>::max();
-  std::size_t attachments = std::numeric_limits<std::size_t>::max();
-  model::Cancellation cancellation = {};
-};
 
 // Applies the defaults of scene.proto and checks everything: ranges, unique names, pins inside their grid,
 // meshes, rates, the number of nodes, and that the integrator is stable with these substeps. Refuses mesh

@@ -88,9 +88,9 @@ void Checks::failNamed(const Path& path, std::string_view name, std::string_view
   fail(path, inQuotes(name), allowed, code);
 }
 
-void Checks::failSize(const Path& path, std::string_view allowed) {
+void Checks::failSize(const Path& path, std::string_view allowed, std::string_view value) {
   if (error_) return;
-  fail(path, "", allowed);
+  fail(path, value, allowed);
   error_->limit = telemetry::Refusal::sceneSize;
 }
 

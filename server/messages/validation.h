@@ -59,7 +59,7 @@ class Checks {
   void fail(const Path& path, std::string_view value, std::string_view allowed,
             v1::ErrorCode code = v1::ERROR_CODE_INVALID_ARGUMENT);
   // Fails because the server's limit of the size of scenes is exceeded.
-  void failSize(const Path& path, std::string_view allowed);
+  void failSize(const Path& path, std::string_view allowed, std::string_view value = "");
 
   // Fails with a text from outside as the value. The text is quoted and truncated.
   void failNamed(const Path& path, std::string_view name, std::string_view allowed,

@@ -112,6 +112,9 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                "Nodes of a scene that clients create");
   table.number("--max-scene-springs", options.server.maxSceneSprings, {.min = 1, .max = 1e9},
                "Springs of a scene that clients create");
+  table.number("--max-node-springs", options.server.maxNodeSprings,
+               {.min = 4, .max = messages::limits::kMaxNodeSprings},
+               "Springs of one node of a mesh in a scene that clients create");
   table.number("--max-scene-attachments", options.server.maxSceneAttachments,
                {.min = 0, .max = messages::limits::kMaxAttachments},
                "Attachments of a scene that clients create");
@@ -252,6 +255,8 @@ void addNetworkOptions(OptionTable& table, Parsed& parsed) {
   table.number("--max-upload-memory-per-address", options.maxUploadMbPerAddress,
                {.min = 0, .max = 1e6, .type = "MEGABYTES"},
                "The same of one address. Programs on this machine have no such limit");
+  table.number("--max-parsed-memory", options.maxParsedMb, {.min = 0, .max = 1e5, .type = "MEGABYTES"},
+               "Memory of an uploaded scene once its message is parsed, in megabytes");
   table.number("--metrics-port", options.metricsPort, kPort,
                "Port of /metrics, /healthz and /readyz for operators. 0 picks a free port. Off by default");
   table.text("--metrics-host", options.metricsHost, "ADDRESS", "Address to listen on with --metrics-port");
@@ -522,6 +527,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
                         (parsed.announce == "auto" && options.tlsSelf && !isLoopback(options.host));
     options.server.maxUploadBytes = static_cast<std::size_t>(options.maxUploadMb * 1e6);
     options.server.maxUploadBytesOfAddress = static_cast<std::size_t>(options.maxUploadMbPerAddress * 1e6);
+    options.server.maxParsedBytes = static_cast<std::size_t>(options.maxParsedMb * 1e6);
     if (parsed.ownersAlone) options.server.outsideControl = false;
     allow(parsed.allowed, options.server.participantsMay);
     options.anonymousRole = parsed.anonymousRole.value_or(options.anonymousRole);

@@ -62,6 +62,7 @@ struct ProgramOptions {
   std::uint32_t maxConnections = 256, maxConnectionsPerAddress = 64;
   double connectionsPerSecond = 200, connectionsPerSecondPerAddress = 20;
   double maxUploadMb = 64, maxUploadMbPerAddress = 32;  // megabytes of uploads
+  double maxParsedMb = 128;                             // megabytes of an upload once it is parsed
   std::string metricsHost = "127.0.0.1";
   std::optional<std::uint16_t> metricsPort;  // unset: no monitoring
   bool announces = false;                    // by mDNS

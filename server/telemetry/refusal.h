@@ -28,7 +28,7 @@ enum class Refusal : std::uint8_t {
   uploadTime,        // an upload took too long
   waitingScenes,     // too many scenes wait to be created
   creationTime,      // creating a scene took too long
-  sceneSize,         // too many nodes, springs or attachments
+  sceneSize,         // too many nodes, springs or attachments, or too large a message
   participants,      // the scene is full
   colliders,         // the price of the participants' colliders exceeds the remaining budget
   parameterChanges,  // too many changes of a scene

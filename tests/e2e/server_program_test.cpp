@@ -432,6 +432,8 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--max-read-rate=8",
                                        "--max-scene-attachments=8",
                                        "--max-scene-springs=5000",
+                                       "--max-node-springs=16",
+                                       "--max-parsed-memory=8",
                                        "--max-upload-memory=32",
                                        "--max-upload-memory-per-address=16",
                                        "--max-upload-time=30",

@@ -147,7 +147,7 @@ TEST(Draco, IsReadWithEveryEncoding) {
     }
     const auto built = buildMesh(
         *source, {}, {.maxVertices = kPoints, .maxCoordinate = 10, .minEdge = 1e-4f, .maxNodeSprings = 100});
-    ASSERT_TRUE(built) << built.error();
+    ASSERT_TRUE(built) << built.error().text;
     EXPECT_EQ(built->mesh.shape.triangles.size(), static_cast<std::size_t>(kFaces));
     EXPECT_EQ(built->mesh.shape.submeshes[0].name, "sheet");
     const model::Triangle& t = built->mesh.shape.triangles[0];

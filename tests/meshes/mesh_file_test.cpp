@@ -101,7 +101,7 @@ TEST_F(MeshFile, RefusesInvalidObjHereOrInBuildMesh) {
     ASSERT_TRUE(source) << face;
     const auto built = buildMesh(*source, {}, {.maxVertices = 10, .maxCoordinate = 10, .minEdge = 0.001f});
     ASSERT_FALSE(built) << face;
-    EXPECT_THAT(built.error(), HasSubstr(says)) << face;
+    EXPECT_THAT(built.error().text, HasSubstr(says)) << face;
   }
 }
 

@@ -48,9 +48,9 @@ BuiltMesh repaired(const MeshSource& source, const MeshOptions& options = kRepai
   const auto refused = buildMesh(source, {.weldDistance = options.weldDistance}, kRepairLimits);
   EXPECT_FALSE(refused) << "needs no repair";
   if (refused) return {};
-  EXPECT_THAT(refused.error(), HasSubstr("set \"repair\""));
+  EXPECT_THAT(refused.error().text, HasSubstr("set \"repair\""));
   auto built = buildMesh(source, options, kRepairLimits);
-  EXPECT_TRUE(built) << built.error();
+  EXPECT_TRUE(built) << built.error().text;
   return built ? std::move(*built) : BuiltMesh();
 }
 
@@ -129,7 +129,7 @@ TEST(RepairedMesh, KeepsTheAreaAndFrontOfAnyPolygon) {
     for (std::size_t i = 0; i < n; ++i)
       area += corners[i].cast<double>().cross(corners[(i + 1) % n].cast<double>()) / 2;
     const auto built = buildMesh(sourceOf(corners, {face}), kRepair, kRepairLimits);
-    ASSERT_TRUE(built) << built.error();
+    ASSERT_TRUE(built) << built.error().text;
     for (const Triangle& t : built->mesh.shape.triangles) {
       const auto at = [&](std::size_t i) { return built->mesh.shape.positions[t[i]].cast<double>(); };
       before += (at(1) - at(0)).cross(at(2) - at(0)) / 2;
@@ -153,7 +153,7 @@ TEST(RepairedMesh, DividesConcavePolygonsOfUpTo1000Corners) {
     return sourceOf(corners, {face});
   };
   EXPECT_EQ(repaired(comb(1000)).mesh.shape.triangles.size(), 998u);
-  EXPECT_EQ(buildMesh(comb(1002), kRepair, kRepairLimits).error(),
+  EXPECT_EQ(buildMesh(comb(1002), kRepair, kRepairLimits).error().text,
             "face 0 has 1002 corners and is not convex; at most 1000 can be repaired: triangulate it when "
             "you export");
 }
@@ -202,7 +202,7 @@ TEST(RepairedMesh, LacksFacesThatAreThereTwice) {
            {{0, 1, 2, 3}, {3, 2, 1, 0}},
            {{0, 1, 2}, {0, 2, 3}, {0, 2, 1}, {3, 2, 0}}}) {
     const auto built = buildMesh(sourceOf(square, faces), kRepair, kRepairLimits);
-    ASSERT_TRUE(built) << built.error();
+    ASSERT_TRUE(built) << built.error().text;
     EXPECT_EQ(built->mesh.shape.triangles.size(), 2u);
     EXPECT_EQ(built->mesh.shape.quads.size(), faces.size() == 2 ? 1u : 0u);
     EXPECT_EQ(built->repairs.droppedDuplicates, 2u);
@@ -265,7 +265,7 @@ TEST(RepairedMesh, DividesVerticesAtWhichSheetsMeet) {
   ASSERT_TRUE(joined);  // allowed without a repair
   EXPECT_EQ(joined->mesh.nodeCount(), 5u);
   const auto built = buildMesh(source, kRepair, kRepairLimits);
-  ASSERT_TRUE(built) << built.error();
+  ASSERT_TRUE(built) << built.error().text;
   EXPECT_EQ(built->mesh.nodeCount(), 6u);
   EXPECT_EQ(built->repairs.splitVertices, 1u);
   EXPECT_THAT(built->repairs.sentences(),
@@ -408,14 +408,14 @@ TEST(RepairedMesh, ObeysEveryRuleForRandomFaces) {
     }
     const auto built = buildMesh(sourceOf(vertices, faces), kRepair, kRepairLimits);
     if (!built) {
-      EXPECT_THAT(built.error(),
+      EXPECT_THAT(built.error().text,
                   testing::AnyOf(HasSubstr("nothing is left after the repair"), HasSubstr("mean length")))
           << seed;
       continue;
     }
     const MeshSource result = sourceOf(built->mesh.shape);
     const auto plain = buildMesh(result, {}, kRepairLimits);
-    ASSERT_TRUE(plain) << seed << ": " << plain.error();
+    ASSERT_TRUE(plain) << seed << ": " << plain.error().text;
     EXPECT_EQ(plain->mesh.shape.positions, built->mesh.shape.positions) << seed;
     EXPECT_EQ(plain->mesh.shape.quads, built->mesh.shape.quads) << seed;
     // Every vertex with a node leads to all of its copies.

@@ -260,6 +260,15 @@ TEST(MeshMessage, RefusesMoreNodesAfterARepairThanAllowed) {
   EXPECT_THAT(scene.error().text, HasSubstr("has more than 6 vertices once its edges are split"));
 }
 
+TEST(MeshMessage, RefusesMoreSpringsOfANodeThanTheLimit) {
+  EXPECT_TRUE(toScene(meshScene()));
+  const Result<model::Scene> scene = toScene(meshScene(), {}, {.nodeSprings = 3});
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().text, HasSubstr("cloths[0].mesh: vertex"));
+  EXPECT_THAT(scene.error().text, HasSubstr("has more than 3 springs"));
+  EXPECT_EQ(scene.error().limit, telemetry::Refusal::sceneSize);
+}
+
 TEST(MeshMessage, RepairedClothsShareTheLimitOfNodes) {
   v1::Scene message = flapScene();
   message.mutable_cloths(0)->mutable_mesh()->set_repair(true);

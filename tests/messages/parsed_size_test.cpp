@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kNoLimit = std::size_t{1} << 40;
 
-std::optional<std::size_t> sizeOf(const std::string& bytes, std::size_t limit = kNoLimit) {
+tl::expected<std::size_t, SizeError> sizeOf(const std::string& bytes, std::size_t limit = kNoLimit) {
   return parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(bytes)), limit);
 }
 
@@ -29,7 +29,7 @@ std::size_t usedBy(const std::string& bytes) {
 TEST(ParsedSize, BoundsNamedScenesWithinAFactorOfEight) {
   for (const std::string& name : namedScenes()) {
     const std::string bytes = toMessage(loadScene(name).value()).SerializeAsString();
-    const std::optional<std::size_t> bound = sizeOf(bytes);
+    const auto bound = sizeOf(bytes);
     ASSERT_TRUE(bound) << name;
     EXPECT_GE(*bound, usedBy(bytes)) << name;
     EXPECT_LE(*bound, 8 * usedBy(bytes)) << name;
@@ -82,7 +82,7 @@ TEST(ParsedSize, RefusesAboveTheLimit) {
   const std::size_t size = sizeOf(bytes).value();
   EXPECT_GT(size, 40 * bytes.size());
   EXPECT_TRUE(sizeOf(bytes, size));
-  EXPECT_FALSE(sizeOf(bytes, size - 1));
+  EXPECT_EQ(sizeOf(bytes, size - 1).error(), SizeError::tooLarge);
 }
 
 TEST(ParsedSize, RefusesWhatTheParserRefuses) {
@@ -91,8 +91,9 @@ TEST(ParsedSize, RefusesWhatTheParserRefuses) {
     const std::string part = bytes.substr(0, length);
     EXPECT_EQ(sizeOf(part).has_value(), v1::Scene().ParseFromString(part)) << length;
   }
-  EXPECT_FALSE(sizeOf("\x0c"));                      // the end of a group that did not start
-  EXPECT_FALSE(sizeOf(std::string(2'000, '\x0b')));  // groups in groups
+  for (const std::string& malformed : {std::string("\x0c"),             // the end of a group that did not start
+                                       std::string(2'000, '\x0b')})  // groups in groups
+    EXPECT_EQ(sizeOf(malformed).error(), SizeError::malformed);
 }
 
 }  // namespace

@@ -128,8 +128,28 @@ TEST_F(ScenesTest, RefusesUploadThatNeedsTooMuchMemory) {
   TestPeer maker(server());
   upload(maker, content);
   const v1::Error error = createUploaded(maker).error();
-  EXPECT_EQ(error.code(), v1::ERROR_CODE_MALFORMED_MESSAGE);
-  EXPECT_THAT(error.text(), HasSubstr("134217728 bytes of memory"));
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(error.text(), HasSubstr("128000000 bytes of memory"));
+}
+
+TEST_F(ScenesTest, OptionsLimitTheParsedSizeAndTheSpringsOfANode) {
+  ServerOptions options;
+  options.maxParsedBytes = 1'000'000;
+  options.maxNodeSprings = 5;
+  START(options);
+  TestPeer maker(server());
+  v1::Scene scene = discScene(8);  // its vertices inside have six neighbours
+  upload(maker, scene.SerializeAsString());
+  const v1::Error springs = createUploaded(maker).error();
+  EXPECT_EQ(springs.code(), v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_THAT(springs.text(), HasSubstr("has more than 5 springs"));
+  for (int i = 0; i < 100'000; ++i) scene.mutable_cloths(0)->add_pins();
+  upload(maker, scene.SerializeAsString());
+  const v1::Error parsed = createUploaded(maker).error();
+  EXPECT_EQ(parsed.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(parsed.text(), HasSubstr("1000000 bytes of memory (--max-parsed-memory)"));
+  EXPECT_EQ(server().state().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::sceneSize)].value(),
+            2u);
 }
 
 TEST_F(ScenesTest, InvalidSceneIsRefusedWithTheReason) {
