@@ -2,6 +2,7 @@
 // All targets, for the program that replays their inputs.
 #include "tests/fuzz/targets/core_target.h"
 #include "tests/fuzz/targets/decoder_target.h"
+#include "tests/fuzz/targets/draco_target.h"
 #include "tests/fuzz/targets/files_target.h"
 #include "tests/fuzz/targets/gltf_target.h"
 #include "tests/fuzz/targets/http_target.h"
@@ -18,9 +19,9 @@ namespace clothstream::fuzz {
 
 std::span<const Target* const> targets() {
   static constexpr const Target* kAll[]{
-      &kCoreTarget,      &kDecoderTarget, &kFilesTarget,     &kGltfTarget,       &kHttpTarget,
-      &kHullTarget,      &kObjTarget,     &kRecordingTarget, &kSavedStateTarget, &kSceneTarget,
-      &kSceneJsonTarget, &kSessionTarget, &kTokenTarget};
+      &kCoreTarget,  &kDecoderTarget,   &kDracoTarget,   &kFilesTarget,     &kGltfTarget,
+      &kHttpTarget,  &kHullTarget,      &kObjTarget,     &kRecordingTarget, &kSavedStateTarget,
+      &kSceneTarget, &kSceneJsonTarget, &kSessionTarget, &kTokenTarget};
   return kAll;
 }
 

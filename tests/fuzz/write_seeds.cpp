@@ -20,6 +20,7 @@
 #include "tests/codec/golden.h"
 #include "tests/core/scripted_server.h"
 #include "tests/fuzz/target.h"
+#include "tests/meshes/draco_sheet.h"
 
 namespace clothstream::fuzz {
 namespace {
@@ -409,6 +410,14 @@ void writeMeshes(const std::filesystem::path& directory) {
   const std::string body =
       number(text.size()) + "JSON" + text + number(data.size()) + std::string("BIN\0", 4) + data;
   gltf.add("glTF" + number(2) + number(12 + body.size()) + body);
+  Folder draco(directory, "draco");
+  constexpr int kSide = 4;
+  for (const meshes::DracoCoding& coding : meshes::kDracoCodings) {
+    const std::string sheet = meshes::compressedSheet(coding, kSide);
+    draco.add(sheet);
+    gltf.add(meshes::glbOf(sheet, (kSide + 1) * (kSide + 1), 6 * kSide * kSide));
+  }
+  draco.add(meshes::compressedSheet(meshes::kDracoCodings[0], kSide, true));
 }
 
 void writeFiles(const std::filesystem::path& directory) {

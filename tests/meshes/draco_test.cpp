@@ -6,20 +6,13 @@
 #include <filesystem>
 #include <fstream>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wconversion"
-#pragma GCC diagnostic ignored "-Wshadow"
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wold-style-cast"
-#include <draco/compression/encode.h>
-#include <draco/mesh/triangle_soup_mesh_builder.h>
-#pragma GCC diagnostic pop
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include "server/meshes/draco_mesh.h"
 #include "server/meshes/mesh_file.h"
+#include "tests/meshes/draco_sheet.h"
 
 namespace clothstream::meshes {
 namespace {
@@ -31,90 +24,12 @@ constexpr int kSide = 20;  // quads on each side of a wavy sheet
 constexpr int kPoints = (kSide + 1) * (kSide + 1), kFaces = 2 * kSide * kSide;
 constexpr DracoRequest kRequest{.positions = 0, .uvs = 1, .maxPoints = kPoints, .maxFaces = kFaces};
 
-Vec3 wave(int x, int y) {
-  return Vec3(static_cast<float>(x), std::sin(0.4f * static_cast<float>(x + y)), static_cast<float>(y)) /
-         kSide;
-}
-
-struct Coding {
-  draco::MeshEncoderMethod method;
-  int quantization;  // bits; 0: floats
-  int speed;         // 10: the fastest
-};
-
-constexpr Coding kCodings[] = {
-    {draco::MESH_EDGEBREAKER_ENCODING, 14, 0}, {draco::MESH_EDGEBREAKER_ENCODING, 14, 5},
-    {draco::MESH_EDGEBREAKER_ENCODING, 0, 5},  {draco::MESH_EDGEBREAKER_ENCODING, 11, 9},
-    {draco::MESH_SEQUENTIAL_ENCODING, 14, 5},  {draco::MESH_SEQUENTIAL_ENCODING, 0, 5},
-    {draco::MESH_SEQUENTIAL_ENCODING, 12, 10},
-};
-
-std::string compress(const Coding& coding, bool hasMetadata = false) {
-  draco::TriangleSoupMeshBuilder builder;
-  builder.Start(kFaces);
-  const int positions = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
-  const int uvs = builder.AddAttribute(draco::GeometryAttribute::TEX_COORD, 2, draco::DT_FLOAT32);
-  draco::FaceIndex face(0);
-  for (int y = 0; y < kSide; ++y)
-    for (int x = 0; x < kSide; ++x)
-      for (const auto& corners :
-           {std::array{x, y, x + 1, y, x + 1, y + 1}, std::array{x, y, x + 1, y + 1, x, y + 1}}) {
-        Vec3 p[3];
-        model::Uv uv[3];
-        for (std::size_t i = 0; i < 3; ++i) {
-          p[i] = wave(corners[2 * i], corners[2 * i + 1]);
-          uv[i] = model::Uv(p[i].x(), p[i].z());
-        }
-        builder.SetAttributeValuesForFace(positions, face, p[0].data(), p[1].data(), p[2].data());
-        builder.SetAttributeValuesForFace(uvs, face, uv[0].data(), uv[1].data(), uv[2].data());
-        ++face;
-      }
-  const std::unique_ptr<draco::Mesh> mesh = builder.Finalize();
-  if (hasMetadata) {
-    auto metadata = std::make_unique<draco::GeometryMetadata>();
-    metadata->AddEntryString("name", "sheet");
-    mesh->AddMetadata(std::move(metadata));
-  }
-  draco::Encoder encoder;
-  encoder.SetEncodingMethod(coding.method);
-  encoder.SetSpeedOptions(coding.speed, coding.speed);
-  if (coding.quantization > 0)
-    for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::TEX_COORD})
-      encoder.SetAttributeQuantization(type, coding.quantization);
-  draco::EncoderBuffer buffer;
-  EXPECT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
-  return std::string(buffer.data(), buffer.size());
+std::string compressed(const DracoCoding& coding, bool hasMetadata = false) {
+  return compressedSheet(coding, kSide, hasMetadata);
 }
 
 auto decoded(const std::string& bytes, const DracoRequest& request = kRequest) {
   return decodeDraco(std::as_bytes(std::span(bytes)), request);
-}
-
-// A .glb file. `points` and `indices` are the counts of its accessors.
-std::string glbOf(const std::string& compressed, std::size_t points, std::size_t indices) {
-  std::string json = R"({"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_draco_mesh_compression"],
-    "extensionsRequired": ["KHR_draco_mesh_compression"], "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-    "meshes": [{"name": "sheet", "primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2,
-      "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0, "TEXCOORD_0": 1}}}}]}],
-    "accessors": [{"componentType": 5126, "count": POINTS, "type": "VEC3"},
-      {"componentType": 5126, "count": POINTS, "type": "VEC2"}, {"componentType": 5125, "count": INDICES, "type": "SCALAR"}],
-    "bufferViews": [{"buffer": 0, "byteLength": BYTES}], "buffers": [{"byteLength": BYTES}]})";
-  for (const auto& [name, number] :
-       {std::pair("POINTS", points), std::pair("INDICES", indices), std::pair("BYTES", compressed.size())})
-    for (std::size_t at = json.find(name); at != json.npos; at = json.find(name))
-      json.replace(at, std::strlen(name), std::to_string(number));
-  json.resize((json.size() + 3) / 4 * 4, ' ');
-  const std::size_t padded = (compressed.size() + 3) / 4 * 4;
-  std::string bytes = "glTF";
-  const auto word = [&](std::size_t value) {
-    const auto number = static_cast<std::uint32_t>(value);
-    bytes.append(reinterpret_cast<const char*>(&number), 4);
-  };
-  word(2), word(12 + 8 + json.size() + 8 + padded);
-  word(json.size()), word(0x4E4F534A), bytes += json;
-  word(padded), word(0x004E4942), bytes += compressed;
-  bytes.resize(bytes.size() + padded - compressed.size(), '\0');
-  return bytes;
 }
 
 tl::expected<MeshSource, std::string> read(const std::string& bytes, std::uint64_t vertices = kPoints) {
@@ -132,15 +47,15 @@ std::string refusal(const std::string& bytes, std::uint64_t vertices = kPoints) 
 }
 
 TEST(Draco, IsReadWithEveryEncoding) {
-  for (const Coding& coding : kCodings) {
-    const auto source = read(glbOf(compress(coding), kPoints, 3 * kFaces));
+  for (const DracoCoding& coding : kDracoCodings) {
+    const auto source = read(glbOf(compressed(coding), kPoints, 3 * kFaces));
     ASSERT_TRUE(source) << source.error();
     const float error = coding.quantization > 0 ? 1.5f / static_cast<float>(1 << coding.quantization) : 0;
     EXPECT_EQ(source->vertices.size(), static_cast<std::size_t>(kPoints));
     for (std::size_t i = 0; i < source->vertices.size(); ++i) {
       const Vec3& p = source->vertices[i];
-      const Vec3 expected =
-          wave(static_cast<int>(std::lround(p.x() * kSide)), static_cast<int>(std::lround(p.z() * kSide)));
+      const Vec3 expected = wave(static_cast<int>(std::lround(p.x() * kSide)),
+                                 static_cast<int>(std::lround(p.z() * kSide)), kSide);
       EXPECT_LE((p - expected).cwiseAbs().maxCoeff(), error) << coding.quantization << ' ' << p.transpose();
       EXPECT_LE((source->uvs[i] - model::Uv(expected.x(), 1 - expected.z())).cwiseAbs().maxCoeff(),
                 error + 1e-6f);
@@ -158,8 +73,8 @@ TEST(Draco, IsReadWithEveryEncoding) {
 }
 
 TEST(Draco, RefusesSizesThatTheFileDoesNotState) {
-  for (const Coding& coding : kCodings) {
-    const std::string bytes = compress(coding);
+  for (const DracoCoding& coding : kDracoCodings) {
+    const std::string bytes = compressed(coding);
     EXPECT_THAT(refusal(glbOf(bytes, kPoints, 3 * kFaces - 3)),
                 HasSubstr("states 800 faces; the file has 799"));
     EXPECT_THAT(refusal(glbOf(bytes, kPoints - 1, 3 * kFaces)),
@@ -167,12 +82,12 @@ TEST(Draco, RefusesSizesThatTheFileDoesNotState) {
     EXPECT_THAT(refusal(glbOf(bytes, kPoints, 3 * kFaces), kPoints - 1),
                 HasSubstr("has 441 vertices; at most 440 more are allowed: simplify it"));
   }
-  EXPECT_THAT(refusal(glbOf(compress(kCodings[0]) + std::string(8000, '\0'), 2, 3)),
+  EXPECT_THAT(refusal(glbOf(compressed(kDracoCodings[0]) + std::string(8000, '\0'), 2, 3)),
               HasSubstr("bytes; at most"));
 }
 
 TEST(Draco, NamesWhatIsMissing) {
-  const std::string bytes = compress(kCodings[0]);
+  const std::string bytes = compressed(kDracoCodings[0]);
   DracoRequest request = kRequest;
   request.positions = 7;
   EXPECT_EQ(decoded(bytes, request).error(), "has no positions in its attribute 7");
@@ -182,7 +97,7 @@ TEST(Draco, NamesWhatIsMissing) {
   request.uvs = 0;
   EXPECT_EQ(decoded(bytes, request).error(), "has no texture coordinates in its attribute 0");
   EXPECT_EQ(decoded("DRAC").error(), "does not start with a header of Draco");
-  EXPECT_THAT(decoded(compress(kCodings[0], true)).error(),
+  EXPECT_THAT(decoded(compressed(kDracoCodings[0], true)).error(),
               HasSubstr("has metadata, which is not supported"));
   std::string old = bytes;
   old[6] = 1;
@@ -194,8 +109,8 @@ TEST(Draco, NamesWhatIsMissing) {
 }
 
 TEST(Draco, RefusesEveryCut) {
-  for (const Coding& coding : kCodings) {
-    const std::string bytes = compress(coding);
+  for (const DracoCoding& coding : kDracoCodings) {
+    const std::string bytes = compressed(coding);
     for (std::size_t kept = 0; kept + 1 < bytes.size(); kept += 1 + kept / 40) {
       // An exactly sized copy, so that sanitizers see reads past its end.
       const std::vector<std::byte> cut(
@@ -242,8 +157,8 @@ TEST(Draco, CostsLittleWithHugeSizes) {
 
 // Changed bytes either decode or do not; sizes stay within what was requested.
 TEST(Draco, SurvivesChangedBytes) {
-  for (const Coding& coding : kCodings) {
-    const std::string bytes = compress(coding);
+  for (const DracoCoding& coding : kDracoCodings) {
+    const std::string bytes = compressed(coding);
     for (std::size_t at = 0; at < bytes.size(); at += 1 + at / 60)
       for (const int bits : {1, 0x80, 0xFF}) {
         std::string changed = bytes;

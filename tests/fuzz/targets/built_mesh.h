@@ -41,12 +41,12 @@ inline void checkRepaired(const meshes::BuiltMesh& built) {
 inline void buildAndCheck(const meshes::MeshSource& source) {
   const auto plain = meshes::buildMesh(source, {.weldDistance = 1e-3f}, kFuzzedMeshLimits);
   if (plain) checkNodes(*plain);
-  if (!plain) require(!plain.error().empty(), "an error has a text");
+  if (!plain) require(!plain.error().text.empty(), "an error has a text");
   const auto repaired =
       meshes::buildMesh(source, {.weldDistance = 1e-3f, .repair = true, .fit = true}, kFuzzedMeshLimits);
   if (!repaired) {
-    require(!repaired.error().empty(), "an error has a text");
-    require(repaired.error().find("set \"repair\"") == std::string::npos,
+    require(!repaired.error().text.empty(), "an error has a text");
+    require(repaired.error().text.find("set \"repair\"") == std::string::npos,
             "a repair does not ask for a repair");
     return;
   }
