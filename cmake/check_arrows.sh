@@ -62,6 +62,9 @@ readonly OUTSIDE='
 <qrencode          | server/tls
 <avahi-            | server/discovery clients/cli
 <Eigen/            | server/model server/reference
+<draco/            | server/meshes
+<tiny_gltf         | server/meshes clients/cli
+<tiny_obj          | server/meshes
 '
 
 failed=0

@@ -18,13 +18,6 @@ using Affine = Eigen::Affine3d;
 template <typename T>
 using Expected = tl::expected<T, std::string>;
 
-template <typename Things>
-auto* at(const Things& things, int index) {
-  return index >= 0 && static_cast<std::size_t>(index) < things.size()
-             ? &things[static_cast<std::size_t>(index)]
-             : nullptr;
-}
-
 Affine localTransform(const tinygltf::Node& node) {
   Affine transform = Affine::Identity();
   if (node.matrix.size() == 16) {
@@ -46,7 +39,7 @@ class Gatherer {
       : model_(model), maxVertices_(maxVertices), visited_(model.nodes.size(), false) {}
 
   Expected<MeshSource> gather() {
-    const tinygltf::Scene* scene = at(model_.scenes, std::max(0, model_.defaultScene));
+    const tinygltf::Scene* scene = elementAt(model_.scenes, std::max(0, model_.defaultScene));
     if (scene) {
       for (const int node : scene->nodes)
         if (auto done = addTree(node); !done) return tl::unexpected(done.error());
@@ -67,14 +60,14 @@ class Gatherer {
     while (!open.empty()) {
       const auto [index, parent] = open.back();
       open.pop_back();
-      const tinygltf::Node* node = at(model_.nodes, index);
+      const tinygltf::Node* node = elementAt(model_.nodes, index);
       if (!node) return tl::unexpected(fmt::format("node {} does not exist", index));
       if (visited_[static_cast<std::size_t>(index)])
         return tl::unexpected(fmt::format("node {} has two parents or is its own ancestor", index));
       visited_[static_cast<std::size_t>(index)] = true;
       const Affine transform = parent * localTransform(*node);
       if (node->mesh >= 0) {
-        const tinygltf::Mesh* mesh = at(model_.meshes, node->mesh);
+        const tinygltf::Mesh* mesh = elementAt(model_.meshes, node->mesh);
         if (!mesh) return tl::unexpected(fmt::format("mesh {} does not exist", node->mesh));
         if (auto done = addMesh(*mesh, transform); !done) return done;
       }
@@ -104,7 +97,7 @@ class Gatherer {
     everyPartHasUvs_ = everyPartHasUvs_ && !read->uvs.empty();
     // v runs downwards in glTF and upwards here.
     for (const model::Uv& uv : read->uvs) source_.uvs.emplace_back(uv.x(), 1 - uv.y());
-    const tinygltf::Material* material = at(model_.materials, primitive.material);
+    const tinygltf::Material* material = elementAt(model_.materials, primitive.material);
     source_.parts.push_back(
         {material && !material->name.empty() ? material->name : mesh.name, source_.faces.size()});
     addFaces(read->indices, static_cast<std::uint32_t>(firstVertex), static_cast<std::uint32_t>(firstUv),

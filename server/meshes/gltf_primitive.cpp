@@ -36,15 +36,8 @@ struct Elements {
   }
 };
 
-template <typename Things>
-auto* find(const Things& things, int index) {
-  return index >= 0 && static_cast<std::size_t>(index) < things.size()
-             ? &things[static_cast<std::size_t>(index)]
-             : nullptr;
-}
-
 Expected<Elements> elementsOf(const tinygltf::Model& model, int index, int type) {
-  const tinygltf::Accessor* accessor = find(model.accessors, index);
+  const tinygltf::Accessor* accessor = elementAt(model.accessors, index);
   if (!accessor) return tl::unexpected(fmt::format("accessor {} does not exist", index));
   const auto refuse = [&](std::string_view what) {
     return tl::unexpected(fmt::format("accessor {} {}", index, what));
@@ -52,9 +45,9 @@ Expected<Elements> elementsOf(const tinygltf::Model& model, int index, int type)
   if (accessor->sparse.isSparse)
     return refuse("is sparse, which is not supported: export it without sparse accessors");
   if (accessor->type != type) return refuse("has the wrong number of components");
-  const tinygltf::BufferView* view = find(model.bufferViews, accessor->bufferView);
+  const tinygltf::BufferView* view = elementAt(model.bufferViews, accessor->bufferView);
   if (view && view->extensions.contains(kMeshoptExtension)) return tl::unexpected(meshoptError());
-  const tinygltf::Buffer* buffer = view ? find(model.buffers, view->buffer) : nullptr;
+  const tinygltf::Buffer* buffer = view ? elementAt(model.buffers, view->buffer) : nullptr;
   if (!buffer) return refuse("has no buffer");
   const int stride = accessor->ByteStride(*view);
   const std::int64_t size =
@@ -191,8 +184,8 @@ Expected<GltfPrimitive> readDraco(const tinygltf::Model& model, const tinygltf::
   const auto refuse = [](std::string_view what) {
     return tl::unexpected(fmt::format("its compressed data ({}) {}", kDracoExtension, what));
   };
-  const tinygltf::BufferView* view = find(model.bufferViews, numberIn(extension, "bufferView"));
-  const tinygltf::Buffer* buffer = view ? find(model.buffers, view->buffer) : nullptr;
+  const tinygltf::BufferView* view = elementAt(model.bufferViews, numberIn(extension, "bufferView"));
+  const tinygltf::Buffer* buffer = view ? elementAt(model.buffers, view->buffer) : nullptr;
   if (!buffer || view->byteOffset > buffer->data.size() ||
       view->byteLength > buffer->data.size() - view->byteOffset)
     return refuse("has no buffer that holds it");
@@ -235,8 +228,8 @@ Expected<GltfPrimitive> readPrimitive(const tinygltf::Model& model, const tinygl
   if (position == primitive.attributes.end()) return tl::unexpected(std::string("has no POSITION"));
   const auto draco = primitive.extensions.find(kDracoExtension);
   if (draco == primitive.extensions.end()) return readPlain(model, primitive, position->second, limits);
-  const tinygltf::Accessor* vertices = find(model.accessors, position->second);
-  const tinygltf::Accessor* corners = find(model.accessors, primitive.indices);
+  const tinygltf::Accessor* vertices = elementAt(model.accessors, position->second);
+  const tinygltf::Accessor* corners = elementAt(model.accessors, primitive.indices);
   if (!vertices || !corners)
     return tl::unexpected(std::string("has no accessors for its POSITION and indices"));
   if (auto problem = checkCounts(vertices->count, corners->count, limits))

@@ -2,6 +2,7 @@
 // Geometry of a primitive of a glTF file.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -16,6 +17,13 @@ namespace clothstream::meshes {
 inline constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
 inline constexpr const char* kMeshoptExtension = "EXT_meshopt_compression";
 inline constexpr const char* kQuantizationExtension = "KHR_mesh_quantization";
+
+// Null if a list of a glTF file has no such element.
+template <typename List>
+auto* elementAt(const List& list, int index) {
+  return index >= 0 && static_cast<std::size_t>(index) < list.size() ? &list[static_cast<std::size_t>(index)]
+                                                                     : nullptr;
+}
 
 // Says what to do with a file that is compressed with meshopt.
 std::string meshoptError();

@@ -221,6 +221,27 @@ TEST_F(Join, CreatesPausesResetsAndDeletesScenes) {
   EXPECT_THAT(meshless.second, HasSubstr("print-scene"));
 }
 
+TEST_F(Join, CreateRepairsAMeshOnRequest) {
+  const TemporaryDirectory directory;
+  const std::filesystem::path file = directory.path() / "flap.json";
+  // Three triangles meet at one edge.
+  std::ofstream(file) << R"({"name": "flap", "cloths": [{"name": "sheet", "mesh": {
+    "positions": [0,0,0, 1,0,0, 0,1,0, 0,-1,0, 0,0,1], "triangles": [0,1,2, 1,0,3, 0,1,4]}}]})";
+  const auto create = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {"create", file.string(), "--server", address_});
+    auto client = clothstream(options);
+    const int code = client->waitForEnd(kPatience).value_or(-1);
+    return std::pair(code, std::move(client));
+  };
+  const auto refused = create({});
+  EXPECT_EQ(refused.first, 4);
+  EXPECT_THAT(refused.second->errors(), AllOf(HasSubstr("is not manifold"), HasSubstr("set \"repair\"")));
+  const auto repaired = create({"--repair"});
+  EXPECT_EQ(repaired.first, 0) << repaired.second->errors();
+  EXPECT_EQ(repaired.second->output(), "flap\n");
+  EXPECT_THAT(repaired.second->errors(), HasSubstr("sheet: "));
+}
+
 TEST_F(Join, ReportsServerThatIsKilled) {
   const auto client = clothstream({"join", address_, "--no-reconnect"}, Process::Output::terminal);
   ASSERT_TRUE(client->waitForOutput("fps", kPatience)) << client->errors();
