@@ -28,8 +28,8 @@ struct VertexNodes {
   std::vector<std::uint32_t> nextCopy;
 };
 
-// Sets the mesh of the cloth. Refuses a file name if there is no reader, and more nodes, or springs of a node,
-// than `most`. Adds to `repairs` if something was repaired. Throws model::Cancelled.
+// Sets the mesh of the cloth. Refuses a file name if there is no reader, and more nodes, or springs of a
+// node, than `most`. Adds to `repairs` if something was repaired. Throws model::Cancelled.
 VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
                         const MeshReader& readMesh, const SceneLimits& most, model::Cloth& cloth,
                         std::vector<v1::MeshRepair>& repairs);

@@ -9,9 +9,11 @@
 
 #include "proto/parameters/apply_change.h"
 #include "server/messages/client_message.h"
+#include "server/messages/cloth_message.h"
 #include "server/messages/cloth_numbers.h"
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
+#include "server/messages/solver_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 

@@ -14,7 +14,6 @@
 #include "server/messages/mesh_message.h"
 #include "server/messages/scene_limits.h"
 #include "server/messages/validation.h"
-#include "server/model/material.h"
 #include "server/model/scene.h"
 #include "server/model/stability.h"
 
@@ -47,15 +46,9 @@ void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all);
 // names each cloth and collider once. Safe for any messages; fields that this release does not know are kept.
 void mergeChange(const v1::ParameterChange& next, v1::ParameterChange& earlier);
 
-// Solver of a cloth. unfitSolver() checks whether it suits the cloth.
-model::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message);
-v1::Solver toMessage(const model::Solver& solver);
 // Gust of an Environment or a ParameterChange.
 model::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message);
 void write(const model::Gust& gust, v1::Gust& message);
-
-// nullptr and a failed check, whose text lists all materials, if no material has this name.
-const model::Material* toMaterial(Checks& checks, const Path& path, const std::string& name);
 
 // Error text if the solver of a cloth cannot be used in this scene; nullopt if it can.
 std::optional<std::string> unfitSolver(const model::Scene& scene, const model::Cloth& cloth);

@@ -4,6 +4,7 @@
 #include "server/messages/node_selection.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
+#include "server/messages/solver_message.h"
 #include "server/messages/vectors.h"
 #include "server/model/mesh.h"
 
@@ -17,31 +18,12 @@ void writeEnvironment(const model::Environment& environment, v1::Environment& me
   write(environment.gust, *message.mutable_gust());
 }
 
-void writeConstraint(const model::Solver& solver, v1::ConstraintSolver& message) {
-  message.set_bend_constraints(solver.bendConstraints);
-  if (solver.compliance) message.set_compliance(*solver.compliance);
-  message.set_iterations(solver.iterations);
-  message.set_tolerance(solver.tolerance);
-  message.set_path(solver.path == model::ConstraintPath::assembled ? v1::CONSTRAINT_PATH_ASSEMBLED
-                                                                   : v1::CONSTRAINT_PATH_MATRIX_FREE);
-}
-
 void writeGrid(const model::Grid& grid, v1::Grid& message) {
   message.set_rows(grid.rows);
   message.set_columns(grid.columns);
   message.set_width(grid.width);
   message.set_height(grid.height);
   write(grid.pose, *message.mutable_pose());
-}
-
-void writeMotion(const model::Motion& motion, v1::Motion& message) {
-  message.set_steady(motion.steady);
-  for (const model::MotionKey& key : motion.keys) {
-    v1::MotionKey& keyMessage = *message.add_keys();
-    keyMessage.set_time(key.time);
-    write(key.position, *keyMessage.mutable_position());
-    write(key.orientation, *keyMessage.mutable_orientation());
-  }
 }
 
 void writeAttachment(const model::Attachment& attachment, v1::Attachment& message) {
@@ -54,7 +36,7 @@ void writeAttachment(const model::Attachment& attachment, v1::Attachment& messag
     return;
   }
   write(attachment.pose, *message.mutable_pose());
-  if (!attachment.motion.keys.empty()) writeMotion(attachment.motion, *message.mutable_motion());
+  if (!attachment.motion.keys.empty()) write(attachment.motion, *message.mutable_motion());
 }
 
 void writeCloth(const model::Cloth& cloth, v1::Cloth& message) {
@@ -79,7 +61,7 @@ void writeCollider(const model::Collider& collider, v1::Collider& message) {
   write(collider.shape, message);
   write(collider.pose, *message.mutable_pose());
   message.set_friction(collider.friction);
-  if (!collider.motion.keys.empty()) writeMotion(collider.motion, *message.mutable_motion());
+  if (!collider.motion.keys.empty()) write(collider.motion, *message.mutable_motion());
 }
 
 v1::Integrator toMessage(model::Integrator integrator) {
@@ -102,31 +84,6 @@ v1::Normals toMessage(model::Normals normals) {
 void write(const model::Gust& gust, v1::Gust& message) {
   message.set_strength(gust.strength);
   message.set_seconds(gust.seconds);
-}
-
-v1::Solver toMessage(const model::Solver& solver) {
-  v1::Solver message;
-  switch (solver.kind) {
-    case model::SolverKind::massSpring:
-      message.mutable_mass_spring();
-      break;
-    case model::SolverKind::constraint:
-      writeConstraint(solver, *message.mutable_constraint());
-      break;
-    case model::SolverKind::acad:
-      message.mutable_acad()->set_activation(solver.activation);
-      writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
-      break;
-    case model::SolverKind::xpbd:
-      message.mutable_xpbd()->set_iterations(solver.iterations);
-      if (solver.compliance) message.mutable_xpbd()->set_compliance(*solver.compliance);
-      break;
-    case model::SolverKind::implicitEuler:
-      message.mutable_implicit_euler()->set_iterations(solver.iterations);
-      message.mutable_implicit_euler()->set_tolerance(solver.tolerance);
-      break;
-  }
-  return message;
 }
 
 v1::Scene toMessage(const model::Scene& scene) {

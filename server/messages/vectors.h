@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Converts vectors and poses between messages and the model.
+// Converts vectors, poses and motions between messages and the model.
 #pragma once
 
 #include "clothstream/v1/scene.pb.h"
@@ -14,8 +14,13 @@ model::Vec3 toVec3(Checks& checks, const Path& path, const v1::Vec3& message, Ra
 model::Quaternion toQuaternion(Checks& checks, const Path& path, const v1::Quaternion& message);
 model::Pose toPose(Checks& checks, const Path& path, const v1::Pose& message);
 
+// Keys without an orientation have this one.
+model::Motion toMotion(Checks& checks, const Path& path, const v1::Motion& message,
+                       const model::Quaternion& orientation);
+
 void write(const model::Vec3& value, v1::Vec3& message);
 void write(const model::Quaternion& value, v1::Quaternion& message);
 void write(const model::Pose& value, v1::Pose& message);
+void write(const model::Motion& value, v1::Motion& message);
 
 }  // namespace clothstream::messages

@@ -7,6 +7,8 @@
 
 #include "server/messages/client_message.h"
 #include "server/messages/scene_message.h"
+#include "server/messages/solver_message.h"
+#include "server/model/material.h"
 #include "tests/messages/scenes.h"
 
 namespace clothstream::messages {

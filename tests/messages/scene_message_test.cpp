@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/model/material.h"
 #include "server/model/springs.h"
 #include "tests/messages/scenes.h"
 
