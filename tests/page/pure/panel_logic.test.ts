@@ -1,37 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Logic of the panel without a browser: pins and places of meshes, numbers, wind, figures, bytes of a scene.
+// Logic of the panel without a browser: pins and places of meshes, numbers, wind, figures.
 
-import assert from "node:assert/strict";
-import { createRequire } from "node:module";
-import { fileURLToPath } from "node:url";
-import { test } from "node:test";
-
-const web = fileURLToPath(new URL("../../clients/web", import.meta.url));
-const { build } = createRequire(`${web}/package.json`)("esbuild");
-
-// Loads TypeScript modules as one.
-async function load(...files) {
-  const contents = files.map((file) => `export * from "./${file}";`).join("\n");
-  const { outputFiles } = await build({
-    stdin: { contents, resolveDir: web, loader: "ts" },
-    bundle: true,
-    write: false,
-    format: "esm",
-    tsconfig: `${web}/tsconfig.base.json`,
-  });
-  return import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].contents).toString("base64")}`);
-}
-const panel = "page/src/panel";
-const { boundsOf, likelySize, nameFor, pinsOf, placeOf: meshPlace } = await load(`${panel}/pins.ts`);
-const { numberText, placeOf, powerOf, valueAt } = await load(`${panel}/number_row.ts`);
-const { vectorOf, windOf } = await load(`${panel}/wind.ts`);
-const { HudHistory, kChannels } = await load(`${panel}/hud_history.ts`);
-const { drawHud, hudText, kHudHeight, kHudWidth } = await load(`${panel}/hud_drawing.ts`);
-const { packed, sceneBytes } = await load("client/src/scene_bytes.ts");
-const { kClothParameters, kSettings } = await load("client/src/tables.ts");
+import { assert, test } from "vitest";
+import { kClothParameters, kSettings } from "@clothstream/client";
+import { drawHud, hudText, kHudHeight, kHudWidth } from "../../../clients/web/page/src/panel/hud_drawing";
+import { HudHistory, kChannels, kStages, type Sample } from "../../../clients/web/page/src/panel/hud_history";
+import { numberText, placeOf, powerOf, valueAt } from "../../../clients/web/page/src/panel/number_row";
+import { boundsOf, likelySize, nameFor, pinsOf, placeOf as meshPlace } from "../../../clients/web/page/src/panel/pins";
+import { vectorOf, windOf } from "../../../clients/web/page/src/panel/wind";
 
 // 3 x 3 vertices, 2 m wide and 1 m high, in the plane of two axes.
-function sheet(right, up) {
+function sheet(right: number, up: number): Float32Array {
   const positions = new Float32Array(27);
   for (let i = 0; i < 9; ++i) {
     positions[3 * i + right] = (i % 3) - 1;
@@ -104,14 +83,14 @@ test("wind keeps speed, heading and rise", () => {
   assert.deepEqual(windOf([0, 0, 0]), { speed: 0, heading: 0, rise: 0 });
   for (const wind of [{ speed: 3, heading: 0, rise: 0 }, { speed: 2, heading: 90, rise: 30 }, { speed: 1, heading: -135, rise: -80 }]) {
     const back = windOf(vectorOf(wind));
-    for (const key of ["speed", "heading", "rise"]) assert.ok(Math.abs(back[key] - wind[key]) < 1e-9, JSON.stringify(back));
+    for (const key of ["speed", "heading", "rise"] as const) assert.ok(Math.abs(back[key] - wind[key]) < 1e-9, JSON.stringify(back));
   }
   const [x, y, z] = vectorOf({ speed: 2, heading: 90, rise: 0 });
   assert.ok(Math.abs(x - 2) < 1e-9 && Math.abs(y) < 1e-9 && Math.abs(z) < 1e-9, "90 degrees is to the right");
   assert.ok(vectorOf({ speed: 1, heading: 0, rise: 0 })[2] === -1, "0 degrees is away from the viewer");
 });
 
-const sampleOf = (value) => Object.fromEntries(kChannels.map((name, index) => [name, value + index]));
+const sampleOf = (value: number) => Object.fromEntries(kChannels.map((name, index) => [name, value + index])) as Sample;
 
 test("the history keeps the newest samples", () => {
   const history = new HudHistory(3);
@@ -124,20 +103,21 @@ test("the history keeps the newest samples", () => {
   assert.equal(history.at("displayRate", 3), 0);
   assert.equal(history.largest("displayRate"), 4);
   assert.equal(history.sum("displayRate"), 9);
-  // Stages are the last five channels.
-  assert.equal(history.latency(), 4 * 5 + 7 + 8 + 9 + 10 + 11);
+  assert.equal(history.latency(), kStages.reduce((sum, stage) => sum + 4 + kChannels.indexOf(stage), 0));
 });
 
+type Call = [name: string, ...values: unknown[]];
+
 // Records the calls of a context instead of drawing.
-function recorder() {
-  const calls = [];
-  const context = new Proxy(
-    { measureText: (text) => ({ width: 6 * text.length }) },
-    {
-      get: (target, name) => target[name] ?? ((...values) => void calls.push([name, ...values])),
-      set: () => true,
-    },
-  );
+function recorder(): { context: CanvasRenderingContext2D; calls: Call[] } {
+  const calls: Call[] = [];
+  const context = new Proxy({} as CanvasRenderingContext2D, {
+    get: (_, name) =>
+      name === "measureText"
+        ? (text: string) => ({ width: 6 * text.length })
+        : (...values: unknown[]) => void calls.push([String(name), ...values]),
+    set: () => true,
+  });
   return { context, calls };
 }
 
@@ -149,7 +129,8 @@ test("the drawing needs only a context, and stays inside its size", () => {
     const { context, calls } = recorder();
     drawHud(context, history, theme);
     assert.ok(calls.length > 20);
-    for (const [name, x, y] of calls.filter(([name]) => name === "lineTo" || name === "moveTo")) {
+    for (const [name, ...place] of calls.filter(([name]) => name === "lineTo" || name === "moveTo")) {
+      const [x, y] = place as [number, number];
       assert.ok(x >= -1e-3 && x <= kHudWidth + 1e-3 && y >= -1e-3 && y <= kHudHeight + 1e-3, `${name} ${x} ${y}`);
     }
     const texts = calls.filter(([name]) => name === "fillText").map(([, text]) => text);
@@ -157,59 +138,4 @@ test("the drawing needs only a context, and stays inside its size", () => {
       assert.ok(texts.includes(wanted), wanted);
   }
   assert.equal(hudText(new HudHistory()), "No figures yet.");
-});
-
-// Fields of a protobuf message as [number, value].
-function fieldsOf(bytes) {
-  const fields = [];
-  let at = 0;
-  const varint = () => {
-    let value = 0;
-    for (let factor = 1; ; factor *= 128) {
-      const byte = bytes[at++];
-      value += (byte & 127) * factor;
-      if (byte < 128) return value;
-    }
-  };
-  while (at < bytes.length) {
-    const tag = varint();
-    if ((tag & 7) === 0) {
-      fields.push([tag >> 3, varint()]);
-      continue;
-    }
-    const size = (tag & 7) === 2 ? varint() : 4;
-    fields.push([tag >> 3, bytes.subarray(at, at + size)]);
-    at += size;
-  }
-  return fields;
-}
-
-test("a scene has its cloth, mesh, pins and floor", () => {
-  const scene = sceneBytes({
-    name: "sheet",
-    description: "From a file",
-    positions: sheet(0, 1),
-    triangles: Uint32Array.from([0, 3, 1]),
-    scale: 0.5,
-    position: [1, 2, 3],
-    material: "cotton",
-    massPerArea: 0.25,
-    pinned: [0, 300],
-    repair: true,
-    selfCollision: true,
-    floor: true,
-  });
-  const fields = new Map(fieldsOf(scene));
-  assert.equal(Buffer.from(fields.get(1)).toString(), "sheet");
-  const cloth = new Map(fieldsOf(fields.get(8)));
-  assert.equal(Buffer.from(cloth.get(40)).toString(), "cotton");
-  assert.deepEqual([...cloth.get(15)], [0, 0xac, 0x02]);
-  assert.equal(cloth.get(21).length, 0);
-  const mesh = new Map(fieldsOf(cloth.get(14)));
-  assert.equal(mesh.get(2).length, 4 * 27);
-  assert.deepEqual([...mesh.get(3)], [0, 3, 1]);
-  assert.equal(mesh.get(70), 1);
-  assert.equal(Buffer.from(mesh.get(9)).readFloatLE(0), 0.5);
-  assert.equal(new Map(fieldsOf(fields.get(9))).get(4).length, 0);
-  assert.deepEqual([...packed([0, 127, 128, 2 ** 31])], [0, 127, 128, 1, 128, 128, 128, 128, 8]);
 });

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+// The WebSocket of the worker: its states, and reasons for people when it closes.
+
+import { afterEach, assert, beforeEach, test, vi } from "vitest";
+import { StreamSocket } from "../../../clients/web/client/src/socket";
+import { FakeSocket, type Closed } from "./fake_socket";
+
+const events: string[] = [];
+let socket: StreamSocket;
+const last = () => FakeSocket.made.at(-1)!;
+
+beforeEach(() => {
+  vi.stubGlobal("WebSocket", FakeSocket);
+  FakeSocket.made = [];
+  events.length = 0;
+  socket = new StreamSocket("ws://server/stream", {
+    opened: () => events.push("opened"),
+    message: (bytes) => events.push(`message of ${bytes.byteLength} bytes`),
+    lost: (reason) => events.push(reason),
+  });
+});
+afterEach(() => vi.unstubAllGlobals());
+
+test("messages are sent only while the socket is open", () => {
+  socket.send(Uint8Array.of(1));
+  socket.open();
+  assert.isTrue(socket.inUse);
+  assert.isFalse(socket.isOpen);
+  socket.send(Uint8Array.of(2));
+  last().opens();
+  socket.send(Uint8Array.of(3));
+  assert.deepEqual(last().sent, [Uint8Array.of(3)]);
+  assert.deepEqual([last().url, last().binaryType], ["ws://server/stream", "arraybuffer"]);
+});
+
+test("text of a server is ignored, bytes are passed on", () => {
+  socket.open();
+  last().opens();
+  last().onmessage?.({ data: "text" });
+  last().onmessage?.({ data: new ArrayBuffer(3) });
+  assert.deepEqual(events, ["opened", "message of 3 bytes"]);
+});
+
+test("the reason of a lost connection says what happened", () => {
+  const cases: [boolean, Closed, string][] = [
+    [false, { reason: "", wasClean: false }, "The server cannot be reached."],
+    [true, { reason: "the scene ended", wasClean: true }, "The server closed the connection: the scene ended."],
+    [true, { reason: "", wasClean: true }, "The server closed the connection."],
+    [true, { reason: "", wasClean: false }, "The connection was lost."],
+  ];
+  for (const [opens, closed, reason] of cases) {
+    socket.open();
+    if (opens) last().opens();
+    last().onclose?.(closed);
+    assert.equal(events.at(-1), reason);
+    assert.isFalse(socket.inUse);
+  }
+});
+
+test("a socket that is closed or replaced reports nothing more", () => {
+  socket.open();
+  const first = last();
+  socket.open();
+  assert.isTrue(first.closed);
+  for (const one of [first, last()]) {
+    if (one === last()) socket.close();
+    assert.deepEqual([one.onopen, one.onmessage, one.onclose], [null, null, null]);
+  }
+  assert.isFalse(socket.inUse);
+  assert.deepEqual(events, []);
+});
