@@ -4,7 +4,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Shape, type Client, type Vec3 } from "@clothstream/client";
-import { ClothMesh, ColliderMeshes, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
+import { Cloths, ColliderMeshes, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
 
@@ -21,8 +21,7 @@ export class View {
   private readonly colliderMeshes = new ColliderMeshes();
   private readonly people = new People();
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
-  private cloths: ClothMesh[] = [];
-  private vertexCount = 0;
+  private readonly cloths: Cloths;
   private readonly eye = new THREE.Vector3();
   private floorHeight = 0;
 
@@ -32,13 +31,14 @@ export class View {
     private readonly detail: Detail,
   ) {
     useSoftShadows();
+    this.cloths = new Cloths(detail);
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.BasicShadowMap;
     this.renderer.toneMapping = THREE.AgXToneMapping;
     this.renderer.toneMappingExposure = 1.35;
     this.studio = new Studio(this.renderer, detail, (reflections) => this.colliderMeshes.reflect(reflections));
-    this.studio.scene.add(this.colliderMeshes.group, this.people.group);
+    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group);
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.enableDamping = true;
     this.orbit.dampingFactor = 0.12;
@@ -71,28 +71,13 @@ export class View {
   }
 
   get clothMeshes(): THREE.Mesh[] {
-    return this.cloths.map((cloth) => cloth.mesh);
+    return this.cloths.meshes;
   }
 
   // Loads topology and rest state of a new description, and fits the camera to them.
   describe(client: Client): void {
-    for (const cloth of this.cloths) {
-      this.studio.scene.remove(cloth.mesh);
-      cloth.dispose();
-    }
-    this.vertexCount = client.frames.vertexCount;
-    const layouts = client.frames.cloths();
-    const drawings = layouts.map((_, number) => client.frames.drawing(number));
-    const rest = client.frames.positions();
-    const triangles = client.frames.triangles();
-    this.cloths = layouts.map((layout, number) => {
-      const look = { number, material: client.parameters.material(number), detail: this.detail };
-      return new ClothMesh(layout, drawings[number]!, rest, triangles, look);
-    });
-    for (const cloth of this.cloths) this.studio.scene.add(cloth.mesh);
-
-    this.bounds.makeEmpty();
-    for (const cloth of this.cloths) this.bounds.union(cloth.reach());
+    this.cloths.describe(client);
+    this.bounds.copy(this.cloths.reach());
     this.colliderMeshes.describe();
     for (const collider of client.frames.colliders()) {
       if (collider.shape === Shape.plane) continue;
@@ -105,7 +90,7 @@ export class View {
 
   // Shows the current materials of the cloths. Call when parameters change.
   dress(client: Client): void {
-    this.cloths.forEach((cloth, number) => cloth.dress(client.parameters.material(number)));
+    this.cloths.dress(client);
   }
 
   // Shows the names of the participants. Call when they change.
@@ -115,12 +100,8 @@ export class View {
 
   // Draws the frame for a time of performance.now(). Reads the core's memory only during the call.
   draw(client: Client | undefined, now: number): void {
-    // A joining client has no vertices yet. The last frame of the previous client stays until the description arrives.
-    if (client && client.frames.vertexCount === this.vertexCount) {
-      client.frames.showAt(now);
-      const normals = client.frames.shownNormals();
-      const positions = client.frames.shownPositions();
-      for (const cloth of this.cloths) cloth.update(positions, normals);
+    // The last frame of the previous client stays until the description of a joining one arrives.
+    if (client && this.cloths.show(client, now)) {
       const colliders = client.frames.shownColliders();
       this.colliderMeshes.place(client, colliders);
       const { isPresenting } = this.renderer.xr;

@@ -2,6 +2,7 @@
 // What the package offers.
 
 export * from "./cloth_mesh";
+export { Cloths } from "./cloths";
 export * from "./collider_meshes";
 export { type Detail, tiled } from "./fabric_material";
 export { fabricNames, fabricOf, type Fabric } from "./fabrics";

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// All cloths of a client, as one three.js object.
+
+import * as THREE from "three";
+import type { Client } from "@clothstream/client";
+import { ClothMesh } from "./cloth_mesh";
+import type { Detail } from "./fabric_material";
+
+export class Cloths {
+  readonly group = new THREE.Group();
+  private list: ClothMesh[] = [];
+  private vertexCount = 0;
+
+  constructor(private readonly detail: Detail = "full") {}
+
+  get meshes(): THREE.Mesh[] {
+    return this.list.map((cloth) => cloth.mesh);
+  }
+
+  // Box in which the cloths will mostly stay.
+  reach(): THREE.Box3 {
+    return this.list.reduce((box, cloth) => box.union(cloth.reach()), new THREE.Box3());
+  }
+
+  // Replaces the cloths by those of a new description.
+  describe(client: Client): void {
+    this.dispose();
+    const { frames, parameters } = client;
+    this.vertexCount = frames.vertexCount;
+    const layouts = frames.cloths();
+    const drawings = layouts.map((_, number) => frames.drawing(number));
+    const materials = layouts.map((_, number) => parameters.material(number));
+    const rest = frames.positions();
+    const triangles = frames.triangles();
+    this.list = layouts.map((layout, number) => {
+      const look = { number, material: materials[number]!, detail: this.detail };
+      return new ClothMesh(layout, drawings[number]!, rest, triangles, look);
+    });
+    for (const cloth of this.list) this.group.add(cloth.mesh);
+  }
+
+  // Shows the current materials. Call when parameters change.
+  dress(client: Client): void {
+    this.list.forEach((cloth, number) => cloth.dress(client.parameters.material(number)));
+  }
+
+  // Shows the cloths as they are at a time of performance.now(). Draw the picture before the next call of the client:
+  // the meshes then read its memory. Returns false, and changes nothing, if the client is joining and has no cloths yet.
+  show(client: Client, now: number): boolean {
+    const { frames } = client;
+    if (frames.vertexCount !== this.vertexCount) return false;
+    frames.showAt(now);
+    const normals = frames.shownNormals();
+    const positions = frames.shownPositions();
+    for (const cloth of this.list) cloth.update(positions, normals);
+    return true;
+  }
+
+  dispose(): void {
+    for (const cloth of this.list) {
+      this.group.remove(cloth.mesh);
+      cloth.dispose();
+    }
+    this.list = [];
+  }
+}
