@@ -129,7 +129,19 @@ test("the example has at most 40 lines and uses only the public interface", asyn
   assert.deepEqual(imported, ["three", "@clothstream/client", "@clothstream/three"]);
 });
 
-test("the types of the packages are complete, however TypeScript finds them", async () => {
+// Copies the programs of the readmes into the project, and returns their names.
+async function copyPrograms() {
+  const names = [];
+  for (const name of ["client", "three"]) {
+    const readme = await readFile(join(folder, "node_modules/@clothstream", name, "README.md"), "utf8");
+    const [, program] = /```ts\n(.*?)```/s.exec(readme);
+    names.push(`readme_${name}.ts`);
+    await writeFile(join(folder, names.at(-1)), program);
+  }
+  return names;
+}
+
+test("the types of the packages suit the example and the readmes, however TypeScript finds them", async () => {
   const compilerOptions = {
     strict: true,
     exactOptionalPropertyTypes: true,
@@ -139,7 +151,7 @@ test("the types of the packages are complete, however TypeScript finds them", as
     module: "nodenext",
     outDir: "compiled",
   };
-  await writeFile(join(folder, "tsconfig.json"), JSON.stringify({ compilerOptions, files: ["main.ts"] }));
+  await writeFile(join(folder, "tsconfig.json"), JSON.stringify({ compilerOptions, files: ["main.ts", ...(await copyPrograms())] }));
   for (const more of [[], ["--module", "esnext", "--moduleResolution", "bundler", "--skipLibCheck", "--noEmit"]])
     await run(process.execPath, [require.resolve("typescript/bin/tsc"), "-p", ".", ...more], { cwd: folder }).catch(({ stdout }) =>
       assert.fail(stdout),

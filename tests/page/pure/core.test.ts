@@ -29,6 +29,14 @@ test("text and numbers are copied to the core and back", async () => {
   assert.throws(() => core.with(["text"], () => assert.fail("from the caller")), "from the caller");
 });
 
+test("a file that is not the core is refused with what to do", async () => {
+  vi.stubGlobal("fetch", () => Promise.resolve(new Response("<!doctype html>")));
+  const error: unknown = await CoreModule.compile("/core.wasm").catch((reason: unknown) => reason);
+  assert.include(String(error), "/core.wasm is not a WebAssembly module");
+  vi.stubGlobal("fetch", () => Promise.resolve(new Response("", { status: 404, statusText: "Not Found" })));
+  assert.include(String(await CoreModule.compile("/core.wasm").catch((reason: unknown) => reason)), "404 Not Found");
+});
+
 test("memory that the core gives back is used again", async () => {
   const core = await CoreModule.start(module);
   const numbers = new Array<number>(100_000).fill(1);

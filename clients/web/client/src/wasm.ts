@@ -128,7 +128,10 @@ export class CoreModule {
   static async compile(url: string | URL): Promise<WebAssembly.Module> {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`${url} could not be loaded: ${response.status} ${response.statusText}`);
-    return WebAssembly.compile(await response.arrayBuffer());
+    return WebAssembly.compile(await response.arrayBuffer()).catch((cause: unknown) => {
+      // A server that answers every address with its page does this.
+      throw new Error(`${url} is not a WebAssembly module. Vite's development server needs optimizeDeps.exclude: ["@clothstream/client"]`, { cause });
+    });
   }
 
   static async start(module: WebAssembly.Module): Promise<CoreModule> {
