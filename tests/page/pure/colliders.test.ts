@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// Reach of colliders, which the view must show.
+
+import { assert, test } from "vitest";
+import { Shape, type Client, type Collider } from "@clothstream/client";
+import { reachOf } from "@clothstream/three";
+
+const vertices = Float32Array.of(0.1, 0, 0, 0, -3, 4, 1, 1, 1);
+const client = { frames: { hull: () => ({ vertices, triangles: Uint32Array.of(0, 1, 2) }) } } as unknown as Client;
+
+function collider(shape: Shape): Collider {
+  const orientation = [0, 0, 0, 1] as const;
+  return { index: 0, name: "", shape, position: [9, 9, 9], orientation, radius: 0.5, length: 2, size: [2, 3, 6], participantId: 0n };
+}
+
+test("the reach of a collider is its farthest point, and nothing for a plane", () => {
+  assert.equal(reachOf(client, collider(Shape.sphere)), 0.5);
+  assert.equal(reachOf(client, collider(Shape.capsule)), 1.5);
+  assert.equal(reachOf(client, collider(Shape.box)), 3.5);
+  assert.equal(reachOf(client, collider(Shape.hull)), 5);
+  assert.equal(reachOf(client, collider(Shape.plane)), 0);
+});
