@@ -8,8 +8,7 @@ import { after, before, test } from "node:test";
 import { kChromium, kPicture, launchBrowser, luminance, openPage, takePicture, takePixels, untilFrames, untilState } from "./browser.mjs";
 import { joinAsGuest } from "./guest.mjs";
 import { startServer } from "./server.mjs";
-import { fabricNames, fabricOf } from "../../clients/web/three/dist/fabrics.js";
-import { kThreads, weave } from "../../clients/web/three/dist/weave.js";
+import { fabricNames } from "../../clients/web/three/dist/fabrics.js";
 
 const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
 if (!existsSync(kChromium)) {
@@ -61,31 +60,6 @@ async function clothColour(page, picture) {
   for (const [x, y] of places) picture.colourAt(x, y).forEach((value, i) => (sum[i] += value / places.length));
   return sum;
 }
-
-test("every pattern repeats without a seam and has unit normals", () => {
-  const size = 4 * kThreads;
-  const seen = new Map();
-  for (const name of fabricNames()) {
-    const fabric = fabricOf(name);
-    const surface = weave(fabric, size);
-    // Neighbours across the edge of the tile differ as neighbours inside do.
-    const step = (column, next) => {
-      let sum = 0;
-      for (let row = 0; row < size; ++row)
-        sum += Math.abs(surface.colour[4 * (row * size + column)] - surface.colour[4 * (row * size + next)]) / size;
-      return sum;
-    };
-    const inside = Math.max(...Array.from({ length: size - 1 }, (_, column) => step(column, column + 1)));
-    assert.ok(step(size - 1, 0) <= 1.2 * inside + 1, `${name}: ${step(size - 1, 0)} at the seam, ${inside} inside`);
-    for (let i = 0; i < surface.relief.length; i += 4) {
-      const length = Math.hypot(...[0, 1, 2].map((axis) => surface.relief[i + axis] / 127.5 - 1));
-      assert.ok(Math.abs(length - 1) < 0.03, `${name}: a normal has length ${length}`);
-    }
-    assert.deepEqual(weave(fabric, size), surface, `${name} is the same every time`);
-    seen.set(name, Buffer.from(surface.colour).toString("base64"));
-  }
-  assert.equal(new Set(seen.values()).size, seen.size, "no two fabrics have the same texels");
-});
 
 test("the default scene is silk, and every material of the server has a look", () =>
   withPage({ viewport: kSmall }, async (page) => {

@@ -25,7 +25,8 @@ if (!existsSync(kChromium)) {
 const run = promisify(execFile);
 const web = fileURLToPath(new URL("../../clients/web/", import.meta.url));
 const require = createRequire(join(web, "package.json"));
-const tarballs = process.env.CLOTHSTREAM_PACKAGES;
+const { version } = require("./client/package.json");
+const tarball = (name) => join(process.env.CLOTHSTREAM_PACKAGES, `clothstream-${name}-${version}.tgz`);
 const kViewport = { width: 400, height: 300 };
 const kTypes = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm" };
 
@@ -50,9 +51,8 @@ after(async () => {
 // Installs the tarballs without a network. Everything else that the project needs is installed in the repository.
 async function install() {
   await writeFile(join(folder, "package.json"), JSON.stringify({ type: "module" }));
-  const files = (await readdir(tarballs)).map((name) => join(tarballs, name));
   const options = ["--offline", "--legacy-peer-deps", "--ignore-scripts", "--no-audit", "--no-fund", "--cache", join(folder, "cache")];
-  await run("npm", ["install", ...options, ...files], { cwd: folder });
+  await run("npm", ["install", ...options, tarball("client"), tarball("three")], { cwd: folder });
   for (const name of ["three", "@types"]) await symlink(join(web, "node_modules", name), join(folder, "node_modules", name));
   for (const name of ["main.ts", "index.html"]) await cp(join(web, "example", name), join(folder, name));
 }
@@ -112,8 +112,7 @@ async function pictureWhere(page, name, condition) {
 test("the tarballs hold modules, types, readme and licence, and nothing else", async () => {
   const listed = { client: ["worker.js", "clothstream_core.wasm"], three: [] };
   for (const [name, more] of Object.entries(listed)) {
-    const { version } = JSON.parse(await readFile(join(web, name, "package.json"), "utf8"));
-    const { stdout } = await run("tar", ["-tzf", join(tarballs, `clothstream-${name}-${version}.tgz`)]);
+    const { stdout } = await run("tar", ["-tzf", tarball(name)]);
     const files = stdout.trim().split("\n").map((file) => file.replace("package/", ""));
     const sources = (await readdir(join(web, name, "src"), { recursive: true })).filter((file) => /(?<!\.d)\.ts$/.test(file));
     const expected = ["LICENSE", "README.md", "package.json", ...more.map((file) => `dist/${file}`)];
