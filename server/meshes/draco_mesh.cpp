@@ -11,11 +11,75 @@
 #pragma GCC diagnostic ignored "-Wshadow"
 #pragma GCC diagnostic ignored "-Wpedantic"
 #pragma GCC diagnostic ignored "-Wold-style-cast"
+#include <draco/compression/attributes/prediction_schemes/mesh_prediction_scheme_data.h>
+#include <draco/compression/attributes/prediction_schemes/mesh_prediction_scheme_tex_coords_decoder.h>
+#include <draco/compression/attributes/prediction_schemes/mesh_prediction_scheme_tex_coords_portable_decoder.h>
+#include <draco/compression/attributes/prediction_schemes/prediction_scheme_wrap_decoding_transform.h>
 #include <draco/compression/mesh/mesh_edgebreaker_decoder.h>
 #include <draco/compression/mesh/mesh_edgebreaker_shared.h>
 #include <draco/compression/mesh/mesh_sequential_decoder.h>
 #include <draco/core/varint_decoding.h>
+#include <draco/mesh/corner_table.h>
+#include <draco/mesh/mesh_attribute_corner_table.h>
 #pragma GCC diagnostic pop
+
+// How many orientations of texture coordinates a mesh states is the only number that Draco up to 1.5.7 does
+// not bound: it reads as many bits as stated, up to 2^31, from a file of any size. The functions below are
+// specialisations for the types that Draco uses. They are strong symbols, and those of its static library are
+// weak, so the linker takes these. The test Draco.RefusesMoreOrientationsThanCorners fails if it does not.
+namespace draco {
+namespace {
+
+using Wrap = PredictionSchemeWrapDecodingTransform<int, int>;
+using Whole = MeshPredictionSchemeData<CornerTable>;                 // no seam
+using Divided = MeshPredictionSchemeData<MeshAttributeCornerTable>;  // at seams of the attribute
+
+// Each corner has one orientation at most.
+template <typename Data, typename Predictor>
+bool readOrientations(const Data& mesh, DecoderBuffer& buffer, Predictor& predictor) {
+  std::int32_t count = 0;
+  if (!buffer.Decode(&count) || count < 0 || count > mesh.corner_table()->num_corners()) return false;
+  RAnsBitDecoder bits;
+  if (!bits.StartDecoding(&buffer)) return false;
+  predictor.ResizeOrientations(count);
+  // A bit says whether an orientation is that of its predecessor.
+  bool orientation = true;
+  for (int i = 0; i < count; ++i) {
+    if (!bits.DecodeNextBit()) orientation = !orientation;
+    predictor.set_orientation(i, orientation);
+  }
+  bits.EndDecoding();
+  return true;
+}
+
+}  // namespace
+
+template <>
+bool MeshPredictionSchemeTexCoordsPortableDecoder<int, Wrap, Whole>::DecodePredictionData(
+    DecoderBuffer* buffer) {
+  return readOrientations(mesh_data(), *buffer, predictor_) &&
+         MeshPredictionSchemeDecoder<int, Wrap, Whole>::DecodePredictionData(buffer);
+}
+
+template <>
+bool MeshPredictionSchemeTexCoordsPortableDecoder<int, Wrap, Divided>::DecodePredictionData(
+    DecoderBuffer* buffer) {
+  return readOrientations(mesh_data(), *buffer, predictor_) &&
+         MeshPredictionSchemeDecoder<int, Wrap, Divided>::DecodePredictionData(buffer);
+}
+
+// Encoders do not write the older scheme any more.
+template <>
+bool MeshPredictionSchemeTexCoordsDecoder<int, Wrap, Whole>::DecodePredictionData(DecoderBuffer*) {
+  return false;
+}
+
+template <>
+bool MeshPredictionSchemeTexCoordsDecoder<int, Wrap, Divided>::DecodePredictionData(DecoderBuffer*) {
+  return false;
+}
+
+}  // namespace draco
 
 namespace clothstream::meshes {
 namespace {

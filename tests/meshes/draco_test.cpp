@@ -155,6 +155,20 @@ TEST(Draco, CostsLittleWithHugeSizes) {
   EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 2.0);
 }
 
+// One of the numbers is that of the orientations of texture coordinates, of which Draco itself would read 2^31.
+TEST(Draco, RefusesMoreOrientationsThanCorners) {
+  for (const DracoCoding& coding : kDracoCodings) {
+    const std::string bytes = compressed(coding);
+    for (std::size_t at = 8; at + 4 <= bytes.size(); ++at) {
+      std::string changed = bytes;
+      changed.replace(at, 4, "\xFF\xFF\xFF\x7F");
+      const std::clock_t start = std::clock();
+      static_cast<void>(decoded(changed));
+      ASSERT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 1.0) << at;
+    }
+  }
+}
+
 // Changed bytes either decode or do not; sizes stay within what was requested.
 TEST(Draco, SurvivesChangedBytes) {
   for (const DracoCoding& coding : kDracoCodings) {
