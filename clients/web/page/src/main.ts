@@ -3,6 +3,7 @@
 
 import { Roles, Session, type SessionListener, type SessionOptions, type Vec3 } from "@clothstream/client";
 import { Drag } from "./drag";
+import { FrameWork } from "./frame_work";
 import { HeadsetPage } from "./headset_page";
 import { Hud } from "./hud";
 import { browserTokens, PairingPanel, ProofForm } from "./identity";
@@ -140,10 +141,12 @@ async function start(): Promise<void> {
   }
 
   const headset: HeadsetPage = new HeadsetPage(view, session, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) });
-  const probe = expose(session, view, headset.headset);
+  const work = new FrameWork();
+  const probe = expose(session, view, headset.headset, work);
 
   let figuresAt = 0;
   function draw(now: number, frame?: XRFrame): void {
+    const began = performance.now();
     const client = session.state.kind === "live" ? session.client : undefined;
     if (frame) headset.draw(frame, now, client);
     player.draw(client);
@@ -163,6 +166,7 @@ async function start(): Promise<void> {
       headset.show();
     }
     view.draw(session.client, displayTime(now, frame));
+    work.add(began, view, session);
   }
   view.renderer.setAnimationLoop(draw);
 }

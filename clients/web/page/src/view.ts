@@ -24,6 +24,9 @@ export class View {
   private readonly cloths: Cloths;
   private readonly eye = new THREE.Vector3();
   private floorHeight = 0;
+  // Times of the last draw(), ms: play-out, local contact and copies into attributes; and the renderer.
+  showMs = 0;
+  renderMs = 0;
 
   // Throws if the browser does not provide WebGL 2.
   constructor(
@@ -100,6 +103,7 @@ export class View {
 
   // Draws the frame for a time of performance.now(). Reads the core's memory only during the call.
   draw(client: Client | undefined, now: number): void {
+    const began = performance.now();
     // The last frame of the previous client stays until the description of a joining one arrives.
     if (client && this.cloths.show(client, now)) {
       const colliders = client.frames.shownColliders();
@@ -110,7 +114,10 @@ export class View {
     }
     if (!this.renderer.xr.isPresenting) this.orbit.update();
     this.studio.cheapShadows = this.detail === "reduced" || this.renderer.xr.isPresenting;
+    const shown = performance.now();
     this.renderer.render(this.studio.scene, this.camera);
+    this.showMs = shown - began;
+    this.renderMs = performance.now() - shown;
   }
 
   // Moves the camera to the default view, which shows the whole scene in a canvas of any shape.

@@ -50,7 +50,7 @@ export class TrackedHand {
   private read(frame: XRFrame, space: XRReferenceSpace, hand: XRHand, toScene: THREE.Matrix4): boolean {
     if (!frame.fillPoses || !frame.fillJointRadii) return false;
     if (!frame.fillPoses(hand.values(), space, this.poses) || !frame.fillJointRadii(hand.values(), this.radii)) return false;
-    if (!this.poses.every(Number.isFinite) || !this.radii.every((radius) => radius > 0 && radius < kLargestRadius)) return false;
+    if (!this.isPossible()) return false;
     this.turn.extractRotation(this.turn.multiplyMatrices(toScene, this.turn.fromArray(this.poses)));
     this.orientation.setFromRotationMatrix(this.turn);
     const scale = toScene.getMaxScaleOnAxis();
@@ -58,6 +58,13 @@ export class TrackedHand {
       this.point.fromArray(this.poses, 16 * joint + 12).applyMatrix4(toScene).toArray(this.joints, 4 * joint);
       this.joints[4 * joint + 3] = this.radii[joint]! * scale;
     }
+    return true;
+  }
+
+  // Called for each frame, so it makes no calls for each number.
+  private isPossible(): boolean {
+    for (let i = 0; i < this.poses.length; ++i) if (!Number.isFinite(this.poses[i]!)) return false;
+    for (let i = 0; i < kJoints; ++i) if (!(this.radii[i]! > 0 && this.radii[i]! < kLargestRadius)) return false;
     return true;
   }
 }
