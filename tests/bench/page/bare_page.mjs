@@ -11,5 +11,5 @@ export function drawNothing() {
 // Waits for a number of drawn frames in all, and fails if they do not come.
 export async function untilDrawn(page, count) {
   const kMs = 30_000 + 200 * count;
-  await page.waitForFunction((wanted) => window.clothstream.work.drawn >= wanted, count, { timeout: kMs, polling: 200 });
+  await page.waitForFunction((wanted) => window.clothstream.drawnFrames >= wanted, count, { timeout: kMs, polling: 200 });
 }

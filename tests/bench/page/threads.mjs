@@ -24,7 +24,7 @@ async function timeRows(browser, url, { size, frames }) {
     await enter(page, "vr");
     const middle = Math.floor(size / 2) * (size + 1);
     let corrected = 0;
-    while ((await page.evaluate(() => window.clothstream.work.drawn)) < frames) {
+    while ((await page.evaluate(() => window.clothstream.drawnFrames)) < frames) {
       for (const depth of [0.2, -0.2]) {
         const seen = await reach(page, "right", await vertex(page, middle), [0, 0, depth], kStep, "() => window.clothstream.localCorrection");
         corrected = Math.max(corrected, ...seen);
@@ -82,9 +82,9 @@ async function memoryRows(browser, url, { frames }) {
     await profiler.send("HeapProfiler.enable");
     const collected = { includeObjectsCollectedByMajorGC: true, includeObjectsCollectedByMinorGC: true };
     await profiler.send("HeapProfiler.startSampling", { samplingInterval: kSamplingBytes, ...collected });
-    const before = await page.evaluate(() => window.clothstream.work.drawn);
+    const before = await page.evaluate(() => window.clothstream.drawnFrames);
     await untilDrawn(page, before + frames / 2);
-    const after = await page.evaluate(() => window.clothstream.work.drawn);
+    const after = await page.evaluate(() => window.clothstream.drawnFrames);
     const { profile } = await profiler.send("HeapProfiler.stopSampling");
     const { renderer, page: own } = divide(profile.head);
     if (renderer === 0) throw new Error("the allocations of the renderer were not found");

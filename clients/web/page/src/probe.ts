@@ -28,8 +28,9 @@ export interface Probe {
   readonly playback: Playback | undefined;
   // Length of the largest correction by local contact, m.
   readonly localCorrection: number;
+  readonly drawnFrames: number;
   // Times of this thread for the newest frames, ms, in ascending order (frame_work.ts).
-  readonly work: { drawn: number; input: number[]; show: number[]; render: number[]; take: number[] };
+  readonly work: { input: number[]; show: number[]; render: number[]; take: number[] };
   readonly headset: HeadsetProbe;
   readonly canvas: HTMLCanvasElement;
   // Projects a point of the scene to CSS pixels of the page.
@@ -104,9 +105,12 @@ export function expose(session: Session, view: View, headset: Headset, work: Fra
     get localCorrection() {
       return session.client.frames.localCorrection;
     },
+    get drawnFrames() {
+      return work.drawn;
+    },
     get work() {
-      const { drawn, input, show, render, take } = work;
-      return { drawn, input: [...input.sorted()], show: [...show.sorted()], render: [...render.sorted()], take: [...take.sorted()] };
+      const { input, show, render, take } = work;
+      return { input: [...input.sorted()], show: [...show.sorted()], render: [...render.sorted()], take: [...take.sorted()] };
     },
     get headset() {
       return {

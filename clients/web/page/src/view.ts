@@ -12,6 +12,8 @@ const kFieldOfView = 32; // degrees, vertical
 const kViewDirection = new THREE.Vector3(0.42, 0.16, 1).normalize();
 const kMargin = 1.0;
 const kTurnStep = Math.PI / 36;
+// Drawn frames before the picture is completed, so that the first ones come soon.
+const kPlainFrames = 2;
 
 export class View {
   readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
@@ -22,6 +24,8 @@ export class View {
   private readonly people = new People();
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private readonly cloths: Cloths;
+  private shownFrames = 0;
+  private isDrawn = false;
   private readonly eye = new THREE.Vector3();
   private floorHeight = 0;
   // Times of the last draw(), ms: play-out, local contact and copies into attributes; and the renderer.
@@ -105,7 +109,8 @@ export class View {
   draw(client: Client | undefined, now: number): void {
     const began = performance.now();
     // The last frame of the previous client stays until the description of a joining one arrives.
-    if (client && this.cloths.show(client, now)) {
+    const shows = client !== undefined && this.cloths.show(client, now);
+    if (shows) {
       const colliders = client.frames.shownColliders();
       this.colliderMeshes.place(client, colliders);
       const { isPresenting } = this.renderer.xr;
@@ -114,7 +119,9 @@ export class View {
     }
     if (!this.renderer.xr.isPresenting) this.orbit.update();
     this.studio.cheapShadows = this.detail === "reduced" || this.renderer.xr.isPresenting;
+    if (shows && ++this.shownFrames > kPlainFrames && !this.renderer.xr.isPresenting) this.studio.complete();
     const shown = performance.now();
+    this.isDrawn = true;
     this.renderer.render(this.studio.scene, this.camera);
     this.showMs = shown - began;
     this.renderMs = performance.now() - shown;
@@ -204,7 +211,7 @@ export class View {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
-    // The new size has cleared the picture.
-    this.renderer.render(this.studio.scene, this.camera);
+    // The new size has cleared the picture. The first one waits for draw(), while the session connects.
+    if (this.isDrawn) this.renderer.render(this.studio.scene, this.camera);
   }
 }
