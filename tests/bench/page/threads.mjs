@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: MIT
 // Times of a frame on both threads, in an emulated headset whose hand moves through the cloth; and memory that a frame
 // allocates on the main thread, in a window.
-import { untilFrames, untilState } from "../../page/browser.mjs";
+import { drawNothing, untilFrames, untilState } from "../../page/browser.mjs";
 import { enter, openHeadset, reach, vertex } from "../../page/headset.mjs";
-import { drawNothing, untilDrawn } from "./bare_page.mjs";
 
 const kMainGoalMs = 0.5;
 const kWorkerGoalMs = 1.5;
 const kStep = 0.02; // m, way of the hand between two drawn frames
 const kSamplingBytes = 256; // mean distance of sampled allocations
+
+// Waits for a number of drawn frames in all, and fails if they do not come.
+async function untilDrawn(page, count) {
+  const kMs = 30_000 + 200 * count;
+  await page.waitForFunction((wanted) => window.clothstream.drawnFrames >= wanted, count, { timeout: kMs, polling: 200 });
+}
 
 const at = (sorted, part) => sorted[Math.round(part * (sorted.length - 1))];
 

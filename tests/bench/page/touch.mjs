@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A scripted hand in an emulated headset: how deep the cloth is drawn inside it, and whether pinches hold the cloth.
-import { untilFrames, untilState } from "../../page/browser.mjs";
+import { drawNothing, untilFrames, untilState } from "../../page/browser.mjs";
 import { deepest, enter, openHeadset, pinch, reach, vertex } from "../../page/headset.mjs";
-import { drawNothing } from "./bare_page.mjs";
 
 const kDepthGoal = 5; // mm
 const kHeldGoal = 95; // %

@@ -23,17 +23,20 @@ export class TrackedHand {
 
   // Whether the joints hold, or did a moment ago.
   present = false;
+  // Whether the device showed the hand in the newest frame.
+  seen = false;
 
   // Call once per frame; `hand` is undefined while the device does not track it. `toScene` leads from the reference
   // space to the scene.
   update(frame: XRFrame, space: XRReferenceSpace, hand: XRHand | undefined, toScene: THREE.Matrix4, nowMs: number): void {
-    if (hand && this.read(frame, space, hand, toScene)) this.seenAt = nowMs;
+    this.seen = hand !== undefined && this.read(frame, space, hand, toScene);
+    if (this.seen) this.seenAt = nowMs;
     this.present = nowMs - this.seenAt <= kHoldMs;
   }
 
   forget(): void {
     this.seenAt = -Infinity;
-    this.present = false;
+    this.present = this.seen = false;
   }
 
   // Copies a joint's position to `out`.
