@@ -18,9 +18,13 @@ async function untilDrawn(page, count) {
 const at = (sorted, part) => sorted[Math.round(part * (sorted.length - 1))];
 
 export async function threadRows(browser, url, options) {
-  return [...(await timeRows(browser, url, options)), ...(await memoryRows(browser, url, options))];
+  const [before] = await timeRows(browser, `${url}&normals=cpu`, options);
+  const rows = await timeRows(browser, url, options);
+  const compared = { ...before, figure: "  with normals of the processor (?normals=cpu)", goal: undefined };
+  return [rows[0], compared, ...rows.slice(1), ...(await memoryRows(browser, url, options))];
 }
 
+// The first row is the time of the main thread.
 async function timeRows(browser, url, { size, frames }) {
   const page = await openHeadset(browser, url, { viewport: { width: 160, height: 90 }, prepare: drawNothing });
   try {

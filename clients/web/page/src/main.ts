@@ -15,7 +15,7 @@ import { Pusher, type Tool } from "./pusher";
 import { expose } from "./probe";
 import { showAddress } from "./share";
 import { View } from "./view";
-import { chosenDetail } from "./detail";
+import { chosenDetail, gathersNormals } from "./detail";
 
 const kFiguresPeriodMs = 250;
 
@@ -26,7 +26,7 @@ async function start(): Promise<void> {
   });
   let view: View;
   try {
-    view = new View(element<HTMLCanvasElement>("canvas"), chosenDetail());
+    view = new View(element<HTMLCanvasElement>("canvas"), chosenDetail(), gathersNormals());
   } catch (error) {
     hud.showFatal(
       "This page needs WebGL 2, which this browser does not provide. " +

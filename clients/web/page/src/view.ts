@@ -36,9 +36,10 @@ export class View {
   constructor(
     readonly canvas: HTMLCanvasElement,
     private readonly detail: Detail,
+    gathersNormals = true, // computes normals on the graphics device where the stream has none
   ) {
     useSoftShadows();
-    this.cloths = new Cloths(detail);
+    this.cloths = new Cloths(detail, gathersNormals);
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.BasicShadowMap;

@@ -19,7 +19,8 @@ const kMostSeconds = 900;
 const kStreamMs = 20_000; // for the first frame
 const kRefreshMs = 250;
 // Place of the panel in space, in metres from the user's feet: above and behind the near edge of the cloth.
-const kPanelPlace = { x: 0, y: 1.5, z: -0.9 };
+const kPanelPlace = { x: 0, y: 1.55, z: -0.9 };
+const kPanelScale = 1.8; // so that it can be read at this distance
 
 class SelfTest {
   readonly headset: Headset;
@@ -60,6 +61,7 @@ class SelfTest {
     );
     this.headset.seat.add(this.panel.mesh);
     this.panel.mesh.position.set(kPanelPlace.x, kPanelPlace.y, kPanelPlace.z);
+    this.panel.mesh.scale.setScalar(kPanelScale);
     this.startVr.addEventListener("click", () => void this.enter());
     this.startWindow.addEventListener("click", () => this.begin());
     this.stopButton.addEventListener("click", () => this.end());
