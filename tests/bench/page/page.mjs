@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the page costs: bytes, time to the first frame, time and memory a frame, and how well hands hold the cloth.
+// Cost of the page: bytes, time to the first frame, time and memory a frame, and how well hands hold the cloth.
 // `./dev bench page` runs it. A figure is printed only after its run is checked. No goal fails the run.
 import { existsSync } from "node:fs";
 import { cpus } from "node:os";

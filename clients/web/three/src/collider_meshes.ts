@@ -84,7 +84,7 @@ export function reachOf(client: Client, collider: Collider): number {
   }
 }
 
-// What the geometry of a mesh depends on. The mesh is reused while it stays the same.
+// Members of a collider that its geometry depends on. The mesh is reused while it stays the same.
 type Look = Pick<Collider, "shape" | "name" | "radius" | "length" | "size">;
 
 function looksLike(look: Look, { shape, name, radius, length, size }: Collider): boolean {

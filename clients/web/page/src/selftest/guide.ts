@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the user is asked to do during a self-test, and when.
+// Steps of a self-test: texts for the user, and when each is shown.
 
 interface Step {
   until: number; // part of the test, 0 to 1

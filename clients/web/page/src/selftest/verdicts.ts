@@ -15,7 +15,7 @@ export interface Verdict {
 const kFullRate = 0.95; // of a nominal rate
 const kShortGapMs = 50;
 const kWorkerShare = 0.5; // of the time between two frames
-const kMainShare = 0.35; // of the time between two pictures, beside the renderer
+const kMainShare = 0.35; // of the time between two pictures; the renderer takes the rest
 const kDirectMs = 100;
 const kSeen = 0.5; // of the pictures
 const kHoldSeconds = 1;
