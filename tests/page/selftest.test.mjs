@@ -43,7 +43,7 @@ async function savedReport(page) {
   const [download] = await Promise.all([page.waitForEvent("download"), page.click("#download")]);
   assert.match(download.suggestedFilename(), /^clothstream-selftest-\d{4}-\d\d-\d\dT\d{6}\.json$/);
   const text = await readFile(await download.path(), "utf8");
-  assert.equal(text, await page.inputValue("#report"));
+  assert.equal(text, await page.inputValue("#json"));
   return JSON.parse(text);
 }
 
@@ -151,7 +151,7 @@ test("controllers are counted, and a second test starts at zero", async () => {
       // The user leaves VR with the button of the headset.
       await page.evaluate(() => window.device.activeSession.end());
       await page.waitForSelector("#results:not([hidden])");
-      const report = JSON.parse(await page.inputValue("#report"));
+      const report = JSON.parse(await page.inputValue("#json"));
       assert.ok(report.controllers.left > 0.9 && report.controllers.right > 0.9, JSON.stringify(report.controllers));
       assert.deepEqual(report.hands, { left: 0, right: 0 });
       const drawn = await page.evaluate(() => window.clothstream.headset.frames);
@@ -202,7 +202,7 @@ test("a length that is not allowed is named, and the usual one is used", async (
 test("a scene that does not exist is named", async () => {
   const page = await openPage(browser, `${server.url}selftest?scene=nowhere`);
   try {
-    await page.waitForFunction(() => /nowhere/.test(document.getElementById("status").textContent));
+    await page.waitForFunction(() => /nowhere/.test(document.getElementById("message").textContent));
   } finally {
     await page.close();
   }

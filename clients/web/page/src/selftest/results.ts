@@ -8,7 +8,7 @@ import { verdictsOn, type Grade } from "./verdicts";
 const kGrades: Record<Grade, string> = { good: "good", poor: "poor", unknown: "not measured" };
 
 export class Results {
-  private readonly text = element<HTMLTextAreaElement>("report");
+  private readonly text = element<HTMLTextAreaElement>("json");
   private readonly download = element<HTMLAnchorElement>("download");
   private readonly copy = element<HTMLButtonElement>("copy");
 

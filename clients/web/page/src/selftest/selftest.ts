@@ -175,7 +175,7 @@ function graphicsOf({ renderer }: View): string | null {
 }
 
 function say(text: string): void {
-  write(element("status"), text);
+  write(element("message"), text);
 }
 
 function chosenSeconds(query: URLSearchParams): number {
