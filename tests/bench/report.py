@@ -120,6 +120,10 @@ def offload(rows):
             for r in rows]
 
 
+def page(rows):
+    return [[r["figure"].strip(), f"{number(r['value'])} {r['unit']}", r["verdict"]] for r in rows]
+
+
 # Name of the table: suite, arguments, columns, function from rows to cells.
 TABLES = {
     "mass_spring": ("mass_spring", [], ["grid", "ns a node and substep", "million node-steps/s", "times the floor",
@@ -145,10 +149,11 @@ TABLES = {
                                                          "late ticks", "bits a vertex"], curtain),
     "offload": ("offload", [], ["vertices", "stream, ms", "kbit/s", "substeps", "mass-spring, ms", "XPBD, ms",
                                 "mass-spring with 10", "XPBD with 10", "even with mass-spring", "with XPBD"], offload),
+    "page": ("page", [], ["figure", "measured", "goal"], page),
 }
 # Suites that are not part of clothstream-bench. Their rows are kept in RESULTS, for plots.
 RESULTS = ROOT / "tests" / "bench" / "results"
-PROGRAMS = {"offload": ["node", "tests/bench/offload/offload.mjs"]}
+PROGRAMS = {"offload": ["node", "tests/bench/offload/offload.mjs"], "page": ["node", "tests/bench/page/page.mjs"]}
 
 
 def pages():
@@ -201,7 +206,7 @@ def report(program, suites):
             continue
         command = [suite, *arguments]
         key = tuple(command)
-        shown = "./dev bench offload" if suite in PROGRAMS else "clothstream-bench " + " ".join(command)
+        shown = f"./dev bench {suite}" if suite in PROGRAMS else "clothstream-bench " + " ".join(command)
         if key not in results:
             print(shown, flush=True)
             called = PROGRAMS.get(suite, [program, *command])

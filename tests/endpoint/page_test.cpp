@@ -41,6 +41,23 @@ TEST(Page, FindsIndexOfDirectoryAndIgnoresQuery) {
   EXPECT_EQ(page.find("/help/")->content, "help");
 }
 
+TEST(Page, FindsHtmlWithoutItsEnding) {
+  const PageDirectory directory;
+  directory.write("index.html", "root");
+  directory.write("selftest.html", "test");
+  directory.write("about", "file");
+  directory.write("about.html", "page");
+  const Page page(directory.path());
+  for (const char* target : {"/selftest", "/selftest?seconds=10", "/selftest.html"}) {
+    ASSERT_NE(page.find(target), nullptr) << target;
+    EXPECT_EQ(page.find(target)->content, "test") << target;
+  }
+  ASSERT_NE(page.find("/about"), nullptr);
+  EXPECT_EQ(page.find("/about")->content, "file");
+  for (const char* target : {"/selftest/", "/self", "/selftest.htm", "/.html"})
+    EXPECT_EQ(page.find(target), nullptr) << target;
+}
+
 TEST(Page, DecodesPercentEncodedNames) {
   const PageDirectory directory;
   directory.write("a file.txt", "spaced");

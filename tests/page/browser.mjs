@@ -52,6 +52,13 @@ export async function openPage(browser, url, { prepare, viewport } = {}) {
   return page;
 }
 
+// Runs in a page before its own scripts: calls that draw do nothing, so that frames come as on a device with a graphics
+// processor. All other calls of WebGL are made.
+export function drawNothing() {
+  for (const name of ["drawArrays", "drawElements", "drawArraysInstanced", "drawElementsInstanced"])
+    WebGL2RenderingContext.prototype[name] = () => undefined;
+}
+
 // Waits for a state: connecting, live, reconnecting or failed.
 export function untilState(page, state) {
   return page.waitForFunction((wanted) => window.clothstream?.state === wanted, state);

@@ -9,9 +9,10 @@ const kRuntime = packageFile("iwer/build/iwer.min.js");
 const kRoom = packageFile("@iwer/sem/build/iwer-sem.min.js");
 const kCapture = packageFile("@iwer/sem/captures/office_small.json");
 
-// Opens a page whose browser has a headset. `room` adds a real room with surfaces. Pages do not share a context.
-export async function openHeadset(browser, url, { room = false, input = "hand" } = {}) {
-  const context = await browser.newContext({ viewport: { width: 640, height: 360 } });
+// Opens a page whose browser has a headset. `room` adds a real room with surfaces.
+// `prepare` runs in the page before its own scripts. Pages do not share a context.
+export async function openHeadset(browser, url, { room = false, input = "hand", viewport = { width: 640, height: 360 }, prepare } = {}) {
+  const context = await browser.newContext({ viewport });
   await context.addInitScript({ path: kRuntime });
   if (room) {
     await context.addInitScript({ path: kRoom });
@@ -32,6 +33,7 @@ export async function openHeadset(browser, url, { room = false, input = "hand" }
     }
     window.device = device;
   }, input);
+  if (prepare) await context.addInitScript(prepare);
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
   page.errors = [];
@@ -78,4 +80,47 @@ export async function toRoom(page, [x, y, z]) {
 
 export function untilSession(page, mode) {
   return page.waitForFunction((wanted) => (window.clothstream.headset.mode ?? "none") === wanted, mode);
+}
+
+// Position of a vertex in the newest frame, in the scene.
+export const vertex = (page, index) => page.evaluate((at) => Array.from(window.clothstream.positions.slice(3 * at, 3 * at + 3)), index);
+
+// Offset from the pose of an emulated hand to the point where its fingers meet, in the room.
+export async function pinchOffset(page, side) {
+  const { position, point } = await page.evaluate((which) => {
+    const { x, y, z } = window.device.hands[which].position;
+    const limb = window.clothstream.headset.limbs.find((one) => one.side === which && one.isHand);
+    return { position: [x, y, z], point: limb.point };
+  }, side);
+  const there = await toRoom(page, point);
+  return there.map((value, axis) => value - position[axis]);
+}
+
+// Brings the fingers of a hand to a point of the scene, with an offset in the room.
+export async function reach(page, side, point, [dx, dy, dz] = [0, 0, 0], step = undefined, watch = undefined) {
+  const offset = await pinchOffset(page, side);
+  const [x, y, z] = await toRoom(page, point);
+  return moveTo(page, "hands", side, [x + dx - offset[0], y + dy - offset[1], z + dz - offset[2]], step, watch);
+}
+
+// Closes (1) or opens (0) the fingers of the right hand, and waits until the page has seen it.
+export async function pinch(page, value) {
+  await page.evaluate((goal) => window.device.hands.right.updatePinchValue(goal), value);
+  const { frames } = await page.evaluate(() => window.clothstream.headset);
+  await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
+}
+
+// Deepest place of a drawn vertex in a joint of the own hand, metres. Runs in the page.
+export function deepest() {
+  const { drawn, headset } = window.clothstream;
+  let most = 0;
+  for (const { joints } of headset.limbs) {
+    for (let j = 0; j < joints.length; j += 4) {
+      for (let i = 0; i < drawn[0].length; i += 3) {
+        const away = Math.hypot(drawn[0][i] - joints[j], drawn[0][i + 1] - joints[j + 1], drawn[0][i + 2] - joints[j + 2]);
+        most = Math.max(most, joints[j + 3] - away);
+      }
+    }
+  }
+  return most;
 }

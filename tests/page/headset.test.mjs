@@ -8,7 +8,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { kChromium, launchBrowser, takePicture, untilFrames, untilState } from "./browser.mjs";
-import { enter, moveTo, openHeadset, toRoom, untilSession } from "./headset.mjs";
+import { deepest, enter, moveTo, openHeadset, pinch, pinchOffset, reach, toRoom, untilSession, vertex } from "./headset.mjs";
 import { writeHangingSheet } from "./scenes.mjs";
 import { startServer } from "./server.mjs";
 
@@ -52,48 +52,7 @@ async function withHeadset(options, use) {
   }
 }
 
-const vertex = (page, index) => page.evaluate((at) => Array.from(window.clothstream.positions.slice(3 * at, 3 * at + 3)), index);
 const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-
-// Offset from the pose of an emulated hand to the point where its fingers meet, in the room.
-async function pinchOffset(page, side) {
-  const { position, point } = await page.evaluate((which) => {
-    const { x, y, z } = window.device.hands[which].position;
-    const limb = window.clothstream.headset.limbs.find((one) => one.side === which && one.isHand);
-    return { position: [x, y, z], point: limb.point };
-  }, side);
-  const there = await toRoom(page, point);
-  return there.map((value, axis) => value - position[axis]);
-}
-
-// Brings the fingers of a hand to a point of the scene, with an offset in the room.
-async function reach(page, side, point, [dx, dy, dz] = [0, 0, 0], step = undefined, watch = undefined) {
-  const offset = await pinchOffset(page, side);
-  const [x, y, z] = await toRoom(page, point);
-  return moveTo(page, "hands", side, [x + dx - offset[0], y + dy - offset[1], z + dz - offset[2]], step, watch);
-}
-
-// Closes (1) or opens (0) the fingers of the right hand, and waits until the page has seen it.
-async function pinch(page, value) {
-  await page.evaluate((goal) => window.device.hands.right.updatePinchValue(goal), value);
-  const { frames } = await page.evaluate(() => window.clothstream.headset);
-  await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
-}
-
-// Deepest place of a drawn vertex in a joint of the own hand, metres. Runs in the page.
-function deepest() {
-  const { drawn, headset } = window.clothstream;
-  let most = 0;
-  for (const { joints } of headset.limbs) {
-    for (let j = 0; j < joints.length; j += 4) {
-      for (let i = 0; i < drawn[0].length; i += 3) {
-        const away = Math.hypot(drawn[0][i] - joints[j], drawn[0][i + 1] - joints[j + 1], drawn[0][i + 2] - joints[j + 2]);
-        most = Math.max(most, joints[j + 3] - away);
-      }
-    }
-  }
-  return most;
-}
 
 test("a hand pushes the cloth, and is never drawn inside it", () =>
   withHeadset({}, async (page) => {

@@ -118,7 +118,8 @@ const PageFile* Page::find(std::string_view target) const {
   std::optional<std::string> path = percentDecoded(target.substr(0, target.find_first_of("?#")));
   if (!path) return nullptr;
   if (path->ends_with('/')) *path += "index.html";
-  const auto file = files_.find(*path);
+  auto file = files_.find(*path);
+  if (file == files_.end()) file = files_.find(*path + ".html");
   return file == files_.end() ? nullptr : &file->second;
 }
 

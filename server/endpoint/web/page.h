@@ -30,7 +30,8 @@ class Page {
   // Adds a file that is not in the directory. Does nothing if there is a file with this path.
   void add(const std::string& path, std::string content);
 
-  // `target` comes from a request: percent-encoded, with an optional query. A directory means its index.html.
+  // `target` comes from a request: percent-encoded, with an optional query. A directory means its index.html,
+  // and a name without a file means that name with ".html".
   // Returns nullptr if there is no such file.
   const PageFile* find(std::string_view target) const;
 

@@ -2,8 +2,9 @@
 // The geometry of the newest frame and of the frame that is shown, and points of it. Returned views point into the
 // core's memory, and are valid until the next call.
 
-import { CS_STAGE_STATISTICS_VERSION, cs_cloth, cs_cloth_point, cs_collider, cs_stage_statistics, cs_statistics, cs_submesh } from "./layout";
-import { microseconds, nowUs, quaternion, vec3, type CoreHandle } from "./handle";
+import { CS_STAGE_STATISTICS_VERSION, cs_cloth, cs_cloth_point, cs_stage_statistics, cs_statistics, cs_submesh } from "./layout";
+import { microseconds, nowUs, vec3, type CoreHandle } from "./handle";
+import { readCollider, ShownColliders } from "./shown_colliders";
 import type { ClothLayout, ClothPoint, Collider, Drawing, Hull, Stages, Statistics, Vec3 } from "./types";
 
 const kFarthestPoint = 1e4; // m
@@ -11,7 +12,11 @@ const kFarthestPoint = 1e4; // m
 export class Frames {
   private playsOut = false;
 
-  constructor(private readonly handle: CoreHandle) {}
+  private readonly shown: ShownColliders;
+
+  constructor(private readonly handle: CoreHandle) {
+    this.shown = new ShownColliders(handle);
+  }
 
   // Plays frames out evenly, with a small delay. Without, the newest frame is shown.
   playOut(): void {
@@ -125,31 +130,15 @@ export class Frames {
   // Colliders of the newest frame.
   colliders(): Collider[] {
     const { cs_collider_count, cs_get_collider } = this.handle.core.exports;
-    return this.readColliders(cs_collider_count(this.handle.pointer), cs_get_collider);
+    return this.handle.list(cs_collider_count(this.handle.pointer), cs_get_collider, (view, at, index) => readCollider(this.handle, view, at, index));
   }
 
-  // Colliders at the time of the last showAt().
-  shownColliders(): Collider[] {
-    if (!this.playsOut) return this.colliders();
-    const { cs_played_collider_count, cs_get_played_collider } = this.handle.core.exports;
-    return this.readColliders(cs_played_collider_count(this.handle.pointer), cs_get_played_collider);
-  }
-
-  private readColliders(
-    count: number,
-    get: (client: number, index: number, out: number) => number,
-  ): Collider[] {
-    return this.handle.list(count, get, (view, at, index) => ({
-      index,
-      name: this.handle.core.text(view.getUint32(at + cs_collider.name, true)),
-      shape: view.getUint32(at + cs_collider.shape, true),
-      position: vec3(view, at + cs_collider.position),
-      orientation: quaternion(view, at + cs_collider.orientation),
-      radius: view.getFloat32(at + cs_collider.radius, true),
-      length: view.getFloat32(at + cs_collider.length, true),
-      size: vec3(view, at + cs_collider.size),
-      participantId: view.getBigUint64(at + cs_collider.participant_id, true),
-    }));
+  // Colliders at the time of the last showAt(). The next call overwrites the list and its objects.
+  shownColliders(): readonly Collider[] {
+    const { pointer, core } = this.handle;
+    const { exports } = core;
+    if (this.playsOut) return this.shown.read(exports.cs_played_collider_count(pointer), exports.cs_get_played_collider);
+    return this.shown.read(exports.cs_collider_count(pointer), exports.cs_get_collider);
   }
 
   // Copies the geometry of a hull collider.

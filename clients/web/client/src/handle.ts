@@ -2,7 +2,7 @@
 // One client of the core: its pointer, and memory for the structs that calls read and write.
 
 import * as layout from "./layout";
-import type { Quaternion, Spring, Vec3 } from "./types";
+import type { Spring } from "./types";
 import type { CoreModule } from "./wasm";
 
 // Enough for each struct of core.h.
@@ -46,12 +46,14 @@ export function microseconds(milliseconds: number): bigint {
   return BigInt(Math.round(1000 * milliseconds));
 }
 
-export function vec3(view: DataView, at: number): Vec3 {
-  return [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
+// Overwrites all elements of `out`, and returns it.
+export function readFloats<Numbers extends number[]>(view: DataView, at: number, out: Numbers): Numbers {
+  for (let i = 0; i < out.length; ++i) out[i] = view.getFloat32(at + 4 * i, true);
+  return out;
 }
 
-export function quaternion(view: DataView, at: number): Quaternion {
-  return [...vec3(view, at), view.getFloat32(at + 12, true)];
+export function vec3(view: DataView, at: number): [number, number, number] {
+  return readFloats(view, at, [0, 0, 0]);
 }
 
 export function spring(view: DataView, at: number): Spring {

@@ -57,6 +57,9 @@ const kNoTokens: TokenStore = { kept: () => "", keep: () => undefined };
 export class Session {
   state: SessionState = { kind: "connecting" };
   client: Client;
+  // Frames that were taken from the worker, and the time that this took on this thread, ms.
+  framesTaken = 0;
+  takeMs = 0;
   private number = 0; // of the session in the worker
   private connection = 0;
   private ring: FrameRing | undefined;
@@ -187,11 +190,16 @@ export class Session {
 
   private receive({ message, arrivedMs, decoding, frame }: FromWorker & { kind: "message" }): void {
     const { client, listener } = this;
+    const began = performance.now();
     let decoded: DecodedFrame | undefined;
     if (frame) decoded = { ...frame, values: frame.buffer ? new Float32Array(frame.buffer) : this.ring!.oldest() };
     const events = client.receiveDecoded(new Uint8Array(message), decoding, decoded, microseconds(arrivedMs));
     if (frame?.buffer) this.post({ kind: "recycle", buffer: frame.buffer }, [frame.buffer]);
     else if (frame) this.ring!.take();
+    if (frame) {
+      ++this.framesTaken;
+      this.takeMs += performance.now() - began;
+    }
     if (events & ~ClientEvent.frame) this.report(client, listener, events);
     if (this.state.kind !== "live" && client.state === ClientState.joined) {
       // A token that a person has typed works: keep it.

@@ -165,6 +165,13 @@ export class CoreModule {
     return this.decoder.decode(memory.subarray(0, memory.indexOf(0)));
   }
 
+  // Whether a zero-terminated string is `text`. May return false for text that is not ASCII.
+  holds(pointer: Pointer, text: string): boolean {
+    const view = this.view();
+    for (let i = 0; i < text.length; ++i) if (view.getUint8(pointer + i) !== text.charCodeAt(i)) return false;
+    return view.getUint8(pointer + text.length) === 0;
+  }
+
   allocate(bytes: number): Pointer {
     const pointer = this.exports.malloc(bytes);
     if (pointer === kNull) throw new Error(`The client core is out of memory (${bytes} bytes requested)`);

@@ -93,7 +93,6 @@ export class Controls {
       });
     }
     if (radius !== undefined && this.collider) client.parameters.setCollider(this.collider, { radius });
-    this.showRadius(client);
   }
 
   private rebase(client: Client): void {
@@ -131,7 +130,8 @@ export class Controls {
     this.gravity.show(Math.hypot(...environment.gravity));
   }
 
-  private showRadius(client: Client): void {
+  // Shows the radius of the chosen collider. Other participants may change it.
+  showRadius(client: Client): void {
     const collider = client.frames.colliders().find(({ name, participantId }) => participantId === 0n && name === this.collider);
     const round = collider?.shape === Shape.sphere || collider?.shape === Shape.capsule;
     element("radius-row").hidden = !round;

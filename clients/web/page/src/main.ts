@@ -3,6 +3,7 @@
 
 import { Roles, Session, type SessionListener, type SessionOptions, type Vec3 } from "@clothstream/client";
 import { Drag } from "./drag";
+import { FrameWork } from "./frame_work";
 import { HeadsetPage } from "./headset_page";
 import { Hud } from "./hud";
 import { browserTokens, PairingPanel, ProofForm } from "./identity";
@@ -14,7 +15,7 @@ import { Pusher, type Tool } from "./pusher";
 import { expose } from "./probe";
 import { showAddress } from "./share";
 import { View } from "./view";
-import { chosenDetail } from "./detail";
+import { chosenDetail, gathersNormals } from "./detail";
 
 const kFiguresPeriodMs = 250;
 
@@ -25,7 +26,7 @@ async function start(): Promise<void> {
   });
   let view: View;
   try {
-    view = new View(element<HTMLCanvasElement>("canvas"), chosenDetail());
+    view = new View(element<HTMLCanvasElement>("canvas"), chosenDetail(), gathersNormals());
   } catch (error) {
     hud.showFatal(
       "This page needs WebGL 2, which this browser does not provide. " +
@@ -140,10 +141,12 @@ async function start(): Promise<void> {
   }
 
   const headset: HeadsetPage = new HeadsetPage(view, session, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) });
-  const probe = expose(session, view, headset.headset);
+  const work = new FrameWork();
+  const probe = expose(session, view, headset.headset, work);
 
   let figuresAt = 0;
   function draw(now: number, frame?: XRFrame): void {
+    const began = performance.now();
     const client = session.state.kind === "live" ? session.client : undefined;
     if (frame) headset.draw(frame, now, client);
     player.draw(client);
@@ -163,6 +166,7 @@ async function start(): Promise<void> {
       headset.show();
     }
     view.draw(session.client, displayTime(now, frame));
+    work.add(began, view, session);
   }
   view.renderer.setAnimationLoop(draw);
 }

@@ -3,6 +3,7 @@
 
 import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Statistics, Vec3 } from "@clothstream/client";
 import type { Doing, Headset } from "@clothstream/three";
+import type { FrameWork } from "./frame_work";
 import type { View } from "./view";
 
 export interface Probe {
@@ -27,6 +28,9 @@ export interface Probe {
   readonly playback: Playback | undefined;
   // Length of the largest correction by local contact, m.
   readonly localCorrection: number;
+  readonly drawnFrames: number;
+  // Times of this thread for the newest frames, ms, in ascending order (frame_work.ts).
+  readonly work: { input: number[]; show: number[]; render: number[]; take: number[] };
   readonly headset: HeadsetProbe;
   readonly canvas: HTMLCanvasElement;
   // Projects a point of the scene to CSS pixels of the page.
@@ -55,7 +59,7 @@ declare global {
 }
 
 // Call described() of the result for each description, before its first frame.
-export function expose(session: Session, view: View, headset: Headset): { described(client: Client): void } {
+export function expose(session: Session, view: View, headset: Headset, work: FrameWork): { described(client: Client): void } {
   let restPositions: Float32Array | undefined;
   window.clothstream = {
     get state() {
@@ -100,6 +104,13 @@ export function expose(session: Session, view: View, headset: Headset): { descri
     },
     get localCorrection() {
       return session.client.frames.localCorrection;
+    },
+    get drawnFrames() {
+      return work.drawn;
+    },
+    get work() {
+      const { input, show, render, take } = work;
+      return { input: [...input.sorted()], show: [...show.sorted()], render: [...render.sorted()], take: [...take.sorted()] };
     },
     get headset() {
       return {

@@ -69,6 +69,7 @@ export class Studio {
   private readonly bounds = new THREE.Box3();
   private floorHeight = 0;
   private reflected: THREE.WebGLRenderTarget | undefined;
+  private sky: Sky | undefined; // whose reflections are not made yet
 
   constructor(
     private readonly renderer: THREE.WebGLRenderer,
@@ -97,6 +98,15 @@ export class Studio {
   // Shadows that need fewer samples, for headsets and phones.
   set cheapShadows(cheap: boolean) {
     setCheapShadows(this.key, cheap);
+  }
+
+  // Makes what the first picture can do without: reflections, which take several seconds on a software device.
+  complete(): void {
+    if (!this.sky) return;
+    this.reflected?.dispose();
+    this.reflected = this.sky.reflections(this.renderer);
+    this.sky = undefined;
+    this.reflectionsChanged(this.reflected.texture);
   }
 
   // Unit vector from the scene to the key light.
@@ -132,9 +142,6 @@ export class Studio {
     this.ambient.sh.copy(sky.probe());
     this.fog.color.set(room.outside);
     this.background.set(room.outside);
-    if (this.detail === "reduced") return;
-    this.reflected?.dispose();
-    this.reflected = sky.reflections(this.renderer);
-    this.reflectionsChanged(this.reflected.texture);
+    if (this.detail === "full") this.sky = sky;
   }
 }

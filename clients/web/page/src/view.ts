@@ -12,6 +12,8 @@ const kFieldOfView = 32; // degrees, vertical
 const kViewDirection = new THREE.Vector3(0.42, 0.16, 1).normalize();
 const kMargin = 1.0;
 const kTurnStep = Math.PI / 36;
+// Drawn frames before the picture is completed, so that the first ones come soon.
+const kPlainFrames = 2;
 
 export class View {
   readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
@@ -22,16 +24,22 @@ export class View {
   private readonly people = new People();
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private readonly cloths: Cloths;
+  private shownFrames = 0;
+  private isDrawn = false;
   private readonly eye = new THREE.Vector3();
   private floorHeight = 0;
+  // Times of the last draw(), ms: play-out, local contact and copies into attributes; and the renderer.
+  showMs = 0;
+  renderMs = 0;
 
   // Throws if the browser does not provide WebGL 2.
   constructor(
     readonly canvas: HTMLCanvasElement,
     private readonly detail: Detail,
+    gathersNormals = true, // computes normals on the graphics device where the stream has none
   ) {
     useSoftShadows();
-    this.cloths = new Cloths(detail);
+    this.cloths = new Cloths(detail, gathersNormals);
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.BasicShadowMap;
@@ -100,8 +108,10 @@ export class View {
 
   // Draws the frame for a time of performance.now(). Reads the core's memory only during the call.
   draw(client: Client | undefined, now: number): void {
+    const began = performance.now();
     // The last frame of the previous client stays until the description of a joining one arrives.
-    if (client && this.cloths.show(client, now)) {
+    const shows = client !== undefined && this.cloths.show(client, now);
+    if (shows) {
       const colliders = client.frames.shownColliders();
       this.colliderMeshes.place(client, colliders);
       const { isPresenting } = this.renderer.xr;
@@ -110,7 +120,12 @@ export class View {
     }
     if (!this.renderer.xr.isPresenting) this.orbit.update();
     this.studio.cheapShadows = this.detail === "reduced" || this.renderer.xr.isPresenting;
+    if (shows && ++this.shownFrames > kPlainFrames && !this.renderer.xr.isPresenting) this.studio.complete();
+    const shown = performance.now();
+    this.isDrawn = true;
     this.renderer.render(this.studio.scene, this.camera);
+    this.showMs = shown - began;
+    this.renderMs = performance.now() - shown;
   }
 
   // Moves the camera to the default view, which shows the whole scene in a canvas of any shape.
@@ -197,7 +212,7 @@ export class View {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
-    // The new size has cleared the picture.
-    this.renderer.render(this.studio.scene, this.camera);
+    // The new size has cleared the picture. The first one waits for draw(), while the session connects.
+    if (this.isDrawn) this.renderer.render(this.studio.scene, this.camera);
   }
 }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// One cloth as a three.js mesh. Vertices are uploaded from the core's memory without a copy, except at seams.
+// One cloth as a three.js mesh.
 
 import * as THREE from "three";
 import type { ClothLayout, Drawing } from "@clothstream/client";
 import { type Detail, fabricMaterial } from "./fabric_material";
 import { fabricOf } from "./fabrics";
+import { NormalGathering } from "./normal_gathering";
 import { type DrawnVertices, separateSeams } from "./seams";
 
 // Madder, indigo, ochre, moss, plum and linen. Their brightness differs too, for colour-blind viewers.
@@ -14,7 +15,9 @@ const kColours = [0x84161f, 0x1c4f7c, 0xb87f22, 0x47693a, 0x6a3f80, 0xb5a98c];
 const kSwing = 0.3;
 
 // How a cloth is drawn. `number` selects the colour of dyed fabrics; `material` is a name of the server, or "".
+// `gathersNormals`: the vertex shader computes the normals, and update() needs none.
 export interface ClothLook {
+  gathersNormals: boolean;
   number: number;
   material: string;
   detail: Detail;
@@ -25,6 +28,7 @@ export class ClothMesh {
   private readonly positions: THREE.BufferAttribute;
   private readonly normals: THREE.BufferAttribute;
   private readonly drawn: DrawnVertices;
+  private readonly gathering: NormalGathering | undefined;
   private readonly parts: number;
   private readonly woven: boolean;
 
@@ -40,13 +44,16 @@ export class ClothMesh {
       .subarray(layout.firstIndex, layout.firstIndex + layout.indexCount)
       .map((index) => index - layout.firstVertex);
     this.drawn = separateSeams(layout.vertexCount, corners, drawing.uvIndices);
-    const rest = new Float32Array(3 * this.drawn.count);
+    if (look.gathersNormals) this.gathering = new NormalGathering(layout, corners, this.drawn);
+    const rest = this.gathering?.positions ?? new Float32Array(3 * this.drawn.count);
     this.place(restPositions, rest);
     this.positions = new THREE.BufferAttribute(rest, 3).setUsage(THREE.DynamicDrawUsage);
     this.normals = new THREE.BufferAttribute(new Float32Array(rest.length), 3).setUsage(THREE.DynamicDrawUsage);
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", this.positions);
+    // Without this attribute, three.js would draw flat faces. Gathered normals leave it as it is.
     geometry.setAttribute("normal", this.normals);
+    if (this.gathering) geometry.setAttribute("clothFan", this.gathering.fans);
     geometry.setIndex(new THREE.BufferAttribute(this.drawn.indices, 1));
     const uvs = this.metricCoordinates(drawing, rest);
     this.woven = uvs !== undefined;
@@ -71,16 +78,12 @@ export class ClothMesh {
     this.makeMaterials();
   }
 
-  // The arrays belong to the whole scene and to the core's memory. They are read when the frame is drawn.
-  update(positions: Float32Array, normals: Float32Array): void {
-    for (const [attribute, values] of [
-      [this.positions, positions],
-      [this.normals, normals],
-    ] as const) {
-      if (this.drawn.count === this.layout.vertexCount) attribute.array = this.part(values);
-      else this.place(values, attribute.array as Float32Array);
-      attribute.needsUpdate = true;
-    }
+  // The arrays belong to the whole scene, and are copied. `normals` are those of the positions, or undefined if the look
+  // gathers them.
+  update(positions: Float32Array, normals: Float32Array | undefined): void {
+    this.replace(this.positions, positions);
+    this.gathering?.changed();
+    if (normals) this.replace(this.normals, normals);
   }
 
   // Box in which the cloth will mostly stay: its start, extended downwards, and to both sides if it hangs.
@@ -93,6 +96,7 @@ export class ClothMesh {
   }
 
   dispose(): void {
+    this.gathering?.dispose();
     this.mesh.geometry.dispose();
     for (const material of this.mesh.material) material.dispose();
   }
@@ -102,7 +106,7 @@ export class ClothMesh {
     const fabric = fabricOf(material);
     const dye = (part: number) => kColours[(number + 2 * part) % kColours.length]!;
     for (const old of this.mesh.material) old.dispose();
-    this.mesh.material = Array.from({ length: this.parts }, (_, part) => fabricMaterial(fabric, dye(part), this.woven, detail));
+    this.mesh.material = Array.from({ length: this.parts }, (_, part) => fabricMaterial(fabric, dye(part), this.woven, detail, this.gathering));
   }
 
   // Texture coordinates in metres, so that all cloths have threads of equal size. Undefined for a mesh without
@@ -116,17 +120,20 @@ export class ClothMesh {
     return uvs.map((coordinate) => coordinate * scale);
   }
 
-  // Copies the cloth's vertices to `out`, followed by the duplicates at seams.
-  private place(values: Float32Array, out: Float32Array): void {
-    const own = this.part(values);
-    out.set(own);
-    this.drawn.copies.forEach((vertex, copy) => {
-      out.set(own.subarray(3 * vertex, 3 * vertex + 3), own.length + 3 * copy);
-    });
+  private replace(attribute: THREE.BufferAttribute, values: Float32Array): void {
+    this.place(values, attribute.array as Float32Array);
+    attribute.needsUpdate = true;
   }
 
-  private part(values: Float32Array): Float32Array {
-    return values.subarray(3 * this.layout.firstVertex, 3 * (this.layout.firstVertex + this.layout.vertexCount));
+  // Copies the cloth's vertices to `out`, followed by the duplicates at seams.
+  private place(values: Float32Array, out: Float32Array): void {
+    const { firstVertex, vertexCount } = this.layout;
+    out.set(values.subarray(3 * firstVertex, 3 * (firstVertex + vertexCount)));
+    const { copies } = this.drawn;
+    for (let copy = 0; copy < copies.length; ++copy) {
+      const from = 3 * copies[copy]!;
+      out.copyWithin(3 * (vertexCount + copy), from, from + 3);
+    }
   }
 }
 

@@ -11,7 +11,11 @@ export class Cloths {
   private list: ClothMesh[] = [];
   private vertexCount = 0;
 
-  constructor(private readonly detail: Detail = "full") {}
+  // `gathersNormals`: the vertex shader computes normals that the stream does not have.
+  constructor(
+    private readonly detail: Detail = "full",
+    private readonly gathersNormals = true,
+  ) {}
 
   get meshes(): THREE.Mesh[] {
     return this.list.map((cloth) => cloth.mesh);
@@ -33,7 +37,7 @@ export class Cloths {
     const rest = frames.positions();
     const triangles = frames.triangles();
     this.list = layouts.map((layout, number) => {
-      const look = { number, material: materials[number]!, detail: this.detail };
+      const look = { number, material: materials[number]!, detail: this.detail, gathersNormals: this.gathers(client) };
       return new ClothMesh(layout, drawings[number]!, rest, triangles, look);
     });
     for (const cloth of this.list) this.group.add(cloth.mesh);
@@ -44,16 +48,20 @@ export class Cloths {
     this.list.forEach((cloth, number) => cloth.dress(client.parameters.material(number)));
   }
 
-  // Shows the cloths as they are at a time of performance.now(). Draw the picture before the next call of the client:
-  // the meshes then read its memory. Returns false, and changes nothing, if the client is joining and has no cloths yet.
+  // Shows the cloths as they are at a time of performance.now(). Returns false, and changes nothing, if the client is
+  // joining and has no cloths yet.
   show(client: Client, now: number): boolean {
     const { frames } = client;
     if (frames.vertexCount !== this.vertexCount) return false;
     frames.showAt(now);
-    const normals = frames.shownNormals();
+    const normals = this.gathers(client) ? undefined : frames.shownNormals();
     const positions = frames.shownPositions();
     for (const cloth of this.list) cloth.update(positions, normals);
     return true;
+  }
+
+  private gathers(client: Client): boolean {
+    return this.gathersNormals && !client.frames.sendsNormals;
   }
 
   dispose(): void {

@@ -39,21 +39,22 @@ export class ColliderMeshes {
 
   // `shown` are all colliders that are shown.
   place(client: Client, shown: readonly Collider[]): void {
-    const colliders = shown.filter(({ participantId }) => participantId === 0n);
-    while (this.meshes.length > colliders.length) this.remove(this.meshes.pop()!);
-    colliders.forEach((collider, index) => {
-      const look = lookOf(collider);
-      let mesh = this.meshes[index];
-      if (mesh?.userData["look"] !== look) {
+    let count = 0;
+    for (const collider of shown) {
+      if (collider.participantId !== 0n) continue;
+      let mesh = this.meshes[count];
+      if (!mesh || !looksLike(mesh.userData["look"] as Look, collider)) {
         if (mesh) this.remove(mesh);
-        mesh = this.meshes[index] = makeMesh(client, collider, look);
+        mesh = this.meshes[count] = makeMesh(client, collider);
         mesh.material.envMap = this.reflections;
         this.group.add(mesh);
       }
       mesh.name = collider.name;
-      mesh.position.set(...collider.position);
-      mesh.quaternion.set(...collider.orientation);
-    });
+      mesh.position.fromArray(collider.position);
+      mesh.quaternion.fromArray(collider.orientation);
+      ++count;
+    }
+    while (this.meshes.length > count) this.remove(this.meshes.pop()!);
   }
 
   private remove(mesh: ColliderMesh): void {
@@ -83,17 +84,21 @@ export function reachOf(client: Client, collider: Collider): number {
   }
 }
 
-// Key of the mesh's geometry. The mesh is reused while the key stays the same.
-function lookOf({ shape, name, radius, length, size }: Collider): string {
-  return [shape, shape === Shape.hull ? name : "", radius, length, ...size].join(" ");
+// Members of a collider that its geometry depends on. The mesh is reused while it stays the same.
+type Look = Pick<Collider, "shape" | "name" | "radius" | "length" | "size">;
+
+function looksLike(look: Look, { shape, name, radius, length, size }: Collider): boolean {
+  if (look.shape !== shape || look.radius !== radius || look.length !== length) return false;
+  return look.size.every((edge, axis) => edge === size[axis]) && (shape !== Shape.hull || look.name === name);
 }
 
-function makeMesh(client: Client, collider: Collider, look: string): ColliderMesh {
+function makeMesh(client: Client, collider: Collider): ColliderMesh {
   const material = new THREE.MeshStandardMaterial(kLooks[collider.shape]);
   const mesh = new THREE.Mesh(geometryOf(client, collider), material);
   mesh.castShadow = collider.shape !== Shape.plane;
   mesh.receiveShadow = true;
-  mesh.userData["look"] = look;
+  const { shape, name, radius, length, size } = collider;
+  mesh.userData["look"] = { shape, name, radius, length, size: [size[0], size[1], size[2]] } satisfies Look;
   return mesh;
 }
 

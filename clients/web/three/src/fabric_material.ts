@@ -3,6 +3,7 @@
 
 import * as THREE from "three";
 import type { Fabric } from "./fabrics";
+import { gatherNormals, type NormalGathering } from "./normal_gathering";
 import { kThreads, weave } from "./weave";
 
 // full: everything. reduced: for phones and other weak graphics, without sheen, anisotropy and roughness maps.
@@ -14,8 +15,15 @@ const kWhite = new THREE.Color(0xffffff);
 // Texels of 200 leave the colour as it is (weave.ts). The material's colour makes up for them.
 const kTexelFactor = 1 / Math.pow(200 / 255, 2.2);
 
-// `colour` dyes fabrics that have none. `woven`: the geometry has texture coordinates in metres.
-export function fabricMaterial(fabric: Fabric, colour: number, woven: boolean, detail: Detail): THREE.MeshPhysicalMaterial {
+// `colour` dyes fabrics that have none. `woven`: the geometry has texture coordinates in metres. With `gathering` the
+// vertex shader computes the normals.
+export function fabricMaterial(
+  fabric: Fabric,
+  colour: number,
+  woven: boolean,
+  detail: Detail,
+  gathering: NormalGathering | undefined,
+): THREE.MeshPhysicalMaterial {
   const base = new THREE.Color(fabric.colour ?? colour);
   const material = new THREE.MeshPhysicalMaterial({
     color: base,
@@ -42,21 +50,22 @@ export function fabricMaterial(fabric: Fabric, colour: number, woven: boolean, d
       material.anisotropy = fabric.anisotropy;
     }
   }
-  passLight(material, fabric);
+  extend(material, fabric, gathering);
   return material;
 }
 
-// Adds light that shines through the cloth from behind, and the colour of the back.
-function passLight(material: THREE.MeshPhysicalMaterial, fabric: Fabric): void {
+// Adds light that shines through the cloth from behind, the colour of the back, and gathered normals.
+function extend(material: THREE.MeshPhysicalMaterial, fabric: Fabric, gathering: NormalGathering | undefined): void {
   const uniforms = { clothTranslucency: { value: fabric.translucency }, clothReverse: { value: fabric.reverse } };
   material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, uniforms);
+    Object.assign(shader.uniforms, uniforms, gathering?.uniforms);
+    if (gathering) shader.vertexShader = gatherNormals(shader.vertexShader);
     shader.fragmentShader = shader.fragmentShader
       .replace("#include <lights_physical_pars_fragment>", `#include <lights_physical_pars_fragment>\n${kPassedLight}`)
       .replace("#include <map_fragment>", "#include <map_fragment>\nif (!gl_FrontFacing) diffuseColor.rgb *= clothReverse;");
   };
   // All fabrics share one program per set of features.
-  material.customProgramCacheKey = () => "cloth";
+  material.customProgramCacheKey = () => (gathering ? "cloth with gathered normals" : "cloth");
 }
 
 const kPassedLight = /* glsl */ `

@@ -21,6 +21,7 @@ export class People {
   private readonly own = new Figures(kOwnOpacity);
   private readonly participants = new Map<bigint, Participant>();
   private readonly labels = new Map<bigint, NameLabel>();
+  private readonly heads = new Map<bigint, Collider>();
 
   constructor() {
     this.group.add(this.others.group, this.own.group);
@@ -43,7 +44,7 @@ export class People {
     this.others.begin();
     this.own.begin();
     for (const label of this.labels.values()) label.sprite.visible = false;
-    const heads = headsOf(colliders);
+    const heads = headsOf(colliders, this.heads);
     for (const collider of colliders) {
       const id = collider.participantId;
       if (id === 0n) continue;
@@ -91,9 +92,9 @@ export function colourOf(id: bigint): THREE.Color {
   return kColours[Number(id % BigInt(kColours.length))]!;
 }
 
-// The head of each participant: the highest sphere that is large enough.
-export function headsOf(colliders: readonly Collider[]): Map<bigint, Collider> {
-  const heads = new Map<bigint, Collider>();
+// The head of each participant: the highest sphere that is large enough. Replaces the content of `heads`, and returns it.
+export function headsOf(colliders: readonly Collider[], heads = new Map<bigint, Collider>()): Map<bigint, Collider> {
+  heads.clear();
   for (const collider of colliders) {
     if (collider.participantId === 0n || collider.shape !== Shape.sphere || collider.radius < kHeadRadius) continue;
     const other = heads.get(collider.participantId);

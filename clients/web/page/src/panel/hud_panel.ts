@@ -5,6 +5,7 @@ import type { Client } from "@clothstream/client";
 import { element } from "./dom";
 import { drawHud, hudText, kHudHeight, kHudWidth, type HudTheme } from "./hud_drawing";
 import { HudHistory } from "./hud_history";
+import { poseStages } from "./pose_stages";
 
 const kLabelPeriodMs = 1000;
 
@@ -60,11 +61,7 @@ export class HudPanel {
       kbit: statistics?.kbitPerSecond ?? 0,
       bitsPerVertex: statistics?.bitsPerVertex ?? 0,
       drops: Math.max(0, dropped - this.dropped),
-      uplink: (statistics?.roundTripMs ?? 0) / 2,
-      server: stages?.serverMs ?? 0,
-      downlink: Math.max(0, stages?.networkMs ?? 0),
-      decode: stages?.decodeMs ?? 0,
-      playOut: stages ? Math.max(0, stages.delayMs - stages.displayableMs) : 0,
+      ...poseStages(statistics, stages),
     });
     this.dropped = dropped;
     this.drawn = 0;

@@ -105,6 +105,7 @@ export class Panel {
   refresh(client: Client | undefined, now: number): void {
     this.hud.sample(client, now);
     if (!client || !this.tabs.isOpen) return;
+    if (this.tabs.current === "air") this.controls.showRadius(client);
     if (this.tabs.current === "cloth") this.cloth.showReport(client);
     if (this.tabs.current === "scene" && now - this.listedAt >= kListPeriodMs) this.wantList();
   }

@@ -4,7 +4,7 @@
 import * as THREE from "three";
 import type { Body } from "./body";
 import type { Limb } from "./limb";
-import { kJoints } from "./tracked_hand";
+import { kJoints, type TrackedHand } from "./tracked_hand";
 
 const kControllerRadius = 0.045; // m
 const kRayLength = 3; // m
@@ -40,21 +40,24 @@ class HandFigure {
     }
   }
 
-  place({ joints, joint }: { joints: Float32Array; joint: (index: number, out: THREE.Vector3) => THREE.Vector3 }): void {
+  place(hand: TrackedHand): void {
+    const { joints } = hand;
     this.turn.identity();
     for (let i = 0; i < kJoints; ++i) {
-      this.matrix.compose(joint(i, this.from), this.turn, this.size.setScalar(joints[4 * i + 3]!));
+      this.matrix.compose(hand.joint(i, this.from), this.turn, this.size.setScalar(joints[4 * i + 3]!));
       this.joints.setMatrixAt(i, this.matrix);
     }
-    kBones.forEach(([a, b], bone) => {
-      joint(a, this.from);
-      joint(b, this.to);
+    for (let bone = 0; bone < kBones.length; ++bone) {
+      const a = kBones[bone]![0];
+      const b = kBones[bone]![1];
+      hand.joint(a, this.from);
+      hand.joint(b, this.to);
       const radius = Math.min(joints[4 * a + 3]!, joints[4 * b + 3]!);
       const length = this.to.distanceTo(this.from);
       this.turn.setFromUnitVectors(kUp, this.size.subVectors(this.to, this.from).divideScalar(Math.max(length, 1e-6)));
       this.matrix.compose(this.from.lerp(this.to, 0.5), this.turn, this.size.set(radius, length, radius));
       this.bones.setMatrixAt(bone, this.matrix);
-    });
+    }
     this.joints.instanceMatrix.needsUpdate = this.bones.instanceMatrix.needsUpdate = true;
   }
 
@@ -100,7 +103,7 @@ export class Figures {
       const figure = this.figureOf(limb);
       figure.group.visible = true;
       if (figure instanceof HandFigure) {
-        figure.place({ joints: limb.hand.joints, joint: (index, out) => limb.hand.joint(index, out) });
+        figure.place(limb.hand);
       } else {
         figure.group.position.copy(limb.pose.point);
         figure.group.scale.setScalar(1 / scale);

@@ -41,6 +41,10 @@ export class Grabber {
     return this.id !== 0;
   }
 
+  isGrab(id: number): boolean {
+    return this.holds && this.id === id;
+  }
+
   // Takes hold of the cloth within `reach` of the hand, or else under the ray. Returns whether there is any.
   take(pose: GrabPose, cloth: Touchable, reach: number): boolean {
     this.release();
@@ -62,7 +66,7 @@ export class Grabber {
 
   // Ends the grab if it has this id: it slipped.
   slipped(id: number): void {
-    if (id === this.id) this.release();
+    if (this.isGrab(id)) this.release();
   }
 
   // The grab for this pose; undefined without one. What a hand holds turns with it.

@@ -13,6 +13,8 @@ export class Limb {
   pressed = false;
   isNew = false;
   present = false;
+  // Whether the device showed it in the newest frame. `present` lasts a moment longer.
+  seen = false;
   private readonly ray = new THREE.Ray();
   private readonly matrix = new THREE.Matrix4();
   private readonly unused = new THREE.Vector3();
@@ -29,12 +31,14 @@ export class Limb {
     if (this.isHand) {
       this.hand.update(frame, space, source?.hand, toScene, nowMs);
       this.present = this.hand.present;
+      this.seen = this.hand.seen;
       if (!this.present) return this.lose();
       this.hand.pinchPoint(this.pose.point);
       this.pose.orientation.copy(this.hand.orientation);
       return;
     }
     const grip = source && frame.getPose(source.gripSpace ?? source.targetRaySpace, space);
+    this.seen = Boolean(grip);
     if (grip) {
       this.seenAt = nowMs;
       this.matrix.multiplyMatrices(toScene, this.matrix.fromArray(grip.transform.matrix));

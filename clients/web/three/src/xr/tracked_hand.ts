@@ -23,17 +23,20 @@ export class TrackedHand {
 
   // Whether the joints hold, or did a moment ago.
   present = false;
+  // Whether the device showed the hand in the newest frame.
+  seen = false;
 
   // Call once per frame; `hand` is undefined while the device does not track it. `toScene` leads from the reference
   // space to the scene.
   update(frame: XRFrame, space: XRReferenceSpace, hand: XRHand | undefined, toScene: THREE.Matrix4, nowMs: number): void {
-    if (hand && this.read(frame, space, hand, toScene)) this.seenAt = nowMs;
+    this.seen = hand !== undefined && this.read(frame, space, hand, toScene);
+    if (this.seen) this.seenAt = nowMs;
     this.present = nowMs - this.seenAt <= kHoldMs;
   }
 
   forget(): void {
     this.seenAt = -Infinity;
-    this.present = false;
+    this.present = this.seen = false;
   }
 
   // Copies a joint's position to `out`.
@@ -50,7 +53,7 @@ export class TrackedHand {
   private read(frame: XRFrame, space: XRReferenceSpace, hand: XRHand, toScene: THREE.Matrix4): boolean {
     if (!frame.fillPoses || !frame.fillJointRadii) return false;
     if (!frame.fillPoses(hand.values(), space, this.poses) || !frame.fillJointRadii(hand.values(), this.radii)) return false;
-    if (!this.poses.every(Number.isFinite) || !this.radii.every((radius) => radius > 0 && radius < kLargestRadius)) return false;
+    if (!this.isPossible()) return false;
     this.turn.extractRotation(this.turn.multiplyMatrices(toScene, this.turn.fromArray(this.poses)));
     this.orientation.setFromRotationMatrix(this.turn);
     const scale = toScene.getMaxScaleOnAxis();
@@ -58,6 +61,13 @@ export class TrackedHand {
       this.point.fromArray(this.poses, 16 * joint + 12).applyMatrix4(toScene).toArray(this.joints, 4 * joint);
       this.joints[4 * joint + 3] = this.radii[joint]! * scale;
     }
+    return true;
+  }
+
+  // Called for each frame, so it makes no calls for each number.
+  private isPossible(): boolean {
+    for (let i = 0; i < this.poses.length; ++i) if (!Number.isFinite(this.poses[i]!)) return false;
+    for (let i = 0; i < kJoints; ++i) if (!(this.radii[i]! > 0 && this.radii[i]! < kLargestRadius)) return false;
     return true;
   }
 }

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Colliders that are read for each drawn frame. Objects are used again, so that drawn frames allocate nothing for them.
+
+import { cs_collider } from "./layout";
+import { readFloats, vec3, type CoreHandle } from "./handle";
+import type { Collider, Quaternion, Vec3 } from "./types";
+
+type Mutable<Type> = { -readonly [Key in keyof Type]: Type[Key] };
+interface KeptCollider extends Omit<Collider, "position" | "orientation" | "size"> {
+  position: Mutable<Vec3>;
+  orientation: Mutable<Quaternion>;
+  size: Mutable<Vec3>;
+}
+
+type Getter = (client: number, index: number, out: number) => number;
+
+export function readCollider(handle: CoreHandle, view: DataView, at: number, index: number): KeptCollider {
+  return {
+    index,
+    name: handle.core.text(view.getUint32(at + cs_collider.name, true)),
+    shape: view.getUint32(at + cs_collider.shape, true),
+    position: vec3(view, at + cs_collider.position),
+    orientation: readFloats(view, at + cs_collider.orientation, [0, 0, 0, 0]),
+    radius: view.getFloat32(at + cs_collider.radius, true),
+    length: view.getFloat32(at + cs_collider.length, true),
+    size: vec3(view, at + cs_collider.size),
+    participantId: view.getBigUint64(at + cs_collider.participant_id, true),
+  };
+}
+
+export class ShownColliders {
+  private readonly kept: KeptCollider[] = [];
+  private readonly list: KeptCollider[] = [];
+
+  constructor(private readonly handle: CoreHandle) {}
+
+  // The list and its objects are valid until the next call.
+  read(count: number, get: Getter): readonly Collider[] {
+    const { core, pointer, scratch } = this.handle;
+    this.list.length = 0;
+    for (let index = 0; index < count; ++index) {
+      if (get(pointer, index, scratch) === 0) continue;
+      const view = core.view();
+      const collider = this.kept[this.list.length];
+      if (collider) this.update(collider, view, scratch, index);
+      else this.kept.push(readCollider(this.handle, view, scratch, index));
+      this.list.push(this.kept[this.list.length]!);
+    }
+    return this.list;
+  }
+
+  private update(collider: KeptCollider, view: DataView, at: number, index: number): void {
+    collider.index = index;
+    const name = view.getUint32(at + cs_collider.name, true);
+    if (!this.handle.core.holds(name, collider.name)) collider.name = this.handle.core.text(name);
+    collider.shape = view.getUint32(at + cs_collider.shape, true);
+    readFloats(view, at + cs_collider.position, collider.position);
+    readFloats(view, at + cs_collider.orientation, collider.orientation);
+    collider.radius = view.getFloat32(at + cs_collider.radius, true);
+    collider.length = view.getFloat32(at + cs_collider.length, true);
+    readFloats(view, at + cs_collider.size, collider.size);
+    collider.participantId = view.getBigUint64(at + cs_collider.participant_id, true);
+  }
+}
