@@ -55,6 +55,7 @@ class Client {
   void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
   // Four numbers per joint: {x, y, z, radius}. Empty removes the hand.
   void setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs);
+  void setHead(const std::optional<cs_own_collider>& head, std::uint64_t nowUs);
   void setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs);
   // Among the positions that are shown.
   std::optional<cs_cloth_point> nearestPoint(const Vec3& point, float maxDistance) const;

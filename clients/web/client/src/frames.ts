@@ -4,9 +4,11 @@
 
 import { CS_STAGE_STATISTICS_VERSION, cs_cloth, cs_cloth_point, cs_collider, cs_stage_statistics, cs_statistics, cs_submesh } from "./layout";
 import { microseconds, nowUs, quaternion, vec3, type CoreHandle } from "./handle";
-import type { ClothLayout, ClothPoint, Collider, Drawing, Hull, Stages, Statistics, Vec3 } from "./types";
+import { kHeadId, type ClothLayout, type ClothPoint, type Collider, type Drawing, type Hull, type Stages, type Statistics, type Vec3 } from "./types";
 
 const kFarthestPoint = 1e4; // m
+// Colliders of participants have their id as name.
+const kHeadName = String(kHeadId);
 
 export class Frames {
   private playsOut = false;
@@ -139,17 +141,22 @@ export class Frames {
     count: number,
     get: (client: number, index: number, out: number) => number,
   ): Collider[] {
-    return this.handle.list(count, get, (view, at, index) => ({
-      index,
-      name: this.handle.core.text(view.getUint32(at + cs_collider.name, true)),
-      shape: view.getUint32(at + cs_collider.shape, true),
-      position: vec3(view, at + cs_collider.position),
-      orientation: quaternion(view, at + cs_collider.orientation),
-      radius: view.getFloat32(at + cs_collider.radius, true),
-      length: view.getFloat32(at + cs_collider.length, true),
-      size: vec3(view, at + cs_collider.size),
-      participantId: view.getBigUint64(at + cs_collider.participant_id, true),
-    }));
+    return this.handle.list(count, get, (view, at, index) => {
+      const name = this.handle.core.text(view.getUint32(at + cs_collider.name, true));
+      const participantId = view.getBigUint64(at + cs_collider.participant_id, true);
+      return {
+        index,
+        name,
+        shape: view.getUint32(at + cs_collider.shape, true),
+        position: vec3(view, at + cs_collider.position),
+        orientation: quaternion(view, at + cs_collider.orientation),
+        radius: view.getFloat32(at + cs_collider.radius, true),
+        length: view.getFloat32(at + cs_collider.length, true),
+        size: vec3(view, at + cs_collider.size),
+        participantId,
+        isHead: participantId !== 0n && name === kHeadName,
+      };
+    });
   }
 
   // Copies the geometry of a hull collider.

@@ -101,6 +101,7 @@ export interface Collider {
   length: number;
   size: Vec3;
   participantId: bigint; // 0 for a collider of the scene
+  isHead: boolean; // of its participant
 }
 
 // Vertices (3 floats each) and triangles (3 indices each).
@@ -209,12 +210,20 @@ export interface OwnCollider {
   size?: Vec3;
 }
 
+// Head of this participant. Lengths in metres.
+export interface Head {
+  position: Vec3;
+  orientation?: Quaternion; // none: unknown
+  radius: number;
+}
+
 export enum HandSide {
   left = 1,
   right = 2,
 }
 
 export const kMaxColliders = 40;
+export const kHeadId = 0x80000040; // CS_HEAD_ID
 export const kMaxGrabs = 10;
 
 // A joining participant: displayed name (may be empty) and requested role (key of Roles, or 0 for any).

@@ -42,6 +42,7 @@ export interface HeadsetProbe {
   readonly frames: number; // drawn in sessions
   readonly isAnchored: boolean;
   readonly placement: number[]; // matrix from scene to room, column by column
+  readonly shadowReach: number; // half the width of the shadow map in the room, m
   // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
   choose(doing: Doing): void;
   // Hands, controllers and rays that are there. Joints: x, y, z, radius of each, in the scene.
@@ -108,6 +109,7 @@ export function expose(session: Session, view: View, headset: Headset): { descri
         frames: headset.frameCount,
         isAnchored: headset.isAnchored,
         placement: headset.placement.matrix.toArray(),
+        shadowReach: view.shadowReach,
         choose: (doing: Doing) => headset.do(doing),
         limbs: Array.from(headset.body.present(), ({ side, isHand, grabber, hand, pose }) => ({
           side,

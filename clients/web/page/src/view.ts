@@ -128,6 +128,7 @@ export class View {
       this.people.place(colliders, this.studio.scene.worldToLocal(eye.getWorldPosition(this.eye)), !isPresenting);
     }
     if (!this.renderer.xr.isPresenting) this.orbit.update();
+    this.studio.scale = this.scene.matrix.getMaxScaleOnAxis();
     this.studio.cheapShadows = this.detail === "reduced" || this.renderer.xr.isPresenting;
     this.renderer.render(this.studio.scene, this.camera);
   }
@@ -189,6 +190,11 @@ export class View {
       frame.left + ((projected.x + 1) / 2) * frame.width,
       frame.top + ((1 - projected.y) / 2) * frame.height,
     ];
+  }
+
+  // Half the width of the shadow map, m of the user's room.
+  get shadowReach(): number {
+    return this.studio.shadowReach;
   }
 
   // Position of a point's shadow on the floor, cast by the key light.

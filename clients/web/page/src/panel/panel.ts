@@ -106,6 +106,7 @@ export class Panel {
     this.hud.sample(client, now);
     if (!client || !this.tabs.isOpen) return;
     if (this.tabs.current === "cloth") this.cloth.showReport(client);
+    if (this.tabs.current === "air") this.controls.showRadius(client);
     if (this.tabs.current === "scene" && now - this.listedAt >= kListPeriodMs) this.wantList();
   }
 
