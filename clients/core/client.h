@@ -174,7 +174,8 @@ class Client {
   std::uint32_t ticksPerFrame(const OperatingPoint& point) const;
   std::uint32_t playbackReceived(Bytes body, std::uint64_t nowUs);
 
-  std::uint32_t fail(std::string text);
+  // `code` is the ErrorCode of the server; 0 if the client found the error.
+  std::uint32_t fail(std::string text, std::uint32_t code = 0);
   std::uint32_t failMalformed(const char* what);
   void send(std::string message);
 
