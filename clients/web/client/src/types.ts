@@ -27,9 +27,19 @@ export const ClientEvent = {
   answer: 32768,
 } as const;
 
-// Values of Client.errorCode after which a person must give a token or a pairing code.
-export const kUnauthenticated = 60;
-export const kWrongPairingCode = 61;
+// Values of Client.errorCode and of SessionState: ErrorCode of session.proto. A newer server may have more.
+export const ErrorCode = {
+  notFound: 3,
+  unsupportedVersion: 4,
+  unsupportedCodec: 5,
+  resourceExhausted: 8,
+  permissionDenied: 30,
+  takenOver: 32,
+  removed: 33,
+  // After these a person must give a token or a pairing code.
+  unauthenticated: 60,
+  wrongPairingCode: 61,
+} as const;
 
 export interface PairingCode {
   code: string;

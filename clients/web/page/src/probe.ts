@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
-import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Statistics, Vec3 } from "@clothstream/client";
-import type { Doing, Headset } from "@clothstream/three";
+import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Stages, Statistics, Vec3 } from "@clothstream/client";
+import * as THREE from "three";
+import type { Doing } from "@clothstream/three";
+import type { HeadsetPage } from "./headset_page";
+import type { HudHistory } from "./panel/hud_history";
 import type { View } from "./view";
 
 export interface Probe {
   readonly state: SessionState["kind"];
   // Arrays are copies with 3 floats per vertex.
   readonly statistics: Statistics;
+  // Stages of the newest frame and state of play-out. Undefined before the first frame.
+  readonly stages: Stages | undefined;
   readonly positions: Float32Array;
   readonly restPositions: Float32Array | undefined;
   readonly normals: Float32Array;
@@ -25,6 +30,8 @@ export interface Probe {
   readonly participants: Participant[];
   // Defined if the scene is a recording.
   readonly playback: Playback | undefined;
+  // Longest pause between frames in the last minute, ms.
+  readonly longestPause: number;
   // Length of the largest correction by local contact, m.
   readonly localCorrection: number;
   readonly headset: HeadsetProbe;
@@ -42,6 +49,7 @@ export interface HeadsetProbe {
   readonly frames: number; // drawn in sessions
   readonly isAnchored: boolean;
   readonly placement: number[]; // matrix from scene to room, column by column
+  readonly panel: { text: string; place: Vec3 }; // the panel in space: its lines, and its middle in the room
   readonly shadowReach: number; // half the width of the shadow map in the room, m
   // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
   choose(doing: Doing): void;
@@ -56,7 +64,8 @@ declare global {
 }
 
 // Call described() of the result for each description, before its first frame.
-export function expose(session: Session, view: View, headset: Headset): { described(client: Client): void } {
+export function expose(session: Session, view: View, page: HeadsetPage, history: HudHistory): { described(client: Client): void } {
+  const { headset } = page;
   let restPositions: Float32Array | undefined;
   window.clothstream = {
     get state() {
@@ -64,6 +73,9 @@ export function expose(session: Session, view: View, headset: Headset): { descri
     },
     get statistics() {
       return session.client.frames.statistics();
+    },
+    get stages() {
+      return session.client.frames.stages();
     },
     get positions() {
       return session.client.frames.positions().slice();
@@ -99,6 +111,9 @@ export function expose(session: Session, view: View, headset: Headset): { descri
     get playback() {
       return session.client.playback.state();
     },
+    get longestPause() {
+      return history.largest("pause");
+    },
     get localCorrection() {
       return session.client.frames.localCorrection;
     },
@@ -109,6 +124,7 @@ export function expose(session: Session, view: View, headset: Headset): { descri
         frames: headset.frameCount,
         isAnchored: headset.isAnchored,
         placement: headset.placement.matrix.toArray(),
+        panel: { text: page.panel.text, place: page.panel.mesh.getWorldPosition(new THREE.Vector3()).toArray() },
         shadowReach: view.shadowReach,
         choose: (doing: Doing) => headset.do(doing),
         limbs: Array.from(headset.body.present(), ({ side, isHand, grabber, hand, pose }) => ({

@@ -40,7 +40,10 @@ export class View {
     this.studio = new Studio(this.renderer, detail, (reflections) => this.colliderMeshes.reflect(reflections));
     this.studio.scene.add(this.colliderMeshes.group, this.people.group);
     this.orbit = new OrbitControls(this.camera, canvas);
-    this.orbit.enableDamping = true;
+    const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+    const damp = () => (this.orbit.enableDamping = !calm.matches);
+    calm.addEventListener("change", damp);
+    damp();
     this.orbit.dampingFactor = 0.12;
     this.fit();
     new ResizeObserver(() => this.resize()).observe(canvas);

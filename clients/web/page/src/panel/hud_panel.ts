@@ -40,8 +40,9 @@ export class HudPanel {
     ++this.drawn;
   }
 
-  // Takes a sample, also without a connection. Call about four times a second.
-  sample(client: Client | undefined, now: number): void {
+  // Takes a sample, also without a connection. Call about four times a second. `pauseMs` is the longest pause between frames
+  // since the last call.
+  sample(client: Client | undefined, now: number, pauseMs: number): void {
     const seconds = (now - this.sampledAt) / 1000;
     const statistics = client?.frames.statistics();
     const stages = client?.frames.stages();
@@ -60,6 +61,7 @@ export class HudPanel {
       kbit: statistics?.kbitPerSecond ?? 0,
       bitsPerVertex: statistics?.bitsPerVertex ?? 0,
       drops: Math.max(0, dropped - this.dropped),
+      pause: pauseMs,
       uplink: (statistics?.roundTripMs ?? 0) / 2,
       server: stages?.serverMs ?? 0,
       downlink: Math.max(0, stages?.networkMs ?? 0),
