@@ -225,8 +225,7 @@ function late(longestMs: number): Failure {
     kind: "late",
     title: "Frames arrive late",
     text:
-      "The cloth may stop and jump. Go closer to the Wi-Fi, or choose a lower quality or frame rate. These words go when frames " +
-      "come in time.",
+      "The cloth may stop and jump. Go closer to the Wi-Fi, or choose a lower quality or frame rate.",
     wait: `The longest pause was ${(longestMs / 1000).toFixed(1)} s.`,
     quiet: true,
     actions: [{ label: "Quality and frame rate", action: "view" }],

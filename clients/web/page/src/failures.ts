@@ -51,6 +51,8 @@ export class Failures {
   // Says why the page cannot work at all. Undefined: it can.
   stop(failure: Failure | undefined): void {
     this.fatal = failure;
+    // The controls do nothing.
+    document.body.toggleAttribute("data-stopped", failure !== undefined);
     this.update();
   }
 

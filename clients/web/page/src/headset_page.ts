@@ -58,6 +58,7 @@ export class HeadsetPage {
       },
       {
         left: () => {
+          this.isBefore = false;
           view.resize();
           view.reset();
         },
@@ -94,8 +95,7 @@ export class HeadsetPage {
     this.put(kPanelPlace, kPanelTurn, kPanelTilt);
     const { client } = this.session;
     this.scenes = client.requests.scenes().map(({ name }) => name);
-    const rows: PanelRow[] = [{ text: statusText(this.session) }];
-    if (current?.quiet) rows.push({ text: current.title, detail: current.wait ?? "" });
+    const rows: PanelRow[] = [current ? { text: current.title, detail: current.wait ?? "" } : { text: statusText(this.session) }];
     const hint = kHints[this.headset.doing];
     if (hint) rows.push({ text: hint });
     if (this.headset.mode === "immersive-ar") rows.push({ text: "Place on a surface", action: () => this.headset.do("place") });
@@ -122,7 +122,9 @@ export class HeadsetPage {
     this.isBefore = true;
     const camera = this.view.renderer.xr.getCamera();
     const eye = camera.getWorldPosition(new THREE.Vector3());
-    const look = camera.getWorldDirection(new THREE.Vector3()).setY(0).normalize();
+    const look = camera.getWorldDirection(new THREE.Vector3()).setY(0);
+    if (look.lengthSq() < 1e-6) look.set(0, 0, -1);
+    look.normalize();
     const place = this.headset.seat.worldToLocal(eye.addScaledVector(look, kBefore).setY(eye.y - kBelowEyes));
     this.put(place, Math.atan2(-look.x, -look.z) - this.headset.seat.rotation.y, 0);
   }
