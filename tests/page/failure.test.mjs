@@ -239,6 +239,21 @@ test("a browser without WebGL 2 reads what to do", async () => {
   }
 });
 
+test("a page whose script does not start says so after a moment", async () => {
+  const context = await browser.newContext();
+  try {
+    await context.route("**/main.js", (route) => route.fulfill({ status: 404, body: "" }));
+    const page = await context.newPage();
+    await page.goto(server.url);
+    assert.ok(await page.isHidden("#no-start"));
+    // The moment is an animation.
+    await page.evaluate(() => document.getAnimations().forEach((one) => one.finish()));
+    assert.ok(await page.isVisible("#no-start"));
+  } finally {
+    await context.close();
+  }
+});
+
 test("a browser without WebAssembly reads what to do", () =>
   withPage(server.url, { prepare: () => delete window.WebAssembly }, (page) => untilFailure(page, "no-webassembly")));
 
@@ -282,22 +297,24 @@ test("a server of another version is told with a button to reload", async () => 
 
 test("a refused local network is explained, and the page connects when it is allowed", async () => {
   const link = await makeLink(server.port);
-  const states = () => {
-    const status = Object.assign(new EventTarget(), { state: "denied" });
-    window.allow = () => {
-      status.state = "granted";
-      status.dispatchEvent(new Event("change"));
-    };
-    navigator.permissions.query = ({ name }) => (name === "local-network-access" ? Promise.resolve(status) : Promise.reject(new TypeError()));
-  };
   try {
-    await withPage(link.url, { prepare: states }, async (page) => {
+    await withPage(link.url, {}, async (page) => {
       await untilGood(page);
+      const browserOfPage = await page.context().newCDPSession(page);
+      const { targetInfo } = await browserOfPage.send("Target.getTargetInfo");
+      const permit = (setting) =>
+        browserOfPage.send("Browser.setPermission", {
+          permission: { name: "local-network-access" },
+          setting,
+          origin: new URL(link.url).origin,
+          browserContextId: targetInfo.browserContextId,
+        });
+      await permit("denied");
       link.cut();
       await untilFailure(page, "network-denied");
       await takePicture(page, "failure_network_denied");
       link.restore();
-      await page.evaluate(() => window.allow());
+      await permit("granted");
       await untilGood(page);
     });
   } finally {

@@ -7,6 +7,8 @@ const kNames = ["local-network-access", "local-network", "loopback-network"];
 
 // Calls `changed` with whether the permission is denied, at first and at each change.
 export function watchLocalNetwork(changed: (denied: boolean) => void): void {
+  // Pages that are not secure never have it, also where they do not need it.
+  if (!window.isSecureContext) return;
   const known: PermissionStatus[] = [];
   const report = () => changed(known.some(({ state }) => state === "denied"));
   for (const name of kNames) {
