@@ -371,12 +371,12 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId) {
       return CS_EVENT_ANSWER;
     }
   }
-  errorCode_ = error->code;
   // The client may try again if only the connection was cut off, or if a reconnect found the server full.
   const bool temporary =
       error->code == field::ErrorCode::kCutOff ||
       (error->code == field::ErrorCode::kResourceExhausted && state_ == CS_STATE_RECONNECTING && !welcomed_);
-  if (error->fatal && !temporary) return fail(std::move(error->text));
+  if (error->fatal && !temporary) return fail(std::move(error->text), error->code);
+  errorCode_ = error->code;
   errorText_ = std::move(error->text);
   return CS_EVENT_ERROR;
 }
@@ -488,8 +488,9 @@ std::uint64_t Client::reconstructionHash() const {
   return newest_.present() ? newest_.hash() : 0;
 }
 
-std::uint32_t Client::fail(std::string text) {
+std::uint32_t Client::fail(std::string text, std::uint32_t code) {
   state_ = CS_STATE_FAILED;
+  errorCode_ = code;
   errorText_ = std::move(text);
   outbox_.clear();
   forgetRequests();

@@ -55,6 +55,7 @@ class Client {
   void setColliders(std::span<const cs_own_collider> colliders, std::uint64_t nowUs);
   // Four numbers per joint: {x, y, z, radius}. Empty removes the hand.
   void setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs);
+  void setHead(const std::optional<cs_own_collider>& head, std::uint64_t nowUs);
   void setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs);
   // Among the positions that are shown.
   std::optional<cs_cloth_point> nearestPoint(const Vec3& point, float maxDistance) const;
@@ -173,7 +174,8 @@ class Client {
   std::uint32_t ticksPerFrame(const OperatingPoint& point) const;
   std::uint32_t playbackReceived(Bytes body, std::uint64_t nowUs);
 
-  std::uint32_t fail(std::string text);
+  // `code` is the ErrorCode of the server; 0 if the client found the error.
+  std::uint32_t fail(std::string text, std::uint32_t code = 0);
   std::uint32_t failMalformed(const char* what);
   void send(std::string message);
 

@@ -25,6 +25,11 @@ void Client::setHand(std::uint32_t side, std::span<const float> joints, std::uin
   sendPoses(nowUs);
 }
 
+void Client::setHead(const std::optional<cs_own_collider>& head, std::uint64_t nowUs) {
+  poses_.head = head;
+  sendPoses(nowUs);
+}
+
 void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
   poses_.grabs.clear();
   for (const cs_grab& grab : grabs) {

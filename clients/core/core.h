@@ -304,8 +304,8 @@ typedef enum cs_shape {
 } cs_shape;
 
 typedef struct cs_collider {
-  const char* name;
-  uint32_t shape; /* cs_shape */
+  const char* name; /* of a collider of a participant: its id in decimal */
+  uint32_t shape;   /* cs_shape */
   float position[3];
   float orientation[4];          /* quaternion x y z w */
   float radius, length, size[3]; /* 0 if the shape does not have them */
@@ -478,6 +478,8 @@ uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t by
 #define CS_MAX_GRABS 10u
 #define CS_HAND_JOINTS 26u
 #define CS_HAND_BONES 20u
+/* Id of the collider that is the participant's head (docs/protocol.md). */
+#define CS_HEAD_ID 0x80000040u
 
 /* Collider of this participant: sphere, capsule or box. */
 typedef struct cs_own_collider {
@@ -537,7 +539,7 @@ typedef enum cs_contact_event_kind { CS_CONTACT_BEGAN = 1, CS_CONTACT_ENDED = 2 
 
 typedef struct cs_contact_event {
   uint32_t kind;           /* cs_contact_event_kind, or a newer kind */
-  uint32_t collider_id;    /* participant's collider: index in cs_set_shapes, or bone of the hand */
+  uint32_t collider_id;    /* participant's collider: index in cs_set_shapes, bone of a hand, or CS_HEAD_ID */
   uint64_t participant_id; /* 0 for a collider of the scene */
   const char* collider;    /* name of the scene's collider */
   const char* cloth;
@@ -557,6 +559,11 @@ void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t
  * participant. Fails, and changes nothing, if the side or the count is not allowed. */
 int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count,
                 uint64_t now_us) CS_NOEXCEPT;
+/* Replaces the head: a sphere that looks along -Z of its own frame, and that others recognise by its id,
+ * CS_HEAD_ID. It counts as a collider of this participant. orientation4 is a quaternion x y z w; NULL means
+ * unknown. A NULL position3 removes the head. */
+void cs_set_head(cs_client* client, const float* position3, const float* orientation4, float radius,
+                 uint64_t now_us) CS_NOEXCEPT;
 /* Finds the point of a cloth that is nearest to a point, or the first one that a ray meets, among the
  * positions that are shown: cs_played_positions if play-out is on, else cs_positions. The direction may have
  * any length. Fails, and changes nothing, without such a point within max_distance metres, or if a number is

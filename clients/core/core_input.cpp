@@ -49,6 +49,17 @@ int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t 
   return 1;
 }
 
+void cs_set_head(cs_client* client, const float* position3, const float* orientation4, float radius,
+                 uint64_t now_us) noexcept {
+  if (position3 == nullptr) return client->client.setHead(std::nullopt, now_us);
+  cs_own_collider head{};
+  head.shape = CS_SHAPE_SPHERE;
+  std::copy(position3, position3 + 3, head.position);
+  if (orientation4 != nullptr) std::copy(orientation4, orientation4 + 4, head.orientation);
+  head.radius = radius;
+  client->client.setHead(head, now_us);
+}
+
 void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) noexcept {
   client->client.setGrabs(std::span(grabs, std::min(count, CS_MAX_GRABS)), now_us);
 }

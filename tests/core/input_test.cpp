@@ -72,6 +72,31 @@ TEST(Colliders, HandsAreSentAsJoints) {
   EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), 20, 8), 0);
 }
 
+TEST(Colliders, TheHeadHasItsOwnIdAndStaysWhenOthersChange) {
+  JoinedClient joined;
+  const float position[] = {1, 2, 3}, orientation[] = {0, 0.6f, 0, 0.8f};
+  cs_set_head(joined.client.get(), position, orientation, 0.11f, 5);
+  const v1::ColliderPoses alone = joined.sent().collider_poses();
+  ASSERT_THAT(alone.colliders(), SizeIs(1));
+  EXPECT_EQ(alone.colliders(0).id(), CS_HEAD_ID);
+  EXPECT_EQ(alone.colliders(0).sphere().radius(), 0.11f);
+  EXPECT_EQ(alone.colliders(0).pose().position().y(), 2);
+  EXPECT_EQ(alone.colliders(0).pose().orientation().w(), 0.8f);
+  // A server accepts 60 colliders; these two hands and the head use 41.
+  const std::vector<float> spheres(4 * CS_MAX_COLLIDERS, 0.5f);
+  const std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
+  cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), CS_HAND_JOINTS, 6);
+  cs_set_hand(joined.client.get(), CS_HAND_RIGHT, joints.data(), CS_HAND_JOINTS, 6);
+  cs_set_colliders(joined.client.get(), spheres.data(), CS_MAX_COLLIDERS, 6);
+  const v1::ColliderPoses full = joined.sent().collider_poses();
+  ASSERT_THAT(full.colliders(), SizeIs(20));
+  EXPECT_EQ(full.colliders(18).id(), 18u);
+  EXPECT_EQ(full.colliders(19).id(), CS_HEAD_ID);
+  cs_set_head(joined.client.get(), nullptr, nullptr, 0, 7);
+  cs_set_colliders(joined.client.get(), nullptr, 0, 7);
+  EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(0));
+}
+
 TEST(Colliders, AreSentWithShapeAndOrientation) {
   JoinedClient joined;
   const cs_own_collider own[] = {{.shape = CS_SHAPE_CAPSULE,

@@ -324,6 +324,16 @@ TEST(Joining, ContinuesAfterANonFatalError) {
   EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
 }
 
+TEST(Joining, AnErrorThatTheClientFindsHasNoCodeOfTheServer) {
+  ClientUnderTest client;
+  client.join(ScriptedServer());
+  client.receive(ScriptedServer::error(v1::ERROR_CODE_INVALID_ARGUMENT, "no", false));
+  EXPECT_EQ(cs_error_code(client.get()), static_cast<std::uint32_t>(v1::ERROR_CODE_INVALID_ARGUMENT));
+  client.receive("\xff");
+  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED);
+  EXPECT_EQ(cs_error_code(client.get()), 0u);
+}
+
 TEST(Joining, RefusesFramesAndDescriptionsOutOfOrder) {
   ScriptedServer server;
   ClientUnderTest early;

@@ -98,6 +98,22 @@ OwnCapsules twoCapsules(float x) {
   return capsules;
 }
 
+TEST(OwnCapsules, TheHeadIsTheLastAsInFrames) {
+  Poses poses;
+  poses.head = cs_own_collider{.shape = CS_SHAPE_SPHERE,
+                               .position = {1, 2, 3},
+                               .orientation = {},
+                               .radius = 0.11f,
+                               .length = 0,
+                               .size = {}};
+  poses.rightHand.assign(std::size_t{4} * CS_HAND_JOINTS, 0.01f);
+  const OwnCapsules capsules = ownCapsules(poses);
+  EXPECT_TRUE(capsules[kOwnCapsules - 2].present());
+  EXPECT_EQ(capsules[kOwnCapsules - 1].radius, 0.11f);
+  EXPECT_EQ(capsules[kOwnCapsules - 1].from.y, 2);
+  EXPECT_FALSE(ownCapsules({}).back().present());
+}
+
 TEST(OwnCapsules, AreRecognisedInAFrameByOrderAndSize) {
   std::vector<Collider> frame(4);
   const auto set = [](Collider& collider, std::uint64_t participant, cs_shape shape, float x, float radius) {

@@ -15,12 +15,13 @@ const kWaitMs = 60_000;
 export const kPicture = { width: 800, height: 450 };
 // Size of pages between screenshots. Software rendering takes most of the tests' time, in proportion to the pixels.
 // The width keeps the layout of wide screens.
-const kQuick = { width: 656, height: 200 };
+export const kQuick = { width: 656, height: 200 };
 // Milliseconds between drawn frames, at least. Without a pause, software rendering would take the processors from the
 // server.
 const kDrawPeriodMs = 50;
 
-export function launchBrowser() {
+// `more` are further arguments of the browser.
+export function launchBrowser(more = []) {
   return chromium.launch({
     executablePath: kChromium,
     args: [
@@ -31,13 +32,15 @@ export function launchBrowser() {
       "--disable-background-networking",
       "--disable-component-update",
       "--no-first-run",
+      ...more,
     ],
   });
 }
 
-// Opens a page. `prepare` runs in it before its own scripts. Errors of the page are collected in `errors`. Without a
-// viewport the page is small, and takes the size of a picture only for screenshots.
-export async function openPage(browser, url, { prepare, viewport } = {}) {
+// Opens a page in a browser, or in a context, which then decides on the viewport. `prepare` runs in it before its own scripts. Errors of the page are collected in `errors`. Without a
+// viewport the page is small, and takes the size of a picture only for screenshots. With `draws: false` the
+// cloth is not drawn, which takes most of the time; the page does everything else.
+export async function openPage(browser, url, { prepare, viewport, draws = true } = {}) {
   const page = await browser.newPage({ viewport: viewport ?? kQuick });
   page.grows = viewport === undefined;
   page.setDefaultTimeout(kWaitMs);
@@ -47,6 +50,7 @@ export async function openPage(browser, url, { prepare, viewport } = {}) {
     const draw = window.requestAnimationFrame.bind(window);
     window.requestAnimationFrame = (callback) => setTimeout(() => draw(callback), period);
   }, kDrawPeriodMs);
+  if (!draws) await page.addInitScript(drawNothing);
   if (prepare) await page.addInitScript(prepare);
   await page.goto(url);
   return page;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A participant with a head and hands, who draws nothing: a page with only the client core.
 
-// Joins from a new page. `head` is {position, orientation, radius}; each of `hands` is {side, wrist}, in metres. Resolves
-// when the server has sent a frame. Close the returned page to leave.
+// Joins from a new page. `head` is {position, orientation, radius}; each of `hands` is {side, wrist}; `ball` is {x, y, z,
+// radius}, in metres. Resolves when the server has sent a frame. Close the returned page to leave.
 export async function joinAsGuest(browser, url, guest) {
   const page = await browser.newPage();
   await page.goto(new URL("main.css", url).href);
@@ -11,10 +11,9 @@ export async function joinAsGuest(browser, url, guest) {
 }
 
 // Runs in the page.
-async function play({ scene, name, head, hands }) {
+async function play({ scene, name, head, hands, ball }) {
   const kFrame = 1; // CS_EVENT_FRAME
   const kJoints = 25; // of WebXR, without the palm
-  const kColliderBytes = 52; // cs_own_collider
   const { instance } = await WebAssembly.instantiate(await (await fetch("clothstream_core.wasm")).arrayBuffer());
   const core = instance.exports;
   core._initialize();
@@ -39,11 +38,12 @@ async function play({ scene, name, head, hands }) {
     return list.flat();
   };
   const pose = () => {
-    const shape = core.malloc(kColliderBytes);
-    new Uint32Array(core.memory.buffer, shape, 1)[0] = 0; // sphere
-    new Float32Array(core.memory.buffer, shape + 4, 12).set([...head.position, ...head.orientation, head.radius, 0, 0, 0, 0]);
-    core.cs_set_shapes(client, shape, 1, now());
-    core.free(shape);
+    const floats = core.malloc(28);
+    new Float32Array(core.memory.buffer, floats, 7).set([...head.position, ...head.orientation]);
+    core.cs_set_head(client, floats, floats + 12, head.radius, now());
+    new Float32Array(core.memory.buffer, floats, 4).set(ball);
+    core.cs_set_colliders(client, floats, 1, now());
+    core.free(floats);
     for (const { side, wrist } of hands) {
       const points = core.malloc(16 * kJoints);
       new Float32Array(core.memory.buffer, points, 4 * kJoints).set(joints(side, wrist));

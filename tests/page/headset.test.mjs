@@ -226,11 +226,19 @@ test("the connection returns while the user stays in VR", async () => {
       const { mode, frames } = await page.evaluate(() => window.clothstream.headset);
       assert.equal(mode, "immersive-vr");
       await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
+      // The panel comes before the eyes and says what happens.
+      await page.waitForFunction(() => /^The connection is lost .*comes back by itself.* Try now Leave$/.test(window.clothstream.headset.panel.text.replaceAll("\n", " ")));
+      const { place } = await page.evaluate(() => window.clothstream.headset.panel);
+      // The camera is one eye, 3 cm from the middle.
+      assert.ok(distance(place, [0, 1.5, -0.7]) < 0.04, `the panel is at ${place}`);
+      await takePicture(page, "vr_lost");
       other = await startServer(other.port, ["--scene", "curtain"]);
       await untilState(page, "live");
       await untilFrames(page, 10);
       assert.equal(await page.evaluate(() => window.clothstream.headset.mode), "immersive-vr");
       await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 41);
+      await page.waitForFunction(() => /Place before me/.test(window.clothstream.headset.panel.text));
+      assert.ok((await page.evaluate(() => window.clothstream.headset.panel.place[0])) < -0.5, "the panel is at its place again");
     });
   } finally {
     await other.stop();
@@ -259,7 +267,8 @@ test("pass-through: the scene is put on a real surface", () =>
     await page.waitForTimeout(500);
     const later = await page.evaluate(() => window.clothstream.headset.placement);
     for (let i = 0; i < 16; ++i) assert.ok(Math.abs(placement[i] - later[i]) < 1e-3, `element ${i}: ${placement[i]} and ${later[i]}`);
-    // Both hands move, turn and scale it.
+    // Both hands move, turn and scale it, and its shadows with it.
+    const { shadowReach } = await page.evaluate(() => window.clothstream.headset);
     await page.evaluate(() => {
       const { left, right } = window.device.controllers;
       left.position.set(-0.2, 0.3, 1);
@@ -274,6 +283,10 @@ test("pass-through: the scene is put on a real surface", () =>
       const m = window.clothstream.headset.placement;
       return Math.abs(Math.hypot(m[0], m[1], m[2]) - scale) < 0.05;
     }, 2);
+    await page.waitForFunction((reach) => {
+      const { placement: m, shadowReach: now } = window.clothstream.headset;
+      return Math.abs(now / reach / Math.hypot(m[0], m[1], m[2]) - 1) < 0.001;
+    }, shadowReach);
   }));
 
 // Both headsets have an origin and a direction of their own: the second one is turned by a quarter and moved.

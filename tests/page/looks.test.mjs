@@ -150,11 +150,13 @@ test("reduced detail shows the same scene", () =>
     assert.ok(red > blue + 40, `silk has red ${red} and blue ${blue}`);
   }));
 
-test("another participant has a head, hands and a name", () =>
+test("another participant has a head of any size, hands and a name; a ball is no head", () =>
   withPage({ query: "?name=Ada", viewport: kPicture }, async (page) => {
     await untilState(page, "live");
     await untilFrames(page, 30);
-    const head = { position: [-0.75, 1.66, 0.3], orientation: [0, -0.5, 0, 0.866], radius: 0.11 };
+    // A person whose scene is twice as large has a head of half the size.
+    const head = { position: [-0.75, 1.66, 0.3], orientation: [0, -0.5, 0, 0.866], radius: 0.055 };
+    const ball = [-0.6, 1.9, 0.3, 0.12];
     const wrists = [
       { side: 1, wrist: [-0.6, 1.25, 0.05] },
       { side: 2, wrist: [-0.85, 1.2, 0.45] },
@@ -167,7 +169,7 @@ test("another participant has a head, hands and a name", () =>
     };
     const before = await coloursNow("alone");
     assert.deepEqual(await page.evaluate(() => window.clothstream.people), []);
-    const guest = await joinAsGuest(browser, server.url, { scene: "", name: "Grace Hopper", head, hands: wrists });
+    const guest = await joinAsGuest(browser, server.url, { scene: "", name: "Grace Hopper", head, hands: wrists, ball });
     try {
       await page.waitForFunction(() => window.clothstream.people.length === 1);
       const [person] = await page.evaluate(() => window.clothstream.people);

@@ -411,12 +411,12 @@ test("the panel changes the solver of a cloth and shows its report", () =>
 test("an unknown scene shows the server's error, and a button joins the default scene", () =>
   withPage({ query: "?scene=no_such_scene" }, async (page) => {
     await untilState(page, "failed");
-    await page.waitForSelector("#banner:not([hidden])");
-    assert.match(await page.textContent("#banner-text"), /no_such_scene/);
+    await page.waitForSelector('#failure[data-kind="not-found"]:not([hidden])');
+    assert.match(await page.textContent("#failure-said"), /no_such_scene/);
     await takePicture(page, "unknown_scene");
-    await page.click("#retry");
+    await page.click('#failure [data-action="default"]');
     await untilState(page, "live");
-    await page.waitForSelector("#banner", { state: "hidden" });
+    await page.waitForSelector("#failure", { state: "hidden" });
   }));
 
 test("the list of scenes joins another scene", () =>
@@ -435,12 +435,12 @@ test("the page shows a lost server, and reconnects when it returns", () =>
     await untilState(page, "live");
     await server.stop();
     await untilState(page, "reconnecting");
-    await page.waitForFunction(() => /(Reconnecting|Trying again in \d+ s)\./.test(document.getElementById("banner-text").textContent));
+    await page.waitForFunction(() => /^No connection for \d+ s\. Trying again (now|in \d+ s)\.$/.test(document.getElementById("failure-wait").textContent));
     await takePicture(page, "reconnecting");
     server = await startServer(server.port);
     await untilState(page, "live");
     await untilFrames(page, 10);
-    await page.waitForSelector("#banner", { state: "hidden" });
+    await page.waitForSelector("#failure", { state: "hidden" });
   }));
 
 test("participants are listed, and a disconnected one returns with its id", async () => {
@@ -530,13 +530,13 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
     const page = await context.newPage();
     await page.goto(paired.url);
     await untilState(page, "asking");
-    assert.match(await page.textContent("#proof-reason"), /requires a token or a pairing code/);
+    assert.match(await page.textContent("#failure-said"), /requires a token or a pairing code/);
     await takePicture(page, "asking");
     await page.fill("#proof-input", code === "000000" ? "000001" : "000000");
     await page.press("#proof-input", "Enter");
-    await page.waitForFunction(() => /is wrong/.test(document.getElementById("proof-reason").textContent));
+    await page.waitForFunction(() => /is wrong/.test(document.getElementById("failure-said").textContent));
     await page.fill("#proof-input", `${code.slice(0, 3)} ${code.slice(3)}`);
-    await page.click("#proof button");
+    await page.click("#proof-send");
     await untilState(page, "live");
     assert.ok(await page.isHidden("#proof"));
     await page.click("#tab-people");
@@ -583,8 +583,8 @@ test("an address that is not JSON is not shown", () =>
 
 test("a browser without WebGL shows what is missing", () =>
   withPage({ prepare: () => (HTMLCanvasElement.prototype.getContext = () => null) }, async (page) => {
-    await page.waitForSelector("#banner:not([hidden])");
-    assert.match(await page.textContent("#banner-text"), /WebGL/);
+    await page.waitForSelector('#failure[data-kind="no-webgl"]:not([hidden])');
+    assert.match(await page.textContent("#failure-text"), /WebGL 2/);
   }));
 
 test("the page fits a small screen", () =>

@@ -280,7 +280,7 @@ test("owners change roles and remove people; others see why they cannot", () =>
       assert.match(await ada.textContent("#confirm-text"), /Remove Ben from the scene\?/);
       await ada.click("#confirm-yes");
       await untilState(ben, "failed");
-      assert.ok((await ben.textContent("#banner-text")).length > 10);
+      assert.ok((await ben.textContent("#failure-text")).length > 10);
       await ada.waitForFunction(() => document.querySelectorAll("#participants .person").length === 1);
       assert.deepEqual(ben.errors, []);
     } finally {

@@ -51,12 +51,13 @@ void addBones(const std::vector<float>& joints, Capsule* to) {
 
 OwnCapsules ownCapsules(const Poses& poses) {
   OwnCapsules capsules;
-  std::transform(poses.colliders.begin(), poses.colliders.end(), capsules.begin(),
-                 [](const cs_own_collider& own) {
-                   return capsuleOf(own.shape, own.position, own.orientation, own.radius, own.length);
-                 });
+  const auto capsuleOfOwn = [](const cs_own_collider& own) {
+    return capsuleOf(own.shape, own.position, own.orientation, own.radius, own.length);
+  };
+  std::transform(poses.colliders.begin(), poses.colliders.end(), capsules.begin(), capsuleOfOwn);
   addBones(poses.leftHand, &capsules[CS_MAX_COLLIDERS]);
   addBones(poses.rightHand, &capsules[CS_MAX_COLLIDERS + CS_HAND_BONES]);
+  if (poses.head) capsules.back() = capsuleOfOwn(*poses.head);
   return capsules;
 }
 

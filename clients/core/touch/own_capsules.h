@@ -25,14 +25,15 @@ struct Capsule {
   Vector at(float part) const { return from + part * (to - from); }
 };
 
-// Spheres and capsules by their index, then the bones of the left and of the right hand. A box is left out.
-inline constexpr std::size_t kOwnCapsules = CS_MAX_COLLIDERS + 2 * CS_HAND_BONES;
+// Spheres and capsules by their index, then the bones of the left and of the right hand, then the head: the
+// order of their ids, which frames have too. A box is left out.
+inline constexpr std::size_t kOwnCapsules = CS_MAX_COLLIDERS + 2 * CS_HAND_BONES + 1;
 using OwnCapsules = std::array<Capsule, kOwnCapsules>;
 
 OwnCapsules ownCapsules(const Poses& poses);
 
-// The capsules of this participant in a frame. They have no names there, but the order and the sizes of those
-// that were sent, `sent`. Returns nullopt if they are not the same.
+// The capsules of this participant in a frame, by the order and the sizes of those that were sent, `sent`.
+// Returns nullopt if they are not the same.
 std::optional<OwnCapsules> capsulesOf(std::span<const Collider> frame, std::uint64_t participantId,
                                       const OwnCapsules& sent);
 

@@ -97,6 +97,13 @@ void addShape(Writer& parent, const cs_own_collider& collider) {
   }
 }
 
+void addCollider(Writer& message, std::uint32_t id, const cs_own_collider& from) {
+  Writer collider(message, field::ColliderPoses::kColliders.number);
+  collider.add_uint32(field::ParticipantCollider::kId.number, id);
+  addPose(collider, field::ParticipantCollider::kPose, from.position, from.orientation);
+  addShape(collider, from);
+}
+
 }  // namespace
 
 void writeAuthenticate(std::string& out, std::uint64_t requestId, const Proof& proof) {
@@ -138,17 +145,14 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
                         std::uint64_t serverTimeUs) {
   // The server's limit, including the bones that it builds for each hand.
   constexpr std::size_t kMost = CS_MAX_COLLIDERS + CS_HAND_BONES;
-  const std::size_t handBones =
-      CS_HAND_BONES * ((poses.leftHand.empty() ? 0u : 1u) + (poses.rightHand.empty() ? 0u : 1u));
+  const std::size_t ofBody =
+      CS_HAND_BONES * ((poses.leftHand.empty() ? 0u : 1u) + (poses.rightHand.empty() ? 0u : 1u)) +
+      (poses.head ? 1u : 0u);
   writeMessage(out, 0, field::ClientMessage::kColliderPoses, [&](Writer& message) {
     using F = field::ColliderPoses;
-    for (std::size_t i = 0; i < std::min(poses.colliders.size(), kMost - handBones); ++i) {
-      const cs_own_collider& from = poses.colliders[i];
-      Writer collider(message, F::kColliders.number);
-      collider.add_uint32(field::ParticipantCollider::kId.number, static_cast<std::uint32_t>(i));
-      addPose(collider, field::ParticipantCollider::kPose, from.position, from.orientation);
-      addShape(collider, from);
-    }
+    for (std::size_t i = 0; i < std::min(poses.colliders.size(), kMost - ofBody); ++i)
+      addCollider(message, static_cast<std::uint32_t>(i), poses.colliders[i]);
+    if (poses.head) addCollider(message, CS_HEAD_ID, *poses.head);
     message.add_uint64(F::kClientTimeUs.number, clientTimeUs);
     for (const OwnGrab& grab : poses.grabs) addGrab(message, grab);
     for (const AttachmentPose& put : poses.attachments) {

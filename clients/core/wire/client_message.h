@@ -58,6 +58,7 @@ struct OwnGrab {
 struct Poses {
   std::vector<cs_own_collider> colliders;  // the id of each is its index
   std::vector<float> leftHand, rightHand;  // {x, y, z, radius} per joint; empty: none
+  std::optional<cs_own_collider> head;     // its id is CS_HEAD_ID
   std::vector<OwnGrab> grabs;
   std::vector<AttachmentPose> attachments;
   bool wantsContacts = false;

@@ -200,6 +200,8 @@ void Program::call(const CoreInput::Call& call) {
       std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
       for (float& joint : joints) joint = numbers.next();
       cs_set_hand(client(), index % 4, joints.data(), index / 4 % (CS_HAND_JOINTS + 1), now_);
+      cs_set_head(client(), index % 2 == 0 ? joints.data() : nullptr,
+                  index % 3 == 0 ? joints.data() : nullptr, joints[0], now_);
       return;
     }
     case 10: {

@@ -126,11 +126,12 @@ export class Connection {
     const decodeMs = this.now() - arrivedMs;
     this.flush();
     if (events & ClientEvent.description) this.prepare();
-    const frame = events & ClientEvent.frame ? this.pass(decodeMs) : undefined;
+    const isFrame = (events & ClientEvent.frame) !== 0;
+    const frame = isFrame ? this.pass(decodeMs) : undefined;
     const refused = this.client.frames.decodeErrors > before;
     const decoding = frame ? Decoding.done : refused ? Decoding.refused : Decoding.skipped;
     const transfer = frame?.buffer ? [bytes, frame.buffer] : [bytes];
-    this.post({ kind: "message", message: bytes, arrivedMs, decoding, frame }, transfer);
+    this.post({ kind: "message", message: bytes, arrivedMs, isFrame, decoding, frame }, transfer);
     if (this.client.state === ClientState.failed) this.socket.close();
   }
 

@@ -3,7 +3,7 @@
 
 import { cs_cloth_point, cs_grab, cs_grab_event, cs_own_collider } from "./layout";
 import { nowUs, type CoreHandle } from "./handle";
-import { HandSide, kMaxColliders, kMaxGrabs, type Grab, type GrabEvent, type OwnCollider } from "./types";
+import { HandSide, kMaxColliders, kMaxGrabs, type Grab, type GrabEvent, type Head, type OwnCollider } from "./types";
 
 const kJointFloats = 4; // x, y, z, radius
 const kHandJoints = 25; // of WebXR
@@ -50,7 +50,7 @@ export class Input {
     core.exports.cs_set_grabs(pointer, this.array, Math.min(grabs.length, kMaxGrabs), nowUs());
   }
 
-  // Replaces the colliders of this participant, except its hands.
+  // Replaces the colliders of this participant, except its hands and its head.
   setColliders(colliders: readonly OwnCollider[]): void {
     const { core, pointer } = this.handle;
     const view = core.view();
@@ -71,6 +71,15 @@ export class Input {
     const { core, pointer } = this.handle;
     if (joints) core.floats(this.array, kHandJoints * kJointFloats).set(joints);
     core.exports.cs_set_hand(pointer, side, this.array, joints ? kHandJoints : 0, nowUs());
+  }
+
+  // Replaces the head, a sphere that looks along -Z of its own frame. Undefined removes it.
+  setHead(head: Head | undefined): void {
+    const { core, pointer } = this.handle;
+    if (!head) return core.exports.cs_set_head(pointer, 0, 0, 0, nowUs());
+    core.with([head.position, head.orientation], (position, orientation) =>
+      core.exports.cs_set_head(pointer, position!, orientation!, head.radius, nowUs()),
+    );
   }
 
   destroy(): void {

@@ -3,18 +3,22 @@
 // that the program reads, draws and writes to.
 
 import { Client, type DecodedFrame } from "./client";
+import { FrameGaps } from "./frame_gaps";
 import { FrameRing } from "./frame_ring";
 import { microseconds } from "./handle";
 import type { FromWorker, Proof, ToWorker } from "./thread_messages";
-import { ClientEvent, ClientState, kUnauthenticated, kWrongPairingCode, type Identity } from "./types";
+import { ClientEvent, ClientState, ErrorCode, type Identity } from "./types";
 import { CoreModule } from "./wasm";
 
 export type SessionState =
   | { kind: "connecting" }
   | { kind: "live" }
   | { kind: "reconnecting"; reason: string; attemptAt: number } // on the clock of performance.now()
-  | { kind: "asking"; reason: string } // the server requires a token or a pairing code
-  | { kind: "failed"; reason: string };
+  // The server requires a token or a pairing code. `code` is an ErrorCode. wasGiven: it has refused one.
+  | { kind: "asking"; reason: string; code: number; wasGiven: boolean }
+  // Nothing happens until the program joins again. "server": it refuses, with an ErrorCode. "client": the client core does
+  // not understand the server. "worker": the worker did not start, or has stopped.
+  | { kind: "failed"; reason: string; cause: "server" | "client" | "worker"; code: number };
 
 // Where the token of a server is kept between visits; "" means none.
 export interface TokenStore {
@@ -60,6 +64,7 @@ export class Session {
   // Frames that were taken from the worker, and the time that this took on this thread, ms.
   framesTaken = 0;
   takeMs = 0;
+  readonly gaps = new FrameGaps(); // between frames of the present connection
   private number = 0; // of the session in the worker
   private connection = 0;
   private ring: FrameRing | undefined;
@@ -84,7 +89,7 @@ export class Session {
     this.tokens = options.tokens ?? kNoTokens;
     this.worker = options.makeWorker?.() ?? new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.handle(data);
-    this.worker.onerror = (event) => this.enter({ kind: "failed", reason: `The worker of the client stopped: ${event.message}` });
+    this.worker.onerror = ({ message }) => this.breakDown(message || "its script could not be loaded");
     this.client = this.begin(options.scene ?? "", { token: this.tokens.kept() });
     window.addEventListener("online", this.reconnect);
     // Closing the socket leaves the scene at once. Otherwise the server would keep the participant's place for a while.
@@ -171,11 +176,13 @@ export class Session {
     if (message.session !== this.number) return;
     switch (message.kind) {
       case "connecting":
+        this.gaps.restart();
         this.connection = message.connection;
         this.client.connecting(microseconds(message.atMs));
         this.client.listScenes();
         return this.flush();
       case "lost":
+        this.gaps.restart();
         this.client.disconnected(microseconds(message.atMs));
         return this.enter({ kind: "reconnecting", reason: message.reason, attemptAt: message.attemptAtMs });
       case "ring":
@@ -184,16 +191,17 @@ export class Session {
       case "message":
         return this.receive(message);
       case "broken":
-        return this.enter({ kind: "failed", reason: `The client core stopped: ${message.reason}` });
+        return this.breakDown(message.reason);
     }
   }
 
-  private receive({ message, arrivedMs, decoding, frame }: FromWorker & { kind: "message" }): void {
+  private receive({ message, arrivedMs, isFrame, decoding, frame }: FromWorker & { kind: "message" }): void {
     const { client, listener } = this;
     const began = performance.now();
     let decoded: DecodedFrame | undefined;
     if (frame) decoded = { ...frame, values: frame.buffer ? new Float32Array(frame.buffer) : this.ring!.oldest() };
     const events = client.receiveDecoded(new Uint8Array(message), decoding, decoded, microseconds(arrivedMs));
+    if (isFrame) this.gaps.arrived(arrivedMs);
     if (frame?.buffer) this.post({ kind: "recycle", buffer: frame.buffer }, [frame.buffer]);
     else if (frame) this.ring!.take();
     if (frame) {
@@ -228,10 +236,15 @@ export class Session {
 
   // Stops, because the same request would be refused again. The user must give a proof, or choose another scene.
   private fail(client: Client): void {
-    const reason = client.errorText;
-    const asks = client.errorCode === kUnauthenticated || client.errorCode === kWrongPairingCode;
-    if (client.errorCode === kUnauthenticated && client.token === this.tokens.kept()) this.tokens.keep("");
-    this.enter(asks ? { kind: "asking", reason } : { kind: "failed", reason });
+    const { errorCode: code, errorText: reason, token } = client;
+    if (code === ErrorCode.unauthenticated && token === this.tokens.kept()) this.tokens.keep("");
+    if (code === ErrorCode.unauthenticated || code === ErrorCode.wrongPairingCode)
+      return this.enter({ kind: "asking", reason, code, wasGiven: code === ErrorCode.wrongPairingCode || token !== "" });
+    this.enter({ kind: "failed", reason, cause: code === 0 ? "client" : "server", code });
+  }
+
+  private breakDown(reason: string): void {
+    this.enter({ kind: "failed", reason, cause: "worker", code: 0 });
   }
 
   private enter(state: SessionState): void {

@@ -3,7 +3,10 @@
 
 import { cs_collider } from "./layout";
 import { readFloats, vec3, type CoreHandle } from "./handle";
-import type { Collider, Quaternion, Vec3 } from "./types";
+import { kHeadId, type Collider, type Quaternion, type Vec3 } from "./types";
+
+// Colliders of participants have their id as name.
+const kHeadName = String(kHeadId);
 
 type Mutable<Type> = { -readonly [Key in keyof Type]: Type[Key] };
 interface KeptCollider extends Omit<Collider, "position" | "orientation" | "size"> {
@@ -15,18 +18,23 @@ interface KeptCollider extends Omit<Collider, "position" | "orientation" | "size
 type Getter = (client: number, index: number, out: number) => number;
 
 export function readCollider(handle: CoreHandle, view: DataView, at: number, index: number): KeptCollider {
+  const name = handle.core.text(view.getUint32(at + cs_collider.name, true));
+  const participantId = view.getBigUint64(at + cs_collider.participant_id, true);
   return {
     index,
-    name: handle.core.text(view.getUint32(at + cs_collider.name, true)),
+    name,
     shape: view.getUint32(at + cs_collider.shape, true),
     position: vec3(view, at + cs_collider.position),
     orientation: readFloats(view, at + cs_collider.orientation, [0, 0, 0, 0]),
     radius: view.getFloat32(at + cs_collider.radius, true),
     length: view.getFloat32(at + cs_collider.length, true),
     size: vec3(view, at + cs_collider.size),
-    participantId: view.getBigUint64(at + cs_collider.participant_id, true),
+    participantId,
+    isHead: isHead(participantId, name),
   };
 }
+
+const isHead = (participantId: bigint, name: string) => participantId !== 0n && name === kHeadName;
 
 export class ShownColliders {
   private readonly kept: KeptCollider[] = [];
@@ -60,5 +68,6 @@ export class ShownColliders {
     collider.length = view.getFloat32(at + cs_collider.length, true);
     readFloats(view, at + cs_collider.size, collider.size);
     collider.participantId = view.getBigUint64(at + cs_collider.participant_id, true);
+    collider.isHead = isHead(collider.participantId, collider.name);
   }
 }

@@ -39,7 +39,8 @@ export type FromWorker = { session: number } & (
   | { kind: "lost"; atMs: number; reason: string; attemptAtMs: number }
   // Memory of a FrameRing for the frames that follow.
   | { kind: "ring"; memory: SharedArrayBuffer }
-  | { kind: "message"; message: ArrayBuffer; arrivedMs: number; decoding: Decoding; frame: SentFrame | undefined }
+  // `isFrame`: it has brought a frame, which is left out if the page has no time for it.
+  | { kind: "message"; message: ArrayBuffer; arrivedMs: number; isFrame: boolean; decoding: Decoding; frame: SentFrame | undefined }
   // The worker cannot go on.
   | { kind: "broken"; reason: string }
 );

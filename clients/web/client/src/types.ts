@@ -27,9 +27,19 @@ export const ClientEvent = {
   answer: 32768,
 } as const;
 
-// Values of Client.errorCode after which a person must give a token or a pairing code.
-export const kUnauthenticated = 60;
-export const kWrongPairingCode = 61;
+// Values of Client.errorCode and of SessionState: ErrorCode of session.proto. A newer server may have more.
+export const ErrorCode = {
+  notFound: 3,
+  unsupportedVersion: 4,
+  unsupportedCodec: 5,
+  resourceExhausted: 8,
+  permissionDenied: 30,
+  takenOver: 32,
+  removed: 33,
+  // After these a person must give a token or a pairing code.
+  unauthenticated: 60,
+  wrongPairingCode: 61,
+} as const;
 
 export interface PairingCode {
   code: string;
@@ -101,6 +111,7 @@ export interface Collider {
   length: number;
   size: Vec3;
   participantId: bigint; // 0 for a collider of the scene
+  isHead: boolean; // of its participant
 }
 
 // Vertices (3 floats each) and triangles (3 indices each).
@@ -209,12 +220,20 @@ export interface OwnCollider {
   size?: Vec3;
 }
 
+// Head of this participant. Lengths in metres.
+export interface Head {
+  position: Vec3;
+  orientation?: Quaternion; // none: unknown
+  radius: number;
+}
+
 export enum HandSide {
   left = 1,
   right = 2,
 }
 
 export const kMaxColliders = 40;
+export const kHeadId = 0x80000040; // CS_HEAD_ID
 export const kMaxGrabs = 10;
 
 // A joining participant: displayed name (may be empty) and requested role (key of Roles, or 0 for any).

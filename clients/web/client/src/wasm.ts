@@ -35,6 +35,7 @@ export interface CoreExports {
   cs_local_correction(client: Pointer): number;
   cs_nearest_point(client: Pointer, point3: Pointer, maxDistance: number, out: Pointer): number;
   cs_set_shapes(client: Pointer, colliders: Pointer, count: number, nowUs: bigint): void;
+  cs_set_head(client: Pointer, position3: Pointer, orientation4: Pointer, radius: number, nowUs: bigint): void;
   cs_set_hand(client: Pointer, side: number, joints: Pointer, count: number, nowUs: bigint): number;
   cs_destroy(client: Pointer): void;
   cs_receive(client: Pointer, message: Pointer, bytes: number, nowUs: bigint): number;

@@ -95,6 +95,14 @@ export class Controls {
     if (radius !== undefined && this.collider) client.parameters.setCollider(this.collider, { radius });
   }
 
+  // Shows the radius of the chosen collider, which frames have. Call a few times per second while it can be seen.
+  showRadius(client: Client): void {
+    const collider = client.frames.colliders().find(({ name, participantId }) => participantId === 0n && name === this.collider);
+    const round = collider?.shape === Shape.sphere || collider?.shape === Shape.capsule;
+    element("radius-row").hidden = !round;
+    if (collider && round) this.radius.show(collider.radius);
+  }
+
   private rebase(client: Client): void {
     this.base = client.parameters.clothParameters();
     this.materials = this.materialsOf(client);
@@ -128,14 +136,6 @@ export class Controls {
     this.gustSeconds.show(environment.gustSeconds);
     this.density.show(environment.airDensity);
     this.gravity.show(Math.hypot(...environment.gravity));
-  }
-
-  // Shows the radius of the chosen collider. Other participants may change it.
-  showRadius(client: Client): void {
-    const collider = client.frames.colliders().find(({ name, participantId }) => participantId === 0n && name === this.collider);
-    const round = collider?.shape === Shape.sphere || collider?.shape === Shape.capsule;
-    element("radius-row").hidden = !round;
-    if (collider && round) this.radius.show(collider.radius);
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Text over the picture: scene, connection state, errors and notices.
+// Text over the picture: scene, connection state and notices. failure_card shows what went wrong.
 
 import type { Client, SessionState } from "@clothstream/client";
 import { element, write } from "./panel/dom";
@@ -8,41 +8,12 @@ const kNoticeMs = 6000;
 
 export class Hud {
   private readonly state = element("state");
-  private readonly banner = element("banner");
-  private readonly bannerText = element("banner-text");
-  private readonly retry = element<HTMLButtonElement>("retry");
   private readonly notice = element("notice");
   private noticeTimer: number | undefined;
 
-  constructor(retry: () => void) {
-    this.retry.addEventListener("click", retry);
-  }
-
-  // Call when the state changes, and regularly to update the countdown.
-  showState(state: SessionState): void {
-    let label: string = state.kind;
-    let text = "";
-    if (state.kind === "reconnecting") {
-      const seconds = Math.max(0, Math.ceil((state.attemptAt - performance.now()) / 1000));
-      label = seconds > 1 ? `reconnecting in ${seconds} s` : "reconnecting";
-      text = `${state.reason} ${seconds > 1 ? `Trying again in ${seconds} s.` : "Reconnecting."}`;
-    } else if (state.kind === "failed") {
-      text = state.reason;
-    }
-    write(this.state, label);
-    this.state.dataset["kind"] = state.kind;
-    write(this.bannerText, text);
-    this.banner.hidden = text === "";
-    write(this.retry, state.kind === "failed" ? "Join the default scene" : "Try now");
-  }
-
-  // Shows an error from which the page cannot recover.
-  showFatal(text: string): void {
-    write(this.state, "stopped");
-    this.state.dataset["kind"] = "failed";
-    write(this.bannerText, text);
-    this.banner.hidden = false;
-    this.retry.hidden = true;
+  showState(kind: SessionState["kind"] | "stopped"): void {
+    write(this.state, kStates[kind]);
+    this.state.dataset["kind"] = kind;
   }
 
   showNotice(text: string): void {
@@ -57,3 +28,12 @@ export class Hud {
     document.title = `${client.sceneName} - ClothStream`;
   }
 }
+
+const kStates: Record<SessionState["kind"] | "stopped", string> = {
+  connecting: "connecting",
+  live: "live",
+  reconnecting: "reconnecting",
+  asking: "not joined",
+  failed: "not joined",
+  stopped: "stopped",
+};

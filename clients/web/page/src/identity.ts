@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How this page proves who it is: asks for a pairing code or a token, keeps the token, and shows codes to owners.
+// How this page proves who it is: takes a pairing code or a token, keeps the token, and shows codes to owners.
 
 import { Roles, type Client, type PairingCode, type Proof, type TokenStore } from "@clothstream/client";
 import { element, write } from "./panel/dom";
@@ -31,28 +31,16 @@ export function proofIn(text: string): Proof {
   return /^\d{6}$/.test(typed) ? { code: typed } : { token: typed };
 }
 
-// Form that asks for a code or a token.
-export class ProofForm {
-  private readonly form = element<HTMLFormElement>("proof");
-  private readonly input = element<HTMLInputElement>("proof-input");
-
-  constructor(given: (proof: Proof) => void) {
-    this.form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      if (this.input.value.trim() === "") return;
-      const proof = proofIn(this.input.value);
-      this.input.value = "";
-      given(proof);
-    });
-  }
-
-  // Shows the form with the server's reason, or hides it.
-  show(reason: string | undefined): void {
-    const opens = reason !== undefined && this.form.hidden;
-    this.form.hidden = reason === undefined;
-    write(element("proof-reason"), reason ?? "");
-    if (opens) this.input.focus();
-  }
+// Takes a code or a token from the form that failure_card shows.
+export function listenToProof(given: (proof: Proof) => void): void {
+  const input = element<HTMLInputElement>("proof-input");
+  element<HTMLFormElement>("proof").addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (input.value.trim() === "" || element<HTMLButtonElement>("proof-send").disabled) return;
+    const proof = proofIn(input.value);
+    input.value = "";
+    given(proof);
+  });
 }
 
 // Whether the server makes codes for a client with this token (docs/identity.md): one with the role owner that is not

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Starts the page: core, view, session, panel, and the drawing loop.
 
-import { Roles, Session, type SessionListener, type SessionOptions, type Vec3 } from "@clothstream/client";
+import { Roles, Session, type Client, type SessionListener, type SessionOptions, type Vec3 } from "@clothstream/client";
+import { kNoWebAssembly, kNoWebGl, notLoaded } from "./advice";
 import { Drag } from "./drag";
 import { FrameWork } from "./frame_work";
 import { HeadsetPage } from "./headset_page";
+import { Failures } from "./failures";
 import { Hud } from "./hud";
-import { browserTokens, PairingPanel, ProofForm } from "./identity";
+import { browserTokens, listenToProof, PairingPanel } from "./identity";
 import { listenToKeys } from "./keys";
 import { element } from "./panel/dom";
 import { Panel } from "./panel/panel";
@@ -18,20 +20,22 @@ import { View } from "./view";
 import { chosenDetail, gathersNormals } from "./detail";
 
 const kFiguresPeriodMs = 250;
+const kLoadAgainMs = 3000;
 
 async function start(): Promise<void> {
-  const hud = new Hud(() => {
-    if (session.state.kind === "failed") chooseScene("");
-    else session.reconnect();
-  });
+  element("no-start").remove();
+  const hud = new Hud();
+  const failures = new Failures();
+  if (typeof WebAssembly !== "object") {
+    hud.showState("stopped");
+    return failures.stop(kNoWebAssembly);
+  }
   let view: View;
   try {
     view = new View(element<HTMLCanvasElement>("canvas"), chosenDetail(), gathersNormals());
   } catch (error) {
-    hud.showFatal(
-      "This page needs WebGL 2, which this browser does not provide. " +
-        "Turn on hardware acceleration, or use another browser.",
-    );
+    hud.showState("stopped");
+    failures.stop(kNoWebGl);
     console.error(error);
     return;
   }
@@ -42,22 +46,22 @@ async function start(): Promise<void> {
   address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
   address.search = "";
   const query = new URLSearchParams(window.location.search);
-  const scene = query.get("scene") ?? "";
+  const scene = sceneOfAddress();
   const role = query.get("role");
   const wanted = [...Roles].find(([, name]) => name === role)?.[0];
   const identity = { name: query.get("name") ?? "", role: wanted ?? 0 };
   if (role !== null && wanted === undefined)
     hud.showNotice(`"${role}" is not a role; use ${[...Roles.values()].join(", ")}.`);
-  const proof = new ProofForm((given) => session.prove(given));
+  listenToProof((given) => session.prove(given));
   const pairing = new PairingPanel(() => {
     session.client.people.createPairingCode();
     session.flush();
   });
   const listener: SessionListener = {
     stateChanged: () => {
-      hud.showState(session.state);
+      hud.showState(session.state.kind);
       panel.stateChanged();
-      proof.show(session.state.kind === "asking" ? session.state.reason : undefined);
+      failures.stateChanged();
     },
     pairingCodeMade: (client) => {
       const made = client.people.pairingCode();
@@ -107,9 +111,12 @@ async function start(): Promise<void> {
     listener,
   };
   const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset() });
-  const session: Session = await Session.open(options).catch((error: unknown) => {
-    hud.showFatal(`The client core did not start: ${error instanceof Error ? error.message : String(error)}`);
-    throw error;
+  const session: Session = await open(options, failures);
+  failures.follow(session, {
+    join: () => chooseScene(sceneOfAddress()),
+    joinDefault: () => chooseScene(""),
+    viewWanted: () => panel.showView(),
+    changed: () => headset.show(),
   });
 
   const castRay = (origin: Vec3, direction: Vec3) =>
@@ -140,9 +147,19 @@ async function start(): Promise<void> {
     session.join(name);
   }
 
-  const headset: HeadsetPage = new HeadsetPage(view, session, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) });
+  const headset: HeadsetPage = new HeadsetPage(view, session, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) }, failures);
   const work = new FrameWork();
-  const probe = expose(session, view, headset.headset, work);
+  const probe = expose(session, view, headset, panel.hud.history, work);
+
+  // Longest pause between frames since the last call, ms. 0 while none are expected.
+  function takePause(client: Client | undefined): number {
+    if (!client || panel.isPaused(client)) session.gaps.restart();
+    const pauseMs = session.gaps.take(performance.now());
+    if (client) failures.sample(pauseMs, intervalOf(client, options.temporalLayers ?? 0));
+    return pauseMs;
+  }
+  // A hidden page draws nothing, and its frames may wait.
+  document.addEventListener("visibilitychange", () => session.gaps.restart());
 
   let figuresAt = 0;
   function draw(now: number, frame?: XRFrame): void {
@@ -161,14 +178,41 @@ async function start(): Promise<void> {
     }
     if (now - figuresAt >= kFiguresPeriodMs) {
       figuresAt = now;
-      panel.refresh(client, now);
-      hud.showState(session.state);
+      const pauseMs = takePause(client);
+      panel.refresh(client, now, pauseMs);
       headset.show();
     }
     view.draw(session.client, displayTime(now, frame));
     work.add(began, view, session);
   }
   view.renderer.setAnimationLoop(draw);
+}
+
+// Opens the session. Tries again until the server has sent everything, because it may just be starting.
+async function open(options: SessionOptions, failures: Failures): Promise<Session> {
+  for (;;) {
+    try {
+      const session = await Session.open(options);
+      failures.stop(undefined);
+      return session;
+    } catch (error) {
+      const said = error instanceof Error ? error.message : String(error);
+      const isUnusable = error instanceof WebAssembly.CompileError || error instanceof WebAssembly.LinkError;
+      failures.stop(notLoaded(said, isUnusable ? undefined : performance.now() + kLoadAgainMs));
+      if (isUnusable) throw error;
+      await new Promise((done) => window.setTimeout(done, kLoadAgainMs));
+    }
+  }
+}
+
+function sceneOfAddress(): string {
+  return new URLSearchParams(window.location.search).get("scene") ?? "";
+}
+
+// Usual time between frames, ms. Fewer temporal layers halve the rate once each.
+function intervalOf({ frames }: Client, temporalLayers: number): number {
+  const skipped = temporalLayers === 0 ? 1 : 2 ** Math.max(0, 3 - temporalLayers);
+  return (1000 * frames.divisor * skipped) / Math.max(1, frames.streamRate);
 }
 
 // Time at which the frame will be seen. A headset may predict it.

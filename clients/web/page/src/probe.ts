@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
-import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Statistics, Vec3 } from "@clothstream/client";
-import type { Doing, Headset } from "@clothstream/three";
+import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Stages, Statistics, Vec3 } from "@clothstream/client";
+import * as THREE from "three";
+import type { Doing } from "@clothstream/three";
 import type { FrameWork } from "./frame_work";
+import type { HeadsetPage } from "./headset_page";
+import type { HudHistory } from "./panel/hud_history";
 import type { View } from "./view";
 
 export interface Probe {
   readonly state: SessionState["kind"];
   // Arrays are copies with 3 floats per vertex.
   readonly statistics: Statistics;
+  // Stages of the newest frame and state of play-out. Undefined before the first frame.
+  readonly stages: Stages | undefined;
   readonly positions: Float32Array;
   readonly restPositions: Float32Array | undefined;
   readonly normals: Float32Array;
@@ -26,6 +31,8 @@ export interface Probe {
   readonly participants: Participant[];
   // Defined if the scene is a recording.
   readonly playback: Playback | undefined;
+  // Longest pause between frames in the last minute, ms.
+  readonly longestPause: number;
   // Length of the largest correction by local contact, m.
   readonly localCorrection: number;
   readonly drawnFrames: number;
@@ -46,6 +53,8 @@ export interface HeadsetProbe {
   readonly frames: number; // drawn in sessions
   readonly isAnchored: boolean;
   readonly placement: number[]; // matrix from scene to room, column by column
+  readonly panel: { text: string; place: Vec3 }; // the panel in space: its lines, and its middle in the room
+  readonly shadowReach: number; // half the width of the shadow map in the room, m
   // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
   choose(doing: Doing): void;
   // Hands, controllers and rays that are there. Joints: x, y, z, radius of each, in the scene.
@@ -59,7 +68,8 @@ declare global {
 }
 
 // Call described() of the result for each description, before its first frame.
-export function expose(session: Session, view: View, headset: Headset, work: FrameWork): { described(client: Client): void } {
+export function expose(session: Session, view: View, page: HeadsetPage, history: HudHistory, work: FrameWork): { described(client: Client): void } {
+  const { headset } = page;
   let restPositions: Float32Array | undefined;
   window.clothstream = {
     get state() {
@@ -67,6 +77,9 @@ export function expose(session: Session, view: View, headset: Headset, work: Fra
     },
     get statistics() {
       return session.client.frames.statistics();
+    },
+    get stages() {
+      return session.client.frames.stages();
     },
     get positions() {
       return session.client.frames.positions().slice();
@@ -102,6 +115,9 @@ export function expose(session: Session, view: View, headset: Headset, work: Fra
     get playback() {
       return session.client.playback.state();
     },
+    get longestPause() {
+      return history.largest("pause");
+    },
     get localCorrection() {
       return session.client.frames.localCorrection;
     },
@@ -119,6 +135,8 @@ export function expose(session: Session, view: View, headset: Headset, work: Fra
         frames: headset.frameCount,
         isAnchored: headset.isAnchored,
         placement: headset.placement.matrix.toArray(),
+        panel: { text: page.panel.text, place: page.panel.mesh.getWorldPosition(new THREE.Vector3()).toArray() },
+        shadowReach: view.shadowReach,
         choose: (doing: Doing) => headset.do(doing),
         limbs: Array.from(headset.body.present(), ({ side, isHand, grabber, hand, pose }) => ({
           side,

@@ -107,18 +107,23 @@ export function setCheapShadows(light: THREE.DirectionalLight, cheap: boolean): 
   light.shadow.radius = cheap ? 0 : 1;
 }
 
-// Aims `light` at a sphere from `direction`. The shadow map leaves room for cloth that swings out of the sphere.
+// Aims `light` at a sphere from `direction`.
 export function aimSoftLight(light: THREE.DirectionalLight, sphere: THREE.Sphere, direction: THREE.Vector3): void {
   light.castShadow = true;
   light.target.position.copy(sphere.center);
   light.position.copy(direction).setLength(4 * sphere.radius).add(sphere.center);
+}
+
+// Sizes the shadow map for a lit sphere of this radius, in metres of the room. It leaves room for cloth that swings out of
+// the sphere.
+export function sizeSoftShadow(light: THREE.DirectionalLight, radius: number): void {
   const camera = light.shadow.camera;
-  camera.left = camera.bottom = (-kWidth / 2) * sphere.radius;
-  camera.right = camera.top = (kWidth / 2) * sphere.radius;
-  camera.near = kNear * sphere.radius;
-  camera.far = kFar * sphere.radius;
+  camera.left = camera.bottom = (-kWidth / 2) * radius;
+  camera.right = camera.top = (kWidth / 2) * radius;
+  camera.near = kNear * radius;
+  camera.far = kFar * radius;
   camera.updateProjectionMatrix();
   light.shadow.mapSize.setScalar(kTexels);
   light.shadow.bias = -0.0005;
-  light.shadow.normalBias = (3 * kWidth * sphere.radius) / kTexels;
+  light.shadow.normalBias = (3 * kWidth * radius) / kTexels;
 }

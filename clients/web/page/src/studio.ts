@@ -5,10 +5,12 @@ import * as THREE from "three";
 import type { Detail } from "@clothstream/three";
 import { Room, type RoomColours } from "./room";
 import { Sky, type SkyColours } from "./sky";
-import { aimSoftLight, setCheapShadows } from "./soft_shadow";
+import { aimSoftLight, setCheapShadows, sizeSoftShadow } from "./soft_shadow";
 
 const kKeyDirection = new THREE.Vector3(0.8, 1.0, 0.65).normalize();
 const kRimDirection = new THREE.Vector3(-0.8, 0.5, -0.7).normalize();
+// Scales that differ by less are the same: a matrix gives them with the error of its floats.
+const kSameScale = 1e-4;
 
 interface Scheme {
   key: number;
@@ -67,7 +69,10 @@ export class Studio {
   private readonly catcher = new THREE.Mesh(new THREE.CircleGeometry(1, 48), new THREE.ShadowMaterial({ opacity: 0.4 }));
   private readonly dark = window.matchMedia("(prefers-color-scheme: dark)");
   private readonly bounds = new THREE.Box3();
+  private readonly sphere = new THREE.Sphere();
   private floorHeight = 0;
+  private diagonal = 0; // of the drawn room
+  private roomScale = 1;
   private reflected: THREE.WebGLRenderTarget | undefined;
   private sky: Sky | undefined; // whose reflections are not made yet
 
@@ -114,18 +119,39 @@ export class Studio {
     return kKeyDirection.clone();
   }
 
+  // Half the width of the shadow map, m of the user's room.
+  get shadowReach(): number {
+    return this.key.shadow.camera.right;
+  }
+
   fit(bounds: THREE.Box3, floorHeight: number): void {
     this.bounds.copy(bounds);
     this.floorHeight = floorHeight;
-    const sphere = bounds.getBoundingSphere(new THREE.Sphere());
-    const diagonal = this.room.fit(bounds, floorHeight, kKeyDirection, this.scheme.room);
-    this.fog.near = 1.3 * diagonal;
-    this.fog.far = 4 * diagonal;
+    const sphere = bounds.getBoundingSphere(this.sphere);
+    this.diagonal = this.room.fit(bounds, floorHeight, kKeyDirection, this.scheme.room);
     this.catcher.position.set(sphere.center.x, floorHeight, sphere.center.z);
     this.catcher.scale.setScalar(3 * sphere.radius);
     aimSoftLight(this.key, sphere, kKeyDirection);
     this.rim.target.position.copy(sphere.center);
     this.rim.position.copy(kRimDirection).multiplyScalar(4 * sphere.radius).add(sphere.center);
+    this.measure();
+  }
+
+  // Metres of the user's room per metre of the scene. Places of lights and meshes scale with the scene by themselves; fog
+  // and shadow map are measured in the user's room.
+  get scale(): number {
+    return this.roomScale;
+  }
+  set scale(scale: number) {
+    if (Math.abs(scale / this.roomScale - 1) < kSameScale) return;
+    this.roomScale = scale;
+    this.measure();
+  }
+
+  private measure(): void {
+    this.fog.near = 1.3 * this.diagonal * this.roomScale;
+    this.fog.far = 4 * this.diagonal * this.roomScale;
+    sizeSoftShadow(this.key, this.sphere.radius * this.roomScale);
   }
 
   private get scheme(): Scheme {

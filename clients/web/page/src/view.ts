@@ -48,7 +48,10 @@ export class View {
     this.studio = new Studio(this.renderer, detail, (reflections) => this.colliderMeshes.reflect(reflections));
     this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group);
     this.orbit = new OrbitControls(this.camera, canvas);
-    this.orbit.enableDamping = true;
+    const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+    const damp = () => (this.orbit.enableDamping = !calm.matches);
+    calm.addEventListener("change", damp);
+    damp();
     this.orbit.dampingFactor = 0.12;
     this.fit();
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -119,6 +122,7 @@ export class View {
       this.people.place(colliders, this.studio.scene.worldToLocal(eye.getWorldPosition(this.eye)), !isPresenting);
     }
     if (!this.renderer.xr.isPresenting) this.orbit.update();
+    this.studio.scale = this.scene.matrix.getMaxScaleOnAxis();
     this.studio.cheapShadows = this.detail === "reduced" || this.renderer.xr.isPresenting;
     if (shows && ++this.shownFrames > kPlainFrames && !this.renderer.xr.isPresenting) this.studio.complete();
     const shown = performance.now();
@@ -185,6 +189,11 @@ export class View {
       frame.left + ((projected.x + 1) / 2) * frame.width,
       frame.top + ((1 - projected.y) / 2) * frame.height,
     ];
+  }
+
+  // Half the width of the shadow map, m of the user's room.
+  get shadowReach(): number {
+    return this.studio.shadowReach;
   }
 
   // Position of a point's shadow on the floor, cast by the key light.

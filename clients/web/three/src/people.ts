@@ -5,8 +5,6 @@ import * as THREE from "three";
 import { Shape, type Collider, type Participant } from "@clothstream/client";
 import { NameLabel } from "./name_label";
 
-// Smallest radius of a sphere that is drawn as a head, m. Spheres of controllers and fingers are smaller.
-const kHeadRadius = 0.07;
 const kOwnOpacity = 0.16;
 // Colours that differ in hue and in brightness.
 const kColours = [0x4f9bd9, 0xe08a4a, 0x6fb56a, 0xc779b8, 0xd9c04f, 0x5fc4bd, 0xd96a6a, 0x8f86dd].map(
@@ -21,7 +19,6 @@ export class People {
   private readonly own = new Figures(kOwnOpacity);
   private readonly participants = new Map<bigint, Participant>();
   private readonly labels = new Map<bigint, NameLabel>();
-  private readonly heads = new Map<bigint, Collider>();
 
   constructor() {
     this.group.add(this.others.group, this.own.group);
@@ -44,16 +41,14 @@ export class People {
     this.others.begin();
     this.own.begin();
     for (const label of this.labels.values()) label.sprite.visible = false;
-    const heads = headsOf(colliders, this.heads);
     for (const collider of colliders) {
       const id = collider.participantId;
       if (id === 0n) continue;
       const self = this.participants.get(id)?.self === true;
-      const head = heads.get(id) === collider;
-      if (self && (head || !showOwn)) continue;
+      if (self && (collider.isHead || !showOwn)) continue;
       const figures = self ? this.own : this.others;
       figures.add(collider, colourOf(id));
-      if (head) {
+      if (collider.isHead) {
         if (turned(collider)) figures.addVisor(collider);
         this.placeLabel(id, collider, eye);
       }
@@ -90,17 +85,6 @@ export class People {
 // Colour of a participant, the same for everyone.
 export function colourOf(id: bigint): THREE.Color {
   return kColours[Number(id % BigInt(kColours.length))]!;
-}
-
-// The head of each participant: the highest sphere that is large enough. Replaces the content of `heads`, and returns it.
-export function headsOf(colliders: readonly Collider[], heads = new Map<bigint, Collider>()): Map<bigint, Collider> {
-  heads.clear();
-  for (const collider of colliders) {
-    if (collider.participantId === 0n || collider.shape !== Shape.sphere || collider.radius < kHeadRadius) continue;
-    const other = heads.get(collider.participantId);
-    if (!other || collider.position[1] > other.position[1]) heads.set(collider.participantId, collider);
-  }
-  return heads;
 }
 
 // Whether the orientation is known. Programs that do not know it send none, which is the identity.

@@ -22,7 +22,7 @@ interface Cell {
   unit: string;
   channel: Channel;
   digits: number;
-  sums?: boolean; // shows the sum over the whole time
+  shows?: "sum" | "largest"; // over the whole time, instead of the newest value
 }
 
 const kCells: readonly Cell[] = [
@@ -32,7 +32,8 @@ const kCells: readonly Cell[] = [
   { label: "round trip", unit: "ms", channel: "roundTrip", digits: 1 },
   { label: "network", unit: "kbit/s", channel: "kbit", digits: 0 },
   { label: "precision", unit: "bit/vertex", channel: "bitsPerVertex", digits: 1 },
-  { label: "dropped in a minute", unit: "", channel: "drops", digits: 0, sums: true },
+  { label: "longest pause", unit: "ms", channel: "pause", digits: 0, shows: "largest" },
+  { label: "dropped", unit: "/min", channel: "drops", digits: 0, shows: "sum" },
 ];
 const kStageLabels = ["up", "server", "down", "decode", "play-out"];
 
@@ -46,9 +47,8 @@ export function drawHud(context: CanvasRenderingContext2D, history: HudHistory, 
   context.textBaseline = "alphabetic";
   context.lineJoin = "round";
   kCells.forEach((cell, index) => {
-    const wide = index === kCells.length - 1 ? 2 : 1;
     const x = (index % kColumns) * kCellWidth;
-    drawCell(context, history, theme, cell, x, Math.floor(index / kColumns) * (kCellHeight + kGap), wide * kCellWidth - kGap);
+    drawCell(context, history, theme, cell, x, Math.floor(index / kColumns) * (kCellHeight + kGap), kCellWidth - kGap);
   });
   drawStages(context, history, theme, 2 * (kCellHeight + kGap));
 }
@@ -61,8 +61,9 @@ export function hudText(history: HudHistory): string {
   return `${figures.join(", ")}; pose to picture ${history.latency().toFixed(1)} ms: ${stages.join(", ")}.`;
 }
 
-function textOf(history: HudHistory, { channel, digits, sums }: Cell): string {
-  return (sums ? history.sum(channel) : history.at(channel)).toFixed(digits);
+function textOf(history: HudHistory, { channel, digits, shows }: Cell): string {
+  const value = shows === "sum" ? history.sum(channel) : shows === "largest" ? history.largest(channel) : history.at(channel);
+  return value.toFixed(digits);
 }
 
 function drawCell(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme, cell: Cell, x: number, y: number, width: number): void {
@@ -71,7 +72,7 @@ function drawCell(context: CanvasRenderingContext2D, history: HudHistory, theme:
   context.fillText(cell.label, x, y + 10);
   const text = textOf(history, cell);
   context.font = `600 15px ${theme.font}`;
-  context.fillStyle = cell.sums && history.sum(cell.channel) > 0 ? theme.bad : theme.text;
+  context.fillStyle = cell.shows === "sum" && history.sum(cell.channel) > 0 ? theme.bad : theme.text;
   context.fillText(text, x, y + 27);
   const end = x + context.measureText(text).width + 4;
   context.font = `10px ${theme.font}`;

@@ -9,6 +9,7 @@ export const kChannels = [
   "kbit", // kilobits per second
   "bitsPerVertex",
   "drops", // frames lost since the sample before
+  "pause", // longest time between two frames since the sample before, ms
   // Stages from a pose to its picture, ms.
   "uplink",
   "server",

@@ -41,8 +41,9 @@ export class HudPanel {
     ++this.drawn;
   }
 
-  // Takes a sample, also without a connection. Call about four times a second.
-  sample(client: Client | undefined, now: number): void {
+  // Takes a sample, also without a connection. Call about four times a second. `pauseMs` is the longest pause between frames
+  // since the last call.
+  sample(client: Client | undefined, now: number, pauseMs: number): void {
     const seconds = (now - this.sampledAt) / 1000;
     const statistics = client?.frames.statistics();
     const stages = client?.frames.stages();
@@ -61,6 +62,7 @@ export class HudPanel {
       kbit: statistics?.kbitPerSecond ?? 0,
       bitsPerVertex: statistics?.bitsPerVertex ?? 0,
       drops: Math.max(0, dropped - this.dropped),
+      pause: pauseMs,
       ...poseStages(statistics, stages),
     });
     this.dropped = dropped;

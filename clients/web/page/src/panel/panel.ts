@@ -101,12 +101,26 @@ export class Panel {
     this.cloth.apply(client);
   }
 
-  // Updates figures and the list of scenes. Call about four times a second.
-  refresh(client: Client | undefined, now: number): void {
-    this.hud.sample(client, now);
+  // Whether the scene sends no frames, because it stands still.
+  isPaused(client: Client): boolean {
+    return this.scenes.isPaused || client.playback.state()?.paused === true;
+  }
+
+  // Opens the tab View at the choices of quality and frame rate.
+  showView(): void {
+    this.tabs.open(true);
+    this.tabs.select("view");
+    element("quality").focus();
+  }
+
+  // Updates figures and the list of scenes. Call about four times a second. `pauseMs` is the longest pause between frames
+  // since the last call.
+  refresh(client: Client | undefined, now: number, pauseMs: number): void {
+    this.hud.sample(client, now, pauseMs);
     if (!client || !this.tabs.isOpen) return;
     if (this.tabs.current === "air") this.controls.showRadius(client);
     if (this.tabs.current === "cloth") this.cloth.showReport(client);
+    if (this.tabs.current === "air") this.controls.showRadius(client);
     if (this.tabs.current === "scene" && now - this.listedAt >= kListPeriodMs) this.wantList();
   }
 

@@ -36,6 +36,11 @@ export class Scenes {
     this.buttons.delete.addEventListener("click", () => void this.delete());
   }
 
+  // Whether the joined scene is paused, by the newest list.
+  get isPaused(): boolean {
+    return this.joined?.paused === true;
+  }
+
   // A scene was made from a file.
   made(scene: string, repairs: string): void {
     this.say([`${scene} is ready.`, ...repairs.split("\n")].join(" ").trim(), "done");

@@ -54,7 +54,7 @@ export class Tabs {
     this.shown(tab);
   }
 
-  private open(open: boolean): void {
+  open(open: boolean): void {
     document.body.dataset["panel"] = open ? "open" : "closed";
     const button = element("panel-open");
     button.hidden = open;

@@ -2,7 +2,7 @@
 // The user of a headset as colliders and grabs of the scene: hands, controllers and head.
 
 import * as THREE from "three";
-import { HandSide, Shape, type Grab, type Input, type OwnCollider } from "@clothstream/client";
+import { HandSide, Shape, type Grab, type Head, type Input, type OwnCollider } from "@clothstream/client";
 import { kReach, type Touchable } from "./grabber";
 import { Limb } from "./limb";
 
@@ -19,6 +19,7 @@ export class Body {
   private readonly limbs = new Map<string, Limb>();
   private readonly sides = { left: false, right: false }; // hands that the server has
   private collides = false; // whether the server has colliders
+  private heads = false; // whether the server has the head
   private grabs = 0; // number of grabs that the server has
   private readonly limbOf = new Map<XRInputSource, Limb>();
 
@@ -75,7 +76,6 @@ export class Body {
   send(input: Input, scale: number): void {
     const colliders: OwnCollider[] = [];
     const grabs: Grab[] = [];
-    if (this.headPresent) colliders.push({ ...sphere(this.head, kHeadRadius / scale), orientation: [this.look.x, this.look.y, this.look.z, this.look.w] });
     const hands = { left: false, right: false };
     for (const limb of this.present()) {
       const grab = limb.grabber.grab(limb.pose);
@@ -91,6 +91,8 @@ export class Body {
       if (this.sides[side] && !hands[side]) input.setHand(kSides[side], undefined);
       this.sides[side] = hands[side];
     }
+    if (this.headPresent || this.heads) input.setHead(this.headPresent ? this.ownHead(scale) : undefined);
+    this.heads = this.headPresent;
     if (colliders.length > 0 || this.collides) input.setColliders(colliders);
     this.collides = colliders.length > 0;
     if (grabs.length > 0 || this.grabs > 0) input.setGrabs(grabs);
@@ -102,6 +104,11 @@ export class Body {
     this.limbs.clear();
     this.headPresent = false;
     this.send(input, 1);
+  }
+
+  private ownHead(scale: number): Head {
+    const { x, y, z, w } = this.look;
+    return { position: this.head.toArray(), orientation: [x, y, z, w], radius: kHeadRadius / scale };
   }
 
   private limb(source: XRInputSource): Limb | undefined {

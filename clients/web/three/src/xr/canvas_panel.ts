@@ -53,6 +53,11 @@ export class CanvasPanel {
     this.draw();
   }
 
+  // Title and texts of the rows, one a line.
+  get text(): string {
+    return [this.title, ...this.rows.map(({ text }) => text)].join("\n");
+  }
+
   // Follows rays and fingers, and presses buttons that a finger goes through. `toWorld` leads from the scene, in which
   // the limbs are, to the world.
   update(body: Body, toWorld: THREE.Matrix4): void {
