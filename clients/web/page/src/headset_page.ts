@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Headsets on the page: buttons to enter, and a panel in space with scenes, people and placement.
+// Headsets on the page: buttons to enter, and a panel in space.
 
-import { Roles, type Client, type Session } from "@clothstream/client";
-import { CanvasPanel, Headset, Immersion, type Doing, type Mode, type PanelRow } from "@clothstream/three";
+import type { Client, Session } from "@clothstream/client";
+import { CanvasPanel, Headset, Immersion, type Mode } from "@clothstream/three";
+import { HeadsetPanel } from "./headset_panel";
 import { element, write } from "./panel/dom";
+import type { Panel } from "./panel/panel";
 import type { View } from "./view";
 
-const kMostScenes = 6;
-const kMostPeople = 3;
 const kEyes = 1.5; // m
-// Place of the panel: to the left of the user's first look, in metres from the user's feet.
-const kPanelPlace = { x: -0.55, y: 1.25, z: -0.55 };
+// Place of the panel in metres from the feet of the user: to the left of the first look, nearer than the scene.
+const kPanelPlace = { x: -0.6, y: 1.25, z: -0.3 };
 // It faces the user's eyes.
 const kPanelTurn = Math.atan2(-kPanelPlace.x, -kPanelPlace.z);
 const kPanelTilt = -Math.atan2(kEyes - kPanelPlace.y, Math.hypot(kPanelPlace.x, kPanelPlace.z));
@@ -22,12 +22,13 @@ export interface HeadsetPageListener {
 
 export class HeadsetPage {
   readonly headset: Headset;
-  private readonly panel = new CanvasPanel();
-  private scenes: string[] = [];
+  readonly panel = new CanvasPanel();
+  private readonly content: HeadsetPanel;
 
   constructor(
     view: View,
     private readonly session: Session,
+    panel: Panel,
     private readonly listener: HeadsetPageListener,
   ) {
     this.headset = new Headset(
@@ -51,6 +52,12 @@ export class HeadsetPage {
         doingChanged: () => this.show(),
       },
     );
+    this.content = new HeadsetPanel(session, panel, {
+      sceneChosen: (scene) => listener.sceneChosen(scene),
+      doingChosen: (doing) => this.headset.do(doing),
+      left: () => void this.headset.leave(),
+      changed: () => this.show(),
+    });
     this.headset.seat.add(this.panel.mesh);
     this.panel.mesh.position.set(kPanelPlace.x, kPanelPlace.y, kPanelPlace.z);
     this.panel.mesh.rotation.set(kPanelTilt, kPanelTurn, 0, "YXZ");
@@ -70,21 +77,12 @@ export class HeadsetPage {
   // Updates the panel.
   show(): void {
     if (!this.headset.session) return;
-    const { client, state } = this.session;
-    this.scenes = client.requests.scenes().map(({ name }) => name);
-    const rows: PanelRow[] = [{ text: statusText(this.session) }];
-    const hint = kHints[this.headset.doing];
-    if (hint) rows.push({ text: hint });
-    if (state.kind === "failed") rows.push({ text: "Join the default scene", action: () => this.listener.sceneChosen("") });
-    if (this.headset.mode === "immersive-ar") rows.push({ text: "Place on a surface", action: () => this.headset.do("place") });
-    else rows.push({ text: "Place before me", action: () => this.headset.do("place") });
-    rows.push({ text: "Share this room: touch two points", action: () => this.headset.do("points") });
-    for (const scene of this.scenes.slice(0, kMostScenes))
-      rows.push({ text: scene.replaceAll("_", " "), isChosen: scene === client.sceneName, action: () => this.listener.sceneChosen(scene) });
-    for (const { name, role, self, away } of client.people.participants().slice(0, kMostPeople))
-      rows.push({ text: self ? `${name} (you)` : name, detail: away ? "away" : (Roles.get(role) ?? "") });
-    rows.push({ text: "Leave", action: () => void this.headset.leave() });
-    this.panel.show(client.sceneName || "ClothStream", rows);
+    this.panel.show(this.session.client.sceneName || "ClothStream", this.content.rows(this.headset.mode, this.headset.doing));
+  }
+
+  // Shows a message on the panel for a moment.
+  say(text: string): void {
+    this.content.say(text);
   }
 
   // Shows a button for each mode that the device offers, or says what is missing.
@@ -119,27 +117,6 @@ const kButtons: readonly (readonly [Mode, string])[] = [
   ["immersive-ar", "enter-ar"],
 ];
 
-const kHints: Record<Doing, string | undefined> = {
-  touch: undefined,
-  place: "Look at a surface and press",
-  points: "Touch the first point, then the second, and press at each",
-};
-
 const kInsecure =
   "Headsets enter VR only on a secure page. Start the server with --tls self, open its https address on the headset, and " +
   "accept the certificate there.";
-
-function statusText({ state, client }: Session): string {
-  switch (state.kind) {
-    case "live": {
-      const { framesPerSecond, roundTripMs } = client.frames.statistics();
-      return `${Math.round(framesPerSecond)} frames/s, round trip ${Math.round(roundTripMs)} ms`;
-    }
-    case "reconnecting":
-      return `${state.reason} Reconnecting.`;
-    case "connecting":
-      return "Connecting";
-    default:
-      return state.reason;
-  }
-}

@@ -87,11 +87,11 @@ async function start(): Promise<void> {
       }
     },
     notice: (text) => {
-      hud.showNotice(text);
+      notify(text);
       panel.noticed();
     },
     refused: (client) => {
-      hud.showNotice(client.errorText);
+      notify(client.errorText);
       panel.refused(client);
     },
   };
@@ -105,7 +105,7 @@ async function start(): Promise<void> {
     temporalLayers: limit("layers", 3),
     listener,
   };
-  const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset() });
+  const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset(), said: (text) => headset.say(text) });
   const session: Session = await Session.open(options).catch((error: unknown) => {
     hud.showFatal(`The client core did not start: ${error instanceof Error ? error.message : String(error)}`);
     throw error;
@@ -139,8 +139,13 @@ async function start(): Promise<void> {
     session.join(name);
   }
 
-  const headset: HeadsetPage = new HeadsetPage(view, session, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) });
-  const probe = expose(session, view, headset.headset);
+  function notify(text: string): void {
+    hud.showNotice(text);
+    headset.say(text);
+  }
+
+  const headset: HeadsetPage = new HeadsetPage(view, session, panel, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) });
+  const probe = expose(session, view, headset);
 
   let figuresAt = 0;
   function draw(now: number, frame?: XRFrame): void {

@@ -2,7 +2,8 @@
 // `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
 import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Statistics, Vec3 } from "@clothstream/client";
-import type { Doing, Headset } from "@clothstream/three";
+import type { Doing } from "@clothstream/three";
+import type { HeadsetPage } from "./headset_page";
 import type { View } from "./view";
 
 export interface Probe {
@@ -44,6 +45,12 @@ export interface HeadsetProbe {
   readonly placement: number[]; // matrix from scene to room, column by column
   // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
   choose(doing: Doing): void;
+  // The panel in space: its picture, lines of text, and buttons with the places of their middles in the room.
+  readonly panel: {
+    readonly canvas: HTMLCanvasElement;
+    readonly texts: string[];
+    readonly buttons: { text: string; isChosen: boolean; isEnabled: boolean; place: Vec3 }[];
+  };
   // Hands, controllers and rays that are there. Joints: x, y, z, radius of each, in the scene.
   readonly limbs: { side: string; isHand: boolean; holds: boolean; joints: number[]; point: Vec3 }[];
 }
@@ -55,7 +62,7 @@ declare global {
 }
 
 // Call described() of the result for each description, before its first frame.
-export function expose(session: Session, view: View, headset: Headset): { described(client: Client): void } {
+export function expose(session: Session, view: View, { headset, panel }: HeadsetPage): { described(client: Client): void } {
   let restPositions: Float32Array | undefined;
   window.clothstream = {
     get state() {
@@ -109,6 +116,11 @@ export function expose(session: Session, view: View, headset: Headset): { descri
         isAnchored: headset.isAnchored,
         placement: headset.placement.matrix.toArray(),
         choose: (doing: Doing) => headset.do(doing),
+        panel: {
+          canvas: panel.canvas,
+          texts: panel.texts,
+          buttons: panel.buttons.map((button) => ({ ...button, place: button.place.toArray() })),
+        },
         limbs: Array.from(headset.body.present(), ({ side, isHand, grabber, hand, pose }) => ({
           side,
           isHand,
