@@ -36,9 +36,9 @@ export function launchBrowser() {
 }
 
 // Opens a page. `prepare` runs in it before its own scripts. Errors of the page are collected in `errors`. Without a
-// viewport the page is small, and takes the size of a picture only for screenshots.
-export async function openPage(browser, url, { prepare, viewport } = {}) {
-  const page = await browser.newPage({ viewport: viewport ?? kQuick });
+// viewport the page is small, and takes the size of a picture only for screenshots. `touch` gives it a touch screen.
+export async function openPage(browser, url, { prepare, viewport, touch = false } = {}) {
+  const page = await browser.newPage({ viewport: viewport ?? kQuick, hasTouch: touch });
   page.grows = viewport === undefined;
   page.setDefaultTimeout(kWaitMs);
   page.errors = [];

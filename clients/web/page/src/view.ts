@@ -5,6 +5,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Shape, type Client, type Vec3 } from "@clothstream/client";
 import { Cloths, ColliderMeshes, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
+import { Fingers } from "./fingers";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
 
@@ -16,6 +17,7 @@ const kTurnStep = Math.PI / 36;
 export class View {
   readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
   readonly orbit: OrbitControls;
+  readonly fingers: Fingers;
   readonly renderer: THREE.WebGLRenderer;
   private readonly studio: Studio;
   private readonly colliderMeshes = new ColliderMeshes();
@@ -23,6 +25,7 @@ export class View {
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private readonly cloths: Cloths;
   private readonly eye = new THREE.Vector3();
+  private isMoved = false; // by the user, since the last reset
   private floorHeight = 0;
 
   // Throws if the browser does not provide WebGL 2.
@@ -30,6 +33,7 @@ export class View {
     readonly canvas: HTMLCanvasElement,
     private readonly detail: Detail,
   ) {
+    this.fingers = new Fingers(canvas);
     useSoftShadows();
     this.cloths = new Cloths(detail);
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
@@ -42,6 +46,7 @@ export class View {
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.enableDamping = true;
     this.orbit.dampingFactor = 0.12;
+    this.orbit.addEventListener("start", () => (this.isMoved = true));
     this.fit();
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
@@ -115,6 +120,7 @@ export class View {
 
   // Moves the camera to the default view, which shows the whole scene in a canvas of any shape.
   reset(): void {
+    this.isMoved = false;
     const centre = this.bounds.getCenter(new THREE.Vector3());
     this.camera.position.copy(centre).add(kViewDirection);
     this.camera.lookAt(centre);
@@ -146,6 +152,7 @@ export class View {
 
   // Turns the camera around its target, in steps of kTurnStep to the right and up.
   turn(right: number, up: number): void {
+    this.isMoved = true;
     const offset = this.camera.position.clone().sub(this.orbit.target);
     const spherical = new THREE.Spherical().setFromVector3(offset);
     spherical.theta += right * kTurnStep;
@@ -154,6 +161,7 @@ export class View {
   }
 
   zoom(factor: number): void {
+    this.isMoved = true;
     this.camera.position.sub(this.orbit.target).multiplyScalar(factor).add(this.orbit.target);
   }
 
@@ -197,6 +205,7 @@ export class View {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
+    if (!this.isMoved) this.reset();
     // The new size has cleared the picture.
     this.renderer.render(this.studio.scene, this.camera);
   }
