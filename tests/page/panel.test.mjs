@@ -9,8 +9,10 @@ import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { kChromium, launchBrowser, openPage, takePicture, untilFrames, untilState } from "./browser.mjs";
 import { poorContrast } from "./contrast.mjs";
-import { dropFile, sheetGlb } from "./mesh_files.mjs";
+import { dracoGlb, dropFile, fineObj, sheetGlb } from "./mesh_files.mjs";
 import { startServer } from "./server.mjs";
+import { fingersOn } from "./touch.mjs";
+import { kClothParameters } from "../../clients/web/client/dist/tables.js";
 
 const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
 if (!existsSync(kChromium)) {
@@ -129,22 +131,192 @@ test("a file dropped on the picture becomes a scene whose pins hold; it is pause
     await page.waitForFunction(() => !document.querySelector('[data-scene="grandma_s_tablecloth"]'));
   }));
 
-test("pins are painted in the preview", () =>
-  withPage("", { viewport: { width: 1000, height: 900 } }, async (page) => {
-    await dropFile(page, "sheet.glb", sheetGlb(8));
+// The places of the canvas of the preview, as fractions of its size.
+async function previewOf(page) {
+  const frame = await page.locator("#preview").boundingBox();
+  return { frame, at: (x, y) => [frame.x + x * frame.width, frame.y + y * frame.height] };
+}
+
+const pinned = (page) => page.evaluate(() => Array.from(window.clothstream.pinned));
+
+// A flat sheet of 41 x 41 vertices, 2.5 cm apart, falls from 2 m where it is not pinned.
+test("a scene holds its cloth where pins are painted, and nowhere else", () =>
+  withPage("", { viewport: { width: 1000, height: 1000 } }, async (page) => {
+    const size = 41;
+    const placeOf = (vertex) => [(vertex % size) / (size - 1) - 0.5, 2, Math.floor(vertex / size) / (size - 1) - 0.5];
+    await dropFile(page, "painted.glb", sheetGlb(size, { flat: true }));
     await page.waitForSelector("#create-fields:not([hidden])");
     await page.selectOption("#create-pins", "none");
     assert.match(await page.textContent("#create-mesh"), /no pins/);
-    const frame = await page.locator("#preview").boundingBox();
-    // The corner at the lower left of the mesh: the picture is 560 x 360 with a margin of 18.
-    const scale = frame.width / 560;
-    const corner = [frame.x + (280 - 162) * scale, frame.y + (360 - 18) * scale];
-    await page.mouse.click(...corner);
-    await untilText(page, "#create-mesh", /, 1 pinned/);
+
+    // A click in the middle pins a disc of half the brush.
+    await page.fill("#pin-brush", "20");
+    const { at } = await previewOf(page);
+    await page.mouse.click(...at(0.5, 0.5));
+    const disc = await pinned(page);
+    assert.ok(disc.length > 35 && disc.length < 60, `${disc.length} vertices`);
+    for (const vertex of disc) {
+      const [x, , z] = placeOf(vertex);
+      assert.ok(Math.hypot(x, z) < 0.115, `${x}, ${z} is pinned`);
+    }
+    // A stroke to the right leaves no gap. A stroke with Shift, or the tool Free, frees.
+    await page.mouse.move(...at(0.5, 0.5));
+    await page.mouse.down();
+    await page.mouse.move(...at(0.7, 0.5), { steps: 2 });
+    await page.mouse.up();
+    const stroke = await pinned(page);
+    const end = Math.max(...stroke.map((vertex) => placeOf(vertex)[0]));
+    assert.ok(end > 0.2, `the stroke ends at x = ${end}`);
+    for (let column = 20; placeOf(column)[0] < end - 0.1; ++column) assert.ok(stroke.includes(20 * size + column), `column ${column}`);
     await page.keyboard.down("Shift");
-    await page.mouse.click(...corner);
+    await page.mouse.click(...at(0.5, 0.5));
     await page.keyboard.up("Shift");
-    await untilText(page, "#create-mesh", /no pins/);
+    assert.ok(!(await pinned(page)).includes(20 * size + 20));
+    await page.click("#pin-undo");
+    assert.deepEqual(await pinned(page), stroke);
+    await page.check('input[name="pin-tool"][value="free"]', { force: true });
+    await page.mouse.click(...at(0.5, 0.5));
+    assert.ok((await pinned(page)).length < stroke.length);
+    await page.focus("#preview");
+    await page.keyboard.press("Control+z");
+    assert.deepEqual(await pinned(page), stroke);
+    await page.click("#pin-undo");
+    assert.deepEqual(await pinned(page), disc);
+
+    // The right button turns the mesh. The middle of the picture is still the middle of the mesh.
+    const before = await page.locator("#preview").screenshot();
+    await page.mouse.move(...at(0.5, 0.5));
+    await page.mouse.down({ button: "right" });
+    await page.mouse.move(...at(0.6, 0.35), { steps: 3 });
+    await page.mouse.up({ button: "right" });
+    assert.notDeepEqual(await page.locator("#preview").screenshot(), before);
+    assert.deepEqual(await pinned(page), disc);
+    await page.check('input[name="pin-tool"][value="pin"]', { force: true });
+    await page.fill("#pin-brush", "16");
+    await page.mouse.click(...at(0.5, 0.5));
+    assert.ok((await pinned(page)).length - disc.length < 12, "the same place is pinned again");
+    // The corner nearest to the viewer, in the turned picture.
+    await page.mouse.move(...at(0.62, 0.62));
+    await page.mouse.down();
+    await page.mouse.up();
+    const pins = await pinned(page);
+    const second = pins.filter((vertex) => !disc.includes(vertex) && Math.hypot(placeOf(vertex)[0], placeOf(vertex)[2]) > 0.12);
+    assert.ok(second.length > 5, `${second.length} vertices in the second place`);
+    await takePicture(page, "panel_painted");
+
+    await page.selectOption("#create-material", "denim");
+    await page.click("#create-send");
+    await untilScene(page, "painted");
+    assert.equal(await page.inputValue("#material"), "denim");
+    // The server changes the order of vertices, so they are found by their places. Next to pins, the cloth bends little.
+    const look = (places) => {
+      const { positions, restPositions: rest } = window.clothstream;
+      const away = (a, i, b, j) => Math.hypot(a[i] - b[j], a[i + 1] - b[j + 1], a[i + 2] - b[j + 2]);
+      const seen = { vertices: rest.length / 3, held: 0, heldMost: 0, freeLeast: Infinity };
+      for (let i = 0; i < rest.length; i += 3) {
+        let nearest = Infinity;
+        for (let pin = 0; pin < places.length; pin += 3) nearest = Math.min(nearest, away(rest, i, places, pin));
+        const moved = away(positions, i, rest, i);
+        if (nearest < 1e-3) {
+          ++seen.held;
+          seen.heldMost = Math.max(seen.heldMost, moved);
+        } else if (nearest > 0.06) seen.freeLeast = Math.min(seen.freeLeast, moved);
+      }
+      return seen;
+    };
+    const places = pins.flatMap(placeOf);
+    await page.waitForFunction(([source, all]) => eval(`(${source})`)(all).freeLeast > 0.005, [String(look), places]);
+    const { vertices, held, heldMost } = await page.evaluate(look, places);
+    assert.equal(vertices, size * size);
+    assert.equal(held, pins.length);
+    assert.ok(heldMost < 0.004, `a pinned vertex moved ${heldMost} m`);
+    await page.click("#scene-delete");
+    await page.click("#confirm-yes");
+    await untilScene(page, "sphere_drop");
+  }));
+
+test("pins are chosen by a box with the keyboard, and by fingers", () =>
+  withPage("", { viewport: { width: 1000, height: 1000 }, touch: true }, async (page) => {
+    await dropFile(page, "sheet.glb", sheetGlb(8));
+    await page.waitForSelector("#create-fields:not([hidden])");
+    await page.focus("#create-pins");
+    await page.keyboard.type("a box");
+    await page.waitForSelector("#create-box:not([hidden])");
+    assert.equal((await pinned(page)).length, 8, "the upper tenth");
+    await page.getByLabel("Bottom to top, from, percent").fill("50");
+    await page.getByLabel("Left to right, to, percent").fill("50");
+    assert.deepEqual(await pinned(page), [0, 1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19, 24, 25, 26, 27]);
+
+    await page.selectOption("#create-pins", "none");
+    await page.locator("#preview").scrollIntoViewIfNeeded();
+    const { at } = await previewOf(page);
+    const fingers = await fingersOn(page);
+    await fingers.down(at(0.5, 0.5));
+    await fingers.move(4, at(0.65, 0.5));
+    await fingers.up();
+    const painted = await pinned(page);
+    assert.ok(painted.length >= 2, `${painted.length} vertices`);
+    // Two fingers turn and zoom. What the first one has begun to paint goes.
+    const before = await page.locator("#preview").screenshot();
+    await fingers.down(at(0.4, 0.7));
+    await fingers.down(at(0.4, 0.7), at(0.6, 0.7));
+    await fingers.move(4, at(0.3, 0.6), at(0.8, 0.6));
+    await fingers.up(1);
+    await fingers.up();
+    assert.deepEqual(await pinned(page), painted);
+    assert.notDeepEqual(await page.locator("#preview").screenshot(), before);
+  }));
+
+test("a mesh that does not fit the world is scaled after a question", () =>
+  withPage("", { viewport: { width: 1000, height: 900 } }, async (page) => {
+    await dropFile(page, "map.obj", Buffer.from("v 0 0 0\nv 25400 0 0\nv 0 12000 0\nf 1 2 3\n"));
+    await untilText(page, "#confirm-text", /map\.obj is 25,400 x 12,000 x 0 m large and reaches 25,400 m from the origin; .*Scale it to 2 m\?$/);
+    await page.click("#confirm button[value=no]");
+    assert.equal(await page.inputValue("#create-size"), "", "the user gives a size");
+    await page.click("#create-send");
+    assert.equal(await page.evaluate(() => document.getElementById("create-size").validity.valueMissing), true);
+    await dropFile(page, "map.obj", Buffer.from("v 0 0 0\nv 25400 0 0\nv 0 12000 0\nf 1 2 3\n"));
+    await page.click("#confirm-yes");
+    await page.waitForFunction(() => document.getElementById("create-size").value === "2");
+
+    // The server scales what is too small, and says so.
+    await dropFile(page, "lace.obj", fineObj(400));
+    await page.waitForFunction(() => document.getElementById("create-name").value === "lace");
+    await page.fill("#create-size", "0.02");
+    await page.click("#create-send");
+    await untilText(page, "#confirm-text", /With a longest side of 0\.02 m, lace\.obj has edges with a mean length of 0\.0\d+ mm; .*Scale it to 2 m\?$/);
+    await page.click("#confirm button[value=no]");
+    assert.ok(await page.isVisible("#create-fields"), "nothing is sent");
+    await page.click("#create-send");
+    await page.click("#confirm-yes");
+    await untilScene(page, "lace");
+    assert.match(await page.textContent("#scene-result"), /^lace is ready\. .*2 m/);
+    const size = await page.evaluate(() => {
+      const xs = Array.from(window.clothstream.restPositions).filter((_, i) => i % 3 === 0);
+      return Math.max(...xs) - Math.min(...xs);
+    });
+    assert.ok(Math.abs(size - 2) < 0.001, `it is ${size} m wide`);
+  }));
+
+test("a file that is compressed with Draco is read, with a decoder that the server has", () =>
+  withPage("", { viewport: { width: 1000, height: 900 } }, async (page) => {
+    const asked = [];
+    page.on("request", (request) => asked.push(new URL(request.url()).pathname));
+    await dropFile(page, "plain.glb", sheetGlb(8));
+    await untilText(page, "#create-mesh", /plain\.glb: 64 vertices/);
+    assert.deepEqual(asked, [], "the decoder is loaded only when it is needed");
+    await dropFile(page, "small.glb", await dracoGlb(20));
+    await untilText(page, "#create-mesh", /small\.glb: 400 vertices, 722 triangles, 20 pinned/);
+    assert.deepEqual(asked.filter((path) => /draco/.test(path)).sort(), ["/draco_decoder.js", "/draco_decoder.wasm"]);
+    // Bytes that are not what they seem.
+    const broken = await dracoGlb(20);
+    broken.fill(0, broken.indexOf("DRACO"), broken.indexOf("DRACO") + 5);
+    await dropFile(page, "broken.glb", broken);
+    await untilText(page, "#create-error", /broken\.glb is compressed with Draco, but cannot be decoded: /);
+    await dropFile(page, "packed.gltf", Buffer.from('{"asset": {"version": "2.0"}, "extensionsUsed": ["EXT_meshopt_compression"]}'));
+    await untilText(page, "#create-error", /packed\.gltf is compressed with meshopt, which is not supported/);
+    await dropFile(page, "old.gltf", Buffer.from('{"asset": {"version": "1.0"}}'));
+    await untilText(page, "#create-error", /old\.gltf is glTF 1\.0, which is not supported/);
   }));
 
 test("files and names that do not work are explained", () =>
@@ -232,6 +404,17 @@ test("parameters of cloth and air change on a second page", () =>
           [id, value],
         );
       }
+      // Every number has a field with its unit, and a help text with its range.
+      const rows = await first.evaluate((options) =>
+        options.map((option) => ({
+          unit: document.getElementById(`number-${option}`).closest(".number").textContent,
+          help: document.getElementById(`number-${option}-help`).textContent,
+        })), kClothParameters.map(({ option }) => option));
+      kClothParameters.forEach(({ option, unit, help }, index) => {
+        assert.ok(rows[index].help.startsWith(help), `${option}: ${rows[index].help}`);
+        assert.match(rows[index].help, /\. \S+ to \S+( [^.]+)?\.$/);
+        assert.equal(rows[index].unit, unit, option);
+      });
       // Values out of range are not sent.
       await first.fill("#number-drag", "11");
       await first.press("#number-drag", "Enter");
@@ -296,7 +479,7 @@ test("figures are hidden at first, and stay when no frame comes", () =>
     assert.ok(await page.isVisible("#hud"));
     const label = (pattern) =>
       page.waitForFunction((source) => new RegExp(source).test(document.getElementById("hud-canvas").ariaLabel), pattern.source);
-    await label(/display [1-9]\d* \/s, stream [1-9]\d* \/s, frame age \d+ ms, round trip \d+\.\d ms, network \d+ kbit\/s/);
+    await label(/display [1-9]\d* \/s, stream [1-9]\d* \/s, frame age \d+ ms, round trip \d+\.\d ms, network \d+ kbit\/s, precision \d+\.\d bit\/vertex, dropped in a minute \d+[;]/);
     await label(/pose to picture \d+\.\d ms: up \d+\.\d, server [\d.]+, down [\d.]+, decode [\d.]+, play-out [\d.]+\./);
     const drawn = await page.evaluate(() => {
       const canvas = document.getElementById("hud-canvas");
@@ -323,10 +506,14 @@ test("a change of quality or frame rate joins again, and stays in the address", 
     await page.selectOption("#quality", "2");
     await page.waitForURL(/quality=2/);
     await untilState(page, "live");
+    await page.selectOption("#layers", "1");
+    await page.waitForURL(/layers=1/);
+    await untilState(page, "live");
     await untilFrames(page, 3);
     await page.reload();
     await untilState(page, "live");
     assert.equal(await page.inputValue("#quality"), "2");
+    assert.equal(await page.inputValue("#layers"), "1");
   }));
 
 test("the keyboard reaches everything in the order of the screen", () =>

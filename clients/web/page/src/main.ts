@@ -145,7 +145,7 @@ async function start(): Promise<void> {
   }
 
   const headset: HeadsetPage = new HeadsetPage(view, session, panel, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) });
-  const probe = expose(session, view, headset);
+  const probe = expose(session, view, headset, panel.create);
 
   let figuresAt = 0;
   function draw(now: number, frame?: XRFrame): void {

@@ -4,6 +4,7 @@
 import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Statistics, Vec3 } from "@clothstream/client";
 import type { Doing } from "@clothstream/three";
 import type { HeadsetPage } from "./headset_page";
+import type { Create } from "./panel/create";
 import type { View } from "./view";
 
 export interface Probe {
@@ -30,6 +31,8 @@ export interface Probe {
   readonly localCorrection: number;
   readonly headset: HeadsetProbe;
   readonly canvas: HTMLCanvasElement;
+  // Vertices that the form for a new scene pins.
+  readonly pinned: Uint32Array;
   // Projects a point of the scene to CSS pixels of the page.
   project(point: Vec3): [number, number];
   // Position of the point's shadow on the floor, cast by the key light.
@@ -62,7 +65,7 @@ declare global {
 }
 
 // Call described() of the result for each description, before its first frame.
-export function expose(session: Session, view: View, { headset, panel }: HeadsetPage): { described(client: Client): void } {
+export function expose(session: Session, view: View, { headset, panel }: HeadsetPage, create: Create): { described(client: Client): void } {
   let restPositions: Float32Array | undefined;
   window.clothstream = {
     get state() {
@@ -131,6 +134,9 @@ export function expose(session: Session, view: View, { headset, panel }: Headset
       };
     },
     canvas: view.canvas,
+    get pinned() {
+      return create.pinned;
+    },
     project: (point) => view.project(point),
     shadowOf: (point) => view.shadowOf(point),
   };

@@ -30,7 +30,7 @@ export class Panel {
   readonly scenes: Scenes;
   private readonly requests: Requests;
   private readonly people: People;
-  private readonly create: Create;
+  readonly create: Create;
   private readonly tabs: Tabs;
   private readonly invite = element<HTMLInputElement>("invite-link");
   private listedAt = -Infinity;
