@@ -390,7 +390,7 @@ test("the keyboard turns, zooms and resets the view, and moves the collider", ()
     assert.ok(distance(from, to) > 0.15, `it went from ${from} to ${to}`);
   }));
 
-// The sheet hangs in the middle; the background is at the upper right.
+// The sheet hangs in the middle; the background below it.
 test("one finger takes hold of cloth or turns the view, and two always zoom", () =>
   withPage({ query: "?scene=hanging", viewport: { width: 390, height: 700 }, touch: true }, async (page) => {
     await untilState(page, "live");
@@ -433,8 +433,8 @@ test("one finger takes hold of cloth or turns the view, and two always zoom", ()
     await page.click("#reset");
     await page.click("#tab-view");
     const front = await apart();
-    await fingers.down([360, 200]);
-    await fingers.move(5, [260, 200]);
+    await fingers.down([340, 540]);
+    await fingers.move(5, [240, 540]);
     await fingers.up();
     await page.waitForFunction(([all, was]) => {
       const [a, b] = all.map((point) => window.clothstream.project(point));
@@ -656,9 +656,7 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
   const paired = await startServer(0, ["--scene", "curtain", "--pairing", "--state-dir", folder]);
   try {
     const [, code] = await paired.line(/^pair +(\d{6})/);
-    const context = await browser.newContext({ viewport: { width: 900, height: 600 } });
-    const page = await context.newPage();
-    await page.goto(paired.url);
+    const page = await openPage(browser, paired.url, { viewport: { width: 900, height: 600 } });
     await untilState(page, "asking");
     assert.match(await page.textContent("#proof-reason"), /requires a token or a pairing code/);
     await takePicture(page, "asking");
@@ -680,8 +678,7 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
     await page.reload();
     await untilState(page, "live");
 
-    const guest = await (await browser.newContext()).newPage();
-    await guest.goto(paired.url);
+    const guest = await openPage(browser, paired.url);
     await untilState(guest, "asking");
     await guest.fill("#proof-input", shown[1] + shown[2]);
     await guest.press("#proof-input", "Enter");
@@ -690,6 +687,7 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
     assert.ok(await guest.isHidden("#pairing"), "participants make no codes");
 
     // A ban lasts until an owner lifts it.
+    await page.click("#tab-people");
     await page.getByRole("button", { name: /^Ban / }).click();
     assert.match(await page.textContent("#confirm-text"), /^Ban .+\? Until an owner lifts the ban/);
     await page.click("#confirm-yes");
@@ -704,8 +702,8 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
     await page.waitForSelector("#bans-row", { state: "hidden" });
     await guest.reload();
     await untilState(guest, "live");
-    await guest.context().close();
-    await context.close();
+    await guest.close();
+    await page.close();
   } finally {
     await paired.stop();
     await rm(folder, { recursive: true });

@@ -290,7 +290,7 @@ test("a mesh that does not fit the world is scaled after a question", () =>
     await page.click("#create-send");
     await page.click("#confirm-yes");
     await untilScene(page, "lace");
-    assert.match(await page.textContent("#scene-result"), /^lace is ready\. .*2 m/);
+    assert.match(await page.textContent("#scene-result"), /^lace is ready\. .*scaled by 100 to 2 x 1\.5 x 0 m/);
     const size = await page.evaluate(() => {
       const xs = Array.from(window.clothstream.restPositions).filter((_, i) => i % 3 === 0);
       return Math.max(...xs) - Math.min(...xs);
