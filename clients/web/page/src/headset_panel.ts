@@ -54,7 +54,6 @@ export class HeadsetPanel {
     const place = mode === "immersive-ar" ? "Place on a surface" : "Place before me";
     return [
       { buttons: kTabs.map((tab) => ({ text: tab, isChosen: tab === this.tab, action: () => this.open(tab) })) },
-      { text: kHints[doing] ?? (performance.now() < this.message.until ? this.message.text : statusText(this.session)) },
       ...(state.kind === "failed" ? [{ buttons: [{ text: "Join the default scene", action: () => listener.sceneChosen("") }] }] : []),
       ...this.content(),
       {
@@ -64,6 +63,8 @@ export class HeadsetPanel {
           { text: "Leave", action: () => listener.left() },
         ],
       },
+      // Last, so that a long text moves no button.
+      { text: kHints[doing] ?? (performance.now() < this.message.until ? this.message.text : statusText(this.session)) },
     ];
   }
 
