@@ -57,6 +57,22 @@ export function untilState(page, state) {
   return page.waitForFunction((wanted) => window.clothstream?.state === wanted, state);
 }
 
+// Waits until the text of an element matches.
+export function untilText(page, selector, pattern) {
+  return page.waitForFunction(
+    ([where, source]) => new RegExp(source).test(document.querySelector(where)?.textContent ?? ""),
+    [selector, pattern.source],
+  );
+}
+
+// Waits until the page is in a scene.
+export function untilScene(page, name) {
+  return page.waitForFunction(
+    (wanted) => document.getElementById("scene-name").textContent === wanted && window.clothstream.state === "live",
+    name,
+  );
+}
+
 // Waits for `count` more frames.
 export async function untilFrames(page, count) {
   const now = await page.evaluate(() => window.clothstream.statistics?.frames ?? 0);
