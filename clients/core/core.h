@@ -675,7 +675,7 @@ void cs_keep_cloth_settings(cs_cloth_settings* out) CS_NOEXCEPT;
  * cloth. */
 int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) CS_NOEXCEPT;
 /* Applies a material (see cs_material) to a cloth: springs, damping, drag, lift, friction, mass and
- * solver. */
+ * solver (XPBD; a cloth with implicit Euler keeps it). */
 void cs_set_material(cs_client* client, const char* cloth, const char* material) CS_NOEXCEPT;
 /* Changes position (m) and radius (m) of a collider of the scene. Both pointers may be NULL. */
 void cs_set_collider(cs_client* client, const char* collider, const float* position3,

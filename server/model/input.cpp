@@ -14,7 +14,12 @@ namespace {
 using parameters::assign;
 
 void apply(const ClothChange& change, Cloth& cloth) {
-  if (change.material) makeOf(*findMaterial(*change.material), cloth);
+  if (change.material) {
+    const Solver solver = cloth.solver;
+    makeOf(*findMaterial(*change.material), cloth);
+    // It takes the stiff springs of every material with fewer substeps than xpbd.
+    if (solver.kind == SolverKind::implicitEuler) cloth.solver = solver;
+  }
   parameters::applyNumbers(
       change.numbers, [&](parameters::ClothNumber number) { return parameters::memberOf(cloth, number); });
   assign(cloth.solver, change.solver);

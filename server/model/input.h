@@ -56,6 +56,7 @@ struct ParticipantPoses {
 };
 
 // Absent values leave the cloth as it is. A material sets its own numbers first, then `numbers` apply.
+// It selects xpbd, except that a cloth with implicit Euler keeps that solver.
 struct ClothChange {
   std::string name = {};  // empty: every cloth
   parameters::ClothNumbers numbers = {};

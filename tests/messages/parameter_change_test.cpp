@@ -235,6 +235,26 @@ TEST_F(ToParameterChange, MakesClothsOfAMaterial) {
   EXPECT_EQ(scene_.cloths[0].solver.kind, model::SolverKind::xpbd);
 }
 
+// Scenes with implicit Euler have too few substeps for xpbd.
+TEST_F(ToParameterChange, KeepsImplicitEulerWithANewMaterial) {
+  model::Solver& solver = scene_.cloths[0].solver;
+  solver.kind = model::SolverKind::implicitEuler;
+  solver.iterations = 14;
+  message_.add_cloths()->set_material("denim");
+  const auto change = toParameterChange(message_, scene_, model::StabilityBound(scene_));
+  ASSERT_TRUE(change) << change.error().text;
+  applyChange(scene_, *change);
+  EXPECT_EQ(scene_.cloths[0].material, "denim");
+  EXPECT_EQ(solver.kind, model::SolverKind::implicitEuler);
+  EXPECT_EQ(solver.iterations, 14u);
+
+  message_.mutable_cloths(0)->mutable_solver()->mutable_xpbd();
+  const auto chosen = toParameterChange(message_, scene_, model::StabilityBound(scene_));
+  ASSERT_TRUE(chosen) << chosen.error().text;
+  applyChange(scene_, *chosen);
+  EXPECT_EQ(solver.kind, model::SolverKind::xpbd);
+}
+
 TEST_F(ToParameterChange, RefusesUnknownAndUnusableMaterials) {
   v1::ClothChange& cloth = *message_.add_cloths();
   cloth.set_material("velvet");

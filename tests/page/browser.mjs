@@ -37,11 +37,12 @@ export function launchBrowser(more = []) {
   });
 }
 
-// Opens a page in a browser, or in a context, which then decides on the viewport. `prepare` runs in it before its own scripts. Errors of the page are collected in `errors`. Without a
-// viewport the page is small, and takes the size of a picture only for screenshots. With `draws: false` the
-// cloth is not drawn, which takes most of the time; the page does everything else.
-export async function openPage(browser, url, { prepare, viewport, draws = true } = {}) {
-  const page = await browser.newPage({ viewport: viewport ?? kQuick });
+// Opens a page in a browser, or in a context, which then decides on the viewport. `prepare` runs in it before its own
+// scripts. Errors of the page are collected in `errors`. Without a viewport the page is small, and takes the size of a
+// picture only for screenshots. With `draws: false` the cloth is not drawn, which takes most of the time; the page does
+// everything else. `touch` gives it a touch screen.
+export async function openPage(browser, url, { prepare, viewport, draws = true, touch = false } = {}) {
+  const page = await browser.newPage({ viewport: viewport ?? kQuick, hasTouch: touch });
   page.grows = viewport === undefined;
   page.setDefaultTimeout(kWaitMs);
   page.errors = [];
@@ -66,6 +67,22 @@ export function drawNothing() {
 // Waits for a state: connecting, live, reconnecting or failed.
 export function untilState(page, state) {
   return page.waitForFunction((wanted) => window.clothstream?.state === wanted, state);
+}
+
+// Waits until the text of an element matches.
+export function untilText(page, selector, pattern) {
+  return page.waitForFunction(
+    ([where, source]) => new RegExp(source).test(document.querySelector(where)?.textContent ?? ""),
+    [selector, pattern.source],
+  );
+}
+
+// Waits until the page is in a scene.
+export function untilScene(page, name) {
+  return page.waitForFunction(
+    (wanted) => document.getElementById("scene-name").textContent === wanted && window.clothstream.state === "live",
+    name,
+  );
 }
 
 // Waits for `count` more frames.

@@ -124,3 +124,59 @@ export function deepest() {
   }
   return most;
 }
+
+// Waits until a button of the panel in space has a text, and returns it.
+export async function panelButton(page, text) {
+  await page.waitForFunction((wanted) => window.clothstream.headset.panel.buttons.some((one) => one.text === wanted), text);
+  return page.evaluate((wanted) => window.clothstream.headset.panel.buttons.find((one) => one.text === wanted), text);
+}
+
+// Waits until a text of the panel in space matches, or has matched. Messages stay for a few seconds only, in which a busy
+// machine draws few frames.
+export function untilPanelText(page, pattern) {
+  return page.waitForFunction((source) => {
+    window.panelTexts ??= new Set();
+    window.panelWatch ??= setInterval(() => window.panelTexts.add(window.clothstream.headset.panel.texts.join(" ")), 50);
+    return [...window.panelTexts].some((text) => new RegExp(source).test(text));
+  }, pattern.source);
+}
+
+// Points the right controller at a button of the panel in space, and pulls its trigger.
+export async function pressButton(page, text) {
+  const { place } = await panelButton(page, text);
+  const origin = [place[0] + 0.2, place[1] - 0.1, place[2] + 0.25];
+  await page.evaluate(
+    ([from, to]) => {
+      const { position, quaternion } = window.device.controllers.right;
+      position.set(...from);
+      // Shortest turn from -z to the button.
+      const way = to.map((value, axis) => value - from[axis]);
+      const length = Math.hypot(...way);
+      const [x, y, z] = way.map((value) => value / length);
+      const turn = [y, -x, 0, 1 - z];
+      quaternion.set(...turn.map((value) => value / Math.hypot(...turn)));
+    },
+    [origin, place],
+  );
+  for (const value of [0, 1, 0]) {
+    await page.evaluate((pull) => window.device.controllers.right.updateButtonValue("trigger", pull), value);
+    const { frames } = await page.evaluate(() => window.clothstream.headset);
+    await page.waitForFunction((before) => window.clothstream.headset.frames > before + 2, frames);
+  }
+}
+
+const kIndexTip = 9; // joint of XRHand
+
+// Moves the tip of the right index finger to `depth` metres behind a button of the panel in space. `eyes` is a point of
+// the room in front of the panel.
+export async function pokeButton(page, text, depth, eyes) {
+  const { place } = await panelButton(page, text);
+  const { hand, joints } = await page.evaluate(() => {
+    const { x, y, z } = window.device.hands.right.position;
+    return { hand: [x, y, z], joints: window.clothstream.headset.limbs.find(({ side, isHand }) => isHand && side === "right").joints };
+  });
+  const tip = await toRoom(page, joints.slice(4 * kIndexTip, 4 * kIndexTip + 3));
+  const way = place.map((value, axis) => value - eyes[axis]);
+  const length = Math.hypot(...way);
+  return moveTo(page, "hands", "right", place.map((value, axis) => value + (depth * way[axis]) / length - tip[axis] + hand[axis]), 0.01);
+}

@@ -8,7 +8,10 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { kChromium, launchBrowser, takePicture, untilFrames, untilState } from "./browser.mjs";
-import { deepest, enter, moveTo, openHeadset, pinch, pinchOffset, reach, toRoom, untilSession, vertex } from "./headset.mjs";
+import {
+  deepest, enter, moveTo, openHeadset, panelButton, pinch, pinchOffset, pokeButton, pressButton, reach, toRoom, untilPanelText,
+  untilSession, vertex,
+} from "./headset.mjs";
 import { writeHangingSheet } from "./scenes.mjs";
 import { startServer } from "./server.mjs";
 
@@ -137,36 +140,101 @@ test("a controller takes hold of the cloth by its ray", () =>
     await page.waitForFunction(() => window.clothstream.headset.limbs.every(({ holds }) => !holds));
   }));
 
-// Rows are 5 cm high below a title, and the panel stands to the left of the user (headset_page.ts, canvas_panel.ts).
-test("the panel in space joins another scene, and the user stays in VR", () =>
-  withHeadset({ input: "controller" }, async (page) => {
+// Number of pixels of the panel in space that have the colour of a plot.
+function plotPixels() {
+  const { canvas } = window.clothstream.headset.panel;
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  let count = 0;
+  for (let i = 0; i < data.length; i += 4) if (data[i] > 200 && data[i + 1] > 140 && data[i + 1] < 190 && data[i + 2] < 110) ++count;
+  return count;
+}
+
+// The user stays in VR and connected throughout.
+test("rays press the panel in space: people, quality, figures, pause, reset, and another scene", () =>
+  withHeadset({ input: "controller", query: "?name=Ada" }, async (page) => {
     await enter(page, "vr");
     await page.waitForFunction(() => window.clothstream.headset.limbs.length === 2);
-    const row = 4; // after the state, two ways to place, and the present scene
-    await page.evaluate((index) => {
-      const place = [-0.55, 1.25, -0.55];
-      const turn = Math.atan2(0.55, 0.55) / 2;
-      const tilt = -Math.atan2(0.25, Math.hypot(0.55, 0.55)) / 2;
-      const [sy, cy, sx, cx] = [Math.sin(turn), Math.cos(turn), Math.sin(tilt), Math.cos(tilt)];
-      const [x, y, z, w] = [cy * sx, sy * cx, -sy * sx, cy * cx];
-      const along = (vx, vy, vz) => {
-        const [tx, ty, tz] = [2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)];
-        return [vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx];
-      };
-      const offset = along(0, 0.393 - 0.018 - 0.05 * (index + 1.5), 0.3);
-      const controller = window.device.controllers.right;
-      controller.position.set(...place.map((value, axis) => value + offset[axis]));
-      controller.quaternion.set(x, y, z, w);
-    }, row);
-    const { frames } = await page.evaluate(() => window.clothstream.headset);
-    await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
-    await takePicture(page, "vr_panel");
-    await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 1));
+    await page.evaluate(() => window.device.quaternion.set(0, 0.5, 0, Math.sqrt(0.75)));
+    await untilPanelText(page, /\d+ frames\/s, round trip \d+ ms/);
+    await takePicture(page, "vr_panel_scenes");
+    await pressButton(page, "People");
+    await untilPanelText(page, /Ada \(you\)/);
+    await takePicture(page, "vr_panel_people");
+
+    await pressButton(page, "Quality");
+    assert.equal((await panelButton(page, "finest")).isChosen, true);
+    await takePicture(page, "vr_panel_quality");
+    await pressButton(page, "a quarter");
+    await page.waitForURL(/quality=2/);
+    await pressButton(page, "at most half");
+    await page.waitForURL(/layers=2/);
+    await untilState(page, "live");
+    await untilFrames(page, 3);
+    assert.equal((await panelButton(page, "a quarter")).isChosen, true);
+    assert.equal((await panelButton(page, "at most half")).isChosen, true);
+
+    const without = await page.evaluate(plotPixels);
+    await pressButton(page, "Figures");
+    await page.waitForFunction(([source, before]) => eval(`(${source})`)() > before + 200, [String(plotPixels), without]);
+    await takePicture(page, "vr_panel_figures");
+
+    await pressButton(page, "Scenes");
+    await pressButton(page, "Pause");
+    await panelButton(page, "Continue");
+    await untilPanelText(page, /[Pp]aused/);
+    await pressButton(page, "Continue");
+    await panelButton(page, "Pause");
+    await pressButton(page, "Reset");
+    await untilPanelText(page, /back at its start|reset/);
+
+    await pressButton(page, "curtain");
     await page.waitForFunction(() => window.clothstream.cloths[0]?.name !== "sheet" && window.clothstream.state === "live");
-    await page.evaluate(() => window.device.controllers.right.updateButtonValue("trigger", 0));
+    assert.equal((await panelButton(page, "curtain")).isChosen, true);
     await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 3);
+    // Scenes that do not fit are on further pages.
+    await pressButton(page, "More");
+    await page.waitForFunction(() => window.clothstream.headset.panel.buttons.every(({ text }) => text !== "curtain"));
+    await untilPanelText(page, /2 of \d/);
+    await pressButton(page, "Back");
+    await panelButton(page, "curtain");
+    assert.equal(await page.evaluate(() => window.clothstream.headset.mode), "immersive-vr");
+    await pressButton(page, "Leave").catch(() => undefined);
+    await untilSession(page, "none");
+  }));
+
+test("a finger presses the panel in space by going through it", () =>
+  withHeadset({}, async (page) => {
+    await enter(page, "vr");
+    await page.waitForFunction(() => window.clothstream.headset.limbs.length === 2);
+    const eyes = [0, 1.5, 0];
+    await pokeButton(page, "Quality", -0.1, eyes);
+    await pokeButton(page, "Quality", -0.02, eyes);
+    assert.equal((await panelButton(page, "Quality")).isChosen, false, "a finger in front of the panel presses nothing");
+    await pokeButton(page, "Quality", 0.015, eyes);
+    assert.equal((await panelButton(page, "Quality")).isChosen, true);
+    await pokeButton(page, "Quality", -0.05, eyes);
+    await pokeButton(page, "half as fine", -0.05, eyes);
+    await takePicture(page, "vr_panel_finger");
+    await pokeButton(page, "half as fine", 0.015, eyes);
+    await page.waitForURL(/quality=1/);
+    await untilState(page, "live");
     assert.equal(await page.evaluate(() => window.clothstream.headset.mode), "immersive-vr");
   }));
+
+test("viewers cannot press what changes the scene", async () => {
+  const owner = await openHeadset(browser, server.url);
+  try {
+    await untilState(owner, "live");
+    await withHeadset({ query: "?role=viewer", input: "controller" }, async (page) => {
+      await enter(page, "vr");
+      assert.equal((await panelButton(page, "Reset")).isEnabled, false);
+      assert.equal((await panelButton(page, "Pause")).isEnabled, false);
+      assert.equal((await panelButton(page, "curtain")).isEnabled, true);
+    });
+  } finally {
+    await owner.context().close();
+  }
+});
 
 test("a lost hand keeps its pose for a moment, then goes, and comes back", () =>
   withHeadset({}, async (page) => {
@@ -227,7 +295,10 @@ test("the connection returns while the user stays in VR", async () => {
       assert.equal(mode, "immersive-vr");
       await page.waitForFunction((before) => window.clothstream.headset.frames > before + 3, frames);
       // The panel comes before the eyes and says what happens.
-      await page.waitForFunction(() => /^The connection is lost .*comes back by itself.* Try now Leave$/.test(window.clothstream.headset.panel.text.replaceAll("\n", " ")));
+      await page.waitForFunction(() => {
+        const { texts, buttons } = window.clothstream.headset.panel;
+        return /comes back by itself/.test(texts.join(" ")) && buttons.map(({ text }) => text).join() === "Try now,Leave";
+      });
       const { place } = await page.evaluate(() => window.clothstream.headset.panel);
       // The camera is one eye, 3 cm from the middle.
       assert.ok(distance(place, [0, 1.5, -0.7]) < 0.04, `the panel is at ${place}`);
@@ -237,7 +308,7 @@ test("the connection returns while the user stays in VR", async () => {
       await untilFrames(page, 10);
       assert.equal(await page.evaluate(() => window.clothstream.headset.mode), "immersive-vr");
       await page.waitForFunction(() => window.clothstream.colliders.filter(({ participantId }) => participantId !== 0n).length === 41);
-      await page.waitForFunction(() => /Place before me/.test(window.clothstream.headset.panel.text));
+      await page.waitForFunction(() => window.clothstream.headset.panel.buttons.some(({ text }) => text === "Place before me"));
       assert.ok((await page.evaluate(() => window.clothstream.headset.panel.place[0])) < -0.5, "the panel is at its place again");
     });
   } finally {

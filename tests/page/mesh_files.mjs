@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Makes mesh files, and drops them on a page.
 
-// A sheet of size x size vertices, 1 m wide, that hangs in the XY plane, as the bytes of a GLB file.
-export function sheetGlb(size) {
+import { createRequire } from "node:module";
+
+const require = createRequire(new URL("../../clients/web/package.json", import.meta.url));
+
+// A sheet of size x size vertices, 1 m wide, that hangs in the XY plane, or lies flat in the XZ plane.
+function sheet(size, flat) {
   const positions = new Float32Array(3 * size * size);
   for (let i = 0; i < size * size; ++i) {
     positions[3 * i] = (i % size) / (size - 1) - 0.5;
-    positions[3 * i + 1] = 1 - Math.floor(i / size) / (size - 1);
+    const down = Math.floor(i / size) / (size - 1);
+    positions[3 * i + (flat ? 2 : 1)] = flat ? down - 0.5 : 1 - down;
   }
   const indices = [];
   for (let row = 0; row + 1 < size; ++row) {
@@ -15,7 +20,12 @@ export function sheetGlb(size) {
       indices.push(a, a + size, a + 1, a + 1, a + size, a + size + 1);
     }
   }
-  const triangles = Uint32Array.from(indices);
+  return { positions, triangles: Uint32Array.from(indices) };
+}
+
+// A sheet as the bytes of a GLB file.
+export function sheetGlb(size, { flat = false } = {}) {
+  const { positions, triangles } = sheet(size, flat);
   const json = {
     asset: { version: "2.0" },
     scene: 0,
@@ -28,16 +38,58 @@ export function sheetGlb(size) {
       { buffer: 0, byteOffset: positions.byteLength, byteLength: triangles.byteLength },
     ],
     accessors: [
-      { bufferView: 0, componentType: 5126, count: size * size, type: "VEC3", min: [-0.5, 0, 0], max: [0.5, 1, 0] },
+      { bufferView: 0, componentType: 5126, count: size * size, type: "VEC3" },
       { bufferView: 1, componentType: 5125, count: triangles.length, type: "SCALAR" },
     ],
   };
-  const text = Buffer.from(JSON.stringify(json));
-  const padded = Buffer.concat([text, Buffer.alloc((4 - (text.length % 4)) % 4, " ")]);
-  const binary = Buffer.concat([Buffer.from(positions.buffer), Buffer.from(triangles.buffer)]);
+  return glb(json, Buffer.concat([Buffer.from(positions.buffer), Buffer.from(triangles.buffer)]));
+}
+
+// The hanging sheet as the bytes of a GLB file that is compressed with Draco.
+export async function dracoGlb(size) {
+  const { positions, triangles } = sheet(size, false);
+  const draco = await require("draco3d").createEncoderModule({});
+  const [builder, mesh, encoder, out] = [new draco.MeshBuilder(), new draco.Mesh(), new draco.Encoder(), new draco.DracoInt8Array()];
+  builder.AddFacesToMesh(mesh, triangles.length / 3, triangles);
+  const attribute = builder.AddFloatAttributeToMesh(mesh, draco.POSITION, size * size, 3, positions);
+  const length = encoder.EncodeMeshToDracoBuffer(mesh, out);
+  const bytes = Buffer.from(Int8Array.from({ length }, (_, i) => out.GetValue(i)).buffer);
+  const extension = "KHR_draco_mesh_compression";
+  const json = {
+    asset: { version: "2.0" },
+    extensionsUsed: [extension],
+    extensionsRequired: [extension],
+    scene: 0,
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0 }],
+    meshes: [
+      { primitives: [{ attributes: { POSITION: 0 }, indices: 1, extensions: { [extension]: { bufferView: 0, attributes: { POSITION: attribute } } } }] },
+    ],
+    buffers: [{ byteLength: bytes.length }],
+    bufferViews: [{ buffer: 0, byteLength: bytes.length }],
+    accessors: [
+      { componentType: 5126, count: size * size, type: "VEC3" },
+      { componentType: 5125, count: triangles.length, type: "SCALAR" },
+    ],
+  };
+  return glb(json, bytes);
+}
+
+function glb(json, binary) {
+  const padded = (bytes, filler) => Buffer.concat([bytes, Buffer.alloc((4 - (bytes.length % 4)) % 4, filler)]);
+  const [text, data] = [padded(Buffer.from(JSON.stringify(json)), " "), padded(binary, 0)];
   const word = (...values) => Buffer.from(Uint32Array.from(values).buffer);
-  const total = 12 + 8 + padded.length + 8 + binary.length;
-  return Buffer.concat([word(0x46546c67, 2, total), word(padded.length, 0x4e4f534a), padded, word(binary.length, 0x004e4942), binary]);
+  const total = 12 + 8 + text.length + 8 + data.length;
+  return Buffer.concat([word(0x46546c67, 2, total), word(text.length, 0x4e4f534a), text, word(data.length, 0x004e4942), data]);
+}
+
+// An OBJ file of one large triangle and a row of `count` small ones. Its longest side is 2.
+export function fineObj(count) {
+  const lines = ["v 0 0 0", "v 2 0 0", "v 0 1 0", "f 1 2 3"];
+  const edge = 0.004;
+  for (let i = 0; i < count + 2; ++i) lines.push(`v ${(i * edge) / 2} ${i % 2 === 0 ? 1.5 : 1.5 + edge} 0`);
+  for (let i = 0; i < count; ++i) lines.push(i % 2 === 0 ? `f ${i + 4} ${i + 6} ${i + 5}` : `f ${i + 4} ${i + 5} ${i + 6}`);
+  return Buffer.from(lines.join("\n"));
 }
 
 // Drops a file on the picture.

@@ -7,9 +7,9 @@ import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { networkInterfaces, tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { kChromium, launchBrowser, kPicture, luminance, openPage, takePicture, takePixels, untilFrames, untilState } from "./browser.mjs";
+import { kChromium, kPicture, launchBrowser, luminance, openPage, takePicture, takePixels, untilFrames, untilState } from "./browser.mjs";
+import { distance, look, untilAtRest, vertexOf } from "./frames.mjs";
 import { makeLink } from "./link.mjs";
-import { writeHangingSheet } from "./scenes.mjs";
 import { startServer } from "./server.mjs";
 
 const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
@@ -28,8 +28,6 @@ const kGoal = -0.3;
 
 const scene = JSON.parse(await readFile(new URL("../../server/scenes/curtain.json", import.meta.url), "utf8"));
 const { rows, columns } = scene.cloths[0].grid;
-const vertexOf = (values, index) => Array.from(values.slice(3 * index, 3 * index + 3));
-const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 
 function pinnedNodes() {
   const nodes = new Set();
@@ -50,42 +48,15 @@ function furthest(before, after) {
   return far;
 }
 
-// Copies vertices, colliders and statistics of one frame.
-function look(page) {
-  return page.evaluate(() => {
-    const { positions, restPositions, colliders, statistics } = window.clothstream;
-    return {
-      positions: Array.from(positions),
-      rest: Array.from(restPositions),
-      spheres: colliders.map(({ name, position, radius }) => ({ name, position: [...position], radius })),
-      statistics,
-    };
-  });
-}
-
-// Waits until the sphere has not moved for three frames.
-function untilAtRest(page) {
-  return page.waitForFunction(() => {
-    const { colliders, statistics } = window.clothstream;
-    const seen = window.seenSphere;
-    if (seen && statistics.frames < seen.frames + 3) return false;
-    window.seenSphere = { frames: statistics.frames, position: colliders[0].position.join() };
-    return window.seenSphere.position === seen?.position;
-  });
-}
-
-let folder;
 let server;
 let browser;
 before(async () => {
-  folder = await mkdtemp(join(tmpdir(), "clothstream-page-"));
-  server = await startServer(0, ["--scene", "curtain", "--scene-file", await writeHangingSheet(folder)]);
+  server = await startServer();
   browser = await launchBrowser();
 });
 after(async () => {
   await browser?.close();
   await server?.stop();
-  if (folder) await rm(folder, { recursive: true });
 });
 
 async function withPage(options, use) {
@@ -322,38 +293,6 @@ test("the sphere can be dragged through the cloth", () =>
     assert.ok(distance(left, position) < 0.01, "the sphere stays where it was released");
   }));
 
-// The middle of the lower edge follows the mouse, and falls back when the mouse releases it.
-test("the cloth can be grabbed", () =>
-  withPage({ query: "?scene=hanging", viewport: kPicture }, async (page) => {
-    await untilState(page, "live");
-    await untilFrames(page, 60);
-    const corner = 39 * 32 + 16;
-    const seen = await look(page);
-    const start = vertexOf(seen.positions, corner);
-    const goal = [start[0], start[1] + 0.4, start[2]];
-    const project = (point) => page.evaluate((at) => window.clothstream.project(at), point);
-    const [x, y] = await project(start);
-    const [goalX, goalY] = await project(goal);
-    // Slightly above the edge, so that the pointer is on the cloth.
-    await page.mouse.move(x, y - 6);
-    await page.mouse.down();
-    assert.equal(await page.evaluate(() => window.clothstream.canvas.style.cursor), "grabbing");
-    await page.mouse.move(goalX, goalY - 6, { steps: 20 });
-    await page.waitForFunction(
-      ([vertex, height]) => window.clothstream.positions[3 * vertex + 1] > height,
-      [corner, goal[1] - 0.05],
-    );
-    await untilFrames(page, 72);
-    const held = (await look(page)).positions[3 * corner + 1];
-    assert.ok(Math.abs(held - goal[1]) < 0.1, `the held vertex is at y = ${held}, not near ${goal[1]}`);
-    await takePicture(page, "held");
-    await page.mouse.up();
-    await page.waitForFunction(
-      ([vertex, height]) => window.clothstream.positions[3 * vertex + 1] < height,
-      [corner, start[1] + 0.1],
-    );
-  }));
-
 test("a slider works by keyboard, and other pages follow", () =>
   withPage({}, (first) =>
     withPage({}, async (second) => {
@@ -526,9 +465,7 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
   const paired = await startServer(0, ["--scene", "curtain", "--pairing", "--state-dir", folder]);
   try {
     const [, code] = await paired.line(/^pair +(\d{6})/);
-    const context = await browser.newContext({ viewport: { width: 900, height: 600 } });
-    const page = await context.newPage();
-    await page.goto(paired.url);
+    const page = await openPage(browser, paired.url, { viewport: { width: 900, height: 600 } });
     await untilState(page, "asking");
     assert.match(await page.textContent("#failure-said"), /requires a token or a pairing code/);
     await takePicture(page, "asking");
@@ -550,16 +487,32 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
     await page.reload();
     await untilState(page, "live");
 
-    const guest = await (await browser.newContext()).newPage();
-    await guest.goto(paired.url);
+    const guest = await openPage(browser, paired.url);
     await untilState(guest, "asking");
     await guest.fill("#proof-input", shown[1] + shown[2]);
     await guest.press("#proof-input", "Enter");
     await untilState(guest, "live");
     await guest.click("#tab-people");
     assert.ok(await guest.isHidden("#pairing"), "participants make no codes");
-    await guest.context().close();
-    await context.close();
+
+    // A ban lasts until an owner lifts it.
+    await page.click("#tab-people");
+    await page.getByRole("button", { name: /^Ban / }).click();
+    assert.match(await page.textContent("#confirm-text"), /^Ban .+\? Until an owner lifts the ban/);
+    await page.click("#confirm-yes");
+    await untilState(guest, "failed");
+    assert.match(await guest.textContent("#banner-text"), /banned/);
+    const lift = page.getByRole("button", { name: /^Lift the ban of / });
+    await lift.waitFor();
+    await takePicture(page, "banned");
+    await guest.reload();
+    await untilState(guest, "failed");
+    await lift.click();
+    await page.waitForSelector("#bans-row", { state: "hidden" });
+    await guest.reload();
+    await untilState(guest, "live");
+    await guest.close();
+    await page.close();
   } finally {
     await paired.stop();
     await rm(folder, { recursive: true });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The panel on a real server: scenes, files, recordings, parameters, people, figures, keyboard and contrast.
+// The panel on a real server: scenes, recordings, parameters, people, figures, keyboard and contrast.
 
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
@@ -7,10 +7,10 @@ import { mkdtemp, readdir, rm, stat } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { kChromium, launchBrowser, openPage, takePicture, untilFrames, untilState } from "./browser.mjs";
+import { kChromium, launchBrowser, openPage, takePicture, untilFrames, untilScene, untilState, untilText } from "./browser.mjs";
 import { poorContrast } from "./contrast.mjs";
-import { dropFile, sheetGlb } from "./mesh_files.mjs";
 import { startServer } from "./server.mjs";
+import { kClothParameters } from "../../clients/web/client/dist/tables.js";
 
 const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
 if (!existsSync(kChromium)) {
@@ -18,7 +18,6 @@ if (!existsSync(kChromium)) {
   process.exit(kSkipped);
 }
 
-const kSheet = 56; // vertices along a side; the scene is larger than one message
 const kTabs = ["scene", "cloth", "air", "people", "view"];
 const kDesktop = { width: 800, height: 450 };
 
@@ -46,132 +45,6 @@ async function withPage(query, options, use) {
     await page.close();
   }
 }
-
-const untilText = (page, selector, pattern) =>
-  page.waitForFunction(
-    ([where, source]) => new RegExp(source).test(document.querySelector(where)?.textContent ?? ""),
-    [selector, pattern.source],
-  );
-const untilScene = (page, name) =>
-  page.waitForFunction(
-    (wanted) => document.getElementById("scene-name").textContent === wanted && window.clothstream.state === "live",
-    name,
-  );
-
-test("a file dropped on the picture becomes a scene whose pins hold; it is paused, reset and deleted", () =>
-  withPage("?name=Ada", { viewport: { width: 1000, height: 900 } }, async (page) => {
-    await dropFile(page, "Grandma's Tablecloth.GLB", sheetGlb(kSheet));
-    await page.waitForSelector("#create-fields:not([hidden])");
-    assert.equal(await page.inputValue("#create-name"), "grandma_s_tablecloth");
-    assert.equal(await page.inputValue("#create-size"), "1");
-    assert.match(await page.textContent("#create-mesh"), /3,136 vertices, 6,050 triangles, 56 pinned/);
-    await page.selectOption("#create-pins", "topCorners");
-    assert.match(await page.textContent("#create-mesh"), /, 2 pinned/);
-    assert.notEqual(await page.inputValue("#create-material"), "");
-    await page.fill("#create-size", "1.5");
-    await page.uncheck("#create-self");
-    await takePicture(page, "panel_create");
-    await page.click("#create-send");
-    await untilScene(page, "grandma_s_tablecloth");
-    assert.match(page.url(), /scene=grandma_s_tablecloth/);
-
-    // The middle of the upper edge falls by 5 cm; the two corners stay within the error of the stream.
-    const look = () =>
-      page.evaluate((size) => {
-        const { positions, restPositions: rest } = window.clothstream;
-        const top = Math.max(...Array.from({ length: rest.length / 3 }, (_, i) => rest[3 * i + 1]));
-        let corners = 0;
-        let middle = 0;
-        const count = rest.length / 3;
-        for (let i = 0; i < count; ++i) {
-          if (rest[3 * i + 1] < top - 0.001) continue;
-          const moved = Math.hypot(...[0, 1, 2].map((axis) => positions[3 * i + axis] - rest[3 * i + axis]));
-          if (Math.abs(Math.abs(rest[3 * i]) - 0.75) < 0.001) corners = Math.max(corners, moved);
-          else middle = Math.max(middle, moved);
-        }
-        return { count, top, corners, middle, expected: size * size };
-      }, kSheet);
-    await page.waitForFunction(() => {
-      const { positions, restPositions: rest } = window.clothstream;
-      let most = 0;
-      for (let i = 0; i < rest.length; ++i) most = Math.max(most, Math.abs(positions[i] - rest[i]));
-      return most > 0.1;
-    });
-    const fallen = await look();
-    assert.equal(fallen.count, fallen.expected);
-    assert.ok(Math.abs(fallen.top - 2) < 0.001, `the upper edge starts at ${fallen.top} m`);
-    assert.ok(fallen.corners < 0.004, `a pinned corner moved ${fallen.corners} m`);
-    assert.ok(fallen.middle > 0.05, `the upper edge moved ${fallen.middle} m`);
-
-    await page.click("#scene-pause");
-    await untilText(page, "#scene-pause", /^Continue$/);
-    await untilText(page, '[data-scene="grandma_s_tablecloth"] .badge', /^paused$/);
-    assert.match(await page.textContent("#scene-result"), /Paused for everyone/);
-    // A paused scene runs until the first frame after its reset.
-    await page.click("#scene-reset");
-    await page.waitForFunction(() => {
-      const { positions, restPositions: rest } = window.clothstream;
-      let most = 0;
-      for (let i = 0; i < rest.length; ++i) most = Math.max(most, Math.abs(positions[i] - rest[i]));
-      return most < 0.02;
-    });
-    await page.click("#scene-pause");
-    await untilText(page, "#scene-pause", /^Pause$/);
-
-    await page.click("#scene-delete");
-    assert.match(await page.textContent("#confirm-text"), /Delete the scene grandma_s_tablecloth\? This cannot be undone/);
-    await page.click("#confirm button[value=no]");
-    assert.equal(await page.evaluate(() => document.getElementById("confirm").open), false);
-    await page.click("#scene-delete");
-    await page.click("#confirm-yes");
-    await untilScene(page, "sphere_drop");
-    await untilText(page, "#scene-result", /^grandma_s_tablecloth is deleted\.$/);
-    await page.waitForFunction(() => !document.querySelector('[data-scene="grandma_s_tablecloth"]'));
-  }));
-
-test("pins are painted in the preview", () =>
-  withPage("", { viewport: { width: 1000, height: 900 } }, async (page) => {
-    await dropFile(page, "sheet.glb", sheetGlb(8));
-    await page.waitForSelector("#create-fields:not([hidden])");
-    await page.selectOption("#create-pins", "none");
-    assert.match(await page.textContent("#create-mesh"), /no pins/);
-    const frame = await page.locator("#preview").boundingBox();
-    // The corner at the lower left of the mesh: the picture is 560 x 360 with a margin of 18.
-    const scale = frame.width / 560;
-    const corner = [frame.x + (280 - 162) * scale, frame.y + (360 - 18) * scale];
-    await page.mouse.click(...corner);
-    await untilText(page, "#create-mesh", /, 1 pinned/);
-    await page.keyboard.down("Shift");
-    await page.mouse.click(...corner);
-    await page.keyboard.up("Shift");
-    await untilText(page, "#create-mesh", /no pins/);
-  }));
-
-test("files and names that do not work are explained", () =>
-  withPage("", { viewport: { width: 1000, height: 900 } }, async (page) => {
-    await dropFile(page, "notes.txt", Buffer.from("hello"));
-    await untilText(page, "#create-error", /notes\.txt is not an OBJ, GLB or glTF file/);
-    await dropFile(page, "empty.obj", Buffer.from("v 0 0 0\n"));
-    await untilText(page, "#create-error", /empty\.obj has no triangles/);
-    await dropFile(page, "broken.glb", Buffer.from("glTF, but not really"));
-    await untilText(page, "#create-error", /broken\.glb/);
-    assert.ok(await page.isHidden("#create-fields"));
-    await dropFile(page, "sphere_drop.obj", Buffer.from("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
-    await page.waitForSelector("#create-fields:not([hidden])");
-    await page.click("#create-send");
-    await untilText(page, "#create-error", /sphere_drop/);
-    assert.ok(await page.isEnabled("#create-send"));
-
-    // A mesh that cannot be cloth, as three faces share an edge, is repaired on request, and the panel says how.
-    await dropFile(page, "book.obj", Buffer.from("v 0 0 0\nv 0 1 0\nv 1 0 0\nv -1 0 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n"));
-    await page.waitForFunction(() => document.getElementById("create-name").value === "book");
-    await page.click("#create-send");
-    await untilText(page, "#create-error", /edge/);
-    await page.check("#create-repair");
-    await page.click("#create-send");
-    await untilScene(page, "book");
-    assert.match(await page.textContent("#scene-result"), /^book is ready\. .*edge/);
-  }));
 
 test("the list of scenes tells what they are, and a click joins one", () =>
   withPage("?name=Ada", { viewport: kDesktop }, async (page) => {
@@ -232,6 +105,17 @@ test("parameters of cloth and air change on a second page", () =>
           [id, value],
         );
       }
+      // Every number has a field with its unit, and a help text with its range.
+      const rows = await first.evaluate((options) =>
+        options.map((option) => ({
+          unit: document.getElementById(`number-${option}`).closest(".number").textContent,
+          help: document.getElementById(`number-${option}-help`).textContent,
+        })), kClothParameters.map(({ option }) => option));
+      kClothParameters.forEach(({ option, unit, help }, index) => {
+        assert.ok(rows[index].help.startsWith(help), `${option}: ${rows[index].help}`);
+        assert.match(rows[index].help, /\. \S+ to \S+( [^.]+)?\.$/);
+        assert.equal(rows[index].unit, unit, option);
+      });
       // Values out of range are not sent.
       await first.fill("#number-drag", "11");
       await first.press("#number-drag", "Enter");
@@ -296,7 +180,7 @@ test("figures are hidden at first, and stay when no frame comes", () =>
     assert.ok(await page.isVisible("#hud"));
     const label = (pattern) =>
       page.waitForFunction((source) => new RegExp(source).test(document.getElementById("hud-canvas").ariaLabel), pattern.source);
-    await label(/display [1-9]\d* \/s, stream [1-9]\d* \/s, frame age \d+ ms, round trip \d+\.\d ms, network \d+ kbit\/s/);
+    await label(/display [1-9]\d* \/s, stream [1-9]\d* \/s, frame age \d+ ms, round trip \d+\.\d ms, network \d+ kbit\/s, precision \d+\.\d bit\/vertex, dropped in a minute \d+[;]/);
     await label(/pose to picture \d+\.\d ms: up \d+\.\d, server [\d.]+, down [\d.]+, decode [\d.]+, play-out [\d.]+\./);
     const drawn = await page.evaluate(() => {
       const canvas = document.getElementById("hud-canvas");
@@ -323,10 +207,14 @@ test("a change of quality or frame rate joins again, and stays in the address", 
     await page.selectOption("#quality", "2");
     await page.waitForURL(/quality=2/);
     await untilState(page, "live");
+    await page.selectOption("#layers", "1");
+    await page.waitForURL(/layers=1/);
+    await untilState(page, "live");
     await untilFrames(page, 3);
     await page.reload();
     await untilState(page, "live");
     assert.equal(await page.inputValue("#quality"), "2");
+    assert.equal(await page.inputValue("#layers"), "1");
   }));
 
 test("the keyboard reaches everything in the order of the screen", () =>

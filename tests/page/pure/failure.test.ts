@@ -6,7 +6,7 @@ import { assert, test } from "vitest";
 import { ErrorCode, type SessionState } from "@clothstream/client";
 import { FrameGaps } from "../../../clients/web/client/src/frame_gaps";
 import { isHeadsetBrowser, kNoWebAssembly, kNoWebGl, notLoaded, whyNoHeadset } from "../../../clients/web/page/src/advice";
-import { failureOf, linesOf, type Failure, type FailureContext } from "../../../clients/web/page/src/failure";
+import { failureOf, type Failure, type FailureContext } from "../../../clients/web/page/src/failure";
 import { LateFrames } from "../../../clients/web/page/src/late_frames";
 
 const calm: FailureContext = { now: 5000, since: 4000, hasJoined: true, networkDenied: false, longestPauseMs: undefined };
@@ -135,9 +135,4 @@ test("the page says why there is no VR: first the page, then the browser, then t
   const quest = "Mozilla/5.0 (X11; Linux x86_64; Quest 3) AppleWebKit/537.36 OculusBrowser/40.0 Chrome/136.0 VR Safari/537.36";
   assert.ok(isHeadsetBrowser(quest));
   assert.ok(!isHeadsetBrowser("Mozilla/5.0 (X11; Linux x86_64) AppleWebKit/537.36 Chrome/142.0.0.0 Safari/537.36"));
-});
-
-test("words are broken into lines for the panel in space", () => {
-  assert.deepEqual(linesOf("The page keeps trying", 10), ["The page", "keeps", "trying"]);
-  assert.deepEqual(linesOf("unbreakable", 4), ["unbreakable"]);
 });

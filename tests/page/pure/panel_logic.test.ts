@@ -6,7 +6,9 @@ import { kClothParameters, kSettings } from "@clothstream/client";
 import { drawHud, hudText, kHudHeight, kHudWidth } from "../../../clients/web/page/src/panel/hud_drawing";
 import { HudHistory, kChannels, kStages, type Sample } from "../../../clients/web/page/src/panel/hud_history";
 import { numberText, placeOf, powerOf, valueAt } from "../../../clients/web/page/src/panel/number_row";
-import { boundsOf, likelySize, nameFor, pinsOf, placeOf as meshPlace } from "../../../clients/web/page/src/panel/pins";
+import { checkGltf } from "../../../clients/web/page/src/panel/gltf_header";
+import { PinSet } from "../../../clients/web/page/src/panel/pin_set";
+import { boundsOf, centred, likelySize, misfitOf, nameFor, pinsOf, placeOf as meshPlace, within, type PinBox } from "../../../clients/web/page/src/panel/pins";
 import { vectorOf, windOf } from "../../../clients/web/page/src/panel/wind";
 
 // 3 x 3 vertices, 2 m wide and 1 m high, in the plane of two axes.
@@ -19,25 +21,107 @@ function sheet(right: number, up: number): Float32Array {
   return positions;
 }
 
-test("pins are on the upper edge, at its ends, at the corners, or in a part", () => {
+const kWhole: PinBox = [[0, 1], [0, 1], [0, 1]];
+
+test("pins are on the upper edge, at its ends, at the corners, or in a box", () => {
   const hanging = sheet(0, 1);
-  assert.deepEqual(pinsOf(hanging, "top", 0), [0, 1, 2]);
-  assert.deepEqual(pinsOf(hanging, "topCorners", 0), [0, 2]);
-  assert.deepEqual(pinsOf(hanging, "corners", 0), [0, 2, 6, 8]);
-  assert.deepEqual(pinsOf(hanging, "part", 0.5), [0, 1, 2, 3, 4, 5]);
-  assert.deepEqual(pinsOf(hanging, "part", 0), [0, 1, 2]);
-  assert.deepEqual(pinsOf(hanging, "none", 0.5), []);
-  assert.deepEqual(pinsOf(new Float32Array(), "top", 0), []);
+  assert.deepEqual(pinsOf(hanging, "top", kWhole), [0, 1, 2]);
+  assert.deepEqual(pinsOf(hanging, "topCorners", kWhole), [0, 2]);
+  assert.deepEqual(pinsOf(hanging, "corners", kWhole), [0, 2, 6, 8]);
+  assert.deepEqual(pinsOf(hanging, "box", kWhole), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
+  assert.deepEqual(pinsOf(hanging, "box", [[0, 1], [0.5, 1], [0, 1]]), [0, 1, 2, 3, 4, 5]);
+  assert.deepEqual(pinsOf(hanging, "box", [[0.5, 1], [0, 0.6], [0, 1]]), [4, 5, 7, 8]);
+  assert.deepEqual(pinsOf(hanging, "box", [[0.6, 0.4], [0, 1], [0, 1]]), []);
+  assert.deepEqual(pinsOf(hanging, "none", kWhole), []);
+  assert.deepEqual(pinsOf(new Float32Array(), "top", kWhole), []);
   // A sheet that lies flat has four corners, and is at one height.
-  assert.deepEqual(pinsOf(sheet(0, 2), "corners", 0), [0, 2, 6, 8]);
-  assert.equal(pinsOf(sheet(0, 2), "top", 0).length, 9);
+  assert.deepEqual(pinsOf(sheet(0, 2), "corners", kWhole), [0, 2, 6, 8]);
+  assert.equal(pinsOf(sheet(0, 2), "top", kWhole).length, 9);
   // A sheet along z has its ends there.
-  assert.deepEqual(pinsOf(sheet(2, 1), "topCorners", 0), [0, 2]);
+  assert.deepEqual(pinsOf(sheet(2, 1), "topCorners", kWhole), [0, 2]);
+});
+
+test("the brush finds the vertices in a ball", () => {
+  assert.deepEqual(within(sheet(0, 1), [0, 1, 0], 1.01), [0, 1, 2, 4, 7]);
+  assert.deepEqual(within(sheet(0, 1), [0, 1, 0.9], 1), [1]);
+  assert.deepEqual(within(sheet(0, 1), [0, 1, 0], 0), [1]);
+  assert.deepEqual(within(sheet(0, 1), [0, 1, 2], 1), []);
+});
+
+test("strokes pin and free vertices, and are undone one by one", () => {
+  const pins = new PinSet(10, [3, 3, 5]);
+  assert.deepEqual([...pins.list()], [3, 5]);
+  assert.equal(pins.canUndo, false);
+  assert.equal(pins.paint([1], true), false, "there is no stroke");
+  pins.begin();
+  assert.equal(pins.paint([1, 2, 3], true), true);
+  assert.equal(pins.paint([2, 3], true), false);
+  pins.end();
+  pins.begin();
+  pins.paint([1, 5, 9], false);
+  pins.paint([1], true);
+  pins.end();
+  assert.deepEqual([...pins.list()], [1, 2, 3]);
+  pins.replace([0, 9]);
+  assert.equal(pins.count, 2);
+  pins.undo();
+  assert.deepEqual([...pins.list()], [1, 2, 3]);
+  pins.undo();
+  assert.deepEqual([...pins.list()], [1, 2, 3, 5]);
+  pins.begin();
+  pins.paint([7], true);
+  pins.cancel();
+  assert.deepEqual([...pins.list()], [1, 2, 3, 5], "a cancelled stroke leaves nothing");
+  pins.undo();
+  assert.deepEqual([...pins.list()], [3, 5]);
+  pins.undo();
+  assert.deepEqual([...pins.list()], [3, 5]);
+  assert.equal(pins.canUndo, false);
+});
+
+test("undo goes back at most 100 strokes", () => {
+  const pins = new PinSet(150);
+  for (let vertex = 0; vertex < 150; ++vertex) {
+    pins.begin();
+    pins.paint([vertex], true);
+    pins.end();
+  }
+  while (pins.canUndo) pins.undo();
+  assert.equal(pins.count, 50);
+});
+
+test("a mesh that does not fit the world is found, with its size", () => {
+  const triangles = Uint32Array.from([0, 3, 1]);
+  assert.equal(misfitOf(sheet(0, 1), triangles, 1), undefined);
+  assert.match(misfitOf(sheet(0, 1), triangles, 1500) ?? "", /^is 3,000 x 1,500 x 0 m large and reaches 1,500 m from the origin; the world ends at 1,000 m\.$/);
+  assert.match(misfitOf(sheet(0, 1).map((value) => value + 1200), triangles, 1) ?? "", /^is 2 x 1 x 0 m large and reaches 1,200 m/);
+  assert.match(misfitOf(sheet(0, 1), triangles, 1e-5) ?? "", /^has edges with a mean length of 0\.00873 mm; at least 0\.1 mm are needed\.$/);
+  assert.deepEqual(centred({ min: [1, 2, 3], max: [3, 3, 3] }), { min: [-1, -0.5, -0], max: [1, 0.5, 0] });
+});
+
+const text = (json: unknown): ArrayBuffer => Uint8Array.from(Buffer.from(JSON.stringify(json))).buffer;
+const primitive = { attributes: { POSITION: 0 }, indices: 1 };
+
+test("glTF that cannot be read is named before it is decoded", () => {
+  const asset = { version: "2.0" };
+  const check = (json: unknown) => () => checkGltf(text(json), "a.gltf", 1000);
+  check({ asset, accessors: [{ count: 1000 }, { count: 3 }], meshes: [{ primitives: [primitive] }] })();
+  assert.throws(check({ asset: { version: "1.0" } }), /a\.gltf is glTF 1\.0, which is not supported\. Convert it to glTF 2\.0/);
+  assert.throws(check({}), /glTF 1\.0/);
+  assert.throws(check({ asset: { version: "3.1" } }), /is glTF 3\.1/);
+  for (const extension of ["EXT_meshopt_compression", "KHR_meshopt_compression"])
+    assert.throws(check({ asset, extensionsUsed: [extension] }), /compressed with meshopt, which is not supported/);
+  assert.throws(check({ asset, accessors: [{ count: 501 }], meshes: [{ primitives: [primitive, primitive] }] }), /more than 1,000 vertices/);
+  assert.throws(check({ asset, accessors: [{ count: 3 }, { count: 6001 }], meshes: [{ primitives: [primitive] }] }), /more than 1,000 vertices/);
+  assert.throws(check({ asset, accessors: [{ count: "many" }], meshes: [{ primitives: [primitive] }] }), /more than/);
+  assert.throws(() => checkGltf(text([]).slice(0, 1), "a.gltf", 1), /cannot be read/);
+  const old = new Uint32Array([0x46546c67, 1, 20, 0, 0]).buffer;
+  assert.throws(() => checkGltf(old, "a.glb", 1), /a\.glb is glTF 1\.0/);
 });
 
 test("all vertices in a pinned place are pinned", () => {
   const positions = new Float32Array([...sheet(0, 1), -1, 1, 0]);
-  assert.deepEqual(pinsOf(positions, "topCorners", 0), [0, 2, 9]);
+  assert.deepEqual(pinsOf(positions, "topCorners", kWhole), [0, 2, 9]);
 });
 
 test("a pinned mesh hangs below 2 m, and another one starts 1 m above the floor", () => {

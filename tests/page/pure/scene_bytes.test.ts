@@ -46,6 +46,7 @@ test("a scene has its cloth, mesh, pins and floor", () => {
     massPerArea: 0.25,
     pinned: [0, 300],
     repair: true,
+    fit: true,
     selfCollision: true,
     floor: true,
   });
@@ -59,6 +60,7 @@ test("a scene has its cloth, mesh, pins and floor", () => {
   assert.equal(mesh.bytes(2).length, 4 * 27);
   assert.deepEqual([...mesh.bytes(3)], [0, 3, 1]);
   assert.equal(mesh.number(70), 1);
+  assert.equal(mesh.number(71), 1);
   assert.equal(new DataView(mesh.bytes(9).slice().buffer).getFloat32(0, true), 0.5);
   assert.equal(fieldsOf(fields.bytes(9)).bytes(4).length, 0);
   assert.deepEqual([...packed([0, 127, 128, 2 ** 31])], [0, 127, 128, 1, 128, 128, 128, 128, 8]);

@@ -13,8 +13,9 @@ export interface MeshScene {
   position: readonly [number, number, number]; // of the mesh in the scene, m
   material: string; // "" means none
   massPerArea?: number; // kg/m^2; undefined: that of the material
-  pinned: readonly number[]; // vertex indices
+  pinned: ArrayLike<number>; // vertex indices
   repair: boolean; // whether the server repairs a mesh that it would refuse (docs/meshes.md)
+  fit: boolean; // whether the server scales a mesh that does not fit the world
   selfCollision: boolean;
   floor: boolean; // a plane at y = 0
 }
@@ -30,6 +31,7 @@ export function sceneBytes(scene: MeshScene): Uint8Array {
     bytes(MeshFields.pose, bytes(PoseFields.position, vec3(scene.position))),
     float(MeshFields.scale, scene.scale),
     ...(scene.repair ? [flag(MeshFields.repair)] : []),
+    ...(scene.fit ? [flag(MeshFields.fit)] : []),
   ]);
   const cloth = joined([
     text(ClothFields.name, scene.name),

@@ -72,7 +72,7 @@ export class Drag {
   }
 
   private press(event: PointerEvent): void {
-    if (event.button !== 0 || this.pointer !== undefined) return;
+    if (event.button !== 0 || this.pointer !== undefined || this.view.fingers.areTwo) return;
     this.aim(event);
     const hit = this.pick();
     if (!hit) return;

@@ -240,14 +240,3 @@ const isLockout = (said: string) => /try again in a minute/.test(said);
 function seconds(count: number): string {
   return count < 120 ? `${count} s` : `${Math.floor(count / 60)} min`;
 }
-
-// Lines of at most `width` characters, for the panel in space.
-export function linesOf(text: string, width: number): string[] {
-  const lines: string[] = [];
-  for (const word of text.split(" ")) {
-    const last = lines.at(-1);
-    if (last !== undefined && last.length + 1 + word.length <= width) lines[lines.length - 1] = `${last} ${word}`;
-    else lines.push(word);
-  }
-  return lines;
-}

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Headsets on the page: buttons to enter, and a panel in space with scenes, people and placement.
+// Headsets on the page: buttons to enter, and a panel in space.
 
 import * as THREE from "three";
-import { Roles, type Client, type Session } from "@clothstream/client";
-import { CanvasPanel, Headset, Immersion, type Doing, type Mode, type PanelRow } from "@clothstream/three";
+import type { Client, Session } from "@clothstream/client";
+import { CanvasPanel, Headset, Immersion, type Mode, type PanelRow } from "@clothstream/three";
 import { isHeadsetBrowser, whyNoHeadset } from "./advice";
-import { linesOf, type Failure, type FailureAction } from "./failure";
+import type { Failure, FailureAction } from "./failure";
 import type { Failures } from "./failures";
+import { HeadsetPanel } from "./headset_panel";
 import { element, make, write } from "./panel/dom";
+import type { Panel } from "./panel/panel";
 import type { View } from "./view";
 
-const kMostScenes = 6;
-const kMostPeople = 3;
 const kEyes = 1.5; // m
-// Place of the panel: to the left of the user's first look, in metres from the user's feet.
-const kPanelPlace = { x: -0.55, y: 1.25, z: -0.55 };
+// Place of the panel in metres from the feet of the user: to the left of the first look, nearer than the scene.
+const kPanelPlace = { x: -0.6, y: 1.25, z: -0.3 };
 // It faces the user's eyes.
 const kPanelTurn = Math.atan2(-kPanelPlace.x, -kPanelPlace.z);
 const kPanelTilt = -Math.atan2(kEyes - kPanelPlace.y, Math.hypot(kPanelPlace.x, kPanelPlace.z));
@@ -22,8 +22,6 @@ const kPanelTilt = -Math.atan2(kEyes - kPanelPlace.y, Math.hypot(kPanelPlace.x, 
 // Place of the panel while it says what went wrong: in the direction of the look, m.
 const kBefore = 0.7;
 const kBelowEyes = 0.1;
-const kLineLength = 46; // characters
-const kMostWords = 9;
 // The others need the page.
 const kActionsInVr: ReadonlySet<FailureAction> = new Set(["connect", "join", "default"]);
 
@@ -35,13 +33,14 @@ export interface HeadsetPageListener {
 export class HeadsetPage {
   readonly headset: Headset;
   readonly panel = new CanvasPanel();
-  private scenes: string[] = [];
+  private readonly content: HeadsetPanel;
   private isBefore = false; // the panel is before the eyes
   private why: Failure | undefined; // there is no headset
 
   constructor(
     private readonly view: View,
     private readonly session: Session,
+    panel: Panel,
     private readonly listener: HeadsetPageListener,
     private readonly failures: Failures,
   ) {
@@ -67,6 +66,12 @@ export class HeadsetPage {
         doingChanged: () => this.show(),
       },
     );
+    this.content = new HeadsetPanel(session, panel, {
+      sceneChosen: (scene) => listener.sceneChosen(scene),
+      doingChosen: (doing) => this.headset.do(doing),
+      left: () => void this.headset.leave(),
+      changed: () => this.show(),
+    });
     this.headset.seat.add(this.panel.mesh);
     this.put(kPanelPlace, kPanelTurn, kPanelTilt);
     for (const [mode, id] of kButtons) element(id).addEventListener("click", () => void this.enter(mode));
@@ -93,30 +98,21 @@ export class HeadsetPage {
     if (current && !current.quiet) return this.showFailure(current);
     this.isBefore = false;
     this.put(kPanelPlace, kPanelTurn, kPanelTilt);
-    const { client } = this.session;
-    this.scenes = client.requests.scenes().map(({ name }) => name);
-    const rows: PanelRow[] = [current ? { text: current.title, detail: current.wait ?? "" } : { text: statusText(this.session) }];
-    const hint = kHints[this.headset.doing];
-    if (hint) rows.push({ text: hint });
-    if (this.headset.mode === "immersive-ar") rows.push({ text: "Place on a surface", action: () => this.headset.do("place") });
-    else rows.push({ text: "Place before me", action: () => this.headset.do("place") });
-    rows.push({ text: "Share this room: touch two points", action: () => this.headset.do("points") });
-    for (const scene of this.scenes.slice(0, kMostScenes))
-      rows.push({ text: scene.replaceAll("_", " "), isChosen: scene === client.sceneName, action: () => this.listener.sceneChosen(scene) });
-    for (const { name, role, self, away } of client.people.participants().slice(0, kMostPeople))
-      rows.push({ text: self ? `${name} (you)` : name, detail: away ? "away" : (Roles.get(role) ?? "") });
-    rows.push({ text: "Leave", action: () => void this.headset.leave() });
-    this.panel.show(client.sceneName || "ClothStream", rows);
+    const words = current ? [current.title + ".", current.wait].join(" ").trim() : undefined;
+    this.panel.show(this.session.client.sceneName || "ClothStream", this.content.rows(this.headset.mode, this.headset.doing, words));
+  }
+
+  // Shows a message on the panel for a moment.
+  say(text: string): void {
+    this.content.say(text);
   }
 
   // Brings the panel before the eyes with what went wrong.
   private showFailure({ title, text, said, wait, asks, actions }: Failure): void {
-    const words = [...linesOf(text, kLineLength), ...(said ? linesOf(said, kLineLength) : []), ...(wait ? [wait] : [])];
-    const rows: PanelRow[] = words.slice(0, kMostWords).map((line) => ({ text: line }));
-    if (asks) rows.push({ text: "Leave VR to type the code or token." });
+    const rows: PanelRow[] = [text, said, wait, asks && "Leave VR to type the code or token."].filter((words) => typeof words === "string").map((words) => ({ text: words }));
     for (const { label, action } of actions)
-      if (kActionsInVr.has(action)) rows.push({ text: label, action: () => this.failures.act(action) });
-    rows.push({ text: "Leave", action: () => void this.headset.leave() });
+      if (kActionsInVr.has(action)) rows.push({ buttons: [{ text: label, action: () => this.failures.act(action) }] });
+    rows.push({ buttons: [{ text: "Leave", action: () => void this.headset.leave() }] });
     this.panel.show(title, rows);
     if (this.isBefore) return;
     this.isBefore = true;
@@ -164,24 +160,3 @@ const kButtons: readonly (readonly [Mode, string])[] = [
   ["immersive-vr", "enter-vr"],
   ["immersive-ar", "enter-ar"],
 ];
-
-const kHints: Record<Doing, string | undefined> = {
-  touch: undefined,
-  place: "Look at a surface and press",
-  points: "Touch the first point, then the second, and press at each",
-};
-
-function statusText({ state, client }: Session): string {
-  switch (state.kind) {
-    case "live": {
-      const { framesPerSecond, roundTripMs } = client.frames.statistics();
-      return `${Math.round(framesPerSecond)} frames/s, round trip ${Math.round(roundTripMs)} ms`;
-    }
-    case "reconnecting":
-      return "Reconnecting";
-    case "connecting":
-      return "Connecting";
-    default:
-      return "Not joined";
-  }
-}

@@ -92,11 +92,11 @@ async function start(): Promise<void> {
       }
     },
     notice: (text) => {
-      hud.showNotice(text);
+      notify(text);
       panel.noticed();
     },
     refused: (client) => {
-      hud.showNotice(client.errorText);
+      notify(client.errorText);
       panel.refused(client);
     },
   };
@@ -110,7 +110,7 @@ async function start(): Promise<void> {
     temporalLayers: limit("layers", 3),
     listener,
   };
-  const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset() });
+  const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset(), said: (text) => headset.say(text) });
   const session: Session = await open(options, failures);
   failures.follow(session, {
     join: () => chooseScene(sceneOfAddress()),
@@ -147,9 +147,14 @@ async function start(): Promise<void> {
     session.join(name);
   }
 
-  const headset: HeadsetPage = new HeadsetPage(view, session, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) }, failures);
+  function notify(text: string): void {
+    hud.showNotice(text);
+    headset.say(text);
+  }
+
+  const headset: HeadsetPage = new HeadsetPage(view, session, panel, { sceneChosen: chooseScene, notice: (text) => hud.showNotice(text) }, failures);
   const work = new FrameWork();
-  const probe = expose(session, view, headset, panel.hud.history, work);
+  const probe = expose(session, view, { headset: headset.headset, panel: headset.panel, work, history: panel.hud.history, create: panel.create });
 
   // Longest pause between frames since the last call, ms. 0 while none are expected.
   function takePause(client: Client | undefined): number {

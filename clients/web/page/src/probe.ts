@@ -3,9 +3,9 @@
 
 import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Stages, Statistics, Vec3 } from "@clothstream/client";
 import * as THREE from "three";
-import type { Doing } from "@clothstream/three";
+import type { CanvasPanel, Doing, Headset } from "@clothstream/three";
 import type { FrameWork } from "./frame_work";
-import type { HeadsetPage } from "./headset_page";
+import type { Create } from "./panel/create";
 import type { HudHistory } from "./panel/hud_history";
 import type { View } from "./view";
 
@@ -40,6 +40,8 @@ export interface Probe {
   readonly work: { input: number[]; show: number[]; render: number[]; take: number[] };
   readonly headset: HeadsetProbe;
   readonly canvas: HTMLCanvasElement;
+  // Vertices that the form for a new scene pins.
+  readonly pinned: Uint32Array;
   // Projects a point of the scene to CSS pixels of the page.
   project(point: Vec3): [number, number];
   // Position of the point's shadow on the floor, cast by the key light.
@@ -53,10 +55,16 @@ export interface HeadsetProbe {
   readonly frames: number; // drawn in sessions
   readonly isAnchored: boolean;
   readonly placement: number[]; // matrix from scene to room, column by column
-  readonly panel: { text: string; place: Vec3 }; // the panel in space: its lines, and its middle in the room
   readonly shadowReach: number; // half the width of the shadow map in the room, m
   // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
   choose(doing: Doing): void;
+  // The panel in space: its middle in the room, its picture, lines of text, and buttons with the places of their middles.
+  readonly panel: {
+    readonly place: Vec3;
+    readonly canvas: HTMLCanvasElement;
+    readonly texts: string[];
+    readonly buttons: { text: string; isChosen: boolean; isEnabled: boolean; place: Vec3 }[];
+  };
   // Hands, controllers and rays that are there. Joints: x, y, z, radius of each, in the scene.
   readonly limbs: { side: string; isHand: boolean; holds: boolean; joints: number[]; point: Vec3 }[];
 }
@@ -67,9 +75,17 @@ declare global {
   }
 }
 
+// What a page has beside its session and view. The self-test has neither a form for scenes nor a history.
+export interface Exposed {
+  headset: Headset;
+  panel: CanvasPanel; // in space
+  work: FrameWork;
+  history?: HudHistory;
+  create?: Create;
+}
+
 // Call described() of the result for each description, before its first frame.
-export function expose(session: Session, view: View, page: HeadsetPage, history: HudHistory, work: FrameWork): { described(client: Client): void } {
-  const { headset } = page;
+export function expose(session: Session, view: View, { headset, panel, work, history, create }: Exposed): { described(client: Client): void } {
   let restPositions: Float32Array | undefined;
   window.clothstream = {
     get state() {
@@ -116,7 +132,7 @@ export function expose(session: Session, view: View, page: HeadsetPage, history:
       return session.client.playback.state();
     },
     get longestPause() {
-      return history.largest("pause");
+      return history?.largest("pause") ?? 0;
     },
     get localCorrection() {
       return session.client.frames.localCorrection;
@@ -135,9 +151,14 @@ export function expose(session: Session, view: View, page: HeadsetPage, history:
         frames: headset.frameCount,
         isAnchored: headset.isAnchored,
         placement: headset.placement.matrix.toArray(),
-        panel: { text: page.panel.text, place: page.panel.mesh.getWorldPosition(new THREE.Vector3()).toArray() },
         shadowReach: view.shadowReach,
         choose: (doing: Doing) => headset.do(doing),
+        panel: {
+          place: panel.mesh.getWorldPosition(new THREE.Vector3()).toArray(),
+          canvas: panel.canvas,
+          texts: panel.texts,
+          buttons: panel.buttons.map((button) => ({ ...button, place: button.place.toArray() })),
+        },
         limbs: Array.from(headset.body.present(), ({ side, isHand, grabber, hand, pose }) => ({
           side,
           isHand,
@@ -148,6 +169,9 @@ export function expose(session: Session, view: View, page: HeadsetPage, history:
       };
     },
     canvas: view.canvas,
+    get pinned() {
+      return create?.pinned ?? new Uint32Array();
+    },
     project: (point) => view.project(point),
     shadowOf: (point) => view.shadowOf(point),
   };

@@ -102,7 +102,7 @@ export class Pusher {
   }
 
   private press(event: PointerEvent): void {
-    if (this.chosen === "hand" || event.button !== 0) return;
+    if (this.chosen === "hand" || event.button !== 0 || this.view.fingers.areTwo) return;
     // The view does not turn, and nothing is dragged.
     event.stopImmediatePropagation();
     this.view.canvas.setPointerCapture(event.pointerId);
@@ -117,7 +117,7 @@ export class Pusher {
   }
 
   private aim(event: PointerEvent): void {
-    if (this.chosen === "hand") return;
+    if (this.chosen === "hand" || this.view.fingers.areTwo) return;
     const frame = this.view.canvas.getBoundingClientRect();
     this.pointer.set(
       (2 * (event.clientX - frame.left)) / frame.width - 1,

@@ -5,6 +5,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Shape, type Client, type Vec3 } from "@clothstream/client";
 import { Cloths, ColliderMeshes, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
+import { Fingers } from "./fingers";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
 
@@ -18,6 +19,7 @@ const kPlainFrames = 2;
 export class View {
   readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
   readonly orbit: OrbitControls;
+  readonly fingers: Fingers;
   readonly renderer: THREE.WebGLRenderer;
   private readonly studio: Studio;
   private readonly colliderMeshes = new ColliderMeshes();
@@ -27,6 +29,7 @@ export class View {
   private shownFrames = 0;
   private isDrawn = false;
   private readonly eye = new THREE.Vector3();
+  private isMoved = false; // by the user, since the last reset
   private floorHeight = 0;
   // Times of the last draw(), ms: play-out, local contact and copies into attributes; and the renderer.
   showMs = 0;
@@ -38,6 +41,7 @@ export class View {
     private readonly detail: Detail,
     gathersNormals = true, // computes normals on the graphics device where the stream has none
   ) {
+    this.fingers = new Fingers(canvas);
     useSoftShadows();
     this.cloths = new Cloths(detail, gathersNormals);
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
@@ -53,6 +57,7 @@ export class View {
     calm.addEventListener("change", damp);
     damp();
     this.orbit.dampingFactor = 0.12;
+    this.orbit.addEventListener("start", () => (this.isMoved = true));
     this.fit();
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
@@ -134,6 +139,7 @@ export class View {
 
   // Moves the camera to the default view, which shows the whole scene in a canvas of any shape.
   reset(): void {
+    this.isMoved = false;
     const centre = this.bounds.getCenter(new THREE.Vector3());
     this.camera.position.copy(centre).add(kViewDirection);
     this.camera.lookAt(centre);
@@ -165,6 +171,7 @@ export class View {
 
   // Turns the camera around its target, in steps of kTurnStep to the right and up.
   turn(right: number, up: number): void {
+    this.isMoved = true;
     const offset = this.camera.position.clone().sub(this.orbit.target);
     const spherical = new THREE.Spherical().setFromVector3(offset);
     spherical.theta += right * kTurnStep;
@@ -173,6 +180,7 @@ export class View {
   }
 
   zoom(factor: number): void {
+    this.isMoved = true;
     this.camera.position.sub(this.orbit.target).multiplyScalar(factor).add(this.orbit.target);
   }
 
@@ -221,6 +229,7 @@ export class View {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
+    if (!this.isMoved) this.reset();
     // The new size has cleared the picture. The first one waits for draw(), while the session connects.
     if (this.isDrawn) this.renderer.render(this.studio.scene, this.camera);
   }

@@ -17,8 +17,6 @@ const kSolverNumbers = [
   ["activation", "Activation", "Stretch at which a spring becomes a constraint, as a fraction of its length"],
 ] as const;
 
-const kImplicitEuler = 5; // CS_SOLVER_IMPLICIT_EULER
-
 export class ClothPanel {
   private readonly cloth = element<HTMLSelectElement>("cloth");
   private readonly material = element<HTMLSelectElement>("material");
@@ -50,12 +48,7 @@ export class ClothPanel {
     this.cloth.addEventListener("change", () => this.chosen.push((client) => this.show(client)));
     this.material.addEventListener("change", () => {
       const { value } = this.material;
-      this.chosen.push((client) => {
-        const solver = client.parameters.solver(this.cloth.selectedIndex);
-        client.parameters.setMaterial(this.name, value);
-        // A material selects XPBD. Implicit Euler holds any material with fewer substeps, so a cloth that has it keeps it.
-        if (solver === kImplicitEuler) client.settings.change(this.name, { solver });
-      });
+      this.chosen.push((client) => client.parameters.setMaterial(this.name, value));
     });
     this.solver.addEventListener("change", () => {
       const solver = Number(this.solver.value);

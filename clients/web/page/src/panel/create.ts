@@ -2,10 +2,11 @@
 // Form that makes a scene from a mesh file: file, name, size, material, mass and pins.
 
 import { sceneBytes } from "@clothstream/client";
-import { element, make, write } from "./dom";
+import { confirmed, element, make, write } from "./dom";
 import { readMesh, type FileMesh } from "./mesh_file";
-import { boundsOf, likelySize, nameFor, pinsOf, placeOf, sizeOf, type PinChoice } from "./pins";
-import { Preview } from "./preview";
+import { boundsOf, centred, kFittedSize, likelySize, misfitOf, nameFor, pinsOf, placeOf, sizeOf, type PinChoice } from "./pins";
+import { Painter } from "./painter";
+import { PinBoxRows } from "./pin_box";
 import type { Requests } from "./requests";
 
 export class Create {
@@ -16,10 +17,10 @@ export class Create {
   private readonly material = element<HTMLSelectElement>("create-material");
   private readonly mass = element<HTMLInputElement>("create-mass");
   private readonly pins = element<HTMLSelectElement>("create-pins");
-  private readonly part = element<HTMLInputElement>("create-part");
   private readonly button = element<HTMLButtonElement>("create-send");
   private readonly progress = element<HTMLProgressElement>("create-progress");
-  private readonly preview = new Preview(element<HTMLCanvasElement>("preview"), () => this.describe());
+  private readonly painter = new Painter(() => this.describe());
+  private readonly box = new PinBoxRows(() => this.choosePins());
   private mesh: FileMesh | undefined;
   private fileName = "";
 
@@ -33,7 +34,7 @@ export class Create {
       if (file) void this.take(file);
     });
     this.listenToDrops();
-    for (const input of [this.pins, this.part]) input.addEventListener("input", () => this.choosePins());
+    this.pins.addEventListener("input", () => this.choosePins());
     this.form.addEventListener("submit", (event) => {
       event.preventDefault();
       void this.send();
@@ -45,6 +46,11 @@ export class Create {
     const before = this.material.value;
     this.material.replaceChildren(...materials.map((name) => new Option(name.replaceAll("_", " "), name)), new Option("none", ""));
     this.material.value = materials.includes(before) ? before : (materials.find((name) => name.includes("cotton")) ?? materials[0] ?? "");
+  }
+
+  // Indices of the pinned vertices of the mesh in the form, ascending.
+  get pinned(): Uint32Array {
+    return this.painter.list();
   }
 
   // A file may be dropped anywhere on the page.
@@ -73,6 +79,9 @@ export class Create {
     this.fail("");
     try {
       this.mesh = await readMesh(file);
+      if (this.longest() === 0) throw new Error(`${file.name} has all vertices in one place.`);
+      element("create-fields").hidden = false;
+      this.painter.show(this.mesh.positions, this.mesh.triangles, this.chosenPins());
     } catch (error) {
       this.mesh = undefined;
       element("create-fields").hidden = true;
@@ -80,55 +89,74 @@ export class Create {
       return;
     }
     this.fileName = file.name;
-    element("create-fields").hidden = false;
     this.name.value = nameFor(file.name);
-    this.size.value = String(likelySize(this.longest()));
-    this.preview.show(this.mesh.positions, this.mesh.triangles);
-    this.choosePins();
+    this.describe();
     element("create-fields").scrollIntoView({ block: "nearest" });
+    await this.chooseSize(this.mesh);
+  }
+
+  // Asks before it scales a file whose size does not fit the world. After a no, the user enters a size.
+  private async chooseSize({ positions, triangles }: FileMesh): Promise<void> {
+    const misfit = misfitOf(positions, triangles, 1);
+    this.size.value = misfit ? "" : String(likelySize(this.longest()));
+    if (!misfit) return;
+    const scales = await confirmed(`If its unit is the metre, ${this.fileName} ${misfit} Scale it to ${kFittedSize} m?`, "Scale");
+    if (scales) this.size.value = String(kFittedSize);
+    else this.size.focus();
   }
 
   private longest(): number {
     return this.mesh ? Math.max(...sizeOf(boundsOf(this.mesh.positions))) : 0;
   }
 
-  private choosePins(): void {
+  private chosenPins(): number[] {
     const choice = this.pins.value as PinChoice;
-    element("create-part-row").hidden = choice !== "part";
+    this.box.hidden = choice !== "box";
+    return this.mesh ? pinsOf(this.mesh.positions, choice, this.box.value) : [];
+  }
+
+  private choosePins(): void {
+    const pins = this.chosenPins();
     if (!this.mesh) return;
-    this.preview.pin(pinsOf(this.mesh.positions, choice, this.part.valueAsNumber / 100));
+    this.painter.replace(pins);
     this.describe();
   }
 
   private describe(): void {
     if (!this.mesh) return;
     const count = (values: { length: number }) => (values.length / 3).toLocaleString("en");
-    const pins = this.preview.pinned.size;
+    const pins = this.painter.count;
     write(
       element("create-mesh"),
       `${this.fileName}: ${count(this.mesh.positions)} vertices, ${count(this.mesh.triangles)} triangles, ` +
-        `${pins === 0 ? "no pins" : `${pins.toLocaleString("en")} pinned`}. Paint in the picture to pin more, with Shift to free.`,
+        `${pins === 0 ? "no pins" : `${pins.toLocaleString("en")} pinned`}.`,
     );
   }
 
   private async send(): Promise<void> {
-    if (!this.mesh) return;
+    const { mesh } = this;
+    if (!mesh) return;
     const longest = this.longest();
-    if (!(longest > 0)) return this.fail("The mesh has no size.");
     const scale = this.size.valueAsNumber / longest;
-    const pinned = [...this.preview.pinned].sort((a, b) => a - b);
+    const misfit = misfitOf(mesh.positions, mesh.triangles, scale);
+    if (misfit && !(await confirmed(`With a longest side of ${this.size.value} m, ${this.fileName} ${misfit} Scale it to ${kFittedSize} m?`, "Scale")))
+      return this.size.focus();
+    const fit = misfit !== undefined;
+    const { pinned } = this;
+    const bounds = boundsOf(mesh.positions);
     const scene = sceneBytes({
       name: this.name.value,
       description: `From ${this.fileName.replace(/[^ -~]/g, "").slice(0, 200) || "a file"}`,
-      positions: this.mesh.positions,
-      triangles: this.mesh.triangles,
-      ...(this.mesh.uvs ? { uvs: this.mesh.uvs } : {}),
+      positions: mesh.positions,
+      triangles: mesh.triangles,
+      ...(mesh.uvs ? { uvs: mesh.uvs } : {}),
       scale,
-      position: placeOf(boundsOf(this.mesh.positions), scale, pinned.length > 0),
+      position: fit ? placeOf(centred(bounds), kFittedSize / longest, pinned.length > 0) : placeOf(bounds, scale, pinned.length > 0),
       material: this.material.value,
       ...(this.mass.value ? { massPerArea: this.mass.valueAsNumber } : {}),
       pinned,
       repair: element<HTMLInputElement>("create-repair").checked,
+      fit,
       selfCollision: element<HTMLInputElement>("create-self").checked,
       floor: element<HTMLInputElement>("create-floor").checked,
     });

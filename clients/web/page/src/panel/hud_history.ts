@@ -35,6 +35,11 @@ export class HudHistory {
     return Math.min(this.count, this.capacity);
   }
 
+  // Number of samples since the start.
+  get added(): number {
+    return this.count;
+  }
+
   add(sample: Sample): void {
     for (const name of kChannels) this.values[name][this.count % this.capacity] = sample[name];
     ++this.count;

@@ -2,9 +2,11 @@
 // Reads an OBJ, glTF or GLB file as one mesh.
 
 import * as THREE from "three";
+import { DRACOLoader } from "three/examples/jsm/loaders/DRACOLoader.js";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
 import { mergeVertices } from "three/examples/jsm/utils/BufferGeometryUtils.js";
+import { checkGltf } from "./gltf_header";
 
 export interface FileMesh {
   positions: Float32Array; // 3 per vertex
@@ -12,6 +14,8 @@ export interface FileMesh {
   uvs: Float32Array | undefined; // 2 per vertex
 }
 
+// Decoder of Draco from the package three. The page loads it for the first file that needs it.
+const kDraco = { js: new URL("./draco_decoder.js", import.meta.url), wasm: new URL("./draco_decoder.wasm", import.meta.url) };
 const kMaxBytes = 64e6;
 const kMaxVertices = 4e6;
 
@@ -23,10 +27,14 @@ export async function readMesh(file: File): Promise<FileMesh> {
     throw new Error(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB; at most ${kMaxBytes / 1e6} MB are allowed.`);
   const root = kind === "obj" ? new OBJLoader().parse(await file.text()) : await readGltf(file);
   const parts: THREE.BufferGeometry[] = [];
+  let vertices = 0;
   root.updateMatrixWorld(true);
   root.traverse((object) => {
     if (!(object instanceof THREE.Mesh)) return;
     const from = object.geometry as THREE.BufferGeometry;
+    // A geometry may be used by several nodes.
+    vertices += from.getAttribute("position").count;
+    if (vertices > kMaxVertices) throw new Error(`${file.name} has more than ${kMaxVertices.toLocaleString("en")} vertices. Simplify it.`);
     const part = new THREE.BufferGeometry();
     part.setAttribute("position", from.getAttribute("position").clone());
     if (from.hasAttribute("uv")) part.setAttribute("uv", from.getAttribute("uv").clone());
@@ -37,17 +45,27 @@ export async function readMesh(file: File): Promise<FileMesh> {
 }
 
 async function readGltf(file: File): Promise<THREE.Object3D> {
+  const bytes = await file.arrayBuffer();
+  checkGltf(bytes, file.name, kMaxVertices);
+  const draco = new DRACOLoader().setDecoderPath({ js: kDraco.js.href, wasm: kDraco.wasm.href }).setWorkerLimit(1);
   try {
-    const { scene } = await new GLTFLoader().parseAsync(await file.arrayBuffer(), "");
+    const { scene } = await new GLTFLoader().setDRACOLoader(draco).parseAsync(bytes, "");
     return scene;
   } catch (error) {
-    const why = error instanceof Error ? error.message : String(error);
-    if (/DRACO/i.test(why)) throw new Error(`${file.name} is compressed with Draco. Export it without compression.`);
-    if (/meshopt/i.test(why)) throw new Error(`${file.name} is compressed with meshopt. Export it without compression.`);
+    const why = reasonOf(error);
+    if (/draco/i.test(why)) throw new Error(`${file.name} is compressed with Draco, but cannot be decoded: ${why}`);
     if (/fetch|load|buffer/i.test(why))
       throw new Error(`${file.name} needs other files. Export it as GLB, which has everything in one file. (${why})`);
     throw new Error(`${file.name} cannot be read: ${why}`);
+  } finally {
+    draco.dispose();
   }
+}
+
+// The worker of DRACOLoader reports errors as plain objects.
+function reasonOf(error: unknown): string {
+  if (error instanceof Error) return error.message;
+  return typeof error === "object" && error !== null && "error" in error ? `Draco: ${String(error.error)}` : String(error);
 }
 
 // `vDown`: texture coordinates count v downwards, as in glTF. The server counts it upwards, like OBJ.
@@ -61,7 +79,6 @@ function merged(parts: THREE.BufferGeometry[], name: string, vDown: boolean): Fi
     if (!part.index) part = mergeVertices(part, 0);
     const from = part.getAttribute("position");
     const first = positions.length / 3;
-    if (first + from.count > kMaxVertices) throw new Error(`${name} has more than ${kMaxVertices.toLocaleString("en")} vertices.`);
     for (let i = 0; i < from.count; ++i) positions.push(from.getX(i), from.getY(i), from.getZ(i));
     if (hasUvs) {
       const uv = part.getAttribute("uv");

@@ -7,6 +7,7 @@ import { ClothPanel } from "./cloth";
 import { Create } from "./create";
 import { element, write } from "./dom";
 import { HudPanel } from "./hud_panel";
+import { Limits } from "./limits";
 import { People } from "./people";
 import { Requests } from "./requests";
 import { Scenes } from "./scenes";
@@ -17,16 +18,19 @@ const kListPeriodMs = 5000;
 export interface PanelListener {
   sceneChosen(scene: string): void;
   viewReset(): void;
+  // An action on a scene succeeded or failed. The panel shows it; another view may show it too.
+  said(text: string): void;
 }
 
 export class Panel {
   readonly controls = new Controls();
   readonly hud = new HudPanel();
   private readonly cloth = new ClothPanel();
+  readonly limits: Limits;
+  readonly scenes: Scenes;
   private readonly requests: Requests;
-  private readonly scenes: Scenes;
   private readonly people: People;
-  private readonly create: Create;
+  readonly create: Create;
   private readonly tabs: Tabs;
   private readonly invite = element<HTMLInputElement>("invite-link");
   private listedAt = -Infinity;
@@ -34,17 +38,21 @@ export class Panel {
   // `options` are those of the session; a change of quality joins the scene again with the new ones.
   constructor(
     private readonly session: () => Session,
-    private readonly options: SessionOptions,
-    private readonly listener: PanelListener,
+    options: SessionOptions,
+    listener: PanelListener,
   ) {
     this.requests = new Requests(session);
-    this.scenes = new Scenes(this.requests, { sceneChosen: (scene) => listener.sceneChosen(scene), listWanted: () => this.wantList() });
+    this.scenes = new Scenes(this.requests, {
+      sceneChosen: (scene) => listener.sceneChosen(scene),
+      listWanted: () => this.wantList(),
+      said: (text) => listener.said(text),
+    });
+    this.limits = new Limits(options, () => listener.sceneChosen(session().client.sceneName));
     this.people = new People(this.requests, session);
     this.create = new Create(this.requests, (scene, repairs) => this.scenes.made(scene, repairs));
     this.tabs = new Tabs((tab) => this.shown(tab));
     element("reset").addEventListener("click", () => listener.viewReset());
     element("invite-copy").addEventListener("click", () => void this.copyLink());
-    for (const name of ["quality", "layers"] as const) this.offerLimit(name);
     window.addEventListener("keydown", (event) => this.press(event));
   }
 
@@ -124,7 +132,8 @@ export class Panel {
     if (this.tabs.current === "scene" && now - this.listedAt >= kListPeriodMs) this.wantList();
   }
 
-  private wantList(): void {
+  // Asks the server for its scenes.
+  wantList(): void {
     const session = this.session();
     if (session.state.kind !== "live") return;
     this.listedAt = performance.now();
@@ -164,20 +173,5 @@ export class Panel {
       write(button, "Press Ctrl C");
     }
     window.setTimeout(() => write(button, "Copy"), 2000);
-  }
-
-  // Choice of the best quality or of temporal layers. It is kept in the address.
-  private offerLimit(name: "quality" | "layers"): void {
-    const choice = element<HTMLSelectElement>(name);
-    const key = name === "layers" ? "temporalLayers" : "quality";
-    choice.value = String(this.options[key] ?? 0);
-    choice.addEventListener("change", () => {
-      const url = new URL(window.location.href);
-      if (choice.value === "0") url.searchParams.delete(name);
-      else url.searchParams.set(name, choice.value);
-      window.history.replaceState(null, "", url);
-      this.options[key] = Number(choice.value);
-      this.listener.sceneChosen(this.session().client.sceneName);
-    });
   }
 }

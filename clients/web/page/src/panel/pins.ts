@@ -6,13 +6,20 @@ export interface Bounds {
   max: [number, number, number];
 }
 
-export const kPinChoices = ["top", "topCorners", "corners", "part", "none"] as const;
-export type PinChoice = (typeof kPinChoices)[number];
+export type PinChoice = "top" | "topCorners" | "corners" | "box" | "none";
+
+// Part of the bounds along each axis, as fractions from the lower to the upper end.
+export type PinBox = readonly [from: number, to: number][];
 
 // Vertices within this part of the height belong to an edge.
 const kEdge = 0.01;
+const kRounding = 1e-6; // of the ends of a box
 const kHangingHeight = 2; // m, of pinned cloth
 const kFallingHeight = 1; // m, below falling cloth
+// Limits of the server (docs/meshes.md): largest coordinate and shortest mean edge, and the size that Mesh.fit gives, m.
+const kWorld = 1000;
+const kShortestEdge = 1e-4;
+export const kFittedSize = 2;
 
 // `positions`: 3 per vertex, at least one vertex.
 export function boundsOf(positions: Float32Array): Bounds {
@@ -30,6 +37,40 @@ export function sizeOf({ min, max }: Bounds): [number, number, number] {
   return [max[0] - min[0], max[1] - min[1], max[2] - min[2]];
 }
 
+// The same bounds around the origin.
+export function centred(bounds: Bounds): Bounds {
+  const [x, y, z] = sizeOf(bounds);
+  return { min: [-x / 2, -y / 2, -z / 2], max: [x / 2, y / 2, z / 2] };
+}
+
+// Why a mesh does not fit the world of the server when it is scaled, as the end of a sentence; undefined if it does.
+export function misfitOf(positions: Float32Array, triangles: Uint32Array, scale: number): string | undefined {
+  const { min, max } = boundsOf(positions);
+  const furthest = scale * Math.max(...min.map(Math.abs), ...max.map(Math.abs));
+  const size = sizeOf({ min, max });
+  if (furthest > kWorld) {
+    const text = size.map((side) => shown(scale * side)).join(" x ");
+    return `is ${text} m large and reaches ${shown(furthest)} m from the origin; the world ends at ${kWorld.toLocaleString("en")} m.`;
+  }
+  const edge = scale * meanEdge(positions, triangles);
+  if (edge >= kShortestEdge) return undefined;
+  return `has edges with a mean length of ${shown(1000 * edge)} mm; at least ${1000 * kShortestEdge} mm are needed.`;
+}
+
+function shown(value: number): string {
+  return Number(value.toPrecision(3)).toLocaleString("en", { maximumSignificantDigits: 3 });
+}
+
+function meanEdge(positions: Float32Array, triangles: Uint32Array): number {
+  let sum = 0;
+  for (let i = 0; i < triangles.length; ++i) {
+    const a = 3 * triangles[i]!;
+    const b = 3 * triangles[i % 3 === 2 ? i - 2 : i + 1]!;
+    sum += Math.hypot(positions[a]! - positions[b]!, positions[a + 1]! - positions[b + 1]!, positions[a + 2]! - positions[b + 2]!);
+  }
+  return triangles.length > 0 ? sum / triangles.length : 0;
+}
+
 // Length of the longest side that a new scene starts with, m: that of the file if it is the size of a cloth, else 1.5.
 export function likelySize(longest: number): number {
   return longest >= 0.2 && longest <= 5 ? Number(longest.toPrecision(3)) : 1.5;
@@ -42,14 +83,14 @@ export function placeOf({ min, max }: Bounds, scale: number, pinned: boolean): [
   return [(-scale * (min[0] + max[0])) / 2, bottom - scale * min[1], (-scale * (min[2] + max[2])) / 2];
 }
 
-// Indices of the pinned vertices, ascending. `part`: fraction of the height for "part", 0 to 1.
-export function pinsOf(positions: Float32Array, choice: PinChoice, part: number): number[] {
+// Indices of the pinned vertices, ascending. `box`: three ranges, for "box".
+export function pinsOf(positions: Float32Array, choice: PinChoice, box: PinBox): number[] {
   if (choice === "none" || positions.length === 0) return [];
   const bounds = boundsOf(positions);
   if (choice === "corners") return corners(positions, bounds);
-  const height = bounds.max[1] - bounds.min[1];
-  const from = bounds.max[1] - (choice === "part" ? Math.max(part, 1e-6) : kEdge) * height;
-  const upper = select(positions, (_, y) => y >= from);
+  if (choice === "box") return inBox(positions, bounds, box);
+  const from = bounds.max[1] - kEdge * (bounds.max[1] - bounds.min[1]);
+  const upper = select(positions, (vertex) => positions[3 * vertex + 1]! >= from);
   if (choice !== "topCorners") return upper;
   // The ends of the upper edge along its longer direction.
   const along = extentOf(positions, upper, 0) >= extentOf(positions, upper, 2) ? 0 : 2;
@@ -85,10 +126,29 @@ function together(positions: Float32Array, vertices: number[]): number[] {
   return [...all];
 }
 
-function select(positions: Float32Array, isIn: (x: number, y: number, z: number) => boolean): number[] {
+function inBox(positions: Float32Array, bounds: Bounds, box: PinBox): number[] {
+  const size = sizeOf(bounds);
+  const ends = box.map(([from, to], axis) => {
+    const at = (part: number) => bounds.min[axis]! + part * size[axis]!;
+    return [at(from) - kRounding * size[axis]!, at(to) + kRounding * size[axis]!] as const;
+  });
+  return select(positions, (vertex) =>
+    ends.every(([from, to], axis) => positions[3 * vertex + axis]! >= from && positions[3 * vertex + axis]! <= to),
+  );
+}
+
+// The vertices within `radius` of a point. Radius 0 finds those in the same place.
+export function within(positions: Float32Array, [x, y, z]: readonly [number, number, number], radius: number): number[] {
+  const most = radius * radius;
+  return select(positions, (vertex) => {
+    const [dx, dy, dz] = [positions[3 * vertex]! - x, positions[3 * vertex + 1]! - y, positions[3 * vertex + 2]! - z];
+    return dx * dx + dy * dy + dz * dz <= most;
+  });
+}
+
+function select(positions: Float32Array, isIn: (vertex: number) => boolean): number[] {
   const found: number[] = [];
-  for (let i = 0; i + 2 < positions.length; i += 3)
-    if (isIn(positions[i]!, positions[i + 1]!, positions[i + 2]!)) found.push(i / 3);
+  for (let vertex = 0; 3 * vertex < positions.length; ++vertex) if (isIn(vertex)) found.push(vertex);
   return found;
 }
 

@@ -1,95 +1,184 @@
 // SPDX-License-Identifier: MIT
-// Picture of a mesh from its largest side, in which a person paints pins.
+// Picture of a mesh that is to become cloth, with its pins. It can be turned, and finds the place under the pointer.
 
-import { boundsOf, sizeOf } from "./pins";
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { boundsOf, sizeOf, within } from "./pins";
 
-const kMargin = 18;
-const kBrush = 9; // pixels of the canvas
-const kMaxTriangles = 40_000; // drawn
+const kFieldOfView = 30; // degrees
+const kMargin = 1.08;
+const kMaxEdges = 60_000; // triangles of a mesh whose edges are drawn
+const kPinSize = 7; // pixels
+const kTurnStep = Math.PI / 24;
+const kZoomStep = 1.15;
+
+// Place under the pointer, in units of the file.
+export interface Touched {
+  point: THREE.Vector3;
+  // The nearest corner of the triangle, and vertices in the same place. Empty next to the mesh.
+  corner: readonly number[];
+}
 
 export class Preview {
-  private readonly context: CanvasRenderingContext2D;
-  private points: Float32Array = new Float32Array(); // 2 per vertex, pixels
-  private triangles: Uint32Array = new Uint32Array();
-  readonly pinned = new Set<number>();
+  readonly orbit: OrbitControls;
+  private readonly renderer: THREE.WebGLRenderer;
+  private readonly scene = new THREE.Scene();
+  private readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
+  private readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
+  private readonly edges: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly pins: THREE.Points<THREE.BufferGeometry, THREE.PointsMaterial>;
+  private readonly brush: THREE.Mesh<THREE.SphereGeometry, THREE.MeshBasicMaterial>;
+  private readonly raycaster = new THREE.Raycaster();
+  private readonly corner = new THREE.Vector3();
+  private positions: Float32Array = new Float32Array();
+  private drawing = 0; // handle of the next drawing
 
-  // `painted` is called when a stroke has changed the pins.
-  constructor(
-    private readonly canvas: HTMLCanvasElement,
-    private readonly painted: () => void,
-  ) {
-    this.context = canvas.getContext("2d")!;
-    canvas.addEventListener("pointerdown", (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      this.paint(event);
-    });
-    canvas.addEventListener("pointermove", (event) => {
-      if (event.buttons & 1) this.paint(event);
-    });
+  // Throws if the browser refuses another WebGL context.
+  constructor(readonly canvas: HTMLCanvasElement) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    const material = new THREE.MeshStandardMaterial({ side: THREE.DoubleSide, flatShading: true, roughness: 0.9, polygonOffset: true });
+    Object.assign(material, { polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+    this.mesh = new THREE.Mesh(new THREE.BufferGeometry(), material);
+    this.edges = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ transparent: true, opacity: 0.2 }));
+    this.pins = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ sizeAttenuation: false }));
+    this.brush = new THREE.Mesh(new THREE.SphereGeometry(1, 24, 16), new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.3, depthWrite: false }));
+    this.brush.visible = false;
+    const light = new THREE.DirectionalLight(0xffffff, 2.2);
+    light.position.set(0.4, 0.8, 1);
+    this.camera.add(light, light.target);
+    light.target.position.set(0, 0, -1);
+    this.scene.add(this.camera, new THREE.AmbientLight(0xffffff, 1.6), this.mesh, this.edges, this.pins, this.brush);
+    this.orbit = new OrbitControls(this.camera, canvas);
+    this.orbit.addEventListener("change", () => this.draw());
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    window.matchMedia("(prefers-color-scheme: light)").addEventListener("change", () => this.draw());
   }
 
+  // Shows a mesh from its largest side.
   show(positions: Float32Array, triangles: Uint32Array): void {
-    const { min, max } = boundsOf(positions);
-    const size = sizeOf({ min, max });
+    this.positions = positions;
+    for (const object of [this.mesh, this.edges, this.pins]) {
+      object.geometry.dispose();
+      object.geometry = new THREE.BufferGeometry();
+    }
+    const shared = new THREE.BufferAttribute(positions, 3);
+    this.mesh.geometry.setAttribute("position", shared).setIndex(new THREE.BufferAttribute(triangles, 1));
+    if (triangles.length / 3 <= kMaxEdges) this.edges.geometry = new THREE.WireframeGeometry(this.mesh.geometry);
+    this.pins.geometry.setAttribute("position", shared).setIndex(new THREE.BufferAttribute(new Uint32Array(), 1));
+    this.reset();
+  }
+
+  showPins(vertices: Uint32Array): void {
+    this.pins.geometry.setIndex(new THREE.BufferAttribute(vertices, 1));
+    this.draw();
+  }
+
+  // Shows where the brush is, as a ball. Undefined hides it.
+  showBrush(at: THREE.Vector3 | undefined, radius: number): void {
+    this.brush.visible = at !== undefined;
+    if (at) this.brush.position.copy(at);
+    this.brush.scale.setScalar(radius);
+    this.draw();
+  }
+
+  // Finds the place under a point of the canvas, which is in CSS pixels. Next to the mesh, it is the nearest vertex that
+  // is at most `radius` from the line of sight.
+  touch(x: number, y: number, radius: number): Touched | undefined {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.camera.updateMatrixWorld();
+    this.raycaster.setFromCamera(new THREE.Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.camera);
+    const [hit] = this.raycaster.intersectObject(this.mesh, false);
+    if (!hit?.face) return this.touchNextToMesh(radius);
+    const { a, b, c } = hit.face;
+    const away = (vertex: number) => this.corner.fromArray(this.positions, 3 * vertex).distanceToSquared(hit.point);
+    const nearest = [a, b, c].reduce((best, vertex) => (away(vertex) < away(best) ? vertex : best));
+    return { point: hit.point, corner: within(this.positions, this.placeOf(nearest), 0) };
+  }
+
+  private touchNextToMesh(radius: number): Touched | undefined {
+    const { ray } = this.raycaster;
+    let nearest = Infinity;
+    for (let i = 0; i < this.positions.length; i += 3) {
+      const point = this.corner.fromArray(this.positions, i);
+      if (ray.distanceSqToPoint(point) > radius * radius) continue;
+      nearest = Math.min(nearest, point.sub(ray.origin).dot(ray.direction));
+    }
+    return nearest === Infinity ? undefined : { point: ray.at(nearest, new THREE.Vector3()), corner: [] };
+  }
+
+  // Turns the view by steps to the right and up.
+  turn(right: number, up: number): void {
+    const way = new THREE.Spherical().setFromVector3(this.camera.position.sub(this.orbit.target));
+    way.theta += right * kTurnStep;
+    way.phi -= up * kTurnStep;
+    this.camera.position.setFromSpherical(way.makeSafe()).add(this.orbit.target);
+    this.orbit.update();
+  }
+
+  // Zooms in by steps.
+  zoom(steps: number): void {
+    this.camera.position.sub(this.orbit.target).multiplyScalar(kZoomStep ** -steps).add(this.orbit.target);
+    this.orbit.update();
+  }
+
+  // Diameter of a ball in CSS pixels, at the middle of the mesh.
+  pixelsOf(radius: number): number {
+    const distance = this.camera.position.distanceTo(this.orbit.target);
+    return (radius * this.canvas.clientHeight) / (distance * Math.tan(THREE.MathUtils.degToRad(kFieldOfView / 2)));
+  }
+
+  private placeOf(vertex: number): [number, number, number] {
+    return [this.positions[3 * vertex]!, this.positions[3 * vertex + 1]!, this.positions[3 * vertex + 2]!];
+  }
+
+  // Looks at the largest side of the mesh. A mesh that lies flat is seen from above, with -z up.
+  private reset(): void {
+    this.resize();
+    const bounds = boundsOf(this.positions);
+    const size = sizeOf(bounds);
     const thin = size.indexOf(Math.min(...size));
-    // Depth along y shows the mesh from above, with -z up; along x from its side.
     const [u, v] = thin === 2 ? [0, 1] : thin === 0 ? [2, 1] : [0, 2];
-    const upwards = v === 1 ? 1 : -1;
-    const { width, height } = this.canvas;
-    const scale = Math.min((width - 2 * kMargin) / (size[u]! || 1), (height - 2 * kMargin) / (size[v]! || 1));
-    this.points = new Float32Array((2 * positions.length) / 3);
-    for (let i = 0; i < positions.length / 3; ++i) {
-      this.points[2 * i] = width / 2 + scale * (positions[3 * i + u]! - (min[u]! + max[u]!) / 2);
-      this.points[2 * i + 1] = height / 2 - upwards * scale * (positions[3 * i + v]! - (min[v]! + max[v]!) / 2);
-    }
-    this.triangles = triangles;
+    const slope = Math.tan(THREE.MathUtils.degToRad(kFieldOfView / 2));
+    const half = (kMargin / 2) * Math.max(size[v]!, size[u]! / this.camera.aspect);
+    const longest = Math.max(...size) || 1;
+    const distance = half / slope + size[thin]! / 2;
+    const middle = new THREE.Vector3(...bounds.min).add(new THREE.Vector3(...bounds.max)).multiplyScalar(0.5);
+    // OrbitControls keep the y axis upright, so a view from above is a little tilted.
+    const way = new THREE.Vector3(thin === 0 ? 1 : 0, thin === 1 ? 1 : 0, thin === 2 ? 1 : thin === 1 ? 1e-3 : 0).normalize();
+    this.camera.near = longest / 1000;
+    this.camera.far = 100 * longest;
+    this.camera.updateProjectionMatrix();
+    this.camera.position.copy(middle).addScaledVector(way, distance || longest);
+    this.orbit.target.copy(middle);
+    this.orbit.minDistance = longest / 20;
+    this.orbit.maxDistance = 10 * longest;
+    this.orbit.update();
     this.draw();
   }
 
-  pin(vertices: readonly number[]): void {
-    this.pinned.clear();
-    for (const vertex of vertices) this.pinned.add(vertex);
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
     this.draw();
   }
 
+  // Draws once, before the next picture of the browser.
   private draw(): void {
-    const { context, points, triangles } = this;
-    const style = getComputedStyle(this.canvas);
-    context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    context.strokeStyle = style.getPropertyValue("--edge");
-    context.lineWidth = 1;
-    context.beginPath();
-    const step = 3 * Math.ceil(triangles.length / 3 / kMaxTriangles);
-    for (let i = 0; i + 2 < triangles.length; i += step) {
-      const [a, b, c] = [2 * triangles[i]!, 2 * triangles[i + 1]!, 2 * triangles[i + 2]!];
-      context.moveTo(points[a]!, points[a + 1]!);
-      context.lineTo(points[b]!, points[b + 1]!);
-      context.lineTo(points[c]!, points[c + 1]!);
-      context.closePath();
-    }
-    context.stroke();
-    context.fillStyle = style.getPropertyValue("--accent");
-    for (const vertex of this.pinned) {
-      context.beginPath();
-      context.arc(points[2 * vertex]!, points[2 * vertex + 1]!, 4, 0, 2 * Math.PI);
-      context.fill();
-    }
-    const text = `Front of the mesh with ${this.pinned.size} pinned vertices. Paint to pin vertices; hold Shift to free them.`;
-    if (this.canvas.getAttribute("aria-label") !== text) this.canvas.setAttribute("aria-label", text);
-  }
-
-  private paint(event: PointerEvent): void {
-    const frame = this.canvas.getBoundingClientRect();
-    const x = ((event.clientX - frame.left) * this.canvas.width) / frame.width;
-    const y = ((event.clientY - frame.top) * this.canvas.height) / frame.height;
-    const before = this.pinned.size;
-    for (let vertex = 0; 2 * vertex < this.points.length; ++vertex) {
-      if (Math.hypot(this.points[2 * vertex]! - x, this.points[2 * vertex + 1]! - y) > kBrush) continue;
-      if (event.shiftKey) this.pinned.delete(vertex);
-      else this.pinned.add(vertex);
-    }
-    if (this.pinned.size === before) return;
-    this.draw();
-    this.painted();
+    if (this.drawing !== 0) return;
+    this.drawing = window.requestAnimationFrame(() => {
+      this.drawing = 0;
+      const style = getComputedStyle(this.canvas);
+      const colour = (name: string) => style.getPropertyValue(`--${name}`).trim();
+      this.mesh.material.color.set(colour("edge"));
+      this.edges.material.color.set(colour("text"));
+      this.pins.material.color.set(colour("accent"));
+      this.pins.material.size = kPinSize * this.renderer.getPixelRatio();
+      this.brush.material.color.set(colour("accent"));
+      this.renderer.render(this.scene, this.camera);
+    });
   }
 }

@@ -11,6 +11,8 @@ export interface ScenesListener {
   sceneChosen(scene: string): void;
   // The list may have changed.
   listWanted(): void;
+  // An action succeeded or failed.
+  said(text: string): void;
 }
 
 export class Scenes {
@@ -23,6 +25,7 @@ export class Scenes {
     delete: element<HTMLButtonElement>("scene-delete"),
   };
   private joined: SceneSummary | undefined;
+  private role = kViewer;
   private shownList = "";
   private deleted = ""; // scene that the server was asked to delete; the next list shows whether it is gone
 
@@ -39,6 +42,11 @@ export class Scenes {
   // Whether the joined scene is paused, by the newest list.
   get isPaused(): boolean {
     return this.joined?.paused === true;
+  }
+
+  // Whether this person may reset, pause and record.
+  get mayAct(): boolean {
+    return this.role !== kViewer;
   }
 
   // A scene was made from a file.
@@ -62,14 +70,15 @@ export class Scenes {
       this.deleted = "";
     }
     this.joined = scenes.find(({ name }) => name === client.sceneName);
-    this.showActions(client.people.role);
+    this.role = client.people.role;
+    this.showActions();
   }
 
-  private showActions(role: number): void {
+  private showActions(): void {
     const scene = this.joined;
     write(this.buttons.pause, scene?.paused ? "Continue" : "Pause");
     write(this.buttons.record, scene?.recorded ? "Stop recording" : "Record");
-    const viewer = role === kViewer ? "Viewers change nothing. An owner can give you another role." : "";
+    const viewer = this.mayAct ? "" : "Viewers change nothing. An owner can give you another role.";
     for (const button of [this.buttons.reset, this.buttons.pause, this.buttons.record]) disable(button, viewer);
     const kept = scene && !scene.created ? "The server started with this scene, so it cannot be deleted." : "";
     disable(this.buttons.delete, viewer || kept);
@@ -96,12 +105,13 @@ export class Scenes {
     return make("li", {}, button);
   }
 
-  private async reset(): Promise<void> {
+  async reset(): Promise<void> {
     this.report(await this.requests.ask((requests) => requests.reset("")), "The cloth is back at its start.");
   }
 
-  private async pause(): Promise<void> {
-    const paused = !this.joined?.paused;
+  // Pauses the scene, or lets it continue.
+  async pause(): Promise<void> {
+    const paused = !this.isPaused;
     this.report(await this.requests.ask((requests) => requests.pause("", paused)), paused ? "Paused for everyone." : "Running again.");
   }
 
@@ -137,5 +147,6 @@ export class Scenes {
     write(this.result, text);
     this.result.dataset["kind"] = kind;
     this.result.hidden = false;
+    this.listener.said(text);
   }
 }

@@ -25,7 +25,7 @@ const kPanelScale = 1.8; // so that it can be read at this distance
 class SelfTest {
   readonly headset: Headset;
   readonly work = new FrameWork(); // for the probe
-  private readonly panel = new CanvasPanel();
+  readonly panel = new CanvasPanel();
   private readonly results = new Results();
   private readonly startVr = element<HTMLButtonElement>("start-vr");
   private readonly startWindow = element<HTMLButtonElement>("start-window");
@@ -223,7 +223,7 @@ async function start(): Promise<void> {
     },
   });
   const test = new SelfTest(view, session, seconds);
-  const probe = expose(session, view, test.headset, test.work);
+  const probe = expose(session, view, test);
   view.renderer.setAnimationLoop((now: number, frame?: XRFrame) => test.draw(now, frame));
 }
 
