@@ -225,8 +225,8 @@ std::vector<model::Submesh> submeshes(const MeshSource& source,
 // Builds the mesh of a source whose faces are triangles and quads. `names` has the vertex of each node that
 // errors name.
 tl::expected<BuiltMesh, MeshError> build(const MeshSource& source, const std::vector<Vec3>& placed,
-                                           Numbering numbering, const std::vector<std::uint32_t>& names,
-                                           const MeshLimits& limits) {
+                                         Numbering numbering, const std::vector<std::uint32_t>& names,
+                                         const MeshLimits& limits) {
   limits.cancellation.check();
   model::MeshShape shape;
   shape.positions.reserve(numbering.vertexOfNode.size());
@@ -252,13 +252,12 @@ tl::expected<BuiltMesh, MeshError> build(const MeshSource& source, const std::ve
 }
 
 tl::expected<BuiltMesh, MeshError> buildRepaired(const MeshSource& source, const std::vector<Vec3>& placed,
-                                                   float weldDistance, const MeshLimits& limits,
-                                                   Repairs& repairs) {
+                                                 float weldDistance, const MeshLimits& limits,
+                                                 Repairs& repairs) {
   // Nodes that are closer than the shortest edge would leave faces that are refused.
   const std::vector<std::uint32_t> welded = weld(placed, std::max(weldDistance, limits.minEdge));
   limits.cancellation.check();
-  const tl::expected<RepairedMesh, MeshError> repaired =
-      repairMesh(source, placed, welded, limits, repairs);
+  const tl::expected<RepairedMesh, MeshError> repaired = repairMesh(source, placed, welded, limits, repairs);
   if (!repaired) return tl::unexpected(repaired.error());
   limits.cancellation.check();
   std::vector<std::uint32_t> apart(repaired->placed.size());
@@ -283,7 +282,7 @@ tl::expected<BuiltMesh, MeshError> buildRepaired(const MeshSource& source, const
 }  // namespace
 
 tl::expected<BuiltMesh, MeshError> buildMesh(const MeshSource& source, const MeshOptions& options,
-                                               const MeshLimits& limits) {
+                                             const MeshLimits& limits) {
   Problem problem = checkSizes(source, options, limits);
   if (!problem) problem = checkNumbers(source);
   if (!problem && !options.repair) problem = checkCorners(source);

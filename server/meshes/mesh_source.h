@@ -61,7 +61,8 @@ struct MeshLimits {
 // Why a mesh is refused, and what to do.
 struct MeshError {
   // NOLINTNEXTLINE(google-explicit-constructor): most errors are no more than a text
-  MeshError(std::string error, bool beyondALimit = false) : text(std::move(error)), isTooLarge(beyondALimit) {}
+  MeshError(std::string error, bool beyondALimit = false)
+      : text(std::move(error)), isTooLarge(beyondALimit) {}
 
   std::string text;
   bool isTooLarge;  // it exceeds maxVertices or maxNodeSprings

@@ -169,8 +169,8 @@ MeshSource toSource(const MeshSource& before, const std::vector<SheetTriangle>& 
 }  // namespace
 
 tl::expected<RepairedMesh, MeshError> repairMesh(const MeshSource& source, const std::vector<Vec3>& placed,
-                                                   const std::vector<std::uint32_t>& welded,
-                                                   const MeshLimits& limits, Repairs& repairs) {
+                                                 const std::vector<std::uint32_t>& welded,
+                                                 const MeshLimits& limits, Repairs& repairs) {
   TriangleMaker maker(source, placed, welded, repairs);
   if (auto problem = maker.make(limits.cancellation)) return tl::unexpected(MeshError(std::move(*problem)));
   std::vector<SheetTriangle> triangles = std::move(maker.triangles());

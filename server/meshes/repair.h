@@ -38,8 +38,8 @@ struct RepairedMesh {
 // is left, if a polygon cannot be divided, or if there would be more vertices than the limit. Adds to
 // `repairs`.
 [[nodiscard]] tl::expected<RepairedMesh, MeshError> repairMesh(const MeshSource& source,
-                                                                 const std::vector<model::Vec3>& placed,
-                                                                 const std::vector<std::uint32_t>& welded,
-                                                                 const MeshLimits& limits, Repairs& repairs);
+                                                               const std::vector<model::Vec3>& placed,
+                                                               const std::vector<std::uint32_t>& welded,
+                                                               const MeshLimits& limits, Repairs& repairs);
 
 }  // namespace clothstream::meshes

@@ -155,7 +155,8 @@ TEST(Draco, CostsLittleWithHugeSizes) {
   EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 2.0);
 }
 
-// One of the numbers is that of the orientations of texture coordinates, of which Draco itself would read 2^31.
+// One of the numbers is that of the orientations of texture coordinates, of which Draco itself would read
+// 2^31.
 TEST(Draco, RefusesMoreOrientationsThanCorners) {
   for (const DracoCoding& coding : kDracoCodings) {
     const std::string bytes = compressed(coding);

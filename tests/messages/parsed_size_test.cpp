@@ -91,7 +91,7 @@ TEST(ParsedSize, RefusesWhatTheParserRefuses) {
     const std::string part = bytes.substr(0, length);
     EXPECT_EQ(sizeOf(part).has_value(), v1::Scene().ParseFromString(part)) << length;
   }
-  for (const std::string& malformed : {std::string("\x0c"),             // the end of a group that did not start
+  for (const std::string& malformed : {std::string("\x0c"),          // the end of a group that did not start
                                        std::string(2'000, '\x0b')})  // groups in groups
     EXPECT_EQ(sizeOf(malformed).error(), SizeError::malformed);
 }
