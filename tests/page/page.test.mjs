@@ -501,7 +501,7 @@ test("the page asks for a pairing code, keeps its token, and shows a code to own
     assert.match(await page.textContent("#confirm-text"), /^Ban .+\? Until an owner lifts the ban/);
     await page.click("#confirm-yes");
     await untilState(guest, "failed");
-    assert.match(await guest.textContent("#banner-text"), /banned/);
+    assert.match(await guest.textContent("#failure-title"), /banned/);
     const lift = page.getByRole("button", { name: /^Lift the ban of / });
     await lift.waitFor();
     await takePicture(page, "banned");
