@@ -180,7 +180,7 @@ test("figures are hidden at first, and stay when no frame comes", () =>
     assert.ok(await page.isVisible("#hud"));
     const label = (pattern) =>
       page.waitForFunction((source) => new RegExp(source).test(document.getElementById("hud-canvas").ariaLabel), pattern.source);
-    await label(/display [1-9]\d* \/s, stream [1-9]\d* \/s, frame age \d+ ms, round trip \d+\.\d ms, network \d+ kbit\/s, precision \d+\.\d bit\/vertex, dropped in a minute \d+[;]/);
+    await label(/display [1-9]\d* \/s, stream [1-9]\d* \/s, frame age \d+ ms, round trip \d+\.\d ms, network \d+ kbit\/s, precision \d+\.\d bit\/vertex, longest pause \d+ ms, dropped \d+ \/min;/);
     await label(/pose to picture \d+\.\d ms: up \d+\.\d, server [\d.]+, down [\d.]+, decode [\d.]+, play-out [\d.]+\./);
     const drawn = await page.evaluate(() => {
       const canvas = document.getElementById("hud-canvas");
