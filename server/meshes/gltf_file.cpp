@@ -2,12 +2,16 @@
 // Reads glTF 2.0 with tinygltf. Checks nodes and extensions.
 #include "server/meshes/gltf_file.h"
 
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 #include <tiny_gltf.h>
 
+#include "server/meshes/file_bytes.h"
 #include "server/meshes/gltf_container.h"
 #include "server/meshes/gltf_primitive.h"
 
@@ -136,11 +140,54 @@ std::optional<std::string> unsupportedExtension(const std::string& name) {
                      name);
 }
 
+// Files that a .gltf file refers to, for the callbacks of tinygltf. They are in its folder, and have a limit
+// of bytes in all, so that a file from a stranger reads nothing else and costs no more than it may.
+class NeighbourFiles {
+ public:
+  NeighbourFiles(const std::filesystem::path& folder, std::uint64_t most)
+      : folder_(std::filesystem::absolute(folder).lexically_normal()), left_(most) {}
+
+  tinygltf::FsCallbacks callbacks() {
+    return {.FileExists = [](const std::string& path,
+                             void* self) { return static_cast<const NeighbourFiles*>(self)->holds(path); },
+            .ExpandFilePath = [](const std::string& path, void*) { return path; },
+            .ReadWholeFile =
+                [](std::vector<unsigned char>* bytes, std::string* error, const std::string& path,
+                   void* self) { return static_cast<NeighbourFiles*>(self)->read(path, *bytes, *error); },
+            .WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&,
+                                 void*) { return false; },
+            .user_data = this};
+  }
+
+ private:
+  bool holds(const std::filesystem::path& path) const {
+    const auto inFolder = std::filesystem::absolute(path).lexically_normal().lexically_relative(folder_);
+    std::error_code ignored;
+    return !inFolder.empty() && *inFolder.begin() != ".." && std::filesystem::is_regular_file(path, ignored);
+  }
+
+  bool read(const std::filesystem::path& path, std::vector<unsigned char>& bytes, std::string& error) {
+    const auto content = readBytes(path, left_);
+    if (content) {
+      left_ -= content->size();
+      bytes.assign(content->begin(), content->end());
+    } else {
+      error = content.error();
+    }
+    return content.has_value();
+  }
+
+  std::filesystem::path folder_;
+  std::uint64_t left_;
+};
+
 }  // namespace
 
 tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::filesystem::path& folder,
-                                               bool binary, std::uint64_t maxVertices) {
+                                               bool binary, const FileLimits& limits) {
   tinygltf::TinyGLTF loader;
+  NeighbourFiles files(folder, limits.bytes - std::min<std::uint64_t>(limits.bytes, bytes.size()));
+  loader.SetFsCallbacks(files.callbacks());
   // Images are not needed, so they are not decoded.
   loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
                            int, void*) { return true; },
@@ -162,7 +209,7 @@ tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::fil
     return tl::unexpected(fmt::format("is not glTF 2.0: {}", error.empty() ? "cannot be parsed" : error));
   for (const std::string& extension : model.extensionsRequired)
     if (auto problem = unsupportedExtension(extension)) return tl::unexpected(std::move(*problem));
-  return Gatherer(model, maxVertices).gather();
+  return Gatherer(model, limits.vertices).gather();
 }
 
 }  // namespace clothstream::meshes

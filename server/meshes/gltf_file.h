@@ -2,20 +2,20 @@
 // Reads glTF 2.0 files.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <string>
 
 #include <tl/expected.hpp>
 
+#include "server/meshes/mesh_file.h"
 #include "server/meshes/mesh_source.h"
 
 namespace clothstream::meshes {
 
-// Reads the bytes of a .gltf file, or of a .glb file if `binary`. Buffers in other files are in `folder`.
-// mesh_file.h describes the result.
+// Reads the bytes of a .gltf file, or of a .glb file if `binary`. It may refer to files in `folder` and
+// below. All files together are within the limit of bytes. mesh_file.h describes the result.
 [[nodiscard]] tl::expected<MeshSource, std::string> readGltf(std::string bytes,
                                                              const std::filesystem::path& folder, bool binary,
-                                                             std::uint64_t maxVertices);
+                                                             const FileLimits& limits);
 
 }  // namespace clothstream::meshes

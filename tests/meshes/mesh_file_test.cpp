@@ -29,7 +29,7 @@ class MeshFile : public testing::Test {
   }
   ~MeshFile() override { std::filesystem::remove_all(folder_); }
 
-  std::filesystem::path write(const char* name, std::string_view bytes) {
+  std::filesystem::path write(const std::string& name, std::string_view bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return folder_ / name;
   }
@@ -210,6 +210,24 @@ TEST_F(MeshFile, RefusesInvalidGltf) {
     ASSERT_FALSE(source) << to;
     EXPECT_THAT(source.error(), AllOf(StartsWith(folder_.string()), HasSubstr(says))) << to;
   }
+}
+
+TEST_F(MeshFile, GltfReadsOnlyFilesOfItsFolderWithinTheLimit) {
+  const std::filesystem::path inside = folder_ / "inside";
+  std::filesystem::create_directories(inside / "parts");
+  write("sheet.bin", sheetBuffer());
+  write("inside/parts/sheet.bin", sheetBuffer());
+  const auto read = [&](const std::string& uri, const FileLimits& limits = kFileLimits) {
+    return readMeshFile(write("inside/a.gltf", replaced(kGltf, "sheet.bin", uri)), limits);
+  };
+  EXPECT_TRUE(read("parts/sheet.bin"));
+  EXPECT_TRUE(read("parts/../parts/sheet.bin"));
+  for (const std::string& uri : {std::string("../sheet.bin"), (folder_ / "sheet.bin").string(),
+                                 std::string("parts"), std::string("/dev/zero")})
+    EXPECT_THAT(read(uri).error(), HasSubstr("File not found")) << uri;
+  const std::size_t json = replaced(kGltf, "sheet.bin", "parts/sheet.bin").size();
+  EXPECT_THAT(read("parts/sheet.bin", {.bytes = json + 40, .vertices = 100}).error(),
+              HasSubstr("has 92 bytes; at most 40 are allowed"));
 }
 
 TEST_F(MeshFile, NamesFormatsThatAreNotSupported) {
