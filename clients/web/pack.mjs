@@ -24,7 +24,7 @@ function withExtensions(code) {
   return code;
 }
 
-// Writes the modules and types of all sources of a package. Files of deleted sources may lie in dist.
+// Writes the modules and types of all sources of a package. Other files in dist are left out: they may be of deleted sources.
 function writeModules(from, to) {
   const sources = readdirSync(join(from, "src"), { recursive: true }).filter((name) => name.endsWith(".ts") && !name.endsWith(".d.ts"));
   for (const source of sources) {

@@ -36,7 +36,7 @@ after(async () => {
   if (folder) await rm(folder, { recursive: true });
 });
 
-// Opens a page with storage of its own. `use` gets the page, which is closed afterwards.
+// Opens a page with separate storage. `use` gets the page, which is closed afterwards.
 async function withPage(url, options, use) {
   const context = await browser.newContext({ colorScheme: options.colorScheme ?? "light", viewport: options.viewport ?? kQuick });
   const page = await openPage(context, url, { draws: false, ...options });
@@ -322,7 +322,7 @@ test("a refused local network is explained, and the page connects when it is all
   }
 });
 
-test("the figures show a stall of 200 ms, and play-out recovers; longer stalls are told until they end", async () => {
+test("the figures show a stall of 300 ms as one of at least 200 ms, and play-out recovers; longer stalls are shown until they end", async () => {
   const link = await makeLink(server.port);
   try {
     await withPage(link.url, {}, async (page) => {

@@ -73,7 +73,7 @@ export class Input {
     core.exports.cs_set_hand(pointer, side, this.array, joints ? kHandJoints : 0, nowUs());
   }
 
-  // Replaces the head, a sphere that looks along -Z of its own frame. Undefined removes it.
+  // Replaces the head, a sphere. The direction of its look is its own -Z axis. Undefined removes it.
   setHead(head: Head | undefined): void {
     const { core, pointer } = this.handle;
     if (!head) return core.exports.cs_set_head(pointer, 0, 0, 0, nowUs());

@@ -56,7 +56,7 @@ export class People {
   remove(participant: bigint): void {
     this.handle.core.exports.cs_remove_participant(this.handle.pointer, participant);
   }
-  // Removes the participant. Nobody can return to the scene with the same token.
+  // Removes the participant, whose token no longer admits anybody to the scene.
   ban(participant: bigint): void {
     this.handle.core.exports.cs_ban_participant(this.handle.pointer, participant);
   }

@@ -4,7 +4,7 @@
 import { ErrorCode, type SessionState } from "@clothstream/client";
 import { kReload } from "./advice";
 
-// What a button of a failure does.
+// Action of a button of a failure.
 export type FailureAction = "connect" | "join" | "default" | "reload" | "view" | "close";
 
 export interface Failure {

@@ -19,7 +19,7 @@ export interface FailuresListener {
 }
 
 export class Failures {
-  // What the page says now.
+  // The failure that the page shows now.
   current: Failure | undefined;
   private readonly card = new FailureCard((action) => this.act(action));
   private readonly late = new LateFrames();

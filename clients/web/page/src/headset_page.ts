@@ -3,7 +3,7 @@
 
 import * as THREE from "three";
 import type { Client, Session } from "@clothstream/client";
-import { CanvasPanel, Headset, Immersion, type Mode, type PanelRow } from "@clothstream/three";
+import { CanvasPanel, Immersion, type Headset, type Mode, type PanelRow } from "@clothstream/three";
 import { isHeadsetBrowser, whyNoHeadset } from "./advice";
 import type { Failure, FailureAction } from "./failure";
 import type { Failures } from "./failures";
@@ -11,6 +11,7 @@ import { HeadsetPanel } from "./headset_panel";
 import { element, make, write } from "./panel/dom";
 import type { Panel } from "./panel/panel";
 import type { View } from "./view";
+import { makeHeadset } from "./view_headset";
 
 const kEyes = 1.5; // m
 // Place of the panel in metres from the feet of the user: to the left of the first look, nearer than the scene.
@@ -44,28 +45,16 @@ export class HeadsetPage {
     private readonly listener: HeadsetPageListener,
     private readonly failures: Failures,
   ) {
-    this.headset = new Headset(
-      {
-        renderer: view.renderer,
-        scene: view.scene,
-        bounds: () => view.box,
-        change: (change) => {
-          change(session.client.input);
-          session.flush();
-        },
-        passThrough: (on) => view.passThrough(on),
+    this.headset = makeHeadset(view, session, {
+      left: () => {
+        this.isBefore = false;
+        view.resize();
+        view.reset();
       },
-      {
-        left: () => {
-          this.isBefore = false;
-          view.resize();
-          view.reset();
-        },
-        pressed: (limb) => this.panel.press(limb),
-        updated: () => this.panel.update(this.headset.body, this.headset.placement.matrix),
-        doingChanged: () => this.show(),
-      },
-    );
+      pressed: (limb) => this.panel.press(limb),
+      updated: () => this.panel.update(this.headset.body, this.headset.placement.matrix),
+      doingChanged: () => this.show(),
+    });
     this.content = new HeadsetPanel(session, panel, {
       sceneChosen: (scene) => listener.sceneChosen(scene),
       doingChosen: (doing) => this.headset.do(doing),

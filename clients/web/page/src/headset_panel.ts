@@ -48,7 +48,7 @@ export class HeadsetPanel {
     this.listener.changed();
   }
 
-  // `words` stand in place of the usual figures.
+  // `words` replace the usual figures in the last row.
   rows(mode: Mode | undefined, doing: Doing, words: string | undefined): PanelRow[] {
     const { listener } = this;
     const place = mode === "immersive-ar" ? "Place on a surface" : "Place before me";

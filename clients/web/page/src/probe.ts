@@ -75,7 +75,7 @@ declare global {
   }
 }
 
-// What a page has beside its session and view. The self-test has neither a form for scenes nor a history.
+// Parts of a page that tests read. The self-test has neither a form for scenes nor a history.
 export interface Exposed {
   headset: Headset;
   panel: CanvasPanel; // in space

@@ -2,13 +2,14 @@
 // The page /selftest: joins a scene, measures for two minutes, in VR if the device offers it, and shows the result.
 
 import { Session, type Client, type SessionState } from "@clothstream/client";
-import { CanvasPanel, Headset, Immersion } from "@clothstream/three";
+import { CanvasPanel, Immersion, type Headset } from "@clothstream/three";
 import { chosenDetail } from "../detail";
 import { browserTokens } from "../identity";
 import { FrameWork } from "../frame_work";
 import { element, write } from "../panel/dom";
 import { expose } from "../probe";
 import { View } from "../view";
+import { makeHeadset } from "../view_headset";
 import { stepText } from "./guide";
 import { Measurement } from "./measurement";
 import { Results } from "./results";
@@ -39,26 +40,14 @@ class SelfTest {
     private readonly session: Session,
     private readonly seconds: number,
   ) {
-    this.headset = new Headset(
-      {
-        renderer: view.renderer,
-        scene: view.scene,
-        bounds: () => view.box,
-        change: (change) => {
-          change(session.client.input);
-          session.flush();
-        },
-        passThrough: (on) => view.passThrough(on),
+    this.headset = makeHeadset(view, session, {
+      left: () => {
+        view.resize();
+        view.reset();
+        this.end();
       },
-      {
-        left: () => {
-          view.resize();
-          view.reset();
-          this.end();
-        },
-        updated: () => this.panel.update(this.headset.body, this.headset.placement.matrix),
-      },
-    );
+      updated: () => this.panel.update(this.headset.body, this.headset.placement.matrix),
+    });
     this.headset.seat.add(this.panel.mesh);
     this.panel.mesh.position.set(kPanelPlace.x, kPanelPlace.y, kPanelPlace.z);
     this.panel.mesh.scale.setScalar(kPanelScale);

@@ -146,7 +146,7 @@ export class Headset {
 
   // Whether a press is used for something other than the cloth.
   private takes(limb: Limb, client: Client | undefined): boolean {
-    // What a hand touches comes before what it points at.
+    // A touch has priority over pointing.
     const reach = kReach / this.placement.scale;
     const touches = this.doing === "touch" && client?.frames.nearestPoint(limb.pose.point.toArray(), reach) !== undefined;
     if (!touches && this.listener.pressed?.(limb)) return true;
