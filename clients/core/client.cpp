@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "clients/core/stream/resume_token.h"
 #include "clients/core/wire/description.h"
 #include "proto/codec/packet_header.h"
 
@@ -42,6 +43,19 @@ void Client::want(const OperatingPoint& atMost) {
   if (outbox_.helloWaits()) sendHello();
 }
 
+bool Client::resume(std::string_view text) {
+  std::optional<ResumeToken> token = readResumeToken(text);
+  if (!token && !text.empty()) return false;
+  hello_.token = token ? std::move(token->secret) : std::string();
+  hello_.attempt = token ? token->attempt + 1 : 1;
+  if (outbox_.helloWaits()) sendHello();
+  return true;
+}
+
+std::string Client::resumeToken() const {
+  return welcome_.token.empty() ? std::string() : toText({welcome_.token, hello_.attempt});
+}
+
 void Client::connecting(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
   if (welcomed_) disconnected(nowUs);
@@ -56,7 +70,7 @@ void Client::connecting(std::uint64_t nowUs) {
 
 void Client::disconnected(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
-  if (!hello_.token.empty()) state_ = CS_STATE_RECONNECTING;
+  if (!welcome_.token.empty()) state_ = CS_STATE_RECONNECTING;
   welcomed_ = false;
   outbox_.clear();
   forgetRequests();
@@ -148,12 +162,14 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
     return fail("The server chose codec " + std::to_string(welcome->codec) + "; this client decodes " +
                 decodedCodecs() + ".");
   const bool returned = state_ == CS_STATE_RECONNECTING;
+  // Whether this is the participant of an earlier client (resume).
+  const bool inherited = !returned && welcome->resumed && !hello_.token.empty();
   // Whether the server resumed the participant and its description is still the one that this client has.
   const bool known = returned && welcome->resumed && described() && hello_.contentId != 0 &&
                      welcome->contentId == hello_.contentId;
   welcome_ = std::move(*welcome);
   welcomed_ = true;
-  resumed_ = returned && welcome_.resumed;
+  resumed_ = inherited || (returned && welcome_.resumed);
   participants_ = std::move(welcome_.participants);
   hello_.token = welcome_.token;
   hello_.scene = welcome_.scene;
@@ -163,7 +179,8 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   frameDivisor_ = 1;
   acknowledgement_ = {};
   if (returned && !resumed_) clock_ = {};
-  if (returned && posed_) sendPoses(nowUs);
+  // The colliders and grabs of an earlier client end, even if this one has none yet.
+  if (inherited || (returned && posed_)) sendPoses(nowUs);
   const std::uint32_t events = participants_.empty() ? 0 : CS_EVENT_PARTICIPANTS;
   if (!known) return events;
   state_ = CS_STATE_JOINED;

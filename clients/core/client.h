@@ -47,6 +47,8 @@ class Client {
   // Used from the next connection on; also for the current one while its Hello waits. A token replaces a
   // pairing code.
   void prove(Proof proof);
+  // Returns false if the text is neither empty nor one of resumeToken().
+  bool resume(std::string_view text);
   // Has no effect on the current connection if its Hello is sent already.
   void want(const OperatingPoint& atMost);
 
@@ -96,6 +98,8 @@ class Client {
   const std::string& token() const { return proof_.token; }
   const PairingCode& pairingCode() const { return pairingCode_; }
   bool resumed() const { return resumed_; }
+  // Empty before the first Welcome.
+  std::string resumeToken() const;
   const std::vector<Participant>& participants() const { return participants_; }
   // The newest change of participants; kind 0 before the first.
   const Presence& presence() const { return presence_; }
@@ -188,7 +192,7 @@ class Client {
   Notice notice_;
   Proof proof_;
   PairingCode pairingCode_;  // newest; no code before the first
-  Hello hello_;              // the token is set after the first Welcome
+  Hello hello_;              // the token is set by resume() or the first Welcome
   Welcome welcome_;
   std::vector<Participant> participants_;
   Presence presence_;

@@ -118,6 +118,15 @@ void cs_set_token(cs_client* client, const char* token) CS_NOEXCEPT;
 void cs_set_pairing_code(cs_client* client, const char* code) CS_NOEXCEPT;
 /* Returns the token that is in use; "" without one. */
 const char* cs_token(const cs_client* client) CS_NOEXCEPT;
+/* Text with which a later client returns as the participant of this one, for example after a restart of the
+ * program: with the same id, name and role, and without its colliders and grabs. "" before the first Welcome.
+ * It works if the connection of this client is lost, not left, and for the server's reconnect grace. Valid
+ * until the next call of this function. Keep it secret. */
+const char* cs_resume_token(cs_client* client) CS_NOEXCEPT;
+/* Returns as the participant of an earlier client. "" means none. Call before the first cs_next_outgoing. If
+ * the server no longer keeps the place, the client joins as a new participant; cs_resumed says which. Fails,
+ * and changes nothing, if the text is not one of cs_resume_token. */
+int cs_set_resume_token(cs_client* client, const char* token) CS_NOEXCEPT;
 /* Sets a monotonic clock in microseconds for measuring decode_ms. NULL disables the measurement. The
  * WebAssembly module does not export this function. */
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) CS_NOEXCEPT;
@@ -158,7 +167,8 @@ void cs_disconnected(cs_client* client, uint64_t now_us) CS_NOEXCEPT;
 /* Returns when the transport must close its connection, if any, and open a new one: after a loss, after a
  * failed attempt, or after a long silence of the server. UINT64_MAX if no reconnect is scheduled. */
 uint64_t cs_connect_at(const cs_client* client) CS_NOEXCEPT;
-/* Returns 1 if the last Welcome resumed the earlier participant of this client, else 0. */
+/* Returns 1 if the last Welcome resumed the participant of this client, or of the one before it
+ * (cs_set_resume_token), else 0. */
 int cs_resumed(const cs_client* client) CS_NOEXCEPT;
 
 cs_state cs_get_state(const cs_client* client) CS_NOEXCEPT;
@@ -436,8 +446,8 @@ int cs_get_played_collider(const cs_client* client, uint32_t index, cs_collider*
  * client reports and that do not end it: they belong to requests of the mirror. A mirror sends no Hello,
  * acknowledgements, and no requests for key frames except cs_request_key_frame. It sends pings only during an
  * upload (cs_create_scene), for which cs_update of the mirror must be called; otherwise cs_update and
- * cs_connect_at of a mirror have no use. Token and pairing code are set on the client. Times are of the same
- * clock for both.
+ * cs_connect_at of a mirror have no use. Token and pairing code are set on the client, a resume token on
+ * both. Times are of the same clock for both.
  */
 
 typedef enum cs_decoding {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "clients/core/client.h"
@@ -11,6 +12,7 @@
 
 struct cs_client {
   clothstream::client::Client client;
+  std::string resumeToken{};  // text that cs_resume_token has returned
 };
 
 namespace clothstream::client {

@@ -66,6 +66,15 @@ const char* cs_token(const cs_client* client) noexcept {
   return client->client.token().c_str();
 }
 
+int cs_set_resume_token(cs_client* client, const char* token) noexcept {
+  return client->client.resume(token) ? 1 : 0;
+}
+
+const char* cs_resume_token(cs_client* client) noexcept {
+  client->resumeToken = client->client.resumeToken();
+  return client->resumeToken.c_str();
+}
+
 void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) noexcept {
   client->client.setClock(now_us);
 }

@@ -145,6 +145,9 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   table.group("Participants");
   table.number("--hold", options.server.reconnectGrace.place, {.min = 0, .max = 3600, .type = "SECONDS"},
                "Reconnect grace: seconds for which a disconnected participant keeps its place. 0 means none");
+  table.number("--hold-page", options.server.reconnectGrace.page, {.min = 0, .max = 3600, .type = "SECONDS"},
+               "Seconds for which a participant whose page was closed or reloaded keeps its place, at most "
+               "--hold. 0 means none");
   table.number("--max-participants", options.server.maxParticipants,
                {.min = 1, .max = hosting::kMaxParticipants},
                "Participants per scene. When the scene is full, the participant that has been disconnected "

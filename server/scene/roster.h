@@ -28,9 +28,11 @@
 namespace clothstream::scene {
 
 // Grace periods after a participant's connection is lost. Its colliders and grabs stay for `poses`, its place
-// in the scene for `place`.
+// in the scene for `place`, or for `page` after its page was closed, which may reload; the shorter one
+// counts.
 struct ReconnectGrace {
   Clock::duration place = std::chrono::seconds(60);
+  Clock::duration page = std::chrono::seconds(10);
   Clock::duration poses = std::chrono::seconds(2);
 };
 

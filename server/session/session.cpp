@@ -142,6 +142,13 @@ void Session::leave() {
   closeLocked(nullptr, DisconnectReason::left);
 }
 
+void Session::closePage() {
+  if (server_.options.reconnectGrace.page <= Clock::duration::zero()) return leave();
+  const std::lock_guard lock(mutex_);
+  now_ = Clock::now();
+  closeLocked(nullptr, DisconnectReason::pageClosed);
+}
+
 void Session::checkSilence(Clock::time_point now) {
   const hosting::ServerOptions& options = server_.options;
   // This runs on a thread that publishes frames. A session that handles a message is not silent; the next
@@ -199,15 +206,18 @@ void Session::end() {
 
 void Session::disconnect(DisconnectReason reason) {
   if (scene_ == nullptr) return;
-  if (reason == DisconnectReason::lost)
-    scene_->roster.disconnect(*mailbox_, server_.options.reconnectGrace, now_);
+  const bool mayReturn = reason == DisconnectReason::lost || reason == DisconnectReason::pageClosed;
+  scene::ReconnectGrace grace = server_.options.reconnectGrace;
+  if (reason == DisconnectReason::pageClosed) grace.place = std::min(grace.place, grace.page);
+  if (mayReturn)
+    scene_->roster.disconnect(*mailbox_, grace, now_);
   else
     scene_->roster.leave(
         *mailbox_, reason == DisconnectReason::left ? scene::LeaveReason::left : scene::LeaveReason::removed,
         now_);
   server_.wake(*scene_);
   telemetry::log({scene_->name(), participant_}, spdlog::level::info, "{} {}; {} in it", peer_,
-                 reason == DisconnectReason::lost ? "was disconnected" : "left", scene_->subscribers.size());
+                 mayReturn ? "was disconnected" : "left", scene_->subscribers.size());
   scene_ = nullptr;
 }
 

@@ -77,6 +77,8 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
 
   // The peer has said goodbye: it leaves the scene for good.
   void leave();
+  // The peer's page was closed. It may have been reloaded, so its place is kept for ReconnectGrace::page.
+  void closePage();
 
   // Returns the next message to write: control messages first, then the newest frame that the peer can decode
   // and has room for (see delivery::Mailbox).
@@ -133,7 +135,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Checks whether this peer may do this to the scene of this name. Returns its participant number there, 0
   // if it is outside the scene, or nothing if the request was refused.
   std::optional<std::uint64_t> actor(const std::string& scene, scene::Action action);
-  enum class DisconnectReason : std::uint8_t { left, removed, lost };
+  enum class DisconnectReason : std::uint8_t { left, removed, lost, pageClosed };
   void disconnect(DisconnectReason reason);
   // Ends a connection that was too slow or silent.
   void cutOff(telemetry::Refusal reason, const std::string& text);

@@ -209,6 +209,66 @@ TEST_F(Reconnecting, JoinsARestartedServerAsNewParticipant) {
   EXPECT_THAT(client.outgoing(), SizeIs(1));  // the poses are sent again
 }
 
+// A program that starts again, or a page that is loaded again.
+TEST_F(Reconnecting, ReturnsAsTheParticipantOfAnEarlierClient) {
+  EXPECT_STREQ(cs_resume_token(client.get()), "");
+  join();
+  const std::string first = cs_resume_token(client.get());
+  cutOff();
+  connect();
+  client.receive(welcome(server, true), now);
+  const std::string token = cs_resume_token(client.get());
+  EXPECT_EQ(first, "30313233343536373839616263646566-1");
+  EXPECT_EQ(token, "30313233343536373839616263646566-2");
+
+  ClientUnderTest later;
+  EXPECT_EQ(cs_set_resume_token(later.get(), token.c_str()), 1);
+  cs_connecting(later.get(), now);
+  const v1::Hello hello = later.outgoing().at(0).hello();
+  EXPECT_EQ(hello.resume_token(), "0123456789abcdef");
+  EXPECT_EQ(hello.attempt(), 4u) << "later than every connection of the earlier client";
+  EXPECT_EQ(hello.description_content_id(), 0u);
+  later.receive(welcome(server, true), now);
+  EXPECT_EQ(cs_resumed(later.get()), 1);
+  // The hands of the earlier client let go.
+  const auto poses = later.outgoing();
+  ASSERT_THAT(poses, SizeIs(1));
+  EXPECT_TRUE(poses[0].has_collider_poses());
+  EXPECT_THAT(poses[0].collider_poses().grabs(), IsEmpty());
+  EXPECT_THAT(poses[0].collider_poses().colliders(), IsEmpty());
+  for (const std::string& chunk : server.chunks())
+    EXPECT_EQ(later.receive(chunk, now) & CS_EVENT_RETURNED, 0u);
+  EXPECT_EQ(cs_get_state(later.get()), CS_STATE_JOINED);
+}
+
+TEST_F(Reconnecting, JoinsAsNewParticipantAfterTheGracePeriod) {
+  join();
+  ClientUnderTest later;
+  ASSERT_EQ(cs_set_resume_token(later.get(), cs_resume_token(client.get())), 1);
+  cs_connecting(later.get(), now);
+  // The first attempt fails.
+  cs_disconnected(later.get(), now);
+  EXPECT_EQ(cs_get_state(later.get()), CS_STATE_JOINING);
+  cs_connecting(later.get(), now);
+  EXPECT_EQ(later.outgoing().at(0).hello().resume_token(), "0123456789abcdef");
+  later.receive(welcome(server, false), now);
+  EXPECT_EQ(cs_resumed(later.get()), 0);
+  EXPECT_THAT(later.outgoing(), IsEmpty());
+}
+
+TEST_F(Reconnecting, RefusesWrongResumeTokens) {
+  for (const std::string& wrong :
+       {std::string("-1"), std::string("30"), std::string("303-1"), std::string("3g-1"), std::string("30-"),
+        std::string("30-x"), std::string("30-1x"), std::string("30--1"), std::string("+3-1"),
+        std::string("30-4294967296"), std::string(130, '3') + "-1"})
+    EXPECT_EQ(cs_set_resume_token(client.get(), wrong.c_str()), 0) << wrong;
+  EXPECT_THAT(client.outgoing().at(0).hello().resume_token(), IsEmpty());
+  ClientUnderTest other;
+  EXPECT_EQ(cs_set_resume_token(other.get(), "30-1"), 1);
+  EXPECT_EQ(cs_set_resume_token(other.get(), ""), 1);
+  EXPECT_THAT(other.outgoing().at(0).hello().resume_token(), IsEmpty());
+}
+
 TEST_F(Reconnecting, RefusesFrameBeforeDescriptionAfterReturning) {
   join();
   cutOff();

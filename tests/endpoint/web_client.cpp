@@ -123,7 +123,11 @@ bool WebSocketClient::closesWithin(std::chrono::steady_clock::duration time) {
 }
 
 void WebSocketClient::leave() {
-  await(io_, [&](auto handler) { stream_.async_close(websocket::close_code::normal, handler); });
+  close(websocket::close_code::normal);
+}
+
+void WebSocketClient::close(websocket::close_code code) {
+  await(io_, [&](auto handler) { stream_.async_close(code, handler); });
 }
 
 void WebSocketClient::disconnect() {

@@ -74,6 +74,7 @@ class WebSocketClient final : public Client {
   StreamEnd end() override;
   // Sends a close frame and waits for the server's.
   void leave() override;
+  void close(websocket::close_code code);
   // Resets the TCP connection.
   void disconnect() override;
 

@@ -110,6 +110,25 @@ TEST_F(WebSocketEndpoint, RemovesColliderOfClientThatHalfCloses) {
   EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
 }
 
+// A page that is closed may have been reloaded.
+TEST_F(WebSocketEndpoint, KeepsPlaceOfClosedPage) {
+  Joined watcher = join();
+  const auto presenceAfter = [&](websocket::close_code code) {
+    Joined page = join();
+    socketOf(page).close(code);
+    watcher.seeUntil([&] {
+      const v1::Presence& presence = watcher.viewer.last.presence();
+      return presence.participant().id() == page.viewer.welcome.participant_id() &&
+             presence.kind() != v1::PRESENCE_KIND_JOINED;
+    });
+    return watcher.viewer.last.presence().kind();
+  };
+  EXPECT_EQ(presenceAfter(websocket::close_code::going_away), v1::PRESENCE_KIND_DISCONNECTED);
+  EXPECT_EQ(presenceAfter(static_cast<websocket::close_code>(4001)), v1::PRESENCE_KIND_DISCONNECTED);
+  EXPECT_EQ(presenceAfter(websocket::close_code::normal), v1::PRESENCE_KIND_LEFT);
+  EXPECT_EQ(presenceAfter(websocket::close_code::none), v1::PRESENCE_KIND_LEFT);
+}
+
 // A client whose machine or network has failed neither reads nor answers pings, and its socket stays open.
 TEST_F(WebSocketEndpoint, DetectsVanishedClientWithinFiveSeconds) {
   Joined watcher = join();

@@ -277,6 +277,16 @@ test("files that do not arrive are loaded again, and a worker that does not star
   }
 });
 
+test("lost graphics are explained, with a button to reload", () =>
+  withPage(server.url, {}, async (page) => {
+    await untilGood(page);
+    await page.evaluate(() => document.getElementById("canvas").getContext("webgl2").getExtension("WEBGL_lose_context").loseContext());
+    await untilFailure(page, "graphics-lost");
+    await takePicture(page, "graphics_lost");
+    await press(page, "reload");
+    await untilGood(page);
+  }));
+
 test("a server of another version is told with a button to reload", async () => {
   const link = await makeLink(server.port);
   try {

@@ -433,6 +433,52 @@ test("participants are listed, and a disconnected one returns with its id", asyn
   }
 });
 
+// The server's default keeps the place of a closed page.
+test("a reload keeps the participant and its role; a duplicated tab is another one", async () => {
+  const kept = await startServer(0, ["--scene", "curtain", "--hold-page", "10"]);
+  const own = (page) => page.evaluate(() => window.clothstream.participants.map(({ id, name, role }) => `${id} ${name} ${role}`));
+  const ada = await openPage(browser, `${kept.url}?name=Ada`);
+  const ben = await openPage(browser, `${kept.url}?name=Ben`);
+  try {
+    await untilState(ada, "live");
+    await untilState(ben, "live");
+    await ben.waitForFunction(() => window.clothstream.participants.length === 2);
+    const before = await own(ben);
+    assert.match(before[0], /Ada 3$/, "the first to come owns the scene");
+    await ben.evaluate(() => {
+      window.roles = new Set();
+      setInterval(() => window.roles.add(window.clothstream.participants.map(({ name, role }) => `${name} ${role}`).join()), 1);
+    });
+    for (let i = 0; i < 2; ++i) {
+      await ada.reload();
+      await untilState(ada, "live");
+      await untilFrames(ada, 10);
+      await ben.waitForFunction(() => window.clothstream.participants.every(({ away }) => !away));
+      assert.deepEqual(await own(ada), before);
+      assert.deepEqual(await own(ben), before);
+    }
+    assert.deepEqual(await ben.evaluate(() => [...window.roles]), ["Ada 3,Ben 2"], "nobody else owned the scene meanwhile");
+
+    // The store of a tab is copied when it is duplicated.
+    const [twin] = await Promise.all([ada.context().waitForEvent("page"), ada.evaluate(() => void window.open(window.location.href))]);
+    await untilState(twin, "live");
+    await ben.waitForFunction(() => window.clothstream.participants.length === 3);
+    await untilState(ada, "live");
+
+    // A page with another name is another participant.
+    await ada.goto(`${kept.url}?name=Eve`);
+    await untilState(ada, "live");
+    await ben.waitForFunction(() => window.clothstream.participants.some(({ name, role }) => name === "Eve" && role === 2));
+    // The place of the closed page expires.
+    await ben.waitForFunction(() => !window.clothstream.participants.some(({ away }) => away), undefined, { timeout: 20_000 });
+    assert.deepEqual([...ada.errors, ...ben.errors], []);
+  } finally {
+    await ada.context().close();
+    await ben.context().close();
+    await kept.stop();
+  }
+});
+
 test("the page shows its address for other devices", async (t) => {
   const outside = Object.values(networkInterfaces())
     .flat()

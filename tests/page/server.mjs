@@ -14,8 +14,9 @@ for (const signal of ["SIGINT", "SIGTERM"]) process.once(signal, () => process.e
 // free one.
 export async function startServer(port = 0, more = ["--scene", "curtain"]) {
   const program = process.env.CLOTHSTREAM_SERVER;
-  // The reconnect grace is shorter than the timeout of a test.
+  // The reconnect grace is shorter than the timeout of a test. Closed pages leave at once, unless a test asks for more.
   const options = ["--port", String(port), "--grpc-port", "0", "--hold", "30", ...more];
+  if (!more.includes("--hold-page")) options.push("--hold-page", "0");
   const child = spawn(program, options, { stdio: ["ignore", "pipe", "pipe"] });
   // The server ends with the test, whatever ends the test.
   process.once("exit", () => child.kill("SIGKILL"));

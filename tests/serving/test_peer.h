@@ -73,6 +73,10 @@ class TestPeer {
     session_->leave();
     session_.reset();
   }
+  void closePage() {
+    session_->closePage();
+    session_.reset();
+  }
 
   const v1::Welcome& welcome() const { return welcome_; }
   const v1::StreamDescription& description() const { return description_; }

@@ -47,5 +47,6 @@ struct Limits {
 
 // Bytes of a participant's names. Servers of this project send at most 64.
 inline constexpr std::size_t kMaxNameBytes = 1024;
+inline constexpr std::size_t kMaxResumeTokenBytes = 64;
 
 }  // namespace clothstream::client

@@ -131,7 +131,7 @@ std::optional<Welcome> readWelcome(Bytes message, const Limits& limits) {
       case F::kRole.tag:
         return set(welcome.role, reader.get_uint32());
       case F::kResumeToken.tag:
-        return setBytes(welcome.token, reader);
+        return setBytes(welcome.token, reader) && welcome.token.size() <= kMaxResumeTokenBytes;
       case F::kResumed.tag:
         return set(welcome.resumed, reader.get_bool());
       case F::kParticipants.tag:

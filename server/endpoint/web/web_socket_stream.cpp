@@ -26,6 +26,8 @@ namespace ws = beast::websocket;
 using namespace std::chrono_literals;
 
 constexpr const char* kSubprotocol = "clothstream.v1";
+// Close code of a page that is closed or reloaded: scripts cannot send ws::close_code::going_away.
+constexpr std::uint16_t kPageClosed = 4001;
 constexpr auto kUpgradeTimeout = 2s;
 constexpr auto kClosingTimeout = 2s;
 // After half of this time without a byte the server sends a ping; after all of it the client counts as
@@ -130,7 +132,13 @@ void WebSocketStream::read() {
 
 void WebSocketStream::onRead(beast::error_code error) {
   // Only a close frame is a goodbye. All other errors mean a lost connection.
-  if (error == ws::error::closed && session_) session_->leave();
+  if (error == ws::error::closed && session_) {
+    const std::uint16_t code = socket_.reason().code;
+    if (code == ws::close_code::going_away || code == kPageClosed)
+      session_->closePage();
+    else
+      session_->leave();
+  }
   if (error) return end();
   if (closing_ || !session_) return;
   if (socket_.got_text())

@@ -328,6 +328,12 @@ void Program::call(const CoreInput::Call& call) {
       return requestScene(index, text);
     case 42:
       return readAnswers();
+    case 43: {
+      const std::string own = cs_resume_token(client());
+      require(cs_set_resume_token(client(), own.c_str()) == 1, "a client takes its own resume token");
+      static_cast<void>(cs_set_resume_token(client(), text));
+      return;
+    }
     default:
       now_ += index % 60'000 * kMs;
   }

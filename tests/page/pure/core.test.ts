@@ -94,12 +94,12 @@ beforeEach(() => {
   posted.length = 0;
 });
 afterEach(() => {
-  connection?.stop();
+  void connection?.leave();
   connection = undefined;
   vi.unstubAllGlobals();
 });
 
-async function connect(): Promise<Connection> {
+async function connect(resumeToken = ""): Promise<Connection> {
   connection = await Connection.start(
     { postMessage: (message) => posted.push(message) },
     {
@@ -111,6 +111,7 @@ async function connect(): Promise<Connection> {
       program: "test",
       identity: kIdentity,
       proof: { token: "" },
+      resumeToken,
       quality: 0,
       temporalLayers: 0,
       pageOrigin: performance.timeOrigin,
@@ -131,6 +132,31 @@ test("messages of the page wait for the connection, and come after Hello", async
   assert.include(textOf(hello!), "flag");
   assert.deepEqual(message, Uint8Array.of(1));
   assert.lengthOf(more, 0);
+});
+
+test("a resume token is sent with Hello, and other text is ignored", async () => {
+  const sent = async (token: string) => {
+    await connect(token);
+    socket().opens();
+    return textOf(socket().sent[0] as Uint8Array);
+  };
+  assert.include(await sent("50697a7a61-3"), "Pizza");
+  assert.notInclude(await sent("Pizza"), "Pizza");
+});
+
+test("leaving ends when the socket is closed, and its code says whether the page may return", async () => {
+  for (const [returns, code] of [[false, undefined], [true, 4001]] as const) {
+    const started = await connect();
+    socket().opens();
+    let left = false;
+    const leaving = started.leave(returns).then(() => (left = true));
+    await Promise.resolve();
+    assert.isTrue(socket().closed && !left);
+    assert.equal(socket().closeCode, code);
+    socket().onclose?.({ reason: "", wasClean: true });
+    await leaving;
+  }
+  connection = undefined;
 });
 
 test("a lost connection is reported with the time of the next attempt, and can be opened at once", async () => {

@@ -10,6 +10,7 @@ export class FakeSocket {
   binaryType = "blob";
   sent: unknown[] = [];
   closed = false;
+  closeCode: number | undefined;
   onopen: (() => void) | null = null;
   onmessage: ((event: { data: unknown }) => void) | null = null;
   onclose: ((event: Closed) => void) | null = null;
@@ -20,8 +21,9 @@ export class FakeSocket {
   send(message: unknown): void {
     this.sent.push(message);
   }
-  close(): void {
+  close(code?: number): void {
     this.closed = true;
+    this.closeCode = code;
   }
   opens(): void {
     this.readyState = FakeSocket.OPEN;

@@ -333,6 +333,34 @@ TEST_F(ParticipantsTest, WithoutGracePeriodALostParticipantIsGone) {
   EXPECT_EQ(presence(watcher, v1::PRESENCE_KIND_LEFT).reason(), v1::LEAVE_REASON_TIMED_OUT);
 }
 
+TEST_F(ParticipantsTest, ClosedPageKeepsItsPlaceBriefly) {
+  ServerOptions options;
+  options.reconnectGrace.page = std::chrono::milliseconds(300);
+  START(options);
+  TestPeer watcher(server()), reloaded(server()), closed(server());
+  join(watcher, "Ada");
+  join(reloaded, "Ben");
+  reloaded.closePage();
+  EXPECT_TRUE(presence(watcher, v1::PRESENCE_KIND_DISCONNECTED).participant().away());
+  TestPeer back(server());
+  back.hello(returning(reloaded));
+  EXPECT_TRUE(back.readUntil(Body::kWelcome).welcome().resumed());
+  join(closed, "Cy");
+  closed.closePage();
+  EXPECT_EQ(presence(watcher, v1::PRESENCE_KIND_LEFT).participant().display_name(), "Cy");
+}
+
+TEST_F(ParticipantsTest, ClosedPageLeavesAtOnceWithoutPageGrace) {
+  ServerOptions options;
+  options.reconnectGrace.page = Clock::duration::zero();
+  START(options);
+  TestPeer watcher(server()), closed(server());
+  join(watcher, "Ada");
+  join(closed, "Ben");
+  closed.closePage();
+  EXPECT_EQ(presence(watcher, v1::PRESENCE_KIND_LEFT).reason(), v1::LEAVE_REASON_LEFT);
+}
+
 TEST_F(ParticipantsTest, TwoHandsGrabTheSameCloth) {
   START();
   TestPeer one(server()), two(server());

@@ -83,6 +83,16 @@ export class Client {
     return this.core.text(this.core.exports.cs_token(this.handle.pointer));
   }
 
+  // Returns as the participant of an earlier client, with its resume token; "" means none. Call it on a client and on its
+  // mirror, before connecting. Texts that are no resume token are ignored.
+  setResumeToken(token: string): void {
+    this.core.with([token], (text) => this.core.exports.cs_set_resume_token(this.handle.pointer, text!));
+  }
+  // Text with which a later client returns as this participant; "" before the first Welcome.
+  get resumeToken(): string {
+    return this.core.text(this.core.exports.cs_resume_token(this.handle.pointer));
+  }
+
   // Limits what the server sends from the next connection on: best quality, 0 (finest) to 3, and temporal layers, 1 to 3
   // or 0 for all.
   want(quality: number, temporalLayers: number): void {

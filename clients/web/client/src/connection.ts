@@ -5,11 +5,13 @@ import { Client, Decoding } from "./client";
 import { microseconds } from "./handle";
 import { copyParts, FrameRing } from "./frame_ring";
 import { StreamSocket } from "./socket";
-import type { FromWorker, SentFrame, Start, ToWorker } from "./thread_messages";
+import type { End, FromWorker, SentFrame, Start, ToWorker } from "./thread_messages";
 import { ClientEvent, ClientState } from "./types";
 import { CoreModule } from "./wasm";
 
 const kPeriodMs = 50;
+// Code of a WebSocket that the server does not take for leaving (docs/protocol.md).
+const kPageClosed = 4001;
 // Buffers that wait for use, when frames are transferred.
 const kMaxBuffers = 4;
 
@@ -43,6 +45,7 @@ export class Connection {
     this.client.want(options.quality, options.temporalLayers);
     if ("code" in options.proof) this.client.setPairingCode(options.proof.code);
     else this.client.setToken(options.proof.token);
+    this.client.setResumeToken(options.resumeToken);
     this.socket = new StreamSocket(options.url, {
       opened: () => this.flush(),
       message: (bytes) => this.receive(bytes),
@@ -52,7 +55,7 @@ export class Connection {
     this.connect();
   }
 
-  handle(message: Exclude<ToWorker, Start>): void {
+  handle(message: Exclude<ToWorker, Start | End>): void {
     switch (message.kind) {
       case "send":
         if (message.connection !== this.number) return;
@@ -65,16 +68,15 @@ export class Connection {
       case "recycle":
         if (this.buffers.length < kMaxBuffers) this.buffers.push(message.buffer);
         return;
-      case "stop":
-        return this.stop();
     }
   }
 
-  // Leaves the scene.
-  stop(): void {
+  // Leaves the scene. returns: the server keeps the participant's place for a while. Resolves when the server knows it, or
+  // the browser has given up.
+  async leave(returns = false): Promise<void> {
     clearInterval(this.timer);
-    this.socket.close();
     this.client.destroy();
+    await this.socket.close(returns ? kPageClosed : undefined);
   }
 
   private now(): number {
@@ -107,7 +109,7 @@ export class Connection {
     this.flush();
     if (atMs < this.client.connectAtMs) return;
     if (!this.socket.inUse) return this.connect();
-    this.socket.close();
+    void this.socket.close();
     this.lose("The server does not answer.");
   }
 
@@ -132,7 +134,7 @@ export class Connection {
     const decoding = frame ? Decoding.done : refused ? Decoding.refused : Decoding.skipped;
     const transfer = frame?.buffer ? [bytes, frame.buffer] : [bytes];
     this.post({ kind: "message", message: bytes, arrivedMs, isFrame, decoding, frame }, transfer);
-    if (this.client.state === ClientState.failed) this.socket.close();
+    if (this.client.state === ClientState.failed) void this.socket.close();
   }
 
   // Makes room for the frames of a new description.

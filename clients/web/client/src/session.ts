@@ -20,7 +20,7 @@ export type SessionState =
   // not understand the server. "worker": the worker did not start, or has stopped.
   | { kind: "failed"; reason: string; cause: "server" | "client" | "worker"; code: number };
 
-// Where the token of a server is kept between visits; "" means none.
+// Where a token is kept between visits; "" means none.
 export interface TokenStore {
   kept(): string;
   keep(token: string): void;
@@ -47,7 +47,9 @@ export interface SessionOptions {
   scene?: string; // "": the server's default scene
   identity?: Identity;
   program?: string; // name of the program, for other participants
-  tokens?: TokenStore; // default: nothing is kept
+  tokens?: TokenStore; // for the server's token. Default: nothing is kept
+  // For the place in the scene while the page reloads. Default: after a reload, one joins as a new participant.
+  places?: TokenStore;
   quality?: number; // best quality wanted, 0 (finest, the default) to 3
   temporalLayers?: number; // 1 to 3; 0, the default: all
   // Addresses of the package's own files, where a bundler does not find them.
@@ -70,6 +72,7 @@ export class Session {
   private ring: FrameRing | undefined;
   private readonly listener: SessionListener;
   private readonly tokens: TokenStore;
+  private readonly places: TokenStore;
 
   // Loads the client core, and joins the scene.
   static async open(options: SessionOptions): Promise<Session> {
@@ -87,22 +90,24 @@ export class Session {
   ) {
     this.listener = options.listener ?? {};
     this.tokens = options.tokens ?? kNoTokens;
+    this.places = options.places ?? kNoTokens;
     this.worker = options.makeWorker?.() ?? new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.handle(data);
     this.worker.onerror = ({ message }) => this.breakDown(message || "its script could not be loaded");
-    this.client = this.begin(options.scene ?? "", { token: this.tokens.kept() });
+    this.scene = options.scene ?? "";
+    this.client = this.begin(this.scene, { token: this.tokens.kept() }, this.takePlace());
     window.addEventListener("online", this.reconnect);
-    // Closing the socket leaves the scene at once. Otherwise the server would keep the participant's place for a while.
-    window.addEventListener("pagehide", this.leave);
+    window.addEventListener("pagehide", this.hide);
     window.addEventListener("pageshow", this.comeBack);
   }
 
   // Leaves the scene for good.
   close(): void {
     window.removeEventListener("online", this.reconnect);
-    window.removeEventListener("pagehide", this.leave);
+    window.removeEventListener("pagehide", this.hide);
     window.removeEventListener("pageshow", this.comeBack);
-    this.worker.terminate();
+    this.worker.onmessage = this.worker.onerror = null;
+    this.post({ kind: "leave" });
     this.client.destroy();
   }
 
@@ -129,26 +134,44 @@ export class Session {
 
   private scene = "";
 
-  private readonly leave = (): void => this.post({ kind: "stop" });
+  // The page is closed or reloaded. The server keeps the participant's place for a while if the page can come back.
+  private readonly hide = (): void => {
+    const { kind } = this.state;
+    if (kind === "live" || kind === "reconnecting") this.places.keep(`${this.client.resumeToken} ${this.wanted()}`);
+    this.post({ kind: "hide", returns: this.options.places !== undefined });
+  };
   // The browser shows a page again that it had put aside.
   private readonly comeBack = (event: PageTransitionEvent): void => {
-    if (event.persisted) this.restart(this.scene, { token: this.client.token });
+    if (event.persisted) this.restart(this.scene, { token: this.client.token }, this.takePlace());
   };
+  // Takes the kept place out of the store, and returns its resume token if it is the wanted one. Only one page may have a
+  // place: the store of a tab is copied when the tab is duplicated.
+  private takePlace(): string {
+    const kept = this.places.kept();
+    if (!kept) return "";
+    this.places.keep("");
+    const end = kept.indexOf(" ");
+    return kept.slice(end + 1) === this.wanted() ? kept.slice(0, end) : "";
+  }
+  private wanted(): string {
+    return JSON.stringify([this.scene, this.options.identity?.name, this.options.identity?.role]);
+  }
 
-  private restart(scene: string, proof: Proof): void {
+  private restart(scene: string, proof: Proof, resumeToken = ""): void {
     // The caller, for example a listener, may use the client until it returns.
     const old = this.client;
     queueMicrotask(() => old.destroy());
-    this.client = this.begin(scene, proof);
+    this.client = this.begin(scene, proof, resumeToken);
     this.enter({ kind: "connecting" });
   }
 
-  private begin(scene: string, proof: Proof): Client {
+  private begin(scene: string, proof: Proof, resumeToken = ""): Client {
     const { url, program = "", identity = { name: "", role: 0 }, quality = 0, temporalLayers = 0 } = this.options;
     this.scene = scene;
     this.ring = undefined;
     const client = new Client(this.core, "mirror", scene, program, identity);
     if ("token" in proof) client.setToken(proof.token);
+    client.setResumeToken(resumeToken);
     client.frames.playOut();
     client.frames.keepClothInFrontOfHands(true);
     this.post({
@@ -160,6 +183,7 @@ export class Session {
       program,
       identity,
       proof,
+      resumeToken,
       quality,
       temporalLayers,
       pageOrigin: performance.timeOrigin,

@@ -27,7 +27,7 @@ export class StreamSocket {
 
   // Closes the current socket, if any, and opens a new one.
   open(): void {
-    this.close();
+    void this.close();
     const socket = new WebSocket(this.url);
     let wasOpen = false;
     socket.binaryType = "arraybuffer";
@@ -45,11 +45,16 @@ export class StreamSocket {
     this.socket = socket;
   }
 
-  close(): void {
-    if (!this.socket) return;
-    this.socket.onopen = this.socket.onmessage = this.socket.onclose = null;
-    this.socket.close();
+  // Says goodbye, so that the server does not keep the participant's place. Resolves when the socket is closed.
+  close(code?: number): Promise<void> {
+    const { socket } = this;
+    if (!socket) return Promise.resolve();
     this.socket = undefined;
+    socket.onopen = socket.onmessage = null;
+    return new Promise((closed) => {
+      socket.onclose = () => closed();
+      socket.close(code);
+    });
   }
 
   send(message: Uint8Array<ArrayBuffer>): void {

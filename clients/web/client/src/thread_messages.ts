@@ -17,11 +17,19 @@ export interface Start {
   program: string;
   identity: Identity;
   proof: Proof;
+  resumeToken: string;
   quality: number;
   temporalLayers: number;
   pageOrigin: number; // performance.timeOrigin of the page
   shares: boolean; // whether frames go through shared memory
 }
+
+// Ends the session.
+export type End =
+  // Leaves the scene; the worker ends.
+  | { kind: "leave" }
+  // The page is closed or reloaded. returns: it can come back as the same participant.
+  | { kind: "hide"; returns: boolean };
 
 export type ToWorker =
   | Start
@@ -29,8 +37,7 @@ export type ToWorker =
   | { kind: "send"; connection: number; message: Uint8Array<ArrayBuffer> }
   // Connects at once instead of at the scheduled time.
   | { kind: "reconnect" }
-  // Ends the session.
-  | { kind: "stop" }
+  | End
   // A buffer of a frame that may be used again.
   | { kind: "recycle"; buffer: ArrayBuffer };
 

@@ -13,6 +13,8 @@ export interface CoreExports {
   cs_set_token(client: Pointer, token: Pointer): void;
   cs_set_pairing_code(client: Pointer, code: Pointer): void;
   cs_token(client: Pointer): Pointer;
+  cs_set_resume_token(client: Pointer, token: Pointer): number;
+  cs_resume_token(client: Pointer): Pointer;
   cs_create_pairing_code(client: Pointer, role: number): void;
   cs_get_pairing_code(client: Pointer, out: Pointer): number;
   cs_error_code(client: Pointer): number;

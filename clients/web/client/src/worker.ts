@@ -4,7 +4,7 @@
 import { Connection, type Port } from "./connection";
 import type { ToWorker } from "./thread_messages";
 
-const scope = self as unknown as Port & { onmessage: (event: MessageEvent<ToWorker>) => void };
+const scope = self as unknown as Port & { onmessage: (event: MessageEvent<ToWorker>) => void; close(): void };
 
 let connection: Promise<Connection> | undefined;
 let session = 0;
@@ -13,18 +13,23 @@ scope.onmessage = ({ data }) => {
   if (data.kind === "start") {
     const before = connection;
     connection = (async () => {
-      (await before?.catch(() => undefined))?.stop();
+      void (await before?.catch(() => undefined))?.leave();
       return Connection.start(scope, data);
     })();
     session = data.session;
     connection.catch((error: unknown) => complain(data.session, error));
     return;
   }
-  const ended = connection;
-  if (data.kind === "stop") connection = undefined;
+  if (data.kind === "leave" || data.kind === "hide") {
+    const returns = data.kind === "hide" && data.returns;
+    const left = Promise.resolve(connection).then((one) => one?.leave(returns), () => undefined);
+    if (data.kind === "leave") void left.finally(() => scope.close());
+    connection = undefined;
+    return;
+  }
   const of = session;
   // A failed start is reported already.
-  ended?.then((one) => one.handle(data), () => undefined).catch((error: unknown) => complain(of, error));
+  connection?.then((one) => one.handle(data), () => undefined).catch((error: unknown) => complain(of, error));
 };
 
 function complain(of: number, error: unknown): void {

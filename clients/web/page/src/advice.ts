@@ -18,6 +18,13 @@ export const kNoWebGl: Failure = {
   actions: [kReload],
 };
 
+export const kGraphicsLost: Failure = {
+  kind: "graphics-lost",
+  title: "The browser has stopped drawing",
+  text: "The graphics processor was reset, or has no memory left. Close other programs that draw, then reload the page. You stay in the scene.",
+  actions: [kReload],
+};
+
 export const kNoWebAssembly: Failure = {
   kind: "no-webassembly",
   title: "This browser cannot decode the stream",

@@ -4,26 +4,31 @@
 import { Roles, type Client, type PairingCode, type Proof, type TokenStore } from "@clothstream/client";
 import { element, write } from "./panel/dom";
 
-const kStorageKey = "clothstream.token";
+// A browser may refuse to store anything. The page then asks for a code again, and a reload joins as a new participant.
+function storeIn(storage: () => Storage, key: string): TokenStore {
+  return {
+    kept() {
+      try {
+        return storage().getItem(key) ?? "";
+      } catch {
+        return "";
+      }
+    },
+    keep(token) {
+      try {
+        if (token) storage().setItem(key, token);
+        else storage().removeItem(key);
+      } catch {
+        // Nothing is kept.
+      }
+    },
+  };
+}
 
-// Token that pairing has given for this server. A browser may refuse to store anything; the page then asks again.
-export const browserTokens: TokenStore = {
-  kept() {
-    try {
-      return window.localStorage.getItem(kStorageKey) ?? "";
-    } catch {
-      return "";
-    }
-  },
-  keep(token) {
-    try {
-      if (token) window.localStorage.setItem(kStorageKey, token);
-      else window.localStorage.removeItem(kStorageKey);
-    } catch {
-      // Asked again the next time.
-    }
-  },
-};
+// Token that pairing has given for this server.
+export const browserTokens = storeIn(() => window.localStorage, "clothstream.token");
+// Place in the scene of a tab that reloads.
+export const tabPlaces = storeIn(() => window.sessionStorage, "clothstream.place");
 
 // Proof in typed text: six digits are a code, anything else is a token.
 export function proofIn(text: string): Proof {

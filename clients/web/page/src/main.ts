@@ -2,13 +2,13 @@
 // Starts the page: core, view, session, panel, and the drawing loop.
 
 import { Roles, Session, type Client, type SessionListener, type SessionOptions, type Vec3 } from "@clothstream/client";
-import { kNoWebAssembly, kNoWebGl, notLoaded } from "./advice";
+import { kGraphicsLost, kNoWebAssembly, kNoWebGl, notLoaded } from "./advice";
 import { Drag } from "./drag";
 import { FrameWork } from "./frame_work";
 import { HeadsetPage } from "./headset_page";
 import { Failures } from "./failures";
 import { Hud } from "./hud";
-import { browserTokens, listenToProof, PairingPanel } from "./identity";
+import { browserTokens, listenToProof, PairingPanel, tabPlaces } from "./identity";
 import { listenToKeys } from "./keys";
 import { element } from "./panel/dom";
 import { Panel } from "./panel/panel";
@@ -30,9 +30,11 @@ async function start(): Promise<void> {
     hud.showState("stopped");
     return failures.stop(kNoWebAssembly);
   }
+  const canvas = element<HTMLCanvasElement>("canvas");
+  canvas.addEventListener("webglcontextlost", () => failures.stop(kGraphicsLost));
   let view: View;
   try {
-    view = new View(element<HTMLCanvasElement>("canvas"), chosenDetail(), gathersNormals());
+    view = new View(canvas, chosenDetail(), gathersNormals());
   } catch (error) {
     hud.showState("stopped");
     failures.stop(kNoWebGl);
@@ -106,6 +108,7 @@ async function start(): Promise<void> {
     identity,
     program: "clothstream page",
     tokens: browserTokens,
+    places: tabPlaces,
     quality: limit("quality", 3),
     temporalLayers: limit("layers", 3),
     listener,

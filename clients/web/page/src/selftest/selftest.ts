@@ -4,7 +4,7 @@
 import { Session, type Client, type SessionState } from "@clothstream/client";
 import { CanvasPanel, Immersion, type Headset } from "@clothstream/three";
 import { chosenDetail } from "../detail";
-import { browserTokens } from "../identity";
+import { browserTokens, tabPlaces } from "../identity";
 import { FrameWork } from "../frame_work";
 import { element, write } from "../panel/dom";
 import { expose } from "../probe";
@@ -198,6 +198,7 @@ async function start(): Promise<void> {
     program: "clothstream self-test",
     identity: { name: "Self-test", role: 0 },
     tokens: browserTokens,
+    places: tabPlaces,
     listener: {
       stateChanged: () => test.stateChanged(session.state),
       described: (client) => {
