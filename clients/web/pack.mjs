@@ -43,7 +43,10 @@ try {
     const from = join(web, name);
     const to = join(staging, name);
     writeModules(from, join(to, "dist"));
-    if (name === "client") cpSync(core, join(to, "dist", "clothstream_core.wasm"));
+    if (name === "client") {
+      cpSync(core, join(to, "dist", "clothstream_core.wasm"));
+      execFileSync("node", [join(web, "write_licenses.mjs"), "core", join(to, "THIRD_PARTY_LICENSES.txt")]);
+    }
     for (const file of ["package.json", "README.md"]) cpSync(join(from, file), join(to, file));
     cpSync(join(web, "../../LICENSE"), join(to, "LICENSE"));
     execFileSync("npm", ["pack", "--silent", "--pack-destination", resolve(folder)], { cwd: to });

@@ -199,6 +199,8 @@ test("every request goes to the server itself, and the page works without intern
     assert.deepEqual(foreign, []);
     const files = new Set(asked.filter((url) => url.startsWith(origin)).map((url) => new URL(url).pathname));
     for (const file of ["/", "/main.js", "/main.css", "/worker.js", "/clothstream_core.wasm"]) assert.ok(files.has(file), file);
+    const licenses = await (await context.request.get(new URL(await page.getAttribute("#page-view a", "href"), origin).href)).text();
+    for (const name of ["libc++", "three.js", "Draco"]) assert.ok(licenses.includes(`=\n${name}`), name);
     // Addresses in what was loaded that a browser would follow by itself.
     for (const file of ["/", "/main.css"]) {
       const text = await (await context.request.get(new URL(file, origin).href)).text();

@@ -109,16 +109,18 @@ async function pictureWhere(page, name, condition) {
   throw new Error(`no picture ${name} has the expected content`);
 }
 
-test("the tarballs hold modules, types, readme and licence, and nothing else", async () => {
-  const listed = { client: ["worker.js", "clothstream_core.wasm"], three: [] };
+test("the tarballs hold modules, types, readme and licences, and nothing else", async () => {
+  const listed = { client: ["THIRD_PARTY_LICENSES.txt", "dist/worker.js", "dist/clothstream_core.wasm"], three: [] };
   for (const [name, more] of Object.entries(listed)) {
     const { stdout } = await run("tar", ["-tzf", tarball(name)]);
     const files = stdout.trim().split("\n").map((file) => file.replace("package/", ""));
     const sources = (await readdir(join(web, name, "src"), { recursive: true })).filter((file) => /(?<!\.d)\.ts$/.test(file));
-    const expected = ["LICENSE", "README.md", "package.json", ...more.map((file) => `dist/${file}`)];
+    const expected = ["LICENSE", "README.md", "package.json", ...more];
     for (const source of sources) expected.push(...[".js", ".d.ts"].map((ending) => `dist/${source.replace(/\.ts$/, ending)}`));
     assert.deepEqual(new Set(files), new Set(expected));
   }
+  const { stdout: licenses } = await run("tar", ["-xzOf", tarball("client"), "package/THIRD_PARTY_LICENSES.txt"]);
+  for (const name of ["libc++", "wasi-libc", "protozero"]) assert.ok(licenses.includes(`=\n${name}`), name);
 });
 
 test("the example has at most 40 lines and uses only the public interface", async () => {

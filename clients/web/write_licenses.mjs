@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// Writes the licences of what others made: of the client core, or of the whole page. Usage: node write_licenses.mjs core|page FILE
+import { readFileSync, writeFileSync } from "node:fs";
+
+const kCore = [
+  ["libc++, libc++abi and compiler-rt of LLVM", "/usr/share/doc/libc++-14-dev-wasm32/copyright"],
+  ["wasi-libc", "/usr/share/doc/wasi-libc/copyright"],
+  ["protozero", "/usr/share/doc/libprotozero-dev/copyright"],
+];
+const kPage = [
+  ["three.js", new URL("node_modules/three/LICENSE", import.meta.url)],
+  ["Draco", "/usr/share/doc/libdraco-dev/copyright"],
+  ["Apache License, version 2.0, of which some of the texts above speak", "/usr/share/common-licenses/Apache-2.0"],
+];
+const parts = { core: kCore, page: [...kCore, ...kPage] };
+
+const [kind, file] = process.argv.slice(2);
+if (!(kind in parts) || !file) {
+  console.error("Usage: node write_licenses.mjs core|page FILE");
+  process.exit(2);
+}
+const text = parts[kind].map(([name, source]) => `${"=".repeat(80)}\n${name}\n${"=".repeat(80)}\n\n${readFileSync(source, "utf8").trim()}\n`);
+writeFileSync(file, `ClothStream contains the following works of others, under their own licences.\n\n${text.join("\n")}`);
