@@ -26,8 +26,8 @@ namespace ws = beast::websocket;
 using namespace std::chrono_literals;
 
 constexpr const char* kSubprotocol = "clothstream.v1";
-// Close code of a page that is closed or reloaded: scripts cannot send ws::close_code::going_away.
-constexpr std::uint16_t kPageClosed = 4001;
+// Close code of a page that may return: scripts cannot send ws::close_code::going_away.
+constexpr std::uint16_t kMayReturn = 4001;
 constexpr auto kUpgradeTimeout = 2s;
 constexpr auto kClosingTimeout = 2s;
 // After half of this time without a byte the server sends a ping; after all of it the client counts as
@@ -134,7 +134,7 @@ void WebSocketStream::onRead(beast::error_code error) {
   // Only a close frame is a goodbye. All other errors mean a lost connection.
   if (error == ws::error::closed && session_) {
     const std::uint16_t code = socket_.reason().code;
-    if (code == ws::close_code::going_away || code == kPageClosed)
+    if (code == ws::close_code::going_away || code == kMayReturn)
       session_->closePage();
     else
       session_->leave();

@@ -10,8 +10,8 @@ import { ClientEvent, ClientState } from "./types";
 import { CoreModule } from "./wasm";
 
 const kPeriodMs = 50;
-// Code of a WebSocket that the server does not take for leaving (docs/protocol.md).
-const kPageClosed = 4001;
+// Close code of a client that may return: the server keeps its place for a while (docs/protocol.md).
+const kMayReturn = 4001;
 // Buffers that wait for use, when frames are transferred.
 const kMaxBuffers = 4;
 
@@ -76,7 +76,7 @@ export class Connection {
   async leave(returns = false): Promise<void> {
     clearInterval(this.timer);
     this.client.destroy();
-    await this.socket.close(returns ? kPageClosed : undefined);
+    await this.socket.close(returns ? kMayReturn : undefined);
   }
 
   private now(): number {
@@ -109,7 +109,7 @@ export class Connection {
     this.flush();
     if (atMs < this.client.connectAtMs) return;
     if (!this.socket.inUse) return this.connect();
-    void this.socket.close();
+    void this.socket.close(kMayReturn);
     this.lose("The server does not answer.");
   }
 
