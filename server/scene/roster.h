@@ -32,7 +32,7 @@ namespace clothstream::scene {
 // counts.
 struct ReconnectGrace {
   Clock::duration place = std::chrono::seconds(60);
-  Clock::duration page = std::chrono::seconds(10);
+  Clock::duration page = std::chrono::seconds(20);
   Clock::duration poses = std::chrono::seconds(2);
 };
 
