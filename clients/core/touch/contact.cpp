@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "proto/codec/vertex_normals.h"
@@ -14,30 +13,12 @@ namespace {
 // Ways that count, m. A longer one is a jump.
 constexpr float kShortestWay = 1e-3f, kLongestWay = 3;
 
+// The part of a sweep that is behind the capsule begins this far back, in units of its kept distance.
+constexpr float kBehind = 0.2f;
+// Above the root of 1 + kBehind * kBehind, so that a box of this many kept distances has the whole sweep.
+constexpr float kSweepMargin = 1.03f;
+
 constexpr float kBucket = 5e-4f, kLeast = 1e-5f;  // m
-
-// Smallest box around points.
-struct Box {
-  Vector least{kFar, kFar, kFar}, most{-kFar, -kFar, -kFar};
-
-  void add(const Capsule& capsule, float margin) {
-    for (const Vector& point : {capsule.from, capsule.to}) add(point, capsule.radius + margin);
-  }
-  bool empty() const { return least.x > most.x; }
-  void add(const Vector& point, float margin) {
-    least = {std::min(least.x, point.x - margin), std::min(least.y, point.y - margin),
-             std::min(least.z, point.z - margin)};
-    most = {std::max(most.x, point.x + margin), std::max(most.y, point.y + margin),
-            std::max(most.z, point.z + margin)};
-  }
-  bool contains(const Vector& point) const {
-    return point.x >= least.x && point.x <= most.x && point.y >= least.y && point.y <= most.y &&
-           point.z >= least.z && point.z <= most.z;
-  }
-
- private:
-  static constexpr float kFar = std::numeric_limits<float>::max();
-};
 
 // Part of the segment at which it is nearest to a point.
 float nearestPart(const Capsule& capsule, const Vector& point) {
@@ -63,12 +44,15 @@ Vector withoutPart(const Vector& vector, const Vector& direction) {
   return vector - dot(vector, direction) * direction;
 }
 
-// Longest way of an end of a capsule.
+// The longer way of the two ends.
+float longestWay(const Capsule& from, const Capsule& to) {
+  return std::max(length(to.from - from.from), length(to.to - from.to));
+}
+
 float travel(const OwnCapsules& from, const OwnCapsules& to) {
   float longest = 0;
   for (std::size_t i = 0; i < kOwnCapsules; ++i)
-    if (from[i].present() && to[i].present())
-      longest = std::max({longest, length(to[i].from - from[i].from), length(to[i].to - from[i].to)});
+    if (from[i].present() && to[i].present()) longest = std::max(longest, longestWay(from[i], to[i]));
   return longest;
 }
 
@@ -129,25 +113,16 @@ std::span<const float> Contact::apply(std::span<const float> played, const OwnCa
   for (const std::uint32_t vertex : lastCorrected_) sizes_[vertex] = 0;
   corrected_.clear();
 
-  Box sweep, end;
-  for (std::size_t i = 0; i < kOwnCapsules; ++i) {
-    if (!now_[i].present()) continue;
-    end.add(now_[i], farthestReach_);
-    sweep.add(now_[i], farthestReach_);
-    if (answered_[i].present()) sweep.add(answered_[i], farthestReach_);
-  }
-  if (end.empty() && lastCorrected_.empty()) return played;
+  box();
+  if (ends_.empty() && lastCorrected_.empty()) return played;
   for (std::uint32_t vertex = 0; vertex < reach_.size(); ++vertex) {
-    const Vector at = vectorAt(played.data(), vertex);
-    if (!sweep.contains(at)) continue;
-    const Vector correction = swept(vertex, at);
+    const Vector correction = swept(vertex, vectorAt(played.data(), vertex));
     if (dot(correction, correction) > 0) correct(vertex, correction);
   }
   spread();
   // Vertices that the others took with them may have come into a capsule.
   for (std::uint32_t vertex = 0; vertex < reach_.size(); ++vertex) {
     const Vector at = vectorAt(played.data(), vertex) + corrections_[vertex];
-    if (!end.contains(at)) continue;
     const Vector push = keptOutside(vertex, at) - at;
     if (dot(push, push) > 0) correct(vertex, corrections_[vertex] + push);
   }
@@ -175,13 +150,31 @@ float Contact::keptDistance(float radius, std::uint32_t vertex) const {
   return std::sqrt(radius * radius + reach_[vertex] * reach_[vertex]);
 }
 
-Vector Contact::swept(std::uint32_t vertex, const Vector& played) const {
-  Vector largest;
-  float largestSize = 0;
+void Contact::box() {
+  sweeps_.clear();
+  ends_.clear();
   for (std::size_t i = 0; i < kOwnCapsules; ++i) {
     const Capsule& start = answered_[i];
     const Capsule& end = now_[i];
-    if (!start.present() || !end.present()) continue;
+    if (!end.present()) continue;
+    const float reach = end.radius + farthestReach_ + kLeast;
+    Box box;
+    box.add(end, reach);
+    ends_.add(i, box);
+    if (!start.present() || longestWay(start, end) < 0.99f * kShortestWay) continue;
+    Box sweep;
+    sweep.add(start, kSweepMargin * reach);
+    sweep.add(end, kSweepMargin * reach);
+    sweeps_.add(i, sweep);
+  }
+}
+
+Vector Contact::swept(std::uint32_t vertex, const Vector& played) const {
+  Vector largest;
+  float largestSize = 0;
+  sweeps_.around(played, [&](std::size_t i) {
+    const Capsule& start = answered_[i];
+    const Capsule& end = now_[i];
     const float kept = keptDistance(end.radius, vertex);
     // The point of the segment that comes nearest to the vertex on its way.
     float part = nearestPart(start, played), gone = 0;
@@ -196,19 +189,19 @@ Vector Contact::swept(std::uint32_t vertex, const Vector& played) const {
                           start.to + progress * (end.to - start.to), end.radius},
                          played);
     }
-    if (!(gone > kShortestWay && gone < kLongestWay)) continue;
+    if (!(gone > kShortestWay && gone < kLongestWay)) return;
     const Vector direction = (1 / gone) * way;
     const float along = dot(played - from, direction);
     const float beside = length(withoutPart(played - from, direction));
-    if (!(beside < kept)) continue;
+    if (!(beside < kept)) return;
     const float front = gone + std::sqrt(kept * kept - beside * beside);
     // Not what is behind the capsule, and less at the rim of what it sweeps, so that nothing jumps there.
-    const float share = ramp(along, -0.2f * kept, 0.3f * kept) * ramp(kept - beside, 0, 0.3f * kept);
+    const float share = ramp(along, -kBehind * kept, 0.3f * kept) * ramp(kept - beside, 0, 0.3f * kept);
     const float size = share * (front - along);
-    if (!(size > largestSize && size < kLongestWay)) continue;
+    if (!(size > largestSize && size < kLongestWay)) return;
     largestSize = size;
     largest = size * direction;
-  }
+  });
   return largest;
 }
 
@@ -261,18 +254,22 @@ void Contact::blend(float most) {
 // on in its direction, so that it stays on the side of those around it.
 Vector Contact::keptOutside(std::uint32_t vertex, const Vector& shown) const {
   Vector at = shown;
-  for (int round = 0; round < 2; ++round)
-    for (const Capsule& capsule : now_) {
-      if (!capsule.present()) continue;
+  bool isMoved = true;
+  for (int round = 0; round < 2 && isMoved; ++round) {
+    isMoved = false;
+    ends_.around(at, [&](std::size_t i) {
+      const Capsule& capsule = now_[i];
       const Vector nearest = capsule.at(nearestPart(capsule, at));
       const Vector away = at - nearest;
       const float kept = keptDistance(capsule.radius, vertex), distance = length(away);
-      if (!(distance < kept)) continue;
+      if (!(distance < kept)) return;
       const Vector side =
           sizes_[vertex] > 0 ? (1 / sizes_[vertex]) * corrections_[vertex] : sideOf(capsule, away, distance);
       const Vector beside = withoutPart(away, side);
       at = nearest + beside + std::sqrt(std::max(0.0f, kept * kept - dot(beside, beside))) * side;
-    }
+      isMoved = true;
+    });
+  }
   return at;
 }
 

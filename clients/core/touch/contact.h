@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "clients/core/touch/capsule_boxes.h"
 #include "clients/core/touch/own_capsules.h"
 #include "clients/core/touch/vector.h"
 #include "clients/core/wire/description.h"
@@ -46,6 +47,8 @@ class Contact {
 
   // Distance from a capsule's segment at which a vertex keeps the triangles around it outside of the capsule.
   float keptDistance(float radius, std::uint32_t vertex) const;
+  // Fills the boxes below.
+  void box();
   // Largest correction by a capsule that sweeps over the vertex; 0 if none does.
   Vector swept(std::uint32_t vertex, const Vector& played) const;
   void correct(std::uint32_t vertex, const Vector& correction);
@@ -59,6 +62,8 @@ class Contact {
   std::vector<std::uint32_t> firstEdge_;  // per vertex, and the end
   std::vector<Edge> edges_;
   OwnCapsules answered_, now_;  // of the last apply()
+  CapsuleBoxes sweeps_;         // what the capsules that have moved can sweep
+  CapsuleBoxes ends_;           // what the newest capsules keep the cloth out of
   std::uint64_t shownUs_ = 0;
   std::vector<Vector> corrections_;
   std::vector<float> sizes_;              // lengths of the corrections
