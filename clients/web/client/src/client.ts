@@ -11,7 +11,7 @@ import { PlaybackControl } from "./playback";
 import { SceneRequests } from "./scene_requests";
 import { Settings } from "./cloth_settings";
 import { ClientState, type Identity } from "./types";
-import type { CoreModule } from "./wasm";
+import { KeptView, type CoreModule } from "./wasm";
 
 // Result of decoding in the client that a mirror follows (cs_decoding).
 export enum Decoding {
@@ -20,9 +20,8 @@ export enum Decoding {
   skipped = 2,
 }
 
-// Frame that the client of a mirror has decoded.
+// Frame that the client of a mirror has decoded, without its values.
 export interface DecodedFrame {
-  values: Float32Array; // 3 floats per vertex: positions, then normals if the stream has them
   hasNormals: boolean;
   hash: bigint;
   decodeMs: number;
@@ -37,8 +36,8 @@ export class Client {
   readonly requests: SceneRequests;
   readonly settings: Settings;
   private readonly handle: CoreHandle;
-  private readonly inbox: Buffer;
-  private readonly decoded: Buffer;
+  private readonly inbox: Buffer<Uint8Array>;
+  private readonly decoded: Buffer<Float32Array>;
 
   // An empty `scene` means the server's default scene. `program` names the program.
   constructor(
@@ -53,8 +52,8 @@ export class Client {
     const pointer = core.with([scene, program, name], (where, what, who) => create(where!, what!, who!, role));
     if (pointer === 0) throw new Error("The client core has no memory left for another client");
     this.handle = new CoreHandle(core, pointer);
-    this.inbox = new Buffer(core);
-    this.decoded = new Buffer(core);
+    this.inbox = new Buffer(core, (pointer, count) => core.bytes(pointer, count));
+    this.decoded = new Buffer(core, (pointer, count) => core.floats(pointer, count));
     this.frames = new Frames(this.handle);
     this.input = new Input(this.handle);
     this.parameters = new Parameters(this.handle);
@@ -104,18 +103,19 @@ export class Client {
     return this.core.exports.cs_receive(this.handle.pointer, this.inbox.write(message), message.byteLength, arrivedUs);
   }
 
-  // Like receive(), for a mirror.
-  receiveDecoded(message: Uint8Array, decoding: Decoding, frame: DecodedFrame | undefined, arrivedUs: bigint): number {
+  // Like receive(), for a mirror. `values` are those of the frame, 3 floats per vertex: positions, then normals if it has
+  // them.
+  receiveDecoded(message: Uint8Array, decoding: Decoding, frame: DecodedFrame | undefined, values: Float32Array, arrivedUs: bigint): number {
     const { exports } = this.core;
     const { scratch, pointer } = this.handle;
     const bytes = this.inbox.write(message);
-    const values = frame ? this.decoded.write(frame.values) : 0;
-    const vertices = frame ? frame.values.length / (frame.hasNormals ? 6 : 3) : 0;
+    const positions = frame ? this.decoded.write(values) : 0;
+    const vertices = frame ? values.length / (frame.hasNormals ? 6 : 3) : 0;
     const view = this.core.view();
     view.setUint32(scratch + cs_decoded.version, CS_DECODED_VERSION, true);
     view.setUint32(scratch + cs_decoded.decoding, decoding, true);
-    view.setUint32(scratch + cs_decoded.positions, values, true);
-    view.setUint32(scratch + cs_decoded.normals, frame?.hasNormals ? values + 12 * vertices : 0, true);
+    view.setUint32(scratch + cs_decoded.positions, positions, true);
+    view.setUint32(scratch + cs_decoded.normals, frame?.hasNormals ? positions + 12 * vertices : 0, true);
     view.setUint32(scratch + cs_decoded.vertex_count, vertices, true);
     view.setBigUint64(scratch + cs_decoded.reconstruction_hash, frame?.hash ?? 0n, true);
     view.setFloat64(scratch + cs_decoded.decode_ms, frame?.decodeMs ?? 0, true);
@@ -176,26 +176,31 @@ export class Client {
 }
 
 // Memory of the core that grows with what is written to it.
-class Buffer {
+class Buffer<View extends Uint8Array | Float32Array> {
   private pointer = 0;
-  private bytes = 0;
+  private room = 0; // elements
+  private readonly view: KeptView<View>;
 
-  constructor(private readonly core: CoreModule) {}
+  constructor(
+    private readonly core: CoreModule,
+    make: (pointer: number, count: number) => View,
+  ) {
+    this.view = new KeptView(core, make);
+  }
 
   // Returns the address of the copy.
-  write(values: Uint8Array | Float32Array): number {
-    if (values.byteLength > this.bytes) {
+  write(values: View): number {
+    if (values.length > this.room) {
       this.free();
-      this.bytes = 2 * values.byteLength;
-      this.pointer = this.core.allocate(this.bytes);
+      this.pointer = this.core.allocate(2 * values.byteLength);
+      this.room = 2 * values.length;
     }
-    if (values instanceof Float32Array) this.core.floats(this.pointer, values.length).set(values);
-    else this.core.bytes(this.pointer, values.length).set(values);
+    this.view.at(this.pointer, this.room).set(values);
     return this.pointer;
   }
 
   free(): void {
     this.core.exports.free(this.pointer);
-    this.pointer = this.bytes = 0;
+    this.pointer = this.room = 0;
   }
 }

@@ -5,6 +5,7 @@
 import { CS_STAGE_STATISTICS_VERSION, cs_cloth, cs_cloth_point, cs_stage_statistics, cs_statistics, cs_submesh } from "./layout";
 import { microseconds, nowUs, vec3, type CoreHandle } from "./handle";
 import { readCollider, ShownColliders } from "./shown_colliders";
+import { KeptView } from "./wasm";
 import type { ClothLayout, ClothPoint, Collider, Drawing, Hull, Stages, Statistics, Vec3 } from "./types";
 
 const kFarthestPoint = 1e4; // m
@@ -13,9 +14,12 @@ export class Frames {
   private playsOut = false;
 
   private readonly shown: ShownColliders;
+  private readonly shownFloats: Record<"positions" | "normals", KeptView<Float32Array>>;
 
   constructor(private readonly handle: CoreHandle) {
     this.shown = new ShownColliders(handle);
+    const keep = () => new KeptView(handle.core, (pointer, count) => handle.core.floats(pointer, count));
+    this.shownFloats = { positions: keep(), normals: keep() };
   }
 
   // Plays frames out evenly, with a small delay. Without, the newest frame is shown.
@@ -82,13 +86,13 @@ export class Frames {
   // Positions that the last showAt() chose.
   shownPositions(): Float32Array {
     if (!this.playsOut) return this.positions();
-    return this.handle.core.floats(this.handle.core.exports.cs_played_positions(this.handle.pointer), 3 * this.vertexCount);
+    return this.shownFloats.positions.at(this.handle.core.exports.cs_played_positions(this.handle.pointer), 3 * this.vertexCount);
   }
 
   // Normals of these positions. The first call after showAt() may have to compute them, and detaches views.
   shownNormals(): Float32Array {
     if (!this.playsOut) return this.normals();
-    return this.handle.core.floats(this.handle.core.exports.cs_played_normals(this.handle.pointer), 3 * this.vertexCount);
+    return this.shownFloats.normals.at(this.handle.core.exports.cs_played_normals(this.handle.pointer), 3 * this.vertexCount);
   }
 
   triangles(): Uint32Array {

@@ -2,7 +2,7 @@
 // Membership in a scene across several connections. A worker has the connection and decodes; this thread has the mirror
 // that the program reads, draws and writes to.
 
-import { Client, type DecodedFrame } from "./client";
+import { Client } from "./client";
 import { FrameGaps } from "./frame_gaps";
 import { FrameRing } from "./frame_ring";
 import { microseconds } from "./handle";
@@ -58,6 +58,7 @@ export interface SessionOptions {
   listener?: SessionListener;
 }
 
+const kNoValues = new Float32Array();
 const kNoTokens: TokenStore = { kept: () => "", keep: () => undefined };
 
 export class Session {
@@ -222,9 +223,8 @@ export class Session {
   private receive({ message, arrivedMs, isFrame, decoding, frame }: FromWorker & { kind: "message" }): void {
     const { client, listener } = this;
     const began = performance.now();
-    let decoded: DecodedFrame | undefined;
-    if (frame) decoded = { ...frame, values: frame.buffer ? new Float32Array(frame.buffer) : this.ring!.oldest() };
-    const events = client.receiveDecoded(new Uint8Array(message), decoding, decoded, microseconds(arrivedMs));
+    const values = frame?.buffer ? new Float32Array(frame.buffer) : frame ? this.ring!.oldest() : kNoValues;
+    const events = client.receiveDecoded(new Uint8Array(message), decoding, frame, values, microseconds(arrivedMs));
     if (isFrame) this.gaps.arrived(arrivedMs);
     if (frame?.buffer) this.post({ kind: "recycle", buffer: frame.buffer }, [frame.buffer]);
     else if (frame) this.ring!.take();

@@ -13,6 +13,7 @@ interface KeptCollider extends Omit<Collider, "position" | "orientation" | "size
   position: Mutable<Vec3>;
   orientation: Mutable<Quaternion>;
   size: Mutable<Vec3>;
+  idWords: readonly [number, number]; // participantId, lower half first
 }
 
 type Getter = (client: number, index: number, out: number) => number;
@@ -30,6 +31,7 @@ export function readCollider(handle: CoreHandle, view: DataView, at: number, ind
     length: view.getFloat32(at + cs_collider.length, true),
     size: vec3(view, at + cs_collider.size),
     participantId,
+    idWords: [view.getUint32(at + cs_collider.participant_id, true), view.getUint32(at + cs_collider.participant_id + 4, true)],
     isHead: isHead(participantId, name),
   };
 }
@@ -45,15 +47,18 @@ export class ShownColliders {
   // The list and its objects are valid until the next call.
   read(count: number, get: Getter): readonly Collider[] {
     const { core, pointer, scratch } = this.handle;
-    this.list.length = 0;
+    let found = 0;
     for (let index = 0; index < count; ++index) {
       if (get(pointer, index, scratch) === 0) continue;
       const view = core.view();
-      const collider = this.kept[this.list.length];
+      const collider = this.kept[found];
       if (collider) this.update(collider, view, scratch, index);
       else this.kept.push(readCollider(this.handle, view, scratch, index));
-      this.list.push(this.kept[this.list.length]!);
+      this.list[found] = this.kept[found]!;
+      ++found;
     }
+    // Only a change of the length reallocates the list.
+    if (this.list.length !== found) this.list.length = found;
     return this.list;
   }
 
@@ -67,7 +72,16 @@ export class ShownColliders {
     collider.radius = view.getFloat32(at + cs_collider.radius, true);
     collider.length = view.getFloat32(at + cs_collider.length, true);
     readFloats(view, at + cs_collider.size, collider.size);
-    collider.participantId = view.getBigUint64(at + cs_collider.participant_id, true);
+    this.updateId(collider, view, at + cs_collider.participant_id);
     collider.isHead = isHead(collider.participantId, collider.name);
+  }
+
+  // Each bigint that is read is a new object, so it is read only after a change.
+  private updateId(collider: KeptCollider, view: DataView, at: number): void {
+    const low = view.getUint32(at, true);
+    const high = view.getUint32(at + 4, true);
+    if (collider.idWords[0] === low && collider.idWords[1] === high) return;
+    collider.idWords = [low, high];
+    collider.participantId = view.getBigUint64(at, true);
   }
 }

@@ -2,7 +2,7 @@
 // Messages between the thread of the connection, which is a worker, and the thread of the page. Times are milliseconds
 // of performance.now() of the page.
 
-import type { Decoding } from "./client";
+import type { DecodedFrame, Decoding } from "./client";
 import type { Identity } from "./types";
 
 // Proof of identity: what a person gives, or a kept token ("" for none).
@@ -53,9 +53,6 @@ export type FromWorker = { session: number } & (
 );
 
 // Decoded frame that belongs to a message. It is in the ring if there is no buffer.
-export interface SentFrame {
+export interface SentFrame extends DecodedFrame {
   buffer: ArrayBuffer | undefined;
-  hasNormals: boolean;
-  hash: bigint;
-  decodeMs: number;
 }

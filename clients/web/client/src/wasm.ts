@@ -202,3 +202,21 @@ export class CoreModule {
     }
   }
 }
+
+// View of the core's memory that is used again while the memory, the place and the size stay the same, so that frames
+// allocate none.
+export class KeptView<View extends Uint8Array | Float32Array> {
+  private view: View | undefined;
+
+  constructor(
+    private readonly core: CoreModule,
+    private readonly make: (pointer: Pointer, count: number) => View,
+  ) {}
+
+  at(pointer: Pointer, count: number): View {
+    const { view } = this;
+    // A view of memory that has grown has another buffer.
+    if (view?.buffer === this.core.exports.memory.buffer && view.byteOffset === pointer && view.length === count) return view;
+    return (this.view = this.make(pointer, count));
+  }
+}

@@ -114,10 +114,11 @@ export class Controls {
 
   // The direction of a wind that is switched off is kept, to be used when it is switched on.
   private takeWind(): Vec3 | undefined {
-    const changes = this.windSliders.map((slider) => slider.take());
-    if (changes.every((change) => change === undefined)) return undefined;
-    const wind = { speed: this.wind.value, heading: this.heading.value, rise: this.rise.value };
-    return vectorOf(wind);
+    const speed = this.wind.take();
+    const heading = this.heading.take();
+    const rise = this.rise.take();
+    if (speed === undefined && heading === undefined && rise === undefined) return undefined;
+    return vectorOf({ speed: this.wind.value, heading: this.heading.value, rise: this.rise.value });
   }
 
   private showEnvironment(environment: Environment): void {

@@ -12,6 +12,7 @@ const kSpeed = 3;
 // Depth behind the touched point to which a press pushes, in radii.
 const kPush = 1.6;
 const kLongestStep = 0.1; // s
+const kNoColliders: readonly OwnCollider[] = [];
 
 export class Pusher {
   radius = 0.12; // of the ball, and half the edge of the box, m
@@ -66,13 +67,13 @@ export class Pusher {
   }
 
   // The collider as it is now; none while the pointer is elsewhere.
-  private update(nowMs: number): OwnCollider[] {
+  private update(nowMs: number): readonly OwnCollider[] {
     const seconds = Math.min(kLongestStep, (nowMs - this.drawnAt) / 1000);
     this.drawnAt = nowMs;
     this.mesh.visible = this.isOver && this.chosen !== "hand";
     if (!this.mesh.visible) {
       this.placed = false;
-      return [];
+      return kNoColliders;
     }
     this.findGoal();
     const { position } = this.mesh;

@@ -128,7 +128,8 @@ export class ClothMesh {
   // Copies the cloth's vertices to `out`, followed by the duplicates at seams.
   private place(values: Float32Array, out: Float32Array): void {
     const { firstVertex, vertexCount } = this.layout;
-    out.set(values.subarray(3 * firstVertex, 3 * (firstVertex + vertexCount)));
+    const isAll = values.length === 3 * vertexCount;
+    out.set(isAll ? values : values.subarray(3 * firstVertex, 3 * (firstVertex + vertexCount)));
     const { copies } = this.drawn;
     for (let copy = 0; copy < copies.length; ++copy) {
       const from = 3 * copies[copy]!;

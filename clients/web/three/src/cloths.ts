@@ -56,7 +56,7 @@ export class Cloths {
     frames.showAt(now);
     const normals = this.gathers(client) ? undefined : frames.shownNormals();
     const positions = frames.shownPositions();
-    for (const cloth of this.list) cloth.update(positions, normals);
+    for (let number = 0; number < this.list.length; ++number) this.list[number]!.update(positions, normals);
     return true;
   }
 

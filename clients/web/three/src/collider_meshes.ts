@@ -40,7 +40,9 @@ export class ColliderMeshes {
   // `shown` are all colliders that are shown.
   place(client: Client, shown: readonly Collider[]): void {
     let count = 0;
-    for (const collider of shown) {
+    // A loop with "of" would allocate an iterator for each drawn frame.
+    for (let index = 0; index < shown.length; ++index) {
+      const collider = shown[index]!;
       if (collider.participantId !== 0n) continue;
       let mesh = this.meshes[count];
       if (!mesh || !looksLike(mesh.userData["look"] as Look, collider)) {
@@ -89,7 +91,8 @@ type Look = Pick<Collider, "shape" | "name" | "radius" | "length" | "size">;
 
 function looksLike(look: Look, { shape, name, radius, length, size }: Collider): boolean {
   if (look.shape !== shape || look.radius !== radius || look.length !== length) return false;
-  return look.size.every((edge, axis) => edge === size[axis]) && (shape !== Shape.hull || look.name === name);
+  if (look.size[0] !== size[0] || look.size[1] !== size[1] || look.size[2] !== size[2]) return false;
+  return shape !== Shape.hull || look.name === name;
 }
 
 function makeMesh(client: Client, collider: Collider): ColliderMesh {

@@ -40,8 +40,9 @@ export class People {
   place(colliders: readonly Collider[], eye: THREE.Vector3, showOwn: boolean): void {
     this.others.begin();
     this.own.begin();
-    for (const label of this.labels.values()) label.sprite.visible = false;
-    for (const collider of colliders) {
+    if (this.labels.size > 0) for (const label of this.labels.values()) label.sprite.visible = false;
+    for (let index = 0; index < colliders.length; ++index) {
+      const collider = colliders[index]!;
       const id = collider.participantId;
       if (id === 0n) continue;
       const self = this.participants.get(id)?.self === true;
@@ -110,15 +111,19 @@ class Figures {
   }
 
   begin(): void {
-    for (const instances of this.kinds()) instances.count = 0;
+    this.balls.count = this.rods.count = this.boxes.count = 0;
   }
 
   end(): void {
-    for (const instances of this.kinds()) instances.finish();
+    this.balls.finish();
+    this.rods.finish();
+    this.boxes.finish();
   }
 
   dispose(): void {
-    for (const instances of this.kinds()) instances.dispose();
+    this.balls.dispose();
+    this.rods.dispose();
+    this.boxes.dispose();
   }
 
   add(collider: Collider, colour: THREE.Color): void {
@@ -160,10 +165,6 @@ class Figures {
     this.place.scale.set(x, y, z);
     this.place.updateMatrix();
     instances.add(this.place.matrix, colour);
-  }
-
-  private kinds(): Instances[] {
-    return [this.balls, this.rods, this.boxes];
   }
 }
 

@@ -30,9 +30,11 @@ export class ClothPanel {
   private readonly solverPart = make("details", { open: true }, make("summary", {}, "Solver"));
   private shownSolver = 0;
   private readonly chosen: ((client: Client) => void)[] = [];
+  private isTouched = false; // a person has used a number since the last apply()
 
   constructor() {
     const parameters = element("parameters");
+    for (const event of ["input", "change"]) parameters.addEventListener(event, () => (this.isTouched = true));
     parameters.append(this.solverPart);
     for (const group of new Set(kClothParameters.map((row) => row.group))) {
       const rows = this.rows.filter((_, index) => kClothParameters[index]!.group === group).map((row) => row.root);
@@ -94,7 +96,12 @@ export class ClothPanel {
 
   // Sends changes to the client. Call once per drawn frame.
   apply(client: Client): void {
-    for (const change of this.chosen.splice(0)) change(client);
+    if (this.chosen.length > 0) for (const change of this.chosen.splice(0)) change(client);
+    if (this.isTouched) this.sendNumbers(client);
+  }
+
+  private sendNumbers(client: Client): void {
+    this.isTouched = false;
     const change: ClothChange = {};
     const numbers: [number, number][] = [];
     this.rows.forEach((row, index) => {
