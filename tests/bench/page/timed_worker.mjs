@@ -11,7 +11,7 @@ function timeFrames() {
   self.frameTimes = [];
   const post = self.postMessage.bind(self);
   self.postMessage = (message, transfer) => {
-    isFrame ||= message.frame !== undefined;
+    isFrame ||= typeof message === "number" || message.frame !== undefined;
     post(message, transfer);
   };
   const { set } = Object.getOwnPropertyDescriptor(WebSocket.prototype, "onmessage");

@@ -103,12 +103,12 @@ export class Client {
     return this.core.exports.cs_receive(this.handle.pointer, this.inbox.write(message), message.byteLength, arrivedUs);
   }
 
-  // Like receive(), for a mirror. `values` are those of the frame, 3 floats per vertex: positions, then normals if it has
-  // them.
-  receiveDecoded(message: Uint8Array, decoding: Decoding, frame: DecodedFrame | undefined, values: Float32Array, arrivedUs: bigint): number {
+  // Like receive(), for a mirror. The message is the first `bytes` of the array. `values` are those of the frame, 3 floats
+  // per vertex: positions, then normals if it has them.
+  receiveDecoded(message: Uint8Array, bytes: number, decoding: Decoding, frame: DecodedFrame | undefined, values: Float32Array, arrivedUs: bigint): number {
     const { exports } = this.core;
     const { scratch, pointer } = this.handle;
-    const bytes = this.inbox.write(message);
+    const copy = this.inbox.write(message);
     const positions = frame ? this.decoded.write(values) : 0;
     const vertices = frame ? values.length / (frame.hasNormals ? 6 : 3) : 0;
     const view = this.core.view();
@@ -119,7 +119,7 @@ export class Client {
     view.setUint32(scratch + cs_decoded.vertex_count, vertices, true);
     view.setBigUint64(scratch + cs_decoded.reconstruction_hash, frame?.hash ?? 0n, true);
     view.setFloat64(scratch + cs_decoded.decode_ms, frame?.decodeMs ?? 0, true);
-    return exports.cs_receive_decoded(pointer, bytes, message.byteLength, scratch, arrivedUs);
+    return exports.cs_receive_decoded(pointer, copy, bytes, scratch, arrivedUs);
   }
 
   // Starts a connection. The next outgoing message is Hello, except of a mirror.

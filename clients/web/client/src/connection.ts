@@ -5,7 +5,7 @@ import { Client, Decoding } from "./client";
 import { microseconds } from "./handle";
 import { copyParts, FrameRing } from "./frame_ring";
 import { StreamSocket } from "./socket";
-import type { End, FromWorker, SentFrame, Start, ToWorker } from "./thread_messages";
+import type { End, FromWorker, SentFrame, Start, Told, ToWorker } from "./thread_messages";
 import { ClientEvent, ClientState } from "./types";
 import { CoreModule } from "./wasm";
 
@@ -18,8 +18,6 @@ const kMaxBuffers = 4;
 export interface Port {
   postMessage(message: FromWorker, transfer: Transferable[]): void;
 }
-
-type Distributive<T, Key extends PropertyKey> = T extends unknown ? Omit<T, Key> : never;
 
 export class Connection {
   private readonly client: Client;
@@ -83,7 +81,7 @@ export class Connection {
     return performance.now() + this.clockOffsetMs;
   }
 
-  private post(message: Distributive<FromWorker, "session">, transfer: Transferable[] = []): void {
+  private post(message: Told, transfer: Transferable[] = []): void {
     this.port.postMessage({ ...message, session: this.options.session }, transfer);
   }
 
@@ -124,12 +122,14 @@ export class Connection {
   private receive(bytes: ArrayBuffer): void {
     const arrivedMs = this.now();
     const before = this.client.frames.decodeErrors;
-    const events = this.client.receive(new Uint8Array(bytes), microseconds(arrivedMs));
+    const message = new Uint8Array(bytes);
+    const events = this.client.receive(message, microseconds(arrivedMs));
     const decodeMs = this.now() - arrivedMs;
     this.flush();
     if (events & ClientEvent.description) this.prepare();
     const isFrame = (events & ClientEvent.frame) !== 0;
-    const frame = isFrame ? this.pass(decodeMs) : undefined;
+    const frame = isFrame ? this.pass(message, arrivedMs, decodeMs) : undefined;
+    if (frame === "in the ring") return this.port.postMessage(this.options.session, []);
     const refused = this.client.frames.decodeErrors > before;
     const decoding = frame ? Decoding.done : refused ? Decoding.refused : Decoding.skipped;
     const transfer = frame?.buffer ? [bytes, frame.buffer] : [bytes];
@@ -145,12 +145,15 @@ export class Connection {
     this.post({ kind: "ring", memory: this.ring.memory });
   }
 
-  // Hands the newest frame to the page. Undefined if the page has no time for it.
-  private pass(decodeMs: number): SentFrame | undefined {
+  // Hands the newest frame to the page, by the ring with its message or without. Undefined if the page has no time for it.
+  private pass(message: Uint8Array, arrivedMs: number, decodeMs: number): SentFrame | "in the ring" | undefined {
     const { frames } = this.client;
     const parts = frames.sendsNormals ? [frames.positions(), frames.normals()] : [frames.positions()];
     const frame = { buffer: undefined, hasNormals: frames.sendsNormals, hash: frames.hash, decodeMs };
-    if (this.ring) return this.ring.write(parts) ? frame : undefined;
+    if (this.ring) {
+      const written = this.ring.write(parts, message, arrivedMs, frame);
+      return written === "whole" ? "in the ring" : written === "large" ? frame : undefined;
+    }
     const bytes = parts.reduce((sum, part) => sum + part.byteLength, 0);
     const kept = this.buffers.pop();
     const buffer = kept?.byteLength === bytes ? kept : new ArrayBuffer(bytes);

@@ -2,11 +2,11 @@
 // Membership in a scene across several connections. A worker has the connection and decodes; this thread has the mirror
 // that the program reads, draws and writes to.
 
-import { Client } from "./client";
+import { Client, Decoding, type DecodedFrame } from "./client";
 import { FrameGaps } from "./frame_gaps";
 import { FrameRing } from "./frame_ring";
 import { microseconds } from "./handle";
-import type { FromWorker, Proof, ToWorker } from "./thread_messages";
+import type { FromWorker, Proof, Told, ToWorker } from "./thread_messages";
 import { ClientEvent, ClientState, ErrorCode, type Identity } from "./types";
 import { CoreModule } from "./wasm";
 
@@ -71,6 +71,7 @@ export class Session {
   private number = 0; // of the session in the worker
   private connection = 0;
   private ring: FrameRing | undefined;
+  private readonly frame: DecodedFrame = { hasNormals: false, hash: 0n, decodeMs: 0 }; // of the ring, for one call
   private readonly listener: SessionListener;
   private readonly tokens: TokenStore;
   private readonly places: TokenStore;
@@ -198,6 +199,10 @@ export class Session {
   }
 
   private handle(message: FromWorker): void {
+    if (typeof message === "number") {
+      if (message === this.number) this.receiveFrame(this.ring!);
+      return;
+    }
     if (message.session !== this.number) return;
     switch (message.kind) {
       case "connecting":
@@ -220,17 +225,34 @@ export class Session {
     }
   }
 
-  private receive({ message, arrivedMs, isFrame, decoding, frame }: FromWorker & { kind: "message" }): void {
-    const { client, listener } = this;
+  private receive({ message, arrivedMs, isFrame, decoding, frame }: Told & { kind: "message" }): void {
     const began = performance.now();
-    const values = frame?.buffer ? new Float32Array(frame.buffer) : frame ? this.ring!.oldest() : kNoValues;
-    const events = client.receiveDecoded(new Uint8Array(message), decoding, frame, values, microseconds(arrivedMs));
+    const values = frame?.buffer ? new Float32Array(frame.buffer) : frame ? this.ring!.oldest().values : kNoValues;
+    const events = this.client.receiveDecoded(new Uint8Array(message), message.byteLength, decoding, frame, values, microseconds(arrivedMs));
     if (isFrame) this.gaps.arrived(arrivedMs);
     if (frame?.buffer) this.post({ kind: "recycle", buffer: frame.buffer }, [frame.buffer]);
     else if (frame) this.ring!.take();
-    if (frame) {
+    this.received(events, frame ? performance.now() - began : undefined);
+  }
+
+  // Takes the next frame of the ring. Frames are many, so this allocates nothing.
+  private receiveFrame(ring: FrameRing): void {
+    const began = performance.now();
+    const slot = ring.oldest();
+    const { arrivedMs } = slot;
+    slot.read(this.frame);
+    const events = this.client.receiveDecoded(slot.message, slot.messageBytes, Decoding.done, this.frame, slot.values, microseconds(arrivedMs));
+    this.gaps.arrived(arrivedMs);
+    ring.take();
+    this.received(events, performance.now() - began);
+  }
+
+  // `takeMs` is the time that a frame took.
+  private received(events: number, takeMs: number | undefined): void {
+    const { client, listener } = this;
+    if (takeMs !== undefined) {
       ++this.framesTaken;
-      this.takeMs += performance.now() - began;
+      this.takeMs += takeMs;
     }
     if (events & ~ClientEvent.frame) this.report(client, listener, events);
     if (this.state.kind !== "live" && client.state === ClientState.joined) {

@@ -41,16 +41,18 @@ export type ToWorker =
   // A buffer of a frame that may be used again.
   | { kind: "recycle"; buffer: ArrayBuffer };
 
-export type FromWorker = { session: number } & (
+// A number is a session, and says that the next frame of its ring is there with its message.
+export type FromWorker = number | ({ session: number } & Told);
+
+export type Told =
   | { kind: "connecting"; connection: number; atMs: number }
   | { kind: "lost"; atMs: number; reason: string; attemptAtMs: number }
   // Memory of a FrameRing for the frames that follow.
   | { kind: "ring"; memory: SharedArrayBuffer }
-  // `isFrame`: it has brought a frame, which is left out if the page has no time for it.
+  // A message of the server that is not in the ring. `isFrame`: it has brought a frame, which is left out if the page has no time for it.
   | { kind: "message"; message: ArrayBuffer; arrivedMs: number; isFrame: boolean; decoding: Decoding; frame: SentFrame | undefined }
   // The worker cannot go on.
-  | { kind: "broken"; reason: string }
-);
+  | { kind: "broken"; reason: string };
 
 // Decoded frame that belongs to a message. It is in the ring if there is no buffer.
 export interface SentFrame extends DecodedFrame {

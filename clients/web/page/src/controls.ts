@@ -86,13 +86,15 @@ export class Controls {
     if (gust !== undefined || gustSeconds !== undefined) client.parameters.setGust(this.gust.value, this.gustSeconds.value);
     if (airDensity !== undefined) client.settings.changeAir({ airDensity });
     if (gravity !== undefined) client.parameters.setEnvironment({ gravity: scaled(this.gravityDirection, gravity) });
-    if (stiffness !== undefined) {
-      client.frames.cloths().forEach(({ name }, index) => {
-        const base = this.base[index];
-        if (base) client.parameters.setCloth(name, stiffened(base, 2 ** stiffness));
-      });
-    }
+    if (stiffness !== undefined) this.stiffen(client, 2 ** stiffness);
     if (radius !== undefined && this.collider) client.parameters.setCollider(this.collider, { radius });
+  }
+
+  private stiffen(client: Client, factor: number): void {
+    client.frames.cloths().forEach(({ name }, index) => {
+      const base = this.base[index];
+      if (base) client.parameters.setCloth(name, stiffened(base, factor));
+    });
   }
 
   // Shows the radius of the chosen collider, which frames have. Call a few times per second while it can be seen.

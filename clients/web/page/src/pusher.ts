@@ -68,13 +68,13 @@ export class Pusher {
 
   // The collider as it is now; none while the pointer is elsewhere.
   private update(nowMs: number): readonly OwnCollider[] {
-    const seconds = Math.min(kLongestStep, (nowMs - this.drawnAt) / 1000);
-    this.drawnAt = nowMs;
     this.mesh.visible = this.isOver && this.chosen !== "hand";
     if (!this.mesh.visible) {
       this.placed = false;
       return kNoColliders;
     }
+    const seconds = this.placed ? Math.min(kLongestStep, (nowMs - this.drawnAt) / 1000) : 0;
+    this.drawnAt = nowMs;
     this.findGoal();
     const { position } = this.mesh;
     if (!this.placed) position.copy(this.goal).addScaledVector(this.raycaster.ray.direction, -2 * this.radius);
