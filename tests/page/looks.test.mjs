@@ -187,3 +187,32 @@ test("another participant has a head of any size, hands and a name; a ball is no
     // The server keeps colliders of a lost connection for 2 s.
     await page.waitForFunction(() => window.clothstream.people.length === 0);
   }));
+
+// Runs in a page before its own scripts: remembers when it has drawn first, and how many frames of the stream it had.
+function watchFirstDraw() {
+  const draw = WebGL2RenderingContext.prototype.drawElements;
+  WebGL2RenderingContext.prototype.drawElements = function (...given) {
+    window.firstDraw ??= { atMs: performance.now(), frames: window.clothstream?.statistics?.frames ?? 0, isComplete: window.clothstream.isComplete };
+    draw.apply(this, given);
+  };
+}
+const kWaitMs = 1000; // view.ts
+
+test("the first picture waits for a frame of the stream for a second, and all detail follows", () =>
+  withPage({ prepare: watchFirstDraw }, async (page) => {
+    await untilState(page, "live");
+    await page.waitForFunction(() => window.firstDraw !== undefined);
+    const { frames, atMs, isComplete } = await page.evaluate(() => window.firstDraw);
+    assert.ok(frames > 0 || atMs >= kWaitMs, `drawn after ${atMs} ms with ${frames} frames`);
+    assert.ok(!isComplete);
+    await page.waitForFunction(() => window.clothstream.isComplete);
+  }));
+
+test("the room is drawn although no frame comes", () =>
+  withPage({ query: "?scene=nothing", prepare: watchFirstDraw }, async (page) => {
+    await untilState(page, "failed");
+    await page.waitForFunction(() => window.firstDraw !== undefined);
+    const { frames, atMs } = await page.evaluate(() => window.firstDraw);
+    assert.equal(frames, 0);
+    assert.ok(atMs >= kWaitMs, `drawn after ${atMs} ms`);
+  }));

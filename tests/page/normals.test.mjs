@@ -34,7 +34,7 @@ async function look(scene, normals) {
   try {
     await untilState(page, "live");
     await page.waitForFunction(() => window.clothstream.statistics.frames > 0 && window.clothstream.drawnFrames > 0);
-    // The picture is complete a few drawn frames later (view.ts).
+    await page.waitForFunction(() => window.clothstream.isComplete);
     const drawn = await page.evaluate(() => window.clothstream.drawnFrames);
     await page.waitForFunction((before) => window.clothstream.drawnFrames > before + 5, drawn);
     const seen = await page.evaluate(() => {

@@ -98,3 +98,67 @@ test("the reach holds all cloths", () => {
   const { min, max } = described().cloths.reach();
   assert.isTrue(min.x <= 0 && max.x >= 7 && min.y < 0 && max.y >= 2);
 });
+
+// A compiler that ends when the test says so.
+class FakeCompiler {
+  readonly objects: THREE.Mesh[] = [];
+  private readonly ends: (() => void)[] = [];
+  readonly compile = (object: THREE.Object3D): Promise<void> => {
+    this.objects.push(object as THREE.Mesh);
+    return new Promise((end) => this.ends.push(end));
+  };
+  end(): void {
+    for (const end of this.ends.splice(0)) end();
+  }
+}
+
+const materials = (cloths: Cloths) => cloths.meshes.flatMap((mesh) => mesh.material as THREE.MeshPhysicalMaterial[]);
+const haveSheen = (cloths: Cloths) => materials(cloths).map((material) => material.sheen > 0);
+function disposed(list: THREE.Material[]): () => number {
+  let count = 0;
+  for (const material of list) material.addEventListener("dispose", () => ++count);
+  return () => count;
+}
+
+test("detail is shown as soon as its materials are compiled, and not before", async () => {
+  const { cloths } = described();
+  const compiler = new FakeCompiler();
+  const old = disposed(materials(cloths));
+  const refined = cloths.refine("full", compiler.compile);
+  assert.deepEqual(haveSheen(cloths), [false, false, false]);
+  assert.deepEqual(compiler.objects.map(({ geometry }) => geometry), cloths.meshes.map(({ geometry }) => geometry));
+  assert.isTrue(compiler.objects.every(({ receiveShadow }) => receiveShadow));
+  assert.equal(old(), 0);
+  compiler.end();
+  await refined;
+  assert.deepEqual(haveSheen(cloths), [true, true, true]);
+  assert.equal(old(), 3);
+});
+
+test("a material that is chosen while another detail is compiled stays", async () => {
+  const { cloths, client } = described();
+  const compiler = new FakeCompiler();
+  const refined = cloths.refine("full", compiler.compile);
+  client.parameters.material = () => "silk";
+  cloths.dress(client);
+  const chosen = materials(cloths);
+  const kept = disposed(chosen);
+  const compiled = disposed(compiler.objects.flatMap(({ material }) => material));
+  compiler.end();
+  await refined;
+  assert.deepEqual(materials(cloths), chosen);
+  assert.deepEqual(haveSheen(cloths), [true, true, true]);
+  assert.deepEqual([kept(), compiled()], [0, 3]);
+});
+
+test("cloths of a new description have the detail, and compiled materials of the old ones are disposed of", async () => {
+  const { cloths, client } = described();
+  const compiler = new FakeCompiler();
+  const refined = cloths.refine("full", compiler.compile);
+  cloths.describe(client);
+  const compiled = disposed(compiler.objects.flatMap(({ material }) => material));
+  compiler.end();
+  await refined;
+  assert.deepEqual(haveSheen(cloths), [true, true, true]);
+  assert.equal(compiled(), 3);
+});

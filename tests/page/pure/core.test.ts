@@ -84,7 +84,8 @@ test("more grabs than allowed are ignored, and bytes that are no message end the
   client.destroy();
 });
 
-const posted: FromWorker[] = [];
+// Frames are posted as numbers.
+const posted: Exclude<FromWorker, number>[] = [];
 let connection: Connection | undefined;
 const socket = () => FakeSocket.made.at(-1)!;
 
@@ -101,7 +102,7 @@ afterEach(() => {
 
 async function connect(resumeToken = ""): Promise<Connection> {
   connection = await Connection.start(
-    { postMessage: (message) => posted.push(message) },
+    { postMessage: (message) => typeof message !== "number" && posted.push(message) },
     {
       kind: "start",
       session: 7,

@@ -30,17 +30,6 @@ async function start(): Promise<void> {
     hud.showState("stopped");
     return failures.stop(kNoWebAssembly);
   }
-  const canvas = element<HTMLCanvasElement>("canvas");
-  canvas.addEventListener("webglcontextlost", () => failures.stop(kGraphicsLost));
-  let view: View;
-  try {
-    view = new View(canvas, chosenDetail(), gathersNormals());
-  } catch (error) {
-    hud.showState("stopped");
-    failures.stop(kNoWebGl);
-    console.error(error);
-    return;
-  }
   void showAddress();
   const player = new Player();
 
@@ -115,6 +104,19 @@ async function start(): Promise<void> {
   };
   const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset(), said: (text) => headset.say(text) });
   const session: Session = await open(options, failures);
+  const canvas = element<HTMLCanvasElement>("canvas");
+  canvas.addEventListener("webglcontextlost", () => failures.stop(kGraphicsLost));
+  // Afterwards, because the worker joins the scene while this thread makes the textures of the room.
+  let view: View;
+  try {
+    view = new View(canvas, chosenDetail(), gathersNormals());
+  } catch (error) {
+    session.close();
+    hud.showState("stopped");
+    failures.stop(kNoWebGl);
+    console.error(error);
+    return;
+  }
   failures.follow(session, {
     join: () => chooseScene(sceneOfAddress()),
     joinDefault: () => chooseScene(""),

@@ -20,6 +20,8 @@ export interface Probe {
   readonly normals: Float32Array;
   // Drawn positions of each cloth. Vertices at seams appear several times.
   readonly drawn: Float32Array[];
+  // Whether the picture has all its detail (view.ts).
+  readonly isComplete: boolean;
   readonly cloths: ClothLayout[];
   // Newest report of each cloth, undefined before the first.
   readonly reports: (ClothReport | undefined)[];
@@ -105,6 +107,9 @@ export function expose(session: Session, view: View, { headset, panel, work, his
     },
     get normals() {
       return session.client.frames.normals().slice();
+    },
+    get isComplete() {
+      return view.isComplete;
     },
     get drawn() {
       return view.clothMeshes.map((mesh) => new Float32Array(mesh.geometry.getAttribute("position").array));

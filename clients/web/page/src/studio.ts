@@ -105,7 +105,7 @@ export class Studio {
     setCheapShadows(this.key, cheap);
   }
 
-  // Makes what the first picture can do without: reflections, which take several seconds on a software device.
+  // Makes what the first picture can do without: reflections.
   complete(): void {
     if (!this.sky) return;
     this.reflected?.dispose();

@@ -13,8 +13,11 @@ const kFieldOfView = 32; // degrees, vertical
 const kViewDirection = new THREE.Vector3(0.42, 0.16, 1).normalize();
 const kMargin = 1.0;
 const kTurnStep = Math.PI / 36;
-// Drawn frames before the picture is completed, so that the first ones come soon.
-const kPlainFrames = 2;
+// Time for which the cloths are drawn with reduced detail and without reflections, so that they come soon, ms.
+const kPlainMs = 500;
+// Time for which nothing is drawn while the first frame of the stream is under way, ms. Compiling what is only the room
+// would delay it.
+const kWaitMs = 1000;
 
 export class View {
   readonly camera = new THREE.PerspectiveCamera(kFieldOfView);
@@ -26,7 +29,10 @@ export class View {
   private readonly people = new People();
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private readonly cloths: Cloths;
-  private shownFrames = 0;
+  private readonly madeMs = performance.now();
+  private plainSinceMs: number | undefined; // time of the first picture with cloths
+  private refining = false;
+  isComplete = false; // the picture has all its detail
   private isDrawn = false;
   private readonly eye = new THREE.Vector3();
   private isMoved = false; // by the user, since the last reset
@@ -43,7 +49,7 @@ export class View {
   ) {
     this.fingers = new Fingers(canvas);
     useSoftShadows();
-    this.cloths = new Cloths(detail, gathersNormals);
+    this.cloths = new Cloths("reduced", gathersNormals);
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.BasicShadowMap;
@@ -129,12 +135,31 @@ export class View {
     if (!this.renderer.xr.isPresenting) this.orbit.update();
     this.studio.scale = this.scene.matrix.getMaxScaleOnAxis();
     this.studio.cheapShadows = this.detail === "reduced" || this.renderer.xr.isPresenting;
-    if (shows && ++this.shownFrames > kPlainFrames && !this.renderer.xr.isPresenting) this.studio.complete();
+    this.isDrawn ||= (shows && client.frames.statistics().frames > 0) || began - this.madeMs >= kWaitMs;
+    if (shows && this.isDrawn) this.refine(began);
     const shown = performance.now();
-    this.isDrawn = true;
-    this.renderer.render(this.studio.scene, this.camera);
+    if (this.isDrawn) this.renderer.render(this.studio.scene, this.camera);
     this.showMs = shown - began;
     this.renderMs = performance.now() - shown;
+  }
+
+  // Completes the picture some time after the first one with cloths. Reflections take several seconds on a software device,
+  // and are not made in a headset.
+  private refine(nowMs: number): void {
+    this.plainSinceMs ??= nowMs;
+    if (nowMs - this.plainSinceMs < kPlainMs) return;
+    if (!this.renderer.xr.isPresenting) this.studio.complete();
+    if (this.refining) return;
+    this.refining = true;
+    void this.cloths.refine(this.detail, (object) => this.compile(object)).then(() => (this.isComplete = true));
+  }
+
+  // Compiles the programs of an object, next to this thread where the browser can.
+  private async compile(object: THREE.Object3D): Promise<void> {
+    // Asking for it where it is missing would print a warning.
+    const isParallel = this.renderer.extensions.has("KHR_parallel_shader_compile");
+    if (isParallel) await this.renderer.compileAsync(object, this.camera, this.studio.scene);
+    else this.renderer.compile(object, this.camera, this.studio.scene);
   }
 
   // Moves the camera to the default view, which shows the whole scene in a canvas of any shape.

@@ -63,7 +63,7 @@ export class ClothMesh {
     parts.forEach((part, index) => geometry.addGroup(part.firstIndex - layout.firstIndex, part.indexCount, index));
     this.parts = parts.length;
     this.mesh = new THREE.Mesh(geometry, []);
-    this.makeMaterials();
+    this.mesh.material = this.makeMaterials();
     this.mesh.castShadow = true;
     this.mesh.receiveShadow = true;
     // Vertices move every frame. Updating the bounds would cost more than it saves in drawing and picking.
@@ -75,7 +75,20 @@ export class ClothMesh {
   dress(material: string): void {
     if (material === this.look.material) return;
     this.look.material = material;
-    this.makeMaterials();
+    this.replaceMaterials(this.makeMaterials());
+  }
+
+  // Shows another detail as soon as its materials are compiled.
+  async refine(detail: Detail, compile: (object: THREE.Object3D) => Promise<unknown>): Promise<void> {
+    if (detail === this.look.detail) return;
+    this.look.detail = detail;
+    const before = this.mesh.material;
+    const drawn = new THREE.Mesh(this.mesh.geometry, this.makeMaterials());
+    drawn.receiveShadow = true;
+    await compile(drawn);
+    // Meanwhile the cloth may have got another material, or have gone.
+    if (this.mesh.material === before) this.replaceMaterials(drawn.material);
+    else for (const material of drawn.material) material.dispose();
   }
 
   // The arrays belong to the whole scene, and are copied. `normals` are those of the positions, or undefined if the look
@@ -98,15 +111,19 @@ export class ClothMesh {
   dispose(): void {
     this.gathering?.dispose();
     this.mesh.geometry.dispose();
-    for (const material of this.mesh.material) material.dispose();
+    this.replaceMaterials([]);
   }
 
-  private makeMaterials(): void {
+  private replaceMaterials(materials: THREE.MeshPhysicalMaterial[]): void {
+    for (const old of this.mesh.material) old.dispose();
+    this.mesh.material = materials;
+  }
+
+  private makeMaterials(): THREE.MeshPhysicalMaterial[] {
     const { number, material, detail } = this.look;
     const fabric = fabricOf(material);
     const dye = (part: number) => kColours[(number + 2 * part) % kColours.length]!;
-    for (const old of this.mesh.material) old.dispose();
-    this.mesh.material = Array.from({ length: this.parts }, (_, part) => fabricMaterial(fabric, dye(part), this.woven, detail, this.gathering));
+    return Array.from({ length: this.parts }, (_, part) => fabricMaterial(fabric, dye(part), this.woven, detail, this.gathering));
   }
 
   // Texture coordinates in metres, so that all cloths have threads of equal size. Undefined for a mesh without

@@ -13,7 +13,7 @@ export class Cloths {
 
   // `gathersNormals`: the vertex shader computes normals that the stream does not have.
   constructor(
-    private readonly detail: Detail = "full",
+    private detail: Detail = "full",
     private readonly gathersNormals = true,
   ) {}
 
@@ -46,6 +46,12 @@ export class Cloths {
   // Shows the current materials. Call when parameters change.
   dress(client: Client): void {
     this.list.forEach((cloth, number) => cloth.dress(client.parameters.material(number)));
+  }
+
+  // Changes the detail, without a pause in the drawing: `compile` makes an object ready to be drawn.
+  async refine(detail: Detail, compile: (object: THREE.Object3D) => Promise<unknown>): Promise<void> {
+    this.detail = detail;
+    await Promise.all(this.list.map((cloth) => cloth.refine(detail, compile)));
   }
 
   // Shows the cloths as they are at a time of performance.now(). Returns false, and changes nothing, if the client is
