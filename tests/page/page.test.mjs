@@ -437,9 +437,9 @@ test("a reload keeps the participant and its role; a duplicated tab is another o
   const kept = await startServer(0, ["--scene", "curtain", "--hold-page", "60"]);
   const own = (page) => page.evaluate(() => window.clothstream.participants.map(({ id, name, role }) => `${id} ${name} ${role}`));
   const ada = await openPage(browser, `${kept.url}?name=Ada`, { draws: false });
+  await untilState(ada, "live"); // before Ben, so that she owns the scene
   const ben = await openPage(browser, `${kept.url}?name=Ben`, { draws: false });
   try {
-    await untilState(ada, "live");
     await untilState(ben, "live");
     await ben.waitForFunction(() => window.clothstream.participants.length === 2);
     const before = await own(ben);
