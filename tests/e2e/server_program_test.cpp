@@ -403,6 +403,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--max-scene-memory=100.5",
                                        "--encoder-threads=7",
                                        "--hold=0.000001",
+                                       "--hold-page=3",
                                        "--max-participants=12",
                                        "--participants-change=cloths,colliders",
                                        "--participants-may=create,own",
