@@ -43,22 +43,24 @@ clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/touch | clients/core/core.h clients/core/wire proto/codec proto/hands
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
-clients/grpc       | clients/core proto/tls clothstream
-clients/library    | clients/core clients/grpc
+clients/native     | clients/core
+clients/grpc       | clients/core clients/native proto/tls clothstream
+clients/websocket  | clients/native proto/text proto/tls
+clients/library    | clients/core clients/native clients/grpc
 clients/files      | proto/codec clothstream
-clients/load       | clients/core clients/grpc proto/codec proto/tls clothstream
-clients/cli        | proto/text proto/discovery clients/core clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream
+clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
+clients/cli        | proto/text proto/discovery clients/core clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='
 <vulkan/           | server/vulkan server/simulation server/encode
 <grpcpp/           | server/endpoint/grpc clients/grpc clients/load
-<boost/beast       | server/endpoint/web server/monitoring clients/load
+<boost/beast       | server/endpoint/web server/monitoring clients/websocket
 <prometheus/       | server/monitoring
 <openssl/          | proto/tls server/tls server/identity server/scene
 <jwt.h>            | server/identity
 <sqlite3           | server/saved_state
-<boost/asio/ssl    | server/tls server/endpoint/web clients/load
+<boost/asio/ssl    | server/tls server/endpoint/web clients/websocket
 <qrencode          | server/tls
 <avahi-            | server/discovery clients/cli
 <Eigen/            | server/model server/reference

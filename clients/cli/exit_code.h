@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "clients/grpc/failure.h"
+#include "clients/native/failure.h"
 
 namespace clothstream::cli {
 

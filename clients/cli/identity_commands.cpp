@@ -97,11 +97,11 @@ ExitCode IdentityCommands::makeCode(const ServerAddress& address) const {
 
 ExitCode IdentityCommands::ban(const ServerAddress& address) const {
   Answer answer(participant_);
-  GrpcClientOptions options;
+  NativeClientOptions options;
   options.scene = scene_;
   options.clientName = "clothstream ban";
   options.reconnectFor = std::chrono::milliseconds(0);
-  const auto joined = GrpcClient::join(
+  const auto joined = joinByGrpc(
       address, options, [&](cs_client* client, std::uint32_t events) { answer.heard(client, events); });
   if (!joined) return refused(joined.error());
   (*joined)->visit([&](cs_client* client) { cs_ban_participant(client, participant_); });

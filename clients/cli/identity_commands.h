@@ -8,7 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/exit_code.h"
-#include "clients/grpc/address.h"
+#include "clients/native/address.h"
 
 namespace clothstream::cli {
 

@@ -49,7 +49,7 @@ class Listener {
     }
     if (report_ && (events & CS_EVENT_REPORT) != 0) {
       line_.clear();
-      for (const ClothFigures& figures : Report::of(client, GrpcClient::nowUs()).cloths)
+      for (const ClothFigures& figures : Report::of(client, NativeClient::nowUs()).cloths)
         fmt::print("{}\n", text(figures));
       std::fflush(stdout);
     }
@@ -74,22 +74,22 @@ class Listener {
   bool report_;
 };
 
-void sendColliders(GrpcClient& client, const JoinOptions& options) {
+void sendColliders(NativeClient& client, const JoinOptions& options) {
   if (options.colliders.empty()) return;
   client.visit([&](cs_client* core) {
     cs_set_colliders(core, options.colliders[0].data(), static_cast<std::uint32_t>(options.colliders.size()),
-                     GrpcClient::nowUs());
+                     NativeClient::nowUs());
   });
 }
 
-Report reportOf(GrpcClient& client) {
+Report reportOf(NativeClient& client) {
   Report report;
-  client.visit([&](cs_client* core) { report = Report::of(core, GrpcClient::nowUs()); });
+  client.visit([&](cs_client* core) { report = Report::of(core, NativeClient::nowUs()); });
   return report;
 }
 
 // Waits for the end of the time, a signal or the end of the stream. Returns the failure if the stream ended.
-std::optional<Failure> follow(GrpcClient& client, const JoinOptions& options, const StatusLine& line) {
+std::optional<Failure> follow(NativeClient& client, const JoinOptions& options, const StatusLine& line) {
   const auto start = SteadyClock::now();
   for (;;) {
     auto wait = kLineInterval;
@@ -116,7 +116,7 @@ ExitCode join(const JoinOptions& options) {
     obj.emplace(std::move(*created));
   }
   const StatusLine line(!options.json && isatty(STDOUT_FILENO) != 0);
-  GrpcClientOptions clientOptions;
+  NativeClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream join";
   clientOptions.displayName = options.name;
@@ -126,9 +126,9 @@ ExitCode join(const JoinOptions& options) {
   clientOptions.maxVertices = options.maxVertices;
   if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };
-  auto joined = GrpcClient::join(options.address, clientOptions, Listener(line, options.report));
+  auto joined = joinByGrpc(options.address, clientOptions, Listener(line, options.report));
   if (!joined) return printError(joined.error());
-  GrpcClient& client = **joined;
+  NativeClient& client = **joined;
   sendColliders(client, options);
 
   const std::optional<Failure> failure = follow(client, options, line);

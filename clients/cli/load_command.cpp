@@ -12,12 +12,10 @@
 
 #include "clients/cli/error.h"
 #include "clients/cli/signals.h"
-#include "clients/grpc/address.h"
+#include "clients/native/address.h"
 
 namespace clothstream::cli {
 namespace {
-
-constexpr const char* kWebPort = ":8080";
 
 // CPU time of a process so far, from /proc. Nothing if there is no such process.
 std::optional<double> cpuSeconds(std::uint32_t pid) {
@@ -183,9 +181,6 @@ void LoadCommand::add(CLI::App& app) {
 void LoadCommand::check() {
   if (!parsed()) return;
   if (address_.empty()) address_ = web_ ? std::string("127.0.0.1") : std::string(kDefaultAddress);
-  const std::size_t host = address_.find("://");
-  if (web_ && address_.find(':', host == std::string::npos ? 0 : host + 3) == std::string::npos)
-    address_ += kWebPort;
   if (options_.viewers > options_.participants)
     throw CLI::ValidationError("--viewers", "must not exceed --participants");
   options_.decoders = decoders_.value_or(options_.participants);

@@ -9,8 +9,8 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/exit_code.h"
-#include "clients/grpc/address.h"
 #include "clients/load/load.h"
+#include "clients/native/address.h"
 
 namespace clothstream::cli {
 

@@ -29,9 +29,9 @@
 #include "clients/cli/set_options.h"
 #include "clients/cli/signals.h"
 #include "clients/core/core.h"
-#include "clients/grpc/address.h"
 #include "clients/grpc/channel.h"
 #include "clients/grpc/identity.h"
+#include "clients/native/address.h"
 #include "proto/tls/fingerprint.h"
 
 namespace {
@@ -73,8 +73,8 @@ struct TrustOptions {
         ->excludes(ca);
   }
 
-  ServerAddress addressOf(const std::string& text) const {
-    auto address = completeAddress(text);
+  ServerAddress addressOf(const std::string& text, Endpoint endpoint) const {
+    auto address = completeAddress(text, endpoint);
     if (!address) throw CLI::ValidationError("ADDRESS", address.error());
     ServerAddress server(std::move(*address));
     server.caFile = caFile;
@@ -266,7 +266,8 @@ int run(int argc, char** argv) {
           "--pair",
           "does not work with --web, because pairing uses gRPC. First pair with \"clothstream list HOST:PORT "
           "--pair CODE\", which keeps a token in ~/.local/state/clothstream/tokens; then use --token FILE");
-    joinOptions.address = listOptions.address = setOptions.address = trust.addressOf(address);
+    joinOptions.address = listOptions.address = setOptions.address =
+        trust.addressOf(address, loadCommand.usesWeb() ? Endpoint::web : Endpoint::grpc);
     if (setCommand.parsed() && !changesAnything(setOptions))
       throw CLI::ValidationError("set", "nothing to change is given; see clothstream set --help");
     if (colliders.size() > CS_MAX_COLLIDERS)

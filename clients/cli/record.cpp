@@ -145,7 +145,7 @@ class StreamFile {
 };
 
 // Waits for the end of the time, a signal, the end of the stream or a write error.
-std::optional<Error> follow(GrpcClient& client, StreamFile& file, const RecordOptions& options) {
+std::optional<Error> follow(NativeClient& client, StreamFile& file, const RecordOptions& options) {
   const auto start = SteadyClock::now();
   const bool terminal = isatty(STDERR_FILENO) != 0;
   for (;;) {
@@ -177,7 +177,7 @@ ExitCode record(const RecordOptions& options) {
   auto output = recording::OutputFile::create(options.output);
   if (!output) return printError(Error{kNotWritten, output.error()});
   StreamFile file(std::move(*output), options.program);
-  GrpcClientOptions clientOptions;
+  NativeClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream record";
   clientOptions.role = CS_ROLE_VIEWER;
@@ -191,18 +191,18 @@ ExitCode record(const RecordOptions& options) {
     if ((events & CS_EVENT_RETURNED) != 0 && cs_resumed(core) != 0)
       fmt::print(stderr, "clothstream: reconnected; the recording continues.\n");
     if ((events & CS_EVENT_FRAME) != 0 && file.wantsKeyFrame())
-      cs_request_key_frame(core, GrpcClient::nowUs());
+      cs_request_key_frame(core, NativeClient::nowUs());
   };
   std::optional<Error> problem;
   Report report;
   {
-    auto joined = GrpcClient::join(options.address, clientOptions, onEvents);
+    auto joined = joinByGrpc(options.address, clientOptions, onEvents);
     if (!joined) {
       std::filesystem::remove(options.output);
       return printError(joined.error());
     }
     problem = follow(**joined, file, options);
-    (*joined)->visit([&](cs_client* core) { report = Report::of(core, GrpcClient::nowUs()); });
+    (*joined)->visit([&](cs_client* core) { report = Report::of(core, NativeClient::nowUs()); });
   }
   if (isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r\033[K");
   if (auto finished = file.finish(); !finished && !problem) problem = Error{kNotWritten, finished.error()};

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
-#include "clients/grpc/address.h"
+#include "clients/native/address.h"
 
 namespace clothstream::cli {
 

@@ -10,7 +10,7 @@
 #include "clients/cli/info.h"
 #include "clients/cli/record.h"
 #include "clients/cli/recover.h"
-#include "clients/grpc/address.h"
+#include "clients/native/address.h"
 
 namespace clothstream::cli {
 

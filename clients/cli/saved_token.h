@@ -7,7 +7,7 @@
 
 #include <tl/expected.hpp>
 
-#include "clients/grpc/address.h"
+#include "clients/native/address.h"
 
 namespace clothstream::cli {
 

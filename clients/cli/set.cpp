@@ -76,13 +76,12 @@ bool changesAnything(const SetOptions& options) {
 
 ExitCode set(const SetOptions& options) {
   Answers answers;
-  GrpcClientOptions clientOptions;
+  NativeClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream set";
   clientOptions.reconnectFor = std::chrono::milliseconds(0);
-  auto joined =
-      GrpcClient::join(options.address, clientOptions,
-                       [&](cs_client* client, std::uint32_t events) { answers.heard(client, events); });
+  auto joined = joinByGrpc(options.address, clientOptions,
+                           [&](cs_client* client, std::uint32_t events) { answers.heard(client, events); });
   if (!joined) return printError(joined.error());
   int changes = 0;
   std::string refusal;

@@ -8,7 +8,7 @@
 
 #include "clients/cli/exit_code.h"
 #include "clients/core/core.h"
-#include "clients/grpc/address.h"
+#include "clients/native/address.h"
 
 namespace clothstream::cli {
 

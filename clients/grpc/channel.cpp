@@ -17,13 +17,11 @@
 #include <grpcpp/security/tls_certificate_verifier.h>
 #include <grpcpp/security/tls_credentials_options.h>
 
+#include "clients/native/transport.h"
 #include "proto/tls/fingerprint.h"
 
 namespace clothstream {
 namespace {
-
-// Enough for a key frame of the largest scene. A description travels in small chunks.
-constexpr int kMaxMessageBytes = 256 * 1024 * 1024;
 
 // Empty unless the text of gRPC is about the server's certificate.
 std::string whyNotTrusted(const std::string& text) {
@@ -118,7 +116,7 @@ std::shared_ptr<grpc::ChannelCredentials> credentialsOf(const ServerAddress& ser
 
 std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server) {
   grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
+  arguments.SetMaxReceiveMessageSize(static_cast<int>(kMaxServerMessageBytes));
   // A separate connection per client, so that two clients of a process do not share flow control.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(server.hostAndPort(), credentialsOf(server), arguments);

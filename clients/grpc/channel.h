@@ -11,8 +11,8 @@
 #include <grpcpp/support/status.h>
 #include <tl/expected.hpp>
 
-#include "clients/grpc/address.h"
-#include "clients/grpc/failure.h"
+#include "clients/native/address.h"
+#include "clients/native/failure.h"
 #include "clothstream/v1/session.grpc.pb.h"
 
 namespace clothstream {

@@ -1,84 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Native client: clients/core over a gRPC stream.
+// Native clients over gRPC.
 #pragma once
 
-#include <chrono>
-#include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <memory>
-#include <optional>
-#include <span>
-#include <string>
 
 #include <tl/expected.hpp>
 
-#include "clients/core/core.h"
-#include "clients/grpc/address.h"
-#include "clients/grpc/failure.h"
+#include "clients/native/native_client.h"
 
 namespace clothstream {
 
-struct GrpcClientOptions {
-  std::string scene;  // empty: the server's default scene
-  std::string clientName = "clothstream";
-  std::string displayName;  // name that others see; may be empty
-  cs_role role = CS_ROLE_UNSPECIFIED;
-  // Finest quality and most temporal layers that the client requests, as in cs_want.
-  std::uint32_t quality = 0, temporalLayers = 0;
-  // Vertices that the client accepts from the server; twice as many triangles (cs_set_limits). 0 means the
-  // defaults of cs_limits. At most 67,108,864.
-  std::uint32_t maxVertices = 0;
-  // Longest time from the call of join() to the complete description.
-  std::chrono::milliseconds joinTimeout{10'000};
-  // Called ten times a second while joining; true cancels. May be empty.
-  std::function<bool()> cancelled;
-  // Receives every message before the cs_client does, on the client's thread. May be empty.
-  std::function<void(std::span<const std::byte>)> onMessage;
-  // Time for which a joined client tries to reconnect. 0: the stream ends with the connection.
-  std::chrono::milliseconds reconnectFor{60'000};
-  // The connection counts as lost after this time without a message. The server answers pings twice a second.
-  // While the client reconnects, the shorter times of clients/core apply.
-  std::chrono::milliseconds silenceTimeout{10'000};
-};
+// `address` must come from completeAddress().
+std::unique_ptr<Transport> makeGrpcTransport(const ServerAddress& address);
 
-// Owns a cs_client and a thread that transfers its messages. Thread-safe.
-class GrpcClient {
- public:
-  // Called on that thread after each message that changed something, with the event bits of cs_receive, also
-  // before join() returns. The bits are 0 when the connection is lost or an attempt to reconnect has failed.
-  // Must not call the GrpcClient.
-  using OnEvents = std::function<void(cs_client*, std::uint32_t events)>;
-
-  // `address` must come from completeAddress(). Returns when the description is complete.
-  [[nodiscard]] static tl::expected<std::unique_ptr<GrpcClient>, Failure> join(
-      const ServerAddress& address, const GrpcClientOptions& options, OnEvents onEvents);
-  // Leaves the scene if the stream has not ended. Waits at most 0.5 s for the server.
-  ~GrpcClient();
-  GrpcClient(const GrpcClient&) = delete;
-  GrpcClient& operator=(const GrpcClient&) = delete;
-
-  // Gives the caller exclusive access until unlock(), which the same thread must call soon. Meanwhile no
-  // message is received; new messages are sent after unlock(). Also works after the end of the stream.
-  cs_client* lock();
-  void unlock();
-  // Calls `task` between lock() and unlock().
-  void visit(const std::function<void(cs_client*)>& task);
-
-  // Waits until something has changed since the last call, the stream has ended, or the timeout is over.
-  // Returns the event bits of all messages since the last call.
-  std::uint32_t wait(std::chrono::milliseconds timeout);
-
-  // Reason why the stream ended, or nothing while it runs.
-  std::optional<Failure> ended() const;
-
-  // Clock of the cs_client, microseconds.
-  static std::uint64_t nowUs();
-
- private:
-  class Stream;
-  explicit GrpcClient(std::unique_ptr<Stream> stream);
-  std::unique_ptr<Stream> stream_;
-};
+// NativeClient::join() over gRPC.
+[[nodiscard]] tl::expected<std::unique_ptr<NativeClient>, Failure> joinByGrpc(
+    const ServerAddress& address, const NativeClientOptions& options, NativeClient::OnEvents onEvents);
 
 }  // namespace clothstream

@@ -8,8 +8,8 @@
 #include <tl/expected.hpp>
 
 #include "clients/core/core.h"
-#include "clients/grpc/address.h"
-#include "clients/grpc/failure.h"
+#include "clients/native/address.h"
+#include "clients/native/failure.h"
 
 namespace clothstream {
 

@@ -10,8 +10,8 @@
 
 #include <tl/expected.hpp>
 
-#include "clients/grpc/address.h"
-#include "clients/grpc/failure.h"
+#include "clients/native/address.h"
+#include "clients/native/failure.h"
 #include "clothstream/v1/session.pb.h"
 
 namespace clothstream {

@@ -9,8 +9,8 @@
 
 #include <tl/expected.hpp>
 
-#include "clients/grpc/address.h"
-#include "clients/grpc/failure.h"
+#include "clients/native/address.h"
+#include "clients/native/failure.h"
 
 namespace clothstream {
 

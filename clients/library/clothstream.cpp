@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The C interface over GrpcClient.
+// The C interface over NativeClient.
 #include "clients/library/clothstream.h"
 
 #include <chrono>
@@ -11,14 +11,14 @@
 #include <string>
 #include <utility>
 
-#include "clients/grpc/address.h"
 #include "clients/grpc/grpc_client.h"
 #include "clients/grpc/identity.h"
+#include "clients/native/address.h"
 
 using namespace clothstream;
 
 struct clothstream_stream {
-  std::unique_ptr<GrpcClient> client;
+  std::unique_ptr<NativeClient> client;
 };
 
 namespace {
@@ -111,7 +111,7 @@ clothstream_result clothstream_open_with_token(const char* address, const char* 
         return fail(CLOTHSTREAM_INVALID, std::move(wrong));
       wanted = *options;
     }
-    GrpcClientOptions clientOptions;
+    NativeClientOptions clientOptions;
     clientOptions.scene = wanted.scene;
     clientOptions.clientName = wanted.client_name;
     clientOptions.displayName = wanted.display_name;
@@ -122,7 +122,7 @@ clothstream_result clothstream_open_with_token(const char* address, const char* 
     clientOptions.reconnectFor = std::chrono::milliseconds(wanted.reconnect_for_ms);
     ServerAddress server(*completed);
     server.token = token;
-    auto joined = GrpcClient::join(server, clientOptions, [](cs_client*, std::uint32_t) {});
+    auto joined = joinByGrpc(server, clientOptions, [](cs_client*, std::uint32_t) {});
     if (!joined) return fail(joined.error());
     *out = std::make_unique<clothstream_stream>(clothstream_stream{std::move(*joined)}).release();
     return CLOTHSTREAM_OK;
@@ -168,7 +168,7 @@ void clothstream_release(clothstream_stream* stream) noexcept {
 }
 
 uint64_t clothstream_now_us(void) noexcept {
-  return GrpcClient::nowUs();
+  return NativeClient::nowUs();
 }
 
 const char* clothstream_error_text(void) noexcept {

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "clients/grpc/address.h"
+#include "clients/native/address.h"
 
 namespace clothstream::load {
 

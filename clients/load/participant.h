@@ -13,9 +13,9 @@
 
 #include "clients/core/core.h"
 #include "clients/core/stream/frame_feedback.h"
-#include "clients/grpc/failure.h"
 #include "clients/load/link.h"
 #include "clients/load/pose_timing.h"
+#include "clients/native/failure.h"
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
 

@@ -17,8 +17,8 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
-#include "clients/grpc/address.h"
 #include "clients/grpc/identity.h"
+#include "clients/native/address.h"
 #include "tests/attack/attacks.h"
 #include "tests/attack/measured_server.h"
 #include "tests/attack/victim.h"

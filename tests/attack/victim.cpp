@@ -67,7 +67,7 @@ class Victim::Client {
 
  private:
   void joinGrpc(const ServerAddress& address, Counts& counts) {
-    auto joined = GrpcClient::join(address, {}, [&counts](cs_client*, std::uint32_t events) {
+    auto joined = joinByGrpc(address, {}, [&counts](cs_client*, std::uint32_t events) {
       if ((events & CS_EVENT_FRAME) != 0) counts.add(1);
     });
     if (!joined) throw std::runtime_error("the victim cannot join: " + joined.error().text);
@@ -98,7 +98,7 @@ class Victim::Client {
     });
   }
 
-  std::unique_ptr<GrpcClient> grpc_;
+  std::unique_ptr<NativeClient> grpc_;
   std::unique_ptr<load::Links> links_;
   std::unique_ptr<load::Participant> participant_;
   std::jthread counter_;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "clients/grpc/address.h"
+#include "clients/native/address.h"
 
 namespace clothstream::attack {
 

@@ -37,7 +37,7 @@ struct Watcher {
     cuts += events == 0;
     if ((events & CS_EVENT_FRAME) == 0) return;
     cs_statistics now;
-    cs_get_statistics(client, GrpcClient::nowUs(), &now);
+    cs_get_statistics(client, NativeClient::nowUs(), &now);
     stepsBack += now.tick <= tick;
     tick = now.tick;
     wrong = now.hash_mismatches + now.decode_errors;
@@ -107,8 +107,8 @@ class ClockJump : public RunningServer {
 
 TEST_F(ClockJump, DoesNotAffectStreamOrRecording) {
   Watcher watcher;
-  auto client = GrpcClient::join(address_, {},
-                                 [&](cs_client* joined, std::uint32_t events) { watcher(joined, events); });
+  auto client =
+      joinByGrpc(address_, {}, [&](cs_client* joined, std::uint32_t events) { watcher(joined, events); });
   ASSERT_TRUE(client.has_value()) << client.error().text;
   const auto seesMore = [&](std::uint64_t count) {
     return eventually([&, from = watcher.framesNow()] { return watcher.framesNow() >= from + count; });

@@ -39,25 +39,27 @@ class ImpairedLink : public RunningServer {
     if (!address_.empty()) link_ = std::make_unique<Link>(portIn(address_));
   }
 
-  std::unique_ptr<GrpcClient> join(const std::string& address) {
-    auto joined = GrpcClient::join(address, {}, [this](cs_client*, std::uint32_t events) {
+  std::unique_ptr<NativeClient> join(const std::string& address) {
+    auto joined = joinByGrpc(address, {}, [this](cs_client*, std::uint32_t events) {
       if (events == 0) ++cuts_;
     });
     if (!joined) throw std::runtime_error(joined.error().text);
     return std::move(*joined);
   }
-  std::unique_ptr<GrpcClient> joinThroughLink() { return join("127.0.0.1:" + std::to_string(link_->port())); }
+  std::unique_ptr<NativeClient> joinThroughLink() {
+    return join("127.0.0.1:" + std::to_string(link_->port()));
+  }
 
-  static cs_statistics statisticsOf(GrpcClient& client) {
+  static cs_statistics statisticsOf(NativeClient& client) {
     cs_statistics statistics;
-    client.visit([&](cs_client* core) { cs_get_statistics(core, GrpcClient::nowUs(), &statistics); });
+    client.visit([&](cs_client* core) { cs_get_statistics(core, NativeClient::nowUs(), &statistics); });
     return statistics;
   }
   static void expectNothingWrong(const cs_statistics& statistics) {
     EXPECT_EQ(statistics.decode_errors, 0u);
     EXPECT_EQ(statistics.hash_mismatches, 0u);
   }
-  static bool streams(GrpcClient& client, std::uint64_t frames) {
+  static bool streams(NativeClient& client, std::uint64_t frames) {
     const std::uint64_t before = statisticsOf(client).frames;
     return eventually([&] { return statisticsOf(client).frames >= before + frames; });
   }
@@ -136,7 +138,7 @@ TEST_F(ImpairedLink, RemovesCollidersOfVanishedClient) {
   {
     auto doomed = joinThroughLink();
     const float sphere[] = {0.4f, 1.7f, 0.3f, 0.1f};
-    doomed->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, GrpcClient::nowUs()); });
+    doomed->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, NativeClient::nowUs()); });
     const auto seesCollider = [&] {
       bool there = false;
       watcher->visit([&](cs_client* core) {

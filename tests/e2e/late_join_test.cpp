@@ -79,11 +79,11 @@ class LateJoin : public RunningServer {
     std::ofstream(directory_.path() / "late.json") << kScene;
     startServer({"--scene", "late", "--scene-file", (directory_.path() / "late.json").string()});
   }
-  std::unique_ptr<GrpcClient> join(std::uint32_t quality, Seen& seen) {
-    GrpcClientOptions options;
+  std::unique_ptr<NativeClient> join(std::uint32_t quality, Seen& seen) {
+    NativeClientOptions options;
     options.quality = quality;
     options.joinTimeout = kPatience;
-    auto joined = GrpcClient::join(address_, options, std::ref(seen));
+    auto joined = joinByGrpc(address_, options, std::ref(seen));
     if (!joined) throw std::runtime_error(joined.error().text);
     return std::move(*joined);
   }

@@ -62,10 +62,10 @@ constexpr std::uint64_t kMaxTicksSkipped = 12;
 
 // A client of a scene. Counts cuts, restarts, skipped ticks and frames that do not match.
 struct Watcher {
-  std::unique_ptr<GrpcClient> join(const std::string& address, const std::string& scene = "") {
-    GrpcClientOptions options;
+  std::unique_ptr<NativeClient> join(const std::string& address, const std::string& scene = "") {
+    NativeClientOptions options;
     options.scene = scene;
-    auto joined = GrpcClient::join(address, options, [this](cs_client* client, std::uint32_t events) {
+    auto joined = joinByGrpc(address, options, [this](cs_client* client, std::uint32_t events) {
       if (events == 0) ++cuts;
       // Ignores other notices: a busy machine cannot keep the rate.
       if ((events & CS_EVENT_NOTICE) != 0 &&
@@ -75,7 +75,7 @@ struct Watcher {
       }
       if ((events & CS_EVENT_FRAME) == 0) return;
       cs_statistics now;
-      cs_get_statistics(client, GrpcClient::nowUs(), &now);
+      cs_get_statistics(client, NativeClient::nowUs(), &now);
       if (now.tick <= tick) ++stepsBack;
       // Only a key frame can follow the failure, since the encoder has lost its references.
       if (now.key_frames > keyFrames && isRestarting.exchange(false)) {
@@ -109,7 +109,7 @@ struct Watcher {
   std::atomic<bool> isRestarting{false};
 };
 
-float gravityOf(GrpcClient& client) {
+float gravityOf(NativeClient& client) {
   cs_environment environment{};
   client.visit([&](cs_client* core) { cs_get_environment(core, &environment); });
   return environment.gravity[1];
@@ -179,7 +179,7 @@ TEST_F(LostDevice, SceneThatKeepsLosingTheDeviceIsStopped) {
   ASSERT_TRUE(eventually([&] { return third->ended().has_value(); }));
   const std::string why = "the scene 'small' is stopped because it harms other scenes";
   EXPECT_THAT(third->ended()->text, HasSubstr(why));
-  const auto again = GrpcClient::join(address_, {}, [](cs_client*, std::uint32_t) {});
+  const auto again = joinByGrpc(address_, {}, [](cs_client*, std::uint32_t) {});
   ASSERT_FALSE(again.has_value());
   EXPECT_THAT(again.error().text, HasSubstr(why));
   Watcher other;
@@ -275,7 +275,7 @@ TEST_F(LostDevice, SceneThatFailsTwiceIsGivenUpAndStartsFromTheBeginning) {
   // Input that waits for the next tick must not reach the new scene.
   client->visit([](cs_client* core) {
     const float sphere[]{0, 1, 0, 0.1f};
-    cs_set_colliders(core, sphere, 1, GrpcClient::nowUs());
+    cs_set_colliders(core, sphere, 1, NativeClient::nowUs());
   });
   fail("memory");
   ASSERT_TRUE(controlScene(address_, "small", false, false));

@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/grpc/grpc_client.h"
+#include "clients/websocket/web_socket_transport.h"
 #include "tests/e2e/link.h"
 #include "tests/e2e/running_server.h"
 #include "tests/e2e/temporary_directory.h"
@@ -57,7 +58,7 @@ struct Seen {
     id = cs_participant_id(client);
     if ((events & CS_EVENT_FRAME) == 0) return;
     cs_statistics statistics;
-    cs_get_statistics(client, GrpcClient::nowUs(), &statistics);
+    cs_get_statistics(client, NativeClient::nowUs(), &statistics);
     tick = statistics.tick;
     if (firstFrameAfterReturn == 0) {
       tickAfterReturn = statistics.tick;
@@ -73,10 +74,12 @@ class Reconnect : public RunningServer {
  protected:
   void SetUp() override { startServer(); }
 
-  static std::unique_ptr<GrpcClient> join(const std::string& address, const std::string& name, Seen& seen) {
-    GrpcClientOptions options;
+  std::unique_ptr<NativeClient> join(const std::string& address, const std::string& name, Seen& seen) const {
+    NativeClientOptions options;
     options.displayName = name;
-    auto joined = GrpcClient::join(address, options, std::ref(seen));
+    auto joined = NativeClient::join(
+        address, endpoint_ == Endpoint::grpc ? makeGrpcTransport(address) : makeWebSocketTransport(address),
+        options, std::ref(seen));
     if (!joined) throw std::runtime_error(joined.error().text);
     return std::move(*joined);
   }
@@ -100,15 +103,29 @@ class Reconnect : public RunningServer {
     EXPECT_EQ(seen.resumed, 1u);
     EXPECT_EQ(seen.id, id);
   }
+  // Address of the endpoint that join() uses.
+  const std::string& served() const { return endpoint_ == Endpoint::grpc ? address_ : web_; }
+
+  Endpoint endpoint_ = Endpoint::grpc;
 };
 
-TEST_F(Reconnect, ResumesAsTheSameParticipant) {
-  Link link(portIn(address_));
+class ReconnectOver : public Reconnect, public ::testing::WithParamInterface<Endpoint> {
+ protected:
+  ReconnectOver() { endpoint_ = GetParam(); }
+};
+
+INSTANTIATE_TEST_SUITE_P(Transports, ReconnectOver, ::testing::Values(Endpoint::grpc, Endpoint::web),
+                         [](const auto& endpoint) {
+                           return std::string(endpoint.param == Endpoint::grpc ? "Grpc" : "WebSocket");
+                         });
+
+TEST_P(ReconnectOver, ResumesAsTheSameParticipant) {
+  Link link(portIn(served()));
   Seen seen, watcherSeen;
-  const auto watcher = join(address_, "Ben", watcherSeen);
+  const auto watcher = join(served(), "Ben", watcherSeen);
   const auto client = join(through(link), "Ada", seen);
   const float sphere[] = {0.4f, 1.7f, 0.3f, 0.1f};
-  client->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, GrpcClient::nowUs()); });
+  client->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, NativeClient::nowUs()); });
   const auto watcherSeesCollider = [&] {
     bool sees = false;
     watcher->visit([&](cs_client* core) {
@@ -137,15 +154,15 @@ TEST_F(Reconnect, ResumesAsTheSameParticipant) {
   EXPECT_FALSE(client->ended());
   client->visit([](cs_client* core) {
     cs_statistics statistics;
-    cs_get_statistics(core, GrpcClient::nowUs(), &statistics);
+    cs_get_statistics(core, NativeClient::nowUs(), &statistics);
     EXPECT_EQ(statistics.hash_mismatches, 0u);
     EXPECT_GT(statistics.dropped, 0u);
   });
 }
 
 // Like a radio link out of reach: connections are neither refused nor accepted.
-TEST_F(Reconnect, ReconnectsAfterLinkThatSwallowedEverything) {
-  Link link(portIn(address_));
+TEST_P(ReconnectOver, ReconnectsAfterLinkThatSwallowedEverything) {
+  Link link(portIn(served()));
   Seen seen;
   const auto client = join(through(link), "Ada", seen);
   for (const auto outage : {1000ms, 3000ms, 5000ms}) {
@@ -174,9 +191,9 @@ TEST_F(Reconnect, JoinsRestartedServerAsNewParticipant) {
 TEST_F(Reconnect, EndsAtOnceWithoutReconnectTime) {
   Link link(portIn(address_));
   Seen seen;
-  GrpcClientOptions options;
+  NativeClientOptions options;
   options.reconnectFor = 0ms;
-  auto joined = GrpcClient::join(through(link), options, std::ref(seen));
+  auto joined = joinByGrpc(through(link), options, std::ref(seen));
   ASSERT_TRUE(joined.has_value()) << joined.error().text;
   link.cut();
   ASSERT_TRUE(eventually([&] { return (*joined)->ended().has_value(); }));
@@ -187,9 +204,9 @@ TEST_F(Reconnect, EndsAtOnceWithoutReconnectTime) {
 TEST_F(Reconnect, EndsAfterReconnectTime) {
   Link link(portIn(address_));
   Seen seen;
-  GrpcClientOptions options;
+  NativeClientOptions options;
   options.reconnectFor = 500ms;
-  auto joined = GrpcClient::join(through(link), options, std::ref(seen));
+  auto joined = joinByGrpc(through(link), options, std::ref(seen));
   ASSERT_TRUE(joined.has_value()) << joined.error().text;
   link.cut();
   ASSERT_TRUE(eventually([&] { return (*joined)->ended().has_value(); }));
@@ -197,10 +214,10 @@ TEST_F(Reconnect, EndsAfterReconnectTime) {
   EXPECT_GE(seen.cuts, 1u);
 }
 
-TEST_F(Reconnect, LeavesAtOnceWhenDestroyed) {
+TEST_P(ReconnectOver, LeavesAtOnceWhenDestroyed) {
   Seen seen, watcherSeen;
-  const auto watcher = join(address_, "Ben", watcherSeen);
-  auto client = join(address_, "Ada", seen);
+  const auto watcher = join(served(), "Ben", watcherSeen);
+  auto client = join(served(), "Ada", seen);
   ASSERT_TRUE(eventually([&] { return watcherSeen.participants == 2; }));
   client.reset();
   ASSERT_TRUE(eventually([&] { return watcherSeen.participants == 1; }));

@@ -40,10 +40,10 @@ constexpr SolverKind kSolvers[] = {SolverKind::massSpring, SolverKind::constrain
 class Member {
  public:
   Member(const std::string& address, const std::string& scene) {
-    GrpcClientOptions options;
+    NativeClientOptions options;
     options.scene = scene;
     options.onMessage = [this](std::span<const std::byte> bytes) { receive(bytes); };
-    auto joined = GrpcClient::join(address, options, [](cs_client*, std::uint32_t) {});
+    auto joined = joinByGrpc(address, options, [](cs_client*, std::uint32_t) {});
     if (!joined) throw std::runtime_error(joined.error().text);
     client_ = std::move(*joined);
   }
@@ -103,7 +103,7 @@ class Member {
   std::uint64_t tick_ = 0;
   std::size_t repeated_ = 0, different_ = 0;
   bool begins_ = false;
-  std::unique_ptr<GrpcClient> client_;
+  std::unique_ptr<NativeClient> client_;
 };
 
 class SavedStateProgram : public RunningServer {

@@ -91,7 +91,7 @@ TEST_F(TlsProgram, ReadsItsCertificateAgainWithoutEndingStreams) {
   std::atomic<int> frames = 0;
   ServerAddress server(address_);
   server.fingerprint = fingerprint("first");
-  auto joined = GrpcClient::join(server, {}, [&](cs_client*, std::uint32_t events) {
+  auto joined = joinByGrpc(server, {}, [&](cs_client*, std::uint32_t events) {
     if ((events & CS_EVENT_FRAME) != 0) ++frames;
   });
   ASSERT_TRUE(joined) << joined.error().text;

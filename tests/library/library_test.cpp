@@ -75,12 +75,12 @@ std::string contents(const char* path) {
 class Watcher {
  public:
   explicit Watcher(const std::string& address) {
-    GrpcClientOptions options;
+    NativeClientOptions options;
     options.displayName = "watcher";
-    auto joined = GrpcClient::join(address, options, [this](cs_client* client, std::uint32_t events) {
+    auto joined = joinByGrpc(address, options, [this](cs_client* client, std::uint32_t events) {
       if ((events & CS_EVENT_FRAME) == 0) return;
       cs_statistics statistics;
-      cs_get_statistics(client, GrpcClient::nowUs(), &statistics);
+      cs_get_statistics(client, NativeClient::nowUs(), &statistics);
       const std::uint64_t hash = fnv1a(cs_positions(client), std::size_t{3} * cs_vertex_count(client));
       const std::lock_guard lock(mutex_);
       hashes_[statistics.tick] = hash;
@@ -109,7 +109,7 @@ class Watcher {
  private:
   mutable std::mutex mutex_;
   std::map<std::uint64_t, std::uint64_t> hashes_;
-  std::unique_ptr<GrpcClient> client_;
+  std::unique_ptr<NativeClient> client_;
 };
 
 class LibraryTest : public RunningServer {
@@ -177,13 +177,13 @@ TEST_F(LibraryTest, ServesCSharp) {
 
 // Example: a game that draws all the time.
 TEST_F(LibraryTest, ReceivesFramesWhileOftenAcquired) {
-  const auto client = GrpcClient::join(address_, {}, [](cs_client*, std::uint32_t) {});
+  const auto client = joinByGrpc(address_, {}, [](cs_client*, std::uint32_t) {});
   ASSERT_TRUE(client.has_value()) << client.error().text;
   const auto end = std::chrono::steady_clock::now() + 3s;
   std::uint64_t frames = 0, acquired = 0;
   for (; std::chrono::steady_clock::now() < end; ++acquired) {
     cs_statistics statistics;
-    cs_get_statistics((*client)->lock(), GrpcClient::nowUs(), &statistics);
+    cs_get_statistics((*client)->lock(), NativeClient::nowUs(), &statistics);
     (*client)->unlock();
     frames = statistics.frames;
   }

@@ -76,12 +76,12 @@ class RecordingPrograms : public ::testing::Test {
   // last frame that a client got.
   void killAfterAChunk(const char* directory, std::uint64_t& tick) {
     std::atomic<std::uint64_t> seen = 0;
-    GrpcClientOptions options;
+    NativeClientOptions options;
     options.reconnectFor = 0ms;
-    const auto client = GrpcClient::join(address_, options, [&](cs_client* joined, std::uint32_t events) {
+    const auto client = joinByGrpc(address_, options, [&](cs_client* joined, std::uint32_t events) {
       if ((events & CS_EVENT_FRAME) == 0) return;
       cs_statistics now;
-      cs_get_statistics(joined, GrpcClient::nowUs(), &now);
+      cs_get_statistics(joined, NativeClient::nowUs(), &now);
       seen = now.tick;
     });
     ASSERT_TRUE(client.has_value()) << client.error().text;

@@ -74,15 +74,15 @@ std::string feedClient(const Target& target) {
   double peak = before;
   std::string end = "the client stays";
   const auto until = Clock::now() + target.time;
-  GrpcClientOptions options;
+  NativeClientOptions options;
   // The client calls this ten times a second.
   options.cancelled = [&] {
     peak = std::max(peak, residentMegabytes());
     return Clock::now() > until;
   };
   while (Clock::now() < until) {
-    const auto client = GrpcClient::join(ServerAddress(fmt::format("127.0.0.1:{}", port)), options,
-                                         [](cs_client*, std::uint32_t) {});
+    const auto client = joinByGrpc(ServerAddress(fmt::format("127.0.0.1:{}", port)), options,
+                                   [](cs_client*, std::uint32_t) {});
     if (!client) end = "the client leaves: " + brief(client.error().text);
   }
   server->Shutdown(std::chrono::system_clock::now());
