@@ -46,7 +46,7 @@ clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
 clients/native     | clients/core
 clients/grpc       | clients/core clients/native proto/tls clothstream
 clients/websocket  | clients/native proto/text proto/tls
-clients/library    | clients/core clients/native clients/grpc
+clients/library    | clients/native clients/grpc clients/websocket proto/tls
 clients/files      | proto/codec clothstream
 clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
 clients/cli        | proto/text proto/discovery clients/core clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream

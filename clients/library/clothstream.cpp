@@ -1,25 +1,37 @@
 // SPDX-License-Identifier: MIT
 // The C interface over NativeClient.
-#include "clients/library/clothstream.h"
-
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <memory>
 #include <new>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
-#include "clients/grpc/grpc_client.h"
-#include "clients/grpc/identity.h"
-#include "clients/native/address.h"
+#include <clothstream/clothstream.h>
+
+#include "clients/library/library_options.h"
+#include "clients/library/library_transport.h"
+#include "clients/native/native_client.h"
+#include "clients/native/pairing.h"
 
 using namespace clothstream;
 
 struct clothstream_stream {
   std::unique_ptr<NativeClient> client;
 };
+
+// First version of clothstream_options.
+struct clothstream_options_1 {
+  std::uint32_t version, role, quality, temporal_layers;
+  const char *scene, *client_name, *display_name;
+  std::uint32_t join_timeout_ms, reconnect_for_ms;
+};
+static_assert(sizeof(clothstream_options_1) == offsetof(clothstream_options, token));
 
 namespace {
 
@@ -50,44 +62,59 @@ clothstream_result guarded(Body body) noexcept {
     return body();
   } catch (const std::bad_alloc&) {
     errorText = "no memory";  // short enough to need no allocation
+  } catch (const std::invalid_argument& error) {
+    return fail(CLOTHSTREAM_INVALID, error.what());
   } catch (const std::exception& error) {
     return fail(CLOTHSTREAM_FAILED, error.what());
   }
   return CLOTHSTREAM_FAILED;
 }
 
-// Returns what is wrong with the options; empty if they are valid.
-std::string optionsError(const clothstream_options& options) {
-  if (options.version != CLOTHSTREAM_OPTIONS_VERSION)
-    return "options->version is " + std::to_string(options.version) + "; this library accepts version " +
-           std::to_string(CLOTHSTREAM_OPTIONS_VERSION) +
-           ". Start from clothstream_default_options, with the header of this library.";
-  if (options.role > CS_ROLE_OWNER)
-    return "options->role is " + std::to_string(options.role) + "; allowed is a cs_role, 0 to " +
-           std::to_string(CS_ROLE_OWNER) + ".";
-  constexpr std::uint32_t kMost = 3;
-  if (options.quality > kMost || options.temporal_layers > kMost)
-    return "options->quality is " + std::to_string(options.quality) + " and temporal_layers " +
-           std::to_string(options.temporal_layers) + "; 0 to " + std::to_string(kMost) +
-           " is allowed for both.";
-  if (!options.scene || !options.client_name || !options.display_name)
-    return "options->scene, client_name or display_name is NULL; \"\" is allowed.";
-  if (options.join_timeout_ms == 0) return "options->join_timeout_ms is 0; at least 1 is allowed.";
-  return {};
+constexpr std::uint32_t kJoinTimeoutMs = 10'000, kReconnectForMs = 60'000;
+constexpr const char* kClientName = "libclothstream";
+
+NativeClientOptions clientOptions(const clothstream_options& options) {
+  NativeClientOptions client;
+  client.scene = options.scene;
+  client.clientName = options.client_name;
+  client.displayName = options.display_name;
+  client.role = static_cast<cs_role>(options.role);
+  client.quality = options.quality;
+  client.temporalLayers = options.temporal_layers;
+  client.joinTimeout = std::chrono::milliseconds(options.join_timeout_ms);
+  client.reconnectFor = std::chrono::milliseconds(options.reconnect_for_ms);
+  return client;
 }
 
 }  // namespace
 
-void clothstream_default_options(clothstream_options* out) noexcept {
+void clothstream_default_options_2(clothstream_options* out) noexcept {
   *out = {.version = CLOTHSTREAM_OPTIONS_VERSION,
           .role = CS_ROLE_UNSPECIFIED,
           .quality = 0,
           .temporal_layers = 0,
           .scene = "",
-          .client_name = "libclothstream",
+          .client_name = kClientName,
           .display_name = "",
-          .join_timeout_ms = 10'000,
-          .reconnect_for_ms = 60'000};
+          .join_timeout_ms = kJoinTimeoutMs,
+          .reconnect_for_ms = kReconnectForMs,
+          .token = "",
+          .ca_file = "",
+          .fingerprint = ""};
+}
+
+// Programs that were built for version 1 have room for no more.
+#undef clothstream_default_options
+extern "C" void clothstream_default_options(clothstream_options_1* out) noexcept {
+  *out = {.version = 1,
+          .role = CS_ROLE_UNSPECIFIED,
+          .quality = 0,
+          .temporal_layers = 0,
+          .scene = "",
+          .client_name = kClientName,
+          .display_name = "",
+          .join_timeout_ms = kJoinTimeoutMs,
+          .reconnect_for_ms = kReconnectForMs};
 }
 
 clothstream_result clothstream_open(const char* address, const clothstream_options* options,
@@ -100,29 +127,14 @@ clothstream_result clothstream_open_with_token(const char* address, const char* 
                                                clothstream_stream** out) noexcept {
   return guarded([&] {
     *out = nullptr;
-    if (!address) return fail(CLOTHSTREAM_INVALID, "The address is NULL.");
     if (!token) return fail(CLOTHSTREAM_INVALID, "The token is NULL; \"\" is allowed.");
-    const auto completed = completeAddress(address);
-    if (!completed) return fail(CLOTHSTREAM_INVALID, completed.error());
-    clothstream_options wanted;
-    clothstream_default_options(&wanted);
-    if (options) {
-      if (std::string wrong = optionsError(*options); !wrong.empty())
-        return fail(CLOTHSTREAM_INVALID, std::move(wrong));
-      wanted = *options;
-    }
-    NativeClientOptions clientOptions;
-    clientOptions.scene = wanted.scene;
-    clientOptions.clientName = wanted.client_name;
-    clientOptions.displayName = wanted.display_name;
-    clientOptions.role = static_cast<cs_role>(wanted.role);
-    clientOptions.quality = wanted.quality;
-    clientOptions.temporalLayers = wanted.temporal_layers;
-    clientOptions.joinTimeout = std::chrono::milliseconds(wanted.join_timeout_ms);
-    clientOptions.reconnectFor = std::chrono::milliseconds(wanted.reconnect_for_ms);
-    ServerAddress server(*completed);
-    server.token = token;
-    auto joined = joinByGrpc(server, clientOptions, [](cs_client*, std::uint32_t) {});
+    auto wanted = readOptions(options);
+    if (!wanted) return fail(CLOTHSTREAM_INVALID, std::move(wanted).error());
+    if (*token != '\0') wanted->token = token;
+    const auto server = readAddress(address, *wanted);
+    if (!server) return fail(CLOTHSTREAM_INVALID, server.error());
+    auto joined = NativeClient::join(*server, makeLibraryTransport(*server), clientOptions(*wanted),
+                                     [](cs_client*, std::uint32_t) {});
     if (!joined) return fail(joined.error());
     *out = std::make_unique<clothstream_stream>(clothstream_stream{std::move(*joined)}).release();
     return CLOTHSTREAM_OK;
@@ -131,14 +143,27 @@ clothstream_result clothstream_open_with_token(const char* address, const char* 
 
 clothstream_result clothstream_pair(const char* address, const char* code, char* token,
                                     size_t token_bytes) noexcept {
+  return clothstream_pair_with_options(address, code, nullptr, token, token_bytes);
+}
+
+clothstream_result clothstream_pair_with_options(const char* address, const char* code,
+                                                 const clothstream_options* options, char* token,
+                                                 size_t token_bytes) noexcept {
   return guarded([&] {
-    if (!address || !code || !token) return fail(CLOTHSTREAM_INVALID, "An argument is NULL.");
+    if (!code || !token) return fail(CLOTHSTREAM_INVALID, "The code or the token is NULL.");
     if (token_bytes < CLOTHSTREAM_TOKEN_BYTES)
       return fail(CLOTHSTREAM_INVALID, "token_bytes is too small; use CLOTHSTREAM_TOKEN_BYTES.");
     *token = '\0';
-    const auto completed = completeAddress(address);
-    if (!completed) return fail(CLOTHSTREAM_INVALID, completed.error());
-    const auto given = pair(*completed, code);
+    if (*code == '\0')
+      return fail(CLOTHSTREAM_INVALID,
+                  "The pairing code is empty; use the six digits that the server shows.");
+    const auto wanted = readOptions(options);
+    if (!wanted) return fail(CLOTHSTREAM_INVALID, wanted.error());
+    const auto server = readAddress(address, *wanted);
+    if (!server) return fail(CLOTHSTREAM_INVALID, server.error());
+    const std::unique_ptr<Transport> transport = makeLibraryTransport(*server);
+    const auto given =
+        pairOver(*transport, *server, code, std::chrono::milliseconds(wanted->join_timeout_ms));
     if (!given) return fail(given.error());
     if (given->size() >= token_bytes) return fail(CLOTHSTREAM_REFUSED, "The server's token is too large.");
     std::memcpy(token, given->c_str(), given->size() + 1);

@@ -20,7 +20,7 @@
 #ifndef CLOTHSTREAM_CLIENTS_LIBRARY_CLOTHSTREAM_H
 #define CLOTHSTREAM_CLIENTS_LIBRARY_CLOTHSTREAM_H
 
-#include "clients/core/core.h"
+#include <clothstream/core.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -40,7 +40,7 @@ typedef enum clothstream_result {
   CLOTHSTREAM_FAILED = 5       /* out of memory or threads */
 } clothstream_result;
 
-#define CLOTHSTREAM_OPTIONS_VERSION 1u
+#define CLOTHSTREAM_OPTIONS_VERSION 2u
 typedef struct clothstream_options {
   uint32_t version; /* CLOTHSTREAM_OPTIONS_VERSION; later versions add fields at the end */
   uint32_t role;    /* requested cs_role */
@@ -53,27 +53,49 @@ typedef struct clothstream_options {
   uint32_t join_timeout_ms; /* at least 1 */
   /* How long to try to reconnect after a loss. 0 means the stream ends with its connection. */
   uint32_t reconnect_for_ms;
+  /* From here on: version 2. A struct of version 1 ends before. */
+  /* Proof for a server that requires a token (docs/identity.md); "" means none. Without TLS, others in the
+   * network can read it. */
+  const char* token;
+  /* With TLS: the server's certificate must be signed by an authority in this PEM file, for the name in the
+   * address. "" means the authorities of the system. */
+  const char* ca_file;
+  /* With TLS, instead of an authority: the server must have the key with this fingerprint, as a server with
+   * --tls self prints it: 64 hexadecimal digits, with or without colons. "" means none. */
+  const char* fingerprint;
 } clothstream_options;
 
 /* Fills in the defaults and the version: client_name "libclothstream", other strings "", role unspecified,
- * the whole stream, 10 s to join, 60 s to reconnect. */
-void clothstream_default_options(clothstream_options* out) CS_NOEXCEPT;
+ * the whole stream, 10 s to join, 60 s to reconnect.
+ *
+ * In C and C++ the name means the function for the version of this header. A program that looks the functions
+ * up by name gets version 1 from clothstream_default_options, as programs for earlier releases do, and
+ * version 2 from clothstream_default_options_2. */
+void clothstream_default_options_2(clothstream_options* out) CS_NOEXCEPT;
+#define clothstream_default_options clothstream_default_options_2
 
 /* Joins a scene. Returns when the description of the scene has arrived.
- * address: HOST or HOST:PORT; the default port is 50051.
+ * address: HOST or HOST:PORT of the server's page; the default port is 8080. wss:// or https:// before it
+ * means TLS, ws:// or http:// means no TLS and is the default. (A library built for gRPC: the gRPC endpoint,
+ * port 50051, and only https://.)
  * options: NULL means the defaults. Strings are copied.
  * *out: the stream; NULL unless the result is CLOTHSTREAM_OK. Free it with clothstream_close. */
 clothstream_result clothstream_open(const char* address, const clothstream_options* options,
                                     clothstream_stream** out) CS_NOEXCEPT;
-/* Like clothstream_open, for a server that requires a token (docs/identity.md). token: "" means none. */
+/* Like clothstream_open with this token instead of options->token. token: "" means that of the options. */
 clothstream_result clothstream_open_with_token(const char* address, const char* token,
                                                const clothstream_options* options,
                                                clothstream_stream** out) CS_NOEXCEPT;
-/* Exchanges a pairing code, six digits that a server or an owner shows, for a token.
+/* Exchanges a pairing code, six digits that a server or an owner shows, for a token. Joins no scene.
  * address: as above. token: buffer of token_bytes, at least CLOTHSTREAM_TOKEN_BYTES; it gets the token with a
  * zero at its end, or "". Keep the token secret. */
 clothstream_result clothstream_pair(const char* address, const char* code, char* token,
                                     size_t token_bytes) CS_NOEXCEPT;
+/* Like clothstream_pair, with ca_file, fingerprint and join_timeout_ms of the options. NULL means the
+ * defaults. */
+clothstream_result clothstream_pair_with_options(const char* address, const char* code,
+                                                 const clothstream_options* options, char* token,
+                                                 size_t token_bytes) CS_NOEXCEPT;
 /* Leaves the scene and frees the stream. Takes at most half a second. NULL is allowed. */
 void clothstream_close(clothstream_stream* stream) CS_NOEXCEPT;
 

@@ -7,8 +7,6 @@
 #include <cstddef>
 #include <memory>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <openssl/err.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
@@ -17,6 +15,20 @@
 namespace clothstream {
 
 constexpr std::size_t kBytes = 32;
+
+namespace {
+
+// Pairs of digits with colons between them.
+std::string inPairs(std::string_view digits) {
+  std::string text;
+  for (std::size_t i = 0; i < digits.size(); ++i) {
+    if (i > 0 && i % 2 == 0) text += ':';
+    text += digits[i];
+  }
+  return text;
+}
+
+}  // namespace
 
 std::optional<std::string> fingerprintOf(const std::string& pem) {
   const std::unique_ptr<BIO, decltype(&BIO_free)> bio(
@@ -36,7 +48,10 @@ std::optional<std::string> fingerprintOf(const x509_st& certificate) {
       EVP_Digest(der, static_cast<std::size_t>(size), digest.data(), nullptr, EVP_sha256(), nullptr);
   OPENSSL_free(der);
   if (hashed != 1) return std::nullopt;
-  return fmt::format("{:02X}", fmt::join(digest, ":"));
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  std::string digits;
+  for (const unsigned char byte : digest) digits.append({kDigits[byte >> 4], kDigits[byte & 15]});
+  return inPairs(digits);
 }
 
 std::optional<std::string> normalFingerprint(std::string_view text) {
@@ -48,12 +63,7 @@ std::optional<std::string> normalFingerprint(std::string_view text) {
     digits += static_cast<char>(std::toupper(static_cast<unsigned char>(letter)));
   }
   if (digits.size() != 2 * kBytes) return std::nullopt;
-  std::string normal;
-  for (std::size_t i = 0; i < digits.size(); ++i) {
-    if (i > 0 && i % 2 == 0) normal += ':';
-    normal += digits[i];
-  }
-  return normal;
+  return inPairs(digits);
 }
 
 }  // namespace clothstream

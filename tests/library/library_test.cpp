@@ -20,6 +20,8 @@
 #include <gtest/gtest.h>
 
 #include "clients/grpc/grpc_client.h"
+#include "clients/native/pairing.h"
+#include "clients/websocket/web_socket_transport.h"
 #include "tests/e2e/running_server.h"
 #include "tests/e2e/temporary_directory.h"
 
@@ -40,10 +42,10 @@ struct Ended {
   std::string output, errors;
 };
 
-// Runs a program from PATH with the library's folder in LD_LIBRARY_PATH.
-Ended run(const Command& command) {
-  Command all{"/usr/bin/env", std::string("LD_LIBRARY_PATH=") +
-                                  std::filesystem::path(CLOTHSTREAM_LIBRARY).parent_path().string()};
+// Runs a program from PATH with the folder of this library in LD_LIBRARY_PATH.
+Ended run(const Command& command, const char* library = CLOTHSTREAM_LIBRARY) {
+  Command all{"/usr/bin/env",
+              std::string("LD_LIBRARY_PATH=") + std::filesystem::path(library).parent_path().string()};
   all.insert(all.end(), command.begin(), command.end());
   Process process(all);
   const std::optional<int> code = process.waitForEnd(kProgram);
@@ -71,7 +73,7 @@ std::string contents(const char* path) {
   return text.str();
 }
 
-// Second client for comparison. It records the hash of each frame.
+// Second client for comparison, over gRPC. It records the hash of each frame.
 class Watcher {
  public:
   explicit Watcher(const std::string& address) {
@@ -117,9 +119,9 @@ class LibraryTest : public RunningServer {
   void SetUp() override { startServer(); }
 
   // Runs a program that follows the stream, and compares its frames.
-  void expectSameFrames(const Command& command) {
+  void expectSameFrames(const Command& command, const char* library = CLOTHSTREAM_LIBRARY) {
     const Watcher watcher(address_);
-    const Ended ended = run(command);
+    const Ended ended = run(command, library);
     ASSERT_EQ(ended.code, 0) << ended.output << ended.errors;
     const std::size_t same = watcher.sameFrames(ended.output);
     std::printf("%zu frames were the same\n", same);
@@ -134,11 +136,15 @@ constexpr bool kSanitized = CLOTHSTREAM_SANITIZE[0] != '\0';
 constexpr const char* kNotSanitized = "only programs that are built with the sanitizer can load the library";
 
 TEST_F(LibraryTest, ServesC) {
-  expectSameFrames({FOLLOW_C, address_});
+  expectSameFrames({FOLLOW_C, web_});
+}
+
+TEST_F(LibraryTest, ServesCOverGrpc) {
+  expectSameFrames({FOLLOW_C, address_}, CLOTHSTREAM_LIBRARY_OVER_GRPC);
 }
 
 TEST_F(LibraryTest, ReportsTheEndOfTheStream) {
-  Process program({FOLLOW_C, address_, "lost"});
+  Process program({FOLLOW_C, web_, "lost"});
   ASSERT_TRUE(program.waitForLine("joined", kPatience)) << program.errors();
   server_->signal(SIGTERM);
   EXPECT_EQ(program.waitForEnd(kProgram), 0) << program.errors();
@@ -152,15 +158,31 @@ TEST_F(LibraryTest, SendsOnlyTheRequestedPartOfTheStream) {
   std::ofstream(sceneFile) << scene;
   TearDown();
   startServer({"--scene", "small", "--scene-file", sceneFile});
-  const Ended ended = run({FOLLOW_C, address_, "wants"});
+  const Ended ended = run({FOLLOW_C, web_, "wants"});
   EXPECT_EQ(ended.code, 0) << ended.output << ended.errors;
+}
+
+TEST_F(LibraryTest, PairsOverGrpcToo) {
+  const TemporaryDirectory state;
+  TearDown();
+  Arguments arguments = kSmallScene;
+  arguments.insert(arguments.end(), {"--pairing", "--state-dir", state.path()});
+  startServer(arguments);
+  const std::string code = server_->waitForLine("pair    ", kPatience).value_or("").substr(0, 6);
+  const auto transport = makeGrpcTransport(address_);
+  const auto token = pairOver(*transport, address_, code, kPatience);
+  ASSERT_TRUE(token) << token.error().text;
+  ServerAddress server(address_);
+  server.token = *token;
+  const auto joined = joinByGrpc(server, {}, [](cs_client*, std::uint32_t) {});
+  EXPECT_TRUE(joined) << joined.error().text;
 }
 
 TEST_F(LibraryTest, ServesPythonWithoutACopy) {
   if (kSanitized) GTEST_SKIP() << kNotSanitized;
   if (!succeeds({CLOTHSTREAM_PYTHON, "-c", "import numpy"}))
     GTEST_SKIP() << CLOTHSTREAM_PYTHON " has no numpy: ./dev test installs Debian's python3-numpy";
-  expectSameFrames({CLOTHSTREAM_PYTHON, "tests/library/follow.py", CLOTHSTREAM_LIBRARY, address_});
+  expectSameFrames({CLOTHSTREAM_PYTHON, "tests/library/follow.py", CLOTHSTREAM_LIBRARY, web_});
 }
 
 TEST_F(LibraryTest, ServesCSharp) {
@@ -172,12 +194,12 @@ TEST_F(LibraryTest, ServesCSharp) {
   const Ended compiled =
       run({"mcs", "-unsafe", "-warnaserror", "-out:" + program, "tests/library/Follow.cs"});
   ASSERT_EQ(compiled.code, 0) << compiled.output << compiled.errors;
-  expectSameFrames({"mono", program, address_});
+  expectSameFrames({"mono", program, web_});
 }
 
 // Example: a game that draws all the time.
-TEST_F(LibraryTest, ReceivesFramesWhileOftenAcquired) {
-  const auto client = joinByGrpc(address_, {}, [](cs_client*, std::uint32_t) {});
+void receivesFramesWhileOftenAcquired(const std::string& address, std::unique_ptr<Transport> transport) {
+  const auto client = NativeClient::join(address, std::move(transport), {}, [](cs_client*, std::uint32_t) {});
   ASSERT_TRUE(client.has_value()) << client.error().text;
   const auto end = std::chrono::steady_clock::now() + 3s;
   std::uint64_t frames = 0, acquired = 0;
@@ -193,10 +215,15 @@ TEST_F(LibraryTest, ReceivesFramesWhileOftenAcquired) {
   EXPECT_GE(frames, 30u);
 }
 
-// ---- Examples of docs/client-library.md
+TEST_F(LibraryTest, ReceivesFramesWhileOftenAcquired) {
+  receivesFramesWhileOftenAcquired(web_, makeWebSocketTransport(web_));
+  receivesFramesWhileOftenAcquired(address_, makeGrpcTransport(address_));
+}
+
+// ---- Examples of docs/client-library.md and examples/
 
 struct Language {
-  const char* name;   // language of the code block in docs/client-library.md
+  const char* name;   // language of the code block in docs/client-library.md; c: examples/c
   const char* file;   // file name of the example
   const char* tool;   // required program; the test is skipped without it
   const char* toRun;  // shell command with {file}, {program} and {address}
@@ -228,7 +255,8 @@ TEST_P(Example, Runs) {
   if (!hasTool(language.tool)) GTEST_SKIP() << language.tool << " is not installed";
   if (std::string(language.name) == "python" && !succeeds({CLOTHSTREAM_PYTHON, "-c", "import numpy"}))
     GTEST_SKIP() << CLOTHSTREAM_PYTHON " has no numpy: ./dev test installs Debian's python3-numpy";
-  const std::string text = block(language.name);
+  const std::string text =
+      std::string(language.name) == "c" ? contents("examples/c/follow.c") : block(language.name);
   ASSERT_FALSE(text.empty());
   const TemporaryDirectory directory;
   const std::string file = directory.path() / language.file;
@@ -239,7 +267,8 @@ TEST_P(Example, Runs) {
   };
   fill("{file}", file);
   fill("{program}", directory.path() / "program");
-  fill("{address}", address_);
+  fill("{address}", web_);
+  fill("{include}", CLOTHSTREAM_INCLUDE);
   fill("{python}", CLOTHSTREAM_PYTHON);
   fill("{folder}", std::filesystem::path(CLOTHSTREAM_LIBRARY).parent_path());
   const Ended ended = run({"sh", "-c", line});
@@ -251,7 +280,7 @@ INSTANTIATE_TEST_SUITE_P(
     Languages, Example,
     ::testing::Values(
         Language{"c", "example.c", "cc",
-                 "cc -std=c11 -Wall -Wextra -Wpedantic -Werror -I. -Iclients/library {file} -o {program} "
+                 "cc -std=c11 -Wall -Wextra -Wpedantic -Werror -I{include} {file} -o {program} "
                  "-L{folder} "
                  "-lclothstream && {program} {address}"},
         Language{"python", "example.py", CLOTHSTREAM_PYTHON, "{python} {file} {address}"},
@@ -274,14 +303,28 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
 TEST(Library, ExportsItsInterfaceAndNothingElse) {
   if (!hasTool("nm")) GTEST_SKIP() << "nm is not installed";
   // A declaration starts its line. Its name is before the first parenthesis.
-  const char* declaration = R"((?:^|\n)[a-z][a-z0-9_ *]*[ *]((?:cs|clothstream)_[a-z_]+)\()";
+  const char* declaration = R"((?:^|\n)[a-z][a-z0-9_ *]*[ *]((?:cs|clothstream)_[a-z0-9_]+)\()";
   std::set<std::string> declared = matches(contents("clients/core/core.h"), declaration);
   EXPECT_GE(declared.size(), 80u);
   declared.merge(matches(contents("clients/library/clothstream.h"), declaration));
   EXPECT_THAT(declared, Contains("clothstream_open"));
+  declared.insert("clothstream_default_options");  // a macro in the header, for version 1
   const Ended symbols = run({"nm", "-D", "--defined-only", CLOTHSTREAM_LIBRARY});
   ASSERT_EQ(symbols.code, 0) << symbols.errors;
   EXPECT_EQ(matches(symbols.output, R"([0-9a-f]+ . ([^\n]+))"), declared);
+}
+
+TEST(Library, NeedsOnlyTlsAndTheLibrariesOfTheCompiler) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizers are libraries too";
+  if (!hasTool("ldd")) GTEST_SKIP() << "ldd is not installed";
+  const Ended needed = run({"ldd", CLOTHSTREAM_LIBRARY});
+  ASSERT_EQ(needed.code, 0) << needed.errors;
+  const std::set<std::string> names = matches(needed.output, R"(\s(?:/\S+/)?([a-z][a-z0-9_+-]*)\.so)");
+  const std::set<std::string> allowed{"linux-vdso", "ld-linux-x86-64", "ld-linux-aarch64", "libssl",
+                                      "libcrypto",  "libstdc++",       "libgcc_s",         "libm",
+                                      "libc"};
+  EXPECT_THAT(names, Contains("libssl"));
+  for (const std::string& name : names) EXPECT_THAT(allowed, Contains(name)) << needed.output;
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * Prints the version of the library. Returns 1 if a function fails. */
-#include <clothstream.h>
+#include <clothstream/clothstream.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#include "clients/library/library_options.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+
+#include "clients/library/library_transport.h"
+#include "proto/tls/fingerprint.h"
+
+namespace clothstream {
+namespace {
+
+std::string error(const clothstream_options& options) {
+  if (options.role > CS_ROLE_OWNER)
+    return "options->role is " + std::to_string(options.role) + "; allowed is a cs_role, 0 to " +
+           std::to_string(CS_ROLE_OWNER) + ".";
+  constexpr std::uint32_t kMost = 3;
+  if (options.quality > kMost || options.temporal_layers > kMost)
+    return "options->quality is " + std::to_string(options.quality) + " and temporal_layers " +
+           std::to_string(options.temporal_layers) + "; 0 to " + std::to_string(kMost) +
+           " is allowed for both.";
+  for (const char* text : {options.scene, options.client_name, options.display_name, options.token,
+                           options.ca_file, options.fingerprint})
+    if (!text)
+      return "options->scene, client_name, display_name, token, ca_file or fingerprint is NULL; \"\" is "
+             "allowed.";
+  if (options.join_timeout_ms == 0) return "options->join_timeout_ms is 0; at least 1 is allowed.";
+  return {};
+}
+
+}  // namespace
+
+tl::expected<clothstream_options, std::string> readOptions(const clothstream_options* options) {
+  clothstream_options whole;
+  clothstream_default_options_2(&whole);
+  if (!options) return whole;
+  constexpr std::size_t kFirstVersionBytes = offsetof(clothstream_options, token);
+  if (options->version != 1 && options->version != CLOTHSTREAM_OPTIONS_VERSION)
+    return tl::unexpected("options->version is " + std::to_string(options->version) +
+                          "; this library accepts the versions 1 to " +
+                          std::to_string(CLOTHSTREAM_OPTIONS_VERSION) +
+                          ". Start from clothstream_default_options, with the header of this library.");
+  std::memcpy(&whole, options, options->version == 1 ? kFirstVersionBytes : sizeof whole);
+  if (std::string wrong = error(whole); !wrong.empty()) return tl::unexpected(std::move(wrong));
+  return whole;
+}
+
+tl::expected<ServerAddress, std::string> readAddress(const char* address,
+                                                     const clothstream_options& options) {
+  if (!address) return tl::unexpected(std::string("The address is NULL."));
+  auto completed = completeAddress(address, kLibraryEndpoint);
+  if (!completed) return tl::unexpected(std::move(completed).error());
+  ServerAddress server(std::move(*completed));
+  server.token = options.token;
+  server.caFile = options.ca_file;
+  const std::string fingerprint = options.fingerprint;
+  if (!server.caFile.empty() && !fingerprint.empty())
+    return tl::unexpected(
+        std::string("options->ca_file and options->fingerprint are both set; use one of them."));
+  if (!server.isEncrypted() && !(server.caFile.empty() && fingerprint.empty()))
+    return tl::unexpected("options->ca_file and options->fingerprint need TLS: use https://" +
+                          server.address + ", or leave them empty.");
+  if (!server.caFile.empty() && !std::ifstream(server.caFile))
+    return tl::unexpected("options->ca_file: cannot read " + server.caFile + ".");
+  if (!fingerprint.empty()) {
+    auto normal = normalFingerprint(fingerprint);
+    if (!normal)
+      return tl::unexpected("options->fingerprint is \"" + fingerprint +
+                            "\"; it must have 64 hexadecimal digits, as the server prints them.");
+    server.fingerprint = std::move(*normal);
+  }
+  return server;
+}
+
+}  // namespace clothstream

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// Reads the options and the address of the C interface.
+#pragma once
+
+#include <string>
+
+#include <clothstream/clothstream.h>
+#include <tl/expected.hpp>
+
+#include "clients/native/address.h"
+
+namespace clothstream {
+
+// Returns a copy of `options` in the version of this library, or what is wrong. nullptr means the defaults. A
+// struct of an earlier version may be shorter.
+[[nodiscard]] tl::expected<clothstream_options, std::string> readOptions(const clothstream_options* options);
+
+// Address, trust and token of the server, or what is wrong. `address` may be nullptr.
+[[nodiscard]] tl::expected<ServerAddress, std::string> readAddress(const char* address,
+                                                                   const clothstream_options& options);
+
+}  // namespace clothstream
