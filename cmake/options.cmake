@@ -1,8 +1,11 @@
 # `clothstream_flags`: warnings, floating-point rules, sanitizers. `clothstream_options`: the same with fmt and spdlog; every
-# target of ours links it.
+# target of ours links it. The sources of libclothstream use neither.
 add_library(clothstream_flags INTERFACE)
 add_library(clothstream_options INTERFACE)
-target_link_libraries(clothstream_options INTERFACE clothstream_flags clothstream_formatting)
+target_link_libraries(clothstream_options INTERFACE clothstream_flags)
+if(NOT CLOTHSTREAM_CLIENT_ONLY)
+  target_link_libraries(clothstream_options INTERFACE clothstream_formatting)
+endif()
 target_include_directories(clothstream_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(clothstream_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Wold-style-cast -Werror
