@@ -131,7 +131,7 @@ clothstream_result clothstream_open_with_token(const char* address, const char* 
     auto wanted = readOptions(options);
     if (!wanted) return fail(CLOTHSTREAM_INVALID, std::move(wanted).error());
     if (*token != '\0') wanted->token = token;
-    const auto server = readAddress(address, *wanted);
+    const auto server = readAddress(address, *wanted, false);
     if (!server) return fail(CLOTHSTREAM_INVALID, server.error());
     auto joined = NativeClient::join(*server, makeLibraryTransport(*server), clientOptions(*wanted),
                                      [](cs_client*, std::uint32_t) {});
@@ -159,7 +159,7 @@ clothstream_result clothstream_pair_with_options(const char* address, const char
                   "The pairing code is empty; use the six digits that the server shows.");
     const auto wanted = readOptions(options);
     if (!wanted) return fail(CLOTHSTREAM_INVALID, wanted.error());
-    const auto server = readAddress(address, *wanted);
+    const auto server = readAddress(address, *wanted, true);
     if (!server) return fail(CLOTHSTREAM_INVALID, server.error());
     const std::unique_ptr<Transport> transport = makeLibraryTransport(*server);
     const auto given =

@@ -54,8 +54,8 @@ typedef struct clothstream_options {
   /* How long to try to reconnect after a loss. 0 means the stream ends with its connection. */
   uint32_t reconnect_for_ms;
   /* From here on: version 2. A struct of version 1 ends before. */
-  /* Proof for a server that requires a token (docs/identity.md); "" means none. Without TLS, others in the
-   * network can read it. */
+  /* Proof for a server that requires a token (docs/identity.md); "" means none. It is sent to other machines
+   * only with TLS. */
   const char* token;
   /* With TLS: the server's certificate must be signed by an authority in this PEM file, for the name in the
    * address. "" means the authorities of the system. */
@@ -88,7 +88,7 @@ clothstream_result clothstream_open_with_token(const char* address, const char* 
                                                clothstream_stream** out) CS_NOEXCEPT;
 /* Exchanges a pairing code, six digits that a server or an owner shows, for a token. Joins no scene.
  * address: as above. token: buffer of token_bytes, at least CLOTHSTREAM_TOKEN_BYTES; it gets the token with a
- * zero at its end, or "". Keep the token secret. */
+ * zero at its end, or "". Keep the token secret. The code is sent to other machines only with TLS. */
 clothstream_result clothstream_pair(const char* address, const char* code, char* token,
                                     size_t token_bytes) CS_NOEXCEPT;
 /* Like clothstream_pair, with ca_file, fingerprint and join_timeout_ms of the options. NULL means the

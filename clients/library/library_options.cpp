@@ -47,8 +47,8 @@ tl::expected<clothstream_options, std::string> readOptions(const clothstream_opt
   return whole;
 }
 
-tl::expected<ServerAddress, std::string> readAddress(const char* address,
-                                                     const clothstream_options& options) {
+tl::expected<ServerAddress, std::string> readAddress(const char* address, const clothstream_options& options,
+                                                     bool pairs) {
   if (!address) return tl::unexpected(std::string("The address is NULL."));
   auto completed = completeAddress(address, kLibraryEndpoint);
   if (!completed) return tl::unexpected(std::move(completed).error());
@@ -56,6 +56,10 @@ tl::expected<ServerAddress, std::string> readAddress(const char* address,
   server.token = options.token;
   server.caFile = options.ca_file;
   const std::string fingerprint = options.fingerprint;
+  if ((pairs || !server.token.empty()) && !server.isEncrypted() && !server.isLoopback())
+    return tl::unexpected(server.address + ": others in the network could read the " +
+                          (pairs ? "pairing code" : "token") + " on its way to the server. Use https://" +
+                          server.address + ", with TLS on the server (--tls self).");
   if (!server.caFile.empty() && !fingerprint.empty())
     return tl::unexpected(
         std::string("options->ca_file and options->fingerprint are both set; use one of them."));

@@ -15,8 +15,10 @@ namespace clothstream {
 // struct of an earlier version may be shorter.
 [[nodiscard]] tl::expected<clothstream_options, std::string> readOptions(const clothstream_options* options);
 
-// Address, trust and token of the server, or what is wrong. `address` may be nullptr.
+// Address, trust and token of the server, or what is wrong. `address` may be nullptr. `pairs`: a pairing code
+// is sent. Codes and tokens go to other machines only with TLS.
 [[nodiscard]] tl::expected<ServerAddress, std::string> readAddress(const char* address,
-                                                                   const clothstream_options& options);
+                                                                   const clothstream_options& options,
+                                                                   bool pairs);
 
 }  // namespace clothstream
