@@ -569,8 +569,8 @@ void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t
  * participant. Fails, and changes nothing, if the side or the count is not allowed. */
 int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count,
                 uint64_t now_us) CS_NOEXCEPT;
-/* Replaces the head: a sphere that looks along -Z of its own frame, and that others recognise by its id,
- * CS_HEAD_ID. It counts as a collider of this participant. orientation4 is a quaternion x y z w; NULL means
+/* Replaces the head: a sphere with the id CS_HEAD_ID, by which others recognise it. It looks along -Z of its
+ * own frame. It counts as a collider of this participant. orientation4 is a quaternion x y z w; NULL means
  * unknown. A NULL position3 removes the head. */
 void cs_set_head(cs_client* client, const float* position3, const float* orientation4, float radius,
                  uint64_t now_us) CS_NOEXCEPT;

@@ -13,6 +13,10 @@ const kFloats = 2; // floats of a frame
 // A message has compressed values, and colliders. A larger one is posted instead.
 const kLeastMessageRoom = 4096; // bytes, and one more for each float
 
+// A slot begins with four numbers and a hash; message and values follow.
+const kHashAt = 32;
+const kMessageAt = 40;
+
 // A frame in the ring.
 class Slot {
   readonly values: Float32Array;
@@ -22,13 +26,13 @@ class Slot {
 
   constructor(memory: SharedArrayBuffer, at: number, floats: number) {
     this.numbers = new Float64Array(memory, at, 4);
-    this.hash = new BigUint64Array(memory, at + 32, 1);
-    this.message = new Uint8Array(memory, at + 40, messageRoom(floats));
-    this.values = new Float32Array(memory, at + 40 + messageRoom(floats), floats);
+    this.hash = new BigUint64Array(memory, at + kHashAt, 1);
+    this.message = new Uint8Array(memory, at + kMessageAt, messageRoom(floats));
+    this.values = new Float32Array(memory, at + kMessageAt + messageRoom(floats), floats);
   }
 
   static bytes(floats: number): number {
-    return 40 + messageRoom(floats) + 8 * Math.ceil(floats / 2);
+    return kMessageAt + messageRoom(floats) + 8 * Math.ceil(floats / 2);
   }
 
   // Size of the message; 0 if it is posted.
