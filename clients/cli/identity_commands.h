@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Commands about identities: `pairing-code`, `ban`, `bans`, `unban`.
+// Commands about identities: `pairing-code`, `bans`, `unban`.
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -22,12 +21,10 @@ class IdentityCommands {
 
  private:
   ExitCode makeCode(const ServerAddress& address) const;
-  ExitCode ban(const ServerAddress& address) const;
   ExitCode listBans(const ServerAddress& address) const;
 
   std::string role_ = "participant", scene_, subject_;
-  std::uint64_t participant_ = 0;
-  CLI::App *pairingCode_ = nullptr, *ban_ = nullptr, *bans_ = nullptr, *unban_ = nullptr;
+  CLI::App *pairingCode_ = nullptr, *bans_ = nullptr, *unban_ = nullptr;
 };
 
 }  // namespace clothstream::cli

@@ -9,6 +9,8 @@
 #include <unistd.h>
 
 #include "clients/cli/error.h"
+#include "clients/cli/event_lines.h"
+#include "clients/cli/input_lines.h"
 #include "clients/cli/obj_file.h"
 #include "clients/cli/presence.h"
 #include "clients/cli/report.h"
@@ -23,12 +25,19 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kLineInterval{100};
 
-// Prints the events of the stream, except frames, to standard error.
+constexpr std::chrono::milliseconds kInputInterval{5};
+
+// Prints the events of the stream, except frames, to standard error, and lines of events to standard output.
 class Listener {
  public:
-  Listener(const StatusLine& line, bool report) : line_(line), report_(report) {}
+  Listener(const StatusLine& line, const JoinOptions& options)
+      : line_(line), report_(options.report), lines_(options.events) {}
 
-  void operator()(cs_client* client, std::uint32_t events) const {
+  void operator()(cs_client* client, std::uint32_t events) {
+    if (lines_) {
+      fmt::print("{}", eventLines_.of(client, events));
+      std::fflush(stdout);
+    }
     if (events == 0 && cs_get_state(client) == CS_STATE_RECONNECTING)
       say("the connection is lost; reconnecting");
     if ((events & CS_EVENT_RETURNED) != 0)
@@ -71,15 +80,27 @@ class Listener {
   }
 
   const StatusLine& line_;
-  bool report_;
+  bool report_, lines_;
+  EventLines eventLines_;
 };
 
-void sendColliders(NativeClient& client, const JoinOptions& options) {
-  if (options.colliders.empty()) return;
+void sendInput(NativeClient& client, const JoinOptions& options) {
   client.visit([&](cs_client* core) {
+    if (options.events) cs_want_contacts(core, 1, NativeClient::nowUs());
+    if (options.colliders.empty()) return;
     cs_set_colliders(core, options.colliders[0].data(), static_cast<std::uint32_t>(options.colliders.size()),
                      NativeClient::nowUs());
   });
+}
+
+// Sends the lines of input whose time has come.
+tl::expected<void, Error> sendLines(NativeClient& client, InputLines& input) {
+  for (;;) {
+    const auto line = input.next(SteadyClock::now());
+    if (!line) return tl::unexpected(Error{kUnreadable, line.error()});
+    if (!*line) return {};
+    client.visit([&](cs_client* core) { (*line)->send(core, NativeClient::nowUs()); });
+  }
 }
 
 Report reportOf(NativeClient& client) {
@@ -88,11 +109,16 @@ Report reportOf(NativeClient& client) {
   return report;
 }
 
-// Waits for the end of the time, a signal or the end of the stream. Returns the failure if the stream ended.
-std::optional<Failure> follow(NativeClient& client, const JoinOptions& options, const StatusLine& line) {
+// Waits for the end of the time, a signal or the end of the stream. Returns an error if the stream ended, or
+// the input is wrong.
+std::optional<Error> follow(NativeClient& client, const JoinOptions& options, InputLines* input,
+                            const StatusLine& line) {
   const auto start = SteadyClock::now();
+  auto nextLine = start;  // of the terminal
   for (;;) {
-    auto wait = kLineInterval;
+    if (input != nullptr)
+      if (auto sent = sendLines(client, *input); !sent) return std::move(sent).error();
+    auto wait = input != nullptr && !input->atEnd() ? kInputInterval : kLineInterval;
     if (options.seconds) {
       const auto end = start + std::chrono::duration_cast<SteadyClock::duration>(
                                    std::chrono::duration<double>(*options.seconds));
@@ -101,8 +127,11 @@ std::optional<Failure> follow(NativeClient& client, const JoinOptions& options, 
       wait = std::min(wait, left);
     }
     if (interrupted(wait)) return std::nullopt;
-    if (std::optional<Failure> failure = client.ended()) return failure;
-    if (line.shown()) line.show(reportOf(client));
+    if (const std::optional<Failure> failure = client.ended())
+      return Error{exitCodeOf(failure->kind), failure->text};
+    if (!line.shown() || SteadyClock::now() < nextLine) continue;
+    nextLine = SteadyClock::now() + kLineInterval;
+    line.show(reportOf(client));
   }
 }
 
@@ -115,7 +144,13 @@ ExitCode join(const JoinOptions& options) {
     if (!created) return printError(kNotWritten, created.error());
     obj.emplace(std::move(*created));
   }
-  const StatusLine line(!options.json && isatty(STDOUT_FILENO) != 0);
+  std::optional<InputLines> input;
+  if (!options.inputPath.empty()) {
+    auto opened = InputLines::open(options.inputPath);
+    if (!opened) return printError(kUnreadable, opened.error());
+    input.emplace(std::move(*opened));
+  }
+  const StatusLine line(!options.json && !options.events && isatty(STDOUT_FILENO) != 0);
   NativeClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream join";
@@ -126,15 +161,15 @@ ExitCode join(const JoinOptions& options) {
   clientOptions.maxVertices = options.maxVertices;
   if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };
-  auto joined = joinByGrpc(options.address, clientOptions, Listener(line, options.report));
+  auto joined = joinByGrpc(options.address, clientOptions, Listener(line, options));
   if (!joined) return printError(joined.error());
   NativeClient& client = **joined;
-  sendColliders(client, options);
+  sendInput(client, options);
 
-  const std::optional<Failure> failure = follow(client, options, line);
+  const std::optional<Error> failure = follow(client, options, input ? &*input : nullptr, line);
   line.clear();
   ExitCode code = kOk;
-  if (failure) code = printError(exitCodeOf(failure->kind), failure->text);
+  if (failure) code = printError(*failure);
   const Report report = reportOf(client);
   if (options.hash && report.statistics.hash_mismatches > 0)
     code =
@@ -147,7 +182,10 @@ ExitCode join(const JoinOptions& options) {
       if (auto written = writeObj(core, *obj); !written) code = printError(kNotWritten, written.error());
     });
   }
-  fmt::print("{}\n", options.json ? report.json(options.hash) : report.text(options.hash));
+  if (options.events)
+    fmt::print("{}", summaryLine(report.json(options.hash)));
+  else
+    fmt::print("{}\n", options.json ? report.json(options.hash) : report.text(options.hash));
   return code;
 }
 

@@ -27,6 +27,8 @@ struct JoinOptions {
   bool json = false;
   bool hash = false;
   bool report = false;                          // print each report of the simulation
+  bool events = false;                          // print events as lines of JSON (event_lines.h)
+  std::string inputPath;                        // lines of input (input_lines.h); empty: none
   std::vector<std::array<float, 4>> colliders;  // x, y, z and radius, m
 };
 

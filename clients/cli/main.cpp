@@ -21,6 +21,7 @@
 #include "clients/cli/list.h"
 #include "clients/cli/load_command.h"
 #include "clients/cli/motion_commands.h"
+#include "clients/cli/participant_commands.h"
 #include "clients/cli/presence.h"
 #include "clients/cli/recording_commands.h"
 #include "clients/cli/saved_token.h"
@@ -217,10 +218,24 @@ int run(int argc, char** argv) {
                 "Print each report of the simulation: strain, energy and more per cloth")
       ->excludes("--json");
   joinCommand
+      .add_flag("--events", joinOptions.events,
+                "Print events as lines of JSON: participants, contacts, grabs, changes, notices, errors; the "
+                "last line is the summary")
+      ->excludes("--json")
+      ->excludes("--report");
+  CLI::Option* const input =
+      joinCommand
+          .add_option(
+              "--input", joinOptions.inputPath,
+              "File with lines of JSON that set colliders, hands, head, grabs and attachments; - reads "
+              "standard input")
+          ->type_name("FILE");
+  joinCommand
       .add_option(
           "--collider", colliders,
           "Sphere X,Y,Z[,RADIUS] in metres that the cloth collides with while this client is joined; may be "
           "repeated")
+      ->excludes(input)
       ->allow_extra_args(false);
 
   SetOptions setOptions;
@@ -243,6 +258,9 @@ int run(int argc, char** argv) {
 
   IdentityCommands identityCommands;
   identityCommands.add(app, address);
+
+  ParticipantCommands participantCommands;
+  participantCommands.add(app, address);
 
   MotionCommands motionCommands;
   motionCommands.add(app);
@@ -268,8 +286,7 @@ int run(int argc, char** argv) {
           "--pair CODE\", which keeps a token in ~/.local/state/clothstream/tokens; then use --token FILE");
     joinOptions.address = listOptions.address = setOptions.address =
         trust.addressOf(address, loadCommand.usesWeb() ? Endpoint::web : Endpoint::grpc);
-    if (setCommand.parsed() && !changesAnything(setOptions))
-      throw CLI::ValidationError("set", "nothing to change is given; see clothstream set --help");
+    if (setCommand.parsed()) checkSetOptions(setOptions);
     if (colliders.size() > CS_MAX_COLLIDERS)
       throw CLI::ValidationError("--collider", fmt::format("at most {} are allowed", CS_MAX_COLLIDERS));
     joinOptions.role = roleNamed(role).value_or(CS_ROLE_UNSPECIFIED);
@@ -286,6 +303,7 @@ int run(int argc, char** argv) {
     listOptions.address = setOptions.address = joinOptions.address;
   }
   if (identityCommands.parsed()) return identityCommands.run(joinOptions.address);
+  if (participantCommands.parsed()) return participantCommands.run(joinOptions.address);
   if (recordingCommands.parsed()) return recordingCommands.run(joinOptions.address, CLOTHSTREAM_VERSION);
   if (loadCommand.parsed()) return loadCommand.run(joinOptions.address);
   if (sceneCommands.parsed()) return sceneCommands.run(joinOptions.address);

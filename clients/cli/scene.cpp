@@ -44,6 +44,7 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
     added->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
         ->capture_default_str();
   };
+  print_ = command("print-scene", "Print a scene of a server as JSON, with its current parameters");
   create_ =
       command("create", "Create a scene on a server from a JSON file, or as a copy of a scene of the server");
   CLI::Option* file = create_->add_option("FILE", options_.file, "Scene in JSON");
@@ -75,7 +76,7 @@ void SceneCommands::add(CLI::App& app, std::string& address) {
                               "Name of the file without .mcap; default: the server chooses");
   stopRecording_ = command("stop-recording", "Stop the recording of a scene on the server");
   for (CLI::App* added :
-       {delete_, pause_, resume_, reset_, seek_, speed_, loop_, startRecording_, stopRecording_}) {
+       {print_, delete_, pause_, resume_, reset_, seek_, speed_, loop_, startRecording_, stopRecording_}) {
     added->add_option("SCENE", options_.name, "Name of the scene")->required();
     takesAddress(added);
   }
@@ -90,10 +91,23 @@ void SceneCommands::check() const {
 }
 
 bool SceneCommands::parsed() const {
-  for (const CLI::App* command :
-       {create_, delete_, pause_, resume_, reset_, seek_, speed_, loop_, startRecording_, stopRecording_})
+  for (const CLI::App* command : {print_, create_, delete_, pause_, resume_, reset_, seek_, speed_, loop_,
+                                  startRecording_, stopRecording_})
     if (command->parsed()) return true;
   return false;
+}
+
+ExitCode SceneCommands::print(const ServerAddress& address) const {
+  const auto scene = getScene(address, options_.name);
+  if (!scene) return printError(scene.error());
+  google::protobuf::util::JsonPrintOptions format;
+  format.add_whitespace = true;
+  std::string json;
+  const auto status = google::protobuf::util::MessageToJsonString(*scene, &json, format);
+  if (!status.ok())
+    return printError(kFailed, fmt::format("cannot print the scene: {}", std::string(status.message())));
+  fmt::print("{}", json);
+  return kOk;
 }
 
 ExitCode SceneCommands::create() const {
@@ -159,6 +173,7 @@ ExitCode SceneCommands::record(const ServerAddress& address) const {
 
 ExitCode SceneCommands::run(const ServerAddress& address) {
   options_.address = address;
+  if (print_->parsed()) return print(address);
   if (create_->parsed()) return create();
   if (delete_->parsed()) return done(deleteScene(address, options_.name));
   if (startRecording_->parsed() || stopRecording_->parsed()) return record(address);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Commands for scenes of a server: `create`, `delete`, `pause`, `resume`, `reset`, `start-recording`,
-// `stop-recording`; for scenes that play a recording: `seek`, `speed`, `loop`.
+// Commands for scenes of a server: `print-scene`, `create`, `delete`, `pause`, `resume`, `reset`,
+// `start-recording`, `stop-recording`; for scenes that play a recording: `seek`, `speed`, `loop`.
 #pragma once
 
 #include <cstdint>
@@ -38,12 +38,14 @@ class SceneCommands {
   ExitCode run(const ServerAddress& address);
 
  private:
+  ExitCode print(const ServerAddress& address) const;
   ExitCode create() const;
   ExitCode control(const ServerAddress& address) const;
   ExitCode record(const ServerAddress& address) const;
 
   SceneOptions options_;
-  CLI::App *create_ = nullptr, *delete_ = nullptr, *pause_ = nullptr, *resume_ = nullptr, *reset_ = nullptr;
+  CLI::App *print_ = nullptr, *create_ = nullptr, *delete_ = nullptr, *pause_ = nullptr, *resume_ = nullptr,
+           *reset_ = nullptr;
   CLI::App *seek_ = nullptr, *speed_ = nullptr, *loop_ = nullptr;
   CLI::App *startRecording_ = nullptr, *stopRecording_ = nullptr;
 };

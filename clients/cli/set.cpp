@@ -39,6 +39,7 @@ class Answers {
     if ((events & CS_EVENT_ERROR) != 0) refusal_ = cs_error_text(client);
     if ((events & CS_EVENT_PARAMETERS) != 0 && cs_parameters_participant(client) == cs_participant_id(client))
       ++held_;
+    if ((events & CS_EVENT_SCENES) != 0) ++held_;
     changed_.notify_all();
   }
 
@@ -71,7 +72,7 @@ std::string noSuchCloth(const cs_client* client, const std::string& name) {
 
 bool changesAnything(const SetOptions& options) {
   return changesCloths(options) || changesEnvironment(options) || !options.gust.empty() ||
-         !options.material.empty();
+         !options.material.empty() || !options.collider.empty() || !options.attachment.empty();
 }
 
 ExitCode set(const SetOptions& options) {
@@ -108,12 +109,29 @@ ExitCode set(const SetOptions& options) {
                          options.airDensity ? &*options.airDensity : nullptr);
       ++changes;
     }
+    if (!options.collider.empty()) {
+      cs_set_collider(client, options.collider.c_str(),
+                      options.position.empty() ? nullptr : options.position.data(),
+                      options.radius ? &*options.radius : nullptr);
+      ++changes;
+    }
     if (!options.gust.empty()) {
       cs_set_gust(client, options.gust[0],
                   options.gust.size() > 1 ? options.gust[1] : parameters::kGustSeconds.initial);
       ++changes;
     }
   });
+  // The server does not confirm a moved attachment, but answers in order. A client sends requests before
+  // poses. So the pose is sent by the first answer, and a refusal comes before the second one.
+  for (int round = 0; round < 2 && !options.attachment.empty(); ++round)
+    changeBy([&](cs_client* client) {
+      if (round == 0)
+        cs_move_attachment(client, options.attachment.c_str(), options.position.data(),
+                           options.orientation.empty() ? nullptr : options.orientation.data(),
+                           NativeClient::nowUs());
+      cs_list_scenes(client);
+      ++changes;
+    });
   if (const auto failure = (*joined)->ended(); failure && !refusal.empty())
     return printError(exitCodeOf(failure->kind), failure->text);
   if (!refusal.empty()) return printError(kRefused, refusal);

@@ -21,6 +21,10 @@ struct SetOptions {
   std::optional<float> airDensity;
   std::vector<float> gust;  // strength and optional seconds; empty: no change
   std::string material;     // empty: no change
+  // Collider of the scene or attachment that moves; at most one of them is not empty.
+  std::string collider, attachment;
+  std::vector<float> position, orientation;  // three and four numbers (quaternion x y z w); empty: no change
+  std::optional<float> radius;               // of the collider, m
 
   SetOptions() { cs_keep_cloth_settings(&settings); }
 };

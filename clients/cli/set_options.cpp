@@ -79,6 +79,25 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
                  "apply after it")
       ->group("Material");
 
+  const char* placed = "Colliders and attachments";
+  CLI::Option* const collider =
+      app.add_option("--collider", options.collider, "Collider of the scene that gets --position or --radius")
+          ->group(placed);
+  CLI::Option* const attachment =
+      app.add_option("--attachment", options.attachment, "Attachment that moves to --position")
+          ->excludes(collider)
+          ->group(placed);
+  app.add_option("--position", options.position, "X,Y,Z, m")->delimiter(',')->expected(3)->group(placed);
+  app.add_option("--orientation", options.orientation,
+                 "Quaternion X,Y,Z,W of the attachment; default: no rotation")
+      ->delimiter(',')
+      ->expected(4)
+      ->needs(attachment)
+      ->group(placed);
+  app.add_option("--radius", options.radius, "Radius of the collider, 0.001 to 10 m")
+      ->needs(collider)
+      ->group(placed);
+
   const char* environment = "Environment";
   app.add_option("--gravity", options.gravity, fmt::format("X,Y,Z, each {}", rangeOf(parameters::kGravity)))
       ->delimiter(',')
@@ -100,6 +119,16 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
   app.add_option("--air-density", options.airDensity,
                  fmt::format("Density of the air, {}", rangeOf(parameters::kAirDensity)))
       ->group(environment);
+}
+
+void checkSetOptions(const SetOptions& options) {
+  const auto wrong = [](const char* option, const char* text) { throw CLI::ValidationError(option, text); };
+  if (!options.collider.empty() && options.position.empty() && !options.radius)
+    wrong("--collider", "needs --position or --radius");
+  if (!options.attachment.empty() && options.position.empty()) wrong("--attachment", "needs --position");
+  if (!options.position.empty() && options.collider.empty() && options.attachment.empty())
+    wrong("--position", "needs --collider or --attachment");
+  if (!changesAnything(options)) wrong("set", "nothing to change is given; see clothstream set --help");
 }
 
 }  // namespace clothstream::cli

@@ -10,5 +10,7 @@ namespace clothstream::cli {
 
 // `options` must outlive the parsing.
 void addSetOptions(CLI::App& app, SetOptions& options);
+// Checks the options together. Throws CLI::ValidationError.
+void checkSetOptions(const SetOptions& options);
 
 }  // namespace clothstream::cli

@@ -100,6 +100,14 @@ tl::expected<v1::SceneSummary, Failure> controlScene(const ServerAddress& addres
   return std::move(*response->mutable_scene());
 }
 
+tl::expected<v1::Scene, Failure> getScene(const ServerAddress& address, const std::string& name) {
+  v1::GetSceneRequest request;
+  request.set_name(name);
+  auto response = callServer<v1::GetSceneResponse>(address, request, &v1::ClothStream::Stub::GetScene);
+  if (!response) return tl::unexpected(std::move(response).error());
+  return std::move(*response->mutable_scene());
+}
+
 tl::expected<std::string, Failure> startRecording(const ServerAddress& address, const std::string& scene,
                                                   const std::string& file) {
   v1::StartRecordingRequest request;

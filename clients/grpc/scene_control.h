@@ -37,6 +37,10 @@ struct CreateSceneOptions {
 [[nodiscard]] tl::expected<void, Failure> controlScene(const ServerAddress& address, const std::string& name,
                                                        std::optional<bool> paused, bool reset);
 
+// Definition of the scene with its current parameters. An empty name is the default scene.
+[[nodiscard]] tl::expected<v1::Scene, Failure> getScene(const ServerAddress& address,
+                                                        const std::string& name);
+
 // Records the scene to a file on the server and returns the name of the file. If `file` is empty, the server
 // chooses the name.
 [[nodiscard]] tl::expected<std::string, Failure> startRecording(const ServerAddress& address,

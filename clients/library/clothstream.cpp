@@ -14,6 +14,7 @@
 
 #include <clothstream/clothstream.h>
 
+#include "clients/library/allocation.h"
 #include "clients/library/library_options.h"
 #include "clients/library/library_transport.h"
 #include "clients/native/native_client.h"
@@ -83,6 +84,11 @@ NativeClientOptions clientOptions(const clothstream_options& options) {
   client.temporalLayers = options.temporal_layers;
   client.joinTimeout = std::chrono::milliseconds(options.join_timeout_ms);
   client.reconnectFor = std::chrono::milliseconds(options.reconnect_for_ms);
+  if (options.log != nullptr)
+    client.onLog = [log = options.log, context = options.log_context](LogLevel level,
+                                                                      const std::string& text) {
+      log(context, static_cast<std::uint32_t>(level), text.c_str());
+    };
   return client;
 }
 
@@ -100,7 +106,9 @@ void clothstream_default_options_2(clothstream_options* out) noexcept {
           .reconnect_for_ms = kReconnectForMs,
           .token = "",
           .ca_file = "",
-          .fingerprint = ""};
+          .fingerprint = "",
+          .log = nullptr,
+          .log_context = nullptr};
 }
 
 // Programs that were built for version 1 have room for no more.
@@ -190,6 +198,18 @@ cs_client* clothstream_acquire(clothstream_stream* stream) noexcept {
 
 void clothstream_release(clothstream_stream* stream) noexcept {
   stream->client->unlock();
+}
+
+clothstream_result clothstream_set_allocator(const clothstream_allocator* allocator) noexcept {
+  return guarded([&] {
+    if (allocator == nullptr || allocator->version != CLOTHSTREAM_ALLOCATOR_VERSION ||
+        allocator->allocate == nullptr || allocator->release == nullptr)
+      return fail(CLOTHSTREAM_INVALID,
+                  "The allocator is NULL, has NULL functions, or its version is not "
+                  "CLOTHSTREAM_ALLOCATOR_VERSION.");
+    std::string wrong = useAllocator(*allocator);
+    return wrong.empty() ? CLOTHSTREAM_OK : fail(CLOTHSTREAM_INVALID, std::move(wrong));
+  });
 }
 
 uint64_t clothstream_now_us(void) noexcept {

@@ -40,6 +40,14 @@ typedef enum clothstream_result {
   CLOTHSTREAM_FAILED = 5       /* out of memory or threads */
 } clothstream_result;
 
+/* Severity of a line of the log. */
+typedef enum clothstream_log_level {
+  CLOTHSTREAM_LOG_INFO = 1, /* joined, reconnected, left; notices of the server */
+  CLOTHSTREAM_LOG_WARNING =
+      2,                    /* a lost connection, a failed attempt to reconnect, an error that ends nothing */
+  CLOTHSTREAM_LOG_ERROR = 3 /* why the stream ended */
+} clothstream_log_level;
+
 #define CLOTHSTREAM_OPTIONS_VERSION 2u
 typedef struct clothstream_options {
   uint32_t version; /* CLOTHSTREAM_OPTIONS_VERSION; later versions add fields at the end */
@@ -63,10 +71,15 @@ typedef struct clothstream_options {
   /* With TLS, instead of an authority: the server must have the key with this fingerprint, as a server with
    * --tls self prints it: 64 hexadecimal digits, with or without colons. "" means none. */
   const char* fingerprint;
+  /* Gets the log of the stream, line by line, on the library's thread; level is a clothstream_log_level. text
+   * is one line without a line break, and valid during the call. It must not call functions of the library.
+   * NULL means no log. */
+  void (*log)(void* context, uint32_t level, const char* text);
+  void* log_context; /* argument of log */
 } clothstream_options;
 
 /* Fills in the defaults and the version: client_name "libclothstream", other strings "", role unspecified,
- * the whole stream, 10 s to join, 60 s to reconnect.
+ * the whole stream, 10 s to join, 60 s to reconnect, no log.
  *
  * In C and C++ the name means the function for the version of this header. A program that looks the functions
  * up by name gets version 1 from clothstream_default_options, as programs for earlier releases do, and
@@ -109,6 +122,23 @@ clothstream_result clothstream_wait(clothstream_stream* stream, uint32_t timeout
  * stream is acquired are sent after clothstream_release. */
 cs_client* clothstream_acquire(clothstream_stream* stream) CS_NOEXCEPT;
 void clothstream_release(clothstream_stream* stream) CS_NOEXCEPT;
+
+#define CLOTHSTREAM_ALLOCATOR_VERSION 1u
+/* Memory functions of the program. They must be thread-safe, and must not call functions of the library. */
+typedef struct clothstream_allocator {
+  uint32_t version; /* CLOTHSTREAM_ALLOCATOR_VERSION */
+  void* context;    /* argument of both functions */
+  /* Returns memory of `bytes` (at least 1) at a multiple of `alignment`, a power of two; NULL without memory.
+   */
+  void* (*allocate)(void* context, size_t bytes, size_t alignment);
+  /* Frees what allocate has returned; never NULL. */
+  void (*release)(void* context, void* memory);
+} clothstream_allocator;
+/* Makes the library take its memory from these functions, instead of from malloc. It applies to all streams
+ * of the process. Call it at most once, before all other functions of the library; later it fails. Memory of
+ * OpenSSL, of threads, and of exceptions still comes from the C library. A library built for gRPC, or with
+ * sanitizers, refuses it. */
+clothstream_result clothstream_set_allocator(const clothstream_allocator* allocator) CS_NOEXCEPT;
 
 /* Monotonic clock of all times. */
 uint64_t clothstream_now_us(void) CS_NOEXCEPT;

@@ -43,6 +43,7 @@ class NativeClient::Stream {
       : address_(std::move(address)),
         options_(options),
         onEvents_(std::move(onEvents)),
+        log_(options.onLog, address_.address),
         core_(cs_create_as(options.scene.c_str(), options.clientName.c_str(), options.displayName.c_str(),
                            options.role),
               &cs_destroy),
@@ -156,8 +157,12 @@ class NativeClient::Stream {
     const bool tries = wasJoined_ && options_.reconnectFor.count() > 0;
     if (!tries || leaving_ || cs_get_state(core_.get()) == CS_STATE_FAILED) return false;
     reconnects_ = true;
+    log_.lost(transport_->lost());
     cs_disconnected(core_.get(), NativeClient::nowUs());
     announce(0);
+    if (const std::uint64_t now = NativeClient::nowUs(), due = cs_connect_at(core_.get());
+        due > now && due != UINT64_MAX)
+      log_.nextAttempt(std::chrono::microseconds(due - now));
     for (;;) {
       const std::uint64_t now = NativeClient::nowUs(), at = cs_connect_at(core_.get());
       if (leaving_ || SteadyClock::now() >= giveUpAt) return false;
@@ -177,6 +182,7 @@ class NativeClient::Stream {
   }
 
   void announce(std::uint32_t events) {
+    log_.received(core_.get(), events);
     onEvents_(core_.get(), events);
     if (cs_get_state(core_.get()) == CS_STATE_JOINED) disconnectedAt_.reset();
     if ((events & CS_EVENT_DESCRIPTION) != 0) wasJoined_ = true;
@@ -245,6 +251,7 @@ class NativeClient::Stream {
 
   void end() {
     ended_ = reason();
+    log_.ended(*ended_, leaving_);
     changed_.notify_all();
     transport_.reset();
   }
@@ -252,6 +259,7 @@ class NativeClient::Stream {
   const ServerAddress address_;
   const NativeClientOptions options_;
   const OnEvents onEvents_;
+  StreamLog log_;  // used by the thread only
   // Set while the thread waits for the mutex. Then lock() lets the thread go first.
   std::atomic<bool> threadWaits_{false};
   std::condition_variable turn_;

@@ -16,6 +16,7 @@
 #include "clients/core/core.h"
 #include "clients/native/address.h"
 #include "clients/native/failure.h"
+#include "clients/native/stream_log.h"
 #include "clients/native/transport.h"
 
 namespace clothstream {
@@ -36,6 +37,8 @@ struct NativeClientOptions {
   std::function<bool()> cancelled;
   // Receives every message before the cs_client does, on the client's thread. May be empty.
   std::function<void(std::span<const std::byte>)> onMessage;
+  // Receives the log, on the client's thread. May be empty.
+  OnLog onLog;
   // Time for which a joined client tries to reconnect. 0: the stream ends with the connection.
   std::chrono::milliseconds reconnectFor{60'000};
   // The connection counts as lost after this time without a message. The server answers pings twice a second.

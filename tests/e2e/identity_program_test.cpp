@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
 #include "tests/e2e/running_server.h"
@@ -168,6 +169,28 @@ TEST_F(IdentityProgram, PairsAndKeepsTheToken) {
   EXPECT_THAT(made.output, HasSubstr("makes a client viewer"));
   EXPECT_EQ(client({"bans", "small", "--server", address_}).exitCode, 0);
   EXPECT_EQ(client({"ban", "small", "4711", "--server", address_}).exitCode, 4);
+
+  // The owner gives a viewer another role, removes it, and needs the numbers that the list shows.
+  Process viewer({"/usr/bin/env", "XDG_STATE_HOME=" + kept(), CLOTHSTREAM, "join", address_, "--role",
+                  "viewer", "--name", "Ben", "--events"});
+  ASSERT_TRUE(viewer.waitForOutput("\"joined\"", kPatience)) << viewer.errors();
+  const auto listed =
+      nlohmann::json::parse(client({"participants", "small", "--server", address_, "--json"}).output);
+  ASSERT_EQ(listed.size(), 1u);
+  EXPECT_EQ(listed[0].at("role"), "viewer");
+  const std::string number = std::to_string(listed[0].at("id").get<std::uint64_t>());
+  for (int i = 0; i < 2; ++i) {
+    const Answer promoted = client({"role", "small", number, "participant", "--server", address_});
+    EXPECT_EQ(promoted.exitCode, 0) << promoted.errors;
+  }
+  EXPECT_TRUE(viewer.waitForOutput("roleChanged", kPatience)) << viewer.output();
+  const Answer removed = client({"remove", "small", number, "--server", address_});
+  EXPECT_EQ(removed.exitCode, 0) << removed.errors;
+  EXPECT_EQ(viewer.waitForEnd(kPatience), 4) << viewer.errors();
+  EXPECT_EQ(client({"role", "small", number, "owner", "--server", address_}).exitCode, 4);
+  EXPECT_EQ(client({"role", "small", number, "king", "--server", address_}).exitCode, 2);
+  EXPECT_EQ(client({"remove", "small", number, "--server", address_}).exitCode, 4);
+
   const Answer lifted = client({"unban", "small", "eve", "--server", address_});
   EXPECT_EQ(lifted.exitCode, 4);
   EXPECT_THAT(lifted.errors, HasSubstr("no such ban"));

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// `join --events`: events of a stream as lines of JSON. docs/command-line.md describes them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "clients/core/core.h"
+
+namespace clothstream::cli {
+
+// Makes lines from the events of one client.
+class EventLines {
+ public:
+  // Lines for a call of NativeClient::OnEvents with these arguments, each with a line break. Frames, reports
+  // and answers have no line.
+  std::string of(cs_client* client, std::uint32_t events);
+
+ private:
+  bool reconnecting_ = false;
+  std::uint64_t joinedAs_ = 0;  // id in the last "joined" line
+};
+
+// Makes a line with the event "summary" of an object (Report::json).
+std::string summaryLine(const std::string& object);
+
+}  // namespace clothstream::cli

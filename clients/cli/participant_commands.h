@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// Commands about the participants of a scene: `participants`, `role`, `remove`, `ban`. They join the scene.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "clients/cli/exit_code.h"
+#include "clients/native/address.h"
+
+namespace clothstream::cli {
+
+// Must outlive the parsing.
+class ParticipantCommands {
+ public:
+  // The commands share `address` with other commands.
+  void add(CLI::App& app, std::string& address);
+  bool parsed() const;
+  ExitCode run(const ServerAddress& address) const;
+
+ private:
+  ExitCode list(const ServerAddress& address) const;
+  // Asks for the change and waits for its effect or the server's refusal.
+  ExitCode change(const ServerAddress& address) const;
+
+  std::string scene_, role_;
+  std::uint64_t participant_ = 0;
+  bool json_ = false;
+  CLI::App *participants_ = nullptr, *setRole_ = nullptr, *remove_ = nullptr, *ban_ = nullptr;
+};
+
+}  // namespace clothstream::cli

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+// The library shares the C++ library of the program, whose memory functions it must not replace.
+#include "clients/library/allocation.h"
+
+namespace clothstream {
+
+std::string useAllocator(const clothstream_allocator&) {
+  return "This library was built for gRPC or with sanitizers, and cannot use an allocator of the program.";
+}
+
+}  // namespace clothstream
