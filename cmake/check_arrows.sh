@@ -43,7 +43,7 @@ clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/touch | clients/core/core.h clients/core/wire proto/codec proto/hands
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
-clients/native     | clients/core
+clients/native     | clients/core proto/text
 clients/grpc       | clients/core clients/native proto/tls clothstream
 clients/websocket  | clients/native proto/text proto/tls
 clients/library    | clients/native clients/grpc clients/websocket proto/tls

@@ -75,7 +75,8 @@ std::optional<std::array<float, 4>> orientationOf(const Json& object, const std:
 template <typename Add>
 void forEach(const Json& array, const std::string& where, std::size_t most, const Add& add) {
   if (!array.is_array()) throw Wrong(fmt::format("{} must be an array", where));
-  if (array.size() > most) throw Wrong(fmt::format("{} has {} elements; at most {} are allowed", where, array.size(), most));
+  if (array.size() > most)
+    throw Wrong(fmt::format("{} has {} elements; at most {} are allowed", where, array.size(), most));
   for (std::size_t i = 0; i < array.size(); ++i) add(array[i], fmt::format("{}[{}]", where, i));
 }
 
@@ -178,9 +179,8 @@ InputLine lineOf(const Json& object) {
   }
   if (object.contains("grabs")) {
     line.grabs.emplace();
-    forEach(object["grabs"], "grabs", CS_MAX_GRABS, [&](const Json& grab, const std::string& where) {
-      line.grabs->push_back(grabOf(grab, where));
-    });
+    forEach(object["grabs"], "grabs", CS_MAX_GRABS,
+            [&](const Json& grab, const std::string& where) { line.grabs->push_back(grabOf(grab, where)); });
   }
   if (object.contains("head")) {
     line.head.emplace();
@@ -205,7 +205,8 @@ InputLine lineOf(const Json& object) {
 }  // namespace
 
 void InputLine::send(cs_client* client, std::uint64_t nowUs) const {
-  if (colliders) cs_set_shapes(client, colliders->data(), static_cast<std::uint32_t>(colliders->size()), nowUs);
+  if (colliders)
+    cs_set_shapes(client, colliders->data(), static_cast<std::uint32_t>(colliders->size()), nowUs);
   if (grabs) cs_set_grabs(client, grabs->data(), static_cast<std::uint32_t>(grabs->size()), nowUs);
   if (head) {
     const bool present = head->has_value();
@@ -284,8 +285,8 @@ tl::expected<std::optional<InputLine>, std::string> InputLines::next(
       line = takeLine();
     }
     if ((line ? line->size() : text_.size()) > kMaxLineBytes)
-      return tl::unexpected(fmt::format("{}, line {}: has more than {} bytes", path_, number_ + (line ? 0 : 1),
-                                        kMaxLineBytes));
+      return tl::unexpected(
+          fmt::format("{}, line {}: has more than {} bytes", path_, number_ + (line ? 0 : 1), kMaxLineBytes));
     if (!line) return std::nullopt;
     if (line->find_first_not_of(" \t\r") == std::string::npos) continue;
     auto parsed = parseInputLine(*line);

@@ -20,9 +20,9 @@ namespace clothstream::cli {
 // Content of one line. Members that are not set change nothing.
 struct InputLine {
   struct Head {
-    std::array<float, 3> position{};                // m
+    std::array<float, 3> position{};                  // m
     std::optional<std::array<float, 4>> orientation;  // quaternion x y z w
-    float radius = 0.1f;                            // m
+    float radius = 0.1f;                              // m
   };
   struct Hand {
     std::uint32_t side = CS_HAND_LEFT;
@@ -30,7 +30,7 @@ struct InputLine {
   };
   struct Attachment {
     std::string name;
-    std::array<float, 3> position{};                // m
+    std::array<float, 3> position{};                  // m
     std::optional<std::array<float, 4>> orientation;  // quaternion x y z w
   };
 
@@ -73,8 +73,8 @@ class InputLines {
   std::string path_;
   std::string text_;  // read, not yet parsed
   bool ended_ = false;
-  std::size_t number_ = 0;            // of the newest line, from 1
-  std::optional<InputLine> waiting_;  // parsed; its time has not come
+  std::size_t number_ = 0;                                     // of the newest line, from 1
+  std::optional<InputLine> waiting_;                           // parsed; its time has not come
   std::optional<std::chrono::steady_clock::time_point> last_;  // time of the newest returned line
 };
 

@@ -98,7 +98,8 @@ ExitCode ParticipantCommands::run(const ServerAddress& address) const {
 }
 
 ExitCode ParticipantCommands::list(const ServerAddress& address) const {
-  const auto joined = joinByGrpc(address, optionsFor(scene_, CS_ROLE_VIEWER), [](cs_client*, std::uint32_t) {});
+  const auto joined =
+      joinByGrpc(address, optionsFor(scene_, CS_ROLE_VIEWER), [](cs_client*, std::uint32_t) {});
   if (!joined) return printError(joined.error());
   auto array = nlohmann::ordered_json::array();
   (*joined)->visit([&](cs_client* client) {
@@ -126,9 +127,9 @@ ExitCode ParticipantCommands::list(const ServerAddress& address) const {
 
 ExitCode ParticipantCommands::change(const ServerAddress& address) const {
   Answer answer(participant_, setRole_->parsed() ? CS_PRESENCE_ROLE_CHANGED : CS_PRESENCE_LEFT);
-  const auto joined = joinByGrpc(
-      address, optionsFor(scene_, CS_ROLE_UNSPECIFIED),
-      [&](cs_client* client, std::uint32_t events) { answer.heard(client, events); });
+  const auto joined =
+      joinByGrpc(address, optionsFor(scene_, CS_ROLE_UNSPECIFIED),
+                 [&](cs_client* client, std::uint32_t events) { answer.heard(client, events); });
   if (!joined) return printError(joined.error());
   bool hasRole = false;
   (*joined)->visit([&](cs_client* client) {

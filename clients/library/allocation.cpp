@@ -57,7 +57,8 @@ void release(void* memory) noexcept {
 
 std::string useAllocator(const clothstream_allocator& allocator) {
   if (active.allocate != &allocateFromC || earlyCount.load(std::memory_order_relaxed) > early.size())
-    return "The library already uses memory; call clothstream_set_allocator once, before all other functions.";
+    return "The library already uses memory; call clothstream_set_allocator once, before all other "
+           "functions.";
   active = allocator;
   return {};
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // `clothstream join --input` and `--events`, and `clothstream set` of colliders and attachments, against the
 // real clothstream-server.
-#include <csignal>
 #include <cmath>
+#include <csignal>
 #include <fstream>
 #include <memory>
 #include <sstream>
@@ -128,8 +128,9 @@ TEST_F(JoinLines, EventsReportJoinsChangesAndLeaves) {
   ASSERT_TRUE(watcher->waitForOutput("participantLeft\",\"seconds\"", kPatience));
   EXPECT_TRUE(eventually([&] {
     watcher->waitForOutput("never printed", 100ms);
-    return watcher->output().find(R"("name":"Ben","client":"clothstream join","role":"participant","away":false}})",
-                                  watcher->output().rfind("participantLeft")) != std::string::npos;
+    return watcher->output().find(
+               R"("name":"Ben","client":"clothstream join","role":"participant","away":false}})",
+               watcher->output().rfind("participantLeft")) != std::string::npos;
   })) << watcher->output();
   watcher->signal(SIGTERM);
   EXPECT_EQ(watcher->waitForEnd(kPatience), 0);
@@ -185,8 +186,7 @@ TEST_F(JoinLines, WrongLineEndsTheProgramWithItsNumber) {
   const auto input = write("wrong", "{\"colliders\": []}\n\n{\"head\": {\"position\": [1, 2]}}\n");
   const auto client = clothstream({"join", address_, "--input", input});
   EXPECT_EQ(client->waitForEnd(kPatience), 7);
-  EXPECT_THAT(client->errors(),
-              HasSubstr("wrong, line 3: head.position must be an array of 3 numbers"));
+  EXPECT_THAT(client->errors(), HasSubstr("wrong, line 3: head.position must be an array of 3 numbers"));
 }
 
 // ---- Without a server

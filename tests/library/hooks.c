@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Gives the library memory functions and a log. Usage: hooks ADDRESS. Prints the log until the first frame, and
-// what happened to the memory.
+// Gives the library memory functions and a log. Usage: hooks ADDRESS. Prints the log until the first frame,
+// and what happened to the memory.
+#include <clothstream/clothstream.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <clothstream/clothstream.h>
 
 static atomic_llong allocations, live, misaligned;
 static int context;
@@ -57,7 +56,8 @@ int main(int argc, char** argv) {
     return 1;
   }
   uint32_t events = 0, all = 0;
-  while ((all & CS_EVENT_FRAME) == 0 && clothstream_wait(stream, 60000, &events) == CLOTHSTREAM_OK) all |= events;
+  while ((all & CS_EVENT_FRAME) == 0 && clothstream_wait(stream, 60000, &events) == CLOTHSTREAM_OK)
+    all |= events;
   if (getenv("WAIT") != NULL)
     while (clothstream_wait(stream, 60000, &events) == CLOTHSTREAM_OK) continue;
   clothstream_close(stream);
