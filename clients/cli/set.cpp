@@ -72,7 +72,8 @@ std::string noSuchCloth(const cs_client* client, const std::string& name) {
 
 bool changesAnything(const SetOptions& options) {
   return changesCloths(options) || changesEnvironment(options) || !options.gust.empty() ||
-         !options.material.empty() || !options.collider.empty() || !options.attachment.empty();
+         !options.material.empty() || options.arealMass || !options.collider.empty() ||
+         !options.attachment.empty();
 }
 
 ExitCode set(const SetOptions& options) {
@@ -101,6 +102,10 @@ ExitCode set(const SetOptions& options) {
     if (changesCloths(options)) {
       if (cs_change_cloth(client, options.cloth.c_str(), &options.settings) == 0)
         return void(refusal = noSuchCloth(client, options.cloth));
+      ++changes;
+    }
+    if (options.arealMass) {
+      cs_set_areal_mass(client, options.cloth.c_str(), *options.arealMass);
       ++changes;
     }
     if (changesEnvironment(options)) {

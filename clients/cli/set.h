@@ -19,8 +19,9 @@ struct SetOptions {
   cs_cloth_settings settings;        // values that are not given stay as cs_keep_cloth_settings sets them
   std::vector<float> gravity, wind;  // three numbers; empty: no change
   std::optional<float> airDensity;
-  std::vector<float> gust;  // strength and optional seconds; empty: no change
-  std::string material;     // empty: no change
+  std::vector<float> gust;         // strength and optional seconds; empty: no change
+  std::string material;            // empty: no change
+  std::optional<float> arealMass;  // kg/m^2
   // Collider of the scene or attachment that moves; at most one of them is not empty.
   std::string collider, attachment;
   std::vector<float> position, orientation;  // three and four numbers (quaternion x y z w); empty: no change

@@ -79,6 +79,9 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
                  "apply after it")
       ->group("Material");
 
+  app.add_option("--areal-mass", options.arealMass, "Mass per area, 0.0001 to 1000 kg/m^2")
+      ->group("Material");
+
   const char* placed = "Colliders and attachments";
   CLI::Option* const collider =
       app.add_option("--collider", options.collider, "Collider of the scene that gets --position or --radius")

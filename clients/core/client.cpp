@@ -38,6 +38,15 @@ void Client::prove(Proof proof) {
   if (outbox_.helloWaits()) sendHello();
 }
 
+bool Client::renew(std::string_view token) {
+  if (state_ != CS_STATE_JOINED || token.empty()) return false;
+  renewing_ = {.token = std::string(token), .pairingCode = {}};
+  std::string message;
+  writeAuthenticate(message, ++lastRequestId_, renewing_);
+  send(std::move(message));
+  return true;
+}
+
 void Client::want(const OperatingPoint& atMost) {
   hello_.wanted = atMost;
   if (outbox_.helloWaits()) sendHello();
@@ -58,6 +67,7 @@ std::string Client::resumeToken() const {
 
 void Client::connecting(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
+  renewing_ = {};
   if (welcomed_) disconnected(nowUs);
   outbox_.clear();
   forgetRequests();
@@ -408,6 +418,7 @@ std::uint32_t Client::scenesReceived(Bytes body) {
 std::uint32_t Client::tokenReceived(Bytes body) {
   std::optional<std::string> token = readToken(body);
   if (!token) return failMalformed("AuthenticateResponse");
+  if (!renewing_.token.empty()) proof_ = std::exchange(renewing_, {});
   if (token->empty()) return 0;
   // The code has been used; the next connection needs the token.
   proof_ = {.token = std::move(*token), .pairingCode = {}};

@@ -47,6 +47,8 @@ class Client {
   // Used from the next connection on; also for the current one while its Hello waits. A token replaces a
   // pairing code.
   void prove(Proof proof);
+  // Returns false before the client has joined, and for an empty token.
+  bool renew(std::string_view token);
   // Returns false if the text is neither empty nor one of resumeToken().
   bool resume(std::string_view text);
   // Has no effect on the current connection if its Hello is sent already.
@@ -65,7 +67,7 @@ class Client {
   void wantContacts(bool wants, std::uint64_t nowUs);
   void move(AttachmentPose attachment, std::uint64_t nowUs);
   void change(const ParameterChange& change);
-  void change(const ColliderChange& change);
+  void changeCollider(std::string_view collider, const cs_collider_change& change);
   void listScenes();
   void setRole(std::uint64_t participant, std::uint32_t role);
   void remove(std::uint64_t participant, bool ban);
@@ -191,6 +193,7 @@ class Client {
   std::string errorText_;
   Notice notice_;
   Proof proof_;
+  Proof renewing_;           // sent by renew(), not yet accepted; empty without one
   PairingCode pairingCode_;  // newest; no code before the first
   Hello hello_;              // the token is set by resume() or the first Welcome
   Welcome welcome_;

@@ -130,9 +130,9 @@ void Client::change(const ParameterChange& change) {
   send(std::move(message));
 }
 
-void Client::change(const ColliderChange& change) {
+void Client::changeCollider(std::string_view collider, const cs_collider_change& change) {
   std::string message;
-  writeColliderChange(message, ++lastRequestId_, change);
+  writeColliderChange(message, ++lastRequestId_, collider, change);
   send(std::move(message));
 }
 

@@ -116,6 +116,10 @@ void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) CS_N
  * with which the client reconnects. Keep it secret. */
 void cs_set_token(cs_client* client, const char* token) CS_NOEXCEPT;
 void cs_set_pairing_code(cs_client* client, const char* code) CS_NOEXCEPT;
+/* Sends a new token on the current connection, which then lasts until the new one expires. Later connections
+ * use it as soon as the server has accepted it. It must be of the same subject and tenant; CS_EVENT_ERROR
+ * reports a refusal. Fails, and changes nothing, before CS_STATE_JOINED and for "". */
+int cs_renew_token(cs_client* client, const char* token) CS_NOEXCEPT;
 /* Returns the token that is in use; "" without one. */
 const char* cs_token(const cs_client* client) CS_NOEXCEPT;
 /* Text with which a later client returns as the participant of this one, for example after a restart of the
@@ -687,9 +691,28 @@ int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_setting
 /* Applies a material (see cs_material) to a cloth: springs, damping, drag, lift, friction, mass and
  * solver (XPBD; a cloth with implicit Euler keeps it). */
 void cs_set_material(cs_client* client, const char* cloth, const char* material) CS_NOEXCEPT;
+/* Changes the mass per area of a cloth: 0.0001 to 1000 kg/m^2. */
+void cs_set_areal_mass(cs_client* client, const char* cloth, float areal_mass) CS_NOEXCEPT;
 /* Changes position (m) and radius (m) of a collider of the scene. Both pointers may be NULL. */
 void cs_set_collider(cs_client* client, const char* collider, const float* position3,
                      const float* radius) CS_NOEXCEPT;
+
+/* Change of a collider of the scene. NaN as the first number of a member keeps the member. The server refuses
+ * numbers that the shape does not have. */
+#define CS_COLLIDER_CHANGE_VERSION 1u
+typedef struct cs_collider_change {
+  uint32_t version;     /* CS_COLLIDER_CHANGE_VERSION */
+  float position[3];    /* m */
+  float orientation[4]; /* quaternion x y z w */
+  float radius;         /* m; sphere or capsule */
+  float length;         /* m; capsule */
+  float size[3];        /* m; box */
+  float friction;       /* 0 or more */
+} cs_collider_change;
+/* Fills in a change that changes nothing. Sets the version. */
+void cs_keep_collider(cs_collider_change* out) CS_NOEXCEPT;
+/* Fails if the version is unknown. */
+int cs_change_collider(cs_client* client, const char* collider, const cs_collider_change* change) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
  * Participants: people in the scene, and their roles.

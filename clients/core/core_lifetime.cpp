@@ -62,6 +62,10 @@ void cs_set_pairing_code(cs_client* client, const char* code) noexcept {
   client->client.prove({.token = {}, .pairingCode = code});
 }
 
+int cs_renew_token(cs_client* client, const char* token) noexcept {
+  return client->client.renew(token) ? 1 : 0;
+}
+
 const char* cs_token(const cs_client* client) noexcept {
   return client->client.token().c_str();
 }

@@ -209,8 +209,35 @@ void cs_set_material(cs_client* client, const char* cloth, const char* material)
   client->client.change(change);
 }
 
+void cs_set_areal_mass(cs_client* client, const char* cloth, float areal_mass) noexcept {
+  ParameterChange change;
+  ClothChange& clothChange = change.cloths.emplace_back();
+  clothChange.name = cloth;
+  clothChange.arealMass = areal_mass;
+  client->client.change(change);
+}
+
 void cs_set_collider(cs_client* client, const char* collider, const float* position3,
                      const float* radius) noexcept {
-  const std::optional<Vec3> position = vec3(position3);
-  client->client.change(ColliderChange{collider, position ? &*position : nullptr, radius});
+  cs_collider_change change;
+  cs_keep_collider(&change);
+  if (position3 != nullptr) std::copy(position3, position3 + 3, change.position);
+  if (radius != nullptr) change.radius = *radius;
+  client->client.changeCollider(collider, change);
+}
+
+void cs_keep_collider(cs_collider_change* out) noexcept {
+  *out = {.version = CS_COLLIDER_CHANGE_VERSION,
+          .position = {kAsIs, kAsIs, kAsIs},
+          .orientation = {kAsIs, kAsIs, kAsIs, kAsIs},
+          .radius = kAsIs,
+          .length = kAsIs,
+          .size = {kAsIs, kAsIs, kAsIs},
+          .friction = kAsIs};
+}
+
+int cs_change_collider(cs_client* client, const char* collider, const cs_collider_change* change) noexcept {
+  if (change->version != CS_COLLIDER_CHANGE_VERSION) return 0;
+  client->client.changeCollider(collider, *change);
+  return 1;
 }

@@ -63,6 +63,29 @@ TEST(Joining, PairsAndReconnectsWithTheTokenOfTheServer) {
   EXPECT_STREQ(cs_token(client.get()), "d.e.f");
 }
 
+TEST(Joining, RenewedTokenCountsOnceTheServerHasAcceptedIt) {
+  ClientUnderTest early;
+  EXPECT_EQ(cs_renew_token(early.get(), "d.e.f"), 0) << "before the client has joined";
+  JoinedClient joined;
+  cs_client* const client = joined.client.get();
+  EXPECT_EQ(cs_renew_token(client, ""), 0);
+  ASSERT_EQ(cs_renew_token(client, "refused"), 1);
+  EXPECT_EQ(joined.sent().authenticate().token(), "refused");
+  joined.client.receive(ScriptedServer::error(v1::ERROR_CODE_OUT_OF_ORDER, "another subject", false));
+  EXPECT_EQ(cs_get_state(client), CS_STATE_JOINED);
+  EXPECT_STREQ(cs_token(client), "");
+  v1::ServerMessage answer;
+  answer.mutable_authenticate();
+  ASSERT_EQ(cs_renew_token(client, "d.e.f"), 1);
+  joined.client.receive(answer.SerializeAsString());
+  EXPECT_STREQ(cs_token(client), "d.e.f");
+  // An answer on the next connection belongs to that connection's own token.
+  ASSERT_EQ(cs_renew_token(client, "g.h.i"), 1);
+  cs_connecting(client, 1'000'000);
+  joined.client.receive(answer.SerializeAsString());
+  EXPECT_STREQ(cs_token(client), "d.e.f");
+}
+
 TEST(Joining, FailsWithTheCodeOfTheServerAfterAWrongProof) {
   ClientUnderTest client;
   client.receive(ScriptedServer::error(v1::ERROR_CODE_WRONG_PAIRING_CODE, "the pairing code is wrong", true));

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Parameters and settings sent to the server. Changes, reports, notices and scenes received from it.
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -45,6 +47,41 @@ TEST(Parameters, SendOnlyGivenValues) {
   EXPECT_EQ(collider.colliders(0).name(), "ball");
   EXPECT_FALSE(collider.colliders(0).has_position());
   EXPECT_EQ(collider.colliders(0).radius(), 0.3f);
+
+  cs_set_areal_mass(joined.client.get(), "sheet", 0.25f);
+  const v1::ParameterChange mass = joined.sent().parameter_change();
+  ASSERT_THAT(mass.cloths(), SizeIs(1));
+  EXPECT_EQ(mass.cloths(0).areal_mass(), 0.25f);
+}
+
+TEST(Parameters, ChangeOfColliderHasOnlyTheNumbersThatAreSet) {
+  JoinedClient joined;
+  cs_collider_change change;
+  cs_keep_collider(&change);
+  ASSERT_EQ(cs_change_collider(joined.client.get(), "box", &change), 1);
+  v1::ColliderChange nothing;
+  nothing.set_name("box");
+  EXPECT_EQ(joined.sent().parameter_change().colliders(0).SerializeAsString(), nothing.SerializeAsString());
+
+  std::ranges::copy(std::array{1.f, 2.f, 3.f}, change.position);
+  std::ranges::copy(std::array{0.f, 0.6f, 0.f, 0.8f}, change.orientation);
+  std::ranges::copy(std::array{0.1f, 0.2f, 0.3f}, change.size);
+  change.radius = 0.5f;
+  change.length = 0.7f;
+  change.friction = 0;
+  ASSERT_EQ(cs_change_collider(joined.client.get(), "box", &change), 1);
+  const v1::ColliderChange all = joined.sent().parameter_change().colliders(0);
+  EXPECT_EQ(all.position().z(), 3);
+  EXPECT_EQ(all.orientation().y(), 0.6f);
+  EXPECT_EQ(all.orientation().w(), 0.8f);
+  EXPECT_EQ(all.size().x(), 0.1f);
+  EXPECT_EQ(all.radius(), 0.5f);
+  EXPECT_EQ(all.length(), 0.7f);
+  EXPECT_TRUE(all.has_friction());
+  EXPECT_EQ(all.friction(), 0);
+
+  change.version = CS_COLLIDER_CHANGE_VERSION + 1;
+  EXPECT_EQ(cs_change_collider(joined.client.get(), "box", &change), 0);
 }
 
 TEST(Parameters, FollowTheDescriptionAndLaterChanges) {

@@ -151,6 +151,8 @@ TEST_F(JoinLines, SetMovesColliderAndAttachment) {
   const auto ball =
       clothstream({"set", address_, "--collider", "ball", "--position", "0,0.5,2", "--radius", "0.25"});
   EXPECT_EQ(ball->waitForEnd(kPatience), 0) << ball->errors();
+  const auto heavy = clothstream({"set", address_, "--areal-mass", "0.5"});
+  EXPECT_EQ(heavy->waitForEnd(kPatience), 0) << heavy->errors();
   const auto unknown = clothstream({"set", address_, "--attachment", "mast", "--position", "1,2,0"});
   EXPECT_EQ(unknown->waitForEnd(kPatience), 4);
   EXPECT_THAT(unknown->errors(), HasSubstr("pole"));
@@ -163,6 +165,7 @@ TEST_F(JoinLines, SetMovesColliderAndAttachment) {
   const Json definition = Json::parse(printed.second);
   EXPECT_EQ(definition.at("colliders").at(0).at("sphere").at("radius"), 0.25);
   EXPECT_EQ(definition.at("colliders").at(0).at("pose").at("position").at("z"), 2.0);
+  EXPECT_EQ(definition.at("cloths").at(0).at("arealMass"), 0.5);
   // The scene that is printed can be created again.
   const auto file = write("again.json", printed.second);
   EXPECT_EQ(run({"create", file, "--name", "again"}).first, 0);

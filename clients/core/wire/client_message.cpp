@@ -32,17 +32,25 @@ void writeMessage(std::string& out, std::uint64_t requestId, field::Field bodyFi
   fill(body);
 }
 
+Vec3 toVec3(std::span<const float, 3> numbers) {
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+void addQuaternion(Writer& parent, field::Field quaternionField, std::span<const float, 4> numbers) {
+  Writer quaternion(parent, quaternionField.number);
+  quaternion.add_float(field::Quaternion::kX.number, numbers[0]);
+  quaternion.add_float(field::Quaternion::kY.number, numbers[1]);
+  quaternion.add_float(field::Quaternion::kZ.number, numbers[2]);
+  quaternion.add_float(field::Quaternion::kW.number, numbers[3]);
+}
+
 // Omits an orientation that is all zero. Writer itself omits nothing.
 void addPose(Writer& parent, field::Field poseField, std::span<const float, 3> position,
              std::span<const float, 4> orientation) {
   Writer pose(parent, poseField.number);
-  addVec3(pose, field::Pose::kPosition, {position[0], position[1], position[2]});
+  addVec3(pose, field::Pose::kPosition, toVec3(position));
   if (std::all_of(orientation.begin(), orientation.end(), [](float part) { return part == 0; })) return;
-  Writer quaternion(pose, field::Pose::kOrientation.number);
-  quaternion.add_float(field::Quaternion::kX.number, orientation[0]);
-  quaternion.add_float(field::Quaternion::kY.number, orientation[1]);
-  quaternion.add_float(field::Quaternion::kZ.number, orientation[2]);
-  quaternion.add_float(field::Quaternion::kW.number, orientation[3]);
+  addQuaternion(pose, field::Pose::kOrientation, orientation);
 }
 
 void addGiven(Writer& message, field::Field floatField, float value) {
@@ -93,7 +101,7 @@ void addShape(Writer& parent, const cs_own_collider& collider) {
     capsule.add_float(field::Capsule::kLength.number, collider.length);
   } else if (collider.shape == CS_SHAPE_BOX) {
     Writer box(parent, field::ParticipantCollider::kBox.number);
-    addVec3(box, field::Box::kSize, {collider.size[0], collider.size[1], collider.size[2]});
+    addVec3(box, field::Box::kSize, toVec3(collider.size));
   }
 }
 
@@ -172,13 +180,18 @@ void writeParameterChange(std::string& out, std::uint64_t requestId, const Param
                [&](Writer& message) { writeFields(message, change); });
 }
 
-void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change) {
+void writeColliderChange(std::string& out, std::uint64_t requestId, std::string_view name,
+                         const cs_collider_change& change) {
   writeMessage(out, requestId, field::ClientMessage::kParameterChange, [&](Writer& parameters) {
     using F = field::ColliderChange;
     Writer collider(parameters, field::ParameterChange::kColliders.number);
-    collider.add_string(F::kName.number, change.name.data(), change.name.size());
-    if (change.position) addVec3(collider, F::kPosition, *change.position);
-    if (change.radius) collider.add_float(F::kRadius.number, *change.radius);
+    collider.add_string(F::kName.number, name.data(), name.size());
+    if (!std::isnan(change.position[0])) addVec3(collider, F::kPosition, toVec3(change.position));
+    if (!std::isnan(change.orientation[0])) addQuaternion(collider, F::kOrientation, change.orientation);
+    addGiven(collider, F::kRadius, change.radius);
+    addGiven(collider, F::kLength, change.length);
+    if (!std::isnan(change.size[0])) addVec3(collider, F::kSize, toVec3(change.size));
+    addGiven(collider, F::kFriction, change.friction);
   });
 }
 

@@ -17,12 +17,6 @@
 
 namespace clothstream::client {
 
-struct ColliderChange {
-  std::string_view name;
-  const Vec3* position = nullptr;
-  const float* radius = nullptr;
-};
-
 // Content of Hello: the client and the scene that it joins.
 struct Hello {
   std::string scene, clientName, displayName;
@@ -67,7 +61,8 @@ struct Poses {
 void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs,
                         std::uint64_t serverTimeUs);
 void writeParameterChange(std::string& out, std::uint64_t requestId, const ParameterChange& change);
-void writeColliderChange(std::string& out, std::uint64_t requestId, const ColliderChange& change);
+void writeColliderChange(std::string& out, std::uint64_t requestId, std::string_view collider,
+                         const cs_collider_change& change);
 void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs);
 void writeFrameAck(std::string& out, std::uint64_t tick);
 // `early`: the client can decode the frames until then.

@@ -187,6 +187,7 @@ void writeCloth(Writer& cloth, const ClothChange& change) {
   }
   if (isSolverDue) writeSolver();
   if (change.material) cloth.add_string(F::kMaterial.number, *change.material);
+  if (change.arealMass) cloth.add_float(F::kArealMass.number, *change.arealMass);
 }
 
 }  // namespace

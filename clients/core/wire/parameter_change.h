@@ -54,6 +54,7 @@ struct ClothChange {
   parameters::ClothNumbers numbers = {};
   std::optional<Solver> solver = {};
   std::optional<std::string> material = {};
+  std::optional<float> arealMass = {};  // kg/m^2; written only, since no client shows it
 };
 
 struct ParameterChange {

@@ -77,6 +77,11 @@ export class Client {
   setPairingCode(code: string): void {
     this.core.with([code], (text) => this.core.exports.cs_set_pairing_code(this.handle.pointer, text!));
   }
+  // Sends a new token of the same subject on the current connection, which then lasts longer. Returns false before the
+  // client has joined.
+  renewToken(token: string): boolean {
+    return this.core.with([token], (text) => this.core.exports.cs_renew_token(this.handle.pointer, text!)) !== 0;
+  }
   // Token in use: that of setToken, or of the server after pairing.
   get token(): string {
     return this.core.text(this.core.exports.cs_token(this.handle.pointer));

@@ -8,6 +8,7 @@ export const CS_PLAY_OUT_OPTIONS_VERSION = 1;
 export const CS_PLAYED_VERSION = 1;
 export const CS_DECODED_VERSION = 1;
 export const CS_CLOTH_SETTINGS_VERSION = 1;
+export const CS_COLLIDER_CHANGE_VERSION = 1;
 export const CS_STAGE_STATISTICS_VERSION = 1;
 export const CS_CLOTH_REPORT_VERSION = 1;
 export const cs_limits = {
@@ -190,6 +191,16 @@ export const cs_cloth_settings = {
   ball_radius: 80,
   ball_friction: 84,
   tether_slack: 88,
+} as const;
+export const cs_collider_change = {
+  sizeof: 56,
+  version: 0,
+  position: 4,
+  orientation: 16,
+  radius: 32,
+  length: 36,
+  size: 40,
+  friction: 52,
 } as const;
 export const cs_participant = {
   sizeof: 24,

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Environment, materials, solvers and reports of the cloths.
 
-import { CS_CLOTH_REPORT_VERSION, CS_CLOTH_SETTINGS_VERSION, cs_cloth_parameters, cs_cloth_report, cs_cloth_settings, cs_environment } from "./layout";
+import { CS_CLOTH_REPORT_VERSION, CS_CLOTH_SETTINGS_VERSION, cs_cloth_parameters, cs_cloth_report, cs_cloth_settings, cs_collider_change, cs_environment } from "./layout";
 import { spring, vec3, type CoreHandle } from "./handle";
-import type { ClothParameters, ClothReport, Environment, Vec3 } from "./types";
+import type { ClothParameters, ClothReport, ColliderChange, Environment, Vec3 } from "./types";
 
 export class Parameters {
   constructor(private readonly handle: CoreHandle) {}
@@ -100,10 +100,24 @@ export class Parameters {
     );
   }
 
-  setCollider(collider: string, change: { position?: Vec3; radius?: number }): void {
-    const radius = change.radius === undefined ? undefined : [change.radius];
-    this.handle.core.with([collider, change.position, radius], (name, position, size) =>
-      this.handle.core.exports.cs_set_collider(this.handle.pointer, name!, position!, size!),
-    );
+  // Changes the mass per area of a cloth, kg/m^2. An empty name means every cloth.
+  setArealMass(cloth: string, arealMass: number): void {
+    this.handle.core.with([cloth], (name) => this.handle.core.exports.cs_set_areal_mass(this.handle.pointer, name!, arealMass));
+  }
+
+  // Changes a collider of the scene. Undefined members stay. The server refuses numbers that the shape does not have.
+  setCollider(collider: string, change: ColliderChange): void {
+    this.handle.core.exports.cs_keep_collider(this.handle.scratch);
+    const view = this.handle.core.view();
+    const set = (offset: number, values: readonly number[]) =>
+      values.forEach((value, i) => view.setFloat32(this.handle.scratch + offset + 4 * i, value, true));
+    const { position, orientation, radius, length, size, friction } = change;
+    if (position) set(cs_collider_change.position, position);
+    if (orientation) set(cs_collider_change.orientation, orientation);
+    if (radius !== undefined) set(cs_collider_change.radius, [radius]);
+    if (length !== undefined) set(cs_collider_change.length, [length]);
+    if (size) set(cs_collider_change.size, size);
+    if (friction !== undefined) set(cs_collider_change.friction, [friction]);
+    this.handle.core.with([collider], (name) => this.handle.core.exports.cs_change_collider(this.handle.pointer, name!, this.handle.scratch));
   }
 }

@@ -138,6 +138,15 @@ export interface Participant {
 // Stiffness in N/m and damping in N s/m.
 export type Spring = readonly [number, number];
 
+export interface ColliderChange {
+  position?: Vec3; // m
+  orientation?: readonly [number, number, number, number]; // quaternion x y z w
+  radius?: number; // m; sphere or capsule
+  length?: number; // m; capsule
+  size?: Vec3; // m; box
+  friction?: number;
+}
+
 export interface Environment {
   gravity: Vec3; // m/s^2
   wind: Vec3; // m/s

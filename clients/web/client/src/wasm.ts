@@ -12,6 +12,7 @@ export interface CoreExports {
   cs_create_as(scene: Pointer, clientName: Pointer, displayName: Pointer, role: number): Pointer;
   cs_set_token(client: Pointer, token: Pointer): void;
   cs_set_pairing_code(client: Pointer, code: Pointer): void;
+  cs_renew_token(client: Pointer, token: Pointer): number;
   cs_token(client: Pointer): Pointer;
   cs_set_resume_token(client: Pointer, token: Pointer): number;
   cs_resume_token(client: Pointer): Pointer;
@@ -89,7 +90,9 @@ export interface CoreExports {
   cs_material(client: Pointer, index: number): Pointer;
   cs_cloth_material(client: Pointer, cloth: number): Pointer;
   cs_set_cloth(client: Pointer, cloth: Pointer, structural2: Pointer, shear2: Pointer, bend2: Pointer, damping: Pointer): void;
-  cs_set_collider(client: Pointer, collider: Pointer, position3: Pointer, radius: Pointer): void;
+  cs_keep_collider(out: Pointer): void;
+  cs_change_collider(client: Pointer, collider: Pointer, change: Pointer): number;
+  cs_set_areal_mass(client: Pointer, cloth: Pointer, arealMass: number): void;
   cs_get_playback(client: Pointer, nowUs: bigint, out: Pointer): number;
   cs_pause(client: Pointer, paused: number): void;
   cs_seek(client: Pointer, seconds: number): void;
