@@ -165,7 +165,7 @@ TEST_F(JoinLines, SetMovesColliderAndAttachment) {
   const Json definition = Json::parse(printed.second);
   EXPECT_EQ(definition.at("colliders").at(0).at("sphere").at("radius"), 0.25);
   EXPECT_EQ(definition.at("colliders").at(0).at("pose").at("position").at("z"), 2.0);
-  EXPECT_EQ(definition.at("cloths").at(0).at("arealMass"), 0.5);
+  EXPECT_NEAR(definition.at("cloths").at(0).at("mass").get<double>(), 0.5 * 0.4 * 0.4, 1e-6);
   // The scene that is printed can be created again.
   const auto file = write("again.json", printed.second);
   EXPECT_EQ(run({"create", file, "--name", "again"}).first, 0);
