@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "clients/cli/event_lines.h"
 
+#include <cstddef>
+#include <span>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/presence.h"
@@ -114,6 +118,24 @@ std::string playbackLine(const cs_client* client) {
   return lineOf(object);
 }
 
+// FNV-1a of the bytes of the positions, 64 bits.
+std::uint64_t hashOf(std::span<const float> positions) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const std::byte byte : std::as_bytes(positions))
+    hash = (hash ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3u;
+  return hash;
+}
+
+std::string frameLine(const cs_client* client) {
+  cs_statistics statistics;
+  cs_get_statistics(client, NativeClient::nowUs(), &statistics);
+  Json object = event(client, "frame");
+  object["tick"] = statistics.tick;
+  object["hash"] =
+      fmt::format("{:016x}", hashOf({cs_positions(client), std::size_t{3} * cs_vertex_count(client)}));
+  return lineOf(object);
+}
+
 std::string textLine(const cs_client* client, const char* name, const char* text, std::uint64_t by = 0) {
   Json object = event(client, name);
   object["text"] = text;
@@ -141,6 +163,7 @@ std::string EventLines::of(cs_client* client, std::uint32_t events) {
   } else if (happened(CS_EVENT_PRESENCE) && cs_get_presence(client, &presence) != 0) {
     lines += presenceLine(client, presence);
   }
+  if (frames_ && happened(CS_EVENT_FRAME)) lines += frameLine(client);
   if (happened(CS_EVENT_CONTACTS)) lines += contactLines(client);
   if (happened(CS_EVENT_GRABS)) lines += grabLines(client);
   if (happened(CS_EVENT_PLAYBACK)) lines += playbackLine(client);

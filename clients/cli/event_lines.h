@@ -12,11 +12,15 @@ namespace clothstream::cli {
 // Makes lines from the events of one client.
 class EventLines {
  public:
-  // Lines for a call of NativeClient::OnEvents with these arguments, each with a line break. Frames, reports
-  // and answers have no line.
+  // `frames`: also a line for each frame.
+  explicit EventLines(bool frames) : frames_(frames) {}
+
+  // Lines for a call of NativeClient::OnEvents with these arguments, each with a line break. Reports and
+  // answers have no line.
   std::string of(cs_client* client, std::uint32_t events);
 
  private:
+  const bool frames_;
   bool reconnecting_ = false;
   std::uint64_t joinedAs_ = 0;  // id in the last "joined" line
 };

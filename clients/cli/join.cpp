@@ -31,7 +31,7 @@ constexpr std::chrono::milliseconds kInputInterval{5};
 class Listener {
  public:
   Listener(const StatusLine& line, const JoinOptions& options)
-      : line_(line), report_(options.report), lines_(options.events) {}
+      : line_(line), report_(options.report), lines_(options.events), eventLines_(options.frames) {}
 
   void operator()(cs_client* client, std::uint32_t events) {
     if (lines_) {

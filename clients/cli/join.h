@@ -28,6 +28,7 @@ struct JoinOptions {
   bool hash = false;
   bool report = false;                          // print each report of the simulation
   bool events = false;                          // print events as lines of JSON (event_lines.h)
+  bool frames = false;                          // with events: a line for each frame too
   std::string inputPath;                        // lines of input (input_lines.h); empty: none
   std::vector<std::array<float, 4>> colliders;  // x, y, z and radius, m
 };

@@ -217,12 +217,16 @@ int run(int argc, char** argv) {
       .add_flag("--report", joinOptions.report,
                 "Print each report of the simulation: strain, energy and more per cloth")
       ->excludes("--json");
+  CLI::Option* const events =
+      joinCommand
+          .add_flag("--events", joinOptions.events,
+                    "Print events as lines of JSON: participants, contacts, grabs, changes, notices, errors; "
+                    "the last line is the summary")
+          ->excludes("--json")
+          ->excludes("--report");
   joinCommand
-      .add_flag("--events", joinOptions.events,
-                "Print events as lines of JSON: participants, contacts, grabs, changes, notices, errors; the "
-                "last line is the summary")
-      ->excludes("--json")
-      ->excludes("--report");
+      .add_flag("--frames", joinOptions.frames, "With --events: also a line for each frame, with a hash")
+      ->needs(events);
   CLI::Option* const input =
       joinCommand
           .add_option(

@@ -68,7 +68,7 @@ TEST_F(JoinLines, InputTouchesClothAndCausesEvents) {
     {"after": 0.5, "colliders": [], "grabs": [{"id": 7, "position": [-0.5, 1.2, 0], "reach": 1}]}
     {"after": 0.5, "grabs": []}
   )");
-  const auto client = clothstream({"join", address_, "--events", "--hash", "--input", input});
+  const auto client = clothstream({"join", address_, "--events", "--frames", "--hash", "--input", input});
   EXPECT_TRUE(client->waitForOutput("grabReleased", kPatience)) << client->errors();
   EXPECT_EQ(run({"pause", "small"}).first, 0);
   EXPECT_TRUE(client->waitForOutput("\"notice\"", kPatience)) << client->errors();
@@ -84,6 +84,7 @@ TEST_F(JoinLines, InputTouchesClothAndCausesEvents) {
   EXPECT_EQ(lines.front().at("participants").at(0).at("id"), id);
   EXPECT_EQ(lines.back().at("event"), "summary");
   EXPECT_EQ(lines.back().at("hashMismatches"), 0);
+  std::uint64_t newestTick = 0;
   bool began = false, ended = false, taken = false, released = false;
   for (const Json& line : lines) {
     const std::string event = line.at("event");
@@ -95,6 +96,11 @@ TEST_F(JoinLines, InputTouchesClothAndCausesEvents) {
       began = began || event == "contactBegan";
       ended = ended || event == "contactEnded";
     }
+    if (event == "frame") {
+      EXPECT_GT(line.at("tick"), newestTick);
+      newestTick = line.at("tick");
+      EXPECT_EQ(line.at("hash").get<std::string>().size(), 16u);
+    }
     if (event.starts_with("grab")) {
       EXPECT_EQ(line.at("participant"), id);
       EXPECT_EQ(line.at("grab"), 7);
@@ -102,6 +108,7 @@ TEST_F(JoinLines, InputTouchesClothAndCausesEvents) {
     taken = taken || (event == "grabTaken" && line.at("vertices") > 0);
     released = released || event == "grabReleased";
   }
+  EXPECT_GT(newestTick, 0u);
   EXPECT_TRUE(began && ended && taken && released) << client->output();
 }
 
