@@ -126,6 +126,22 @@ class TlsClient {
   std::string fingerprint_;
 };
 
+using TlsStream = websocket::stream<ssl::stream<tcp::socket>&>;
+
+void joinSmall(TlsStream& stream) {
+  stream.handshake("127.0.0.1", "/stream");
+  stream.binary(true);
+  stream.write(net::buffer(hello("small")));
+}
+
+v1::ServerMessage nextMessage(TlsStream& stream) {
+  beast::flat_buffer incoming;
+  stream.read(incoming);
+  v1::ServerMessage message;
+  EXPECT_TRUE(message.ParseFromArray(incoming.cdata().data(), static_cast<int>(incoming.size())));
+  return message;
+}
+
 TEST_F(TlsEndpoint, ServesPageAndStream) {
   TlsClient client(endpoint_->port());
   ASSERT_FALSE(client.shakeHands());
@@ -133,20 +149,33 @@ TEST_F(TlsEndpoint, ServesPageAndStream) {
   EXPECT_EQ(client.get("/").body(), "<html>cloth</html>");
   EXPECT_EQ(client.get("/none").result(), http::status::not_found);
 
-  websocket::stream<ssl::stream<tcp::socket>&> stream(client.stream());
-  stream.handshake("127.0.0.1", "/stream");
-  stream.binary(true);
-  stream.write(net::buffer(hello("small")));
-  bool frame = false;
-  while (!frame) {
-    beast::flat_buffer incoming;
-    stream.read(incoming);
-    v1::ServerMessage answer;
-    ASSERT_TRUE(answer.ParseFromArray(incoming.cdata().data(), static_cast<int>(incoming.size())));
-    frame = answer.has_frame();
+  TlsStream stream(client.stream());
+  joinSmall(stream);
+  while (!nextMessage(stream).has_frame()) {
   }
   stream.close(websocket::close_code::normal);
   EXPECT_EQ(failedHandshakes().value(), 0U);
+}
+
+// WinHTTP cuts the connection after its close frame.
+TEST_F(TlsEndpoint, TakesCloseFrameAsGoodbyeWithoutTheEndOfTls) {
+  TlsClient watcher(endpoint_->port()), leaving(endpoint_->port());
+  ASSERT_FALSE(watcher.shakeHands());
+  ASSERT_FALSE(leaving.shakeHands());
+  TlsStream watcherStream(watcher.stream()), leavingStream(leaving.stream());
+  joinSmall(watcherStream);
+  while (!nextMessage(watcherStream).has_frame()) {
+  }
+  joinSmall(leavingStream);
+  while (!nextMessage(leavingStream).has_frame()) {
+  }
+  // A close frame with the code 1000 and a mask of zeros.
+  net::write(leaving.stream(), net::buffer(std::string("\x88\x82\0\0\0\0\x03\xe8", 8)));
+  leaving.stream().next_layer().close();
+  v1::PresenceKind kind = v1::PRESENCE_KIND_UNSPECIFIED;
+  while (kind != v1::PRESENCE_KIND_LEFT && kind != v1::PRESENCE_KIND_DISCONNECTED)
+    kind = nextMessage(watcherStream).presence().kind();
+  EXPECT_EQ(kind, v1::PRESENCE_KIND_LEFT);
 }
 
 TEST_F(TlsEndpoint, RedirectsRequestsWithoutTls) {

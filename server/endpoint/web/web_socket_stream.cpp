@@ -131,9 +131,10 @@ void WebSocketStream::read() {
 }
 
 void WebSocketStream::onRead(beast::error_code error) {
-  // Only a close frame is a goodbye. All other errors mean a lost connection.
-  if (error == ws::error::closed && session_) {
-    const std::uint16_t code = socket_.reason().code;
+  // Only a close frame is a goodbye. All other errors mean a lost connection. After its close frame, a client
+  // may cut the connection without the end of TLS, as WinHTTP under Wine does: then the error is another one.
+  const std::uint16_t code = socket_.reason().code;
+  if (error && (error == ws::error::closed || code != ws::close_code::none) && session_) {
     if (code == ws::close_code::going_away || code == kMayReturn)
       session_->closePage();
     else
