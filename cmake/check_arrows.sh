@@ -46,6 +46,7 @@ clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
 clients/native     | clients/core proto/text
 clients/grpc       | clients/core clients/native proto/tls clothstream
 clients/websocket  | clients/native proto/text proto/tls
+clients/websocket/winhttp | clients/websocket clients/native proto/text proto/tls
 clients/library    | clients/native clients/grpc clients/websocket proto/tls
 clients/files      | proto/codec clothstream
 clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
@@ -61,6 +62,9 @@ readonly OUTSIDE='
 <jwt.h>            | server/identity
 <sqlite3           | server/saved_state
 <boost/asio/ssl    | server/tls server/endpoint/web clients/websocket
+<windows.h         | clients/websocket/winhttp
+<winhttp.h         | clients/websocket/winhttp
+<wincrypt.h        | clients/websocket/winhttp
 <qrencode          | server/tls
 <avahi-            | server/discovery clients/cli
 <Eigen/            | server/model server/reference

@@ -9,9 +9,22 @@
 #include <cstdlib>
 #include <new>
 
+#ifdef _WIN32
+#include <malloc.h>
+#endif
+
 namespace clothstream {
 namespace {
 
+#ifdef _WIN32
+void* allocateFromC(void*, std::size_t bytes, std::size_t alignment) noexcept {
+  return _aligned_malloc(bytes, alignment);
+}
+
+void releaseToC(void*, void* memory) noexcept {
+  _aligned_free(memory);
+}
+#else
 void* allocateFromC(void*, std::size_t bytes, std::size_t alignment) noexcept {
   if (alignment <= alignof(std::max_align_t)) return std::malloc(bytes);
   return std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
@@ -20,6 +33,7 @@ void* allocateFromC(void*, std::size_t bytes, std::size_t alignment) noexcept {
 void releaseToC(void*, void* memory) noexcept {
   std::free(memory);
 }
+#endif
 
 // Written only before the library allocates anything for a stream.
 constinit clothstream_allocator active{CLOTHSTREAM_ALLOCATOR_VERSION, nullptr, &allocateFromC, &releaseToC};

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 #include "clients/library/library_transport.h"
@@ -66,7 +67,8 @@ tl::expected<ServerAddress, std::string> readAddress(const char* address, const 
   if (!server.isEncrypted() && !(server.caFile.empty() && fingerprint.empty()))
     return tl::unexpected("options->ca_file and options->fingerprint need TLS: use https://" +
                           server.address + ", or leave them empty.");
-  if (!server.caFile.empty() && !std::ifstream(server.caFile))
+  const std::u8string caFile(server.caFile.begin(), server.caFile.end());
+  if (!caFile.empty() && !std::ifstream(std::filesystem::path(caFile)))
     return tl::unexpected("options->ca_file: cannot read " + server.caFile + ".");
   if (!fingerprint.empty()) {
     auto normal = normalFingerprint(fingerprint);
