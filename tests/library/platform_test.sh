@@ -1,0 +1,152 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Builds libclothstream for another platform, follows a scene there and here at the same time, and compares the bits of
+# each frame: without TLS, with TLS and a fingerprint, and with TLS and an authority. Refused servers are reported.
+# Usage: platform_test.sh windows-x64|linux-arm64 CMAKE SOURCES BUILD SERVER HASHES
+# BUILD: folder of the build, which is used again. HASHES: hashes.c for this machine.
+set -euo pipefail
+platform=$1 cmake=$2 sources=$3 build=$4 server=$5 here=$6
+readonly FRAMES=60
+
+skip() { echo "skipped: $*" && exit 77; }
+fail() { echo "$*" && exit 1; }
+need() { # command package
+  command -v "$1" >/dev/null || skip "$1 is missing; install $2 (./dev test --long does)"
+}
+
+case "$platform" in
+  windows-x64)
+    need x86_64-w64-mingw32-g++-posix g++-mingw-w64-x86-64-posix
+    wine=$(command -v wine64 || echo /usr/lib/wine/wine64)
+    need "$wine" wine64
+    compiler=x86_64-w64-mingw32-gcc-posix
+    ;;
+  linux-arm64)
+    need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
+    need qemu-aarch64 qemu-user
+    [ -e /usr/lib/aarch64-linux-gnu/libssl.so ] ||
+      skip "OpenSSL for arm64 is missing; dpkg --add-architecture arm64, and install libssl-dev:arm64 (./dev test --long does)"
+    compiler=aarch64-linux-gnu-gcc
+    ;;
+  *) fail "no such platform: $platform" ;;
+esac
+
+folder=$(mktemp -d)
+server_pid=
+export WINEPREFIX=$folder/wine WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml=
+unset DISPLAY
+stopServer() {
+  [ -z "$server_pid" ] || kill "$server_pid" 2>/dev/null || true
+  [ -z "$server_pid" ] || wait "$server_pid" 2>/dev/null || true
+  server_pid=
+}
+cleanUp() {
+  stopServer
+  # Ends the processes of this WINEPREFIX only.
+  [ ! -d "$WINEPREFIX" ] || /usr/lib/wine/wineserver64 -k 2>/dev/null || true
+  rm -rf "$folder"
+}
+trap cleanUp EXIT
+
+"$cmake" -S "$sources" -B "$build" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$sources/cmake/toolchains/$platform.cmake" \
+  -DCLOTHSTREAM_CLIENT_ONLY=ON -DCMAKE_BUILD_TYPE=Release -DCMAKE_UNITY_BUILD=ON -DCMAKE_CXX_FLAGS=-Werror \
+  >"$folder/configure" ||
+  fail "$(cat "$folder/configure")"
+"$cmake" --build "$build" --target clothstream_library -- -j2 >"$folder/build" || fail "$(cat "$folder/build")"
+prefix=$folder/prefix
+"$cmake" --install "$build" --prefix "$prefix" >/dev/null
+library=$(find "$prefix" -name 'libclothstream.so' -o -name 'clothstream.dll.a')
+"$compiler" -std=c11 -O2 -Wall -Wextra -Wpedantic -Werror -I"$prefix/include" "$sources/tests/library/hashes.c" "$library" \
+  -o "$folder/hashes"
+
+if [ "$platform" = windows-x64 ]; then
+  "$cmake" -S "$sources/examples/c" -B "$folder/example" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" \
+    -DCMAKE_TOOLCHAIN_FILE="$sources/cmake/toolchains/$platform.cmake" >/dev/null
+  "$cmake" --build "$folder/example" >/dev/null
+  cp "$prefix/bin/clothstream.dll" "$folder/"
+  needs=$(x86_64-w64-mingw32-objdump -p "$folder/clothstream.dll" | sed -n 's/.*DLL Name: //p' | sort | tr 'A-Z\n' 'a-z ')
+  [ "$needs" = "crypt32.dll kernel32.dll msvcrt.dll mswsock.dll winhttp.dll ws2_32.dll " ] ||
+    fail "clothstream.dll must need only libraries of Windows, but it needs $needs"
+  "$wine" wineboot -i >/dev/null 2>&1
+  /usr/lib/wine/wineserver64 -p # stays between the programs
+fi
+
+# there PROGRAM ARGUMENT...: runs a program of the platform.
+there() {
+  case "$platform" in
+    windows-x64) "$wine" "$@" | tr -d '\r' ;;
+    linux-arm64) qemu-aarch64 -L / -E LD_LIBRARY_PATH="${library%/*}" "$@" ;;
+  esac
+}
+
+# serve OPTION...: starts a server on a free port. Sets `address` (HOST:PORT) and `fingerprint`.
+serve() {
+  stopServer
+  "$server" --port 0 --grpc-port 0 --scene small --scene-file "$sources/tests/e2e/small.json" \
+    --state-dir "$folder/state" "$@" >"$folder/server" 2>&1 &
+  server_pid=$!
+  for _ in $(seq 600); do
+    address=$(sed -nE 's/^page *https?:\/\/([^/]*)\/$/\1/p' "$folder/server")
+    [ -n "$address" ] && break
+    if ! kill -0 "$server_pid" 2>/dev/null; then
+      grep -q 'no Vulkan' "$folder/server" && skip "the server needs a Vulkan device"
+      fail "$(cat "$folder/server")"
+    fi
+    sleep 0.1
+  done
+  fingerprint=$(sed -n 's/^key *//p' "$folder/server")
+}
+
+# compare WHAT ADDRESS OPTION...: both must have the same bits for the ticks that both have.
+compare() {
+  local what=$1 same
+  shift
+  "$here" "$1" "$FRAMES" "${@:2}" >"$folder/here" &
+  local pid=$!
+  there "$folder/hashes" "$1" "$FRAMES" "${@:2}" >"$folder/there" || fail "$what: $platform failed"
+  wait "$pid" || fail "$what: the program of this machine failed"
+  for side in here there; do sort -o "$folder/$side" "$folder/$side"; done
+  same=$(comm -12 "$folder/here" "$folder/there" | wc -l)
+  local common
+  common=$(join -j 2 <(sort -k 2,2 "$folder/here") <(sort -k 2,2 "$folder/there") | wc -l)
+  echo "$what: $same of $common common frames have the same bits"
+  [ "$same" -eq "$common" ] && [ "$common" -ge 20 ] || fail "$what: frames differ, or too few are common"
+}
+
+# refuse WHAT TEXT ADDRESS OPTION...: the program must fail and say TEXT.
+refuse() {
+  local what=$1 text=$2 said status=0
+  shift 2
+  said=$(there "$folder/hashes" "$1" 1 "${@:2}" 2>&1) || status=$?
+  [ "$status" -ne 0 ] || fail "$what: was accepted"
+  [[ $said == *"$text"* ]] || fail "$what: '$text' is not in: $said"
+  echo "$what: $said"
+}
+
+serve
+compare "without TLS" "ws://$address"
+if [ "$platform" = windows-x64 ]; then
+  cp "$folder/clothstream.dll" "$folder/example/"
+  said=$(there "$folder/example/follow.exe" "$address")
+  [[ $said == *"320 vertices, the first at "* ]] || fail "the example says: $said"
+fi
+refuse "TLS that the server does not have" "does not answer with TLS" "wss://$address"
+
+mkdir "$folder/keys"
+"$server" token --new-key "$folder/keys/key.pem" >/dev/null
+token=$("$server" token --key "$folder/keys/key.pem" --role participant --name Ada --subject ada)
+serve --tls self --token-keys "$folder/keys"
+authority=$folder/state/tls/self.pem
+compare "fingerprint and token" "wss://$address" fingerprint "$fingerprint" token "$token"
+compare "authority and token" "wss://$address" ca "$authority" token "$token"
+wrong=$(tr '0-9A-F' '1-9A-F0' <<<"$fingerprint")
+refuse "wrong fingerprint" "it has the fingerprint $fingerprint" "wss://$address" fingerprint "$wrong" token "$token"
+refuse "unknown authority" "no known authority has signed its certificate" "wss://$address" token "$token"
+openssl req -x509 -newkey rsa:2048 -nodes -keyout "$folder/other.key" -out "$folder/other.pem" -subj /CN=other 2>/dev/null
+refuse "other authority" "no known authority has signed its certificate" "wss://$address" ca "$folder/other.pem" token "$token"
+refuse "no token" "requires a token" "wss://$address" fingerprint "$fingerprint"
+
+# Each program has left with a close frame, so that the server keeps no place for it.
+stopServer
+! grep 'was disconnected' "$folder/server" || fail "a client that has left counts as lost"
+[ "$(grep -c ' left; ' "$folder/server")" -eq 4 ] || fail "not every client has left: $(cat "$folder/server")"
