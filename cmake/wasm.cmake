@@ -1,8 +1,9 @@
 # The client core as WebAssembly, built from the sources of the native core with Debian's clang for wasm32.
 # Targets: clothstream_core_wasm is the module of the page and uses WebAssembly's SIMD. clothstream_core_wasm_scalar is
 # the same without SIMD, for tests only. The global properties CLOTHSTREAM_CORE_WASM and CLOTHSTREAM_CORE_WASM_SCALAR
-# hold their paths. A module imports nothing. It exports its memory, _initialize, malloc, free and the functions of
-# clients/core/core.h.
+# hold their paths. These modules import nothing. They export their memory, _initialize, malloc, free and the functions
+# of clients/core/core.h. clothstream_recording_wasm is the core with clients/recording, for programs that read
+# recordings; it imports two functions of the host (clients/recording/wasm). CLOTHSTREAM_RECORDING_WASM holds its path.
 find_program(WASM_CXX NAMES clang++ clang++-14 REQUIRED)
 find_program(WASM_LD NAMES wasm-ld wasm-ld-14 REQUIRED)
 
@@ -14,15 +15,20 @@ file(CREATE_LINK ${SIMDE_INCLUDE}/simde ${wasmOut}/include/simde SYMBOLIC)
 set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=hidden -isystem ${wasmOut}/include -std=c++20
   -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow -Werror -I${PROJECT_SOURCE_DIR})
 
-# All functions that core.h declares, except cs_set_clock, which takes a function pointer.
-set(coreHeader ${PROJECT_SOURCE_DIR}/clients/core/core.h)
-set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${coreHeader})
-file(READ ${coreHeader} coreText)
-string(REGEX MATCHALL "cs_[a-z_]+\\(" wasmExports "${coreText}")
-list(TRANSFORM wasmExports REPLACE "\\($" "")
-list(REMOVE_ITEM wasmExports cs_set_clock)
-list(APPEND wasmExports malloc free)
-list(TRANSFORM wasmExports PREPEND -Wl,--export=)
+# clothstream_wasm_exports(RESULT HEADER native...): linker flags that export all functions of a header, except those
+# that only the native library has because they take a path or a function pointer.
+function(clothstream_wasm_exports result header)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${header})
+  file(READ ${header} text)
+  string(REGEX MATCHALL "cs_[a-z_]+\\(" exports "${text}")
+  list(TRANSFORM exports REPLACE "\\($" "")
+  list(REMOVE_ITEM exports ${ARGN})
+  list(TRANSFORM exports PREPEND -Wl,--export=)
+  set(${result} ${exports} PARENT_SCOPE)
+endfunction()
+clothstream_wasm_exports(coreExports ${PROJECT_SOURCE_DIR}/clients/core/core.h cs_set_clock)
+list(APPEND coreExports -Wl,--export=malloc -Wl,--export=free)
+set_property(GLOBAL PROPERTY CLOTHSTREAM_CORE_EXPORTS ${coreExports})
 
 set_property(GLOBAL PROPERTY CLOTHSTREAM_WASM_FLAGS ${wasmFlags})
 
@@ -52,9 +58,10 @@ endfunction()
 # clothstream_wasm_module(FOLDER PROPERTY flags...) builds FOLDER/clothstream_core.wasm and stores its path in PROPERTY.
 function(clothstream_wasm_module folder property)
   get_property(decoderSources GLOBAL PROPERTY CLOTHSTREAM_DECODER_SOURCES)
+  get_property(coreSources GLOBAL PROPERTY CLOTHSTREAM_CLIENT_CORE_SOURCES)
   set(module ${folder}/clothstream_core.wasm)
-  clothstream_link_wasm(${module} FLAGS ${ARGN} EXPORTS ${wasmExports}
-    SOURCES ${CLOTHSTREAM_CLIENT_CORE_SOURCES} ${decoderSources} ${PROJECT_SOURCE_DIR}/clients/core/wasm/runtime.cpp)
+  clothstream_link_wasm(${module} FLAGS ${ARGN} EXPORTS ${coreExports}
+    SOURCES ${coreSources} ${decoderSources} ${PROJECT_SOURCE_DIR}/clients/core/wasm/runtime.cpp)
   set_property(GLOBAL PROPERTY ${property} ${module})
 endfunction()
 
@@ -66,3 +73,20 @@ if(CLOTHSTREAM_TESTS)
   get_property(scalarModule GLOBAL PROPERTY CLOTHSTREAM_CORE_WASM_SCALAR)
   add_custom_target(clothstream_core_wasm_scalar ALL DEPENDS ${scalarModule})
 endif()
+
+# Called when clients/recording is configured.
+function(clothstream_recording_wasm)
+  get_property(coreExports GLOBAL PROPERTY CLOTHSTREAM_CORE_EXPORTS)
+  foreach(part CLIENT_CORE CLIENT_RECORDING RECORDING_READER DECODER)
+    get_property(sources GLOBAL PROPERTY CLOTHSTREAM_${part}_SOURCES)
+    list(APPEND recordingSources ${sources})
+  endforeach()
+  clothstream_wasm_exports(recordingExports ${PROJECT_SOURCE_DIR}/clients/recording/recording.h
+    cs_recording_open cs_recording_open_bytes cs_recording_open_source)
+  set(module ${PROJECT_BINARY_DIR}/web-wasm/recording/clothstream_recording.wasm)
+  clothstream_link_wasm(${module} FLAGS -msimd128 -I${PROJECT_BINARY_DIR}/include
+    EXPORTS ${coreExports} ${recordingExports} -Wl,--export=cs_recording_open_host
+    SOURCES ${recordingSources} ${PROJECT_SOURCE_DIR}/clients/core/wasm/runtime.cpp)
+  add_custom_target(clothstream_recording_wasm ALL DEPENDS ${module})
+  set_property(GLOBAL PROPERTY CLOTHSTREAM_RECORDING_WASM ${module})
+endfunction()

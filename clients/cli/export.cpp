@@ -11,14 +11,15 @@
 #include "clients/cli/error.h"
 #include "clients/cli/gltf_animation.h"
 #include "clients/cli/obj_file.h"
-#include "clients/cli/played_recording.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
+#include "clients/recording/played_recording.h"
 #include "proto/recording/file.h"
 
 namespace clothstream::cli {
 namespace {
 
+using client::PlayedRecording;
 using Done = tl::expected<void, Error>;
 // Takes a frame and its time in seconds since the first frame.
 using TakeFrame = std::function<Done(const cs_client*, double)>;

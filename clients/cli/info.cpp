@@ -10,14 +10,15 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/error.h"
-#include "clients/cli/played_recording.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
+#include "clients/recording/played_recording.h"
 #include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
 
+using client::PlayedRecording;
 using recording::RecordingReader;
 using recording::Topic;
 

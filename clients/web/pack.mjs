@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Packs the packages client and three for npm. Usage: node pack.mjs FOLDER CORE. FOLDER gets a tarball of each package,
-// CORE is clothstream_core.wasm. `tsc --build client three` has written their modules to dist.
+// Packs the packages client and three for npm. Usage: node pack.mjs FOLDER CORE RECORDING. FOLDER gets a tarball of each
+// package, CORE is clothstream_core.wasm and RECORDING clothstream_recording.wasm. `tsc --build client three` has written
+// their modules to dist.
 import { execFileSync } from "node:child_process";
 import { cpSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -8,9 +9,9 @@ import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import ts from "typescript";
 
-const [folder, core] = process.argv.slice(2);
-if (!core) {
-  console.error("Usage: node pack.mjs FOLDER CORE");
+const [folder, core, recording] = process.argv.slice(2);
+if (!recording) {
+  console.error("Usage: node pack.mjs FOLDER CORE RECORDING");
   process.exit(2);
 }
 const web = fileURLToPath(new URL(".", import.meta.url));
@@ -45,7 +46,10 @@ try {
     writeModules(from, join(to, "dist"));
     if (name === "client") {
       cpSync(core, join(to, "dist", "clothstream_core.wasm"));
-      execFileSync("node", [join(web, "write_licenses.mjs"), "core", join(to, "THIRD_PARTY_LICENSES.txt")]);
+      cpSync(recording, join(to, "dist", "clothstream_recording.wasm"));
+      // Part of the tarball, so that the package needs no other.
+      cpSync(join(web, "node_modules/fzstd"), join(to, "node_modules/fzstd"), { recursive: true });
+      execFileSync("node", [join(web, "write_licenses.mjs"), "client", join(to, "THIRD_PARTY_LICENSES.txt")]);
     }
     for (const file of ["package.json", "README.md"]) cpSync(join(from, file), join(to, file));
     cpSync(join(web, "../../LICENSE"), join(to, "LICENSE"));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Writes the licences of what others made: of the client core, or of the whole page. Usage: node write_licenses.mjs core|page FILE
+// Writes the licences of what others made: of the client package, or of the whole page. Usage: node write_licenses.mjs
+// client|page FILE
 import { readFileSync, writeFileSync } from "node:fs";
 
 const kCore = [
@@ -7,16 +8,17 @@ const kCore = [
   ["wasi-libc", "/usr/share/doc/wasi-libc/copyright"],
   ["protozero", "/usr/share/doc/libprotozero-dev/copyright"],
 ];
+const kClient = [["fzstd", new URL("node_modules/fzstd/LICENSE", import.meta.url)]];
 const kPage = [
   ["three.js", new URL("node_modules/three/LICENSE", import.meta.url)],
   ["Draco", "/usr/share/doc/libdraco-dev/copyright"],
   ["Apache License, version 2.0, of which some of the texts above speak", "/usr/share/common-licenses/Apache-2.0"],
 ];
-const parts = { core: kCore, page: [...kCore, ...kPage] };
+const parts = { client: [...kCore, ...kClient], page: [...kCore, ...kPage] };
 
 const [kind, file] = process.argv.slice(2);
 if (!(kind in parts) || !file) {
-  console.error("Usage: node write_licenses.mjs core|page FILE");
+  console.error("Usage: node write_licenses.mjs client|page FILE");
   process.exit(2);
 }
 const text = parts[kind].map(([name, source]) => `${"=".repeat(80)}\n${name}\n${"=".repeat(80)}\n\n${readFileSync(source, "utf8").trim()}\n`);

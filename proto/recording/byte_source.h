@@ -2,6 +2,7 @@
 // Source of a reader's bytes: a file or memory.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -25,7 +26,7 @@ class MemorySource : public ByteSource {
   explicit MemorySource(std::string bytes) : bytes_(std::move(bytes)) {}
   std::uint64_t size() const override { return bytes_.size(); }
   bool read(std::uint64_t offset, std::uint64_t count, std::string& out) const override {
-    out.assign(bytes_, offset, count);
+    out.assign(bytes_, static_cast<std::size_t>(offset), static_cast<std::size_t>(count));
     return true;
   }
 

@@ -41,8 +41,8 @@ class ByteReader {
   std::string_view take(std::uint64_t count) {
     ok_ = ok_ && count <= bytes_.size();
     if (!ok_) return {};
-    const std::string_view taken = bytes_.substr(0, count);
-    bytes_.remove_prefix(count);
+    const std::string_view taken = bytes_.substr(0, static_cast<std::size_t>(count));
+    bytes_.remove_prefix(taken.size());
     return taken;
   }
 

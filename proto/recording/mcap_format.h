@@ -5,11 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <span>
 #include <string>
 #include <string_view>
-
-#include <zlib.h>
 
 namespace clothstream::recording {
 
@@ -41,11 +38,5 @@ inline constexpr std::uint64_t kMaxSummaryBytes = std::uint64_t{256} << 20;
 inline constexpr std::uint64_t kMaxPlainRecordBytes = std::uint64_t{16} << 20;  // schema, channel, metadata
 
 using Metadata = std::map<std::string, std::string>;
-
-// CRC-32 as in zip files, continued from `before`.
-inline std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
-  return static_cast<std::uint32_t>(
-      ::crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
 
 }  // namespace clothstream::recording

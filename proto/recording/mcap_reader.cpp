@@ -5,17 +5,15 @@
 #include <algorithm>
 #include <utility>
 
-#include <fmt/format.h>
-#include <zstd.h>
-
 #include "proto/recording/bytes.h"
+#include "proto/recording/crc32.h"
+#include "proto/recording/decompress.h"
 
 namespace clothstream::recording {
 namespace {
 
-template <typename... Arguments>
-tl::unexpected<std::string> broken(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
-  return tl::unexpected(fmt::format(text, std::forward<Arguments>(arguments)...));
+tl::unexpected<std::string> broken(std::string text) {
+  return tl::unexpected(std::move(text));
 }
 
 using Done = tl::expected<void, std::string>;
@@ -120,7 +118,7 @@ Done McapReader::State::readStart() {
     std::string otherVersion(kMagic);
     otherVersion[kVersionByte] = bytes[kVersionByte];
     if (bytes == otherVersion)
-      return broken("MCAP of version '{}'; only version '0' can be read", bytes.substr(kVersionByte, 1));
+      return broken("MCAP of version '" + bytes.substr(kVersionByte, 1) + "'; only version '0' can be read");
     return broken("not an MCAP file: wrong magic bytes");
   }
   const std::optional<Record> header = recordAt(kMagic.size());
@@ -252,7 +250,7 @@ bool McapReader::State::readSummary() {
   const std::uint64_t footerPart = kRecordHead + kFooterBytes - sizeof crc;
   if (!source->read(start, footerAt - start + footerPart, bytes)) return false;
   if (crc != 0 && crcOf(bytes) != crc) return false;
-  ByteReader summary(std::string_view(bytes).substr(0, footerAt - start));
+  ByteReader summary(std::string_view(bytes).substr(0, static_cast<std::size_t>(footerAt - start)));
   while (summary.left() > 0) {
     const auto opcode = static_cast<Opcode>(summary.number<std::uint8_t>());
     const std::string_view record = summary.take(summary.number<std::uint64_t>());
@@ -326,7 +324,8 @@ tl::expected<McapReader, std::string> McapReader::open(std::unique_ptr<ByteSourc
     scanned->scan();
     state = std::move(scanned);
   }
-  std::ranges::stable_sort(state->chunks, {}, &ChunkPlace::start);
+  std::stable_sort(state->chunks.begin(), state->chunks.end(),
+                   [](const ChunkPlace& a, const ChunkPlace& b) { return a.start < b.start; });
   return McapReader(std::move(state));
 }
 
@@ -361,7 +360,9 @@ const Metadata* McapReader::metadata(const std::string& name) const {
 }
 
 std::size_t McapReader::chunkAt(std::uint64_t time) const {
-  const auto after = std::ranges::upper_bound(state_->chunks, time, {}, &ChunkPlace::start);
+  const auto after =
+      std::upper_bound(state_->chunks.begin(), state_->chunks.end(), time,
+                       [](std::uint64_t sought, const ChunkPlace& chunk) { return sought < chunk.start; });
   const auto count = static_cast<std::size_t>(after - state_->chunks.begin());
   return count == 0 ? 0 : count - 1;
 }
@@ -385,7 +386,7 @@ Done McapReader::State::parseMessages(const ChunkHead& head) {
     if (!fields.ok()) return broken("a message in it is too short");
     message.bytes = fields.rest();
     if (!channels.contains(message.channel))
-      return broken("a message in it belongs to the unknown channel {}", message.channel);
+      return broken("a message in it belongs to the unknown channel " + std::to_string(message.channel));
     if (message.time < head.start || message.time > head.end)
       return broken("a message in it is outside of its time range");
   }
@@ -396,7 +397,7 @@ tl::expected<std::span<const Message>, std::string> McapReader::read(std::size_t
   State& s = *state_;
   const ChunkPlace& place = s.chunks[chunk];
   const auto wrong = [&](std::string_view what) {
-    return broken("the chunk at byte {} cannot be read: {}", place.offset, what);
+    return broken("the chunk at byte " + std::to_string(place.offset) + " cannot be read: " + std::string(what));
   };
   const std::optional<Record> record = s.recordAt(place.offset);
   if (!record || record->opcode != Opcode::chunk || record->length != place.length - kRecordHead)
@@ -410,16 +411,11 @@ tl::expected<std::span<const Message>, std::string> McapReader::read(std::size_t
     if (head->records.size() != head->size) return wrong("it has another size than it says");
     s.records = head->records;
   } else if (head->compression == "zstd") {
-    // Two fields hold the size. Neither is trusted beyond kMaxChunkBytes.
-    if (ZSTD_getFrameContentSize(head->records.data(), head->records.size()) != head->size)
-      return wrong("it has another size than it says");
-    s.records.resize(head->size);
-    if (ZSTD_decompress(s.records.data(), s.records.size(), head->records.data(), head->records.size()) !=
-        head->size)
-      return wrong("its compressed bytes are damaged");
+    if (!decompressZstd(head->records, head->size, s.records))
+      return wrong("its compressed bytes are damaged, or have another size than it says");
   } else {
-    return wrong(
-        fmt::format("it is compressed by '{:.16}', and zstd is what can be read", head->compression));
+    return wrong("it is compressed by '" + std::string(head->compression.substr(0, 16)) +
+                 "', and zstd is what can be read");
   }
   if (head->crc != 0 && crcOf(s.records) != head->crc) return wrong("its checksum does not match");
   if (Done parsed = s.parseMessages(*head); !parsed) return wrong(parsed.error());
@@ -438,8 +434,9 @@ Done McapReader::check() {
   }
   if (s.statistics && (s.statistics->messages != found.messages || s.statistics->chunks != s.chunks.size() ||
                        s.statistics->counts != found.counts))
-    return broken("its statistics count {} messages in {} chunks, but it has {} in {}",
-                  s.statistics->messages, s.statistics->chunks, found.messages, s.chunks.size());
+    return broken("its statistics count " + std::to_string(s.statistics->messages) + " messages in " +
+                  std::to_string(s.statistics->chunks) + " chunks, but it has " +
+                  std::to_string(found.messages) + " in " + std::to_string(s.chunks.size()));
   const std::optional<Record> end = s.recordAt(s.dataEnd);
   std::string bytes;
   if (!end || end->opcode != Opcode::dataEnd || end->end() != s.summaryStart ||
@@ -450,7 +447,7 @@ Done McapReader::check() {
   constexpr std::uint64_t kPiece = std::uint64_t{1} << 20;
   for (std::uint64_t offset = 0; offset < s.dataEnd; offset += kPiece) {
     if (!s.source->read(offset, std::min(kPiece, s.dataEnd - offset), bytes))
-      return broken("the bytes from {} on cannot be read", offset);
+      return broken("the bytes from " + std::to_string(offset) + " on cannot be read");
     crc = crcOf(bytes, crc);
   }
   if (stated != 0 && stated != crc) return broken("the checksum of its data does not match");

@@ -8,6 +8,7 @@
 #include <zstd.h>
 
 #include "proto/recording/bytes.h"
+#include "proto/recording/crc32.h"
 
 namespace clothstream::recording {
 namespace {

@@ -6,21 +6,32 @@
 #include <span>
 #include <utility>
 
-#include <fmt/format.h>
+#include <protozero/pbf_reader.hpp>
 
 #include "proto/codec/packet_header.h"
+#include "proto/wire/message_structure.h"
 
 namespace clothstream::recording {
 
 bool isKeyFrame(std::string_view bytes) {
-  v1::Frame frame;
-  if (!frame.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return false;
-  const auto packet = codec::parsePacket(std::as_bytes(std::span(frame.packet())));
-  return packet && packet->header.kind == codec::PacketKind::key;
+  if (!wellFormed(bytes)) return false;
+  std::string_view packet;
+  protozero::pbf_reader frame(bytes.data(), bytes.size());
+  while (frame.next()) {
+    if (frame.tag_and_type() !=
+        protozero::tag_and_type(kFramePacket, protozero::pbf_wire_type::length_delimited)) {
+      frame.skip();
+      continue;
+    }
+    const protozero::data_view view = frame.get_view();
+    packet = {view.data(), view.size()};
+  }
+  const auto parsed = codec::parsePacket(std::as_bytes(std::span(packet.data(), packet.size())));
+  return parsed && parsed->header.kind == codec::PacketKind::key;
 }
 
 tl::unexpected<std::string> RecordingReader::broken(std::string_view what) const {
-  return tl::unexpected(fmt::format("{} is broken: {}", name_, what));
+  return tl::unexpected(name_ + " is broken: " + std::string(what));
 }
 
 tl::expected<RecordingReader, std::string> RecordingReader::open(const std::string& path, CutFiles cutFiles) {
@@ -32,22 +43,20 @@ tl::expected<RecordingReader, std::string> RecordingReader::open(const std::stri
 tl::expected<RecordingReader, std::string> RecordingReader::open(std::unique_ptr<ByteSource> source,
                                                                  std::string name, CutFiles cutFiles) {
   auto mcap = McapReader::open(std::move(source));
-  if (!mcap) return tl::unexpected(fmt::format("{} cannot be read: {}", name, mcap.error()));
+  if (!mcap) return tl::unexpected(name + " cannot be read: " + mcap.error());
   RecordingReader reader(std::move(*mcap), std::move(name));
   for (const auto& [id, channel] : reader.mcap_.channels()) {
-    const auto known = std::ranges::find(kTopicNames, channel.topic);
+    const auto known = std::find(kTopicNames.begin(), kTopicNames.end(), channel.topic);
     if (known != kTopicNames.end()) reader.topics_[id] = static_cast<Topic>(known - kTopicNames.begin());
   }
   const Metadata* metadata = reader.mcap_.metadata(std::string(kMetadataName));
   if (metadata == nullptr || reader.topics_.empty())
-    return tl::unexpected(fmt::format(
-        "{} is an MCAP file, but no recording of clothstream: its metadata is missing", reader.name_));
+    return tl::unexpected(reader.name_ +
+                          " is an MCAP file, but no recording of clothstream: its metadata is missing");
   reader.metadata_ = *metadata;
   if (cutFiles == CutFiles::refused && !reader.mcap_.indexed())
-    return tl::unexpected(
-        fmt::format("{} is truncated or damaged at its end: `clothstream recover {} OUT` makes a complete "
-                    "recording of the rest",
-                    reader.name_, reader.name_));
+    return tl::unexpected(reader.name_ + " is truncated or damaged at its end: `clothstream recover " +
+                          reader.name_ + " OUT` makes a complete recording of the rest");
   return reader;
 }
 
@@ -99,7 +108,7 @@ tl::expected<std::optional<RecordedMessage>, std::string> RecordingReader::next(
   return std::nullopt;
 }
 
-tl::expected<v1::StreamDescription, std::string> RecordingReader::description() {
+tl::expected<std::string, std::string> RecordingReader::description() {
   rewind();
   for (;;) {
     const auto message = next();
@@ -107,11 +116,7 @@ tl::expected<v1::StreamDescription, std::string> RecordingReader::description() 
     if (!*message) return broken("the description of its stream is missing");
     if ((*message)->topic != Topic::description) continue;
     rewind();
-    v1::StreamDescription description;
-    const std::string_view bytes = (*message)->bytes;
-    if (!description.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-      return broken("the description of its stream is invalid");
-    return description;
+    return std::string((*message)->bytes);
   }
 }
 
@@ -120,14 +125,16 @@ void RecordingReader::rewind() {
 }
 
 tl::expected<std::vector<RecordedMessage>, std::string> RecordingReader::messages(std::size_t chunk,
-                                                                                  Topic topic) {
+                                                                                  Topic topic,
+                                                                                  std::size_t first,
+                                                                                  std::size_t end) {
   std::vector<RecordedMessage> found;
   const auto& channels = mcap_.chunks()[chunk].channels;
   const auto isOfTopic = [&](std::uint16_t channel) { return topicOf(channel) == topic; };
-  if (channels && std::ranges::none_of(*channels, isOfTopic)) return found;
+  if (channels && std::none_of(channels->begin(), channels->end(), isOfTopic)) return found;
   if (auto loaded = load(chunk); !loaded) return tl::unexpected(loaded.error());
-  for (const Message& message : messages_)
-    if (isOfTopic(message.channel)) found.push_back({topic, message.time, message.bytes});
+  for (std::size_t i = first; i < std::min(end, messages_.size()); ++i)
+    if (isOfTopic(messages_[i].channel)) found.push_back({topic, messages_[i].time, messages_[i].bytes});
   return found;
 }
 

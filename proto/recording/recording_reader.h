@@ -2,20 +2,21 @@
 // Reader of recordings: message by message, starting at any time.
 #pragma once
 
-#include <array>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include <tl/expected.hpp>
 
-#include "clothstream/v1/session.pb.h"
 #include "proto/recording/mcap_reader.h"
 #include "proto/recording/topics.h"
 
@@ -49,17 +50,27 @@ class RecordingReader {
   std::uint64_t start() const;
   std::uint64_t end() const;
 
-  // Description of the recorded stream at the start of the recording.
-  [[nodiscard]] tl::expected<v1::StreamDescription, std::string> description();
+  // Serialised StreamDescription at the start of the recording. Rewinds. readDescription parses it.
+  [[nodiscard]] tl::expected<std::string, std::string> description();
 
   // Next message; nothing at the end. Messages of unknown channels are skipped.
   [[nodiscard]] tl::expected<std::optional<RecordedMessage>, std::string> next();
   // Makes the newest key frame at or before `time` the next message; without one, the first message.
   [[nodiscard]] tl::expected<void, std::string> seek(std::uint64_t time);
   void rewind();
-  // All messages of a topic in a chunk, valid until the next call. Does not move the reader.
-  [[nodiscard]] tl::expected<std::vector<RecordedMessage>, std::string> messages(std::size_t chunk,
-                                                                                 Topic topic);
+  // A message: its chunk, and its index among all messages of the chunk.
+  struct Place {
+    std::size_t chunk = 0, message = 0;
+    friend auto operator<=>(const Place&, const Place&) = default;
+  };
+  // Place of the next message, to which go() returns.
+  Place place() const { return {chunk_, message_}; }
+  void go(const Place& place) { std::tie(chunk_, message_) = std::tuple(place.chunk, place.message); }
+  // Messages of a topic in a chunk with an index from `first` to `end` - 1, valid until the next call. Does not
+  // move the reader.
+  [[nodiscard]] tl::expected<std::vector<RecordedMessage>, std::string> messages(
+      std::size_t chunk, Topic topic, std::size_t first = 0,
+      std::size_t end = std::numeric_limits<std::size_t>::max());
   // Recovers after an error of next(): the next message is the first of the following chunk. Returns the
   // chunk that is skipped.
   ChunkPlace passChunk();
@@ -79,6 +90,8 @@ class RecordingReader {
   std::span<const Message> messages_;
 };
 
+// Field number of Frame.packet.
+inline constexpr std::uint32_t kFramePacket = 1;
 // True if a serialised Frame can be decoded without earlier frames.
 bool isKeyFrame(std::string_view frame);
 

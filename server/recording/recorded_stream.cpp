@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "proto/recording/recorded_description.h"
 #include "server/messages/limits.h"
 
 namespace clothstream::recording {
@@ -44,7 +45,7 @@ tl::expected<RecordedStream, std::string> RecordedStream::open(const std::string
 }
 
 tl::expected<RecordedStream, std::string> RecordedStream::of(RecordingReader reader) {
-  auto description = reader.description();
+  auto description = readDescription(reader);
   if (!description) return tl::unexpected(description.error());
   const auto isRate = [](std::uint32_t rate) { return rate >= 1 && rate <= 1000; };
   if (!isRate(description->simulation_rate()) || !isRate(description->stream_rate()))

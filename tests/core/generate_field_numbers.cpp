@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Writes clients/core/wire/field_numbers.h from the descriptors of scene.proto and session.proto.
+// Writes clients/core/wire/field_numbers.h from the descriptors of scene.proto, session.proto and
+// recording.proto.
 // Usage: generate_field_numbers [--check] FILE. With --check it writes nothing, and fails if FILE is out of
 // date.
 #include <cctype>
@@ -11,6 +12,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/wire_format_lite.h>
 
+#include "clothstream/v1/recording.pb.h"
 #include "clothstream/v1/session.pb.h"
 #include "tests/core/generated_file.h"
 
@@ -123,6 +125,7 @@ std::string header() {
       "};\n";
   for (int i = 0; i < session.dependency_count(); ++i) out += fileText(*session.dependency(i));
   out += fileText(session);
+  out += fileText(*clothstream::v1::RecordedTick::descriptor()->file());
   return out + "\n}  // namespace clothstream::client::field\n";
 }
 

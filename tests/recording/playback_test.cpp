@@ -16,6 +16,7 @@
 
 #include "proto/codec/decoder.h"
 #include "proto/codec/encoder.h"
+#include "proto/recording/recorded_description.h"
 #include "proto/recording/recording_writer.h"
 #include "server/scene/live_scene.h"
 #include "tests/codec/motion.h"
@@ -373,7 +374,7 @@ TEST_F(PlaybackTest, SeekGivesTheParametersOfPlayingThrough) {
 
 TEST(ParameterHistory, GivesTheSameWithFewerEntries) {
   RecordingReader reader = readerOf(sampleWithSliders());
-  const v1::StreamDescription description = reader.description().value();
+  const v1::StreamDescription description = readDescription(reader).value();
   const ParameterHistory all(reader, description);
   EXPECT_EQ(all.stride(), 1u);
   const std::size_t one = ParametersInForce(description).now().ByteSizeLong();

@@ -17,6 +17,7 @@
 
 #include "proto/codec/packet_header.h"
 #include "proto/recording/file.h"
+#include "proto/recording/recorded_description.h"
 #include "proto/recording/recording_reader.h"
 #include "server/messages/scene_file.h"
 #include "server/recording/recordings.h"
@@ -187,7 +188,7 @@ TEST_F(RecorderTest, HoldsTheStreamAndRegularKeyFrames) {
   EXPECT_EQ(reader->metadata("scene"), "small");
   EXPECT_EQ(reader->metadata("server"), "test");
   EXPECT_NE(reader->metadata("driver"), "unknown");
-  EXPECT_EQ(reader->description()->scene(), "small");
+  EXPECT_EQ(readDescription(*reader)->scene(), "small");
   std::array<std::size_t, kTopicNames.size()> counts{};
   std::size_t sinceKey = 0, farthest = 0;
   for (auto message = reader->next(); *message; message = reader->next()) {

@@ -12,6 +12,7 @@
 #include "proto/codec/packet_header.h"
 #include "proto/recording/file.h"
 #include "proto/recording/mcap_reader.h"
+#include "proto/recording/recorded_description.h"
 #include "proto/recording/recording_reader.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/recording/sample.h"
@@ -32,7 +33,7 @@ TEST(Recording, RoundTrips) {
   EXPECT_TRUE(reader.check().has_value());
   EXPECT_EQ(reader.metadata("scene"), "sample");
   EXPECT_EQ(reader.metadata("driver"), "unknown");
-  EXPECT_EQ(reader.description()->scene(), "sample");
+  EXPECT_EQ(readDescription(reader)->scene(), "sample");
   EXPECT_EQ(reader.start(), sampleTime(0));
   EXPECT_EQ(reader.end(), sampleTime(kSampleFrames - 1));
   std::uint64_t frames = 0, ticks = 0;
@@ -161,7 +162,7 @@ TEST(Recording, ReadsAnyBytesSafely) {
       countMessages(*reader, topic);
     }
     (void)reader->seek(random());
-    (void)reader->description();
+    (void)readDescription(*reader);
     (void)reader->check();
   }
 }

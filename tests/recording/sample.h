@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "clothstream/v1/session.pb.h"
 #include "proto/codec/stream_layout.h"
 #include "proto/recording/mcap_writer.h"
 #include "proto/recording/recording_reader.h"

@@ -7,23 +7,6 @@
 namespace clothstream::client {
 namespace {
 
-// Reads a Sphere or a Capsule. A Sphere is a Capsule without a length.
-bool readRound(Bytes message, Collider& collider) {
-  using F = field::Capsule;
-  static_assert(field::Sphere::kRadius.tag == F::kRadius.tag);
-  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    if (tag == F::kRadius.tag) return setFinite(collider.radius, reader);
-    return tag == F::kLength.tag ? setFinite(collider.length, reader) : skip(reader);
-  });
-}
-
-bool readBox(Bytes message, Vec3& size) {
-  using F = field::Box;
-  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    return tag == F::kSize.tag ? readVec3(reader.get_view(), size) : skip(reader);
-  });
-}
-
 // Appends the triangles of a face as a fan around its first corner.
 bool readFace(Bytes message, std::vector<std::uint32_t>& triangles) {
   using F = field::Face;
@@ -41,6 +24,22 @@ bool readFace(Bytes message, std::vector<std::uint32_t>& triangles) {
 }
 
 }  // namespace
+
+bool readRound(Bytes message, Collider& collider) {
+  using F = field::Capsule;
+  static_assert(field::Sphere::kRadius.tag == F::kRadius.tag);
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kRadius.tag) return setFinite(collider.radius, reader);
+    return tag == F::kLength.tag ? setFinite(collider.length, reader) : skip(reader);
+  });
+}
+
+bool readBox(Bytes message, Vec3& size) {
+  using F = field::Box;
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    return tag == F::kSize.tag ? readVec3(reader.get_view(), size) : skip(reader);
+  });
+}
 
 bool readCollider(Bytes message, Collider& collider) {
   using F = field::ColliderState;

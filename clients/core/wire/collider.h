@@ -35,6 +35,9 @@ struct Hull {
 // number is not finite, or there are more elements than the protocol allows.
 [[nodiscard]] bool readCollider(Bytes message, Collider& collider);
 [[nodiscard]] std::optional<Hull> readHull(Bytes message);
+// Reads radius and length of a Sphere or a Capsule. A Sphere is a Capsule without a length.
+[[nodiscard]] bool readRound(Bytes message, Collider& collider);
+[[nodiscard]] bool readBox(Bytes message, Vec3& size);
 
 // Limit for the colliders of the scene and of all participants together.
 inline constexpr std::size_t kMaxSceneColliders = 4096;

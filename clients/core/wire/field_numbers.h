@@ -721,4 +721,89 @@ struct StopRecordingResponse {
   static constexpr Field kBytes{2, WireType::kVarint};
 };
 
+// clothstream/v1/recording.proto
+struct Recovery {
+  static constexpr std::uint32_t kNone = 0;
+  static constexpr std::uint32_t kRollback = 1;
+  static constexpr std::uint32_t kReset = 2;
+};
+struct AppliedGripState {
+  static constexpr std::uint32_t kFree = 0;
+  static constexpr std::uint32_t kHolds = 1;
+  static constexpr std::uint32_t kTakes = 2;
+};
+struct ParticipantEventKind {
+  static constexpr std::uint32_t kUnspecified = 0;
+  static constexpr std::uint32_t kJoined = 1;
+  static constexpr std::uint32_t kLeft = 2;
+};
+struct RecordedScene {
+  static constexpr Field kScene{1, WireType::kBytes};
+};
+struct Checkpoint {
+  static constexpr Field kTick{1, WireType::kVarint};
+  static constexpr Field kState{2, WireType::kBytes};
+  static constexpr Field kRestored{3, WireType::kVarint};
+  static constexpr Field kGripsHold{4, WireType::kVarint};
+  static constexpr Field kHeld{5, WireType::kBytes};
+  static constexpr Field kStart{50, WireType::kVarint};
+};
+struct HeldNodes {
+  static constexpr Field kNodes{1, WireType::kBytes};
+  static constexpr Field kGrabs{2, WireType::kBytes};
+  static constexpr Field kPlaces{3, WireType::kBytes};
+  static constexpr Field kTaken{4, WireType::kBytes};
+  static constexpr Field kSlipped{5, WireType::kBytes};
+  static constexpr Field kOffsets{6, WireType::kBytes};
+};
+struct RecordedTick {
+  static constexpr Field kTick{1, WireType::kVarint};
+  static constexpr Field kStateHash{2, WireType::kFixed64};
+  static constexpr Field kUnhealthy{3, WireType::kVarint};
+  static constexpr Field kRecovery{4, WireType::kVarint};
+  static constexpr Field kKeepsState{5, WireType::kVarint};
+  static constexpr Field kCloths{6, WireType::kBytes};
+  static constexpr Field kGravity{7, WireType::kBytes};
+  static constexpr Field kWind{8, WireType::kBytes};
+  static constexpr Field kAirDensity{9, WireType::kFixed32};
+  static constexpr Field kColliders{10, WireType::kBytes};
+  static constexpr Field kAttachments{11, WireType::kBytes};
+  static constexpr Field kGrips{12, WireType::kBytes};
+  static constexpr Field kSubsteps{60, WireType::kVarint};
+};
+struct ClothParameters {
+  static constexpr Field kCloth{1, WireType::kBytes};
+  static constexpr Field kTakenBack{2, WireType::kFixed32};
+};
+struct AppliedCollider {
+  static constexpr Field kStart{1, WireType::kBytes};
+  static constexpr Field kEnd{2, WireType::kBytes};
+  static constexpr Field kFriction{3, WireType::kFixed32};
+  static constexpr Field kParticipantId{4, WireType::kVarint};
+  static constexpr Field kId{5, WireType::kVarint};
+  static constexpr Field kSphere{6, WireType::kBytes};
+  static constexpr Field kCapsule{7, WireType::kBytes};
+  static constexpr Field kPlane{8, WireType::kBytes};
+  static constexpr Field kBox{9, WireType::kBytes};
+};
+struct AppliedGrip {
+  static constexpr Field kState{1, WireType::kVarint};
+  static constexpr Field kStart{2, WireType::kBytes};
+  static constexpr Field kEnd{3, WireType::kBytes};
+  static constexpr Field kRadius{4, WireType::kFixed32};
+  static constexpr Field kReach{5, WireType::kFixed32};
+  static constexpr Field kMaxForce{6, WireType::kFixed32};
+  static constexpr Field kSlipDistance{7, WireType::kFixed32};
+  static constexpr Field kPlaceNodes{8, WireType::kBytes};
+  static constexpr Field kPlaceWeights{9, WireType::kBytes};
+  static constexpr Field kLeftAtStart{10, WireType::kFixed32};
+  static constexpr Field kLeftAtEnd{11, WireType::kFixed32};
+};
+struct ParticipantEvent {
+  static constexpr Field kParticipantId{1, WireType::kVarint};
+  static constexpr Field kKind{2, WireType::kVarint};
+  static constexpr Field kClientName{3, WireType::kBytes};
+  static constexpr Field kDisplayName{4, WireType::kBytes};
+};
+
 }  // namespace clothstream::client::field

@@ -171,7 +171,7 @@ bool readFrame(Bytes message, Frame& frame) {
   using F = field::Frame;
   frame.packet = {};
   frame.tickTimeUs = frame.packetTimeUs = 0;
-  frame.reconstructionHash = 0;
+  frame.reconstructionHash = frame.stateHash = 0;
   frame.colliders.clear();
   frame.report.reset();
   frame.divisor = 1;
@@ -185,6 +185,8 @@ bool readFrame(Bytes message, Frame& frame) {
         return set(frame.packetTimeUs, reader.get_uint64());
       case F::kReconstructionHash.tag:
         return set(frame.reconstructionHash, reader.get_fixed64());
+      case F::kStateHash.tag:
+        return set(frame.stateHash, reader.get_fixed64());
       case F::kColliders.tag:
         if (frame.colliders.size() == kMaxSceneColliders) return false;
         frame.colliders.push_back(reader.get_view());

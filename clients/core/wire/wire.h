@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,7 @@
 
 #include "clients/core/wire/field_numbers.h"
 #include "proto/text/utf8.h"
+#include "proto/wire/message_structure.h"
 
 namespace clothstream::client {
 
@@ -23,9 +25,9 @@ using Bytes = protozero::data_view;
 using Reader = protozero::pbf_reader;
 using Vec3 = std::array<float, 3>;
 
-// Whether the bytes are a sequence of complete fields: a tag with a valid number and a proto3 wire type,
-// varints of at most ten bytes, lengths within the message. Submessages are not checked.
-[[nodiscard]] bool wellFormed(Bytes message);
+[[nodiscard]] inline bool wellFormed(Bytes message) {
+  return clothstream::wellFormed(std::string_view(message.data(), message.size()));
+}
 
 // Field number with a wire type, as on the wire. A known number with an unexpected wire type does not match,
 // so it is skipped like an unknown field.

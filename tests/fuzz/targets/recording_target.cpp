@@ -13,6 +13,7 @@
 
 #include "clothstream/v1/recording.pb.h"
 #include "inputs.pb.h"
+#include "proto/recording/recorded_description.h"
 #include "proto/recording/recording_reader.h"
 #include "proto/recording/recording_writer.h"
 #include "server/messages/scene_message.h"
@@ -148,7 +149,7 @@ void readAll(const std::string& bytes) {
   auto reader = open(bytes, CutFiles::read);
   if (!reader) return require(!reader.error().empty(), "an error has a text");
   static_cast<void>(reader->check());
-  static_cast<void>(reader->description());
+  static_cast<void>(recording::readDescription(*reader));
   Simulation simulation;
   for (;;) {
     const auto message = reader->next();

@@ -8,6 +8,18 @@ import { HandSide, kMaxColliders, kMaxGrabs, type Grab, type GrabEvent, type Hea
 const kJointFloats = 4; // x, y, z, radius
 const kHandJoints = 25; // of WebXR
 
+// Events of all participants' grabs in the newest ClientEvent.grabs.
+export function readGrabEvents(handle: CoreHandle): GrabEvent[] {
+  const { core, pointer } = handle;
+  return handle.list(core.exports.cs_grab_event_count(pointer), core.exports.cs_get_grab_event, (view, at) => ({
+    participant: view.getBigUint64(at + cs_grab_event.participant_id, true),
+    grab: view.getUint32(at + cs_grab_event.grab_id, true),
+    vertices: view.getUint32(at + cs_grab_event.vertices, true),
+    distance: view.getFloat32(at + cs_grab_event.distance, true),
+    ticksSinceSeen: Number(view.getBigUint64(at + cs_grab_event.ticks_since_seen, true)),
+  }));
+}
+
 export class Input {
   // Arrays of structs for a call: as large as the largest of them.
   private readonly array: number;
@@ -22,14 +34,7 @@ export class Input {
   grabEvents(): GrabEvent[] {
     const { core, pointer } = this.handle;
     const own = core.exports.cs_participant_id(pointer);
-    const events = this.handle.list(core.exports.cs_grab_event_count(pointer), core.exports.cs_get_grab_event, (view, at) => ({
-      participant: view.getBigUint64(at + cs_grab_event.participant_id, true),
-      grab: view.getUint32(at + cs_grab_event.grab_id, true),
-      vertices: view.getUint32(at + cs_grab_event.vertices, true),
-      distance: view.getFloat32(at + cs_grab_event.distance, true),
-      ticksSinceSeen: Number(view.getBigUint64(at + cs_grab_event.ticks_since_seen, true)),
-    }));
-    return events.filter(({ participant }) => participant === own);
+    return readGrabEvents(this.handle).filter(({ participant }) => participant === own);
   }
 
   // Sets all grabs of this participant; a missing one releases. A new id starts a new grab.

@@ -117,16 +117,36 @@ export interface CoreExports {
   cs_get_ban(client: Pointer, index: number, out: Pointer): number;
 }
 
+// Functions of clients/recording/recording.h, which only clothstream_recording.wasm has.
+export interface RecordingExports extends CoreExports {
+  cs_recording_open_host(source: number, bytes: number): Pointer;
+  cs_recording_close(recording: Pointer): void;
+  cs_recording_is_open(recording: Pointer): number;
+  cs_recording_error_text(recording: Pointer): Pointer;
+  cs_recording_client(recording: Pointer): Pointer;
+  cs_recording_get_info(recording: Pointer, out: Pointer): number;
+  cs_recording_metadata(recording: Pointer, name: Pointer): Pointer;
+  cs_recording_next(recording: Pointer, kinds: number, out: Pointer): number;
+  cs_recording_seek(recording: Pointer, seconds: number, out: Pointer): number;
+  cs_recording_seek_tick(recording: Pointer, tick: bigint, out: Pointer): number;
+  cs_recording_message(recording: Pointer, bytes: Pointer): Pointer;
+  cs_recording_get_tick(recording: Pointer, out: Pointer): number;
+  cs_recording_get_collider(recording: Pointer, index: number, out: Pointer): number;
+  cs_recording_get_attachment(recording: Pointer, index: number, out: Pointer): number;
+  cs_recording_get_grab(recording: Pointer, index: number, out: Pointer): number;
+  cs_recording_state(recording: Pointer, nodeCount: Pointer, tick: Pointer): Pointer;
+}
+
 const kNull: Pointer = 0;
 
 // Any call may grow the memory, which detaches every view. Get a new view for each access.
-export class CoreModule {
+export class CoreModule<Exports extends CoreExports = CoreExports> {
   private readonly decoder = new TextDecoder();
   private readonly encoder = new TextEncoder();
 
   private data: DataView;
 
-  private constructor(readonly exports: CoreExports) {
+  private constructor(readonly exports: Exports) {
     this.data = new DataView(exports.memory.buffer);
   }
 
@@ -141,8 +161,13 @@ export class CoreModule {
   }
 
   static async start(module: WebAssembly.Module): Promise<CoreModule> {
-    const instance = await WebAssembly.instantiate(module);
-    const exports = instance.exports as unknown as CoreExports;
+    return CoreModule.startWith<CoreExports>(module, {});
+  }
+
+  // Starts a module that imports functions.
+  static async startWith<Exports extends CoreExports>(module: WebAssembly.Module, imports: WebAssembly.Imports): Promise<CoreModule<Exports>> {
+    const instance = await WebAssembly.instantiate(module, imports);
+    const exports = instance.exports as unknown as Exports;
     exports._initialize();
     return new CoreModule(exports);
   }

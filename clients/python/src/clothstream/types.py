@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: MIT
+"""Plain data: what a scene contains, what happens in it, and what can be changed. Units are SI; coordinates are
+right-handed with +Y up."""
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+from . import _bindings as b
+
+Vec3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+"""x, y, z, w."""
+Spring = tuple[float, float]
+"""Stiffness in N/m and damping in N s/m."""
+
+
+class Event(enum.IntFlag):
+    """What changed."""
+
+    FRAME = b.CS_EVENT_FRAME
+    DESCRIPTION = b.CS_EVENT_DESCRIPTION
+    NOTICE = b.CS_EVENT_NOTICE
+    ERROR = b.CS_EVENT_ERROR
+    PARAMETERS = b.CS_EVENT_PARAMETERS
+    SCENES = b.CS_EVENT_SCENES
+    REPORT = b.CS_EVENT_REPORT
+    GRABS = b.CS_EVENT_GRABS
+    CONTACTS = b.CS_EVENT_CONTACTS
+    PARTICIPANTS = b.CS_EVENT_PARTICIPANTS
+    PRESENCE = b.CS_EVENT_PRESENCE
+    RETURNED = b.CS_EVENT_RETURNED
+    PLAYBACK = b.CS_EVENT_PLAYBACK
+    TOKEN = b.CS_EVENT_TOKEN
+    PAIRING_CODE = b.CS_EVENT_PAIRING_CODE
+    ANSWER = b.CS_EVENT_ANSWER
+
+
+class Role(enum.IntEnum):
+    UNSPECIFIED = b.CS_ROLE_UNSPECIFIED
+    VIEWER = b.CS_ROLE_VIEWER
+    PARTICIPANT = b.CS_ROLE_PARTICIPANT
+    OWNER = b.CS_ROLE_OWNER
+
+
+class Shape(enum.IntEnum):
+    """Shape of a collider, in its own frame."""
+
+    SPHERE = b.CS_SHAPE_SPHERE  # radius
+    CAPSULE = b.CS_SHAPE_CAPSULE  # radius; length of the segment along Y, centred on the origin
+    PLANE = b.CS_SHAPE_PLANE  # the half-space y <= 0
+    BOX = b.CS_SHAPE_BOX  # size, centred on the origin
+    HULL = b.CS_SHAPE_HULL
+
+
+class Solver(enum.IntEnum):
+    AS_IS = b.CS_SOLVER_AS_IS
+    MASS_SPRING = b.CS_SOLVER_MASS_SPRING
+    CONSTRAINT = b.CS_SOLVER_CONSTRAINT
+    ACAD = b.CS_SOLVER_ACAD
+    XPBD = b.CS_SOLVER_XPBD
+    IMPLICIT_EULER = b.CS_SOLVER_IMPLICIT_EULER
+
+
+@dataclasses.dataclass(frozen=True)
+class Cloth:
+    name: str
+    first_vertex: int
+    vertex_count: int
+    rows: int  # 0 if the cloth is not a grid
+    columns: int
+    first_index: int  # range of its corners in the flattened triangles
+    index_count: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Collider:
+    name: str  # of a participant's collider: its id
+    shape: int  # Shape
+    position: Vec3  # m
+    orientation: Quaternion
+    radius: float  # m
+    length: float  # m
+    size: Vec3  # m
+    participant_id: int  # 0: the scene
+
+
+@dataclasses.dataclass(frozen=True)
+class Participant:
+    id: int
+    name: str
+    client_name: str
+    role: int  # Role, or a newer role
+    away: int  # 1 if the connection is lost and the server waits for a reconnect
+
+
+@dataclasses.dataclass(frozen=True)
+class Presence:
+    kind: int  # 1 joined, 2 left, 3 role changed, 4 disconnected, 5 returned
+    reason: int  # of leaving: 1 left, 2 timed out, 3 removed
+    by: int  # id of the participant who caused it; 0: the participant itself or the server
+    participant: Participant
+
+
+@dataclasses.dataclass(frozen=True)
+class Environment:
+    gravity: Vec3  # m/s^2
+    wind: Vec3  # m/s
+    air_density: float  # kg/m^3
+    gust_strength: float  # m/s; 0: no gusts
+    gust_seconds: float
+
+
+@dataclasses.dataclass(frozen=True)
+class ClothSettings:
+    """Parameters of a cloth. NaN, and -1 for bend_constraints and assembled: not known, or its solver has none."""
+
+    structural: Spring
+    shear: Spring
+    bend: Spring
+    damping: float  # 1/s
+    drag: float
+    lift: float
+    friction: float
+    thickness: float  # m
+    solver: int  # Solver, or a newer kind
+    bend_constraints: int
+    iterations: int
+    tolerance: float
+    compliance: float  # m/N
+    activation: float
+    assembled: int
+    dihedral_bending: float  # N m
+    ball_radius: float  # m
+    ball_friction: float
+    tether_slack: float
+
+
+@dataclasses.dataclass(frozen=True)
+class GrabEvent:
+    participant_id: int
+    grab_id: int
+    kind: int  # 1 taken, 2 slipped, 3 released
+    vertices: int  # number of vertices that the grab holds now
+
+
+@dataclasses.dataclass(frozen=True)
+class ContactEvent:
+    kind: int  # 1 began, 2 ended
+    collider_id: int
+    participant_id: int  # 0: a collider of the scene
+    collider: str
+    cloth: str
+    impulse: float  # N s
+    seconds: float
+
+
+@dataclasses.dataclass(frozen=True)
+class ClothReport:
+    """Measurements of a cloth by the server, a few times per second."""
+
+    active_constraints: int
+    iterations: int
+    residual: float
+    strain_max: float  # fraction of the rest length
+    strain_p99: float
+    strain_mean: float
+    kinetic_energy: float  # J
+    elastic_energy: float
+    gravity_energy: float
+    penetration: float  # m
+    device_ms: float
+    tick: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Statistics:
+    tick: int
+    frames: int
+    key_frames: int
+    dropped: int
+    decode_errors: int
+    bytes: int
+    hash_mismatches: int
+    frames_per_second: float
+    kbit_per_second: float
+    bits_per_vertex: float
+    round_trip_ms: float
+    clock_offset_us: float
+    decode_ms: float
+
+
+@dataclasses.dataclass(frozen=True)
+class SceneSummary:
+    name: str
+    description: str
+    vertex_count: int
+    cloth_count: int
+    participants: int
+    max_participants: int
+    running: int
+    paused: int
+    created: int
+    recorded: int
+    is_recording: int
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnCollider:
+    """Collider of this participant: a sphere, capsule or box."""
+
+    shape: Shape = Shape.SPHERE
+    position: Vec3 = (0, 0, 0)  # m
+    orientation: Quaternion = (0, 0, 0, 1)
+    radius: float = 0.1  # m
+    length: float = 0  # m
+    size: Vec3 = (0, 0, 0)  # m
+
+
+@dataclasses.dataclass(frozen=True)
+class Grab:
+    """Hand that holds the cloth. NaN: the server's default."""
+
+    id: int  # a new id takes hold; an id that is missing in the next call lets go
+    position: Vec3  # m
+    orientation: Quaternion = (0, 0, 0, 1)
+    radius: float = float("nan")  # m
+    reach: float = float("nan")  # m
+    max_force: float = float("nan")  # N
+    slip_distance: float = float("nan")  # m
