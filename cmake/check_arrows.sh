@@ -13,8 +13,9 @@ proto/discovery    |
 proto/hands        |
 server/model       | proto/parameters
 server/vulkan      |
+proto/wire         |
 proto/codec        |
-proto/recording    | proto/codec clothstream
+proto/recording    | proto/codec proto/wire clothstream
 server/reference   | server/model
 server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
@@ -42,7 +43,8 @@ server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/touch | clients/core/core.h clients/core/wire proto/codec proto/hands
-clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text
+clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text proto/wire
+clients/recording  | clients/core proto/codec proto/recording
 clients/native     | clients/core proto/text
 clients/grpc       | clients/core clients/native proto/tls clothstream
 clients/websocket  | clients/native proto/text proto/tls
@@ -50,7 +52,7 @@ clients/websocket/winhttp | clients/websocket clients/native proto/text proto/tl
 clients/library    | clients/native clients/grpc clients/websocket proto/tls
 clients/files      | proto/codec clothstream
 clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
-clients/cli        | proto/text proto/discovery clients/core clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream
+clients/cli        | proto/text proto/discovery clients/core clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream
 '
 # rooms that may include these headers
 readonly OUTSIDE='

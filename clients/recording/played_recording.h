@@ -38,7 +38,7 @@ class PlayedRecording {
   [[nodiscard]] tl::expected<std::optional<PlayedMessage>, std::string> next(std::uint32_t kinds);
   // Continues to the next frame. Returns false at the end.
   [[nodiscard]] tl::expected<bool, std::string> next();
-  // Goes to the newest frame at or before a time (ns since 1970) or a tick; nothing if there is none.
+  // Goes to the newest frame at or before a time (ns since 1970) or a tick; nothing without such a frame.
   [[nodiscard]] tl::expected<std::optional<PlayedMessage>, std::string> seek(std::uint64_t time);
   [[nodiscard]] tl::expected<std::optional<PlayedMessage>, std::string> seekTick(std::uint64_t tick);
 

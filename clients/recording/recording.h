@@ -84,8 +84,8 @@ typedef struct cs_recording_info {
 } cs_recording_info;
 /* Fails if the recording is not open or `out->version` is unknown. */
 int cs_recording_get_info(const cs_recording* recording, cs_recording_info* out) CS_NOEXCEPT;
-/* Value of an entry of the metadata, such as "server", "scene", "started" or "device" (docs/recording.md); "" if
- * there is none. Valid until cs_recording_close. */
+/* Value of an entry of the metadata, such as "server", "scene", "started" or "device" (docs/recording.md); ""
+ * without one. Valid until cs_recording_close. */
 const char* cs_recording_metadata(const cs_recording* recording, const char* name) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
@@ -134,7 +134,7 @@ typedef enum cs_recording_result {
 cs_recording_result cs_recording_next(cs_recording* recording, uint32_t kinds, cs_recorded* out) CS_NOEXCEPT;
 /* Goes to a time, in seconds since the start: the client shows the newest frame at or before it, as if the
  * recording had been played up to there, with the parameters and participants of this time. Decoding starts at
- * the key frame before. *out: this frame; its kind is 0 if there is none, and the client shows the rest state.
+ * the key frame before. *out: this frame. Without such a frame its kind is 0, and the client shows the rest state.
  * out may be NULL. Statistics of the client continue. Fails if the recording is not open, the time is not a
  * number, the version is unknown, or the bytes cannot be read. */
 int cs_recording_seek(cs_recording* recording, double seconds, cs_recorded* out) CS_NOEXCEPT;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <memory>
 #include <optional>
@@ -10,6 +11,8 @@
 #include <utility>
 #include <variant>
 #include <vector>
+
+#include <clothstream/recording.h>
 
 #include "clothstream/v1/recording.pb.h"
 #include "inputs.pb.h"
@@ -222,11 +225,62 @@ void play(const std::string& bytes, const RecordingInput& input) {
   }
 }
 
+// Reads to the end through the C interface, as a client without a server does.
+void readToTheEnd(cs_recording* recording, std::size_t most) {
+  cs_recorded message{};
+  message.version = CS_RECORDED_VERSION;
+  // Every message and every chunk that cannot be read come once.
+  for (std::size_t i = 0; i <= most; ++i) {
+    const cs_recording_result result = cs_recording_next(recording, CS_RECORDED_ALL, &message);
+    if (result == CS_RECORDING_END) return;
+    if (result == CS_RECORDING_ERROR) {
+      require(*cs_recording_error_text(recording) != '\0', "an error has a text");
+      if (cs_get_state(cs_recording_client(recording)) == CS_STATE_FAILED) return;
+      continue;
+    }
+    cs_recorded_tick tick{};
+    tick.version = CS_RECORDED_TICK_VERSION;
+    cs_recorded_collider collider{};
+    if (cs_recording_get_tick(recording, &tick) == 1)
+      require(cs_recording_get_collider(recording, tick.collider_count, &collider) == 0,
+              "a tick has as many colliders as it says");
+    std::uint32_t nodes = 0;
+    const float* state = cs_recording_state(recording, &nodes, nullptr);
+    float sum = 0;  // read, so that a sanitizer finds a state that is too small
+    for (std::size_t number = 0; number < std::size_t{6} * nodes; ++number) sum += state[number];
+    require(nodes > 0 || sum == 0, "no nodes have no state");
+    const cs_client* client = cs_recording_client(recording);
+    const float* positions = cs_positions(client);
+    for (std::size_t number = 0; number < std::size_t{3} * cs_vertex_count(client); ++number)
+      require(std::isfinite(positions[number]), "positions are numbers");
+  }
+  require(false, "a recording ends");
+}
+
+void playInClient(const std::string& bytes, const RecordingInput& input) {
+  cs_recording* recording =
+      cs_recording_open_bytes(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+  require((cs_recording_is_open(recording) == 1) == (cs_recording_client(recording) != nullptr),
+          "an open recording has a client");
+  if (cs_recording_is_open(recording) == 1) {
+    readToTheEnd(recording, bytes.size());
+    int seeks = 0;
+    for (const float seconds : input.seeks()) {
+      if (++seeks > 8) break;
+      if (cs_recording_seek(recording, seconds, nullptr) == 1) readToTheEnd(recording, bytes.size());
+      const std::uint64_t tick = std::isfinite(seconds) ? static_cast<std::uint64_t>(std::fmod(std::abs(seconds), 64)) : 0;
+      if (cs_recording_seek_tick(recording, tick, nullptr) == 1) readToTheEnd(recording, bytes.size());
+    }
+  }
+  cs_recording_close(recording);
+}
+
 void run(const RecordingInput& input) {
   const std::string bytes = fileOf(input);
   readAll(bytes);
   recover(bytes);
   play(bytes, input);
+  playInClient(bytes, input);
 }
 
 constexpr std::array<std::string_view, 3> kWords{"sheet", "sample", "ball"};

@@ -9,7 +9,7 @@ const kJointFloats = 4; // x, y, z, radius
 const kHandJoints = 25; // of WebXR
 
 // Events of all participants' grabs in the newest ClientEvent.grabs.
-export function readGrabEvents(handle: CoreHandle): GrabEvent[] {
+export function readGrabEvents(handle: CoreHandle): (GrabEvent & { participant: bigint })[] {
   const { core, pointer } = handle;
   return handle.list(core.exports.cs_grab_event_count(pointer), core.exports.cs_get_grab_event, (view, at) => ({
     participant: view.getBigUint64(at + cs_grab_event.participant_id, true),

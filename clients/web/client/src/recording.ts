@@ -140,7 +140,7 @@ function succeeded(body: () => boolean): number {
   }
 }
 
-// A recording that is played. After next() and the seeks, all members tell of this place in it.
+// A recording that is played. All members describe the place up to which it was read.
 export class Recording {
   readonly frames: Frames;
   readonly parameters: Parameters;
@@ -193,7 +193,7 @@ export class Recording {
     };
   }
 
-  // Entry of the metadata, such as "server" or "scene" (docs/recording.md); "" if there is none.
+  // Entry of the metadata, such as "server" or "scene" (docs/recording.md); "" without one.
   metadata(name: string): string {
     return this.core.with([name], (text) => this.core.text(this.core.exports.cs_recording_metadata(this.pointer, text!)));
   }
@@ -207,8 +207,8 @@ export class Recording {
     return result === 0 ? undefined : this.message(out);
   }
 
-  // Goes to the newest frame at or before a time, in seconds since the start; undefined if there is none. Throws if it
-  // cannot be read.
+  // Goes to the newest frame at or before a time, in seconds since the start; undefined without such a
+  // frame. Throws if it cannot be read.
   seek(seconds: number): RecordedMessage | undefined {
     const out = this.prepared(CS_RECORDED_VERSION);
     if (this.core.exports.cs_recording_seek(this.pointer, seconds, out) === 0) throw this.error();
@@ -228,7 +228,7 @@ export class Recording {
   }
 
   // Events of grabs in the newest message of the kind events.
-  grabEvents(): GrabEvent[] {
+  grabEvents(): (GrabEvent & { participant: bigint })[] {
     return readGrabEvents(this.handle);
   }
 
@@ -316,7 +316,7 @@ export class Recording {
 function readPose(view: DataView, at: number): RecordedPose {
   return {
     position: vec3(view, at + cs_recorded_pose.position),
-    orientation: readFloats(view, at + cs_recorded_pose.orientation, [0, 0, 0, 0]),
+    orientation: readFloats<[number, number, number, number]>(view, at + cs_recorded_pose.orientation, [0, 0, 0, 0]),
   };
 }
 
