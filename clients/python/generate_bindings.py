@@ -29,9 +29,8 @@ class Header:
         for body in re.findall(r"enum(?: \w+)? \{([^}]*)\}", code):
             self.constants += re.findall(r"(\w+) = (-?\d+)", body)
         structs = re.findall(r"typedef struct \w+ \{([^}]*)\} (\w+);", code)
-        # ctypes programs open a file or bytes, so they need no function pointers.
-        self.structs = [(name, body) for body, name in structs if "(" not in body]
-        self.opaque = set(re.findall(r"typedef struct (\w+) \w+;", code)) | {name for body, name in structs if "(" in body}
+        self.structs = [(name, body) for body, name in structs]
+        self.opaque = set(re.findall(r"typedef struct (\w+) \w+;", code))
         functions = re.findall(r"^([a-z][\w ]*?[ *]+)(\w+)\(([^()]*)\) CS_NOEXCEPT;", code, flags=re.M)
         self.functions = [(name, result, parameters) for result, name, parameters in functions]
 
@@ -71,6 +70,9 @@ def bindings() -> str:
         for name, body in header.structs:
             out += f"\n\nclass {name}(c.Structure):\n    _fields_ = [\n"
             for declaration in filter(str.strip, body.split(";")):
+                if function := re.search(r"\(\*(\w+)\)", declaration):
+                    out += f'        ("{function[1]}", c.c_void_p),  # a function\n'
+                    continue
                 kind, names = re.match(r"\s*((?:const )?\w+[ *]+)(.*)", declaration, flags=re.S).groups()
                 for member in names.split(","):
                     member = member.strip()

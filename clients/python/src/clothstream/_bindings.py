@@ -440,6 +440,15 @@ class cs_cloth_report(c.Structure):
     ]
 
 
+class cs_recording_source(c.Structure):
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("size", c.c_uint64),
+        ("user", c.c_void_p),
+        ("read", c.c_void_p),  # a function
+    ]
+
+
 class cs_recording_info(c.Structure):
     _fields_ = [
         ("version", c.c_uint32),
@@ -513,6 +522,34 @@ class cs_recorded_grab(c.Structure):
         ("reach", c.c_float),
         ("max_force", c.c_float),
         ("slip_distance", c.c_float),
+    ]
+
+
+class clothstream_options(c.Structure):
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("role", c.c_uint32),
+        ("quality", c.c_uint32),
+        ("temporal_layers", c.c_uint32),
+        ("scene", c.c_char_p),
+        ("client_name", c.c_char_p),
+        ("display_name", c.c_char_p),
+        ("join_timeout_ms", c.c_uint32),
+        ("reconnect_for_ms", c.c_uint32),
+        ("token", c.c_char_p),
+        ("ca_file", c.c_char_p),
+        ("fingerprint", c.c_char_p),
+        ("log", c.c_void_p),  # a function
+        ("log_context", c.c_void_p),
+    ]
+
+
+class clothstream_allocator(c.Structure):
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("context", c.c_void_p),
+        ("allocate", c.c_void_p),  # a function
+        ("release", c.c_void_p),  # a function
     ]
 
 
@@ -646,7 +683,7 @@ FUNCTIONS = {
     "cs_get_cloth_report": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_cloth_report)]),
     "cs_recording_open": (c.c_void_p, [c.c_char_p]),
     "cs_recording_open_bytes": (c.c_void_p, [c.POINTER(c.c_uint8), c.c_size_t]),
-    "cs_recording_open_source": (c.c_void_p, [c.c_void_p]),
+    "cs_recording_open_source": (c.c_void_p, [c.POINTER(cs_recording_source)]),
     "cs_recording_close": (None, [c.c_void_p]),
     "cs_recording_is_open": (c.c_int, [c.c_void_p]),
     "cs_recording_error_text": (c.c_char_p, [c.c_void_p]),
@@ -662,16 +699,16 @@ FUNCTIONS = {
     "cs_recording_get_attachment": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_recorded_pose)]),
     "cs_recording_get_grab": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_recorded_grab)]),
     "cs_recording_state": (c.POINTER(c.c_float), [c.c_void_p, c.POINTER(c.c_uint32), c.POINTER(c.c_uint64)]),
-    "clothstream_default_options_2": (None, [c.c_void_p]),
-    "clothstream_open": (c.c_int, [c.c_char_p, c.c_void_p, c.POINTER(c.c_void_p)]),
-    "clothstream_open_with_token": (c.c_int, [c.c_char_p, c.c_char_p, c.c_void_p, c.POINTER(c.c_void_p)]),
+    "clothstream_default_options_2": (None, [c.POINTER(clothstream_options)]),
+    "clothstream_open": (c.c_int, [c.c_char_p, c.POINTER(clothstream_options), c.POINTER(c.c_void_p)]),
+    "clothstream_open_with_token": (c.c_int, [c.c_char_p, c.c_char_p, c.POINTER(clothstream_options), c.POINTER(c.c_void_p)]),
     "clothstream_pair": (c.c_int, [c.c_char_p, c.c_char_p, c.c_char_p, c.c_size_t]),
-    "clothstream_pair_with_options": (c.c_int, [c.c_char_p, c.c_char_p, c.c_void_p, c.c_char_p, c.c_size_t]),
+    "clothstream_pair_with_options": (c.c_int, [c.c_char_p, c.c_char_p, c.POINTER(clothstream_options), c.c_char_p, c.c_size_t]),
     "clothstream_close": (None, [c.c_void_p]),
     "clothstream_wait": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
     "clothstream_acquire": (c.c_void_p, [c.c_void_p]),
     "clothstream_release": (None, [c.c_void_p]),
-    "clothstream_set_allocator": (c.c_int, [c.c_void_p]),
+    "clothstream_set_allocator": (c.c_int, [c.POINTER(clothstream_allocator)]),
     "clothstream_now_us": (c.c_uint64, []),
     "clothstream_error_text": (c.c_char_p, []),
     "clothstream_version": (c.c_char_p, []),

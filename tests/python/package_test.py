@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: MIT
+"""The installed package: its structs, recordings of every version, a real server, and simulating."""
+import contextlib
+import ctypes
+import gzip
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+import clothstream
+from clothstream import _bindings
+
+TESTS = pathlib.Path(__file__).resolve().parent.parent
+SERVER, PROGRAM = os.environ["CLOTHSTREAM_SERVER"], os.environ["CLOTHSTREAM_PROGRAM"]
+SMALL = TESTS / "e2e/small.json"
+
+
+@contextlib.contextmanager
+def running_server(*options):
+    """Starts a server with the scene `small` on a free port, and gives its address."""
+    command = [SERVER, "--port", "0", "--grpc-port", "0", "--scene", "small", "--scene-file", str(SMALL), *options]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        printed = ""
+        for line in server.stdout:
+            printed += line
+            if found := re.match(r"page *(http:\S+)", line):
+                break
+        else:
+            if "no Vulkan" in printed:
+                raise unittest.SkipTest("the server needs a Vulkan device")
+            raise AssertionError(f"the server ended: {printed}")
+        yield found[1]
+    finally:
+        server.terminate()
+        server.communicate(timeout=60)
+
+
+def recorded(path):
+    with gzip.open(path) as file:
+        return file.read()
+
+
+class Bindings(unittest.TestCase):
+    def test_structs_have_the_layout_of_the_c_compiler(self):
+        structs = [kind for kind in vars(_bindings).values() if isinstance(kind, type) and issubclass(kind, ctypes.Structure)]
+        self.assertGreater(len(structs), 30)
+        wanted, found = {}, {}
+        code = "#include <clothstream/clothstream.h>\n#include <clothstream/recording.h>\n#include <stdio.h>\nint main(void) {\n"
+        for struct in structs:
+            name = struct.__name__
+            wanted[name] = ctypes.sizeof(struct)
+            code += f'printf("{name} %zu\\n", sizeof({name}));\n'
+            for field, _ in struct._fields_:
+                wanted[f"{name}.{field}"] = getattr(struct, field).offset
+                code += f'printf("{name}.{field} %zu\\n", offsetof({name}, {field}));\n'
+        with tempfile.TemporaryDirectory() as folder:
+            source, program = pathlib.Path(folder, "layout.c"), pathlib.Path(folder, "layout")
+            source.write_text(code + "return 0;\n}\n")
+            subprocess.run(["cc", "-I", os.environ["CLOTHSTREAM_INCLUDE"], str(source), "-o", str(program)], check=True)
+            for line in subprocess.run([str(program)], check=True, capture_output=True, text=True).stdout.splitlines():
+                name, value = line.split()
+                found[name] = int(value)
+        self.assertEqual(found, wanted)
+
+    def test_the_package_has_the_version_of_its_library(self):
+        from importlib.metadata import version
+        self.assertEqual(clothstream.__version__, version("clothstream"))
+        self.assertTrue(pathlib.Path(clothstream.__file__).with_name("libclothstream.so").exists(), "it is the wheel")
+
+
+class Recordings(unittest.TestCase):
+    def test_frames_of_every_version_have_the_recorded_hashes(self):
+        files = sorted(TESTS.glob("replay/*/*.mcap.gz"))
+        self.assertGreater(len(files), 20)
+        for file in files:
+            with self.subTest(file=file.name), clothstream.open_recording(recorded(file)) as recording:
+                ticks = []
+                for frame in recording:
+                    self.assertEqual(frame.hash, frame.recorded_hash)
+                    ticks.append(frame.tick)
+                self.assertEqual(len(ticks), recording.info.frames)
+                self.assertEqual(ticks, sorted(set(ticks)))
+
+    def test_a_seek_gives_the_frame_that_playing_gives(self):
+        with clothstream.open_recording(recorded(TESTS / "replay/0.2.0/flag.mcap.gz")) as recording:
+            frames = [(frame.tick, frame.seconds, frame.positions.copy(), recording.environment.wind) for frame in recording]
+            for tick, seconds, positions, wind in frames[::-5] + frames[::7]:
+                for frame in (recording.seek(seconds), recording.seek_tick(tick)):
+                    self.assertEqual(frame.tick, tick)
+                    np.testing.assert_array_equal(frame.positions, positions)
+                    self.assertEqual(recording.environment.wind, wind)
+            self.assertIsNone(recording.seek_tick(0))
+
+    def test_the_journal_has_the_input_of_each_tick(self):
+        with clothstream.open_recording(recorded(TESTS / "replay/0.2.0/flag.mcap.gz")) as recording:
+            kinds, radii, states = set(), set(), 0
+            for message in recording.messages():
+                kinds.add(message.kind)
+                if message.kind == clothstream.Recorded.TICK:
+                    self.assertEqual(recording.journal.tick, message.tick)
+                    self.assertEqual(recording.journal.state_hash, message.state_hash)
+                    radii |= {one.radius for one in recording.journal.colliders if one.participant_id == 7}
+                if message.kind == clothstream.Recorded.CHECKPOINT:
+                    tick, state = recording.checkpoint
+                    self.assertEqual(state.shape, (recording.vertex_count, 6))
+                    states += 1
+            self.assertGreater(states, 0)
+            self.assertEqual([round(radius, 6) for radius in radii], [0.1])
+            self.assertLessEqual({clothstream.Recorded.FRAME, clothstream.Recorded.PARAMETERS, clothstream.Recorded.SCENE}, kinds)
+            self.assertEqual(recording.scene, "flag")
+            self.assertEqual(recording.cloths[0].vertex_count, recording.vertex_count)
+            self.assertEqual(recording.triangles.max(), recording.vertex_count - 1)
+
+    def test_cut_and_other_files_are_errors_or_end_early(self):
+        whole = recorded(TESTS / "replay/0.2.0/flag.mcap.gz")
+        with self.assertRaisesRegex(clothstream.RecordingError, "not an MCAP file"):
+            clothstream.open_recording(b"PNG")
+        with self.assertRaisesRegex(clothstream.RecordingError, "no such file.mcap"):
+            clothstream.open_recording("no such file.mcap")
+        before = 0
+        for length in range(0, len(whole), len(whole) // 60):
+            with contextlib.suppress(clothstream.RecordingError):
+                with clothstream.open_recording(whole[:length]) as recording:
+                    self.assertFalse(recording.info.complete)
+                    frames = sum(1 for _ in recording)
+                    self.assertGreaterEqual(frames, before)
+                    before = frames
+        self.assertGreater(before, 0)
+
+    def test_a_frame_that_is_not_current_says_so(self):
+        recording = clothstream.open_recording(recorded(TESTS / "replay/0.2.0/flag.mcap.gz"))
+        frame = recording.next(clothstream.Recorded.FRAME)
+        view = frame.positions
+        self.assertEqual((view.dtype, view.shape, view.flags.owndata, view.flags.writeable),
+                         (np.float32, (recording.vertex_count, 3), False, False))
+        recording.next(clothstream.Recorded.FRAME)
+        with self.assertRaisesRegex(clothstream.Error, "no longer current"):
+            frame.positions
+        recording.close()
+        with self.assertRaisesRegex(clothstream.RecordingError, "closed"):
+            recording.info
+
+
+class Streams(unittest.TestCase):
+    def test_a_stream_and_its_recording_have_the_same_frames(self):
+        with tempfile.TemporaryDirectory() as folder, running_server("--recordings", folder) as address:
+            with clothstream.join(address, "small", role="owner", name="Py") as stream:
+                self.assertEqual((stream.scene, stream.vertex_count, len(stream.cloths)), ("small", 320, 2))
+                self.assertEqual([one.name for one in stream.participants], ["Py"])
+                file = stream.start_recording("drape")
+                seen, wind = {}, None
+                stream.set_environment(wind=(1, 0, 3))
+                stream.set_colliders([(-0.5, 3.25, 0.125, 0.25)])
+                for frame in stream:
+                    seen[frame.tick] = (frame.hash, frame.positions.copy())
+                    own = [one for one in frame.colliders if one.participant_id == stream.participant_id]
+                    wind = stream.environment.wind
+                    if len(seen) >= 60 and own and wind == (1, 0, 3):
+                        break
+                self.assertEqual((own[0].position, own[0].radius), ((-0.5, 3.25, 0.125), 0.25))
+                self.assertEqual(stream.statistics.hash_mismatches, 0)
+                name, size = stream.stop_recording()
+            [path] = pathlib.Path(folder).glob("*drape*.mcap")
+            self.assertEqual(path.stat().st_size, size)
+            self.assertIn("drape", file)
+            with clothstream.open_recording(path) as recording:
+                same = 0
+                for frame in recording:
+                    self.assertEqual(frame.hash, frame.recorded_hash)
+                    if frame.tick in seen:
+                        self.assertEqual(frame.hash, seen[frame.tick][0])
+                        np.testing.assert_array_equal(frame.positions, seen[frame.tick][1])
+                        same += 1
+                self.assertGreater(same, 20)
+                self.assertEqual(recording.environment.wind, (1, 0, 3))
+            # The C client of the program finds the same hashes.
+            subprocess.run([PROGRAM, "info", str(path)], check=True, capture_output=True)
+
+    def test_scenes_are_made_changed_and_deleted(self):
+        with running_server() as address, clothstream.join(address, role="owner") as stream:
+            self.assertEqual(stream.copy_scene("small", "other"), "other")
+            self.assertEqual({one.name for one in stream.scenes()} & {"small", "other"}, {"small", "other"})
+            with self.assertRaises(clothstream.RequestRefused) as refused:
+                stream.copy_scene("no-such-scene", "third")
+            self.assertIn("no-such-scene", str(refused.exception))
+            stream.delete_scene("other")
+            self.assertNotIn("other", {one.name for one in stream.scenes()})
+            self.assertGreater(len(stream.definition()), 100)
+            stream.change_cloth("left", drag=1.25, solver=clothstream.Solver.XPBD)
+            while stream.cloth_settings(0).solver != clothstream.Solver.XPBD:
+                stream.wait(10)
+            self.assertEqual(stream.cloth_settings(0).drag, 1.25)
+            with self.assertRaisesRegex(TypeError, "drift"):
+                stream.change_cloth(drift=1)
+            with self.assertRaisesRegex(ValueError, "no cloth"):
+                stream.change_cloth("sail", drag=1)
+            stream.pause()
+            stream.reset()
+            stream.pause(False)
+            stream.next_frame()
+
+    def test_joining_says_why_it_fails(self):
+        with self.assertRaisesRegex(ValueError, "HOST"):
+            clothstream.join("")
+        with self.assertRaisesRegex(clothstream.ConnectionFailed, "127.0.0.1:1"):
+            clothstream.join("127.0.0.1:1", timeout=3)
+
+
+class Simulations(unittest.TestCase):
+    def test_simulating_gives_states(self):
+        try:
+            states = clothstream.simulate(SMALL, 24, every=6, server=SERVER)
+        except clothstream.SimulationFailed as error:
+            if "no Vulkan" in str(error):
+                self.skipTest("the server needs a Vulkan device")
+            raise
+        self.assertEqual(states.positions.shape, (5, 320, 3))
+        self.assertEqual(states.velocities.shape, (5, 320, 3))
+        self.assertEqual(list(states.ticks), [0, 6, 12, 18, 24])
+        self.assertEqual(len(set(states.hashes)), 5)
+        self.assertAlmostEqual(states.seconds[-1], 24 / 120)
+        self.assertLess(states.positions[-1, :, 1].mean(), states.positions[0, :, 1].mean(), "the cloth falls")
+        with self.assertRaisesRegex(clothstream.SimulationFailed, "no-such-scene"):
+            clothstream.simulate("no-such-scene", 1, server=SERVER)
+        with self.assertRaisesRegex(clothstream.SimulationFailed, "cannot be started"):
+            clothstream.simulate("small", 1, server="/no/such/program")
+
+
+if __name__ == "__main__":
+    sys.exit(0 if unittest.main(exit=False).result.wasSuccessful() else 1)
