@@ -136,7 +136,7 @@ typedef struct clothstream_allocator {
 } clothstream_allocator;
 /* Makes the library take its memory from these functions, instead of from malloc. It applies to all streams
  * of the process. Call it at most once, before all other functions of the library; later it fails. Memory of
- * OpenSSL, of threads, and of exceptions still comes from the C library. A library built for gRPC, or with
+ * OpenSSL, zstd, threads and exceptions still comes from the C library. A library built for gRPC, or with
  * sanitizers, refuses it. */
 clothstream_result clothstream_set_allocator(const clothstream_allocator* allocator) CS_NOEXCEPT;
 

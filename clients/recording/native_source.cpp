@@ -30,8 +30,9 @@ cs_recording* cs_recording_open(const char* path) noexcept {
 
 cs_recording* cs_recording_open_source(const cs_recording_source* source) noexcept {
   if (source->version != CS_RECORDING_SOURCE_VERSION || !source->read)
-    return openRecording(tl::unexpected(std::string("cs_recording_source has an unknown version or no function "
-                                                    "`read`; use CS_RECORDING_SOURCE_VERSION.")),
-                         "");
+    return openRecording(
+        tl::unexpected(std::string("cs_recording_source has an unknown version or no function "
+                                   "`read`; use CS_RECORDING_SOURCE_VERSION.")),
+        "");
   return openRecording(std::make_unique<ProgramSource>(*source), "the recording");
 }

@@ -175,7 +175,8 @@ bool PlayedRecording::applyJournal(const RecordedMessage& message, PlayedMessage
 PlayedRecording::Played PlayedRecording::applyFrame(const RecordedMessage& message, PlayedMessage played) {
   played.events = give(field::ServerMessage::kFrame, message.bytes, message.time);
   if (cs_get_state(client()) == CS_STATE_FAILED) return tl::unexpected(std::string(cs_error_text(client())));
-  if ((played.events & CS_EVENT_FRAME) == 0 || !readFrame(bytesOf(message.bytes), frame_)) return std::nullopt;
+  if ((played.events & CS_EVENT_FRAME) == 0 || !readFrame(bytesOf(message.bytes), frame_))
+    return std::nullopt;
   if (const auto header = headerOf(frame_.packet)) {
     played.tick = header->tick;
     played.key = header->kind == codec::PacketKind::key;
@@ -294,9 +295,9 @@ PlayedRecording::Played PlayedRecording::seekTo(std::uint64_t time, std::optiona
     }
     if (!*message) break;
     const bool isLater =
-        (*message)->time > time || (tick && (*message)->topic == Topic::frames &&
-                                    readFrame(bytesOf((*message)->bytes), frame_) &&
-                                    headerOf(frame_.packet).value_or(codec::PacketHeader{}).tick > *tick);
+        (*message)->time > time ||
+        (tick && (*message)->topic == Topic::frames && readFrame(bytesOf((*message)->bytes), frame_) &&
+         headerOf(frame_.packet).value_or(codec::PacketHeader{}).tick > *tick);
     if (isLater) {
       reader_.go(place);
       break;

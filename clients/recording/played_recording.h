@@ -33,8 +33,9 @@ class PlayedRecording {
  public:
   [[nodiscard]] static tl::expected<PlayedRecording, std::string> open(recording::RecordingReader reader);
 
-  // Continues to the next message of these kinds; nothing at the end. Frames that cannot be decoded are skipped;
-  // cs_get_statistics() counts them. After an error the next call continues behind the damaged chunk.
+  // Continues to the next message of these kinds; nothing at the end. Frames that cannot be decoded are
+  // skipped; cs_get_statistics() counts them. After an error the next call continues behind the damaged
+  // chunk.
   [[nodiscard]] tl::expected<std::optional<PlayedMessage>, std::string> next(std::uint32_t kinds);
   // Continues to the next frame. Returns false at the end.
   [[nodiscard]] tl::expected<bool, std::string> next();

@@ -68,7 +68,7 @@ int seekWith(cs_recording* recording, Seek seek, Where where, cs_recorded* out) 
 
 // Copies an element of a list of the newest tick.
 template <typename List, typename Out>
-int writeElement(const cs_recording* recording, List RecordedTick::* list, std::uint32_t index, Out* out) {
+int writeElement(const cs_recording* recording, List RecordedTick::*list, std::uint32_t index, Out* out) {
   if (!recording->played || !recording->played->tick()) return 0;
   const List& elements = *recording->played->tick().*list;
   if (index >= elements.size()) return 0;
@@ -80,7 +80,8 @@ int writeElement(const cs_recording* recording, List RecordedTick::* list, std::
 
 cs_recording* openRecording(tl::expected<std::unique_ptr<recording::ByteSource>, std::string> source,
                             std::string name) {
-  auto* opened = new cs_recording;  // NOLINT(bugprone-unhandled-exception-at-new): out of memory ends the program
+  auto* opened =
+      new cs_recording;  // NOLINT(bugprone-unhandled-exception-at-new): out of memory ends the program
   const auto open = [&]() -> tl::expected<PlayedRecording, std::string> {
     if (!source) return tl::unexpected(source.error());
     auto reader =
@@ -99,9 +100,9 @@ cs_recording* openRecording(tl::expected<std::unique_ptr<recording::ByteSource>,
 }  // namespace clothstream::client
 
 cs_recording* cs_recording_open_bytes(const uint8_t* bytes, size_t count) noexcept {
-  return openRecording(std::make_unique<BorrowedBytes>(
-                           std::string_view(reinterpret_cast<const char*>(bytes), count)),
-                       "the recording");
+  return openRecording(
+      std::make_unique<BorrowedBytes>(std::string_view(reinterpret_cast<const char*>(bytes), count)),
+      "the recording");
 }
 
 void cs_recording_close(cs_recording* recording) noexcept {
@@ -161,7 +162,8 @@ cs_recording_result cs_recording_next(cs_recording* recording, uint32_t kinds, c
 int cs_recording_seek(cs_recording* recording, double seconds, cs_recorded* out) noexcept {
   if (!recording->played) return 0;
   if (std::isnan(seconds)) {
-    recording->errorText = "The time of a seek is not a number; use seconds since the start of the recording.";
+    recording->errorText =
+        "The time of a seek is not a number; use seconds since the start of the recording.";
     return 0;
   }
   const recording::RecordingReader& reader = recording->played->reader();
@@ -217,7 +219,8 @@ int cs_recording_get_grab(const cs_recording* recording, uint32_t index, cs_reco
   return writeElement(recording, &RecordedTick::grabs, index, out);
 }
 
-const float* cs_recording_state(const cs_recording* recording, uint32_t* node_count, uint64_t* tick) noexcept {
+const float* cs_recording_state(const cs_recording* recording, uint32_t* node_count,
+                                uint64_t* tick) noexcept {
   *node_count = 0;
   if (!recording->played || !recording->played->checkpoint()) return nullptr;
   const Checkpoint& checkpoint = *recording->played->checkpoint();

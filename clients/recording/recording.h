@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT
- * C interface that reads recordings (docs/recording.md) without a server: frames, events, participants, and the
- * journal of a server.
+ * C interface that reads recordings (docs/recording.md) without a server: frames, events, participants, and
+ * the journal of a server.
  *
  * A recording is played in a cs_client of its own, which cs_recording_client returns. cs_recording_next reads
  * the next message of the file and gives it to this client. Then the functions of core.h that take a const
  * cs_client answer for this place in the recording: cs_positions, cs_normals, cs_reconstruction_hash,
  * cs_get_collider, cs_get_environment, cs_get_grab_event, cs_get_participant, and so on.
  *
- * Threads: a recording is not thread-safe. Call its functions from one thread at a time. Several recordings are
- * independent of each other.
+ * Threads: a recording is not thread-safe. Call its functions from one thread at a time. Several recordings
+ * are independent of each other.
  *
  * Errors: no function throws or aborts because of the bytes that it reads. A file that is cut is read up to
  * the cut. Memory is bounded: a chunk of the file has at most 320 MiB, its index at most 256 MiB, and the
@@ -41,8 +41,8 @@ extern "C" {
 
 typedef struct cs_recording cs_recording;
 
-/* Opens a regular file. path: UTF-8. A file that grows is read up to the size that it has now. The WebAssembly
- * module does not export this function. */
+/* Opens a regular file. path: UTF-8. A file that grows is read up to the size that it has now. The
+ * WebAssembly module does not export this function. */
 cs_recording* cs_recording_open(const char* path) CS_NOEXCEPT;
 /* Opens the bytes of a file in memory. They are not copied: keep them unchanged until cs_recording_close. */
 cs_recording* cs_recording_open_bytes(const uint8_t* bytes, size_t count) CS_NOEXCEPT;
@@ -62,21 +62,22 @@ cs_recording* cs_recording_open_source(const cs_recording_source* source) CS_NOE
 
 /* Frees the recording, its client, and all pointers that they returned. NULL is allowed. */
 void cs_recording_close(cs_recording* recording) CS_NOEXCEPT;
-/* Returns 1 if the recording can be read, else 0. All other functions are allowed in both cases; without an open
- * recording they fail, and return 0, "" or NULL. */
+/* Returns 1 if the recording can be read, else 0. All other functions are allowed in both cases; without an
+ * open recording they fail, and return 0, "" or NULL. */
 int cs_recording_is_open(const cs_recording* recording) CS_NOEXCEPT;
 /* Returns the last error as a sentence; "" if there was none. */
 const char* cs_recording_error_text(const cs_recording* recording) CS_NOEXCEPT;
-/* Returns the client in which the recording is played; NULL if the recording is not open. It has the description
- * of the stream from the start: cs_vertex_count, cs_triangles, cs_get_cloth. The pointer is valid until
- * cs_recording_close. */
+/* Returns the client in which the recording is played; NULL if the recording is not open. It has the
+ * description of the stream from the start: cs_vertex_count, cs_triangles, cs_get_cloth. The pointer is valid
+ * until cs_recording_close. */
 const cs_client* cs_recording_client(const cs_recording* recording) CS_NOEXCEPT;
 
 #define CS_RECORDING_INFO_VERSION 1u
 typedef struct cs_recording_info {
-  uint32_t version;  /* CS_RECORDING_INFO_VERSION */
-  int32_t complete;  /* 1: the file has its index. 0: it is cut or damaged at its end, and is read up to there */
-  double seconds;    /* time from the first message to the last */
+  uint32_t version; /* CS_RECORDING_INFO_VERSION */
+  int32_t
+      complete;   /* 1: the file has its index. 0: it is cut or damaged at its end, and is read up to there */
+  double seconds; /* time from the first message to the last */
   uint64_t start_ns; /* time of the first message: nanoseconds since 1970 */
   uint64_t bytes;    /* size of the file */
   uint64_t frames;   /* number of frames, from the index; 0 if the file is not complete */
@@ -94,14 +95,14 @@ const char* cs_recording_metadata(const cs_recording* recording, const char* nam
 
 /* Kinds of messages. A set of them is their sum. */
 enum {
-  CS_RECORDED_FRAME = 1,       /* cs_positions and all other functions about frames */
-  CS_RECORDED_PARAMETERS = 2,  /* cs_get_environment, cs_get_cloth_settings */
-  CS_RECORDED_EVENTS = 4,      /* cs_get_grab_event, cs_get_contact_event; see cs_recorded.events */
-  CS_RECORDED_NOTICE = 8,      /* cs_notice_text */
+  CS_RECORDED_FRAME = 1,        /* cs_positions and all other functions about frames */
+  CS_RECORDED_PARAMETERS = 2,   /* cs_get_environment, cs_get_cloth_settings */
+  CS_RECORDED_EVENTS = 4,       /* cs_get_grab_event, cs_get_contact_event; see cs_recorded.events */
+  CS_RECORDED_NOTICE = 8,       /* cs_notice_text */
   CS_RECORDED_PARTICIPANT = 16, /* somebody joined or left: cs_get_presence, cs_get_participant */
   /* Only in recordings of servers: the journal. */
-  CS_RECORDED_SCENE = 32,      /* the definition: cs_recording_message has a RecordedScene (recording.proto) */
-  CS_RECORDED_TICK = 64,       /* input and state hash of a tick: cs_recording_get_tick */
+  CS_RECORDED_SCENE = 32, /* the definition: cs_recording_message has a RecordedScene (recording.proto) */
+  CS_RECORDED_TICK = 64,  /* input and state hash of a tick: cs_recording_get_tick */
   CS_RECORDED_CHECKPOINT = 128, /* exact state: cs_recording_state */
   CS_RECORDED_ALL = 255
 };
@@ -126,23 +127,23 @@ typedef enum cs_recording_result {
   CS_RECORDING_NEXT = 1    /* *out is the next message */
 } cs_recording_result;
 
-/* Reads up to the next message of `kinds`, a set of CS_RECORDED values, and gives it and all messages before it
- * to the client. Frames that cannot be decoded, because a part of the file is damaged, are skipped;
+/* Reads up to the next message of `kinds`, a set of CS_RECORDED values, and gives it and all messages before
+ * it to the client. Frames that cannot be decoded, because a part of the file is damaged, are skipped;
  * cs_get_statistics counts them. out: only its version is read; it is unchanged unless the result is
- * CS_RECORDING_NEXT. An error in a chunk of the file is reported once: the next call continues after this chunk.
- * A malformed message ends the recording, and each later call reports it. */
+ * CS_RECORDING_NEXT. An error in a chunk of the file is reported once: the next call continues after this
+ * chunk. A malformed message ends the recording, and each later call reports it. */
 cs_recording_result cs_recording_next(cs_recording* recording, uint32_t kinds, cs_recorded* out) CS_NOEXCEPT;
 /* Goes to a time, in seconds since the start: the client shows the newest frame at or before it, as if the
- * recording had been played up to there, with the parameters and participants of this time. Decoding starts at
- * the key frame before. *out: this frame. Without such a frame its kind is 0, and the client shows the rest state.
- * out may be NULL. Statistics of the client continue. Fails if the recording is not open, the time is not a
- * number, the version is unknown, or the bytes cannot be read. */
+ * recording had been played up to there, with the parameters and participants of this time. Decoding starts
+ * at the key frame before. *out: this frame. Without such a frame its kind is 0, and the client shows the
+ * rest state. out may be NULL. Statistics of the client continue. Fails if the recording is not open, the
+ * time is not a number, the version is unknown, or the bytes cannot be read. */
 int cs_recording_seek(cs_recording* recording, double seconds, cs_recorded* out) CS_NOEXCEPT;
 /* Like cs_recording_seek, to the newest frame with this tick or an earlier one. */
 int cs_recording_seek_tick(cs_recording* recording, uint64_t tick, cs_recorded* out) CS_NOEXCEPT;
 
-/* The newest message, as in the file: serialised protobuf of the type that docs/recording.md lists. NULL and 0
- * before the first, and after a seek. */
+/* The newest message, as in the file: serialised protobuf of the type that docs/recording.md lists. NULL and
+ * 0 before the first, and after a seek. */
 const uint8_t* cs_recording_message(const cs_recording* recording, size_t* bytes) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
@@ -194,26 +195,26 @@ typedef enum cs_grab_state {
 } cs_grab_state;
 
 typedef struct cs_recorded_grab {
-  uint32_t state;                               /* cs_grab_state, or a newer state */
-  cs_recorded_pose start, end;                  /* at the start and end of the tick */
+  uint32_t state;                                /* cs_grab_state, or a newer state */
+  cs_recorded_pose start, end;                   /* at the start and end of the tick */
   float radius, reach, max_force, slip_distance; /* m, m, N, m */
 } cs_recorded_grab;
 
-/* The newest CS_RECORDED_TICK at or before the place in the recording. Fails before the first, after a seek to a
- * place without one between its key frame and its frame, or if `out->version` is unknown. */
+/* The newest CS_RECORDED_TICK at or before the place in the recording. Fails before the first, after a seek
+ * to a place without one between its key frame and its frame, or if `out->version` is unknown. */
 int cs_recording_get_tick(const cs_recording* recording, cs_recorded_tick* out) CS_NOEXCEPT;
-/* Colliders in the order in which they act: those of the scene, then those of participants. Attachments in the
- * order of the cloths of the scene, at the end of the tick. Grabs by their index in the simulation. Each function
- * fails if the index is out of range. */
+/* Colliders in the order in which they act: those of the scene, then those of participants. Attachments in
+ * the order of the cloths of the scene, at the end of the tick. Grabs by their index in the simulation. Each
+ * function fails if the index is out of range. */
 int cs_recording_get_collider(const cs_recording* recording, uint32_t index,
                               cs_recorded_collider* out) CS_NOEXCEPT;
 int cs_recording_get_attachment(const cs_recording* recording, uint32_t index,
                                 cs_recorded_pose* out) CS_NOEXCEPT;
 int cs_recording_get_grab(const cs_recording* recording, uint32_t index, cs_recorded_grab* out) CS_NOEXCEPT;
 
-/* The newest CS_RECORDED_CHECKPOINT: 6 floats for each of *node_count nodes, position (m) and velocity (m/s), and
- * the tick after which they hold. tick may be NULL. Returns NULL and 0 before the first, and after a seek to a
- * place without one between its key frame and its frame. */
+/* The newest CS_RECORDED_CHECKPOINT: 6 floats for each of *node_count nodes, position (m) and velocity (m/s),
+ * and the tick after which they hold. tick may be NULL. Returns NULL and 0 before the first, and after a seek
+ * to a place without one between its key frame and its frame. */
 const float* cs_recording_state(const cs_recording* recording, uint32_t* node_count,
                                 uint64_t* tick) CS_NOEXCEPT;
 

@@ -38,7 +38,8 @@ inline std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
           kCrcTables[1][byte(6)] ^ kCrcTables[0][byte(7)];
     bytes.remove_prefix(8);
   }
-  for (const char last : bytes) crc = crc >> 8 ^ kCrcTables[0][(crc ^ static_cast<std::uint8_t>(last)) & 0xff];
+  for (const char last : bytes)
+    crc = crc >> 8 ^ kCrcTables[0][(crc ^ static_cast<std::uint8_t>(last)) & 0xff];
   return ~crc;
 }
 

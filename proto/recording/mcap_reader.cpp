@@ -397,7 +397,8 @@ tl::expected<std::span<const Message>, std::string> McapReader::read(std::size_t
   State& s = *state_;
   const ChunkPlace& place = s.chunks[chunk];
   const auto wrong = [&](std::string_view what) {
-    return broken("the chunk at byte " + std::to_string(place.offset) + " cannot be read: " + std::string(what));
+    return broken("the chunk at byte " + std::to_string(place.offset) +
+                  " cannot be read: " + std::string(what));
   };
   const std::optional<Record> record = s.recordAt(place.offset);
   if (!record || record->opcode != Opcode::chunk || record->length != place.length - kRecordHead)

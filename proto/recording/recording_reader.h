@@ -66,8 +66,8 @@ class RecordingReader {
   // Place of the next message, to which go() returns.
   Place place() const { return {chunk_, message_}; }
   void go(const Place& place) { std::tie(chunk_, message_) = std::tuple(place.chunk, place.message); }
-  // Messages of a topic in a chunk with an index from `first` to `end` - 1, valid until the next call. Does not
-  // move the reader.
+  // Messages of a topic in a chunk with an index from `first` to `end` - 1, valid until the next call. Does
+  // not move the reader.
   [[nodiscard]] tl::expected<std::vector<RecordedMessage>, std::string> messages(
       std::size_t chunk, Topic topic, std::size_t first = 0,
       std::size_t end = std::numeric_limits<std::size_t>::max());

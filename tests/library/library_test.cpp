@@ -182,7 +182,8 @@ TEST_F(LibraryTest, ServesPythonWithoutACopy) {
   if (kSanitized) GTEST_SKIP() << kNotSanitized;
   if (!succeeds({CLOTHSTREAM_PYTHON, "-c", "import numpy"}))
     GTEST_SKIP() << CLOTHSTREAM_PYTHON " has no numpy: ./dev test installs Debian's python3-numpy";
-  expectSameFrames({CLOTHSTREAM_PYTHON, "tests/library/follow.py", CLOTHSTREAM_LIBRARY, web_});
+  expectSameFrames({"/usr/bin/env", "PYTHONPATH=clients/python/src", "CLOTHSTREAM_LIBRARY=" CLOTHSTREAM_LIBRARY,
+                    CLOTHSTREAM_PYTHON, "-B", "tests/library/follow.py", web_});
 }
 
 TEST_F(LibraryTest, ServesCSharp) {
@@ -283,7 +284,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "cc -std=c11 -Wall -Wextra -Wpedantic -Werror -I{include} {file} -o {program} "
                  "-L{folder} "
                  "-lclothstream && {program} {address}"},
-        Language{"python", "example.py", CLOTHSTREAM_PYTHON, "{python} {file} {address}"},
+        Language{"python", "example.py", CLOTHSTREAM_PYTHON, "PYTHONPATH=clients/python/src CLOTHSTREAM_LIBRARY={folder}/libclothstream.so {python} -B {file} {address}"},
         Language{"csharp", "Example.cs", "mcs",
                  "mcs -unsafe -out:{program} {file} && mono {program} {address}"},
         Language{"rust", "example.rs", "/usr/bin/rustc",
@@ -306,6 +307,8 @@ TEST(Library, ExportsItsInterfaceAndNothingElse) {
   const char* declaration = R"((?:^|\n)[a-z][a-z0-9_ *]*[ *]((?:cs|clothstream)_[a-z0-9_]+)\()";
   std::set<std::string> declared = matches(contents("clients/core/core.h"), declaration);
   EXPECT_GE(declared.size(), 80u);
+  declared.merge(matches(contents("clients/recording/recording.h"), declaration));
+  EXPECT_THAT(declared, Contains("cs_recording_open"));
   declared.merge(matches(contents("clients/library/clothstream.h"), declaration));
   EXPECT_THAT(declared, Contains("clothstream_open"));
   declared.insert("clothstream_default_options");  // a macro in the header, for version 1

@@ -92,7 +92,8 @@ class Recordings(unittest.TestCase):
         with clothstream.open_recording(recorded(TESTS / "replay/0.2.0/flag.mcap.gz")) as recording:
             frames = [(frame.tick, frame.seconds, frame.positions.copy(), recording.environment.wind) for frame in recording]
             for tick, seconds, positions, wind in frames[::-5] + frames[::7]:
-                for frame in (recording.seek(seconds), recording.seek_tick(tick)):
+                for seek, where in ((recording.seek, seconds), (recording.seek_tick, tick)):
+                    frame = seek(where)
                     self.assertEqual(frame.tick, tick)
                     np.testing.assert_array_equal(frame.positions, positions)
                     self.assertEqual(recording.environment.wind, wind)
@@ -197,6 +198,9 @@ class Streams(unittest.TestCase):
             while stream.cloth_settings(0).solver != clothstream.Solver.XPBD:
                 stream.wait(10)
             self.assertEqual(stream.cloth_settings(0).drag, 1.25)
+            stream.change_collider("ball", radius=0.2)
+            while [one.radius for one in stream.next_frame().colliders if one.name == "ball"] != [np.float32(0.2)]:
+                pass
             with self.assertRaisesRegex(TypeError, "drift"):
                 stream.change_cloth(drift=1)
             with self.assertRaisesRegex(ValueError, "no cloth"):

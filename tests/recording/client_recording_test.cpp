@@ -179,7 +179,8 @@ TEST(ClientRecording, FollowsParticipants) {
       },
       "test", {{"scene", "sample"}});
   ASSERT_TRUE(writer->write(Topic::description, 1, sampleDescription().SerializeAsString()));
-  const auto write = [&](std::uint64_t second, std::uint64_t id, v1::ParticipantEventKind kind, const char* name) {
+  const auto write = [&](std::uint64_t second, std::uint64_t id, v1::ParticipantEventKind kind,
+                         const char* name) {
     v1::ParticipantEvent event;
     event.set_participant_id(id);
     event.set_kind(kind);
@@ -200,7 +201,7 @@ TEST(ClientRecording, FollowsParticipants) {
   }
   ASSERT_EQ(cs_get_presence(opened.client(), &presence), 1);
   EXPECT_EQ(presence.kind, std::uint32_t{CS_PRESENCE_LEFT});
-  EXPECT_STREQ(presence.participant.name, "Ann") << "the event that somebody left has no name";
+  EXPECT_STREQ(presence.participant.name, "Ann") << "an event of leaving has no name";
   ASSERT_EQ(cs_recording_seek(opened.get(), 0.5, nullptr), 1);
   EXPECT_EQ(cs_participant_count(opened.client()), 0u);
 }
@@ -252,7 +253,8 @@ TEST_P(ReplayFile, GivesTheRecordedHashesAndTheJournal) {
       const float* state = cs_recording_state(opened.get(), &nodes, &tick);
       ASSERT_EQ(nodes, vertices);
       EXPECT_EQ(tick, message.tick);
-      EXPECT_TRUE(std::all_of(state, state + std::size_t{6} * nodes, [](float x) { return std::isfinite(x); }));
+      EXPECT_TRUE(
+          std::all_of(state, state + std::size_t{6} * nodes, [](float x) { return std::isfinite(x); }));
     } else if (message.kind == CS_RECORDED_PARAMETERS) {
       ++changes;
     }
@@ -278,15 +280,16 @@ std::vector<std::string> replayFiles() {
   return files;
 }
 
-INSTANTIATE_TEST_SUITE_P(OfEveryVersion, ReplayFile, ::testing::ValuesIn(replayFiles()), [](const auto& file) {
-  std::string name = file.param.substr(std::string("tests/replay/").size());
-  name.resize(name.size() - std::string(".mcap.gz").size());
-  for (char& c : name)
-    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(OfEveryVersion, ReplayFile, ::testing::ValuesIn(replayFiles()),
+                         [](const auto& file) {
+                           std::string name = file.param.substr(std::string("tests/replay/").size());
+                           name.resize(name.size() - std::string(".mcap.gz").size());
+                           for (char& c : name)
+                             if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+                           return name;
+                         });
 
-// Reads all that is there, and returns the number of frames.
+// Reads to the end, and returns the number of frames.
 std::uint64_t readAll(const Opened& opened, bool* failed = nullptr) {
   std::uint64_t frames = 0;
   cs_recorded message = emptyMessage();
@@ -296,8 +299,7 @@ std::uint64_t readAll(const Opened& opened, bool* failed = nullptr) {
     if (result == CS_RECORDING_ERROR) {
       EXPECT_STRNE(cs_recording_error_text(opened.get()), "");
       if (failed) *failed = true;
-      if (cs_recording_is_open(opened.get()) == 0 ||
-          cs_get_state(opened.client()) == CS_STATE_FAILED)
+      if (cs_recording_is_open(opened.get()) == 0 || cs_get_state(opened.client()) == CS_STATE_FAILED)
         return frames;
     } else if (message.kind == CS_RECORDED_FRAME) {
       ++frames;

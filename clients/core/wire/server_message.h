@@ -104,7 +104,7 @@ struct Frame {
   Bytes packet;
   std::uint64_t tickTimeUs = 0, packetTimeUs = 0;  // server's clock
   std::uint64_t reconstructionHash = 0;
-  std::uint64_t stateHash = 0;  // of the simulation
+  std::uint64_t stateHash = 0;   // of the simulation
   std::vector<Bytes> colliders;  // serialised ColliderStates
   std::optional<Bytes> report;   // a serialised SimulationReport
   std::uint32_t divisor = 1;     // the server sends each divisor-th frame

@@ -268,7 +268,8 @@ void playInClient(const std::string& bytes, const RecordingInput& input) {
     for (const float seconds : input.seeks()) {
       if (++seeks > 8) break;
       if (cs_recording_seek(recording, seconds, nullptr) == 1) readToTheEnd(recording, bytes.size());
-      const std::uint64_t tick = std::isfinite(seconds) ? static_cast<std::uint64_t>(std::fmod(std::abs(seconds), 64)) : 0;
+      const std::uint64_t tick =
+          std::isfinite(seconds) ? static_cast<std::uint64_t>(std::fmod(std::abs(seconds), 64)) : 0;
       if (cs_recording_seek_tick(recording, tick, nullptr) == 1) readToTheEnd(recording, bytes.size());
     }
   }

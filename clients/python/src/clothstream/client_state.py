@@ -62,9 +62,10 @@ class ClientState:
     def _client(self) -> contextlib.AbstractContextManager[int]:
         raise NotImplementedError
 
-    def _floats(self, function: str) -> np.ndarray:
+    def _floats(self, function: str, copied: bool = False) -> np.ndarray:
         with self._client() as client:
-            return array(getattr(lib, function)(client), (lib.cs_vertex_count(client), 3), np.float32)
+            view = array(getattr(lib, function)(client), (lib.cs_vertex_count(client), 3), np.float32)
+            return view.copy() if copied else view
 
     def _list(self, count: str, get: str, struct: Type[c.Structure], kind: Type[T]) -> list[T]:
         with self._client() as client:
@@ -99,6 +100,11 @@ class ClientState:
     @property
     def cloths(self) -> list[Cloth]:
         return self._list("cs_cloth_count", "cs_get_cloth", b.cs_cloth, Cloth)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Positions of the newest frame, or at rest before the first, in metres: float32 of shape (vertices, 3). A copy."""
+        return self._floats("cs_positions", copied=True)
 
     @property
     def triangles(self) -> np.ndarray:

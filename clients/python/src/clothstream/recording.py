@@ -123,7 +123,7 @@ class RecordedFrame(Frame):
 
 
 class Recording(ClientState):
-    """A recording that is played. All members tell of the place up to which it was read."""
+    """A recording that is played. All members describe the place up to which it was read."""
 
     def __init__(self, handle: int, kept: object = None):
         self._handle: int | None = handle

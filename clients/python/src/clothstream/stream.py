@@ -165,6 +165,12 @@ class Stream(ClientState):
         with self._client() as client:
             return lib.cs_get_role(client)
 
+    def renew_token(self, token: str) -> None:
+        """Sends a new token of the same subject before the current one expires. Event.ERROR reports a refusal."""
+        with self._client() as client:
+            if not lib.cs_renew_token(client, token.encode()):
+                raise Error("The token was not sent: the connection is lost, or the token is empty.")
+
     # Input of this participant. It is sent as soon as the current frame ends.
 
     def set_colliders(self, colliders: Sequence[OwnCollider | Sequence[float]]) -> None:
@@ -248,6 +254,23 @@ class Stream(ClientState):
         """Applies one of `materials` to a cloth; "" means every cloth."""
         with self._client() as client:
             lib.cs_set_material(client, cloth.encode(), material.encode())
+
+    def set_areal_mass(self, kilograms: float, cloth: str = "") -> None:
+        """Changes the mass per area of a cloth: 0.0001 to 1000 kg/m^2. "" means every cloth."""
+        with self._client() as client:
+            lib.cs_set_areal_mass(client, cloth.encode(), kilograms)
+
+    def change_collider(self, collider: str, **changes: Any) -> None:
+        """Changes a collider of the scene: position, radius, length, size (m), orientation (x, y, z, w), friction."""
+        struct = b.cs_collider_change()
+        lib.cs_keep_collider(c.byref(struct))
+        names = {name for name, _ in b.cs_collider_change._fields_} - {"version"}
+        for name, value in changes.items():
+            if name not in names:
+                raise TypeError(f"colliders have no '{name}'; they have {', '.join(sorted(names))}")
+            setattr(struct, name, tuple(value) if name in ("position", "orientation", "size") else value)
+        with self._client() as client:
+            lib.cs_change_collider(client, collider.encode(), c.byref(struct))
 
     # Requests about scenes. They wait for the server's answer, which ends the current frame.
 
