@@ -11,6 +11,7 @@
 #include "clients/cli/error.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
+#include "proto/recording/crc32.h"
 #include "proto/recording/file.h"
 #include "proto/recording/recording_reader.h"
 #include "proto/recording/recording_writer.h"

@@ -213,6 +213,8 @@ class Streams(unittest.TestCase):
     def test_joining_says_why_it_fails(self):
         with self.assertRaisesRegex(ValueError, "HOST"):
             clothstream.join("")
+        with self.assertRaisesRegex(ValueError, "guest"):
+            clothstream.join("localhost", role="guest")
         with self.assertRaisesRegex(clothstream.ConnectionFailed, "127.0.0.1:1"):
             clothstream.join("127.0.0.1:1", timeout=3)
 

@@ -260,10 +260,11 @@ class Recording(ClientState):
         return (tick.value, array(pointer, (nodes.value, 6), np.float32).copy()) if pointer else None
 
 
-def open_recording(source: str | os.PathLike[str] | bytes) -> Recording:
+def open_recording(source: str | os.PathLike[str] | bytes | bytearray | memoryview) -> Recording:
     """Opens a recording (MCAP): a path, or the bytes of a file. Raises RecordingError if it cannot be read. A file that is
     cut is read up to the cut."""
-    if isinstance(source, bytes):
-        memory = c.cast(c.c_char_p(source), c.POINTER(c.c_uint8))
-        return Recording(lib.cs_recording_open_bytes(memory, len(source)), source)
+    if isinstance(source, (bytes, bytearray, memoryview)):
+        kept = bytes(source)  # the library reads it until the recording is closed
+        memory = c.cast(c.c_char_p(kept), c.POINTER(c.c_uint8))
+        return Recording(lib.cs_recording_open_bytes(memory, len(kept)), kept)
     return Recording(lib.cs_recording_open(os.fsencode(source)))

@@ -41,6 +41,8 @@ def join(address: str, scene: str = "", *, role: str | Role = "", name: str = ""
     timeout, reconnect_for: seconds to join, and to try to reconnect after a loss.
 
     Raises ValueError if an argument is not allowed, and ConnectionFailed."""
+    if isinstance(role, str) and role.lower() not in _ROLES:
+        raise ValueError(f"role: '{role}'; use viewer, participant, owner or \"\"")
     options = b.clothstream_options()
     lib.clothstream_default_options_2(c.byref(options))
     kept = [value.encode() for value in (scene, name, token, ca_file, fingerprint)]
