@@ -29,7 +29,7 @@ server/identity    | server/scene server/schedule server/messages clothstream
 server/saved_state | server/scene server/model server/messages server/telemetry clothstream
 server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
-server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
+server/recording   | server/encode server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls
 server/discovery   | proto/discovery
@@ -37,8 +37,8 @@ server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
-server/options     | server/hosting server/recording server/step server/scene server/model
-server/program     | server/options server/identity server/tls server/discovery server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
+server/options     | proto/recording server/hosting server/recording server/step server/scene server/model
+server/program     | proto/recording server/options server/identity server/tls server/discovery server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
 server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
@@ -51,8 +51,9 @@ clients/websocket  | clients/native proto/text proto/tls
 clients/websocket/winhttp | clients/websocket clients/native proto/text proto/tls
 clients/library    | clients/native clients/grpc clients/websocket proto/tls
 clients/files      | proto/codec clothstream
+clients/measure    | clients/core
 clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
-clients/cli        | proto/text proto/discovery clients/core clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream
+clients/cli        | proto/text proto/discovery clients/core clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream clients/measure
 '
 # rooms that may include these headers
 readonly OUTSIDE='
@@ -68,6 +69,7 @@ readonly OUTSIDE='
 <winhttp.h         | clients/websocket/winhttp
 <wincrypt.h        | clients/websocket/winhttp
 <qrencode          | server/tls
+<zip.h             | clients/files
 <avahi-            | server/discovery clients/cli
 <Eigen/            | server/model server/reference
 <draco/            | server/meshes

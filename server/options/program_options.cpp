@@ -11,6 +11,7 @@
 #include <netinet/in.h>
 #include <unistd.h>
 
+#include "proto/recording/verdict.h"
 #include "server/hosting/scene_server.h"
 #include "server/options/option_table.h"
 #include "server/scene/roles.h"
@@ -367,11 +368,19 @@ CLI::App& addResimulateCommand(OptionTable& table, ProgramOptions& options) {
   CLI::App& command =
       table.command("resimulate", "Simulate a recording again, and compare each state with the recorded one");
   table.word("FILE", options.recording, "Recording that --record wrote");
+  table.text("--states", options.states, "OUT",
+             "Write positions and velocities of every tick to this file, in the format of `step`");
+  table.flag("--json", options.json, "Print the result as one JSON object");
   addDeviceOptions(table, options);
-  command.footer(fmt::format(
-      "Exit code: 0 if every state is bitwise equal, 1 for an error, a difference or a missing part, {} if\n"
-      "interrupted.",
-      kInterrupted));
+  command.footer(
+      fmt::format("Exit code: 0 if every state is bitwise equal, 1 for other bits although the kernels are "
+                  "not known to be\n"
+                  "other ones, 2 for wrong arguments, 6 if OUT cannot be written, 7 if FILE cannot be read "
+                  "or simulated, 8 if\n"
+                  "the program itself fails, 9 for other bits from other kernels, 10 if nothing differs but "
+                  "a part is missing,\n"
+                  "{} if interrupted.",
+                  kInterrupted));
   return command;
 }
 
@@ -518,6 +527,8 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   const CLI::App& resimulate = addResimulateCommand(table, options);
   const CLI::App& play = addPlayCommand(table, options);
   const CLI::App& token = addTokenCommand(table, parsed);
+  // For `resimulate`, 1 means a difference.
+  const auto wrongArguments = [&] { return resimulate.parsed() ? recording::kWrongArguments : 1; };
 
   try {
     app.parse(argc, argv);
@@ -545,12 +556,12 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   } catch (const CLI::ExtrasError&) {
     fmt::print(stderr, "{}\nRun with --help for more information.\n",
                table.unexpected(app.remaining(true).front()));
-    return 1;
+    return wrongArguments();
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
+    return app.exit(error) == 0 ? 0 : wrongArguments();
   } catch (const OptionError& error) {
     fmt::print(stderr, "{}\n", error.what());
-    return 1;
+    return wrongArguments();
   }
   if (parsed.printConfig) return fmt::print("{}", table.toToml()), 0;
   if (parsed.printMarkdown) return printMarkdown(table), 0;

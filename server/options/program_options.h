@@ -88,8 +88,10 @@ struct ProgramOptions {
   // Commands.
   step::StepOptions step;
   recording::PlaybackOptions playback;
-  std::string recording;   // file of `play` and `resimulate`
-  std::string printScene;  // name or file
+  std::string recording;         // file of `play` and `resimulate`
+  std::string printScene;        // name or file
+  std::filesystem::path states;  // file of states that `resimulate` writes; empty: none
+  bool json = false;             // `resimulate` prints one JSON object
   TokenOptions token;
 };
 

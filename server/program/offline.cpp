@@ -3,15 +3,23 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
-#include <stdexcept>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
+#include "proto/recording/verdict.h"
+#include "server/messages/scene_file.h"
 #include "server/model/scene.h"
 #include "server/program/commands.h"
 #include "server/program/devices.h"
 #include "server/program/scenes.h"
 #include "server/recording/resimulate.h"
+#include "server/step/state_file.h"
 #include "server/step/step.h"
 #include "server/vulkan/device.h"
 
@@ -33,19 +41,82 @@ class Progress {
   Clock::time_point next_ = Clock::now() + std::chrono::seconds(1);
 };
 
+// Writes the simulated states and, at the end, their description.
+class States {
+ public:
+  explicit States(const std::filesystem::path& path) : file_(path) {}
+
+  void add(const recording::SimulatedState& state) {
+    if (file_.frames() == 0) {
+      nodes_ = state.scene.nodeCount();
+      description_ = {{"tickSeconds", state.scene.tickSeconds()},
+                      {"cloths", step::describeCloths(state.scene)},
+                      {"scene", Json::parse(messages::toJson(state.scene))}};
+    }
+    file_.append(state.snapshot.bytes);
+    ticks_.push_back(state.snapshot.tick);
+    hashes_.push_back(fmt::format("{:016x}", state.hash));
+    if (!state.same) different_.push_back(state.snapshot.tick);
+  }
+
+  void finish(const recording::Resimulation& result, const std::string& recording) {
+    description_.update({{"complete", !result.interrupted && result.missing.empty()},
+                         {"ticks", std::move(ticks_)},
+                         {"hashes", std::move(hashes_)},
+                         {"differentTicks", std::move(different_)},
+                         {"recording", recording},
+                         {"device", {{"name", result.device}}},
+                         {"server", kServerName}});
+    file_.finish(description_, nodes_);
+  }
+
+ private:
+  using Json = nlohmann::ordered_json;
+
+  step::StateFile file_;
+  std::uint32_t nodes_ = 0;
+  Json description_, ticks_ = Json::array(), hashes_ = Json::array(), different_ = Json::array();
+};
+
+int failedWith(int code, const std::string& error) {
+  fmt::print(stderr, "clothstream-server: {}\n", error);
+  return code;
+}
+
+int runResimulation(const ProgramOptions& options, const Signals& signals) {
+  std::error_code none;
+  if (std::filesystem::equivalent(options.recording, options.states, none))
+    return failedWith(recording::kWrongArguments,
+                      fmt::format("--states: {} is the recording; choose another file", options.recording));
+  std::unique_ptr<States> states;
+  const auto add = [&](const recording::SimulatedState& state) {
+    if (!states) states = std::make_unique<States>(options.states);
+    states->add(state);
+  };
+  Progress progress;
+  recording::ResimulateOptions resimulation{
+      .path = options.recording,
+      .device = [&](std::uint32_t nodes) { return deviceOptions(options, nodes); },
+      .interrupted = [&] { return signals.interrupted(); },
+      .progress = [&](double part) { progress.show(part); }};
+  if (!options.states.empty()) resimulation.states = add;
+  const auto result = recording::resimulate(resimulation);
+  if (!result) return failedWith(recording::kFileUnreadable, result.error());
+  if (states) states->finish(*result, options.recording);
+  fmt::print("{}", options.json ? recording::toJson(*result) : recording::toText(*result));
+  return result->interrupted ? kInterrupted : static_cast<int>(result->verdict());
+}
+
 }  // namespace
 
 int resimulate(const ProgramOptions& options, const Signals& signals) {
-  Progress progress;
-  const auto result =
-      recording::resimulate({.path = options.recording,
-                             .device = [&](std::uint32_t nodes) { return deviceOptions(options, nodes); },
-                             .interrupted = [&] { return signals.interrupted(); },
-                             .progress = [&](double part) { progress.show(part); }});
-  if (!result) throw std::runtime_error(result.error());
-  fmt::print("{}", recording::toText(*result));
-  if (result->interrupted) return kInterrupted;
-  return result->firstDifferent || !result->missing.empty() ? 1 : 0;
+  try {
+    return runResimulation(options, signals);
+  } catch (const step::FileError& error) {
+    return failedWith(recording::kFileNotWritten, error.what());
+  } catch (const std::exception& error) {
+    return failedWith(recording::kProgramFailed, error.what());
+  }
 }
 
 int runSteps(const ProgramOptions& options, const Signals& signals) {

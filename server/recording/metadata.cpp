@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "kernels/shader_hash.h"
+#include "proto/recording/verdict.h"
 
 namespace clothstream::recording {
 namespace {
@@ -20,6 +21,10 @@ std::string setting(const char* name) {
 }
 
 }  // namespace
+
+std::string shaderHash() {
+  return kernels::kShaderHash;
+}
 
 std::string processorFeatures() {
 #if defined(__x86_64__)
@@ -50,7 +55,7 @@ Metadata metadataOf(const std::string& serverName, const vulkan::DeviceInfo& dev
           {"vulkan", device.apiVersion},
           {"processor", processorFeatures()},
           {"software_vector_bits", setting("LP_NATIVE_VECTOR_WIDTH")},
-          {"shaders", kernels::kShaderHash},
+          {kKernelsEntry, shaderHash()},
           {"codec", fmt::format("{}", description.codec())},
           {"max_error", fmt::format("{}", description.max_error())},
           {"vertices", fmt::format("{}", scene.nodeCount())},

@@ -15,6 +15,9 @@ namespace clothstream::recording {
 Metadata metadataOf(const std::string& serverName, const vulkan::DeviceInfo& device,
                     const model::Scene& scene, const v1::StreamDescription& description);
 
+// Hash of the compiled kernels of this program.
+std::string shaderHash();
+
 // Processor features of this machine that software Vulkan devices depend on, separated by spaces.
 std::string processorFeatures();
 

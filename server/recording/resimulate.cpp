@@ -3,14 +3,17 @@
 #include "server/recording/resimulate.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "clothstream/v1/recording.pb.h"
 #include "proto/recording/recording_reader.h"
 #include "server/messages/scene_message.h"
+#include "server/recording/metadata.h"
 #include "server/recording/tick_message.h"
 #include "server/scene/snapshot_message.h"
 #include "server/simulation/cloth_simulation.h"
@@ -33,18 +36,6 @@ Done parse(std::string_view bytes, const char* what, MessageType& message) {
   return {};
 }
 
-Difference differenceOf(const simulation::StateSnapshot& recorded, const simulation::StateSnapshot& now) {
-  const simulation::NodeState was = simulation::unpack(recorded), is = simulation::unpack(now);
-  Difference difference{.tick = recorded.tick};
-  for (std::size_t i = 0; i < was.positions.size(); ++i) {
-    const double distance = (is.positions[i].cast<double>() - was.positions[i].cast<double>()).norm();
-    // The negated comparison counts NaN as the largest distance.
-    if (!(distance <= difference.largest)) difference.largest = distance;
-    difference.mean += distance / static_cast<double>(was.positions.size());
-  }
-  return difference;
-}
-
 // Repeats the device work of a SceneHost from its recording.
 class Replay {
  public:
@@ -54,6 +45,8 @@ class Replay {
   Done take(const v1::RecordedScene& message);
   Done take(v1::Checkpoint& message);
   Done take(const v1::RecordedTick& message);
+  // Frames show how far a state is off that differs.
+  void takeFrame(std::string_view frame);
   // Reports that a message cannot be read. The replay continues from the next state. States of releases
   // before 0.3 do not contain the nodes that grabs hold, so those with grabs are skipped.
   void lose(std::string reason);
@@ -67,6 +60,7 @@ class Replay {
   }
   void makeSimulation(const simulation::StateSnapshot& state);
   void compare(const v1::RecordedTick& message, const simulation::TickStatus& status);
+  void showGiven(const simulation::StateSnapshot& state);
 
   const ResimulateOptions& options_;
   Resimulation& result_;
@@ -77,6 +71,7 @@ class Replay {
   std::uint32_t substeps_ = 0;  // of simulation_
   bool lost_ = false;           // waits for a state from which it can continue
   bool keeps_ = false;          // the device has a state for a rollback
+  std::unique_ptr<FrameDistance> frames_;
   std::unique_ptr<vulkan::Device> device_;
   std::unique_ptr<vulkan::Recorder> recorder_;
   std::unique_ptr<simulation::ClothSimulation> simulation_;
@@ -92,7 +87,16 @@ Done Replay::take(const v1::RecordedScene& message) {
   if (!scene) return broken("its scene is invalid: {}", scene.error().text);
   definition_ = message.scene();
   scene_ = std::move(*scene);
+  result_.maxError = double{scene_.stream.maxError};
+  frames_ = std::make_unique<FrameDistance>(scene_);
   return {};
+}
+
+void Replay::takeFrame(std::string_view frame) {
+  if (!frames_) return;
+  frames_->take(frame);
+  result_.frames = frames_->frames();
+  result_.largestOfFrames = frames_->largest();
 }
 
 Done Replay::take(v1::Checkpoint& message) {
@@ -111,19 +115,23 @@ Done Replay::take(v1::Checkpoint& message) {
     result_.device = fmt::format("{} ({})", device_->info().name, device_->info().driver);
     makeSimulation(snapshot);
     keeps_ = tick_ == 0;
+    showGiven(snapshot);
   } else if (lost_ && (!message.grips_hold() || message.has_held())) {
     lost_ = false;
     tick_ = message.tick();
     result_.missing.back().until = tick_;
     makeSimulation(snapshot);
     keeps_ = message.restored();
+    showGiven(snapshot);
   } else if (lost_) {
     return {};
   } else if (message.restored()) {
     makeSimulation(snapshot);
   } else if (result_.firstDifferent) {
     submit([&] { simulation_->recordSaveState(*recorder_); });
-    result_.differences.push_back(differenceOf(snapshot, simulation_->collectState(tick_)));
+    result_.differences.push_back(
+        differenceOf(tick_, simulation::unpack(snapshot).positions,
+                     simulation::unpack(simulation_->collectState(tick_)).positions));
   }
   return {};
 }
@@ -174,14 +182,24 @@ Done Replay::take(const v1::RecordedTick& message) {
   return {};
 }
 
+void Replay::showGiven(const simulation::StateSnapshot& state) {
+  if (!options_.states) return;
+  options_.states(
+      {.snapshot = state, .hash = simulation::statusOf(state).stateHash, .given = true, .scene = scene_});
+}
+
 void Replay::compare(const v1::RecordedTick& message, const simulation::TickStatus& status) {
   ++result_.ticks;
   // NaNs may have different bits.
   const bool bothUnhealthy = message.unhealthy() && !status.healthy;
   const bool same = bothUnhealthy || (!message.unhealthy() && status.stateHash == message.state_hash());
-  if (options_.states) {
+  const bool compares = !same || result_.firstDifferent;
+  if (options_.states || compares) {
     submit([&] { simulation_->recordSaveState(*recorder_); });
-    options_.states(message.tick(), same, simulation::unpack(simulation_->collectState(message.tick())));
+    const simulation::StateSnapshot snapshot = simulation_->collectState(message.tick());
+    if (compares && frames_) frames_->add(message.tick(), simulation::unpack(snapshot).positions);
+    if (options_.states)
+      options_.states({.snapshot = snapshot, .hash = status.stateHash, .same = same, .scene = scene_});
   }
   if (same) return;
   ++result_.different;
@@ -211,6 +229,8 @@ Done replay(RecordingReader& reader, const ResimulateOptions& options, Resimulat
     } else if ((*message)->topic == Topic::checkpoints) {
       v1::Checkpoint checkpoint;
       done = parse(bytes, "state", checkpoint).and_then([&] { return replay.take(checkpoint); });
+    } else if ((*message)->topic == Topic::frames) {
+      replay.takeFrame(bytes);
     } else if ((*message)->topic == Topic::ticks) {
       done = parse(bytes, "tick", tick).and_then([&] { return replay.take(tick); });
       if (options.progress && length > 0)
@@ -235,6 +255,7 @@ tl::expected<Resimulation, std::string> resimulate(const ResimulateOptions& opti
   if (!reader) return tl::unexpected(reader.error());
   Resimulation result;
   result.scene = reader->metadata("scene");
+  result.kernels = compareKernels(reader->metadata(kKernelsEntry), shaderHash());
   result.recordedOn = fmt::format("{} ({})", reader->metadata("device"), reader->metadata("driver"));
   if (Done done = replay(*reader, options, result); !done)
     return broken("{} cannot be simulated again: {}", options.path, done.error());
@@ -244,8 +265,8 @@ tl::expected<Resimulation, std::string> resimulate(const ResimulateOptions& opti
 std::string toText(const Resimulation& result) {
   const std::string ticks =
       fmt::format("{} ticks{}", result.ticks, result.interrupted ? " before it was interrupted" : "");
-  std::string text = fmt::format("scene     {}\nrecorded  {}\nagain     {}\n", result.scene,
-                                 result.recordedOn, result.device);
+  std::string text = fmt::format("scene     {}\nrecorded  {}\nagain     {}\nkernels   {}\n", result.scene,
+                                 result.recordedOn, result.device, nameOf(result.kernels));
   for (const Difference& difference : result.differences)
     text += fmt::format("tick {}: nodes differ by at most {:.3g} m, on average by {:.3g} m\n",
                         difference.tick, difference.largest, difference.mean);
@@ -255,12 +276,53 @@ std::string toText(const Resimulation& result) {
                         missing.reason);
   const char* all = result.missing.empty() ? "all" : "all available ticks";
   if (!result.firstDifferent) return text + fmt::format("{}, {} bit-identical\n", ticks, all);
-  if (result.differences.empty())
+  if (result.frames > 0)
+    text += fmt::format(
+        "{} frames show other positions: nodes are at most {:.3g} m from them (tick {}), of which {:.3g} m "
+        "may be "
+        "the codec's\n",
+        result.frames, result.largestOfFrames.largest, result.largestOfFrames.tick,
+        std::sqrt(3.0) * result.maxError);
+  else if (result.differences.empty())
     text += "no state was recorded after the first difference, so its size is unknown\n";
   return text +
          fmt::format(
              "{} of {} differ, first tick {}: the hash of its state is {:016x}, recorded was {:016x}\n",
              result.different, ticks, *result.firstDifferent, result.hash, result.recordedHash);
+}
+
+std::string toJson(const Resimulation& result) {
+  using Json = nlohmann::ordered_json;
+  const auto hex = [](std::uint64_t hash) { return fmt::format("{:016x}", hash); };
+  const auto jsonOf = [](const Difference& difference) {
+    return Json{{"tick", difference.tick}, {"largest", difference.largest}, {"mean", difference.mean}};
+  };
+  Json json{{"verdict", nameOf(result.verdict())},
+            {"exitCode", static_cast<int>(result.verdict())},
+            {"interrupted", result.interrupted},
+            {"scene", result.scene},
+            {"kernels", nameOf(result.kernels)},
+            {"recordedOn", result.recordedOn},
+            {"device", result.device},
+            {"ticks", result.ticks},
+            {"different", result.different},
+            {"firstDifferent", nullptr},
+            {"missing", Json::array()},
+            {"states", Json::array()},
+            {"frames", {{"compared", result.frames}, {"maxError", result.maxError}, {"largest", nullptr}}}};
+  if (result.firstDifferent)
+    json["firstDifferent"] = {{"tick", *result.firstDifferent},
+                              {"hash", hex(result.hash)},
+                              {"recordedHash", hex(result.recordedHash)}};
+  for (const Missing& missing : result.missing) {
+    Json& part = json["missing"].emplace_back(Json{{"after", missing.after}, {"until", nullptr}});
+    if (missing.until) part["until"] = *missing.until;
+    part["reason"] = missing.reason;
+  }
+  for (const Difference& difference : result.differences) json["states"].push_back(jsonOf(difference));
+  if (result.frames > 0) json["frames"]["largest"] = jsonOf(result.largestOfFrames);
+  // Names of devices and files may not be UTF-8.
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
 }  // namespace clothstream::recording

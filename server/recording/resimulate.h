@@ -10,17 +10,13 @@
 
 #include <tl/expected.hpp>
 
+#include "proto/recording/verdict.h"
 #include "server/model/scene.h"
+#include "server/recording/frame_distance.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream::recording {
-
-// Distance of nodes from their recorded positions, metres.
-struct Difference {
-  std::uint64_t tick = 0;
-  double largest = 0, mean = 0;
-};
 
 // Part of a recording that could not be simulated again.
 struct Missing {
@@ -39,7 +35,25 @@ struct Resimulation {
   std::uint64_t hash = 0, recordedHash = 0;
   // Differences at every recorded state from there on.
   std::vector<Difference> differences;
+  // Frames from there on that were compared with the states of their ticks, and the largest difference.
+  // Frames are within sqrt(3) max error of the state that they show (metres).
+  std::uint64_t frames = 0;
+  Difference largestOfFrames;
+  double maxError = 0;
   std::string scene, recordedOn, device;  // names; recordedOn and device include the driver
+  // Whether this program has the kernels of the recording.
+  Kernels kernels = Kernels::unknown;
+
+  Verdict verdict() const { return verdictOf(firstDifferent.has_value(), !missing.empty(), kernels); }
+};
+
+// A state that was simulated, or from which the simulation started or continued.
+struct SimulatedState {
+  const simulation::StateSnapshot& snapshot;  // its tick is set
+  std::uint64_t hash = 0;
+  bool given = false;  // the recording has this state, and the simulation starts or continues from it
+  bool same = true;    // it equals the recorded state
+  const model::Scene& scene;
 };
 
 struct ResimulateOptions {
@@ -50,8 +64,9 @@ struct ResimulateOptions {
   std::function<bool()> interrupted;
   // Called after every tick with the completed fraction, 0 to 1. May be empty.
   std::function<void(double)> progress;
-  // Called after every tick with the state, and whether it equals the recorded one. May be empty.
-  std::function<void(std::uint64_t tick, bool same, const simulation::NodeState& state)> states{};
+  // Called at the start, after every tick, and where the simulation continues after a missing part. May be
+  // empty.
+  std::function<void(const SimulatedState&)> states{};
 };
 
 // The error describes the problem of the file. Exceptions of the device pass through.
@@ -59,5 +74,7 @@ struct ResimulateOptions {
 
 // Report for people. The last line is the verdict.
 std::string toText(const Resimulation& result);
+// The same as one JSON object, with the verdict and the exit code.
+std::string toJson(const Resimulation& result);
 
 }  // namespace clothstream::recording

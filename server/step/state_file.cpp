@@ -5,7 +5,6 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,7 +15,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 
 [[noreturn]] void fail(const std::filesystem::path& path) {
-  throw std::runtime_error(fmt::format("cannot write {}: {}", path.string(), std::strerror(errno)));
+  throw FileError(fmt::format("cannot write {}: {}", path.string(), std::strerror(errno)));
 }
 
 }  // namespace
@@ -55,8 +54,23 @@ void StateFile::finish(const nlohmann::ordered_json& description, std::uint32_t 
   if (!out) fail(temporary);
   std::error_code problem;
   std::filesystem::rename(temporary, sidecar(), problem);
-  if (problem)
-    throw std::runtime_error(fmt::format("cannot write {}: {}", sidecar().string(), problem.message()));
+  if (problem) throw FileError(fmt::format("cannot write {}: {}", sidecar().string(), problem.message()));
+}
+
+nlohmann::ordered_json describeCloths(const model::Scene& scene) {
+  using Json = nlohmann::ordered_json;
+  Json cloths = Json::array();
+  std::uint32_t first = 0;
+  for (const model::Cloth& cloth : scene.cloths) {
+    Json& entry =
+        cloths.emplace_back(Json{{"name", cloth.name}, {"firstNode", first}, {"nodes", cloth.nodeCount()}});
+    if (!cloth.mesh) {
+      entry["rows"] = cloth.grid.rows;
+      entry["columns"] = cloth.grid.columns;
+    }
+    first += cloth.nodeCount();
+  }
+  return cloths;
 }
 
 }  // namespace clothstream::step

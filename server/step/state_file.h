@@ -7,18 +7,27 @@
 #include <filesystem>
 #include <fstream>
 #include <span>
+#include <stdexcept>
 #include <string>
 
 #include <nlohmann/json.hpp>
 
+#include "server/model/scene.h"
+
 namespace clothstream::step {
+
+// Names the file and the system's message.
+class FileError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 // FILE has frames of little-endian float32: for each node in order its position (m) and velocity (m/s), six
 // numbers. FILE.json describes them (docs/simulation.md). finish() writes FILE.json completely or not at all;
 // before that it does not exist.
 class StateFile {
  public:
-  // Throws std::runtime_error with the path and the system's message, like the other functions.
+  // Throws FileError, like the other functions.
   explicit StateFile(std::filesystem::path path);
 
   void append(std::span<const std::byte> frame);
@@ -33,5 +42,8 @@ class StateFile {
   std::ofstream file_;
   std::uint64_t frames_ = 0;
 };
+
+// Describes the cloths of a scene: name, first node, number of nodes, and rows and columns of a grid.
+nlohmann::ordered_json describeCloths(const model::Scene& scene);
 
 }  // namespace clothstream::step

@@ -19,21 +19,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-Json describe(const model::Scene& scene) {
-  Json cloths = Json::array();
-  std::uint32_t first = 0;
-  for (const model::Cloth& cloth : scene.cloths) {
-    Json& entry =
-        cloths.emplace_back(Json{{"name", cloth.name}, {"firstNode", first}, {"nodes", cloth.nodeCount()}});
-    if (!cloth.mesh) {
-      entry["rows"] = cloth.grid.rows;
-      entry["columns"] = cloth.grid.columns;
-    }
-    first += cloth.nodeCount();
-  }
-  return cloths;
-}
-
 Json describe(std::span<const simulation::ClothReport> reports, double deviceSeconds) {
   Json cloths = Json::array();
   for (const simulation::ClothReport& report : reports)
@@ -138,7 +123,7 @@ Outcome run(vulkan::Device& device, const model::Scene& scene, const StepOptions
                {"tickSeconds", scene.tickSeconds()},
                {"ticks", std::move(frames.ticks)},
                {"hashes", std::move(frames.hashes)},
-               {"cloths", describe(scene)},
+               {"cloths", describeCloths(scene)},
                {"reports", std::move(frames.reports)},
                {"device", {{"name", info.name}, {"driver", info.driver}, {"vulkan", info.apiVersion}}},
                {"server", options.serverName},

@@ -117,15 +117,17 @@ void replay(const std::string& path, std::uint32_t ticks) {
                              .interrupted = [] { return false; },
                              .progress = {},
                              .states =
-                                 [&](std::uint64_t tick, bool same, const simulation::NodeState& state) {
+                                 [&](const recording::SimulatedState& state) {
+                                   const std::uint64_t tick = state.snapshot.tick;
                                    const auto frame = frames.positions.find(tick);
                                    if (frame == frames.positions.end()) {
-                                     EXPECT_TRUE(same) << "tick " << tick << " is not what it was";
+                                     EXPECT_TRUE(state.same) << "tick " << tick << " is not what it was";
                                      return;
                                    }
-                                   ASSERT_EQ(frame->second.size(), 3 * state.positions.size());
-                                   const double away = distance(frame->second, state);
-                                   EXPECT_TRUE(same) << fmt::format(
+                                   ASSERT_EQ(frame->second.size(), 3 * std::size_t{state.scene.nodeCount()});
+                                   const double away =
+                                       distance(frame->second, simulation::unpack(state.snapshot));
+                                   EXPECT_TRUE(state.same) << fmt::format(
                                        "tick {} is not what it was: a node is {:.3g} m from where its frame "
                                        "shows it, of which {:.3g} m "
                                        "may be the codec's",
