@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Depth of vertices below the surface of a solid.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "clients/core/core.h"
+#include "clients/measure/surface.h"
+
+namespace clothstream::measure {
+
+// Collider with its pose, and the faces of a hull.
+class Solid {
+ public:
+  // `corners` and `triangles` are those of cs_get_hull; they are empty for other shapes.
+  Solid(const cs_collider& collider, std::span<const float> corners,
+        std::span<const std::uint32_t> triangles);
+
+  // Distance of a point to the nearest place of the surface, metres: positive inside, 0 or negative outside.
+  // For a hull it is the distance to the nearest plane of a face.
+  double depthOf(const Point& point) const;
+
+ private:
+  struct Face {
+    Point normal;  // unit length, outwards
+    double offset = 0;
+  };
+
+  std::uint32_t shape_ = 0;
+  double radius_ = 0, halfLength_ = 0;
+  Point position_{}, halfSize_{};
+  std::array<double, 4> orientation_{};  // quaternion x y z w, unit length
+  std::vector<Face> faces_;
+};
+
+// All colliders of the newest frame.
+std::vector<Solid> solidsOf(const cs_client* client);
+
+// Largest depth of the vertices `first` to `first` + `count` - 1 in any of the solids, metres; 0 if none is
+// inside.
+double penetrationOf(std::span<const Solid> solids, std::span<const float> positions, std::uint32_t first,
+                     std::uint32_t count);
+
+}  // namespace clothstream::measure
