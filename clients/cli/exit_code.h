@@ -5,19 +5,22 @@
 #include <string>
 
 #include "clients/native/failure.h"
+#include "proto/recording/verdict.h"
 
 namespace clothstream::cli {
 
 enum ExitCode : int {
   kOk = 0,
-  kHashMismatch = 1,
-  kUsage = 2,
+  kHashMismatch = static_cast<int>(recording::Verdict::different),
+  kUsage = recording::kWrongArguments,
   kUnreachable = 3,
   kRefused = 4,
   kLost = 5,
-  kNotWritten = 6,
-  kUnreadable = 7,
-  kFailed = 8,
+  kNotWritten = recording::kFileNotWritten,
+  kUnreadable = recording::kFileUnreadable,
+  kFailed = recording::kProgramFailed,
+  kOtherKernels = static_cast<int>(recording::Verdict::otherKernels),
+  kMissing = static_cast<int>(recording::Verdict::missing),
 };
 
 struct ExitMeaning {
@@ -29,7 +32,8 @@ struct ExitMeaning {
 inline constexpr ExitMeaning kExitMeanings[] = {
     {kOk, "success"},
     {kHashMismatch,
-     "--hash or load found a frame that differs from the server's, or encode one that is not as promised"},
+     "a difference: --hash or load found a frame that differs from the server's, encode one that is not as "
+     "promised, or a comparison other bits"},
     {kUsage, "wrong arguments"},
     {kUnreachable, "no server answers"},
     {kRefused, "the server refuses: an unknown scene, a value that is not allowed"},
@@ -37,10 +41,17 @@ inline constexpr ExitMeaning kExitMeanings[] = {
     {kNotWritten, "a file cannot be written, or writing was interrupted"},
     {kUnreadable, "a file cannot be read, or its content is wrong"},
     {kFailed, "clothstream itself failed, for example for a lack of memory"},
+    {kOtherKernels, "a comparison found other bits, which other kernels made"},
+    {kMissing, "a comparison found no difference, but data that is missing or damaged"},
 };
 
 // Text for --help, in lines of at most 107 columns.
 std::string exitCodeHelp();
+
+// Verdicts of comparisons have the codes kOk, kHashMismatch, kOtherKernels and kMissing.
+constexpr ExitCode exitCodeOf(recording::Verdict verdict) {
+  return static_cast<ExitCode>(verdict);
+}
 
 constexpr ExitCode exitCodeOf(Failure::Kind kind) {
   switch (kind) {

@@ -10,6 +10,7 @@
 
 #include "clients/cli/error.h"
 #include "clients/cli/gltf_animation.h"
+#include "clients/cli/npz_export.h"
 #include "clients/cli/obj_file.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
@@ -24,29 +25,35 @@ using Done = tl::expected<void, Error>;
 // Takes a frame and its time in seconds since the first frame.
 using TakeFrame = std::function<Done(const cs_client*, double)>;
 
-// Passes each requested frame to `take` and returns their number.
-tl::expected<std::uint32_t, Error> forEachFrame(const ExportOptions& options, const TakeFrame& take) {
+tl::expected<PlayedRecording, Error> open(const ExportOptions& options) {
   auto reader = orError(kUnreadable, recording::RecordingReader::open(options.recording));
   if (!reader) return tl::unexpected(reader.error());
   auto played = PlayedRecording::open(std::move(*reader));
   if (!played) return makeError(kUnreadable, "{}: {}", options.recording, played.error());
-  const double length = static_cast<double>(played->reader().end() - played->reader().start()) * 1e-9;
+  return std::move(*played);
+}
+
+// Passes each requested frame to `take` and returns their number. Without a rate it passes all frames.
+tl::expected<std::uint32_t, Error> forEachFrame(const ExportOptions& options, PlayedRecording& played,
+                                                std::optional<double> rate, const TakeFrame& take) {
+  const double length = static_cast<double>(played.reader().end() - played.reader().start()) * 1e-9;
   const double wanted = std::min(std::max(length - options.from, 0.0), options.seconds.value_or(length));
-  Progress progress("export", 1 + static_cast<std::uint32_t>(std::min(wanted * options.rate, 1e9)));
+  const double shownRate = rate.value_or(cs_stream_rate(played.client()));
+  Progress progress("export", 1 + static_cast<std::uint32_t>(std::min(wanted * shownRate, 1e9)));
   std::uint32_t frames = 0;
   double first = 0;
   for (;;) {
     if (interrupted()) return makeError(kNotWritten, "interrupted; {} was not written", options.out);
-    const auto more = played->next();
+    const auto more = played.next();
     if (!more) return makeError(kUnreadable, "{}: {}", options.recording, more.error());
     if (!*more) break;
-    const double now = played->seconds();
+    const double now = played.seconds();
     if (now < options.from) continue;
     if (options.seconds && now >= options.from + *options.seconds) break;
     if (frames == 0) first = now;
     // Tolerates 1 ms, since the time of a frame is when it was recorded.
-    if (now - first + 0.001 < frames / options.rate) continue;
-    if (auto taken = take(played->client(), now - first); !taken) return tl::unexpected(taken.error());
+    if (rate && now - first + 0.001 < frames / *rate) continue;
+    if (auto taken = take(played.client(), now - first); !taken) return tl::unexpected(taken.error());
     progress.show(++frames);
   }
   if (frames == 0) return makeError(kUnreadable, "{} has no frame in the requested time", options.recording);
@@ -54,8 +61,11 @@ tl::expected<std::uint32_t, Error> forEachFrame(const ExportOptions& options, co
 }
 
 tl::expected<std::uint32_t, Error> writeGltf(const ExportOptions& options) {
+  auto played = open(options);
+  if (!played) return tl::unexpected(played.error());
+  const double rate = options.rate.value_or(kDefaultExportRate);
   GltfAnimation animation;
-  auto frames = forEachFrame(options, [&](const cs_client* client, double seconds) -> Done {
+  auto frames = forEachFrame(options, *played, rate, [&](const cs_client* client, double seconds) -> Done {
     if (animation.frames() == kMaxGltfFrames)
       return makeError(
           kUsage,
@@ -78,13 +88,28 @@ tl::expected<std::uint32_t, Error> writeGltf(const ExportOptions& options) {
   return frames;
 }
 
+tl::expected<std::uint32_t, Error> writeNpz(const ExportOptions& options) {
+  auto played = open(options);
+  if (!played) return tl::unexpected(played.error());
+  auto npz = NpzExport::begin(options.out, *played);
+  if (!npz) return tl::unexpected(npz.error());
+  auto frames = forEachFrame(options, *played, options.rate,
+                             [&](const cs_client*, double) { return npz->add(*played); });
+  if (!frames) return frames;
+  if (auto written = npz->finish(); !written) return tl::unexpected(written.error());
+  return frames;
+}
+
 tl::expected<std::uint32_t, Error> writeObjs(const ExportOptions& options) {
+  auto played = open(options);
+  if (!played) return tl::unexpected(played.error());
   std::error_code problem;
   if (!std::filesystem::create_directory(options.out, problem))
     return makeError(kNotWritten, "cannot create the directory {}: {}", options.out,
                      problem ? problem.message() : "it exists already");
+  const double rate = options.rate.value_or(kDefaultExportRate);
   std::uint32_t next = 0;
-  auto frames = forEachFrame(options, [&](const cs_client* client, double) -> Done {
+  auto frames = forEachFrame(options, *played, rate, [&](const cs_client* client, double) -> Done {
     const auto path = std::filesystem::path(options.out) / fmt::format("frame_{:06}.obj", next++);
     auto file = orError(kNotWritten, files::NewFile::create(path.string()));
     if (!file) return tl::unexpected(file.error());
@@ -101,7 +126,9 @@ ExitCode exportFrames(const ExportOptions& options) {
   const bool gltf = extension == ".glb" || extension == ".gltf";
   if (std::filesystem::exists(options.out))
     return printError(Error{kNotWritten, fmt::format("cannot write {}: it exists already", options.out)});
-  const auto frames = gltf ? writeGltf(options) : writeObjs(options);
+  const auto frames = extension == ".npz" ? writeNpz(options)
+                      : gltf              ? writeGltf(options)
+                                          : writeObjs(options);
   if (!frames) return printError(frames.error());
   fmt::print("{}: {} frames\n", options.out, *frames);
   return kOk;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clothstream export`: writes the frames of a recording as glTF or OBJ files.
+// `clothstream export`: writes the frames of a recording as glTF, as OBJ files or as arrays of numpy.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,13 @@ namespace clothstream::cli {
 
 struct ExportOptions {
   std::string recording;
-  std::string out;   // FILE.glb, FILE.gltf or a directory for OBJ files; must not exist
-  double rate = 24;  // most frames a second
-  double from = 0;   // seconds of the recording to skip
+  std::string out;             // FILE.glb, FILE.gltf, FILE.npz or a directory for OBJ files; must not exist
+  std::optional<double> rate;  // most frames a second; absent: all for .npz, otherwise kDefaultExportRate
+  double from = 0;             // seconds of the recording to skip
   std::optional<double> seconds;
 };
+
+inline constexpr double kDefaultExportRate = 24;
 
 // Most frames of a glTF file, which is built in memory with one morph target per frame.
 inline constexpr std::uint32_t kMaxGltfFrames = 1000;

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "clients/cli/comparison_commands.h"
 #include "clients/cli/discover.h"
 #include "clients/cli/error.h"
 #include "clients/cli/exit_code.h"
@@ -269,6 +270,9 @@ int run(int argc, char** argv) {
   MotionCommands motionCommands;
   motionCommands.add(app);
 
+  ComparisonCommands comparisonCommands;
+  comparisonCommands.add(app);
+
   RecordingCommands recordingCommands;
   recordingCommands.add(app, address);
 
@@ -301,6 +305,7 @@ int run(int argc, char** argv) {
   blockEndingSignals();
   if (discoverCommand.parsed()) return discoverCommand.run();
   if (motionCommands.parsed()) return motionCommands.run();
+  if (comparisonCommands.parsed()) return comparisonCommands.run(CLOTHSTREAM_VERSION);
   if (!recordingCommands.parsed() || recordingCommands.connects()) {
     const auto proved = proof.prove(joinOptions.address);
     if (!proved) return printError(proved.error());

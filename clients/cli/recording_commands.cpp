@@ -32,18 +32,19 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
   recover_->add_option("FILE", recoverOptions_.recording, "Damaged recording; it is not changed")->required();
   recover_->add_option("OUT", recoverOptions_.out, "Recording to write; must not exist")->required();
 
-  export_ =
-      app.add_subcommand("export", "Write the frames of a recording as an animated glTF or as OBJ files");
+  export_ = app.add_subcommand(
+      "export", "Write the frames of a recording as an animated glTF, as OBJ files, or for numpy");
   export_->add_option("FILE", exportOptions_.recording, "The recording")->required();
   export_
-      ->add_option("OUT", exportOptions_.out,
-                   "NAME.glb (binary) or NAME.gltf (text) for a glTF with one morph target per frame; any "
-                   "other name for a "
-                   "directory with one OBJ file per frame. Must not exist")
+      ->add_option(
+          "OUT", exportOptions_.out,
+          "NAME.glb (binary) or NAME.gltf (text) for a glTF with one morph target per frame; NAME.npz for "
+          "arrays of numpy; any other name for a directory with one OBJ file per frame. Must not exist")
       ->required();
-  export_->add_option("--rate", exportOptions_.rate, "Most frames a second")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  export_
+      ->add_option("--rate", exportOptions_.rate,
+                   "Most frames a second. Default: 24, but all frames for NAME.npz")
+      ->check(CLI::PositiveNumber);
   export_->add_option("--from", exportOptions_.from, "Seconds of the recording to skip")
       ->check(CLI::NonNegativeNumber);
   export_->add_option("--seconds", exportOptions_.seconds, "Most seconds of the recording to export")

@@ -47,6 +47,8 @@ class PlayedRecording {
   const recording::RecordingReader& reader() const { return reader_; }
   // Time of the newest frame since the start of the recording, s.
   double seconds() const { return secondsOf(frameTime_); }
+  // Hash of the exact state of the newest frame; 0 if it is not known.
+  std::uint64_t stateHash() const { return newestFrame_ ? newestFrame_->stateHash : 0; }
   double secondsOf(std::uint64_t time) const { return static_cast<double>(time - reader_.start()) * 1e-9; }
   // The newest tick and checkpoint; nothing before the first and after a seek.
   const std::optional<RecordedTick>& tick() const { return tick_; }

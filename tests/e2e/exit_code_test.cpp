@@ -25,7 +25,7 @@ TEST(ExitCode, HelpAndDocumentationAgree) {
   std::ranges::replace(help, '\n', ' ');
   std::ifstream page("docs/command-line.md");
   ASSERT_TRUE(page) << "run the tests in the root of the repository";
-  const std::regex row(R"(\| (\d) \| (.*) \|)");
+  const std::regex row(R"(\| (\d+) \| (.*) \|)");
   std::smatch match;
   std::string documented = "Exit codes:";
   for (std::string line; std::getline(page, line);)
