@@ -91,11 +91,8 @@ std::string toText(const Difference& difference, const DiffOptions& options) {
         "precision positions of A are within {} of the simulation along each axis, of B within {}\n",
         lengthOf(frames.maxError[0]), lengthOf(frames.maxError[1]));
   }
-  const std::string_view tolerated =
-      difference.verdict() != Verdict::different && difference.firstTick() && options.tolerance > 0
-          ? " within the tolerance"
-          : "";
-  return text + fmt::format("{}{}\n", nameOf(difference.verdict()), tolerated);
+  const bool tolerates = difference.verdict() == Verdict::equal && difference.firstTick();
+  return text + fmt::format("{}{}\n", nameOf(difference.verdict()), tolerates ? " within the tolerance" : "");
 }
 
 Json toJson(const VertexDistance& place) {

@@ -33,6 +33,9 @@ class FirstDifferences : public MessageDifferencer::Reporter {
     add(path, [&] { return fmt::format("{}, became absent", valueOf(a, path, false)); });
   }
   void ReportModified(const Message& a, const Message& b, const Path& path) override {
+    // The fields of a changed message have been reported before.
+    if (path.back().field != nullptr && path.back().field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE)
+      return;
     add(path, [&] { return fmt::format("{} became {}", valueOf(a, path, false), valueOf(b, path, true)); });
   }
 

@@ -154,7 +154,7 @@ class Import(Arrays):
         numpy.testing.assert_array_equal(out["rest_positions"], arrays["rest_positions"])
         self.assertLess(numpy.linalg.norm(out["positions"] - arrays["positions"], axis=-1).max(), REACH)
         self.assertEqual(out["rate"][0], 60)
-        coarse = self.exported(self.imported("coarse", arrays, "--max-error", "2mm"), "coarse.npz")
+        coarse = self.exported(self.imported("coarse", arrays, "--max-error", "2mm"), "coarse_out.npz")
         far = numpy.linalg.norm(coarse["positions"] - arrays["positions"], axis=-1).max()
         self.assertTrue(REACH < far < numpy.sqrt(3) * 0.002 + 1e-6, far)
 

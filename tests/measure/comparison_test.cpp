@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `clothstream diff` and `golden` with recordings in which one thing was changed.
+// `clothstream diff` and `golden`, and `clothstream-server resimulate`, with recordings in which one thing
+// was changed.
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -11,6 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <zlib.h>
 
 #include "clothstream/v1/recording.pb.h"
 #include "proto/recording/recording_writer.h"
@@ -33,15 +35,20 @@ struct Ended {
   std::string output, errors;
 };
 
-Ended clothstream(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), CLOTHSTREAM);
-  e2e::Process process(arguments);
+Ended run(const std::vector<std::string>& command) {
+  e2e::Process process(command);
   const int code = process.waitForEnd(kPatience).value_or(-1);
   return {code, process.output(), process.errors()};
 }
 
+Ended clothstream(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), CLOTHSTREAM);
+  return run(arguments);
+}
+
 // Changes a message, or returns false to leave it out.
 using Change = std::function<bool(Topic, std::string& bytes)>;
+const Change kNoChange = [](Topic, std::string&) { return true; };
 
 // Changes the first tick with this number.
 template <typename Apply>
@@ -60,23 +67,25 @@ class Comparison : public ::testing::Test {
   std::string pathOf(const std::string& name) const { return (directory_.path() / name).string(); }
 
   // Writes the sample with a change and this hash of its kernels.
-  std::string write(
-      const std::string& name, const std::string& kernels = "1",
-      const Change& change = [](Topic, std::string&) { return true; }) const {
+  std::string write(const std::string& name, const std::string& kernels = "1",
+                    const Change& change = kNoChange) const {
+    return rewrite(readerOf(sampleRecording(kFrames)), name, kernels, change);
+  }
+  std::string rewrite(RecordingReader reader, const std::string& name, const std::string& kernels,
+                      const Change& change) const {
     std::string out;
     const Sink sink = [&](std::string_view more) {
       out += more;
       return Written();
     };
-    RecordingReader reader = readerOf(sampleRecording(kFrames));
     Metadata metadata = reader.metadata();
     metadata["shaders"] = kernels;
     auto writer = RecordingWriter::begin(sink, "test", metadata);
     EXPECT_TRUE(writer);
     for (auto message = reader.next(); message && *message; message = reader.next()) {
       std::string bytes((*message)->bytes);
-      if (change((*message)->topic, bytes))
-        EXPECT_TRUE(writer->write((*message)->topic, (*message)->time, bytes));
+      if (!change((*message)->topic, bytes)) continue;
+      EXPECT_TRUE(writer->write((*message)->topic, (*message)->time, bytes));
     }
     EXPECT_TRUE(writer->finish());
     save(name, out);
@@ -99,6 +108,41 @@ class Comparison : public ::testing::Test {
 
   e2e::TemporaryDirectory directory_;
 };
+
+// Recordings that a server made, with changes.
+class Resimulation : public Comparison {
+ protected:
+  void SetUp() override {
+    if (run({CLOTHSTREAM_SERVER, "--list-devices"}).output.empty())
+      GTEST_SKIP() << "there is no Vulkan device";
+  }
+  std::string writeFlag(const std::string& name, const std::string& kernels,
+                        const Change& change = kNoChange) const {
+    const std::string kept = "tests/replay/" CLOTHSTREAM_VERSION "/flag.mcap.gz";
+    gzFile in = gzopen(kept.c_str(), "rb");
+    std::string bytes;
+    std::vector<char> part(65'536);
+    for (int count = 1; in != nullptr && count > 0;) {
+      count = gzread(in, part.data(), static_cast<unsigned>(part.size()));
+      if (count > 0) bytes.append(part.data(), static_cast<std::size_t>(count));
+    }
+    EXPECT_TRUE(in != nullptr && gzclose(in) == Z_OK) << kept;
+    return rewrite(readerOf(bytes), name, kernels, change);
+  }
+  json resimulate(const std::string& path) const {
+    const Ended ended = run({CLOTHSTREAM_SERVER, "resimulate", path, "--json"});
+    const json result = json::parse(ended.output, nullptr, false);
+    EXPECT_TRUE(result.is_object()) << ended.errors << ended.output;
+    EXPECT_EQ(result.value("exitCode", -1), ended.code);
+    return result;
+  }
+};
+
+// From here on the wind blows harder than it did, so that the recorded states cannot come again.
+constexpr std::uint64_t kChangedTick = 15;
+Change otherWind() {
+  return changeTick(kChangedTick, [](v1::RecordedTick& tick) { tick.mutable_wind()->set_x(40); });
+}
 
 using Diff = Comparison;
 using Golden = Comparison;
@@ -231,6 +275,50 @@ TEST_F(Golden, FindsReplacedMissingAndNewRecordings) {
   EXPECT_EQ(replaced.code, 1);
   EXPECT_EQ(json::parse(replaced.output)["recordings"][0]["verdict"], "different");
   EXPECT_THAT(replaced.output, HasSubstr("it has 29 frames and 0 ticks with other hashes"));
+}
+
+TEST_F(Resimulation, KeepsVerdictsApart) {
+  const json same = resimulate(writeFlag("same", "1"));
+  EXPECT_EQ(same["exitCode"], 0) << same;
+  EXPECT_EQ(same["verdict"], "equal");
+  EXPECT_TRUE(same["firstDifferent"].is_null());
+  const json different = resimulate(writeFlag("different", "", otherWind()));
+  EXPECT_EQ(different["exitCode"], 1) << different;
+  EXPECT_EQ(different["kernels"], "unknown");
+  EXPECT_EQ(different["firstDifferent"]["tick"], kChangedTick);
+  const json kernels = resimulate(writeFlag("kernels", "2", otherWind()));
+  EXPECT_EQ(kernels["exitCode"], 9) << kernels;
+  const json missing = resimulate(writeFlag("missing", "", [](Topic topic, std::string& bytes) {
+    v1::RecordedTick tick;
+    return topic != Topic::ticks || !tick.ParseFromString(bytes) || tick.tick() != kChangedTick;
+  }));
+  EXPECT_EQ(missing["exitCode"], 10) << missing;
+  EXPECT_EQ(missing["missing"][0]["after"], kChangedTick - 1);
+}
+
+TEST_F(Resimulation, FramesShowHowFarADifferentStateIs) {
+  const std::string path = writeFlag("different", "", otherWind());
+  const json result = resimulate(path);
+  EXPECT_GT(result["frames"]["compared"], 5);
+  const double largest = result["frames"]["largest"]["largest"];
+  EXPECT_GT(largest, result["frames"]["maxError"]);
+  EXPECT_LT(largest, 2);
+  const Ended text = run({CLOTHSTREAM_SERVER, "resimulate", path});
+  EXPECT_EQ(text.code, 1);
+  EXPECT_THAT(text.output, HasSubstr("frames show other positions: nodes are at most "));
+}
+
+TEST_F(Resimulation, GoldenSaysWhichRecordingsAreNoLongerSimulatedAsTheyWere) {
+  writeFlag("still.mcap", "1");
+  writeFlag("changed.mcap", "", otherWind());
+  const std::string folder = directory_.path().string();
+  EXPECT_EQ(clothstream({"golden", folder, "--update"}).code, 0);
+  const Ended ended = clothstream({"golden", folder, "--server", CLOTHSTREAM_SERVER});
+  EXPECT_EQ(ended.code, 1) << ended.errors;
+  EXPECT_THAT(ended.output, HasSubstr("equal         still.mcap: "));
+  EXPECT_THAT(ended.output, HasSubstr("different     changed.mcap: "));
+  EXPECT_THAT(ended.output, HasSubstr("first tick 15; by at most "));
+  EXPECT_THAT(ended.output, EndsWith("2 recordings: different\n"));
 }
 
 TEST_F(Golden, RefusesABrokenManifest) {

@@ -62,9 +62,9 @@ class States(unittest.TestCase):
             self.assertEqual(about["hashes"][tick], f"{frames['state_hashes'][frame]:016x}")
             away = numpy.linalg.norm(states[tick, :, :3] - frames["positions"][frame], axis=-1)
             self.assertLess(away.max(), reach)
-        # Velocities are those of the motion: most nodes follow theirs within a tick.
+        # Velocities are those of the motion.
         moved = (states[10:, :, :3] - states[9:-1, :, :3]) / about["tickSeconds"]
-        self.assertLess(numpy.median(numpy.linalg.norm(moved - states[10:, :, 3:], axis=-1)), 0.2)
+        self.assertGreater(numpy.corrcoef(moved.ravel(), states[10:, :, 3:].ravel())[0, 1], 0.9)
 
     def test_exit_codes_of_resimulate(self):
         recording = self.kept("flag")
@@ -109,14 +109,14 @@ class States(unittest.TestCase):
         self.assertEqual(ended.returncode, 0, ended.stderr)
         frames = json.loads(ended.stdout)["frames"]
         self.assertEqual(len(frames), 31)
+        most = max(report["cloths"][0]["kineticEnergy"] for report in about["reports"][1:])
         gravity = []
         for frame, report in zip(frames[1:-1], about["reports"][1:-1]):
             measured, reported = frame["cloths"][0], report["cloths"][0]
             self.assertAlmostEqual(measured["strainMax"], reported["strainMax"], delta=2e-5)
             self.assertAlmostEqual(measured["strainMean"], reported["strainMean"], delta=2e-5)
-            # Central differences of positions are not the velocities of the integration.
-            self.assertAlmostEqual(measured["kineticEnergy"], reported["kineticEnergy"],
-                                   delta=0.03 * reported["kineticEnergy"] + 1e-4)
+            # Central differences of positions are close to the velocities of the integration.
+            self.assertAlmostEqual(measured["kineticEnergy"], reported["kineticEnergy"], delta=0.02 * most)
             gravity.append(measured["gravityEnergy"] - reported["gravityEnergy"])
         # The report leaves out pinned nodes, which do not move.
         self.assertLess(numpy.ptp(gravity), 1e-3)

@@ -140,7 +140,7 @@ TEST_F(RecordingPrograms, RecordAStreamCompletelyWithKeyFrames) {
   EXPECT_EQ(unknown.code, 4);
   EXPECT_FALSE(std::filesystem::exists(pathOf("none")));
   const Ended simulated = run({CLOTHSTREAM_SERVER, "resimulate", path});
-  EXPECT_EQ(simulated.code, 1);
+  EXPECT_EQ(simulated.code, 7);
   EXPECT_THAT(simulated.errors, HasSubstr("it holds no simulation"));
 }
 
