@@ -10,6 +10,8 @@
 namespace clothstream::cli {
 namespace {
 
+using client::PlayedRecording;
+
 class RecordedMotion : public Motion {
  public:
   RecordedMotion(std::string path, PlayedRecording played, const v1::StreamDescription& description)
