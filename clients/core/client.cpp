@@ -82,6 +82,7 @@ void Client::disconnected(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
   if (!welcome_.token.empty()) state_ = CS_STATE_RECONNECTING;
   welcomed_ = false;
+  unseenTick_.reset();
   outbox_.clear();
   forgetRequests();
   std::uint64_t seed = 0;
@@ -295,9 +296,20 @@ std::uint32_t Client::packetReceived(std::uint64_t nowUs, const cs_decoded* give
   if (decoded.key) keyFrameRequest_.answered();
   // A key frame makes the client's state equal to the server's again.
   if (!isMirror && !decoded.hashMatches) requestKeyFrame(nowUs);
-  if (!isMirror && acknowledgement_.due(nowUs)) outbox_.setAck(decoded.tick);
+  if (!isMirror) acknowledge(decoded.tick, nowUs);
   timeFrame(decoded.key, nowUs);
   return CS_EVENT_FRAME;
+}
+
+void Client::acknowledge(std::uint64_t tick, std::uint64_t nowUs) {
+  if (inLockstep() && holdsAcknowledgements_)
+    unseenTick_ = tick;
+  else if (inLockstep() || acknowledgement_.due(nowUs))
+    outbox_.setAck(tick);
+}
+
+void Client::acknowledgeSeen() {
+  if (const auto tick = std::exchange(unseenTick_, std::nullopt)) outbox_.setAck(*tick);
 }
 
 void Client::timeFrame(bool key, std::uint64_t nowUs) {
@@ -329,7 +341,8 @@ cs_decoding Client::decode(std::span<const std::byte> packet) {
 }
 
 void Client::requestKeyFrame(std::uint64_t nowUs, bool early) {
-  if (!keyFrameRequest_.wanted(nowUs)) return;
+  // In lockstep the server waits for an answer to each frame: an acknowledgement or this request.
+  if (!keyFrameRequest_.wanted(nowUs) && (early || !inLockstep())) return;
   std::string request;
   writeKeyFrameRequest(request, description_.layout.epoch, early);
   send(std::move(request));

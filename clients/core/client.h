@@ -84,6 +84,11 @@ class Client {
   std::uint64_t listBans(std::string_view scene);
   std::uint64_t liftBan(std::string_view scene, std::string_view subject);
   void requestEarlyKeyFrame(std::uint64_t nowUs);
+  // Whether the server plays a recording in lockstep.
+  bool inLockstep() const { return welcome_.acknowledgeEveryFrame; }
+  // In lockstep, frames are then acknowledged by acknowledgeSeen() only.
+  void holdAcknowledgements(bool on) { holdsAcknowledgements_ = on; }
+  void acknowledgeSeen();
   // nullptr turns play-out off. Returns false if the options are not allowed.
   bool setPlayOut(const cs_play_out_options* options);
   void setLocalContact(bool on);
@@ -157,6 +162,7 @@ class Client {
   std::uint32_t described(Bytes content);
   std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs, const cs_decoded* decoded);
   std::uint32_t packetReceived(std::uint64_t nowUs, const cs_decoded* decoded);
+  void acknowledge(std::uint64_t tick, std::uint64_t nowUs);
   void timeFrame(bool key, std::uint64_t nowUs);
   cs_decoding decode(std::span<const std::byte> packet);
   void requestKeyFrame(std::uint64_t nowUs, bool early = false);
@@ -210,6 +216,8 @@ class Client {
   OperatingPoint point_, formerPoint_;  // current one, and that of the newest frame
   std::uint32_t frameDivisor_ = 1;      // of the newest frame
   Acknowledgement acknowledgement_;
+  bool holdsAcknowledgements_ = false;
+  std::optional<std::uint64_t> unseenTick_;  // of a frame whose acknowledgement is held
   KeyFrameRequest keyFrameRequest_;
   FrameStatistics statistics_;
   ServerClock clock_;

@@ -788,7 +788,7 @@ int cs_get_pairing_code(const cs_client* client, cs_pairing_code* out) CS_NOEXCE
 typedef struct cs_playback {
   double length;        /* s */
   double position;      /* s from the start, at now_us */
-  double speed;         /* 1 is real time */
+  double speed;         /* 1 is real time; 0: as fast as the participants acknowledge frames */
   int32_t loop, paused; /* 0 or 1 */
 } cs_playback;
 
@@ -798,13 +798,23 @@ void cs_request_key_frame(cs_client* client, uint64_t now_us) CS_NOEXCEPT;
 
 /* Fails if the scene is not a recording, or its state is not known yet. */
 int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out) CS_NOEXCEPT;
+
+/* Returns 1 if the server plays the recording in lockstep: it sends the next frame when all participants have
+ * acknowledged the last one. */
+int cs_in_lockstep(const cs_client* client) CS_NOEXCEPT;
+/* on: in lockstep, a frame is acknowledged by cs_acknowledge_seen instead of when it is decoded. A program
+ * that does not look at each frame when it arrives then still sees all of them. Default 0. */
+void cs_hold_acknowledgements(cs_client* client, int on) CS_NOEXCEPT;
+/* The program has seen the newest frame. Does nothing if its acknowledgement is not held. */
+void cs_acknowledge_seen(cs_client* client) CS_NOEXCEPT;
+
 /* The functions below send requests that affect all participants. They do nothing before CS_STATE_JOINED. */
 
 /* Pauses or resumes the clock of any scene. */
 void cs_pause(cs_client* client, int paused) CS_NOEXCEPT;
 /* Recordings only: continues at `seconds` from the start, 0 to the length. */
 void cs_seek(cs_client* client, double seconds) CS_NOEXCEPT;
-/* Recordings only: 0.1 to 8; 1 is real time. */
+/* Recordings only: 0.1 to 8; 1 is real time. In lockstep also 0: as fast as the participants acknowledge. */
 void cs_set_speed(cs_client* client, double speed) CS_NOEXCEPT;
 /* Recordings only: whether playback starts again at the end. */
 void cs_set_loop(cs_client* client, int loop) CS_NOEXCEPT;

@@ -17,6 +17,18 @@ int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out) 
   return 1;
 }
 
+int cs_in_lockstep(const cs_client* client) noexcept {
+  return client->client.inLockstep() ? 1 : 0;
+}
+
+void cs_hold_acknowledgements(cs_client* client, int on) noexcept {
+  client->client.holdAcknowledgements(on != 0);
+}
+
+void cs_acknowledge_seen(cs_client* client) noexcept {
+  client->client.acknowledgeSeen();
+}
+
 void cs_pause(cs_client* client, int paused) noexcept {
   client->client.control({.paused = paused != 0});
 }

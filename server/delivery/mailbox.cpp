@@ -113,6 +113,7 @@ std::uint8_t Mailbox::chosenQuality() const {
 }
 
 void Mailbox::adapt(Clock::time_point now) {
+  if (shape_.lockstep) return;
   const bool behind = !held_.empty() || (needsKey_ && !(endpointWaits_ && hasRoom()));
   const OperatingPoint before = adaptation_.point();
   if (!adaptation_.update(behind, now)) return;
@@ -211,6 +212,17 @@ bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
   }
   wake();
   return true;
+}
+
+bool Mailbox::awaitsAcknowledgement() const {
+  const std::lock_guard lock(mutex_);
+  return !closed_ && (!streaming_ || !held_.empty() || !sent_.empty());
+}
+
+std::optional<std::uint64_t> Mailbox::overdue(Clock::time_point before) const {
+  const std::lock_guard lock(mutex_);
+  if (!shape_.lockstep || closed_ || sent_.empty() || sent_.front().time >= before) return std::nullopt;
+  return sent_.front().tick;
 }
 
 void Mailbox::restart() {

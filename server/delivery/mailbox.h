@@ -84,6 +84,12 @@ class Mailbox {
 
   // The peer has decoded this tick. Returns false if the tick was never sent.
   [[nodiscard]] bool acknowledge(std::uint64_t tick, Clock::time_point now);
+  // Returns whether the peer has not acknowledged everything that was delivered, or does not receive frames
+  // yet. False once it is closed.
+  bool awaitsAcknowledgement() const;
+  // Tick of the oldest frame that was sent before this time and is not acknowledged, if the stream is in
+  // lockstep.
+  std::optional<std::uint64_t> overdue(Clock::time_point before) const;
   // The peer cannot continue decoding: it restarts with a key frame.
   void restart();
   // Returns whether the peer was sent no frame since restart(), or since it subscribed. The next frame is

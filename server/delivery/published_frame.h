@@ -43,6 +43,9 @@ struct StreamShape {
   std::uint8_t layers = 1;
   // Number of qualities of each frame. 1 means a single quality, which may have any number.
   std::uint8_t qualities = 1;
+  // The next frame is published when every subscriber has acknowledged the last one. Layers and quality then
+  // do not adapt to the link.
+  bool lockstep = false;
 };
 
 // Qualities of the next frame that subscribers ask for. Bit n stands for quality n.

@@ -84,4 +84,16 @@ std::uint8_t Subscribers::needsKeyFrame() const {
   return qualities;
 }
 
+bool Subscribers::awaitAcknowledgement() const {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::any_of(
+      subscribers_, [](const Subscriber& subscriber) { return subscriber.mailbox->awaitsAcknowledgement(); });
+}
+
+bool Subscribers::anyRestarts() const {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::any_of(subscribers_,
+                             [](const Subscriber& subscriber) { return subscriber.mailbox->isRestarting(); });
+}
+
 }  // namespace clothstream::delivery

@@ -41,6 +41,10 @@ class Subscribers {
   RequestedFrames requested(Clock::time_point now) const;
   // Qualities, as bits, in which a subscriber needs a key frame; see Mailbox::needsKeyFrame().
   std::uint8_t needsKeyFrame() const;
+  // Returns whether any subscriber has a frame that it has not acknowledged, or does not receive frames yet.
+  bool awaitAcknowledgement() const;
+  // Returns whether any subscriber has received no frame since it joined or asked for a key frame.
+  bool anyRestarts() const;
 
  private:
   struct Subscriber {

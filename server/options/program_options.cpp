@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -384,19 +385,44 @@ CLI::App& addResimulateCommand(OptionTable& table, ProgramOptions& options) {
   return command;
 }
 
+constexpr NumberRange kSpeedRange{.min = recording::kMinSpeed, .max = recording::kMaxSpeed};
+constexpr const char* kMaxSpeedWord = "max";
+constexpr double kMaxSeed = std::numeric_limits<std::uint32_t>::max();
+
 CLI::App& addPlayCommand(OptionTable& table, ProgramOptions& options) {
   CLI::App& command =
       table.command("play", "Serve a recording as a scene that clients join, pause, seek, speed up and loop");
   table.word("FILE", options.recording, "Recording that --record or `clothstream record` wrote");
   table.number("--from", options.playback.from, {.min = 0, .type = "SECONDS"},
                "Start this many seconds after the beginning");
-  table.number("--speed", options.playback.speed, {.min = recording::kMinSpeed, .max = recording::kMaxSpeed},
-               "Recorded seconds per second");
+  table.text(
+      "--speed", options.playSpeed, "N|max",
+      "Recorded seconds per second, 0.1 to 8. In lockstep also max: as fast as frames are acknowledged",
+      [](const std::string& text) {
+        return text == kMaxSpeedWord ? std::string() : checkNumber(kSpeedRange, false)(text);
+      });
   table.flag("--loop", options.playback.loop, "Continue from the beginning at the end, instead of pausing");
+  table.flag("--lockstep", options.playback.lockstep,
+             "Send the next frame when all participants have acknowledged the last one");
+  table.number("--wait-for", options.playback.waitFor, {.min = 1, .max = hosting::kMaxParticipants},
+               "Participants that must be there before the first frame");
+  table.number("--faults", options.playback.faults, {.min = 0, .max = kMaxSeed, .type = "SEED"},
+               "Drop and delay frames. The same seed gives the same faults");
   command.footer(
       "Options of clothstream-server for participants, network and log apply too. No device is needed.");
   command.fallthrough();
   return command;
+}
+
+double playbackSpeed(const ProgramOptions& options) {
+  if (options.playSpeed == kMaxSpeedWord) {
+    if (!options.playback.lockstep)
+      throw OptionError("--speed: max requires --lockstep; use 0.1 to 8 without it");
+    return recording::kUnpaced;
+  }
+  double speed = 1;
+  std::from_chars(options.playSpeed.data(), options.playSpeed.data() + options.playSpeed.size(), speed);
+  return speed;
 }
 
 // Seconds in a text such as 90s, 30m, 8h and 7d; nothing for others.
@@ -546,6 +572,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     allow(parsed.allowed, options.server.participantsMay);
     options.anonymousRole = parsed.anonymousRole.value_or(options.anonymousRole);
     options.token.role = parsed.tokenRole.value_or(options.token.role);
+    options.playback.speed = playbackSpeed(options);
     options.token.valid = parseTime(parsed.tokenValid).value_or(std::chrono::hours(8));
     const bool serves = app.get_subcommands().empty() || play.parsed();
     if (serves && !parsed.printConfig && !parsed.printMarkdown && !parsed.listDevices &&

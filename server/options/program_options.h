@@ -88,6 +88,7 @@ struct ProgramOptions {
   // Commands.
   step::StepOptions step;
   recording::PlaybackOptions playback;
+  std::string playSpeed = "1";   // of `play`: a number or "max"
   std::string recording;         // file of `play` and `resimulate`
   std::string printScene;        // name or file
   std::filesystem::path states;  // file of states that `resimulate` writes; empty: none

@@ -31,6 +31,8 @@ int play(const ProgramOptions& options, const Signals& signals) {
   const std::string scene = recording->scene();
   const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
                                         recording->length(), scene, recording->device());
+  if (options.playback.faults)
+    spdlog::info("faults with the seed {}: frames are dropped and late on purpose", *options.playback.faults);
   std::unique_ptr<EndGuard> guard;  // outlives the server
   hosting::ServerOptions serverOptions = options.server;
   serverOptions.authenticator = makeAuthenticator(options);

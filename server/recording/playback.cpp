@@ -43,6 +43,8 @@ Playback::Playback(RecordedStream recording, const PlaybackOptions& options)
       speed_(options.speed),
       loop_(options.loop),
       parameters_(recording.description()),
+      options_(options),
+      faults_(options.faults ? std::optional<FaultPlan>(*options.faults) : std::nullopt),
       recording_(std::move(recording)),
       ticksPerFrame_(std::max(1u, description().simulation_rate() / description().stream_rate())) {}
 
@@ -109,9 +111,11 @@ messages::Result<void> Playback::control(const v1::ControlSceneRequest& request)
     wanted.seek = 0;
   }
   if (request.has_speed()) {
-    if (!(request.speed() >= kMinSpeed && request.speed() <= kMaxSpeed))
+    const bool unpaced = options_.lockstep && request.speed() == kUnpaced;
+    if (!unpaced && !(request.speed() >= kMinSpeed && request.speed() <= kMaxSpeed))
       return tl::unexpected(
-          wrong(fmt::format("speed = {}: must be {} to {}", request.speed(), kMinSpeed, kMaxSpeed)));
+          wrong(fmt::format("speed = {}: must be {} to {}{}", request.speed(), kMinSpeed, kMaxSpeed,
+                            options_.lockstep ? ", or 0 for as fast as frames are acknowledged" : "")));
     wanted.speed = request.speed();
   }
   if (request.has_loop()) wanted.loop = request.loop();
@@ -134,23 +138,40 @@ v1::Playback Playback::playback() const {
 }
 
 std::optional<Playback::Clock::time_point> Playback::step(scene::LiveScene& scene, Clock::time_point now) {
+  if (options_.lockstep && scene.subscribers.awaitAcknowledgement()) return now + kLookAgain;
   takeWanted(scene, now);
   const bool here = scene.subscribers.size() > 0;
   if (!here) asleep_ = true;
-  if (here && (asleep_ || paused_) && scene.subscribers.requested(now).keyFrames != 0) {
+  if (needsJump(scene, now)) {
     jump(scene, position_, now);
     asleep_ = false;
+    begun_ = true;
   }
   const bool flows = here && !asleep_ && !paused_;
   scene.running = flows;
   if (flows) flow(scene, now);
-  if (here && (announcementDue_ || (flows && now >= nextAnnouncement_))) {
+  if (here && (announcementDue_ || (flows && needsAnnouncement(now)))) {
     nextAnnouncement_ = now + kAnnouncementPeriod;
     announcePlayback(scene);
   }
   if (!here) return std::nullopt;
   if (asleep_ || paused_ || !next_) return now + kLookAgain;
-  return due(timeOf(*next_));
+  if (heldUntil_) return *heldUntil_;
+  return speed_ == kUnpaced ? now : due(timeOf(*next_));
+}
+
+bool Playback::needsJump(const scene::LiveScene& scene, Clock::time_point now) const {
+  if (!asleep_ && !paused_) return false;
+  const std::size_t subscribers = scene.subscribers.size();
+  if (subscribers == 0 || (!begun_ && subscribers < options_.waitFor)) return false;
+  if (scene.subscribers.requested(now).keyFrames == 0) return false;
+  // In lockstep, a subscriber that lost the last frames to a fault does not get an earlier frame again.
+  return !options_.lockstep || !atEnd_ || asleep_ || scene.subscribers.anyRestarts();
+}
+
+bool Playback::needsAnnouncement(Clock::time_point now) const {
+  if (options_.lockstep) return std::floor(position_) != std::floor(announcedPosition_);
+  return now >= nextAnnouncement_;
 }
 
 void Playback::takeWanted(scene::LiveScene& scene, Clock::time_point now) {
@@ -175,6 +196,7 @@ void Playback::takeWanted(scene::LiveScene& scene, Clock::time_point now) {
 void Playback::jump(scene::LiveScene& scene, double seconds, Clock::time_point now) {
   recording_.seek(seconds);
   next_.reset();
+  heldSince_ = heldUntil_ = std::nullopt;
   atEnd_ = false;
   announcementDue_ = true;
   moveTo(seconds);
@@ -185,14 +207,14 @@ void Playback::jump(scene::LiveScene& scene, double seconds, Clock::time_point n
       const bool begins = newest_ == 0 && timed->header.tick <= kMaxFirstTick;
       shift_ = begins ? 0 : newest_ + ticksPerFrame_ - timed->header.tick;
       announceParameters(scene, *timed);
-      publishFrame(scene, *timed);
+      publishFrame(scene, *timed, Clock::now());
       break;
     }
     if (std::holds_alternative<RecordedStream::End>(next)) {
       next_ = std::move(next);
       break;
     }
-    publish(scene, next);
+    publish(scene, next, Clock::now());
   }
   origin_ = now;
   originPosition_ = position_;
@@ -212,16 +234,49 @@ double Playback::timeOf(const RecordedStream::Next& next) const {
 void Playback::flow(scene::LiveScene& scene, Clock::time_point now) {
   for (int i = 0; i < kMaxMessages; ++i) {
     if (!next_) next_ = recording_.next();
-    const Clock::time_point dueAt = due(timeOf(*next_));
-    if (dueAt > now) return;
-    if (now - dueAt > kMaxLateness) origin_ += now - dueAt - kMaxLateness;
+    if (!isDue(*next_, now)) return;
     if (std::holds_alternative<RecordedStream::End>(*next_)) return reachEnd(scene, now);
+    const Passage passage = passageOf(*next_, scene, now);
+    if (passage == Passage::held) return;
+    const Clock::time_point made = std::exchange(heldSince_, std::nullopt).value_or(Clock::now());
     // Publishing changes the message, so one that fails is left out. Clients miss it as they miss a lost
     // frame.
     RecordedStream::Next next = *std::exchange(next_, std::nullopt);
-    publish(scene, next);
+    if (passage == Passage::free) publish(scene, next, made);
+    if (options_.lockstep && scene.subscribers.awaitAcknowledgement()) return;
   }
   next_ = recording_.next();
+}
+
+bool Playback::isDue(const RecordedStream::Next& next, Clock::time_point now) {
+  if (speed_ == kUnpaced) return true;
+  const Clock::time_point dueAt = due(timeOf(next));
+  if (dueAt > now) return false;
+  if (now - dueAt > kMaxLateness) origin_ += now - dueAt - kMaxLateness;
+  return true;
+}
+
+Playback::Passage Playback::passageOf(const RecordedStream::Next& next, const scene::LiveScene& scene,
+                                      Clock::time_point now) {
+  const auto* timed = std::get_if<RecordedStream::TimedMessage>(&next);
+  if (!faults_ || timed == nullptr || !timed->isFrame()) return Passage::free;
+  if (heldUntil_) {
+    if (now < *heldUntil_) return Passage::held;
+    heldUntil_.reset();
+    return Passage::free;
+  }
+  const Fault fault = faults_->at(timed->header.tick);
+  if (fault.kind == Fault::Kind::none) return Passage::free;
+  if (fault.kind == Fault::Kind::drop) {
+    telemetry::log({scene.name()}, spdlog::level::debug, "fault: the frame at {:.3f} s is dropped",
+                   timed->time);
+    return Passage::dropped;
+  }
+  telemetry::log({scene.name()}, spdlog::level::debug, "fault: the frame at {:.3f} s waits {} ms",
+                 timed->time, fault.wait.count());
+  heldSince_ = now;
+  heldUntil_ = now + fault.wait;
+  return Passage::held;
 }
 
 void Playback::reachEnd(scene::LiveScene& scene, Clock::time_point now) {
@@ -238,7 +293,7 @@ void Playback::reachEnd(scene::LiveScene& scene, Clock::time_point now) {
       delivery::notice(v1::NOTICE_KIND_SCENE_PAUSED, "the recording is at its end", newest_));
 }
 
-void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next) {
+void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next, Clock::time_point made) {
   if (const auto* lost = std::get_if<RecordedStream::Lost>(&next)) {
     const std::string text = fmt::format(
         "the recording is damaged: {:.2f} s to {:.2f} s of it cannot be shown", lost->start, lost->end);
@@ -253,7 +308,7 @@ void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next) {
     // may not.
     const std::uint64_t tick = timed.header.tick + shift_;
     if (tick <= newest_ || tick - newest_ > kMaxTickStep) shift_ += newest_ + ticksPerFrame_ - tick;
-    return publishFrame(scene, timed);
+    return publishFrame(scene, timed, made);
   }
   if (timed.message.has_parameter_changed()) {
     v1::ParameterChanged& changed = *timed.message.mutable_parameter_changed();
@@ -268,7 +323,8 @@ void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next) {
   scene.subscribers.announce(delivery::serialise(timed.message));
 }
 
-void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessage& timed) {
+void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessage& timed,
+                            Clock::time_point made) {
   v1::Frame& frame = *timed.message.mutable_frame();
   codec::PacketHeader& header = timed.header;
   header.tick += shift_;
@@ -280,12 +336,11 @@ void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessag
   const std::size_t headerBytes = codec::writeHeader(header, packet);
   std::ranges::copy(parsed->body, packet.begin() + static_cast<std::ptrdiff_t>(headerBytes));
   packet.resize(headerBytes + parsed->body.size());
-  const Clock::time_point now = Clock::now();
-  frame.set_tick_time_us(schedule::microseconds(now));
-  frame.set_packet_time_us(schedule::microseconds(now));
+  frame.set_tick_time_us(schedule::microseconds(made));
+  frame.set_packet_time_us(schedule::microseconds(made));
 
   const delivery::PublishedFrame published =
-      delivery::publishedFrame(header, delivery::serialiseFrame(frame, packet), now);
+      delivery::publishedFrame(header, delivery::serialiseFrame(frame, packet), made);
   newest_ = header.tick;
   scene.tick = header.tick;
   scene.metrics.frames.add();
@@ -297,6 +352,7 @@ void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessag
 
 void Playback::announcePlayback(scene::LiveScene& scene) {
   announcementDue_ = false;
+  announcedPosition_ = position_;
   scene.subscribers.announce(scene::playbackMessage(*this));
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 
+#include "server/recording/fault_plan.h"
 #include "server/recording/recorded_stream.h"
 #include "server/scene/frame_source.h"
 #include "server/schedule/clock.h"
@@ -17,17 +18,28 @@
 namespace clothstream::recording {
 
 inline constexpr double kMinSpeed = 0.1, kMaxSpeed = 8;
+// Speed without pacing by the clock: as fast as the participants acknowledge frames. Only in lockstep.
+inline constexpr double kUnpaced = 0;
 
 struct PlaybackOptions {
   double from = 0;   // start position, s, at most the length of the recording
-  double speed = 1;  // kMinSpeed to kMaxSpeed
+  double speed = 1;  // kMinSpeed to kMaxSpeed, or kUnpaced
   bool loop = false;
+  // Publishes nothing until every subscriber has acknowledged the last frame.
+  bool lockstep = false;
+  // Subscribers that must be there before the first frame.
+  std::uint32_t waitFor = 1;
+  // Seed of a FaultPlan. Unset: no faults.
+  std::optional<std::uint32_t> faults{};
 };
 
 // Sends packets as recorded, except for their ticks, which always increase. After a seek or loop the first
 // frame is a key frame with the next tick. References between frames are relative, so they stay valid.
 // Playback stops while the scene has no participants, and until the first one can receive a frame. A client
 // that needs a key frame gets the next recorded one, or, while the scene is paused, the previous one.
+//
+// In lockstep, what subscribers receive, and in which order, depends only on the recording, the faults and
+// the requests of participants, not on time.
 class Playback final : public scene::FrameSource {
  public:
   Playback(RecordedStream recording, const PlaybackOptions& options);
@@ -39,6 +51,7 @@ class Playback final : public scene::FrameSource {
   std::string deviceName() const override { return recording_.device(); }
   void begin(scene::LiveScene& scene) override;
   void end() override;
+  bool inLockstep() const override { return options_.lockstep; }
   void wake() override;
   messages::Result<void> control(const v1::ControlSceneRequest& request) override;
   v1::Playback playback() const override;
@@ -60,10 +73,19 @@ class Playback final : public scene::FrameSource {
   // Continues from the newest key frame at or before this time, and publishes it immediately.
   void jump(scene::LiveScene& scene, double seconds, Clock::time_point now);
   void flow(scene::LiveScene& scene, Clock::time_point now);
+  // Whether this message is due. A later one is then late by at most kMaxLateness.
+  bool isDue(const RecordedStream::Next& next, Clock::time_point now);
   Clock::time_point due(double seconds) const;
+  // Whether a subscriber waits for a key frame that only a jump can give it.
+  bool needsJump(const scene::LiveScene& scene, Clock::time_point now) const;
+  bool needsAnnouncement(Clock::time_point now) const;
+  enum class Passage : std::uint8_t { free, dropped, held };
+  // Effect of the faults on the message now. A held message may pass from heldUntil_ on.
+  Passage passageOf(const RecordedStream::Next& next, const scene::LiveScene& scene, Clock::time_point now);
   double timeOf(const RecordedStream::Next& next) const;
-  void publish(scene::LiveScene& scene, RecordedStream::Next& next);
-  void publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessage& timed);
+  void publish(scene::LiveScene& scene, RecordedStream::Next& next, Clock::time_point made);
+  // `made`: time of the frame in its message.
+  void publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessage& timed, Clock::time_point made);
   void reachEnd(scene::LiveScene& scene, Clock::time_point now);
   // Announces position and settings.
   void announcePlayback(scene::LiveScene& scene);
@@ -79,13 +101,20 @@ class Playback final : public scene::FrameSource {
   bool loop_ = false, paused_ = false;
   ParametersInForce parameters_;
 
+  const PlaybackOptions options_;
+  const std::optional<FaultPlan> faults_;
+
   // Used by step() only.
   RecordedStream recording_;
   const std::uint64_t ticksPerFrame_;
   std::optional<RecordedStream::Next> next_;
+  bool begun_ = false;  // the first frame was published
   bool asleep_ = true, atEnd_ = false;
   bool announcementDue_ = false;  // the state changed and must be announced
   Clock::time_point origin_{}, nextAnnouncement_{};
+  double announcedPosition_ = 0;  // of the newest announcement, s
+  // Set while a fault holds next_.
+  std::optional<Clock::time_point> heldSince_, heldUntil_;
   double originPosition_ = 0;      // position in the recording at the origin, s
   std::uint64_t shift_ = 0;        // sent tick minus recorded tick, modulo 2^64
   std::uint64_t newest_ = 0;       // newest tick sent

@@ -22,10 +22,14 @@ class FrameSource {
   // Name of the device that simulated the frames.
   virtual std::string deviceName() const = 0;
 
+  // Whether the next frame waits until all subscribers have acknowledged the last one. Constant.
+  virtual bool inLockstep() const { return false; }
+
   // Publishes to the scene's subscribers from now until end() has returned. Called once.
   virtual void begin(LiveScene& scene) = 0;
   virtual void end() = 0;
-  // A subscriber joined or left, or the scene was paused or resumed.
+  // A subscriber joined or left, or the scene was paused or resumed. In lockstep also: a subscriber has
+  // acknowledged what it was sent.
   virtual void wake() = 0;
 
   // Applies seek, speed, loop and reset of the request: all of them, or none and an error.

@@ -257,7 +257,9 @@ delivery::StreamShape LiveScene::shape() const {
             .layers = start_.stream.temporalLayers,
             .qualities = start_.stream.qualities};
   const std::uint32_t layers = source->description().temporal_layers();
-  return {.rate = start_.streamRate, .layers = static_cast<std::uint8_t>(std::max(layers, 1u))};
+  return {.rate = start_.streamRate,
+          .layers = static_cast<std::uint8_t>(std::max(layers, 1u)),
+          .lockstep = source->inLockstep()};
 }
 
 v1::ParameterChange LiveScene::resetParameters() {

@@ -22,6 +22,9 @@ class TokenBucket {
     return true;
   }
 
+  // Returns tokens that were taken.
+  void giveBack(double cost = 1) { tokens_ = std::min(burst_, tokens_ + cost); }
+
   // Returns whether the bucket has all its tokens, like a new one.
   bool isFull(Clock::time_point now) {
     refill(now);

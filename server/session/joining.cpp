@@ -135,6 +135,7 @@ void Session::welcome(const scene::Roster::Admission& admission, const messages:
     scene::write(participant, *welcome.add_participants());
   welcome.set_hold_ms(static_cast<std::uint32_t>(
       std::chrono::duration_cast<std::chrono::milliseconds>(server_.options.reconnectGrace.place).count()));
+  welcome.set_acknowledge_every_frame(scene_->shape().lockstep);
   answer(reply);
 }
 

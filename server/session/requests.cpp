@@ -138,20 +138,35 @@ void Session::dispatchInScene(const v1::ClientMessage& message, Clock::time_poin
       if (!allowed(controlRate_, "requests about participants")) return;
       return refuseUnless(scene_->roster.remove(*mailbox_, message.remove_participant(), now));
     case Body::kFrameAck:
-      if (!mailbox_->acknowledge(message.frame_ack().tick(), now))
-        refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
-                fmt::format("frame_ack.tick = {}: must be of a frame that was sent",
-                            message.frame_ack().tick())});
-      return;
+      return acknowledge(message.frame_ack().tick(), now);
     case Body::kKeyFrameRequest:
       // A key frame costs all subscribers of its quality. The mailbox limits early requests.
       if (message.key_frame_request().early()) return mailbox_->requestKeyFrame();
-      if (!mailbox_->isRestarting() && allowed(keyFrameRate_, "key frame requests")) mailbox_->restart();
+      if (mailbox_->isRestarting()) return;
+      // In lockstep the key frame is a recorded one, which costs nothing.
+      if (!inLockstep() && !allowed(keyFrameRate_, "key frame requests")) return;
+      mailbox_->restart();
+      if (inLockstep()) server_.wake(*scene_);
       return;
     default:
       return refuse({v1::ERROR_CODE_MALFORMED_MESSAGE,
                      "the message has no body, or one that this server does not know"});
   }
+}
+
+bool Session::inLockstep() const {
+  return scene_->source && scene_->source->inLockstep();
+}
+
+void Session::acknowledge(std::uint64_t tick, Clock::time_point now) {
+  const bool awaited = mailbox_->awaitsAcknowledgement();
+  if (!mailbox_->acknowledge(tick, now))
+    return refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
+                   fmt::format("frame_ack.tick = {}: must be of a frame that was sent", tick)});
+  if (!inLockstep() || !awaited || mailbox_->awaitsAcknowledgement()) return;
+  // Each frame permits one such acknowledgement, so they need no other limit.
+  messageRate_.giveBack();
+  server_.wake(*scene_);
 }
 
 bool Session::manage(const v1::ClientMessage& message) {

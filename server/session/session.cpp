@@ -171,6 +171,12 @@ void Session::checkSilence(Clock::time_point now) {
   requestId_ = 0;
   now_ = now;
   refuseUnless(upload_.checkPace({options.maxUploadTime, options.minUploadRate * kKilobyte}, now));
+  if (const auto tick = mailbox_->overdue(now - options.silence))
+    return cutOff(
+        telemetry::Refusal::silence,
+        fmt::format("the client has not acknowledged the frame of tick {} within {} s: the recording is "
+                    "played in lockstep, so acknowledge every frame (welcome.acknowledge_every_frame)",
+                    *tick, schedule::seconds(options.silence)));
   if (now - lastHeard_.load() > options.silence)
     return cutOff(telemetry::Refusal::silence,
                   fmt::format("the client was silent for {} s: acknowledge frames, or send pings",

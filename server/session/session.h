@@ -119,6 +119,8 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
                std::uint64_t description);
   // Sends what a peer that joins must know besides the description: pause, work, playback, recording.
   void tellPresentState(scene::LiveScene& scene);
+  bool inLockstep() const;
+  void acknowledge(std::uint64_t tick, Clock::time_point now);
   void poses(const v1::ColliderPoses& message, Clock::time_point now);
   void create(const v1::CreateSceneRequest& request);
   // Returns a function that answers the current message when its result is known.

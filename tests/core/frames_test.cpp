@@ -117,6 +117,66 @@ TEST(Frames, KeepTheHullsOfTheDescription) {
   EXPECT_EQ(vertices, 0u);
 }
 
+class LockstepFrames : public ::testing::Test {
+ protected:
+  LockstepFrames() {
+    v1::ServerMessage welcome;
+    welcome.ParseFromString(server.welcome());
+    welcome.mutable_welcome()->set_acknowledge_every_frame(true);
+    client.receive(welcome.SerializeAsString());
+    client.receiveAll(server.chunks());
+    client.outgoing();
+  }
+  std::vector<std::uint64_t> acks() {
+    std::vector<std::uint64_t> ticks;
+    for (const v1::ClientMessage& message : client.outgoing())
+      if (message.has_frame_ack()) ticks.push_back(message.frame_ack().tick());
+    return ticks;
+  }
+
+  ScriptedServer server;
+  ClientUnderTest client;
+};
+
+TEST_F(LockstepFrames, AreAllAcknowledged) {
+  EXPECT_EQ(cs_in_lockstep(client.get()), 1);
+  for (std::uint64_t tick = 1; tick <= 10; ++tick) {
+    client.receive(server.frame(tick), tick);  // us
+    EXPECT_THAT(acks(), ElementsAre(tick));
+  }
+}
+
+TEST_F(LockstepFrames, AreAcknowledgedWhenTheProgramHasSeenThem) {
+  cs_hold_acknowledgements(client.get(), 1);
+  for (std::uint64_t tick = 1; tick <= 3; ++tick) {
+    client.receive(server.frame(tick));
+    EXPECT_THAT(acks(), IsEmpty());
+    cs_acknowledge_seen(client.get());
+    cs_acknowledge_seen(client.get());
+    EXPECT_THAT(acks(), ElementsAre(tick));
+  }
+}
+
+TEST_F(LockstepFrames, ThatCannotBeDecodedAreAnsweredByARequestEachTime) {
+  client.receive(server.frame(1));
+  server.frame(2);  // lost
+  for (std::uint64_t tick = 3; tick <= 5; ++tick) {
+    client.outgoing();
+    client.receive(server.frame(tick), tick);
+    std::size_t requests = 0;
+    for (const v1::ClientMessage& message : client.outgoing()) requests += message.has_key_frame_request();
+    EXPECT_EQ(requests, 1u) << tick;
+  }
+}
+
+TEST(Frames, AreNotHeldOutsideOfLockstep) {
+  Joined joined;
+  EXPECT_EQ(cs_in_lockstep(joined.client.get()), 0);
+  cs_hold_acknowledgements(joined.client.get(), 1);
+  joined.client.receive(joined.server.frame(1));
+  EXPECT_THAT(joined.acks(), ElementsAre(1u));
+}
+
 TEST(Frames, AcknowledgesEverySecondFrameOfAFastStream) {
   Joined joined;
   std::vector<std::uint64_t> ticks;

@@ -391,6 +391,7 @@ struct Welcome {
   static constexpr Field kResumed{32, WireType::kVarint};
   static constexpr Field kParticipants{33, WireType::kBytes};
   static constexpr Field kHoldMs{34, WireType::kVarint};
+  static constexpr Field kAcknowledgeEveryFrame{80, WireType::kVarint};
 };
 struct Participant {
   static constexpr Field kId{1, WireType::kVarint};

@@ -139,6 +139,8 @@ std::optional<Welcome> readWelcome(Bytes message, const Limits& limits) {
         return readParticipant(reader.get_view(), welcome.participants.emplace_back());
       case F::kHoldMs.tag:
         return set(welcome.graceMs, reader.get_uint32());
+      case F::kAcknowledgeEveryFrame.tag:
+        return set(welcome.acknowledgeEveryFrame, reader.get_bool());
       default:
         return skip(reader);
     }

@@ -66,6 +66,7 @@ struct Welcome {
   bool resumed = false;
   std::vector<Participant> participants;
   std::uint32_t graceMs = 0;
+  bool acknowledgeEveryFrame = false;
 };
 
 struct Presence {

@@ -68,7 +68,9 @@ export class Player {
   // Another client may choose a speed that is not in the list.
   private showSpeed(speed: number): void {
     const value = String(speed);
-    if (![...this.speed.options].some((option) => option.value === value)) this.speed.add(new Option(`× ${value}`, value));
+    if (![...this.speed.options].some((option) => option.value === value)) {
+      this.speed.add(new Option(speed === 0 ? "max" : `× ${value}`, value)); // 0: in lockstep, as fast as frames are acknowledged
+    }
     this.speed.value = value;
   }
 }
