@@ -83,6 +83,7 @@ NativeClientOptions clientOptions(const clothstream_options& options) {
   client.quality = options.quality;
   client.temporalLayers = options.temporal_layers;
   client.joinTimeout = std::chrono::milliseconds(options.join_timeout_ms);
+  client.acknowledgesSeen = true;
   client.reconnectFor = std::chrono::milliseconds(options.reconnect_for_ms);
   if (options.log != nullptr)
     client.onLog = [log = options.log, context = options.log_context](LogLevel level,

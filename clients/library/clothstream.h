@@ -14,6 +14,10 @@
  * clothstream_acquire, clothstream_wait or clothstream_close on a stream that the same thread has acquired.
  * Do not use the library in a child process after fork() without exec().
  *
+ * Lockstep (`clothstream-server play --lockstep`): the server sends the next frame when the program has seen
+ * the last one. That is the next call of clothstream_wait after the one that reported CS_EVENT_FRAME. In a
+ * program that never calls clothstream_wait, it is clothstream_release.
+ *
  * Times are microseconds of clothstream_now_us. Strings are UTF-8. No exception leaves the library. If memory
  * runs out while a stream runs, the program ends.
  */

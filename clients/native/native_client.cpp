@@ -51,6 +51,7 @@ class NativeClient::Stream {
     cs_set_token(core_.get(), address_.token.c_str());
     cs_want(core_.get(), options.quality, options.temporalLayers);
     cs_set_clock(core_.get(), &NativeClient::nowUs);
+    cs_hold_acknowledgements(core_.get(), options.acknowledgesSeen ? 1 : 0);
     if (options.maxVertices > 0) {
       cs_limits limits;
       cs_default_limits(&limits);
@@ -93,6 +94,7 @@ class NativeClient::Stream {
   }
 
   void unlock() {
+    if (!waits_) cs_acknowledge_seen(core_.get());
     wake();
     mutex_.unlock();
   }
@@ -101,8 +103,14 @@ class NativeClient::Stream {
 
   std::uint32_t wait(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
+    waits_ = true;
+    if (std::exchange(reportedFrame_, false)) {
+      cs_acknowledge_seen(core_.get());
+      wake();
+    }
     changed_.wait_for(lock, timeout, [&] { return hasNews_ || ended_; });
     hasNews_ = false;
+    reportedFrame_ = (events_ & CS_EVENT_FRAME) != 0;
     return std::exchange(events_, 0);
   }
 
@@ -266,8 +274,10 @@ class NativeClient::Stream {
   // Guards everything below. The thread releases it only while it waits for the transport.
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  bool hasNews_ = false;      // since the last wait()
-  std::uint32_t events_ = 0;  // since the last wait()
+  bool hasNews_ = false;        // since the last wait()
+  std::uint32_t events_ = 0;    // since the last wait()
+  bool waits_ = false;          // the program calls wait()
+  bool reportedFrame_ = false;  // by the last wait()
   std::optional<Failure> ended_;
   std::unique_ptr<cs_client, decltype(&cs_destroy)> core_;
   // Reset when the stream has ended. Other threads only call its wake().

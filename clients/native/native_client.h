@@ -41,6 +41,10 @@ struct NativeClientOptions {
   OnLog onLog;
   // Time for which a joined client tries to reconnect. 0: the stream ends with the connection.
   std::chrono::milliseconds reconnectFor{60'000};
+  // In lockstep, a frame is acknowledged when the program has seen it: with the call of wait() after the one
+  // that reported it, or, in a program that never calls wait(), with unlock(). Otherwise each frame is
+  // acknowledged after onEvents.
+  bool acknowledgesSeen = false;
   // The connection counts as lost after this time without a message. The server answers pings twice a second.
   // While the client reconnects, the shorter times of clients/core apply.
   std::chrono::milliseconds silenceTimeout{10'000};
