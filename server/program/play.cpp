@@ -18,6 +18,20 @@
 
 namespace clothstream::program {
 
+namespace {
+
+// A test that compares frames must not run with less than the recording.
+void checkWhole(recording::RecordedStream& recording, const std::string& path) {
+  const auto whole = recording.check();
+  if (whole && !recording.truncated()) return;
+  throw std::runtime_error(
+      fmt::format("{}; --lockstep plays only whole recordings: use an undamaged copy, or "
+                  "play the result of clothstream recover",
+                  whole ? path + ": the end is missing or damaged" : whole.error()));
+}
+
+}  // namespace
+
 int play(const ProgramOptions& options, const Signals& signals) {
   StartGuard start(signals, options.server.drain);
   const auto monitoring = openMonitoring(options);
@@ -26,6 +40,7 @@ int play(const ProgramOptions& options, const Signals& signals) {
   if (options.playback.from > recording->length())
     throw std::runtime_error(fmt::format("--from: {} s is after the end of {}; use 0 to {:.3f}",
                                          options.playback.from, options.recording, recording->length()));
+  if (options.playback.lockstep) checkWhole(*recording, options.recording);
   if (recording->truncated())
     spdlog::warn("{} is truncated or damaged at its end; the readable part is played", options.recording);
   const std::string scene = recording->scene();

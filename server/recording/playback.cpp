@@ -233,6 +233,7 @@ double Playback::timeOf(const RecordedStream::Next& next) const {
 
 void Playback::flow(scene::LiveScene& scene, Clock::time_point now) {
   for (int i = 0; i < kMaxMessages; ++i) {
+    if (options_.lockstep && scene.subscribers.awaitAcknowledgement()) return;
     if (!next_) next_ = recording_.next();
     if (!isDue(*next_, now)) return;
     if (std::holds_alternative<RecordedStream::End>(*next_)) return reachEnd(scene, now);
@@ -243,7 +244,6 @@ void Playback::flow(scene::LiveScene& scene, Clock::time_point now) {
     // frame.
     RecordedStream::Next next = *std::exchange(next_, std::nullopt);
     if (passage == Passage::free) publish(scene, next, made);
-    if (options_.lockstep && scene.subscribers.awaitAcknowledgement()) return;
   }
   next_ = recording_.next();
 }

@@ -38,6 +38,8 @@ class RecordedStream {
   const std::string& device() const { return reader_.metadata("device"); }
   // True if the end of the file is missing.
   bool truncated() const { return !reader_.mcap().indexed(); }
+  // Reads every byte and checks all checksums. The error names the path and the problem.
+  [[nodiscard]] tl::expected<void, std::string> check() { return reader_.check(); }
   // Length in seconds.
   double length() const { return secondsAt(reader_.end()); }
 
