@@ -50,6 +50,7 @@ clients/grpc       | clients/core clients/native proto/tls clothstream
 clients/websocket  | clients/native proto/text proto/tls
 clients/websocket/winhttp | clients/websocket clients/native proto/text proto/tls
 clients/library    | clients/native clients/grpc clients/websocket proto/tls
+clients/testing    |
 clients/files      | proto/codec clothstream
 clients/measure    | clients/core
 clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
