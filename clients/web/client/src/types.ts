@@ -22,6 +22,7 @@ export const ClientEvent = {
   grabs: 128,
   participants: 512,
   returned: 2048,
+  playback: 4096,
   token: 8192,
   pairingCode: 16384,
   answer: 32768,
