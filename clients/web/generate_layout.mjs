@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Writes client/src/layout.ts: sizes and offsets of the structs of clients/core/core.h and clients/recording/recording.h in
-// WebAssembly memory. The wasm32 compiler computes them. Usage: node generate_layout.mjs CLANG [--check]. With --check it writes nothing, and fails
-// if layout.ts is out of date.
+// Writes what other languages need to know of the C interface:
+//   client/src/layout.ts: sizes and offsets of the structs of clients/core/core.h and clients/recording/recording.h in
+//   WebAssembly memory;
+//   ../unity/Runtime/Core/Native.cs: enums, structs and functions of core.h for C# on 64-bit machines.
+// The compiler computes sizes and offsets. Usage: node generate_layout.mjs CLANG [--check]. With --check it writes nothing,
+// and fails if a file is out of date.
 import { execFileSync } from "node:child_process";
 import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { basename, join } from "node:path";
 import { fileURLToPath } from "node:url";
+import { writeCSharp } from "../unity/write_native.mjs";
 
 const [compiler, mode] = process.argv.slice(2);
 if (!compiler || (mode && mode !== "--check")) {
@@ -15,6 +19,7 @@ if (!compiler || (mode && mode !== "--check")) {
 }
 const headerPaths = ["../core/core.h", "../recording/recording.h"].map((path) => fileURLToPath(new URL(path, import.meta.url)));
 const layoutPath = fileURLToPath(new URL("client/src/layout.ts", import.meta.url));
+const nativePath = fileURLToPath(new URL("../unity/Runtime/Core/Native.cs", import.meta.url));
 
 // Struct names with the names of their members. A struct with a function pointer is only for native programs.
 function structs(header) {
@@ -27,19 +32,19 @@ function structs(header) {
   });
 }
 
-// Compiles C expressions for wasm32 and returns their values.
-function evaluate(expressions) {
+// Compiles C expressions for a target and returns their values. Each value is one larger in the assembly, because the
+// compiler writes zeros in another way.
+function evaluate(expressions, target) {
   const folder = mkdtempSync(join(tmpdir(), "clothstream-layout-"));
   try {
-    const source = join(folder, "layout.c");
-    const module = join(folder, "layout.wasm");
-    const values = expressions.join(",\n  ");
     for (const path of headerPaths) cpSync(path, join(folder, "clothstream", basename(path)));
-    writeFileSync(source, `#include <clothstream/recording.h>\nconst unsigned values[] = {\n  ${values}};\n`);
-    const flags = ["-x", "c", "-std=c11", "--target=wasm32", "-ffreestanding", "-nostdlib", `-I${folder}`];
-    execFileSync(compiler, [...flags, "-Wl,--no-entry", "-Wl,--export=values", "-o", module, source]);
-    const { exports } = new WebAssembly.Instance(new WebAssembly.Module(readFileSync(module)));
-    return [...new Uint32Array(exports.memory.buffer, exports.values.value, expressions.length)];
+    const values = expressions.map((expression) => `${expression} + 1`).join(",\n  ");
+    const source = `#include <clothstream/recording.h>\nconst unsigned values[] = {\n  ${values}};\n`;
+    const flags = ["-x", "c", "-std=c11", `--target=${target}`, "-ffreestanding", `-I${folder}`, "-S", "-o", "-", "-"];
+    const assembly = execFileSync(compiler, flags, { input: source, encoding: "utf8" });
+    const found = [...assembly.matchAll(/^\s*\.(?:long|int32)\s+(\d+)/gm)].map(([, value]) => Number(value) - 1);
+    if (found.length !== expressions.length) throw new Error(`${compiler} has written ${found.length} values for ${expressions.length} expressions`);
+    return found;
   } finally {
     rmSync(folder, { recursive: true });
   }
@@ -52,7 +57,7 @@ const expressions = [
   ...versions,
   ...found.flatMap(({ name, members }) => [`sizeof(${name})`, ...members.map((member) => `offsetof(${name}, ${member})`)]),
 ];
-const values = evaluate(expressions);
+const values = evaluate(expressions, "wasm32");
 let next = 0;
 const lines = versions.map((name) => `export const ${name} = ${values[next++]};`);
 for (const { name, members } of found) {
@@ -67,8 +72,16 @@ const text = `// SPDX-License-Identifier: MIT
 ${lines.join("\n")}
 `;
 
-if (mode !== "--check") writeFileSync(layoutPath, text);
-else if (readFileSync(layoutPath, "utf8") !== text) {
-  console.error(`${layoutPath} is out of date. Run: node clients/web/generate_layout.mjs ${compiler}`);
-  process.exit(1);
+const evaluated64 = evaluate(expressions, "x86_64-linux-gnu");
+const native = writeCSharp(readFileSync(headerPaths[0], "utf8"), new Map(expressions.map((expression, i) => [expression, evaluated64[i]])));
+
+for (const [path, wanted] of [
+  [layoutPath, text],
+  [nativePath, native],
+]) {
+  if (mode !== "--check") writeFileSync(path, wanted);
+  else if (readFileSync(path, "utf8") !== wanted) {
+    console.error(`${path} is out of date. Run: node clients/web/generate_layout.mjs ${compiler}`);
+    process.exit(1);
+  }
 }

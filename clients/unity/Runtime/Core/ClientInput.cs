@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// Poses, grabs and attachments of this participant.
+using System;
+
+namespace ClothStream.Core
+{
+    public sealed unsafe partial class Client
+    {
+        /// <summary>Replaces the colliders of this participant: at most 40, or 20 with two hands.</summary>
+        public void SetShapes(OwnCollider[] colliders, ulong timeUs)
+        {
+            fixed (OwnCollider* first = colliders)
+                lock (Gate) Native.cs_set_shapes(Handle, first, (uint)colliders.Length, timeUs);
+            Flush();
+        }
+
+        /// <summary>Replaces one tracked hand; an empty array removes it.</summary>
+        /// <param name="joints">{x, y, z, radius} for each of 26 joints, in the order of OpenXR: palm first.</param>
+        /// <exception cref="ArgumentException">The number of joints is neither 0 nor 26.</exception>
+        public void SetHand(HandSide side, float[] joints, ulong timeUs)
+        {
+            fixed (float* first = joints)
+                lock (Gate)
+                    if (Native.cs_set_hand(Handle, (uint)side, first, (uint)joints.Length / 4, timeUs) == 0)
+                        throw new ArgumentException("A hand has 26 joints of 4 numbers, not " + joints.Length + " numbers.");
+            Flush();
+        }
+
+        /// <summary>Replaces the head, by which others recognise this participant. It looks along -Z of its own frame.</summary>
+        /// <param name="position">3 numbers; null removes the head.</param>
+        /// <param name="orientation">Quaternion x y z w; null means unknown.</param>
+        public void SetHead(float[] position, float[] orientation, float radius, ulong timeUs)
+        {
+            fixed (float* at = position, turned = orientation)
+                lock (Gate) Native.cs_set_head(Handle, at, turned, radius, timeUs);
+            Flush();
+        }
+
+        /// <summary>Replaces the grabs of this participant, at most 10. A new id takes hold; an id that is missing lets
+        /// go.</summary>
+        public void SetGrabs(Grab[] grabs, int count, ulong timeUs)
+        {
+            fixed (Grab* first = grabs)
+                lock (Gate) Native.cs_set_grabs(Handle, first, (uint)count, timeUs);
+            Flush();
+        }
+
+        /// <summary>Finds the point of a shown cloth that is nearest to a point, within a distance (m).</summary>
+        public bool TryFindNearest(float x, float y, float z, float maxDistance, out ClothPoint point)
+        {
+            float* from = stackalloc float[3];
+            from[0] = x;
+            from[1] = y;
+            from[2] = z;
+            ClothPoint found;
+            lock (Gate)
+            {
+                bool succeeds = Native.cs_nearest_point(Handle, from, maxDistance, &found) != 0;
+                point = succeeds ? found : new ClothPoint();
+                return succeeds;
+            }
+        }
+
+        /// <summary>Moves an attachment of the scene; it stays there.</summary>
+        /// <param name="orientation">Quaternion x y z w; null means no rotation.</param>
+        public void MoveAttachment(string attachment, float[] position, float[] orientation, ulong timeUs)
+        {
+            fixed (byte* name = Utf8.Bytes(attachment))
+            fixed (float* at = position, turned = orientation)
+                lock (Gate) Native.cs_move_attachment(Handle, name, at, turned, timeUs);
+            Flush();
+        }
+    }
+}
