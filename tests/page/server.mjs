@@ -50,10 +50,10 @@ export async function startServer(port = 0, more = ["--scene", "curtain"]) {
       }
       throw new Error(`no line ${pattern}\n${output.join("\n")}`);
     },
-    async stop() {
+    async stop(signal = "SIGTERM") {
       child.off("exit", complain);
       if (child.exitCode !== null || child.signalCode !== null) return;
-      child.kill("SIGTERM");
+      child.kill(signal);
       await once(child, "exit");
     },
   };

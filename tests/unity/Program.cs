@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Test program for the engine-free part of the Unity package. Usage: Program.exe COMMAND ADDRESS [ARGUMENTS]
-//   follow: prints "frame TICK HASH" for each of 60 frames
+//   follow: prints "frame TICK HASH" for each frame until the standard input ends
 //   input: moves a hand, grabs a cloth, changes the wind, sees another participant
 //   return: joins, prints "joined", and waits until the connection was lost and is back
 //   secure FINGERPRINT TOKEN: joins over TLS
@@ -33,9 +33,9 @@ static unsafe class Program
         }
     }
 
-    static Client Join(string address, string fingerprint = "", string token = "")
+    static Client Join(string address, string name = "Sharp", string fingerprint = "", string token = "")
     {
-        var client = new Client(new ClientOptions { Address = address, Scene = "small", DisplayName = "Sharp", Role = Role.Participant, Fingerprint = fingerprint, Token = token });
+        var client = new Client(new ClientOptions { Address = address, Scene = "small", DisplayName = name, Role = Role.Participant, Fingerprint = fingerprint, Token = token });
         Await(client, () => client.State == State.Joined, "joins");
         return client;
     }
@@ -63,7 +63,7 @@ static unsafe class Program
 
     static void Follow(string address)
     {
-        using (Client client = Join(address))
+        using (Client client = Join(address, "watcher"))
         {
             Check(client.SceneName == "small" && client.StreamRate == 60 && client.Role >= Role.Participant, "the scene is described");
             ClothRange[] cloths = client.Cloths;
@@ -74,9 +74,9 @@ static unsafe class Program
             var uvs = new float[2 * cloths[1].VertexCount];
             fixed (float* first = uvs) client.TextureCoordinates(1, first);
             Check(uvs[0] == 0 && uvs[1] == 1 && uvs[20] == 1 && uvs[21] == 1 && uvs[uvs.Length - 1] == 0, "texture coordinates cover a grid");
-            ulong tick = 0;
-            int frames = 0;
-            Await(client, () => PrintFrame(client, ref tick) && ++frames == 60, "60 frames come");
+            var input = new Thread(() => Console.In.ReadToEnd());
+            input.Start();
+            for (ulong tick = 0; input.IsAlive; Thread.Sleep(1)) PrintFrame(client, ref tick);
             Statistics statistics = client.Statistics;
             Check(statistics.hashMismatches == 0 && statistics.decodeErrors == 0, "frames are those of the server");
             Check(client.Hash != 0, "the frame has a hash");
@@ -213,7 +213,7 @@ static unsafe class Program
 
     static void Secure(string address, string fingerprint, string token)
     {
-        using (Client client = Join(address, fingerprint, token))
+        using (Client client = Join(address, "Sharp", fingerprint, token))
         {
             ulong tick = 0;
             Await(client, () => PrintFrame(client, ref tick), "a frame comes");

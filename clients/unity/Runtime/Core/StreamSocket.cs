@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: MIT
-// One connection to the server, by ClientWebSocket. All members are for one thread. Tasks of the socket set an event when
-// they have ended; Poll then takes their results.
+// One connection to the server: TCP, TLS and WebSocket. All members are for one thread. Tasks set an event when they have
+// ended; Poll then takes their results.
 using System;
+using System.IO;
 using System.Net.Security;
+using System.Net.Sockets;
 using System.Net.WebSockets;
 using System.Runtime.InteropServices;
+using System.Security.Authentication;
+using System.Security.Cryptography.X509Certificates;
 using System.Threading;
 using System.Threading.Tasks;
 
@@ -16,10 +20,12 @@ namespace ClothStream.Core
         const int MaxMessageBytes = 256 << 20;
         const int FirstBufferBytes = 64 << 10;
 
-        readonly ClientWebSocket socket = new ClientWebSocket();
+        readonly TcpClient tcp;
+        readonly string fingerprint;
         readonly CancellationTokenSource cancel = new CancellationTokenSource();
         readonly Action<Task> wake;
-        readonly Task connecting;
+        readonly Task<WebSocket> opening;
+        WebSocket socket;
         Task<WebSocketReceiveResult> receiving;
         Task sending;
         byte[] incoming = new byte[FirstBufferBytes], outgoing = new byte[1024];
@@ -30,18 +36,11 @@ namespace ClothStream.Core
         /// certificate.</param>
         public StreamSocket(ServerAddress address, string fingerprint, AutoResetEvent woken)
         {
+            this.fingerprint = fingerprint;
             wake = task => woken.Set();
-            // The client core sends pings.
-            socket.Options.KeepAliveInterval = TimeSpan.Zero;
-            if (address.IsEncrypted)
-                socket.Options.RemoteCertificateValidationCallback = (sender, certificate, chain, errors) =>
-                {
-                    ShownFingerprint = certificate == null ? "" : KeyFingerprint.Of(certificate.GetRawCertData());
-                    IsTrusted = fingerprint == "" ? errors == SslPolicyErrors.None : ShownFingerprint == fingerprint;
-                    return IsTrusted;
-                };
-            connecting = socket.ConnectAsync(address.Stream, cancel.Token);
-            Watch(connecting);
+            tcp = new TcpClient { NoDelay = true };
+            opening = Open(address);
+            Watch(opening);
         }
 
         public bool IsOpen { get; private set; }
@@ -61,8 +60,8 @@ namespace ClothStream.Core
             {
                 if (!IsOpen)
                 {
-                    if (!connecting.IsCompleted) return 0;
-                    connecting.GetAwaiter().GetResult();
+                    if (!opening.IsCompleted) return 0;
+                    socket = opening.GetAwaiter().GetResult();
                     IsOpen = true;
                     Receive();
                 }
@@ -103,8 +102,28 @@ namespace ClothStream.Core
             HasEnded = true;
             IsOpen = false;
             cancel.Cancel();
-            socket.Abort();
-            socket.Dispose();
+            socket?.Dispose();
+            tcp.Dispose();
+        }
+
+        async Task<WebSocket> Open(ServerAddress address)
+        {
+            await tcp.ConnectAsync(address.Host, address.Port).ConfigureAwait(false);
+            Stream stream = tcp.GetStream();
+            if (address.IsEncrypted)
+            {
+                var encrypted = new SslStream(stream, false, IsExpected);
+                await encrypted.AuthenticateAsClientAsync(address.Host, null, SslProtocols.None, false).ConfigureAwait(false);
+                stream = encrypted;
+            }
+            return await WebSocketUpgrade.Open(stream, address.Stream).ConfigureAwait(false);
+        }
+
+        bool IsExpected(object sender, X509Certificate certificate, X509Chain chain, SslPolicyErrors errors)
+        {
+            ShownFingerprint = certificate == null ? "" : KeyFingerprint.Of(certificate.GetRawCertData());
+            IsTrusted = fingerprint == "" ? errors == SslPolicyErrors.None : ShownFingerprint == fingerprint;
+            return IsTrusted;
         }
 
         int TakeReceived()

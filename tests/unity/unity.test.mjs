@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// The package for Unity, with mono in place of Unity: its C# follows a real server through the core that was compiled from
+// its sources, with clang and libc++ as for Android. A stub takes the place of the engine.
+//
+// Environment: CLOTHSTREAM_SERVER, CLOTHSTREAM_PACKAGES (folder of the package), CLOTHSTREAM_UNITY_CORE (the compiled
+// core), FOLLOW_C and CLOTHSTREAM_LIBRARY (a client in C, and the folder of its library).
+
+import assert from "node:assert/strict";
+import { execFile, execFileSync, spawn } from "node:child_process";
+import { once } from "node:events";
+import { mkdir, mkdtemp, readdir, readFile, rm, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { createInterface } from "node:readline";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { promisify } from "node:util";
+import { startServer } from "../page/server.mjs";
+import { assets } from "../../clients/unity/metas.mjs";
+
+const { CLOTHSTREAM_SERVER, CLOTHSTREAM_PACKAGES, CLOTHSTREAM_UNITY_CORE, FOLLOW_C, CLOTHSTREAM_LIBRARY } = process.env;
+for (const tool of ["mcs", "mono"]) {
+  try {
+    execFileSync("sh", ["-c", `command -v ${tool}`]);
+  } catch {
+    console.log(`Skipped: ${tool} is not installed; ./dev test installs Debian's mono-mcs and mono-runtime`);
+    process.exit(77);
+  }
+}
+
+const run = promisify(execFile);
+const here = fileURLToPath(new URL(".", import.meta.url));
+const package_ = join(CLOTHSTREAM_PACKAGES, "com.clothstream.client");
+const kSmall = ["--scene", "small", "--scene-file", join(here, "../e2e/small.json")];
+// Unity accepts more, mono's compiler does not.
+const kCompiler = ["-unsafe", "-debug", "-warnaserror", "-langversion:7"];
+
+let folder;
+let program;
+
+before(async () => {
+  folder = await mkdtemp(join(tmpdir(), "clothstream-unity-"));
+  const core = join(folder, "ClothStream.Core.dll");
+  await compile(core, join(package_, "Runtime/Core"), ["-target:library"]);
+  program = join(folder, "Program.exe");
+  await compile(program, here, [`-r:${core}`]);
+});
+
+after(() => rm(folder, { recursive: true }));
+
+// Compiles all C# of a folder.
+async function compile(out, from, options) {
+  const sources = (await readdir(from)).filter((name) => name.endsWith(".cs")).map((name) => join(from, name));
+  await run("mcs", [...kCompiler, ...options, `-out:${out}`, ...sources]);
+}
+
+const environment = { ...process.env, LD_LIBRARY_PATH: `${dirname(CLOTHSTREAM_UNITY_CORE)}:${CLOTHSTREAM_LIBRARY}`, MONO_PATH: "" };
+const mono = (file, ...args) => run("mono", ["--debug", file, ...args], { env: environment });
+
+// Hash of each frame that a client has printed, by tick.
+const frames = (output) => new Map([...output.matchAll(/^frame (\d+) (\w+)$/gm)].map(([, tick, hash]) => [tick, hash]));
+
+// Runs `use` with the address of a new server.
+async function withServer(options, use) {
+  const server = await startServer(0, options);
+  try {
+    return await use(`127.0.0.1:${server.port}`, server);
+  } finally {
+    await server.stop();
+  }
+}
+
+test("each asset of the package has a .meta file with a GUID that no other has", async () => {
+  const found = assets(package_);
+  assert.ok(found.some(({ path }) => path === "Runtime/Plugins/Android/ClothStreamCore.androidlib"));
+  const guids = await Promise.all(
+    found.map(async ({ path }) => /^guid: ([0-9a-f]{32})$/m.exec(await readFile(join(package_, `${path}.meta`), "utf8"))[1]),
+  );
+  assert.equal(new Set(guids).size, found.length);
+});
+
+test("the package brings the licences of the sources that it contains", async () => {
+  const others = (await readdir(join(package_, "Runtime/Plugins/Android/ClothStreamCore.androidlib/cpp"))).filter((name) => !/^(clients|proto|clothstream_core\.cpp)$/.test(name));
+  assert.deepEqual(others.sort(), ["protozero", "simde", "tl"]);
+  const notices = await readFile(join(package_, "Third Party Notices.md"), "utf8");
+  for (const work of ["protozero", "tl::expected", "SIMDe"]) assert.match(notices, new RegExp(`^# ${work}$`, "m"));
+});
+
+test("addresses, fingerprints and options are checked", async () => {
+  await mono(program, "parts", "-");
+});
+
+test("frames are those of a client in C, bit for bit", () =>
+  withServer(kSmall, async (address) => {
+    const sharp = spawn("mono", ["--debug", program, "follow", address], { env: environment, stdio: ["pipe", "pipe", "inherit"] });
+    const lines = createInterface({ input: sharp.stdout });
+    const printed = [];
+    lines.on("line", (line) => printed.push(line));
+    await Promise.race([once(lines, "line"), once(lines, "close")]);
+    const c = await run(FOLLOW_C, [address], { env: environment });
+    sharp.stdin.end();
+    const [code] = await once(sharp, "close");
+    assert.equal(code, 0);
+    const [own, other] = [frames(printed.join("\n")), frames(c.stdout)];
+    const both = [...own.keys()].filter((tick) => other.has(tick));
+    console.log(`${both.length} frames of both clients`);
+    assert.ok(both.length >= 20);
+    for (const tick of both) assert.equal(own.get(tick), other.get(tick), `tick ${tick}`);
+  }));
+
+test("hands, grabs and parameters reach the server and other participants", () => withServer(kSmall, (address) => mono(program, "input", address)));
+
+test("a client returns after its server was killed and started again", async () => {
+  const first = await startServer(0, kSmall);
+  const child = spawn("mono", ["--debug", program, "return", `127.0.0.1:${first.port}`], { env: environment });
+  const lines = [];
+  let second;
+  try {
+    for await (const line of createInterface({ input: child.stdout })) {
+      lines.push(line);
+      if (line === "joined") await first.stop("SIGKILL");
+      if (line.startsWith("lost: ")) second = await startServer(first.port, kSmall);
+    }
+    if (child.exitCode === null) await once(child, "exit");
+  } finally {
+    child.kill();
+    await first.stop();
+    await second?.stop();
+  }
+  assert.equal(child.exitCode, 0, lines.join("\n"));
+  assert.equal(lines.at(-1), "returned");
+});
+
+test("with TLS the key of the server and the token are checked", async () => {
+  const keys = join(folder, "keys");
+  await mkdir(keys, { mode: 0o700 });
+  await run(CLOTHSTREAM_SERVER, ["token", "--new-key", join(keys, "key.pem")]);
+  const { stdout: token } = await run(CLOTHSTREAM_SERVER, ["token", "--key", join(keys, "key.pem"), "--subject", "unity"]);
+  const secure = ["--tls", "self", "--state-dir", join(folder, "state"), "--token-keys", keys];
+  await withServer([...kSmall, ...secure], async (plain, server) => {
+    const address = `wss://${plain}`;
+    const [, key] = await server.line(/\b((?:[0-9A-F]{2}:){31}[0-9A-F]{2})\b/);
+    await mono(program, "secure", address, key, token.trim());
+    const wrong = key.replaceAll("0", "1").replaceAll("2", "3");
+    const refused = async (fingerprint, proof) => (await mono(program, "refused", address, fingerprint, proof)).stdout;
+    assert.match(await refused(wrong, token.trim()), new RegExp(`^refused 0: .* has the fingerprint ${key}`));
+    assert.match(await refused("", token.trim()), new RegExp(`^refused 0: .*no known authority.* ${key}`));
+    assert.match(await refused(key, ""), /^refused 60: /);
+  });
+});
