@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: MIT
+// Sends head, hands and controllers, and grabs cloth.
+using System.Collections.Generic;
+using ClothStream.Core;
+using UnityEngine;
+using UnityEngine.XR;
+
+namespace ClothStream
+{
+    /// <summary>
+    /// Sends the tracked hands of this person, or else the controllers, and the head. A pinch or the trigger grabs cloth. Hands
+    /// need the package com.unity.xr.hands.
+    /// </summary>
+    [AddComponentMenu("ClothStream/ClothStream Input")]
+    public sealed class ClothStreamInput : MonoBehaviour
+    {
+        const int Joints = (int)Native.CS_HAND_JOINTS;
+        static readonly HandSide[] Sides = { HandSide.Left, HandSide.Right };
+
+        [Tooltip("Connection to which the poses are sent. Empty: the one on this object or its parents.")]
+        public ClothStreamConnection connection;
+        [Tooltip("Space of the tracking: the camera offset of the XR Origin. Empty: the world.")]
+        public Transform trackingOrigin;
+        [Tooltip("Head, usually the camera. Empty: no head is sent.")]
+        public Transform head;
+        [Tooltip("Radius of the head in metres.")]
+        [Range(0.05f, 0.3f)]
+        public float headRadius = 0.1f;
+        [Tooltip("Radius in metres of the sphere that stands for a controller.")]
+        [Range(0.01f, 0.2f)]
+        public float controllerRadius = 0.04f;
+        [Tooltip("Distance in metres within which a pinch or trigger grabs cloth.")]
+        [Range(0.01f, 0.3f)]
+        public float grabReach = 0.05f;
+
+        readonly PinchGrab[] grabs = { new PinchGrab(0), new PinchGrab(1) };
+        readonly Grab[] held = new Grab[2];
+        readonly float[] joints = new float[4 * Joints], position = new float[3], orientation = new float[4];
+        readonly List<OwnCollider> spheres = new List<OwnCollider>();
+        readonly Vector3[] places = new Vector3[Joints];
+        readonly float[] radii = new float[Joints];
+        static readonly float[] NoJoints = new float[0];
+
+        void OnEnable()
+        {
+            if (connection == null) connection = GetComponentInParent<ClothStreamConnection>();
+            if (connection != null) return;
+            Debug.LogError("ClothStream: ClothStream Input has no connection. Set it in the inspector.", this);
+            enabled = false;
+        }
+
+        void Update()
+        {
+            if (!connection.IsJoined) return;
+            Client client = connection.Client;
+            ulong nowUs = Client.NowUs;
+            int count = 0;
+            spheres.Clear();
+            for (int i = 0; i < Sides.Length; ++i)
+            {
+                var sample = new HandSample { joints = places, radii = radii };
+                bool isTracked = TryGetHand(Sides[i], ref sample);
+                client.SetHand(Sides[i], isTracked ? StreamJoints(sample) : NoJoints, nowUs);
+                if (!isTracked && TryGetController(Sides[i], ref sample))
+                {
+                    isTracked = true;
+                    spheres.Add(Sphere(sample.position));
+                }
+                if (isTracked) UpdateGrab(client, grabs[i], sample);
+                else grabs[i].Release();
+                if (grabs[i].IsHolding) held[count++] = grabs[i].Grab;
+            }
+            client.SetShapes(spheres.ToArray(), nowUs);
+            client.SetGrabs(held, count, nowUs);
+            if (head == null) return;
+            Store(connection.ToStream(head.position), connection.ToStream(head.rotation));
+            client.SetHead(position, orientation, headRadius, nowUs);
+        }
+
+        void OnDisable()
+        {
+            foreach (PinchGrab grab in grabs) grab.Release();
+            Client client = connection != null ? connection.Client : null;
+            if (client == null) return;
+            ulong nowUs = Client.NowUs;
+            foreach (HandSide side in Sides) client.SetHand(side, NoJoints, nowUs);
+            client.SetShapes(new OwnCollider[0], nowUs);
+            client.SetGrabs(held, 0, nowUs);
+            client.SetHead(null, null, headRadius, nowUs);
+        }
+
+        bool TryGetHand(HandSide side, ref HandSample sample)
+        {
+#if CLOTHSTREAM_XR_HANDS
+            return TrackedHands.TryGet(side, trackingOrigin, ref sample);
+#else
+            return false;
+#endif
+        }
+
+        bool TryGetController(HandSide side, ref HandSample sample)
+        {
+            InputDevice device = InputDevices.GetDeviceAtXRNode(side == HandSide.Left ? XRNode.LeftHand : XRNode.RightHand);
+            Vector3 at;
+            Quaternion turned;
+            if (!device.isValid || !device.TryGetFeatureValue(CommonUsages.devicePosition, out at) ||
+                !device.TryGetFeatureValue(CommonUsages.deviceRotation, out turned)) return false;
+            sample.position = trackingOrigin == null ? at : trackingOrigin.TransformPoint(at);
+            sample.rotation = trackingOrigin == null ? turned : trackingOrigin.rotation * turned;
+            device.TryGetFeatureValue(CommonUsages.trigger, out sample.strength);
+            return true;
+        }
+
+        void UpdateGrab(Client client, PinchGrab grab, HandSample sample)
+        {
+            Store(connection.ToStream(sample.position), connection.ToStream(sample.rotation));
+            grab.Reach = grabReach;
+            grab.Update(client, sample.strength, position, orientation);
+        }
+
+        float[] StreamJoints(HandSample sample)
+        {
+            for (int i = 0; i < Joints; ++i)
+            {
+                Vector3 point = connection.ToStream(sample.joints[i]);
+                joints[4 * i] = point.x;
+                joints[4 * i + 1] = point.y;
+                joints[4 * i + 2] = point.z;
+                joints[4 * i + 3] = sample.radii[i];
+            }
+            return joints;
+        }
+
+        unsafe OwnCollider Sphere(Vector3 world)
+        {
+            Vector3 point = connection.ToStream(world);
+            var sphere = new OwnCollider { shape = (uint)Shape.Sphere, radius = controllerRadius };
+            sphere.position[0] = point.x;
+            sphere.position[1] = point.y;
+            sphere.position[2] = point.z;
+            return sphere;
+        }
+
+        void Store(Vector3 at, Quaternion turned)
+        {
+            position[0] = at.x;
+            position[1] = at.y;
+            position[2] = at.z;
+            orientation[0] = turned.x;
+            orientation[1] = turned.y;
+            orientation[2] = turned.z;
+            orientation[3] = turned.w;
+        }
+    }
+}
