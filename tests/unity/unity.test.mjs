@@ -36,22 +36,29 @@ const kSmall = ["--scene", "small", "--scene-file", join(here, "../e2e/small.jso
 const kCompiler = ["-unsafe", "-debug", "-warnaserror", "-langversion:7"];
 
 let folder;
-let program;
+let program, sceneProgram;
 
 before(async () => {
   folder = await mkdtemp(join(tmpdir(), "clothstream-unity-"));
-  const core = join(folder, "ClothStream.Core.dll");
-  await compile(core, join(package_, "Runtime/Core"), ["-target:library"]);
-  program = join(folder, "Program.exe");
-  await compile(program, here, [`-r:${core}`]);
+  const core = await compile("ClothStream.Core.dll", [join(package_, "Runtime/Core")]);
+  program = await compile("Program.exe", [here], [`-r:${core}`]);
+  const engine = await compile("UnityEngine.dll", [join(here, "engine")]);
+  const references = [`-r:${core}`, `-r:${engine}`];
+  const components = join(package_, "Runtime/Unity");
+  // Without com.unity.xr.hands, and as in a build without checks.
+  await compile("WithoutHands.dll", [components], references);
+  const unity = await compile("ClothStream.Unity.dll", [components], [...references, "-define:CLOTHSTREAM_XR_HANDS", "-define:ENABLE_UNITY_COLLECTIONS_CHECKS"]);
+  sceneProgram = await compile("SceneProgram.exe", [join(here, "scene"), join(package_, "Samples~/ClothInARoom")], [...references, `-r:${unity}`]);
 });
 
 after(() => rm(folder, { recursive: true }));
 
-// Compiles all C# of a folder.
-async function compile(out, from, options) {
-  const sources = (await readdir(from)).filter((name) => name.endsWith(".cs")).map((name) => join(from, name));
-  await run("mcs", [...kCompiler, ...options, `-out:${out}`, ...sources]);
+// Compiles all C# of folders, and returns the path of the result.
+async function compile(name, folders, options = []) {
+  const found = await Promise.all(folders.map(async (from) => (await readdir(from)).filter((file) => file.endsWith(".cs")).map((file) => join(from, file))));
+  const out = join(folder, name);
+  await run("mcs", [...kCompiler, ...(name.endsWith(".dll") ? ["-target:library"] : []), ...options, `-out:${out}`, ...found.flat()]);
+  return out;
 }
 
 const environment = { ...process.env, LD_LIBRARY_PATH: `${dirname(CLOTHSTREAM_UNITY_CORE)}:${CLOTHSTREAM_LIBRARY}`, MONO_PATH: "" };
@@ -148,3 +155,5 @@ test("with TLS the key of the server and the token are checked", async () => {
     assert.match(await refused(key, ""), /^refused 60: /);
   });
 });
+
+test("components draw cloth, send hands and controllers, grab, and report errors", () => withServer(kSmall, (address) => mono(sceneProgram, address)));

@@ -64,6 +64,7 @@ namespace ClothStream
             if (client == null || connection.Descriptions == 0) return;
             lock (client.Gate)
             {
+                if (client.VertexCount == 0) return;
                 if (descriptions != connection.Descriptions) Describe(client);
                 // A new description has arrived after the Update of the connection.
                 if (client.VertexCount != Mesh.vertexCount) return;
