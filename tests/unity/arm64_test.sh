@@ -10,8 +10,8 @@ if ! command -v aarch64-linux-gnu-objdump >/dev/null || ! [ -d /usr/aarch64-linu
   exit 77
 fi
 object=$(mktemp)
-trap 'rm "$object"' EXIT
-"$clang" --target=aarch64-linux-gnu -stdlib=libc++ "$@" -Wall -Wextra -Werror -fPIC -I"$library/cpp" -c -o "$object" \
+trap 'rm -f "$object"' EXIT
+"$clang" --target=aarch64-linux-gnu -stdlib=libc++ "$@" -fPIC -I"$library/cpp" -c -o "$object" \
   "$library/cpp/clothstream_core.cpp"
 code=$(aarch64-linux-gnu-objdump -d "$object")
 multiplications=$(grep -cE '\sfmul\s' <<<"$code")
