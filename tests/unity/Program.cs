@@ -5,6 +5,7 @@
 //   return: joins, prints "joined", and waits until the connection was lost and is back
 //   secure FINGERPRINT TOKEN: joins over TLS
 //   refused FINGERPRINT TOKEN: prints why the client failed
+//   problem: prints why there is no connection
 //   parts: everything that needs no server; ADDRESS has no meaning
 // Throws, and so returns 1, if a check fails.
 using System;
@@ -234,6 +235,15 @@ static unsafe class Program
         }
     }
 
+    static void PrintProblem(string address)
+    {
+        using (var client = new Client(new ClientOptions { Address = address }))
+        {
+            Await(client, () => client.Problem != "", "there is a problem");
+            Console.WriteLine(client.Problem);
+        }
+    }
+
     static void Main(string[] arguments)
     {
         string address = arguments[1];
@@ -244,6 +254,7 @@ static unsafe class Program
             case "return": Return(address); break;
             case "secure": Secure(address, arguments[2], arguments[3]); break;
             case "refused": Refused(address, arguments[2], arguments[3]); break;
+            case "problem": PrintProblem(address); break;
             case "parts": Parts.Run(); break;
             default: throw new ArgumentException("unknown command " + arguments[0]);
         }

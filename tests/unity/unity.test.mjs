@@ -8,6 +8,7 @@
 import assert from "node:assert/strict";
 import { execFile, execFileSync, spawn } from "node:child_process";
 import { once } from "node:events";
+import { createServer } from "node:net";
 import { mkdir, mkdtemp, readdir, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
@@ -154,6 +155,30 @@ test("with TLS the key of the server and the token are checked", async () => {
     assert.match(await refused("", token.trim()), new RegExp(`^refused 0: .*no known authority.* ${key}`));
     assert.match(await refused(key, ""), /^refused 60: /);
   });
+});
+
+// What a client says of a program that answers with these bytes and then ends the connection.
+async function problemWith(answer) {
+  const server = createServer((socket) => {
+    socket.on("error", () => {});
+    socket.once("data", () => socket.end(answer));
+  });
+  server.listen(0, "127.0.0.1");
+  await once(server, "listening");
+  try {
+    return (await mono(program, "problem", `127.0.0.1:${server.address().port}`)).stdout;
+  } finally {
+    server.close();
+  }
+}
+
+test("answers of other programs are refused with a reason", async () => {
+  assert.match(await problemWith("220 mail.example.org ESMTP\r\n\r\n"), /another program answers, not a clothstream-server/);
+  assert.match(await problemWith("HTTP/1.1 404 Not Found\r\n\r\n"), /HTTP status 404 \(Not Found\)\.$/m);
+  assert.match(await problemWith("HTTP/1.1 403 Forbidden\r\nContent-Length: 2000000000\r\n\r\nthe scene\x07 is full\r\nmore"), /HTTP status 403 \(the scene is full\)\.$/m);
+  assert.match(await problemWith("HTTP/1.1 101 Switching Protocols\r\nSec-WebSocket-Accept: AAAA\r\n\r\n"), /does not answer as a WebSocket/);
+  assert.match(await problemWith(`HTTP/1.1 200 OK\r\n${"X: y\r\n".repeat(2000)}`), /header of more than 8 KiB/);
+  assert.match(await problemWith("HTTP/1.1 1"), /ended the connection before its answer/);
 });
 
 test("components draw cloth, send hands and controllers, grab, and report errors", () => withServer(kSmall, (address) => mono(sceneProgram, address)));

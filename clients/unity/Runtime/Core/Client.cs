@@ -2,6 +2,7 @@
 // A client with a thread that has the connection: it receives, decodes, acknowledges and reconnects.
 using System;
 using System.Diagnostics;
+using System.Linq;
 using System.Threading;
 
 namespace ClothStream.Core
@@ -19,6 +20,7 @@ namespace ClothStream.Core
     {
         // Longest time between two calls of cs_update, and time for the server to answer a goodbye.
         const int UpdateIntervalMs = 50, ClosingMs = 500;
+        const int MaxShownLetters = 300;
 
         readonly ServerAddress address;
         readonly string fingerprint;
@@ -194,9 +196,18 @@ namespace ClothStream.Core
 
         void Explain()
         {
-            if (!socket.IsTrusted) Fail(NotTrusted());
-            else if (socket.Why == "") problem = "The server at " + address + " has closed the connection.";
-            else problem = "No connection to the server at " + address + ": " + socket.Why.TrimEnd('.') + ".";
+            lock (Gate)
+            {
+                if (!socket.IsTrusted) Fail(NotTrusted());
+                else if (socket.Why == "") problem = "The server at " + address + " has closed the connection.";
+                else problem = "No connection to the server at " + address + ": " + Printable(socket.Why).TrimEnd('.') + ".";
+            }
+        }
+
+        // The server, or a program that answers in its place, may have sent the text.
+        static string Printable(string text)
+        {
+            return string.Concat(text.Where(letter => !char.IsControl(letter)).Take(MaxShownLetters));
         }
 
         string NotTrusted()

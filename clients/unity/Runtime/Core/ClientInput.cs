@@ -7,10 +7,10 @@ namespace ClothStream.Core
     public sealed unsafe partial class Client
     {
         /// <summary>Replaces the colliders of this participant: at most 40, or 20 with two hands.</summary>
-        public void SetShapes(OwnCollider[] colliders, ulong timeUs)
+        public void SetShapes(OwnCollider[] colliders, int count, ulong timeUs)
         {
             fixed (OwnCollider* first = colliders)
-                lock (Gate) Native.cs_set_shapes(Handle, first, (uint)colliders.Length, timeUs);
+                lock (Gate) Native.cs_set_shapes(Handle, first, (uint)count, timeUs);
             Flush();
         }
 

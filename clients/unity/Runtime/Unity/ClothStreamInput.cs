@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Sends head, hands and controllers, and grabs cloth.
-using System.Collections.Generic;
 using ClothStream.Core;
 using UnityEngine;
 using UnityEngine.XR;
@@ -36,7 +35,7 @@ namespace ClothStream
         readonly PinchGrab[] grabs = { new PinchGrab(0), new PinchGrab(1) };
         readonly Grab[] held = new Grab[2];
         readonly float[] joints = new float[4 * Joints], position = new float[3], orientation = new float[4];
-        readonly List<OwnCollider> spheres = new List<OwnCollider>();
+        readonly OwnCollider[] spheres = new OwnCollider[2];
         readonly Vector3[] places = new Vector3[Joints];
         readonly float[] radii = new float[Joints];
         static readonly float[] NoJoints = new float[0];
@@ -54,8 +53,7 @@ namespace ClothStream
             if (!connection.IsJoined) return;
             Client client = connection.Client;
             ulong nowUs = Client.NowUs;
-            int count = 0;
-            spheres.Clear();
+            int count = 0, sphereCount = 0;
             for (int i = 0; i < Sides.Length; ++i)
             {
                 var sample = new HandSample { joints = places, radii = radii };
@@ -64,13 +62,13 @@ namespace ClothStream
                 if (!isTracked && TryGetController(Sides[i], ref sample))
                 {
                     isTracked = true;
-                    spheres.Add(Sphere(sample.position));
+                    spheres[sphereCount++] = Sphere(sample.position);
                 }
                 if (isTracked) UpdateGrab(client, grabs[i], sample);
                 else grabs[i].Release();
                 if (grabs[i].IsHolding) held[count++] = grabs[i].Grab;
             }
-            client.SetShapes(spheres.ToArray(), nowUs);
+            client.SetShapes(spheres, sphereCount, nowUs);
             client.SetGrabs(held, count, nowUs);
             if (head == null) return;
             Store(connection.ToStream(head.position), connection.ToStream(head.rotation));
@@ -84,7 +82,7 @@ namespace ClothStream
             if (client == null) return;
             ulong nowUs = Client.NowUs;
             foreach (HandSide side in Sides) client.SetHand(side, NoJoints, nowUs);
-            client.SetShapes(new OwnCollider[0], nowUs);
+            client.SetShapes(spheres, 0, nowUs);
             client.SetGrabs(held, 0, nowUs);
             client.SetHead(null, null, headRadius, nowUs);
         }
