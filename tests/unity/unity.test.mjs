@@ -182,3 +182,9 @@ test("answers of other programs are refused with a reason", async () => {
 });
 
 test("components draw cloth, send hands and controllers, grab, and report errors", () => withServer(kSmall, (address) => mono(sceneProgram, address)));
+
+test("a connection pairs, and joins with the token that it got", () =>
+  withServer([...kSmall, "--pairing", "--state-dir", join(folder, "pairing")], async (address, server) => {
+    const [, code] = await server.line(/^pair +(\d{6})/);
+    await mono(sceneProgram, address, code);
+  }));

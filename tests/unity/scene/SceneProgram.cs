@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Test program for the components, with the stub of the engine. Usage: SceneProgram.exe ADDRESS
+// Test program for the components, with the stub of the engine. Usage: SceneProgram.exe ADDRESS [PAIRING_CODE]
+// With a code: pairs, and joins with the token that it got. Otherwise everything else.
 using System;
 using System.Collections.Generic;
 using System.Linq;
@@ -139,8 +140,36 @@ static unsafe class SceneProgram
         Await(() => client.TakeGrabEvents().Any(grab => grab.kind == (uint)GrabEventKind.Taken), "a trigger grabs");
     }
 
+    static void Pairs(string address, string code)
+    {
+        var stream = new GameObject("stream");
+        var connection = stream.AddComponent<ClothStreamConnection>();
+        connection.enabled = false;
+        Debug.Lines.Clear();
+        string token = "";
+        connection.Paired += given => token = given;
+        connection.address = address;
+        connection.pairingCode = code;
+        connection.enabled = true;
+        Await(() => connection.IsJoined && token != "", "the code admits and gives a token");
+        connection.enabled = false;
+        connection.pairingCode = "";
+        connection.enabled = true;
+        Await(() => connection.Client.State == State.Failed, "the server refuses without a token");
+        Check(connection.Client.ErrorCode == (uint)Errors.Unauthenticated, "because it is missing");
+        connection.enabled = false;
+        connection.token = token;
+        connection.enabled = true;
+        Await(() => connection.IsJoined, "the token admits");
+    }
+
     static void Main(string[] arguments)
     {
+        if (arguments.Length == 2)
+        {
+            Pairs(arguments[0], arguments[1]);
+            return;
+        }
         var material = new Material();
         var stream = new GameObject("stream");
         stream.SetActive(false);

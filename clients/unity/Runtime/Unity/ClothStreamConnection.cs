@@ -24,6 +24,8 @@ namespace ClothStream
         public Role role = Role.Unspecified;
         [Tooltip("Token for a server that requires one. Builds contain it, so set it in a script before this component is enabled. Sent to other machines only with TLS.")]
         public string token = "";
+        [Tooltip("Code of six digits for a server with pairing. The server answers with a token: keep it, and set it in place of the code next time. See Paired.")]
+        public string pairingCode = "";
         [Tooltip("With TLS: fingerprint of the server's key, 64 hexadecimal digits, as a server with --tls self prints it. Empty: an authority must have signed its certificate.")]
         public string fingerprint = "";
         [Tooltip("Smooth motion although frames arrive unevenly. Off: the newest frame is shown.")]
@@ -46,6 +48,8 @@ namespace ClothStream
         public bool IsJoined { get { return Client != null && Client.State == State.Joined; } }
         /// <summary>Raised in Update with what has changed since the frame before.</summary>
         public event Action<Events> Changed;
+        /// <summary>Raised with the token that the server has given for the pairing code. Keep it secret.</summary>
+        public event Action<string> Paired;
 
         /// <summary>Point of the stream for a point in the world.</summary>
         public Vector3 ToStream(Vector3 world)
@@ -88,7 +92,8 @@ namespace ClothStream
             {
                 Client = new Client(new ClientOptions
                 {
-                    Address = address, Scene = scene, DisplayName = displayName, Role = role, Token = token, Fingerprint = fingerprint, Quality = (uint)quality
+                    Address = address, Scene = scene, DisplayName = displayName, Role = role, Token = token, PairingCode = pairingCode, Fingerprint = fingerprint,
+                    Quality = (uint)quality
                 });
                 if (playOut) Client.StartPlayOut(delayMs < 0 ? double.NaN : delayMs);
                 Client.SetLocalContact(playOut && localContact);
@@ -108,6 +113,7 @@ namespace ClothStream
             if ((news & Events.Description) != 0) ++Descriptions;
             Client.Play(Client.NowUs);
             Log();
+            if ((news & Events.Token) != 0) Paired?.Invoke(Client.Token);
             if (news != 0) Changed?.Invoke(news);
         }
 
