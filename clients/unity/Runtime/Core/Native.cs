@@ -588,6 +588,9 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern int cs_get_pairing_code(IntPtr client, PairingCode* @out);
         [DllImport(Library)] public static extern void cs_request_key_frame(IntPtr client, ulong nowUs);
         [DllImport(Library)] public static extern int cs_get_playback(IntPtr client, ulong nowUs, Playback* @out);
+        [DllImport(Library)] public static extern int cs_in_lockstep(IntPtr client);
+        [DllImport(Library)] public static extern void cs_hold_acknowledgements(IntPtr client, int on);
+        [DllImport(Library)] public static extern void cs_acknowledge_seen(IntPtr client);
         [DllImport(Library)] public static extern void cs_pause(IntPtr client, int paused);
         [DllImport(Library)] public static extern void cs_seek(IntPtr client, double seconds);
         [DllImport(Library)] public static extern void cs_set_speed(IntPtr client, double speed);
