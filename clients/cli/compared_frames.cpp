@@ -10,9 +10,11 @@
 #include <fmt/format.h>
 
 #include "clients/cli/message_difference.h"
-#include "clients/recording/played_recording.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
+#include "clients/recording/played_recording.h"
+#include "clothstream/v1/session.pb.h"
+#include "proto/recording/recorded_description.h"
 
 namespace clothstream::cli {
 namespace {
@@ -70,7 +72,7 @@ tl::expected<Frames, Error> open(const std::string& path, double& maxError,
   if (!reader) return tl::unexpected(reader.error());
   if (!reader->mcap().indexed()) damaged.emplace_back("its end is missing or damaged");
   if (const auto checked = reader->check(); !checked && damaged.empty()) damaged.push_back(checked.error());
-  const auto description = orError(kUnreadable, reader->description());
+  const auto description = orError(kUnreadable, readDescription(*reader));
   if (!description) return tl::unexpected(description.error());
   maxError = double{description->max_error()};
   auto played = PlayedRecording::open(std::move(*reader));

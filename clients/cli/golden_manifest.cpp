@@ -10,6 +10,7 @@
 #include "clients/files/new_file.h"
 #include "clients/files/regular_file.h"
 #include "clothstream/v1/recording.pb.h"
+#include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
 #include "proto/recording/recording_reader.h"
 

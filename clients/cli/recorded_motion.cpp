@@ -6,6 +6,8 @@
 
 #include "clients/cli/motion.h"
 #include "clients/recording/played_recording.h"
+#include "clothstream/v1/session.pb.h"
+#include "proto/recording/recorded_description.h"
 
 namespace clothstream::cli {
 namespace {
@@ -72,7 +74,7 @@ class RecordedMotion : public Motion {
 tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(const std::string& path) {
   auto reader = orError(kUnreadable, recording::RecordingReader::open(path));
   if (!reader) return tl::unexpected(reader.error());
-  const auto description = orError(kUnreadable, reader->description());
+  const auto description = orError(kUnreadable, readDescription(*reader));
   if (!description) return tl::unexpected(description.error());
   if (description->simulation_rate() == 0)
     return makeError(kUnreadable, "{} is broken: its stream has no simulation rate", path);
