@@ -13,7 +13,6 @@
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "clients/recording/played_recording.h"
-#include "clothstream/v1/session.pb.h"
 #include "proto/recording/recorded_description.h"
 
 namespace clothstream::cli {
@@ -36,7 +35,9 @@ class Frames {
     for (;;) {
       const auto message = played_.next(CS_RECORDED_FRAME);
       if (message && !*message) return false;
-      if (message && frame_.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size()))) break;
+      if (message &&
+          frame_.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())))
+        break;
       note(message ? "a frame cannot be read" : message.error());
       if (cs_get_state(client()) == CS_STATE_FAILED) return false;
     }
@@ -72,7 +73,7 @@ tl::expected<Frames, Error> open(const std::string& path, double& maxError,
   if (!reader) return tl::unexpected(reader.error());
   if (!reader->mcap().indexed()) damaged.emplace_back("its end is missing or damaged");
   if (const auto checked = reader->check(); !checked && damaged.empty()) damaged.push_back(checked.error());
-  const auto description = orError(kUnreadable, readDescription(*reader));
+  const auto description = orError(kUnreadable, recording::readDescription(*reader));
   if (!description) return tl::unexpected(description.error());
   maxError = double{description->max_error()};
   auto played = PlayedRecording::open(std::move(*reader));

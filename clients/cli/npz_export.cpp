@@ -28,7 +28,8 @@ std::span<const T> one(const T& value) {
 
 }  // namespace
 
-tl::expected<NpzExport, Error> NpzExport::begin(const std::string& path, const client::PlayedRecording& played) {
+tl::expected<NpzExport, Error> NpzExport::begin(const std::string& path,
+                                                const client::PlayedRecording& played) {
   auto writer = orError(kNotWritten, files::NpzWriter::create(path));
   if (!writer) return tl::unexpected(writer.error());
   NpzExport npz(std::move(*writer));

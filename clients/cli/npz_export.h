@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "clients/cli/error.h"
-#include "clients/recording/played_recording.h"
 #include "clients/files/npz_writer.h"
+#include "clients/recording/played_recording.h"
 
 namespace clothstream::cli {
 

@@ -6,7 +6,6 @@
 
 #include "clients/cli/motion.h"
 #include "clients/recording/played_recording.h"
-#include "clothstream/v1/session.pb.h"
 #include "proto/recording/recorded_description.h"
 
 namespace clothstream::cli {
@@ -74,7 +73,7 @@ class RecordedMotion : public Motion {
 tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(const std::string& path) {
   auto reader = orError(kUnreadable, recording::RecordingReader::open(path));
   if (!reader) return tl::unexpected(reader.error());
-  const auto description = orError(kUnreadable, readDescription(*reader));
+  const auto description = orError(kUnreadable, recording::readDescription(*reader));
   if (!description) return tl::unexpected(description.error());
   if (description->simulation_rate() == 0)
     return makeError(kUnreadable, "{} is broken: its stream has no simulation rate", path);
