@@ -66,6 +66,25 @@ class States(unittest.TestCase):
         moved = (states[10:, :, :3] - states[9:-1, :, :3]) / about["tickSeconds"]
         self.assertGreater(numpy.corrcoef(moved.ravel(), states[10:, :, 3:].ravel())[0, 1], 0.9)
 
+    def measure(self, file):
+        ended = self.run_program(CLOTHSTREAM, "measure", file, "--json", "--no-intersections")
+        self.assertEqual(ended.returncode, 0, ended.stderr)
+        return {frame["tick"]: frame["cloths"][0] for frame in json.loads(ended.stdout)["frames"]}
+
+    def test_exact_states_have_the_measures_of_the_frames_within_their_error(self):
+        # The steps of docs/comparing.md.
+        recording, out = self.kept("swing"), self.path("out.f32")
+        self.assertEqual(self.run_program(SERVER, "resimulate", recording, "--states", out).returncode, 0)
+        exported = self.run_program(CLOTHSTREAM, "export", recording, self.path("frames.npz"))
+        self.assertEqual(exported.returncode, 0, exported.stderr)
+        states, about = self.states(out)
+        frames = numpy.load(self.path("frames.npz"))
+        surface = {name: frames[name] for name in ("rest_positions", "triangles", "cloths", "cloth_names", "rate")}
+        numpy.savez(self.path("out.npz"), positions=states[..., :3], ticks=about["ticks"], **surface)
+        exact, shown = self.measure(self.path("out.npz")), self.measure(recording)
+        for tick, measured in shown.items():
+            self.assertAlmostEqual(exact[tick]["strainMean"], measured["strainMean"], delta=0.02)
+
     def test_exit_codes_of_resimulate(self):
         recording = self.kept("flag")
         resimulate = (SERVER, "resimulate")
