@@ -57,18 +57,19 @@ prefix=$folder/prefix
 "$cmake" --install "$build" --prefix "$prefix" >/dev/null
 library=$(find "$prefix" -name 'libclothstream.so' -o -name 'clothstream.dll.a')
 "$compiler" -std=c11 -O2 -Wall -Wextra -Wpedantic -Werror -I"$prefix/include" "$sources/tests/library/hashes.c" "$library" \
-  -o "$folder/hashes"
+  -o "$folder/hashes.exe"
 
 if [ "$platform" = windows-x64 ]; then
   "$cmake" -S "$sources/examples/c" -B "$folder/example" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" \
     -DCMAKE_TOOLCHAIN_FILE="$sources/cmake/toolchains/$platform.cmake" >/dev/null
   "$cmake" --build "$folder/example" >/dev/null
   cp "$prefix/bin/clothstream.dll" "$folder/"
-  needs=$(x86_64-w64-mingw32-objdump -p "$folder/clothstream.dll" | sed -n 's/.*DLL Name: //p' | sort | tr 'A-Z\n' 'a-z ')
+  needs=$(x86_64-w64-mingw32-objdump -p "$folder/clothstream.dll" | sed -n 's/.*DLL Name: //p' | tr 'A-Z' 'a-z' | LC_ALL=C sort | tr '\n' ' ')
   [ "$needs" = "crypt32.dll kernel32.dll msvcrt.dll mswsock.dll winhttp.dll ws2_32.dll " ] ||
     fail "clothstream.dll must need only libraries of Windows, but it needs $needs"
-  "$wine" wineboot -i >/dev/null 2>&1
+  mkdir "$WINEPREFIX"
   /usr/lib/wine/wineserver64 -p # stays between the programs
+  "$wine" wineboot -i >/dev/null 2>&1
 fi
 
 # there PROGRAM ARGUMENT...: runs a program of the platform.
@@ -103,7 +104,7 @@ compare() {
   shift
   "$here" "$1" "$FRAMES" "${@:2}" >"$folder/here" &
   local pid=$!
-  there "$folder/hashes" "$1" "$FRAMES" "${@:2}" >"$folder/there" || fail "$what: $platform failed"
+  there "$folder/hashes.exe" "$1" "$FRAMES" "${@:2}" >"$folder/there" || { kill "$pid" && fail "$what: $platform failed"; }
   wait "$pid" || fail "$what: the program of this machine failed"
   for side in here there; do sort -o "$folder/$side" "$folder/$side"; done
   same=$(comm -12 "$folder/here" "$folder/there" | wc -l)
@@ -117,7 +118,7 @@ compare() {
 refuse() {
   local what=$1 text=$2 said status=0
   shift 2
-  said=$(there "$folder/hashes" "$1" 1 "${@:2}" 2>&1) || status=$?
+  said=$(there "$folder/hashes.exe" "$1" 1 "${@:2}" 2>&1) || status=$?
   [ "$status" -ne 0 ] || fail "$what: was accepted"
   [[ $said == *"$text"* ]] || fail "$what: '$text' is not in: $said"
   echo "$what: $said"
