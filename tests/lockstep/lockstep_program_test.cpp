@@ -117,7 +117,7 @@ class LockstepProgram : public ::testing::Test {
                                      path_,    "--lockstep", "--speed",     "max"};
     options.insert(options.end(), more.begin(), more.end());
     server_ = std::make_unique<ServerProcess>(options);
-    const std::string line = server_->lineWith("page ");
+    const std::string line = server_->lineWith("page    ");
     port_ = server_->portIn(line);
     address_ = "127.0.0.1:" + std::to_string(port_);
   }

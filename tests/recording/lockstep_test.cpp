@@ -163,7 +163,7 @@ TEST_F(LockstepTest, AnnouncesThePositionOncePerRecordedSecond) {
   const Viewer& viewer = join();
   stepOften();
   std::vector<double> positions;
-  for (const v1::Playback& playback : viewer.playbacks) positions.push_back(playback.position());
+  for (const v1::Playback& announced : viewer.playbacks) positions.push_back(announced.position());
   EXPECT_THAT(positions, ::testing::ElementsAre(
                              ::testing::DoubleNear(0, 1e-6), ::testing::DoubleNear(1, 0.02),
                              ::testing::DoubleNear(2, 0.02), ::testing::DoubleNear(149.0 / 60, 1e-6)));

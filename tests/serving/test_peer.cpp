@@ -2,6 +2,7 @@
 // Reads messages, assembles the description and decodes frames.
 #include "tests/serving/test_peer.h"
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 #include <utility>
@@ -141,7 +142,7 @@ void TestPeer::seeChunk(const v1::Chunk& chunk) {
   layout.maxError = description_.max_error();
   layout.normals = octahedral ? codec::NormalMode::octahedral : codec::NormalMode::none;
   layout.temporalLayers = static_cast<std::uint8_t>(description_.temporal_layers());
-  layout.qualities = static_cast<std::uint8_t>(description_.qualities());
+  layout.qualities = static_cast<std::uint8_t>(std::max(1u, description_.qualities()));
   for (const v1::ClothDescription& cloth : description_.cloths())
     layout.cloths.push_back(
         {cloth.vertex_count(), cloth.rows(), cloth.columns(), numbersOf<std::uint32_t>(cloth.triangles()),
