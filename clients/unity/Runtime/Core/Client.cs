@@ -56,7 +56,7 @@ namespace ClothStream.Core
             thread.Start();
         }
 
-        /// <summary>Leaves the scene. Takes at most half a second.</summary>
+        /// <summary>Leaves the scene. Takes at most half a second. Do not hold Gate: the client's thread needs it.</summary>
         public void Dispose()
         {
             if (leaving) return;
