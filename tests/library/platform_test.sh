@@ -8,33 +8,11 @@ set -euo pipefail
 platform=$1 cmake=$2 sources=$3 build=$4 server=$5 here=$6
 readonly FRAMES=60
 
-skip() { echo "skipped: $*" && exit 77; }
-fail() { echo "$*" && exit 1; }
-need() { # command package
-  command -v "$1" >/dev/null || skip "$1 is missing; install $2 (./dev test --long does)"
-}
-
-case "$platform" in
-  windows-x64)
-    need x86_64-w64-mingw32-g++-posix g++-mingw-w64-x86-64-posix
-    wine=$(command -v wine64 || echo /usr/lib/wine/wine64)
-    need "$wine" wine64
-    compiler=x86_64-w64-mingw32-gcc-posix
-    ;;
-  linux-arm64)
-    need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
-    need qemu-aarch64 qemu-user
-    [ -e /usr/lib/aarch64-linux-gnu/libssl.so ] ||
-      skip "OpenSSL for arm64 is missing; dpkg --add-architecture arm64, and install libssl-dev:arm64 (./dev test --long does)"
-    compiler=aarch64-linux-gnu-gcc
-    ;;
-  *) fail "no such platform: $platform" ;;
-esac
+. "$(dirname "${BASH_SOURCE[0]}")/platform.sh"
+needPlatform "$platform"
 
 folder=$(mktemp -d)
 server_pid=
-export WINEPREFIX=$folder/wine WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml=
-unset DISPLAY
 stopServer() {
   [ -z "$server_pid" ] || kill "$server_pid" 2>/dev/null || true
   [ -z "$server_pid" ] || wait "$server_pid" 2>/dev/null || true
@@ -42,43 +20,24 @@ stopServer() {
 }
 cleanUp() {
   stopServer
-  # Ends the processes of this WINEPREFIX only.
-  [ ! -d "$WINEPREFIX" ] || /usr/lib/wine/wineserver64 -k 2>/dev/null || true
+  stopWine
   rm -rf "$folder"
 }
 trap cleanUp EXIT
 
-"$cmake" -S "$sources" -B "$build" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$sources/cmake/toolchains/$platform.cmake" \
-  -DCLOTHSTREAM_CLIENT_ONLY=ON -DCMAKE_BUILD_TYPE=Release -DCMAKE_UNITY_BUILD=ON -DCMAKE_CXX_FLAGS=-Werror \
-  >"$folder/configure" ||
-  fail "$(cat "$folder/configure")"
-"$cmake" --build "$build" --target clothstream_library -- -j2 >"$folder/build" || fail "$(cat "$folder/build")"
 prefix=$folder/prefix
-"$cmake" --install "$build" --prefix "$prefix" >/dev/null
-library=$(find "$prefix" -name 'libclothstream.so' -o -name 'clothstream.dll.a')
-"$compiler" -std=c11 -O2 -Wall -Wextra -Wpedantic -Werror -I"$prefix/include" "$sources/tests/library/hashes.c" "$library" \
-  -o "$folder/hashes.exe"
+buildLibrary "$build" "$prefix"
+compileProgram "$sources/tests/library/hashes.c" "$prefix" "$folder/hashes.exe"
 
 if [ "$platform" = windows-x64 ]; then
   "$cmake" -S "$sources/examples/c" -B "$folder/example" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" \
     -DCMAKE_TOOLCHAIN_FILE="$sources/cmake/toolchains/$platform.cmake" >/dev/null
   "$cmake" --build "$folder/example" >/dev/null
-  cp "$prefix/bin/clothstream.dll" "$folder/"
   needs=$(x86_64-w64-mingw32-objdump -p "$folder/clothstream.dll" | sed -n 's/.*DLL Name: //p' | tr 'A-Z' 'a-z' | LC_ALL=C sort | tr '\n' ' ')
   [ "$needs" = "crypt32.dll kernel32.dll msvcrt.dll mswsock.dll winhttp.dll ws2_32.dll " ] ||
     fail "clothstream.dll must need only libraries of Windows, but it needs $needs"
-  mkdir "$WINEPREFIX"
-  /usr/lib/wine/wineserver64 -p # stays between the programs
-  "$wine" wineboot -i >/dev/null 2>&1
+  startWine "$folder/wine"
 fi
-
-# there PROGRAM ARGUMENT...: runs a program of the platform.
-there() {
-  case "$platform" in
-    windows-x64) "$wine" "$@" | tr -d '\r' ;;
-    linux-arm64) qemu-aarch64 -L / -E LD_LIBRARY_PATH="${library%/*}" "$@" ;;
-  esac
-}
 
 # serve OPTION...: starts a server on a free port. Sets `address` (HOST:PORT) and `fingerprint`.
 serve() {

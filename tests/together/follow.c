@@ -3,13 +3,14 @@
  * follow ADDRESS FINGERPRINT TOKEN_FILE NAME OUT. Prints "frame TICK HASH" for each frame, with the 64-bit FNV-1a
  * hash of the positions. After the notice that the scene is paused, waits for the frame of that tick, writes its
  * positions to OUT, and leaves. */
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
 #include <clothstream/clothstream.h>
 
-static unsigned long long fnv1a(const float* values, size_t count) {
-  unsigned long long hash = 0xcbf29ce484222325u;
+static uint64_t fnv1a(const float* values, size_t count) {
+  uint64_t hash = 0xcbf29ce484222325u;
   const unsigned char* bytes = (const unsigned char*)values;
   for (size_t i = 0; i < count * sizeof *values; ++i) hash = (hash ^ bytes[i]) * 0x100000001b3u;
   return hash;
@@ -52,7 +53,7 @@ int main(int argc, char** argv) {
     if ((events & CS_EVENT_FRAME) != 0) {
       cs_statistics statistics;
       cs_get_statistics(client, clothstream_now_us(), &statistics);
-      printf("frame %llu %016llx\n", (unsigned long long)statistics.tick, fnv1a(cs_positions(client), count));
+      printf("frame %" PRIu64 " %016" PRIx64 "\n", statistics.tick, fnv1a(cs_positions(client), count));
       fflush(stdout);
     }
     paused = paused || ((events & CS_EVENT_NOTICE) != 0 && strstr(cs_notice_text(client), "paused") != NULL);
