@@ -5,7 +5,8 @@
 namespace clothstream {
 
 std::string useAllocator(const clothstream_allocator&) {
-  return "This library was built for gRPC, for macOS or with sanitizers, and cannot use an allocator of the program.";
+  return "This library was built for gRPC, for macOS or with sanitizers, and cannot use an allocator of the "
+         "program.";
 }
 
 }  // namespace clothstream

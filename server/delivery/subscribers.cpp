@@ -90,6 +90,12 @@ bool Subscribers::awaitAcknowledgement() const {
       subscribers_, [](const Subscriber& subscriber) { return subscriber.mailbox->awaitsAcknowledgement(); });
 }
 
+bool Subscribers::allRestart() const {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::all_of(subscribers_,
+                             [](const Subscriber& subscriber) { return subscriber.mailbox->isRestarting(); });
+}
+
 bool Subscribers::anyRestarts() const {
   const std::lock_guard lock(mutex_);
   return std::ranges::any_of(subscribers_,

@@ -43,8 +43,10 @@ class Subscribers {
   std::uint8_t needsKeyFrame() const;
   // Returns whether any subscriber has a frame that it has not acknowledged, or does not receive frames yet.
   bool awaitAcknowledgement() const;
-  // Returns whether any subscriber has received no frame since it joined or asked for a key frame.
+  // Returns whether a subscriber has received no frame since it joined or asked for a key frame: any, or all
+  // that there are.
   bool anyRestarts() const;
+  bool allRestart() const;
 
  private:
   struct Subscriber {

@@ -141,7 +141,9 @@ std::optional<Playback::Clock::time_point> Playback::step(scene::LiveScene& scen
   if (options_.lockstep && scene.subscribers.awaitAcknowledgement()) return now + kLookAgain;
   takeWanted(scene, now);
   const bool here = scene.subscribers.size() > 0;
-  if (!here) asleep_ = true;
+  // In lockstep the key frame before serves a subscriber that returns alone, whether or not the loss of its
+  // former connection was noticed.
+  if (!here || (options_.lockstep && scene.subscribers.allRestart())) asleep_ = true;
   if (needsJump(scene, now)) {
     jump(scene, position_, now);
     asleep_ = false;

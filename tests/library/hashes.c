@@ -41,6 +41,7 @@ static int follow(clothstream_stream* stream, unsigned long frames) {
     if (statistics.frames > 0 && statistics.tick != tick) {
       tick = statistics.tick;
       printf("frame %" PRIu64 " %016" PRIx64 "\n", tick, hash_of(client));
+      fflush(stdout);
       --frames;
     }
     clothstream_release(stream);

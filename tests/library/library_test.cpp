@@ -182,8 +182,9 @@ TEST_F(LibraryTest, ServesPythonWithoutACopy) {
   if (kSanitized) GTEST_SKIP() << kNotSanitized;
   if (!succeeds({CLOTHSTREAM_PYTHON, "-c", "import numpy"}))
     GTEST_SKIP() << CLOTHSTREAM_PYTHON " has no numpy: ./dev test installs Debian's python3-numpy";
-  expectSameFrames({"/usr/bin/env", "PYTHONPATH=clients/python/src", "CLOTHSTREAM_LIBRARY=" CLOTHSTREAM_LIBRARY,
-                    CLOTHSTREAM_PYTHON, "-B", "tests/library/follow.py", web_});
+  expectSameFrames({"/usr/bin/env", "PYTHONPATH=clients/python/src",
+                    "CLOTHSTREAM_LIBRARY=" CLOTHSTREAM_LIBRARY, CLOTHSTREAM_PYTHON, "-B",
+                    "tests/library/follow.py", web_});
 }
 
 TEST_F(LibraryTest, ServesCSharp) {
@@ -284,7 +285,9 @@ INSTANTIATE_TEST_SUITE_P(
                  "cc -std=c11 -Wall -Wextra -Wpedantic -Werror -I{include} {file} -o {program} "
                  "-L{folder} "
                  "-lclothstream && {program} {address}"},
-        Language{"python", "example.py", CLOTHSTREAM_PYTHON, "PYTHONPATH=clients/python/src CLOTHSTREAM_LIBRARY={folder}/libclothstream.so {python} -B {file} {address}"},
+        Language{"python", "example.py", CLOTHSTREAM_PYTHON,
+                 "PYTHONPATH=clients/python/src CLOTHSTREAM_LIBRARY={folder}/libclothstream.so {python} -B "
+                 "{file} {address}"},
         Language{"csharp", "Example.cs", "mcs",
                  "mcs -unsafe -out:{program} {file} && mono {program} {address}"},
         Language{"rust", "example.rs", "/usr/bin/rustc",

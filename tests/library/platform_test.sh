@@ -18,7 +18,14 @@ stopServer() {
   [ -z "$server_pid" ] || wait "$server_pid" 2>/dev/null || true
   server_pid=
 }
+here_pid=
+stopHere() {
+  [ -z "$here_pid" ] || kill "$here_pid" 2>/dev/null || true
+  [ -z "$here_pid" ] || wait "$here_pid" 2>/dev/null || true
+  here_pid=
+}
 cleanUp() {
+  stopHere
   stopServer
   stopWine
   rm -rf "$folder"
@@ -57,18 +64,32 @@ serve() {
   fingerprint=$(sed -n 's/^key *//p' "$folder/server")
 }
 
-# compare WHAT ADDRESS OPTION...: both must have the same bits for the ticks that both have.
-compare() {
-  local what=$1 same
+# waitFor FAILURE COMMAND...: waits until the command succeeds.
+waitFor() {
+  local failure=$1
   shift
-  "$here" "$1" "$FRAMES" "${@:2}" >"$folder/here" &
-  local pid=$!
-  there "$folder/hashes.exe" "$1" "$FRAMES" "${@:2}" >"$folder/there" || { kill "$pid" && fail "$what: $platform failed"; }
-  wait "$pid" || fail "$what: the program of this machine failed"
-  for side in here there; do sort -o "$folder/$side" "$folder/$side"; done
-  same=$(comm -12 "$folder/here" "$folder/there" | wc -l)
-  local common
-  common=$(join -j 2 <(sort -k 2,2 "$folder/here") <(sort -k 2,2 "$folder/there") | wc -l)
+  for _ in $(seq 600); do
+    "$@" && return
+    sleep 0.1
+  done
+  fail "$failure"
+}
+
+# compare WHAT ADDRESS OPTION...: both must have the same bits for the ticks that both have. The program of this machine
+# runs from before the other one starts until it has the other one's last tick.
+compare() {
+  local what=$1 same common last
+  shift
+  "$here" "$1" 100000 "${@:2}" >"$folder/here" &
+  here_pid=$!
+  waitFor "$what: the program of this machine has no frame" grep -q frame "$folder/here"
+  there "$folder/hashes.exe" "$1" "$FRAMES" "${@:2}" >"$folder/there" || fail "$what: $platform failed"
+  last=$(tail -n 1 "$folder/there" | cut -d ' ' -f 2)
+  waitFor "$what: the program of this machine has ended" awk -v last="$last" '$2 >= last { found = 1 } END { exit !found }' "$folder/here"
+  stopHere
+  for side in here there; do grep -E '^frame [0-9]+ [0-9a-f]{16}$' "$folder/$side" | sort >"$folder/$side.sorted"; done
+  same=$(comm -12 "$folder/here.sorted" "$folder/there.sorted" | wc -l)
+  common=$(join -j 2 <(sort -k 2,2 "$folder/here.sorted") <(sort -k 2,2 "$folder/there.sorted") | wc -l)
   echo "$what: $same of $common common frames have the same bits"
   [ "$same" -eq "$common" ] && [ "$common" -ge 20 ] || fail "$what: frames differ, or too few are common"
 }
@@ -106,7 +127,6 @@ openssl req -x509 -newkey rsa:2048 -nodes -keyout "$folder/other.key" -out "$fol
 refuse "other authority" "no known authority has signed its certificate" "wss://$address" ca "$folder/other.pem" token "$token"
 refuse "no token" "requires a token" "wss://$address" fingerprint "$fingerprint"
 
-# Each program has left with a close frame, so that the server keeps no place for it.
+# The programs of the platform have left with a close frame, so that the server keeps no place for them.
 stopServer
-! grep 'was disconnected' "$folder/server" || fail "a client that has left counts as lost"
-[ "$(grep -c ' left; ' "$folder/server")" -eq 4 ] || fail "not every client has left: $(cat "$folder/server")"
+[ "$(grep -c ' left; ' "$folder/server")" -eq 2 ] || fail "a client that has left counts as lost: $(cat "$folder/server")"

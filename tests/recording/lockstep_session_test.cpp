@@ -67,6 +67,8 @@ TEST_F(LockstepSession, AnswersEveryKeyFrameRequest) {
     peer.readFrames(1);
     ASSERT_EQ(peer.frames().size(), frames);
     EXPECT_TRUE(peer.frames().back().key);
+    // The only client gets the key frame before again.
+    EXPECT_EQ(peer.frames().back().stateHash, peer.frames().front().stateHash);
   }
 }
 

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: MIT
  * Follows a stream through libclothstream on any platform, for together.test.mjs. Usage:
- * follow ADDRESS FINGERPRINT TOKEN_FILE NAME OUT. Prints "frame TICK HASH" for each frame, with the 64-bit FNV-1a
- * hash of the positions. After the notice that the scene is paused, waits for the frame of that tick, writes its
- * positions to OUT, and leaves. */
+ * follow ADDRESS FINGERPRINT TOKEN_FILE NAME OUT. Prints "frame TICK HASH" for each frame, with the 64-bit
+ * FNV-1a hash of the positions. After the notice that the scene is paused, waits for the frame of that tick,
+ * writes its positions to OUT, and leaves. */
+#include <clothstream/clothstream.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-
-#include <clothstream/clothstream.h>
 
 static uint64_t fnv1a(const float* values, size_t count) {
   uint64_t hash = 0xcbf29ce484222325u;
