@@ -75,9 +75,9 @@ const cs_client* cs_recording_client(const cs_recording* recording) CS_NOEXCEPT;
 #define CS_RECORDING_INFO_VERSION 1u
 typedef struct cs_recording_info {
   uint32_t version; /* CS_RECORDING_INFO_VERSION */
-  int32_t
-      complete;   /* 1: the file has its index. 0: it is cut or damaged at its end, and is read up to there */
-  double seconds; /* time from the first message to the last */
+  /* 1: the file has its index. 0: it is cut or damaged at its end, and is read up to there. */
+  int32_t complete;
+  double seconds;    /* time from the first message to the last */
   uint64_t start_ns; /* time of the first message: nanoseconds since 1970 */
   uint64_t bytes;    /* size of the file */
   uint64_t frames;   /* number of frames, from the index; 0 if the file is not complete */
