@@ -1,4 +1,5 @@
-# Linux on 64-bit Arm, with Debian's g++-aarch64-linux-gnu and libssl-dev:arm64 (dpkg --add-architecture arm64):
+# Linux on 64-bit Arm, with Debian's g++-aarch64-linux-gnu, libssl-dev:arm64 and libzstd-dev:arm64
+# (dpkg --add-architecture arm64):
 #   cmake -G Ninja -B build/arm64 -DCMAKE_TOOLCHAIN_FILE=cmake/toolchains/linux-arm64.cmake -DCLOTHSTREAM_CLIENT_ONLY=ON
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)

@@ -21,8 +21,8 @@ needPlatform() {
     linux-arm64)
       need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
       need qemu-aarch64 qemu-user
-      [ -e /usr/lib/aarch64-linux-gnu/libssl.so ] ||
-        skip "OpenSSL for arm64 is missing; dpkg --add-architecture arm64, and install libssl-dev:arm64 (./dev test --long does)"
+      { [ -e /usr/lib/aarch64-linux-gnu/libssl.so ] && [ -e /usr/lib/aarch64-linux-gnu/libzstd.so ]; } ||
+        skip "OpenSSL or zstd for arm64 is missing; dpkg --add-architecture arm64, and install libssl-dev:arm64 and libzstd-dev:arm64 (./dev test --long does)"
       compiler=aarch64-linux-gnu-gcc
       ;;
     *) fail "no such platform: $platform" ;;
