@@ -145,7 +145,7 @@ Change otherWind() {
 }
 
 using Diff = Comparison;
-using Golden = Comparison;
+using GoldenRecordings = Comparison;
 
 TEST_F(Diff, EqualRecordingsAreEqual) {
   const std::string a = write("a"), b = write("b");
@@ -248,7 +248,7 @@ TEST_F(Diff, LostFramesAreMissing) {
   EXPECT_EQ(result["frames"]["only"], json::array({1, 0}));
 }
 
-TEST_F(Golden, FindsReplacedMissingAndNewRecordings) {
+TEST_F(GoldenRecordings, FindsReplacedMissingAndNewRecordings) {
   const auto withoutTicks = [](Topic topic, std::string&) { return topic != Topic::ticks; };
   write("a.mcap", "1", withoutTicks);
   write("b.mcap", "1", withoutTicks);
@@ -322,7 +322,7 @@ TEST_F(Resimulation, GoldenSaysWhichRecordingsAreNoLongerSimulatedAsTheyWere) {
   EXPECT_THAT(ended.output, EndsWith("2 recordings: different\n"));
 }
 
-TEST_F(Golden, RefusesABrokenManifest) {
+TEST_F(GoldenRecordings, RefusesABrokenManifest) {
   write("a.mcap");
   for (
       const char* text :
@@ -335,7 +335,7 @@ TEST_F(Golden, RefusesABrokenManifest) {
   }
 }
 
-TEST_F(Golden, NamesTheServerThatCannotRun) {
+TEST_F(GoldenRecordings, NamesTheServerThatCannotRun) {
   write("a.mcap");
   EXPECT_EQ(clothstream({"golden", directory_.path().string(), "--update"}).code, 0);
   const Ended ended = clothstream({"golden", directory_.path().string(), "--server", "/nowhere/server"});
