@@ -55,10 +55,10 @@ void SceneOnDevice::warmUp(const model::Scene& scene, const std::stop_token& sto
   }
   submitAndWait();
   // One submission for each kernel, so that other scenes can use the device between two of them.
-  for (const vulkan::Bindings* bindings : recorder.rehearsed()) {
+  for (const vulkan::RehearsedKernel& kernel : recorder.rehearsed()) {
     if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
     recorder.begin();
-    recorder.touch(*bindings);
+    recorder.touch(*kernel.bindings);
     submitAndWait();
   }
 

@@ -77,6 +77,12 @@ Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
     throw std::runtime_error(
         fmt::format("a buffer of {} texels is more than the {} that kernels can read on {}",
                     bytes / kTexelBytes, limits.maxTexelElements, device.info().name));
+  if (!device.executes()) {
+    if (!mapped) return;
+    handles_->hostBytes.resize(bytes);
+    mapped_ = handles_->hostBytes.data();
+    return;
+  }
   const Traits traits = traitsOf(purpose);
   const vk::raii::Device& vulkan = device.handles().device;
   try {

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <span>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -49,13 +50,26 @@ Limits limitsOf(const vk::raii::PhysicalDevice& physical) {
           .deviceMemoryBytes = memory};
 }
 
-vk::raii::Device openDevice(const Candidate& candidate) {
+bool offersStatistics(const vk::raii::PhysicalDevice& physical) {
+  const auto extensions = physical.enumerateDeviceExtensionProperties();
+  return std::ranges::any_of(extensions, [](const vk::ExtensionProperties& extension) {
+    return std::string_view(extension.extensionName) == VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME;
+  });
+}
+
+vk::raii::Device openDevice(const Candidate& candidate, bool statistics) {
   const float priority = 1;
   const vk::DeviceQueueCreateInfo queue{
       .queueFamilyIndex = candidate.queueFamily, .queueCount = 1, .pQueuePriorities = &priority};
-  const vk::PhysicalDeviceVulkan12Features features{.timelineSemaphore = VK_TRUE};
-  return {candidate.physical,
-          vk::DeviceCreateInfo{.pNext = &features, .queueCreateInfoCount = 1, .pQueueCreateInfos = &queue}};
+  vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR executables{.pipelineExecutableInfo = VK_TRUE};
+  const vk::PhysicalDeviceVulkan12Features features{.pNext = statistics ? &executables : nullptr,
+                                                    .timelineSemaphore = VK_TRUE};
+  const char* extension = VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME;
+  return {candidate.physical, vk::DeviceCreateInfo{.pNext = &features,
+                                                   .queueCreateInfoCount = 1,
+                                                   .pQueueCreateInfos = &queue,
+                                                   .enabledExtensionCount = statistics ? 1u : 0u,
+                                                   .ppEnabledExtensionNames = &extension}};
 }
 
 // Header of a pipeline cache file; the driver's own data follows.
@@ -118,7 +132,8 @@ void writeCache(const std::filesystem::path& path, std::span<const std::uint8_t>
 
 }  // namespace
 
-Device::Device(const DeviceOptions& options) : handles_(new Handles{.context = openLoader()}) {
+Device::Device(const DeviceOptions& options)
+    : handles_(new Handles{.context = openLoader()}), executes_(!options.compileOnly) {
   const SoftwareThreads threads(options.softwareThreads);
   const bool validate = options.validation || validationByEnvironment();
   handles_->instance = makeInstance(handles_->context, validate);
@@ -132,10 +147,13 @@ Device::Device(const DeviceOptions& options) : handles_(new Handles{.context = o
   if (!pipelineCacheFile_.empty()) cached = readCache(pipelineCacheFile_, properties);
   pipelineCacheLoaded_ = cached.size();
   try {
-    handles_->device = openDevice(chosen);
+    handles_->keepsStatistics = options.compileOnly && offersStatistics(chosen.physical);
+    handles_->device = openDevice(chosen, handles_->keepsStatistics);
     const vk::SemaphoreTypeCreateInfo timeline{.semaphoreType = vk::SemaphoreType::eTimeline};
     handles_->queue = handles_->device.getQueue(chosen.queueFamily, 0);
-    handles_->timeline = vk::raii::Semaphore(handles_->device, vk::SemaphoreCreateInfo{.pNext = &timeline});
+    // Drivers without a GPU have no semaphores.
+    if (executes_)
+      handles_->timeline = vk::raii::Semaphore(handles_->device, vk::SemaphoreCreateInfo{.pNext = &timeline});
     handles_->pipelineCache = vk::raii::PipelineCache(
         handles_->device,
         vk::PipelineCacheCreateInfo{.initialDataSize = cached.size(), .pInitialData = cached.data()});
@@ -143,6 +161,8 @@ Device::Device(const DeviceOptions& options) : handles_(new Handles{.context = o
     throw DeviceError(
         fmt::format("the Vulkan device {} cannot be opened: {}", chosen.info.name, error.what()));
   }
+  gpuKernels_ = options.kernels == KernelSettings::automatic ? chosen.info.kind != DeviceKind::software
+                                                             : options.kernels == KernelSettings::gpu;
   limits_ = limitsOf(chosen.physical);
   if (chosen.info.kind == DeviceKind::software) limits_.parallelWorkgroups = threads.count();
   handles_->queueFamily = chosen.queueFamily;
@@ -152,7 +172,7 @@ Device::Device(const DeviceOptions& options) : handles_(new Handles{.context = o
 
 Device::~Device() {
   try {
-    handles_->device.waitIdle();
+    if (executes_) handles_->device.waitIdle();
     if (!pipelineCacheFile_.empty()) writeCache(pipelineCacheFile_, handles_->pipelineCache.getData());
   } catch (const std::exception& error) {
     spdlog::warn("closing the Vulkan device {}: {}", info_.name, error.what());
@@ -171,6 +191,7 @@ TimelineValue Device::submitSlice(Recorder& recorder, std::uint32_t slice) {
 }
 
 TimelineValue Device::submit(const Recorder& recorder, std::uint32_t first, std::uint32_t end) {
+  assert(executes_);
   Recorder::Handles& recording = recorder.handles();
   recording.submitted.clear();
   for (std::uint32_t slice = first; slice < end; ++slice)

@@ -16,6 +16,10 @@ namespace clothstream::vulkan {
 
 enum class DeviceKind : std::uint8_t { discrete, integrated, virtualGpu, software, other };
 
+// Settings of kernels: rows of an invocation, sizes of workgroups, cloths that one workgroup solves. The bits
+// of the results do not depend on them. `automatic` means `cpu` for software devices and `gpu` for others.
+enum class KernelSettings : std::uint8_t { automatic, cpu, gpu };
+
 struct DeviceInfo {
   std::uint32_t index = 0;  // index in listDevices()
   std::string name = {};
@@ -38,6 +42,11 @@ struct DeviceOptions {
   // no cache. A damaged file, or one of another driver, is ignored and replaced. A failed write is only
   // logged.
   std::filesystem::path cacheDirectory = {};
+  KernelSettings kernels = KernelSettings::automatic;
+  // Only compile kernels: buffers have no device memory, recordings hold rehearsals only, and nothing may be
+  // submitted. A driver without a GPU is enough. Kernels keep the statistics of their compiler
+  // (kernel_statistics.h).
+  bool compileOnly = false;
 };
 
 struct Limits {
@@ -85,6 +94,10 @@ class Device {
   const DeviceInfo& info() const { return info_; }
   const Limits& limits() const { return limits_; }
   bool isSoftware() const { return info_.kind == DeviceKind::software; }
+  // True if kernels have the settings for GPUs.
+  bool hasGpuKernels() const { return gpuKernels_; }
+  // False if the device was opened with DeviceOptions::compileOnly.
+  bool executes() const { return executes_; }
 
   // Submits a finished recording to the queue. Returns the timeline value that is reached when it is done.
   // The recorder must not begin again before that. Submissions of one thread run in order. Throws DeviceLost.
@@ -121,6 +134,7 @@ class Device {
   TimelineValue submitted_ = 0;
   DeviceInfo info_;
   Limits limits_;
+  bool executes_ = true, gpuKernels_ = true;
   std::filesystem::path pipelineCacheFile_;
 };
 

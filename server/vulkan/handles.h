@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -40,10 +41,13 @@ struct Device::Handles {
   vk::raii::Semaphore timeline = nullptr;
   vk::raii::PipelineCache pipelineCache = nullptr;
   std::uint32_t queueFamily = 0;
+  bool keepsStatistics = false;  // of kernels: kernel_statistics.h
   mutable std::atomic<std::uint64_t> allocatedBytes{0};
   // Pipelines that kernels use.
   mutable std::mutex pipelinesMutex{};
   mutable std::map<PipelineKey, std::weak_ptr<const Kernel::Handles>> pipelines{};
+  // A device that only compiles keeps every pipeline, so that it compiles none twice.
+  mutable std::vector<std::shared_ptr<const Kernel::Handles>> kept{};
 
   bool validates() const { return *messenger != vk::DebugUtilsMessengerEXT{}; }
 };
@@ -57,6 +61,7 @@ struct Buffer::Handles {
   std::atomic<std::uint64_t>* allocatedBytes;  // of the device
   std::uint64_t bytes = 0;                     // of `memory`
   vk::raii::DeviceMemory memory = nullptr;
+  std::vector<std::byte> hostBytes;  // on a device that only compiles, which has no `memory`
   vk::raii::Buffer buffer = nullptr;
   vk::raii::BufferView texelView = nullptr;
 };

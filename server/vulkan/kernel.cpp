@@ -59,9 +59,11 @@ std::shared_ptr<const Kernel::Handles> Kernel::makePipeline(const Device::Handle
   const vk::raii::ShaderModule module(vulkan,
                                       vk::ShaderModuleCreateInfo{.codeSize = description.spirv.size_bytes(),
                                                                  .pCode = description.spirv.data()});
+  vk::PipelineCreateFlags flags = vk::PipelineCreateFlagBits::eDispatchBase;
+  if (device.keepsStatistics) flags |= vk::PipelineCreateFlagBits::eCaptureStatisticsKHR;
   made->pipeline =
       vk::raii::Pipeline(vulkan, device.pipelineCache,
-                         vk::ComputePipelineCreateInfo{.flags = vk::PipelineCreateFlagBits::eDispatchBase,
+                         vk::ComputePipelineCreateInfo{.flags = flags,
                                                        .stage = {.stage = vk::ShaderStageFlagBits::eCompute,
                                                                  .module = *module,
                                                                  .pName = "main",
@@ -83,7 +85,9 @@ Kernel::Kernel(const Device& device, const KernelDescription& description)
     : name_(description.name),
       bindings_(description.bindings),
       pushConstantBytes_(description.pushConstantBytes),
-      workgroupSize_(description.workgroupSize) {
+      workgroupSize_(description.workgroupSize),
+      spirv_(description.spirv),
+      specialisation_(description.specialisation) {
   const Limits& limits = device.limits();
   if (workgroupSize_ > limits.maxWorkgroupSizeX || workgroupSize_ > limits.maxWorkgroupInvocations)
     throw std::runtime_error(fmt::format(
@@ -101,7 +105,10 @@ Kernel::Kernel(const Device& device, const KernelDescription& description)
     auto& shared =
         device.handles().pipelines[{description.spirv.data(), bindings_, pushConstantBytes_, constants}];
     handles_ = shared.lock();
-    if (!handles_) shared = handles_ = makePipeline(device.handles(), description, constants);
+    if (!handles_) {
+      shared = handles_ = makePipeline(device.handles(), description, constants);
+      if (!device.executes()) device.handles().kept.push_back(handles_);
+    }
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(
         fmt::format("kernel {} is refused by {}: {}", name_, device.info().name, error.what()));
@@ -117,7 +124,8 @@ Bindings::Bindings(const Device& device, const Kernel& kernel, std::span<const B
   const std::span<const BindingKind> kinds = kernel.bindings();
   assert(buffers.size() == kinds.size());
   const auto count = static_cast<std::uint32_t>(kinds.size());
-  if (count == 0) return;
+  for (const Buffer* buffer : buffers) buffers_.push_back({&buffer->handles(), buffer->bytes()});
+  if (count == 0 || !device.executes()) return;
 
   std::vector<vk::DescriptorPoolSize> sizes;
   std::vector<vk::DescriptorBufferInfo> infos(count);

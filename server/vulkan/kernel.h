@@ -2,6 +2,7 @@
 // A compute pipeline from embedded SPIR-V, and the buffers that are bound to it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
@@ -52,6 +53,9 @@ class Kernel {
   const std::string& name() const { return name_; }
   std::span<const BindingKind> bindings() const { return bindings_; }
   std::uint32_t pushConstantBytes() const { return pushConstantBytes_; }
+  std::span<const std::uint32_t> spirv() const { return spirv_; }
+  // KernelDescription::specialisation.
+  std::span<const std::uint32_t> specialisation() const { return specialisation_; }
 
  private:
   static std::shared_ptr<const Handles> makePipeline(const Device::Handles& device,
@@ -62,7 +66,15 @@ class Kernel {
   std::vector<BindingKind> bindings_;
   std::uint32_t pushConstantBytes_ = 0;
   std::uint32_t workgroupSize_ = 0;
+  std::span<const std::uint32_t> spirv_;
+  std::vector<std::uint32_t> specialisation_;
   std::shared_ptr<const Handles> handles_;
+};
+
+// A buffer that is bound.
+struct BoundBuffer {
+  const void* identity = nullptr;  // differs from that of every other buffer
+  std::size_t bytes = 0;
 };
 
 // One buffer for each of the kernel's bindings, in order. Kernel and buffers must outlive this object.
@@ -76,12 +88,14 @@ class Bindings {
   Bindings& operator=(Bindings&&) noexcept;
 
   const Kernel& kernel() const { return *kernel_; }
+  std::span<const BoundBuffer> buffers() const { return buffers_; }
   // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }
 
  private:
   const Kernel* kernel_;
+  std::vector<BoundBuffer> buffers_;
   std::unique_ptr<Handles> handles_;
 };
 

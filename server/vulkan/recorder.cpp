@@ -36,6 +36,7 @@ Recorder::Recorder(Recorder&&) noexcept = default;
 Recorder& Recorder::operator=(Recorder&&) noexcept = default;
 
 Recorder::Recorder(const Device& device) : device_(&device), handles_(std::make_unique<Handles>()) {
+  if (!device.executes()) return;
   const vk::raii::Device& vulkan = device.handles().device;
   handles_->pool = vk::raii::CommandPool(
       vulkan, vk::CommandPoolCreateInfo{.queueFamilyIndex = device.handles().queueFamily});
@@ -56,6 +57,9 @@ std::uint32_t Recorder::sliceCount() const {
 }
 
 void Recorder::begin() {
+  open_ = true;
+  rehearses_ = !device_->executes();
+  if (rehearses_) return rehearsed_.clear();
   handles_->pool.reset();
   handles_->used = 0;
   beginSlice();
@@ -63,8 +67,6 @@ void Recorder::begin() {
   marks_.clear();
   timedSlices_ = 0;
   largestDispatch_ = 0;
-  open_ = true;
-  rehearses_ = false;
 }
 
 void Recorder::beginSlice() {
@@ -111,14 +113,18 @@ void Recorder::beginRehearsal() {
   rehearses_ = true;
 }
 
-void Recorder::note(const Bindings& bindings) {
-  const auto same = [&](const Bindings* known) {
-    return &known->kernel().handles() == &bindings.kernel().handles();
+void Recorder::note(const Bindings& bindings, std::uint64_t invocations) {
+  const auto same = [&](const RehearsedKernel& known) {
+    return &known.bindings->kernel().handles() == &bindings.kernel().handles();
   };
-  if (std::ranges::none_of(rehearsed_, same)) rehearsed_.push_back(&bindings);
+  auto known = std::ranges::find_if(rehearsed_, same);
+  if (known == rehearsed_.end()) known = rehearsed_.insert(known, {.bindings = &bindings});
+  known->invocations = std::max(known->invocations, invocations);
+  ++known->dispatches;
 }
 
 void Recorder::beginStage(std::string_view stage) {
+  if (!device_->executes()) return;
   assert(open_ && marks_.size() + 1 < kMaxTimestamps);
   mark();
   marks_.push_back(stage);
@@ -145,7 +151,7 @@ bool Recorder::divides(const Bindings& bindings, std::uint64_t threads, std::uin
 void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                              std::uint64_t threads, std::uint64_t work) {
   if (threads == 0) return;
-  if (rehearses_) return note(bindings);
+  if (rehearses_) return note(bindings, threads);
   const Kernel& kernel = bindings.kernel();
   const std::uint64_t groups = (threads + kernel.workgroupSize() - 1) / kernel.workgroupSize();
   const std::uint32_t most = device_->limits().maxDispatchX;
@@ -172,7 +178,7 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
 void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
                                      const Buffer& groups, std::size_t offset, std::uint64_t most) {
   assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
-  if (rehearses_) return note(bindings);
+  if (rehearses_) return note(bindings, most);
   count(most);
   bind(bindings, push, pushBytes);
   handles_->current().dispatchIndirect(*groups.handles().buffer, offset);
@@ -198,6 +204,7 @@ void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pu
 
 void Recorder::barrier() {
   assert(open_);
+  if (!device_->executes()) return;
   const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses};
   handles_->current().pipelineBarrier(kWork, kWork | Stage::eDrawIndirect, {}, memory, nullptr, nullptr);
 }
@@ -205,7 +212,7 @@ void Recorder::barrier() {
 void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset,
                     std::size_t toOffset) {
   assert(open_ && fromOffset + bytes <= from.bytes() && toOffset + bytes <= to.bytes());
-  if (bytes == 0) return;
+  if (bytes == 0 || !device_->executes()) return;
   handles_->current().copyBuffer(
       *from.handles().buffer, *to.handles().buffer,
       vk::BufferCopy{.srcOffset = fromOffset, .dstOffset = toOffset, .size = bytes});
@@ -213,12 +220,13 @@ void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std
 
 void Recorder::fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset) {
   assert(open_ && bytes % 4 == 0 && offset % 4 == 0 && offset + bytes <= buffer.bytes());
-  if (bytes == 0) return;
+  if (bytes == 0 || !device_->executes()) return;
   handles_->current().fillBuffer(*buffer.handles().buffer, offset, bytes, value);
 }
 
 void Recorder::finish() {
   if (!open_) return;
+  assert(device_->executes());
   if (!marks_.empty()) mark();
   endSlice();
   open_ = false;

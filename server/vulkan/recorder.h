@@ -15,13 +15,21 @@
 
 namespace clothstream::vulkan {
 
+// Kernel that a rehearsal noted.
+struct RehearsedKernel {
+  const Bindings* bindings = nullptr;  // of its first dispatch
+  std::uint64_t invocations = 0;       // of its largest dispatch
+  std::uint64_t dispatches = 0;
+};
+
 struct StageTime {
   std::string_view stage;  // the name passed to beginStage; static storage
   double seconds = 0;
 };
 
 // Reusable command buffers with their timestamps. Belongs to one thread at a time. Allocates no memory after
-// its longest recording.
+// its longest recording. On a device that only compiles (Device::executes), every recording is a rehearsal:
+// it notes kernels and has no commands.
 class Recorder {
  public:
   explicit Recorder(const Device& device);
@@ -43,8 +51,9 @@ class Recorder {
 
   // Begins a rehearsal: the following dispatches do not run; their kernels are noted.
   void beginRehearsal();
-  // The first bindings of each pipeline that the last rehearsal noted. Valid until the next rehearsal.
-  std::span<const Bindings* const> rehearsed() const { return rehearsed_; }
+  // One entry for each pipeline that the last rehearsal noted, in the order of their first dispatches. Valid
+  // until the next rehearsal.
+  std::span<const RehearsedKernel> rehearsed() const { return rehearsed_; }
   // Runs a kernel on no data, so that the device does its first-time work now. A software device compiles the
   // kernel then, which takes up to tenths of a second.
   void touch(const Bindings& bindings);
@@ -120,7 +129,7 @@ class Recorder {
   void count(std::uint64_t invocations);
   void beginSlice();
   void endSlice();
-  void note(const Bindings& bindings);
+  void note(const Bindings& bindings, std::uint64_t invocations);
   void bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes);
   void mark();
 
@@ -130,7 +139,7 @@ class Recorder {
   std::vector<std::string_view> marks_;
   std::vector<std::uint64_t> ticks_;
   std::vector<StageTime> times_;
-  std::vector<const Bindings*> rehearsed_;
+  std::vector<RehearsedKernel> rehearsed_;
   std::uint64_t sliceInvocations_ = ~std::uint64_t{0}, invocations_ = 0;  // limit, and of the current slice
   std::uint64_t largestDispatch_ = 0;
   std::uint32_t timedSlices_ = 0;  // slices whose start was marked

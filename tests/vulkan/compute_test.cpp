@@ -322,10 +322,15 @@ TEST_F(ComputeTest, ARehearsalRunsNoKernelAndNotesEachOnce) {
   recorder.fill(b, 7, b.bytes());
   for (const Bindings* one : {&bindings, &same, &others}) recorder.dispatch(*one, kCount, kCount);
   tests::submitAndWait(tests::device(), recorder);
-  EXPECT_THAT(recorder.rehearsed(), ::testing::ElementsAre(&bindings, &others));
-  for (const Bindings* one : recorder.rehearsed()) {
+  using ::testing::AllOf, ::testing::Field;
+  EXPECT_THAT(recorder.rehearsed(), ::testing::ElementsAre(AllOf(Field(&RehearsedKernel::bindings, &bindings),
+                                                                 Field(&RehearsedKernel::invocations, kCount),
+                                                                 Field(&RehearsedKernel::dispatches, 2u)),
+                                                           AllOf(Field(&RehearsedKernel::bindings, &others),
+                                                                 Field(&RehearsedKernel::dispatches, 1u))));
+  for (const RehearsedKernel& one : recorder.rehearsed()) {
     recorder.begin();
-    recorder.touch(*one);
+    recorder.touch(*one.bindings);
     tests::submitAndWait(tests::device(), recorder);
   }
   EXPECT_THAT(contents<std::uint32_t>(b), Each(7u));
