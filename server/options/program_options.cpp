@@ -40,7 +40,7 @@ struct Parsed {
   ProgramOptions options;
   std::vector<std::string> changeable, allowed;
   std::string record, recordings, config, tls = "off", announce = "auto", overload = "adapt",
-                                          tokenValid = "8h";
+                                          tokenValid = "8h", kernels = "auto";
   std::optional<scene::Role> anonymousRole, tokenRole;
   bool ownersAlone = false;
   CLI::Option* stateDirectory = nullptr;
@@ -293,11 +293,16 @@ void checkTls(const ProgramOptions& options) {
     throw OptionError("--tls-client-ca needs TLS: add --tls-certificate and --tls-key, or --tls self");
 }
 
-void addDeviceOptions(OptionTable& table, ProgramOptions& options) {
+void addDeviceOptions(OptionTable& table, Parsed& parsed) {
+  ProgramOptions& options = parsed.options;
   table.text("--device", options.server.device.select, "DEVICE",
              "Index of a Vulkan device, or part of its name. By default the best device is used");
   table.number("--software-threads", options.server.device.softwareThreads, kThreads,
                "Threads of a software device in addition to the waiting one. By default chosen for --scene");
+  table.text(
+      "--kernels", parsed.kernels, "KIND",
+      "Settings of the kernels: gpu, cpu, or auto: cpu for a software device. States have the same bits",
+      checkChoice({"auto", "cpu", "gpu"}));
   table.showDefault(table.text("--cache-dir", options.server.device.cacheDirectory, "DIR",
                                "Directory for compiled kernels; '' disables the cache"),
                     "$XDG_CACHE_HOME/clothstream or $HOME/.cache/clothstream");
@@ -339,7 +344,8 @@ CLI::App& addPrintSceneCommand(OptionTable& table, ProgramOptions& options) {
   return command;
 }
 
-CLI::App& addStepCommand(OptionTable& table, ProgramOptions& options) {
+CLI::App& addStepCommand(OptionTable& table, Parsed& parsed) {
+  ProgramOptions& options = parsed.options;
   CLI::App& command =
       table.command("step", "Run a scene without clock or network, and write its states to a file");
   table.text("--scene", options.server.defaultScene, "NAME", "Name of a scene, or a JSON file")
@@ -353,7 +359,7 @@ CLI::App& addStepCommand(OptionTable& table, ProgramOptions& options) {
   table.number("--rate", options.rate, kRate, "Ticks per second, instead of the scene's own rate");
   table.number("--substeps", options.substeps, kSubsteps,
                "Integration steps per tick, instead of the scene's own number");
-  addDeviceOptions(table, options);
+  addDeviceOptions(table, parsed);
   command.footer(fmt::format(
       "The file holds frames of little-endian float32, six per node: position and velocity. FILE.json has "
       "the\n"
@@ -365,14 +371,15 @@ CLI::App& addStepCommand(OptionTable& table, ProgramOptions& options) {
   return command;
 }
 
-CLI::App& addResimulateCommand(OptionTable& table, ProgramOptions& options) {
+CLI::App& addResimulateCommand(OptionTable& table, Parsed& parsed) {
+  ProgramOptions& options = parsed.options;
   CLI::App& command =
       table.command("resimulate", "Simulate a recording again, and compare each state with the recorded one");
   table.word("FILE", options.recording, "Recording that --record wrote");
   table.text("--states", options.states, "OUT",
              "Write positions and velocities of every tick to this file, in the format of `step`");
   table.flag("--json", options.json, "Print the result as one JSON object");
-  addDeviceOptions(table, options);
+  addDeviceOptions(table, parsed);
   command.footer(
       fmt::format("Exit code: 0 if every state is bitwise equal, 1 for other bits although the kernels are "
                   "not known to be\n"
@@ -545,12 +552,12 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   addNetworkOptions(table, parsed);
   addTlsOptions(table, parsed);
   table.group("Device");
-  addDeviceOptions(table, options);
+  addDeviceOptions(table, parsed);
   table.action("--list-devices", parsed.listDevices, "List the Vulkan devices, and exit");
   addProgramOptions(table, parsed);
   const CLI::App& printScene = addPrintSceneCommand(table, options);
-  const CLI::App& step = addStepCommand(table, options);
-  const CLI::App& resimulate = addResimulateCommand(table, options);
+  const CLI::App& step = addStepCommand(table, parsed);
+  const CLI::App& resimulate = addResimulateCommand(table, parsed);
   const CLI::App& play = addPlayCommand(table, options);
   const CLI::App& token = addTokenCommand(table, parsed);
   // For `resimulate`, 1 means a difference.
@@ -561,6 +568,9 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     options.warnings = table.applySources(environ, configFile(parsed));
     if (!parsed.changeable.empty()) options.server.participantsMay = toPermissions(parsed.changeable);
     options.tlsSelf = parsed.tls == "self";
+    options.server.device.kernels = parsed.kernels == "gpu"   ? vulkan::KernelSettings::gpu
+                                    : parsed.kernels == "cpu" ? vulkan::KernelSettings::cpu
+                                                              : vulkan::KernelSettings::automatic;
     options.keepsScenes = parsed.stateDirectory->count() > 0 && !options.stateDirectory.empty();
     checkTls(options);
     options.announces = parsed.announce == "on" ||

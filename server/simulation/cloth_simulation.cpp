@@ -45,7 +45,7 @@ std::uint32_t workgroupSizeOn(const vulkan::Device& device, const SimulationOpti
 
 // Number of invocations that hash a state. They share the nodes and fill the device.
 std::uint64_t hashInvocations(const vulkan::Device& device, std::uint32_t nodes) {
-  const std::uint64_t nodesPerInvocation = device.isSoftware() ? 64 : 8;
+  const std::uint64_t nodesPerInvocation = device.hasGpuKernels() ? 8 : 64;
   return (nodes + nodesPerInvocation - 1) / nodesPerInvocation;
 }
 

@@ -45,8 +45,8 @@ struct TickInputs {
 TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick);
 
 struct SimulationOptions {
-  // Rows of a grid that one invocation walks down. 0: the measured best for the device (more on software
-  // devices).
+  // Rows of a grid that one invocation walks down. 0: as the device's vulkan::KernelSettings have it (fewer
+  // for GPUs).
   std::uint32_t rowsPerInvocation = 0;
   // Invocations in a workgroup. 0: the measured best for the device.
   std::uint32_t workgroupSize = 0;

@@ -12,11 +12,11 @@ namespace clothstream::simulation {
 using vulkan::BindingKind;
 
 // On software devices every load costs time, so that an invocation handles several rows. On GPUs every idle
-// lane costs time.
+// lane costs time (vulkan::KernelSettings).
 GridStage::Cut GridStage::cutGrids(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                                    const GridOptions& options) {
   Cut cut{options.rowsPerInvocation, options.workgroupSize, {}};
-  if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.isSoftware() ? 4 : 1;
+  if (cut.rowsPerInvocation == 0) cut.rowsPerInvocation = device.hasGpuKernels() ? 1 : 4;
   cut.tiles = makeTiles(cloths, cut.rowsPerInvocation, cut.workgroupSize);
   while (cut.tiles.records.size() > device.limits().maxDispatchX) {
     cut.rowsPerInvocation *= 2;

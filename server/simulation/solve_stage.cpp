@@ -48,12 +48,29 @@ bool isImplicit(const SolveGroup& group) {
   return group.kind == model::SolverKind::implicitEuler;
 }
 
+// Partition of the work. The results do not depend on it.
+struct SolveCut {
+  std::uint32_t workgroup;           // invocations of a chunk
+  std::uint32_t iterationWorkgroup;  // of a chunk in the kernels of an iteration
+  std::uint32_t wholeNodes;          // nodes of the largest cloth that one workgroup solves
+  bool spread;                       // in an iteration, each node of a walk has its own invocation
+};
+
 // A workgroup handles one chunk, or solves a system chunk by chunk with barriers between its passes. On a
 // software device barriers cost nothing if the workgroup is no wider than the CPU's vectors, because it then
 // does not switch between invocations. Loops over lanes rely on a width that divides their number.
-std::uint32_t solveWorkgroup(const vulkan::Device& device, std::uint32_t wanted) {
-  if (wanted == 0) wanted = device.isSoftware() ? 8 : kSolveLanes;
-  return std::bit_floor(std::min({wanted, kSolveLanes, device.limits().maxWorkgroupInvocations}));
+SolveCut cutSolves(const vulkan::Device& device, std::uint32_t wanted,
+                   std::optional<std::uint32_t> wholeNodes) {
+  const bool gpu = device.hasGpuKernels();
+  const auto workgroup = [&](std::uint32_t invocations, std::uint32_t most) {
+    if (wanted != 0) invocations = wanted;
+    return std::bit_floor(std::min({invocations, most, device.limits().maxWorkgroupInvocations}));
+  };
+  const std::uint32_t places = gpu ? kSolveLanes * CLOTHSTREAM_SOLVE_WALK : kSolveLanes;
+  return {.workgroup = workgroup(gpu ? kSolveLanes : 8, kSolveLanes),
+          .iterationWorkgroup = workgroup(gpu ? places : 8, places),
+          .wholeNodes = wholeNodes.value_or(gpu ? 1024 : 4096),
+          .spread = gpu};
 }
 
 constexpr std::uint32_t kChunkNodes = kSolveLanes * CLOTHSTREAM_SOLVE_WALK;
@@ -63,13 +80,16 @@ constexpr std::uint32_t kPrepareWork = 12;
 // lavapipe allows an invocation 65,535 loop rounds, over all loops together. Beyond that it ends each loop
 // after one round.
 std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
-                                    std::uint32_t listed, std::uint32_t workgroup) {
+                                    std::uint32_t listed, const SolveCut& cut) {
   const std::uint32_t nodes = std::max(1u, group.smallChunks * kChunkNodes);
   const std::uint32_t most = std::max(1u, nodesPerDispatch(device) / nodes);
   if (!device.isSoftware()) return most;
-  const std::uint32_t tree = 2 * kSolveLanes / workgroup + 16;
-  const std::uint32_t walks = kSolveLanes / workgroup;
-  const std::uint32_t walk = group.mesh ? CLOTHSTREAM_SOLVE_WALK * (listed + 2) + 2 : 1;
+  const std::uint32_t workgroup = cut.iterationWorkgroup;
+  const std::uint32_t rows = cut.spread ? 1 : CLOTHSTREAM_SOLVE_WALK;
+  const std::uint32_t places = kSolveLanes * CLOTHSTREAM_SOLVE_WALK / rows;
+  const std::uint32_t tree = 3 * kSolveLanes / workgroup + 17;
+  const std::uint32_t walks = places / workgroup;
+  const std::uint32_t walk = group.mesh ? rows * (listed + 2) + 2 : 1;
   const std::uint32_t chunk = walks * (walk + 2) + tree;
   const std::uint32_t iteration = group.smallChunks * (chunk + 2) + tree + group.smallChunks;
   return std::max(1u, std::min((65'535 - 2 * iteration) / iteration, most));
@@ -84,11 +104,11 @@ struct GroupKernels {
 };
 
 struct SolveStage::Kernels {
-  Kernels(const vulkan::Device& on, std::uint32_t size) : device(on), workgroup(size) {}
+  Kernels(const vulkan::Device& on, const SolveCut& partition) : device(on), cut(partition) {}
 
   std::unique_ptr<Kernel> make(const char* name, std::span<const std::uint32_t> spirv,
                                std::vector<BindingKind> bindings, std::size_t push, const SolveGroup& group,
-                               bool measure = false) const {
+                               bool iterates = false, bool measure = false) const {
     return std::make_unique<Kernel>(
         device,
         vulkan::KernelDescription{
@@ -96,9 +116,9 @@ struct SolveStage::Kernels {
             .spirv = spirv,
             .bindings = std::move(bindings),
             .pushConstantBytes = static_cast<std::uint32_t>(push),
-            .workgroupSize = workgroup,
+            .workgroupSize = iterates ? cut.iterationWorkgroup : cut.workgroup,
             .specialisation = {isImplicit(group) ? 1u : 0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u,
-                               isAdaptive(group) ? 1u : 0u, measure ? 1u : 0u}});
+                               isAdaptive(group) ? 1u : 0u, measure ? 1u : 0u, cut.spread ? 1u : 0u}});
   }
 
   const GroupKernels& of(const SolveGroup& group) {
@@ -130,15 +150,15 @@ struct SolveStage::Kernels {
                         sizeof(shared::PreparePush), group);
     }
     if (!on.whole && group.smallSystems > 0)
-      on.whole =
-          make("solve_velocities", kernels::solve_velocities, vectors, sizeof(shared::SolvePush), group);
+      on.whole = make("solve_velocities", kernels::solve_velocities, vectors, sizeof(shared::SolvePush),
+                      group, true);
     if (!on.multiply && group.hasLarge()) {
-      on.multiply =
-          make("multiply_residuals", kernels::multiply_residuals, multiply, sizeof(shared::SolvePush), group);
+      on.multiply = make("multiply_residuals", kernels::multiply_residuals, multiply,
+                         sizeof(shared::SolvePush), group, true);
       on.measure = make("multiply_residuals", kernels::multiply_residuals, multiply,
-                        sizeof(shared::SolvePush), group, true);
-      on.update =
-          make("update_corrections", kernels::update_corrections, vectors, sizeof(shared::SolvePush), group);
+                        sizeof(shared::SolvePush), group, true, true);
+      on.update = make("update_corrections", kernels::update_corrections, vectors, sizeof(shared::SolvePush),
+                       group, true);
     }
     return on;
   }
@@ -154,7 +174,7 @@ struct SolveStage::Kernels {
   }
 
   const vulkan::Device& device;
-  std::uint32_t workgroup;
+  SolveCut cut;
   std::array<GroupKernels, 12> groups;
   std::array<std::unique_ptr<Kernel>, 2> applies;
 };
@@ -172,7 +192,7 @@ struct SolveStage::Systems {
   Systems(const vulkan::Device& device, const SolveTables& tables, const StateBuffers& state,
           Kernels& kernels)
       : nodes(tables.nodes),
-        workgroup(kernels.workgroup),
+        cut(kernels.cut),
         systems(device, tables.systems),
         chunks(device, tables.chunks),
         springs(device, tables.springs),
@@ -198,7 +218,7 @@ struct SolveStage::Systems {
     for (const SolveGroup& on : tables.groups) {
       groups.push_back(
           {.on = on,
-           .iterationsPerDispatch = simulation::iterationsPerDispatch(device, on, tables.listed, workgroup),
+           .iterationsPerDispatch = simulation::iterationsPerDispatch(device, on, tables.listed, cut),
            .firstSize = size});
       size += sizesOf(on);
       for (const std::size_t from : {0, 1}) bind(device, kernels, state, from, groups.back());
@@ -265,7 +285,8 @@ struct SolveStage::Systems {
   void recordSmall(vulkan::Recorder& recorder, const Group& group, std::uint32_t from) const;
   void recordLarge(vulkan::Recorder& recorder, const Group& group, std::uint32_t from) const;
 
-  std::uint32_t nodes, workgroup;
+  std::uint32_t nodes;
+  SolveCut cut;
   std::vector<std::uint32_t> cloths;
   DeviceTable systems, chunks, springs, incidences, lists;
   Buffer emptyGroups, groupSizes;
@@ -278,9 +299,7 @@ SolveStage::SolveStage(const vulkan::Device& device, std::span<const model::Clot
                        std::optional<std::uint32_t> wholeNodes)
     : device_(device),
       state_(state),
-      workgroupSize_(solveWorkgroup(device, workgroupSize)),
-      wholeNodes_(wholeNodes.value_or(device.isSoftware() ? 4096 : 1024)),
-      kernels_(std::make_unique<Kernels>(device, workgroupSize_)) {
+      kernels_(std::make_unique<Kernels>(device, cutSolves(device, workgroupSize, wholeNodes))) {
   makeTables(cloths);
   takeTables();
 }
@@ -289,7 +308,7 @@ SolveStage::~SolveStage() = default;
 
 void SolveStage::makeTables(std::span<const model::Cloth> cloths) {
   nextSystems_.reset();
-  const SolveTables tables = solveTables(cloths, wholeNodes_);
+  const SolveTables tables = solveTables(cloths, kernels_->cut.wholeNodes);
   if (!tables.systems.empty()) nextSystems_ = std::make_unique<Systems>(device_, tables, state_, *kernels_);
 }
 
@@ -320,7 +339,7 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
                                  .substepRate = static_cast<float>(1 / h),
                                  .firstSpring = on.firstSpring,
                                  .endSpring = on.endSpring};
-  const std::uint64_t all = std::uint64_t{push.chunks} * workgroup;
+  const std::uint64_t all = std::uint64_t{push.chunks} * cut.workgroup;
   recorder.barrier();
   if (on.mesh) {
     recorder.dispatch(group.springs[from], push, on.endSpring - on.firstSpring);
@@ -328,7 +347,7 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
   }
   if (group.check.empty()) {
     recorder.dispatch(group.prepare[from], push, all,
-                      workPerInvocation(kChunkNodes * kPrepareWork, workgroup));
+                      workPerInvocation(kChunkNodes * kPrepareWork, cut.workgroup));
     return;
   }
   recorder.dispatch(group.check[from], push, all);
@@ -348,9 +367,9 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
                                  .endIteration = end,
                                  .firstChunk = 0,
                                  .nextGroup = 0};
-    const std::uint64_t threads = std::uint64_t{group.on.smallSystems} * workgroup;
-    const std::uint64_t work =
-        workPerInvocation(std::uint64_t{group.on.smallChunks} * kChunkNodes * (end - first), workgroup);
+    const std::uint64_t threads = std::uint64_t{group.on.smallSystems} * cut.iterationWorkgroup;
+    const std::uint64_t work = workPerInvocation(
+        std::uint64_t{group.on.smallChunks} * kChunkNodes * (end - first), cut.iterationWorkgroup);
     recorder.barrier();
     // ACAD may have nothing to solve. Indirect dispatches cannot be divided.
     if (isAdaptive(group.on) && !recorder.divides(group.whole[from], threads, work))
@@ -369,7 +388,7 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
   const auto number = [&](std::uint32_t iteration) {
     return group.firstSize + kIteration + kSize * iteration;
   };
-  const std::uint64_t most = std::uint64_t{on.endChunk - on.firstLargeChunk} * workgroup;
+  const std::uint64_t most = std::uint64_t{on.endChunk - on.firstLargeChunk} * cut.iterationWorkgroup;
   shared::SolvePush push{.nodes = nodes,
                          .firstSystem = 0,
                          .firstIteration = 0,
@@ -406,13 +425,14 @@ void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
                                  .reserved = 0};
     recorder.barrier();
     // Nodes that ACAD leaves alone stay in place, unless they may collide.
-    const std::uint64_t threads = std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.workgroup;
+    const std::uint64_t threads = std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.cut.workgroup;
     if (isAdaptive(group.on) && collision.colliderCount == 0)
       recorder.dispatchIndirect(group.apply[from], push, all.groupSizes,
                                 group.firstSize * sizeof(std::uint32_t), threads);
     else
-      recorder.dispatch(group.apply[from], push, threads,
-                        workPerInvocation(std::uint64_t{kChunkNodes} * collision.nodeWork, all.workgroup));
+      recorder.dispatch(
+          group.apply[from], push, threads,
+          workPerInvocation(std::uint64_t{kChunkNodes} * collision.nodeWork, all.cut.workgroup));
   }
 }
 

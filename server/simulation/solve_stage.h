@@ -57,7 +57,6 @@ class SolveStage {
 
   const vulkan::Device& device_;
   StateBuffers state_;
-  std::uint32_t workgroupSize_, wholeNodes_;
   std::unique_ptr<Kernels> kernels_;  // created at their first use
   std::unique_ptr<Systems> systems_;  // null if there is no system
   std::unique_ptr<Systems> nextSystems_;

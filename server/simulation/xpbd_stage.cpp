@@ -24,18 +24,17 @@ constexpr std::uint32_t kAllPasses = 7;
 // On a software device barriers cost nothing if the workgroup is no wider than the CPU's vectors, and an
 // invocation makes at most 65,535 loop rounds. A cloth in one workgroup saves dispatches (two for a grid, one
 // less than the number of colours for a mesh) but leaves all other CPUs idle. With two CPUs the break-even is
-// at about these sizes.
+// at about these sizes. On a GPU, the kernel of a whole grid needs more registers than RADV has for it.
 XpbdCut cutXpbd(const vulkan::Device& device, std::uint32_t workgroupSize,
                 std::optional<std::uint32_t> wholeNodes) {
-  const bool software = device.isSoftware();
   const std::uint32_t most = device.limits().maxWorkgroupInvocations;
-  XpbdCut cut{.wholeWorkgroup = workgroupSize != 0 ? workgroupSize
-                                : software         ? 8
-                                                   : 256,
+  XpbdCut cut{.wholeWorkgroup = workgroupSize != 0       ? workgroupSize
+                                : device.hasGpuKernels() ? 256
+                                                         : 8,
               .partWorkgroup = workgroupSize != 0 ? workgroupSize : 64,
-              .wholeGridNodes = wholeNodes.value_or(2'048),
+              .wholeGridNodes = wholeNodes.value_or(device.hasGpuKernels() ? 0 : 2'048),
               .wholeMeshNodes = wholeNodes.value_or(8'192),
-              .rounds = software ? 65'000 : ~0u};
+              .rounds = device.isSoftware() ? 65'000 : ~0u};
   cut.wholeWorkgroup = std::min(cut.wholeWorkgroup, most);
   cut.partWorkgroup = std::min(cut.partWorkgroup, most);
   return cut;
@@ -97,7 +96,8 @@ const Stage& XpbdStage::grids(const XpbdVariant& variant, std::uint32_t passes) 
           .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage},
           .pushConstantBytes = sizeof(shared::XpbdPush),
           .workgroupSize = passes == kAllPasses ? cut_.wholeWorkgroup : cut_.partWorkgroup,
-          .specialisation = {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, passes, bend ? 1u : 0u}},
+          .specialisation = {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, passes, bend ? 1u : 0u,
+                             device_.hasGpuKernels() ? 1u : 0u}},
       Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, other, &multipliers_},
       Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, one, &multipliers_});
   return *stage;

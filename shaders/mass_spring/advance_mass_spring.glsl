@@ -14,6 +14,18 @@
 #include "shaders/mass_spring/state.glsl"
 #include "shaders/shared/grid_strip.glsl"
 
+// Without a window, nodes are read just before the force that needs them, so that a GPU needs fewer
+// registers.
+const bool kWindow = kRowsPerInvocation > 1;
+
+// A node in the window, or at `index` if there is no window.
+Node nodeOf(Node window, uint index) {
+  if (kWindow) {
+    return window;
+  }
+  return fetchNode(index);
+}
+
 void main() {
   Strip strip = locateStrip(push.firstTile);
   if (strip.row >= strip.rows) {
@@ -54,12 +66,15 @@ void main() {
   uint index = start + row * columns;
   uint aboveIndex = start + (row > 0 ? row - 1 : 0) * columns;
   uint belowIndex = start + min(row + 1, lastRow) * columns;
-  Node leftAbove = fetchNode(aboveIndex - toLeft);
-  Node left = fetchNode(index - toLeft);
+  Node leftAbove, left, below, rightAbove, right;
+  if (kWindow) {
+    leftAbove = fetchNode(aboveIndex - toLeft);
+    left = fetchNode(index - toLeft);
+    below = fetchNode(belowIndex);
+    rightAbove = fetchNode(aboveIndex + toRight);
+    right = fetchNode(index + toRight);
+  }
   Node above = fetchNode(aboveIndex);
-  Node below = fetchNode(belowIndex);
-  Node rightAbove = fetchNode(aboveIndex + toRight);
-  Node right = fetchNode(index + toRight);
   Node here = fetchNode(index);
   here.velocity = fetchVelocity(index);
 
@@ -68,9 +83,11 @@ void main() {
   vec3 aboveForce = springForce(here, above, where(row > 0, alongColumn));
   vec3 above2Force =
       springForce(here, fetchNode(start + (row > 1 ? row - 2 : 0) * columns), where(row > 1, bendColumn));
-  vec3 nextAbove2Force = springForce(below, above, where(row > 0, bendColumn));
-  vec3 leftAboveAir, rightAboveAir1, rightAboveAir2;
-  if (kAir) {
+  vec3 nextAbove2Force, leftAboveAir, rightAboveAir1, rightAboveAir2;
+  if (kWindow) {
+    nextAbove2Force = springForce(below, above, where(row > 0, bendColumn));
+  }
+  if (kAir && kWindow) {
     leftAboveAir = airForce(above, left, here, air);
     rightAboveAir1 = airForce(above, here, rightAbove, air);
     rightAboveAir2 = airForce(rightAbove, here, right, air);
@@ -86,18 +103,22 @@ void main() {
     index = start + min(row, lastRow) * columns;
     belowIndex = start + min(row + 1, lastRow) * columns;
     Node below2 = fetchNode(start + min(row + 2, lastRow) * columns);
-    Node leftBelow = fetchNode(belowIndex - toLeft);
-    Node rightBelow = fetchNode(belowIndex + toRight);
-
-    vec3 belowForce = springForce(here, below, where(hasBelow, alongColumn));
     vec3 below2Force = springForce(here, below2, where(hasBelow2, bendColumn));
+    below = nodeOf(below, belowIndex);
+    vec3 belowForce = springForce(here, below, where(hasBelow, alongColumn));
+    left = nodeOf(left, index - toLeft);
     precise vec3 force = springForce(here, left, leftSpring);
+    right = nodeOf(right, index + toRight);
     force = force + springForce(here, right, rightSpring);
     force = force + aboveForce;
     force = force + belowForce;
+    leftAbove = nodeOf(leftAbove, aboveIndex - toLeft);
     force = force + springForce(here, leftAbove, where(row > 0, leftShear));
+    rightAbove = nodeOf(rightAbove, aboveIndex + toRight);
     force = force + springForce(here, rightAbove, where(row > 0, rightShear));
+    Node leftBelow = fetchNode(belowIndex - toLeft);
     force = force + springForce(here, leftBelow, where(hasBelow, leftShear));
+    Node rightBelow = fetchNode(belowIndex + toRight);
     force = force + springForce(here, rightBelow, where(hasBelow, rightShear));
     force = force + springForce(here, fetchNode(index - toLeft2), left2Spring);
     force = force + springForce(here, fetchNode(index + toRight2), right2Spring);
@@ -105,6 +126,11 @@ void main() {
     force = force + below2Force;
 
     if (kAir) {
+      if (!kWindow) {
+        leftAboveAir = airForce(above, left, here, air);
+        rightAboveAir1 = airForce(above, here, rightAbove, air);
+        rightAboveAir2 = airForce(rightAbove, here, right, air);
+      }
       // A quad with corners a b above e f has the triangles (a, e, b) and (b, e, f).
       vec3 leftAir1 = airForce(left, leftBelow, here, air);
       vec3 leftAir2 = airForce(here, leftBelow, below, air);

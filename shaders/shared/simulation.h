@@ -187,6 +187,7 @@ struct XpbdPush {
   uint32_t firstSpring;
   uint32_t springs;
   uint32_t firstMultiplier;  // of all meshes
+  uint32_t zero;             // 0, which compilers do not know (correct_grids.comp)
 };
 
 struct FinishPush {
@@ -222,7 +223,7 @@ static_assert(sizeof(XpbdGridTile) == 16 && sizeof(XpbdMeshTile) == 16 && sizeof
 static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, wind) == 16 &&
               offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);
 static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 44 && sizeof(SolvePush) == 24 &&
-              sizeof(ApplyPush) == 48 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 28 &&
+              sizeof(ApplyPush) == 48 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&
               sizeof(FinishPush) == 48 && sizeof(HashPush) == 4);
 static_assert(sizeof(StatusRecord) == 16 && offsetof(StatusRecord, unhealthy) == 8);
 }  // namespace clothstream::shared

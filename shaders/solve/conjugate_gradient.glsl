@@ -8,6 +8,12 @@
 #include "shaders/shared/conjugate_gradient_step.glsl"
 #include "shaders/solve/linear_system.glsl"
 
+// True: every node of a walk has its own invocation, so that a GPU has four times as many, each with few
+// registers. False: an invocation walks down, and neighbours stay in registers. The bits are the same.
+layout(constant_id = 6) const bool kSpread = false;
+const uint kRows = kSpread ? 1 : kWalk;  // nodes of a walk that an invocation handles
+const uint kParts = kWalk / kRows;       // invocations that share a walk
+
 layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
 layout(binding = 4) uniform samplerBuffer incidences;  // ListRecord by node of a mesh
 layout(binding = 5) uniform samplerBuffer lists;       // SpringEndsRecord
@@ -95,6 +101,15 @@ SpringWeights acrossAt(bool exists, uint node) {
   return kNoWeights;
 }
 
+// A point in the window, or of `node` if there is no window. Then it is read just before the term that needs
+// it, so that a GPU needs fewer registers.
+Point pointOf(Point window, uint node) {
+  if (kSpread) {
+    return pointAt(node);
+  }
+  return window;
+}
+
 // Walks down a column with a window of registers, as in shaders/mass_spring. Springs beyond an edge have no
 // weight, and loads beyond an edge read the edge instead.
 vec2 multiplyGrid(System system, Walk walk) {
@@ -114,13 +129,16 @@ vec2 multiplyGrid(System system, Walk walk) {
   uint aboveIndex = start + (hasAbove ? row - 1 : 0) * columns;
   uint above2Index = start + (row > 1 ? row - 2 : 0) * columns;
   uint belowIndex = start + min(row + 1, lastRow) * columns;
-  Point leftAbove = pointAt(aboveIndex - toLeft);
+  Point leftAbove, rightAbove, left, right, below;
+  if (!kSpread) {
+    leftAbove = pointAt(aboveIndex - toLeft);
+    rightAbove = pointAt(aboveIndex + toRight);
+    left = pointAt(index - toLeft);
+    right = pointAt(index + toRight);
+    below = pointAt(belowIndex);
+  }
   Point above = pointAt(aboveIndex);
-  Point rightAbove = pointAt(aboveIndex + toRight);
-  Point left = pointAt(index - toLeft);
   Point here = pointAt(index);
-  Point right = pointAt(index + toRight);
-  Point below = pointAt(belowIndex);
   SpringWeights aboveAlong = alongAt(hasAbove, aboveIndex);
   SpringWeights aboveAcross = acrossAt(hasAbove, aboveIndex);
   SpringWeights leftAboveAlong = alongAt(hasAbove && hasLeft, aboveIndex - toLeft);
@@ -131,30 +149,37 @@ vec2 multiplyGrid(System system, Walk walk) {
   vec3 above2Force, nextAbove2Force;
   if (kBend) {
     above2Force = pull(here, pointAt(above2Index), above2Along.secondBelow, above2Across.secondBelow);
-    nextAbove2Force = pull(below, above, aboveAlong.secondBelow, aboveAcross.secondBelow);
+    if (!kSpread) {
+      nextAbove2Force = pull(below, above, aboveAlong.secondBelow, aboveAcross.secondBelow);
+    }
   }
 
   precise vec2 sums = vec2(0.0);
-  [[unroll]] for (uint k = 0; k < kWalk; ++k) {
+  [[unroll]] for (uint k = 0; k < kRows; ++k) {
     index = start + min(row, lastRow) * columns;
     belowIndex = start + min(row + 1, lastRow) * columns;
     Point below2 = pointAt(start + min(row + 2, lastRow) * columns);
-    Point leftBelow = pointAt(belowIndex - toLeft);
-    Point rightBelow = pointAt(belowIndex + toRight);
     SpringWeights own = alongAt(true, index);
     SpringWeights ownAcross = acrossAt(true, index);
     SpringWeights ofLeft = alongAt(hasLeft, index - toLeft);
     SpringWeights ofLeftAcross = acrossAt(hasLeft, index - toLeft);
 
+    below = pointOf(below, belowIndex);
     vec3 belowForce = pull(here, below, own.below, ownAcross.below);
     precise vec3 sum = own.mass * here.own.residual;
+    left = pointOf(left, index - toLeft);
     sum = sum + pull(here, left, ofLeft.right, ofLeftAcross.right);
+    right = pointOf(right, index + toRight);
     sum = sum + pull(here, right, own.right, ownAcross.right);
     sum = sum + aboveForce;
     sum = sum + belowForce;
+    leftAbove = pointOf(leftAbove, aboveIndex - toLeft);
     sum = sum + pull(here, leftAbove, leftAboveAlong.rightBelow, leftAboveAcross.rightBelow);
+    rightAbove = pointOf(rightAbove, aboveIndex + toRight);
     sum = sum + pull(here, rightAbove, aboveAlong.rightToBelow, aboveAcross.rightToBelow);
+    Point leftBelow = pointAt(belowIndex - toLeft);
     sum = sum + pull(here, leftBelow, ofLeft.rightToBelow, ofLeftAcross.rightToBelow);
+    Point rightBelow = pointAt(belowIndex + toRight);
     sum = sum + pull(here, rightBelow, own.rightBelow, ownAcross.rightBelow);
     if (kBend) {
       float left2Along = alongAt(hasLeft2, index - toLeft2).secondRight;
@@ -191,7 +216,7 @@ vec2 multiplyGrid(System system, Walk walk) {
 vec2 multiplyMesh(System system, Walk walk) {
   float compliance = clothAt(cloths, system.cloth).scaledCompliance;
   precise vec2 sums = vec2(0.0);
-  for (uint k = 0; k < kWalk; ++k) {
+  for (uint k = 0; k < kRows; ++k) {
     uint node = walk.first + min(k, max(walk.count, 1) - 1);
     Point here = pointAt(node);
     float inverseMass = texelFetch(positions, int(node)).w;
@@ -225,7 +250,52 @@ uint lanesOf(System system, uint chunk) {
   return (actives[system.firstChunk + chunk] & kActive) == 0 ? 0 : kLanes;
 }
 
+// Sums of the parts of all walks of a chunk.
+shared vec2 parts[kSpread ? kLanes * kWalk : 1];
+
+// Places of a chunk: its lanes, part by part.
+uint placesOf(System system, uint chunk) {
+  return kParts * lanesOf(system, chunk);
+}
+
+// The nodes of a place.
+Walk partAt(System system, uint chunk, uint place) {
+  Walk walk = walkAt(system, chunk * kLanes + place % kLanes);
+  if (!kSpread) {
+    return walk;
+  }
+  uint part = place / kLanes;
+  uint step_ = min(part, max(walk.count, 1) - 1);
+  walk.row += kMesh ? 0 : step_;
+  walk.first += step_ * walk.step;
+  walk.count = part < walk.count ? 1 : 0;
+  return walk;
+}
+
+void keepPart(uint place, vec2 sums) {
+  if (kSpread) {
+    parts[place] = sums;
+  } else {
+    lanes[place] = sums;
+  }
+}
+
+// Adds the parts of each walk in their order. A part without nodes adds zero.
+void addParts() {
+  barrier();
+  for (uint lane = self(); lane < kLanes; lane += width()) {
+    precise vec2 sums = vec2(0.0);
+    [[unroll]] for (uint part = 0; part < kParts; ++part) {
+      sums = sums + parts[part * kLanes + lane];
+    }
+    lanes[lane] = sums;
+  }
+}
+
 void keepSums(System system, uint chunk) {
+  if (kSpread) {
+    addParts();
+  }
   vec2 sums = sumOfLanes();
   if (self() == 0) {
     chunkSums[system.firstChunk + chunk] = sums;
@@ -234,37 +304,37 @@ void keepSums(System system, uint chunk) {
 
 // Computes a chunk's part of A z and of the sums.
 void multiplyChunk(System system, uint chunk) {
-  uint end = lanesOf(system, chunk);
-  uint lane = self();
+  uint end = placesOf(system, chunk);
+  uint place = self();
   do {
-    Walk walk = walkAt(system, chunk * kLanes + lane);
+    Walk walk = partAt(system, chunk, place);
     vec2 sums = vec2(0.0);
-    if (walk.count > 0 && lane < end) {
+    if (walk.count > 0 && place < end) {
       sums = kMesh ? multiplyMesh(system, walk) : multiplyGrid(system, walk);
     }
-    lanes[lane] = sums;
-    lane += width();
-  } while (lane < end);
+    keepPart(place, sums);
+    place += width();
+  } while (place < end);
   keepSums(system, chunk);
 }
 
 // Measures only the residual's norm.
 void measureChunk(System system, uint chunk) {
-  uint end = lanesOf(system, chunk);
-  uint lane = self();
+  uint end = placesOf(system, chunk);
+  uint place = self();
   do {
-    Walk walk = walkAt(system, chunk * kLanes + lane);
+    Walk walk = partAt(system, chunk, place);
     precise vec2 sums = vec2(0.0);
-    [[unroll]] for (uint k = 0; k < kWalk; ++k) {
-      if (k < walk.count && lane < end) {
+    [[unroll]] for (uint k = 0; k < kRows; ++k) {
+      if (k < walk.count && place < end) {
         ResidualRecord own = residualAt(walk.first + k * walk.step);
         precise vec3 z = own.preconditioner * own.residual;
         sums.x = sums.x + dotProduct(own.residual, z);
       }
     }
-    lanes[lane] = sums;
-    lane += width();
-  } while (lane < end);
+    keepPart(place, sums);
+    place += width();
+  } while (place < end);
   keepSums(system, chunk);
 }
 
@@ -295,12 +365,12 @@ void takeSums(System system, bool normOnly) {
 
 // Takes the step at the nodes of a chunk.
 void updateChunk(System system, uint chunk, SolveRecord solve) {
-  uint end = solve.running == 0 ? 0 : lanesOf(system, chunk);
+  uint end = solve.running == 0 ? 0 : placesOf(system, chunk);
   bool first = solve.iterations == 1;
-  uint lane = self();
+  uint place = self();
   do {
-    Walk walk = walkAt(system, chunk * kLanes + lane);
-    [[unroll]] for (uint k = 0; k < kWalk; ++k) {
+    Walk walk = partAt(system, chunk, place);
+    [[unroll]] for (uint k = 0; k < kRows; ++k) {
       uint node = walk.first + min(k, max(walk.count, 1) - 1) * walk.step;
       ResidualRecord before = residualAt(node);
       vec3 oldDirection = first ? vec3(0.0) : fetch(kDirections, node).xyz;
@@ -309,15 +379,15 @@ void updateChunk(System system, uint chunk, SolveRecord solve) {
       precise vec3 image = fetch(kProducts, node).xyz + solve.directionShare * oldImage;
       precise vec3 residual = before.residual - solve.stepLength * image;
       precise vec3 correction = fetch(kCorrections, node).xyz + solve.stepLength * direction;
-      if (k < walk.count && lane < end) {
+      if (k < walk.count && place < end) {
         vectors[vectorAt(kDirections, node)].xyz = direction;
         vectors[vectorAt(kImages, node)].xyz = image;
         vectors[vectorAt(kResiduals, node)].xyz = residual;
         vectors[vectorAt(kCorrections, node)].xyz = correction;
       }
     }
-    lane += width();
-  } while (lane < end);
+    place += width();
+  } while (place < end);
 }
 
 #endif

@@ -16,6 +16,9 @@ layout(local_size_x_id = 0) in;
 // Bits: corners, seams, insides. All three bits: a workgroup handles a whole cloth.
 layout(constant_id = 3) const uint kPasses = 7;
 layout(constant_id = 4) const bool kBend = true;
+// True: places at the substep's start are read for each spring instead of kept in registers, which suits
+// GPUs. The bits are the same.
+layout(constant_id = 5) const bool kFewRegisters = false;
 
 layout(binding = 0) uniform samplerBuffer cloths;          // ClothRecord
 layout(binding = 1) uniform samplerBuffer tiles;           // XpbdGridTile
@@ -62,7 +65,11 @@ Grid grid;
 // The nodes of the block, row by row, and their places at the substep's start.
 vec4 nodes[kSize * kSize];
 vec3 begun[kSize * kSize];
-int indices[kSize * kSize];
+bool keepsBegun;  // false: `begun` is not used
+// Node of a place in the block: rowStarts[row] + columns[column]. Beyond the grid's edge it is the node on
+// the edge. Corners reach one row and one column farther than a block.
+int rowStarts[kSize + 1];
+int columns[kSize + 1];
 // The block's first multiplier, and the distance from a colour's multiplier to that of the next colour.
 uint multiplierAt;
 uint multiplierStride;
@@ -89,29 +96,48 @@ Grid gridOf(XpbdGridTile tile, ClothRecord cloth) {
               ruleOf(bend, bendColumn, inverseMass));
 }
 
-void load(uint at, int row, int column) {
+// `row` and `column` are of the block's first node, which may lie outside the grid.
+void locate(int row, int column) {
+  [[unroll]] for (int k = 0; k <= int(kSize); ++k) {
+    rowStarts[k] = grid.firstNode + clamp(row + k, 0, grid.rows - 1) * grid.columns;
+    columns[k] = clamp(column + k, 0, grid.columns - 1);
+  }
+}
+
+// Loads the node at a place in the block into nodes[at].
+void load(uint at, uint placeRow, uint placeColumn, int row, int column) {
+  row += int(placeRow);
+  column += int(placeColumn);
   bool inside = row >= 0 && row < grid.rows && column >= 0 && column < grid.columns;
-  int index =
-      grid.firstNode + clamp(row, 0, grid.rows - 1) * grid.columns + clamp(column, 0, grid.columns - 1);
+  int index = rowStarts[placeRow] + columns[placeColumn];
   vec4 node = kWhole ? positions[index] : texelFetch(currentPositions, index);
   nodes[at] = vec4(node.xyz, inside ? node.w : kAbsent);
-  indices[at] = index;
-  if (kDamped) {
+  if (kDamped && keepsBegun) {
     begun[at] = texelFetch(startPositions, index).xyz;
   }
 }
 
-void store(uint at) {
+void store(uint at, uint placeRow, uint placeColumn) {
   if (nodes[at].w > 0.0) {
-    positions[indices[at]].xyz = snapTiny(nodes[at].xyz);
+    positions[rowStarts[placeRow] + columns[placeColumn]].xyz = snapTiny(nodes[at].xyz);
   }
+}
+
+// Place of a block's node at the substep's start. `push.zero` hides from the compiler that two springs read
+// the same texel, because it would keep the texel in registers between them.
+vec3 begunAt(uint at, uint colour) {
+  if (keepsBegun) {
+    return begun[at];
+  }
+  int index = rowStarts[at / kSize] + columns[at % kSize] + int(push.zero * (colour + 1));
+  return texelFetch(startPositions, index).xyz;
 }
 
 void correct(uint a, uint b, Rule rule, uint colour) {
   precise vec3 d = nodes[b].xyz - nodes[a].xyz;
   precise vec3 before = vec3(0.0);
   if (kDamped) {
-    before = begun[b] - begun[a];
+    before = begunAt(b, colour) - begunAt(a, colour);
   }
   precise float inverseMasses = nodes[a].w + nodes[b].w;
   precise float nearlyBoth = 1.5 * grid.inverseMass;
@@ -145,6 +171,7 @@ void placeBlock(uint block, uint perRow, float inversePerRow, uint count, uint f
   uint blockRow = uint(quotient);
   row = int(kSize * blockRow) - shift;
   column = int(kSize * (block - blockRow * perRow)) - shift;
+  locate(row, column);
   exists = block < count;
   multiplierAt = firstMultiplier + (exists ? block : 0);
   multiplierStride = count;
@@ -153,15 +180,16 @@ void placeBlock(uint block, uint perRow, float inversePerRow, uint count, uint f
 void correctCorners(uint block, uint perRow, float inversePerRow, uint count, uint firstMultiplier) {
   int row, column;
   placeBlock(block, perRow, inversePerRow, count, firstMultiplier, 0, row, column);
+  keepsBegun = true;
   [[unroll]] for (uint k = 0; k < 4; ++k) {
-    int r = int(k / 2), c = int(k % 2);
-    load(k, row + 1 + r, column + 3 + c);
-    load(4 + k, row + 3 + r, column + 1 + c);
+    load(k, 1 + k / 2, 3 + k % 2, row, column);
+    load(4 + k, 3 + k / 2, 1 + k % 2, row, column);
   }
   correctShear(0, 1, 2, 3, 0);
   correctShear(4, 5, 6, 7, 2);
-  [[unroll]] for (uint k = 0; k < 8; ++k) {
-    store(k);
+  [[unroll]] for (uint k = 0; k < 4; ++k) {
+    store(k, 1 + k / 2, 3 + k % 2);
+    store(4 + k, 3 + k / 2, 1 + k % 2);
   }
 }
 
@@ -175,8 +203,9 @@ void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint
                   bool seams) {
   int row, column;
   placeBlock(block, perRow, inversePerRow, count, firstMultiplier, seams ? 2 : 0, row, column);
+  keepsBegun = !kFewRegisters;
   [[unroll]] for (uint k = 0; k < kSize * kSize; ++k) {
-    load(k, row + int(k / kSize), column + int(k % kSize));
+    load(k, k / kSize, k % kSize, row, column);
   }
   uint colour = 0;
   if (kBend) {
@@ -215,7 +244,7 @@ void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint
     }
   }
   [[unroll]] for (uint k = 0; k < kSize * kSize; ++k) {
-    store(k);
+    store(k, k / kSize, k % kSize);
   }
 }
 

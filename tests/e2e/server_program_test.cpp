@@ -292,7 +292,7 @@ TEST_F(ServerProgram, ExplainsOptionsAndRefusesUnknownOnes) {
   for (const char* option :
        {"--scene", "--scene-file", "--rate", "--substeps", "--max-error", "--normals", "--reports", "step",
         "--host", "--port", "--grpc-port", "--page", "--device", "--list-devices", "--list-materials",
-        "--software-threads", "--log-level", "--seconds"})
+        "--software-threads", "--kernels", "--log-level", "--seconds"})
     EXPECT_THAT(help.output(), HasSubstr(option));
   ServerProcess version({"--version"});
   EXPECT_EQ(version.exitCode(), 0);

@@ -28,12 +28,11 @@ using vulkan::kTexels;
 AssembledCut cutAssembled(const vulkan::Device& device, std::uint32_t workgroupSize,
                           std::optional<std::uint32_t> wholeNodes) {
   constexpr std::uint32_t kLanes = CLOTHSTREAM_SOLVE_LANES;
-  const bool software = device.isSoftware();
-  if (workgroupSize == 0) workgroupSize = software ? 8 : kLanes;
+  if (workgroupSize == 0) workgroupSize = device.hasGpuKernels() ? kLanes : 8;
   return {
       .workgroup = std::bit_floor(std::min({workgroupSize, kLanes, device.limits().maxWorkgroupInvocations})),
-      .wholeNodes = wholeNodes.value_or(software ? 4096 : 1024),
-      .rounds = software ? 65'000 : ~0u};
+      .wholeNodes = wholeNodes.value_or(device.hasGpuKernels() ? 1024 : 4096),
+      .rounds = device.isSoftware() ? 65'000 : ~0u};
 }
 
 // Loop rounds of a solve that take as long as one unit of work.
