@@ -51,6 +51,9 @@ constexpr std::array kSuites{
                  &bench::runPrice},
     bench::Suite{"creation", "time to check, prepare, load and delete a scene, for each of its nodes",
                  &bench::runCreation},
+    bench::Suite{"kernels",
+                 "registers, spills, instructions, bytes and bounds of every kernel; it only compiles them",
+                 &bench::runKernels, true},
 };
 
 }  // namespace
@@ -75,6 +78,11 @@ int main(int argc, char** argv) {
   app.add_option("--device", settings.device.select, "Index or part of the name of the Vulkan device");
   CLI::Option* threadsOption = app.add_option("--software-threads", softwareThreads,
                                               "Threads of a software device (0: only the calling thread)");
+  const std::map<std::string, vulkan::KernelSettings> kernels{{"auto", vulkan::KernelSettings::automatic},
+                                                              {"cpu", vulkan::KernelSettings::cpu},
+                                                              {"gpu", vulkan::KernelSettings::gpu}};
+  app.add_option("--kernels", settings.device.kernels, "Settings of the kernels: auto, cpu or gpu")
+      ->transform(CLI::CheckedTransformer(kernels));
   app.add_option("--seconds", settings.seconds, "Seconds to measure for each row")
       ->check(CLI::PositiveNumber);
   app.add_option("--rows", settings.rowsPerInvocation, "Rows of a grid for each invocation (0: automatic)");
@@ -94,6 +102,7 @@ int main(int argc, char** argv) {
   if (*threadsOption) settings.device.softwareThreads = softwareThreads;
 
   try {
+    settings.device.compileOnly = suites.at(name)->compileOnly;
     vulkan::Device device(settings.device);
     if (!json)
       fmt::print("{}, {}, Vulkan {}, {} CPU threads\n", device.info().name, device.info().driver,

@@ -40,6 +40,7 @@ struct Suite {
   const char* name;
   const char* description;
   Rows (*run)(vulkan::Device& device, const Settings& settings);
+  bool compileOnly = false;  // the device is opened with vulkan::DeviceOptions::compileOnly
 };
 
 Rows runMassSpring(vulkan::Device& device, const Settings& settings);
@@ -57,6 +58,7 @@ Rows runSelfCollision(vulkan::Device& device, const Settings& settings);
 Rows runCodec(vulkan::Device& device, const Settings& settings);
 Rows runCodecDevice(vulkan::Device& device, const Settings& settings);
 Rows runPrice(vulkan::Device& device, const Settings& settings);
+Rows runKernels(vulkan::Device& device, const Settings& settings);
 Rows runCreation(vulkan::Device& device, const Settings& settings);
 
 }  // namespace clothstream::bench

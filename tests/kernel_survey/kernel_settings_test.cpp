@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// The settings of kernels for GPUs give the same bits as those for CPUs, on the device of the tests.
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/vulkan/device.h"
+#include "tests/kernel_survey/settings_pair.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::kernel_survey {
+namespace {
+
+using enum model::SolverKind;
+
+class KernelSettings : public tests::GpuTest {};
+
+TEST_F(KernelSettings, FollowTheDeviceUnlessTheyAreGiven) {
+  const vulkan::Device automatic{vulkan::DeviceOptions{}}, cpu({.kernels = vulkan::KernelSettings::cpu}),
+      gpu({.kernels = vulkan::KernelSettings::gpu});
+  EXPECT_EQ(automatic.hasGpuKernels(), !automatic.isSoftware());
+  EXPECT_FALSE(cpu.hasGpuKernels());
+  EXPECT_TRUE(gpu.hasGpuKernels());
+}
+
+// Cloths that one workgroup works on with both settings, with one of them, and with none.
+TEST_F(KernelSettings, GiveTheSameBitsForEverySolver) {
+  model::Scene scene;
+  scene.substeps = 2;
+  for (const model::SolverKind kind : {massSpring, constraint, acad, xpbd, implicitEuler})
+    for (const auto& [rows, columns] : {std::pair{11u, 17u}, {41u, 37u}})
+      for (const bool mesh : {false, true}) {
+        model::Cloth cloth = tests::calmCloth(rows, columns);
+        cloth.pins = {tests::topRow(cloth)};
+        cloth.friction = 0.4f;
+        cloth.drag = 0.6f;
+        cloth.lift = 0.4f;
+        cloth.solver.kind = kind;
+        cloth.solver.iterations = kind == xpbd ? 3 : 40;
+        cloth.solver.bendConstraints = mesh;
+        scene.cloths.push_back(mesh ? model::asMesh(cloth) : cloth);
+      }
+  for (const bool large : {false, true})
+    scene.cloths.push_back(tests::assembled(tests::calmCloth(large ? 41 : 11, large ? 37 : 17)));
+  SettingsPair pair(scene);
+  for (int tick = 0; tick < 8; ++tick) pair.expectSameTick(tests::passingBall(scene, tick), tick);
+}
+
+TEST_F(KernelSettings, GiveTheSameBitsOfUndampedSprings) {
+  model::Cloth cloth = tests::calmCloth(33, 18);
+  cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
+  cloth.pins = {tests::topRow(cloth)};
+  model::Cloth corrected = cloth;
+  corrected.solver.kind = xpbd;
+  SettingsPair pair(tests::sceneOf({cloth, corrected}));
+  for (int tick = 0; tick < 8; ++tick) pair.expectSameTick(tests::passingBall(pair.scene(), tick), tick);
+}
+
+TEST_F(KernelSettings, GiveTheSameNormals) {
+  SettingsPair pair(tests::sceneOf({tests::calmCloth(19, 33), tests::discCloth(8)}));
+  pair.expectSameTick(tests::passingBall(pair.scene(), 0), 0);
+  EXPECT_EQ(pair.cpu().normals(), pair.gpu().normals());
+}
+
+}  // namespace
+}  // namespace clothstream::kernel_survey
