@@ -314,7 +314,7 @@ typedef enum cs_shape {
   CS_SHAPE_CAPSULE = 1, /* radius; length of the segment along Y, centred on the origin */
   CS_SHAPE_PLANE = 2,   /* the half-space y <= 0 */
   CS_SHAPE_BOX = 3,     /* size, centred on the origin */
-  CS_SHAPE_HULL = 4     /* convex hull; see cs_get_hull */
+  CS_SHAPE_HULL = 4     /* convex hull or closed mesh; see cs_get_hull */
 } cs_shape;
 
 typedef struct cs_collider {

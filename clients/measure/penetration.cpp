@@ -25,6 +25,42 @@ Point turnBack(const std::array<double, 4>& q, const Point& v) {
   return {v[0] + q[3] * t[0] + u[0], v[1] + q[3] * t[1] + u[1], v[2] + q[3] * t[2] + u[2]};
 }
 
+Point minus(const Point& a, const Point& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+// Triangles of the largest hull that the protocol allows, 128 corners. A mesh that small may be a hull.
+constexpr std::size_t kMaxHullTriangles = 252;
+// A corner in front of a face by more than this share of the distances from the origin makes a hull a mesh.
+constexpr double kFlat = 1e-3;
+
+double squaredFromSegment(const Point& p, const Point& a, const Point& b) {
+  const Point ab = minus(b, a), ap = minus(p, a);
+  const double part = std::clamp(dot(ap, ab) / std::max(dot(ab, ab), 1e-300), 0.0, 1.0);
+  const Point apart{ap[0] - part * ab[0], ap[1] - part * ab[1], ap[2] - part * ab[2]};
+  return dot(apart, apart);
+}
+
+double squaredFromTriangle(const Point& p, const std::array<Point, 3>& t) {
+  const Point normal = cross(minus(t[1], t[0]), minus(t[2], t[0]));
+  bool isAbove = true;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Point &a = t[i], &b = t[(i + 1) % 3];
+    isAbove = isAbove && dot(cross(normal, minus(b, a)), minus(p, a)) >= 0;
+    nearest = std::min(nearest, squaredFromSegment(p, a, b));
+  }
+  const double height = dot(normal, minus(p, t[0]));
+  return isAbove ? height * height / std::max(dot(normal, normal), 1e-300) : nearest;
+}
+
+// Van Oosterom and Strackee, "The solid angle of a plane triangle", 1983.
+double solidAngle(const Point& p, const std::array<Point, 3>& t) {
+  const Point a = minus(t[0], p), b = minus(t[1], p), c = minus(t[2], p);
+  const double la = std::sqrt(dot(a, a)), lb = std::sqrt(dot(b, b)), lc = std::sqrt(dot(c, c));
+  return 2 * std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+}
+
 }  // namespace
 
 Solid::Solid(const cs_collider& collider, std::span<const float> corners,
@@ -48,6 +84,39 @@ Solid::Solid(const cs_collider& collider, std::span<const float> corners,
     for (double& number : normal) number /= size;
     faces_.push_back({normal, dot(normal, a)});
   }
+  const auto isInFront = [&](const Face& face) {
+    for (std::size_t i = 0; i < corners.size() / 3; ++i)
+      if (const Point p = pointAt(corners, i);
+          dot(face.normal, p) - face.offset > kFlat * std::sqrt(dot(p, p)))
+        return true;
+    return false;
+  };
+  if (triangles.size() / 3 <= kMaxHullTriangles && std::none_of(faces_.begin(), faces_.end(), isInFront))
+    return;
+  faces_.clear();
+  low_.fill(std::numeric_limits<double>::infinity());
+  high_.fill(-std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i + 2 < triangles.size(); i += 3) {
+    triangles_.push_back({pointAt(corners, triangles[i]), pointAt(corners, triangles[i + 1]),
+                          pointAt(corners, triangles[i + 2])});
+    for (const Point& corner : triangles_.back())
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        low_[axis] = std::min(low_[axis], corner[axis]);
+        high_[axis] = std::max(high_[axis], corner[axis]);
+      }
+  }
+}
+
+double Solid::depthInMesh(const Point& p) const {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (p[axis] < low_[axis] || p[axis] > high_[axis]) return 0;
+  double nearest = std::numeric_limits<double>::infinity(), angle = 0;
+  for (const std::array<Point, 3>& triangle : triangles_) {
+    nearest = std::min(nearest, squaredFromTriangle(p, triangle));
+    angle += solidAngle(p, triangle);
+  }
+  const double wholeAngle = 4 * std::acos(-1.0);
+  return (angle > wholeAngle / 2 ? 1 : -1) * std::sqrt(nearest);
 }
 
 double Solid::depthOf(const Point& point) const {
@@ -67,6 +136,7 @@ double Solid::depthOf(const Point& point) const {
       return depth;
     }
     default: {
+      if (!triangles_.empty()) return depthInMesh(p);
       if (faces_.empty()) return 0;
       double depth = std::numeric_limits<double>::infinity();
       for (const Face& face : faces_) depth = std::min(depth, face.offset - dot(face.normal, p));

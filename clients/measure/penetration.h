@@ -2,6 +2,7 @@
 // Depth of vertices below the surface of a solid.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -19,7 +20,8 @@ class Solid {
         std::span<const std::uint32_t> triangles);
 
   // Distance of a point to the nearest place of the surface, metres: positive inside, 0 or negative outside.
-  // For a hull it is the distance to the nearest plane of a face.
+  // For a hull it is the distance to the nearest plane of a face. For a mesh, every triangle is tested if the
+  // point is in the mesh's box.
   double depthOf(const Point& point) const;
 
  private:
@@ -28,11 +30,15 @@ class Solid {
     double offset = 0;
   };
 
+  double depthInMesh(const Point& p) const;
+
   std::uint32_t shape_ = 0;
   double radius_ = 0, halfLength_ = 0;
   Point position_{}, halfSize_{};
-  std::array<double, 4> orientation_{};  // quaternion x y z w, unit length
-  std::vector<Face> faces_;
+  std::array<double, 4> orientation_{};          // quaternion x y z w, unit length
+  std::vector<Face> faces_;                      // of a hull
+  std::vector<std::array<Point, 3>> triangles_;  // of a mesh
+  Point low_{}, high_{};                         // corners of the mesh's box
 };
 
 // All colliders of the newest frame.

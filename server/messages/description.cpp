@@ -10,6 +10,7 @@
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
+#include "server/messages/solid_message.h"
 #include "server/messages/vectors.h"
 #include "server/model/mesh.h"
 
@@ -105,6 +106,7 @@ v1::StreamDescription descriptionWithoutCloths(const model::Scene& scene, std::u
     write(collider, model::poseAt(collider, seconds), state);
     if (const auto* hull = std::get_if<model::Hull>(&collider.shape))
       writeHull(**hull, *state.mutable_hull());
+    if (const auto* solid = std::get_if<model::Solid>(&collider.shape)) write(**solid, *state.mutable_mesh());
   }
   *description.mutable_definition() = toMessageWithoutMeshes(scene);
   for (const model::Material& material : model::materials())

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "proto/parameters/cloth_parameters.h"
+#include "server/model/closed_mesh.h"
 #include "server/model/stability.h"
 
 namespace clothstream::messages {
@@ -25,6 +26,8 @@ inline constexpr std::size_t kMaxAttachments = 64;               // per scene
 inline constexpr std::size_t kMaxMotionKeys = 1024;              // per collider
 inline constexpr std::size_t kMinHullParts = 4;                  // vertices, faces
 inline constexpr std::size_t kMaxHullParts = 128;
+inline constexpr std::size_t kMaxSolids = 8;  // colliders of a scene that are meshes
+inline constexpr std::size_t kMaxSolidVertices = 3 * model::kMaxClosedMeshTriangles;
 inline constexpr std::uint32_t kMinGridNodes = 2;  // per row or column
 inline constexpr std::uint32_t kMaxGridNodes = 8192;
 inline constexpr std::uint64_t kMaxNodes = 16'777'216;  // per scene

@@ -11,6 +11,7 @@
 #include "server/messages/description.h"
 #include "server/messages/limits.h"
 #include "server/messages/shapes.h"
+#include "server/messages/solid_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 #include "server/model/hinges.h"
@@ -78,10 +79,11 @@ model::Environment toEnvironment(Checks& checks, const Path& path, const v1::Env
   return environment;
 }
 
-model::Collider toCollider(Checks& checks, const Path& path, const v1::Collider& message) {
+model::Collider toCollider(Checks& checks, const Path& path, const v1::Collider& message,
+                           const MeshReader& readMesh) {
   model::Collider collider;
   collider.name = checks.name(path / "name", message.name());
-  collider.shape = toShape(checks, path, message);
+  collider.shape = toShape(checks, path, message, readMesh);
   collider.pose = toPose(checks, path / "pose", message.pose());
   if (message.has_friction())
     collider.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
@@ -209,6 +211,13 @@ void checkStatedSize(Checks& checks, const v1::Scene& message, const SceneLimits
                                                 attachments, most.attachments));
 }
 
+void checkSolids(Checks& checks, const v1::Scene& message) {
+  const auto count = std::ranges::count_if(message.colliders(), &v1::Collider::has_mesh);
+  if (static_cast<std::size_t>(count) > limits::kMaxSolids)
+    checks.fail(Path("colliders"), "",
+                fmt::format("have {} meshes; must have at most {}", count, limits::kMaxSolids));
+}
+
 void checkSize(Checks& checks, const model::Scene& scene, const SceneLimits& most) {
   std::uint64_t nodes = 0, springs = 0;
   for (const model::Cloth& cloth : scene.cloths) {
@@ -223,6 +232,8 @@ void checkSize(Checks& checks, const model::Scene& scene, const SceneLimits& mos
                     fmt::format("have {} springs in all; must have at most {}", springs, most.springs));
   std::size_t bytes = 0;
   for (const model::Cloth& cloth : scene.cloths) bytes += geometryBytes(cloth);
+  for (const model::Collider& collider : scene.colliders)
+    if (const auto* solid = std::get_if<model::Solid>(&collider.shape)) bytes += geometryBytes(**solid);
   if (bytes > limits::kMaxGeometryBytes)
     checks.fail(
         Path("cloths"), "",
@@ -321,6 +332,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checks.count(root / "cloths", static_cast<std::size_t>(message.cloths_size()), 1, limits::kMaxCloths);
   checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
                limits::kMaxColliders);
+  checkSolids(checks, message);
   const std::uint64_t mostNodes = std::min(most.nodes, limits::kMaxNodes);
   std::uint64_t nodes = 0;
   for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i) {
@@ -333,7 +345,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
     nodes = std::min(mostNodes, nodes + scene.cloths.back().nodeCount());
   }
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
-    scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i)));
+    scene.colliders.push_back(toCollider(checks, root.at("colliders", i), message.colliders(i), readMesh));
   scene.stream = toStreamSettings(checks, root / "stream", message.stream());
   // Sizes first: the other checks take time in proportion to them.
   checkSize(checks, scene, most);

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "server/messages/limits.h"
+#include "server/messages/solid_message.h"
 #include "server/messages/vectors.h"
 
 namespace clothstream::messages {
@@ -78,13 +79,15 @@ void writeSimple(const model::Shape& shape, Message& message) {
                  },
                  [&](const model::Plane&) { message.mutable_plane(); },
                  [&](const model::Box& box) { write(box.size, *message.mutable_box()->mutable_size()); },
-                 [&](const model::Hull&) { message.clear_shape(); }},
+                 [&](const model::Hull&) { message.clear_shape(); },
+                 [&](const model::Solid&) { message.clear_shape(); }},
              shape);
 }
 
 }  // namespace
 
-model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message) {
+model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message,
+                     const MeshReader& readMesh) {
   switch (message.shape_case()) {
     case v1::Collider::kSphere:
       return toSphere(checks, path / "sphere", message.sphere(), kOfScene);
@@ -96,10 +99,14 @@ model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& messa
       return toBox(checks, path / "box", message.box(), kOfScene);
     case v1::Collider::kHull:
       return toHull(checks, path / "hull", message.hull());
+    case v1::Collider::kMesh:
+      if (model::Solid solid = toSolid(checks, path / "mesh", message.mesh(), readMesh)) return solid;
+      return {};
     case v1::Collider::SHAPE_NOT_SET:
       break;
   }
-  checks.fail(path, "", "has no shape; must have \"sphere\", \"capsule\", \"plane\", \"box\" or \"hull\"");
+  checks.fail(path, "",
+              "has no shape; must have \"sphere\", \"capsule\", \"plane\", \"box\", \"hull\" or \"mesh\"");
   return {};
 }
 
@@ -121,6 +128,7 @@ model::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantColl
 void write(const model::Shape& shape, v1::Collider& message) {
   writeSimple(shape, message);
   if (const auto* hull = std::get_if<model::Hull>(&shape)) writeHull(**hull, *message.mutable_hull());
+  if (std::holds_alternative<model::Solid>(shape)) message.mutable_mesh();
 }
 
 void write(const model::Shape& shape, v1::ColliderState& message) {

@@ -4,17 +4,20 @@
 
 #include "clothstream/v1/scene.pb.h"
 #include "clothstream/v1/session.pb.h"
+#include "server/messages/mesh_message.h"
 #include "server/messages/validation.h"
 #include "server/model/collider.h"
 
 namespace clothstream::messages {
 
-model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message);
+// Refuses the file of a mesh if there is no reader.
+model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& message,
+                     const MeshReader& readMesh = {});
 model::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantCollider& message);
 
 // Replaces the shape of the message.
 void write(const model::Shape& shape, v1::Collider& message);
-// Replaces the shape of the message. A hull is written without its corners, which are in the description.
+// Replaces the shape of the message. Hulls and meshes are left out; the description has them.
 void write(const model::Shape& shape, v1::ColliderState& message);
 void writeHull(const model::ConvexHull& hull, v1::ConvexHull& message);
 

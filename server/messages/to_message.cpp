@@ -4,6 +4,7 @@
 #include "server/messages/node_selection.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
+#include "server/messages/solid_message.h"
 #include "server/messages/solver_message.h"
 #include "server/messages/vectors.h"
 #include "server/model/mesh.h"
@@ -91,6 +92,9 @@ v1::Scene toMessage(const model::Scene& scene) {
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     if (const model::Cloth& cloth = scene.cloths[i]; cloth.mesh)
       write(*cloth.mesh, *message.mutable_cloths(static_cast<int>(i))->mutable_mesh());
+  for (std::size_t i = 0; i < scene.colliders.size(); ++i)
+    if (const auto* solid = std::get_if<model::Solid>(&scene.colliders[i].shape))
+      write(**solid, *message.mutable_colliders(static_cast<int>(i))->mutable_mesh());
   return message;
 }
 

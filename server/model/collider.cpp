@@ -38,7 +38,8 @@ float reachOf(const Shape& shape) {
                                    for (const Vec3& vertex : hull->vertices)
                                      corner = corner.cwiseMax(vertex.cwiseAbs());
                                    return corner.norm();
-                                 }},
+                                 },
+                                 [](const Solid& solid) { return solid->reach; }},
                     shape);
 }
 

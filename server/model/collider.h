@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/model/closed_mesh.h"
 #include "server/model/convex_hull.h"
 #include "server/model/pose.h"
 
@@ -34,7 +35,12 @@ struct Box {
 // Immutable and shared between copies of the collider. Never null.
 using Hull = std::shared_ptr<const ConvexHull>;
 
-using Shape = std::variant<Sphere, Capsule, Plane, Box, Hull>;
+// Body with a triangle mesh as surface. Immutable and shared like a hull. Never null.
+using Solid = std::shared_ptr<const ClosedMesh>;
+// A node that is deeper inside a solid than this, and than its way in the substep, is left where it is, m.
+inline constexpr float kSolidDepth = 0.03f;
+
+using Shape = std::variant<Sphere, Capsule, Plane, Box, Hull, Solid>;
 
 // Visitor for std::visit with one function per shape.
 template <typename... Visitors>

@@ -34,6 +34,7 @@ constexpr std::uint32_t kGroupSolve = 4096, kGroupGrid = 2048, kGroupMesh = 8192
 constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
+constexpr double kTriangleBytes = 400;  // of a solid
 
 // Copies of a scene's lists: as it started, as it was accepted, as it runs, and as descriptions.
 constexpr double kListCopies = 6;
@@ -58,10 +59,12 @@ bool isSystem(SolverKind kind) {
 }  // namespace
 
 double colliderWork(const Shape& shape) {
+  if (std::holds_alternative<Solid>(shape)) return kSolidWork;
   const double planes =
       std::visit(ShapeVisitor{[](const Sphere&) { return 0.0; }, [](const Capsule&) { return 0.0; },
                               [](const Plane&) { return 1.0; }, [](const Box&) { return kBoxPlanes; },
-                              [](const Hull& hull) { return static_cast<double>(hull->planes.size()); }},
+                              [](const Hull& hull) { return static_cast<double>(hull->planes.size()); },
+                              [](const Solid&) { return 0.0; }},
                  shape);
   return kCollider + kPlane * planes;
 }
@@ -160,6 +163,10 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
   if (scene.integrator == Integrator::rungeKutta4) work.dispatches += 11 * substeps;
   const auto any = [&](auto has) { return std::ranges::any_of(scene.cloths, has) ? 1.0 : 0.0; };
   work.dispatches += 3 * substeps * any([](const Cloth& cloth) { return cloth.dihedralBending != 0; });
+  const bool solids = std::ranges::any_of(scene.colliders, [](const Collider& collider) {
+    return std::holds_alternative<Solid>(collider.shape);
+  });
+  work.dispatches += substeps * (solids ? 1 : 0);
   work.dispatches +=
       (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
   return work;
@@ -168,7 +175,11 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
 double PriceModel::bytes(const Scene& scene) const {
   assert(scene.cloths.size() == cloths_.size());
   double bytes = kSceneBytes;
-  for (const Collider& collider : scene.colliders) bytes += listBytes(collider.motion.keys);
+  for (const Collider& collider : scene.colliders) {
+    bytes += listBytes(collider.motion.keys);
+    if (const auto* solid = std::get_if<Solid>(&collider.shape))
+      bytes += kTriangleBytes * static_cast<double>((*solid)->triangles.size());
+  }
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     const Cloth& cloth = scene.cloths[i];
     const ClothCounts& counts = cloths_[i];

@@ -42,6 +42,9 @@ struct Work {
   }
 };
 
+// Work of a triangle mesh for each node and substep, in node-steps.
+inline constexpr double kSolidWork = 6;
+
 // Work of a collider with this shape for each node and substep, in node-steps. A third of the nodes are
 // assumed to be near each collider.
 double colliderWork(const Shape& shape);

@@ -60,7 +60,7 @@ void writeShape(const model::Shape& shape, v1::AppliedCollider& message) {
           },
           [&](const model::Plane&) { message.mutable_plane(); },
           [&](const model::Box& box) { messages::write(box.size, *message.mutable_box()->mutable_size()); },
-          [&](const model::Hull&) {}},
+          [&](const model::Hull&) {}, [&](const model::Solid&) {}},
       shape);
 }
 
@@ -143,8 +143,11 @@ model::Shape shapeOf(Numbers& numbers, const v1::AppliedCollider& message, const
     case v1::AppliedCollider::SHAPE_NOT_SET:
       break;
   }
-  known = message.participant_id() == 0 && message.id() < scene.colliders.size() &&
-          std::holds_alternative<model::Hull>(scene.colliders[message.id()].shape);
+  known = false;
+  if (message.participant_id() == 0 && message.id() < scene.colliders.size()) {
+    const model::Shape& own = scene.colliders[message.id()].shape;
+    known = std::holds_alternative<model::Hull>(own) || std::holds_alternative<model::Solid>(own);
+  }
   return known ? scene.colliders[message.id()].shape : model::Shape{};
 }
 

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/reference/solid.h"
+
 namespace clothstream::reference {
 namespace {
 
@@ -79,9 +81,37 @@ std::optional<Vec3> entry(const model::Shape& shape, double thickness, const Vec
   return from + inside * (to - from);
 }
 
+// A path that crosses the surface, or begins inside, stays on the side of its beginning. Other paths end
+// outside of the thickness.
+std::optional<Contact> contactWithSolid(const model::ClosedMesh& mesh, double thickness, const Vec3& from,
+                                        const Vec3& to) {
+  const double way = (to - from).norm();
+  const NearestPoint begin = nearestOn(mesh, from), end = nearestOn(mesh, to);
+  const double bound = way + std::max(thickness, double{model::kSolidDepth});
+  if (std::abs(begin.distance) >= bound || begin.distance - way >= thickness) return std::nullopt;
+  const bool begunInside = begin.distance < 0;
+  Vec3 normal = begin.normal, touched = begin.point;
+  if (!begunInside) {
+    const std::optional<Crossing> crossing = firstCrossing(mesh, from, to);
+    if (!crossing)
+      return end.distance < thickness ? std::optional(Contact{end.normal, thickness - end.distance})
+                                      : std::nullopt;
+    normal = crossing->normal;
+    touched = from + crossing->part * (to - from);
+  }
+  if (std::abs(end.distance) < bound && end.normal.dot(normal) > 0) {
+    if (end.distance < thickness) return Contact{end.normal, thickness - end.distance};
+    if (begunInside) return std::nullopt;
+  }
+  const double depth = thickness - normal.dot(to - touched);
+  return depth > 0 ? std::optional(Contact{normal, depth}) : std::nullopt;
+}
+
 // Both points are in the shape's frame.
 std::optional<Contact> contactOf(const model::Shape& shape, double thickness, const Vec3& from,
                                  const Vec3& to) {
+  if (const auto* solid = std::get_if<model::Solid>(&shape))
+    return contactWithSolid(**solid, thickness, from, to);
   const bool begunInside = over(shape, thickness, from).height <= 0;
   const std::optional<Vec3> entered = begunInside ? from : entry(shape, thickness, from, to);
   if (!entered) return std::nullopt;
@@ -103,6 +133,8 @@ std::optional<Contact> contactOf(const model::Shape& shape, double thickness, co
 }  // namespace
 
 double heightOver(const model::Shape& shape, const Pose& pose, const Vec3& point) {
+  if (const auto* solid = std::get_if<model::Solid>(&shape))
+    return nearestOn(**solid, pose.orientation.conjugate() * (point - pose.position)).distance;
   return over(shape, 0, pose.orientation.conjugate() * (point - pose.position)).height;
 }
 

@@ -43,14 +43,21 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
     ReferenceCloth& cloth = cloths_[i];
     before_[i].assign(cloth.positions().begin(), cloth.positions().end());
     cloth.integrate(inputs.environment, scene_.integrator, scene_.substepSeconds());
-    for (const MovingCollider& collider : inputs.colliders)
-      cloth.collide(collider.shape,
-                    stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
-                    collider.friction, before_[i]);
+    collide(inputs, index, i, false);
   }
   attachments_.apply(cloths_, inputs.grabs, index, scene_.substeps, scene_.tickSeconds());
-  if (!selfCollision_.exists()) return;
-  for (int i = 0; i < model::kContactIterations; ++i) collideWithCloth(inputs, index);
+  if (selfCollision_.exists())
+    for (int i = 0; i < model::kContactIterations; ++i) collideWithCloth(inputs, index);
+  for (std::size_t i = 0; i < cloths_.size(); ++i) collide(inputs, index, i, true);
+}
+
+void ReferenceSimulation::collide(const TickInputs& inputs, std::uint32_t index, std::size_t cloth,
+                                  bool solids, std::span<const std::uint8_t> only) {
+  for (const MovingCollider& collider : inputs.colliders)
+    if (std::holds_alternative<model::Solid>(collider.shape) == solids)
+      cloths_[cloth].collide(
+          collider.shape, stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
+          collider.friction, before_[cloth], only);
 }
 
 void ReferenceSimulation::collideWithCloth(const TickInputs& inputs, std::uint32_t index) {
@@ -69,10 +76,7 @@ void ReferenceSimulation::collideWithCloth(const TickInputs& inputs, std::uint32
     const std::size_t nodes = cloth.nodeCount();
     std::copy_n(positions.begin() + static_cast<std::ptrdiff_t>(first), nodes, cloth.positions().begin());
     std::copy_n(velocities.begin() + static_cast<std::ptrdiff_t>(first), nodes, cloth.velocities().begin());
-    for (const MovingCollider& collider : inputs.colliders)
-      cloth.collide(collider.shape,
-                    stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
-                    collider.friction, before_[i], std::span(touched).subspan(first, nodes));
+    collide(inputs, index, i, false, std::span(touched).subspan(first, nodes));
     first += nodes;
   }
 }

@@ -39,7 +39,7 @@ class ReferenceSimulation {
   void tick();
 
   // Simulates substep `index` of a tick: forces, integration and colliders in order; attachments, tethers and
-  // grabs; self-collision, and colliders again.
+  // grabs; self-collision, and colliders again; colliders that are triangle meshes.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
   // Number of simulated ticks.
@@ -49,6 +49,10 @@ class ReferenceSimulation {
   const Attachments& attachments() const { return attachments_; }
 
  private:
+  // Collides nodes with the colliders that are solids, or with the others. If `only` is not empty, it has a 1
+  // for each node that collides.
+  void collide(const TickInputs& inputs, std::uint32_t index, std::size_t cloth, bool solids,
+               std::span<const std::uint8_t> only = {});
   void collideWithCloth(const TickInputs& inputs, std::uint32_t index);
 
   model::Scene scene_;

@@ -9,6 +9,7 @@
 #include "server/messages/grab_place.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
+#include "server/messages/solid_message.h"
 #include "server/messages/vectors.h"
 #include "server/saved_state/crc.h"
 #include "server/scene/snapshot_message.h"
@@ -254,9 +255,13 @@ v1::SavedCheckpoint toMessage(const scene::Checkpoint& checkpoint) {
 }
 
 Read<model::Scene> withParameters(const v1::Scene& parameters, const model::Scene& start) {
-  if (static_cast<std::size_t>(parameters.cloths_size()) != start.cloths.size())
+  if (static_cast<std::size_t>(parameters.cloths_size()) != start.cloths.size() ||
+      static_cast<std::size_t>(parameters.colliders_size()) != start.colliders.size())
     return tl::unexpected(std::string("its parameters are of another scene"));
   v1::Scene whole = parameters;
+  for (std::size_t i = 0; i < start.colliders.size(); ++i)
+    if (const auto* solid = std::get_if<model::Solid>(&start.colliders[i].shape))
+      messages::write(**solid, *whole.mutable_colliders(static_cast<int>(i))->mutable_mesh());
   for (std::size_t i = 0; i < start.cloths.size(); ++i)
     if (start.cloths[i].mesh)
       messages::write(*start.cloths[i].mesh, *whole.mutable_cloths(static_cast<int>(i))->mutable_mesh());
@@ -266,6 +271,10 @@ Read<model::Scene> withParameters(const v1::Scene& parameters, const model::Scen
       scene->simulationRate == start.simulationRate && scene->substeps == start.substeps &&
       std::ranges::equal(scene->cloths, start.cloths, {}, &model::Cloth::nodeCount, &model::Cloth::nodeCount);
   if (scene && !same) return tl::unexpected(std::string("its parameters are of another scene"));
+  // A simulation knows a mesh by its address.
+  for (std::size_t i = 0; scene && i < start.colliders.size(); ++i)
+    if (std::holds_alternative<model::Solid>(start.colliders[i].shape))
+      scene->colliders[i].shape = start.colliders[i].shape;
   return scene;
 }
 

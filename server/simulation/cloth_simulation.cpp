@@ -18,6 +18,7 @@
 #include "server/simulation/attachment/attachment_stage.h"
 #include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/collision/collision_stage.h"
+#include "server/simulation/collision/solid_stage.h"
 #include "server/simulation/grid_stage.h"
 #include "server/simulation/mass_stage.h"
 #include "server/simulation/mesh_stage.h"
@@ -161,6 +162,7 @@ struct ClothSimulation::Pipeline {
   std::vector<float> clothMasses;  // kg
   std::uint32_t workgroupSize;
   Buffers buffers;
+  SolidTables solidTables;
   CollisionStage collision;
   GridStage grids;
   Stage hash;
@@ -174,6 +176,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<SelfCollisionStage> selfCollision;  // null if no cloth uses it
   std::vector<model::Solver> solvers;                 // of the cloths in the tables
   std::vector<SpringStiffness> stiffness;             // of the cloths' springs
+  std::unique_ptr<SolidStage> solids;                 // null if no collider is a triangle mesh
   std::unique_ptr<AttachmentStage> attachments;       // created when it is first needed
   std::unique_ptr<ReportStage> report;                // created for the first report
   std::unique_ptr<MassStage> massChange;              // created when a mass first changes
@@ -201,7 +204,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       clothMasses(massesOf(scene.cloths)),
       workgroupSize(workgroupSizeOn(on, options)),
       buffers(on, nodes, records.size()),
-      collision(on, nodes, static_cast<std::uint32_t>(records.size()),
+      solidTables(simulation::solidTables(scene.colliders)),
+      collision(on, solidTables, nodes, static_cast<std::uint32_t>(records.size()),
                 {&buffers.state.positions[0], &buffers.state.positions[1]},
                 {&buffers.state.velocities[0], &buffers.state.velocities[1]}),
       grids(on, scene.cloths, stateOf(buffers, collision), buffers.normals, integrator,
@@ -227,6 +231,9 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
   if (SelfCollisionStage::isIn(scene))
     selfCollision =
         std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), workgroupSize);
+  if (!solidTables.empty())
+    solids = std::make_unique<SolidStage>(on, solidTables, scene.cloths, stateOf(buffers, collision),
+                                          workgroupSize);
   if (const AttachmentTables tables = attachmentTables(scene); !tables.empty()) {
     makeAttachments(tables);
     attachments->setSlack(scene.cloths);
@@ -319,6 +326,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (assembled) assembled->recordTables(recorder);
   if (bending) bending->recordTables(recorder);
   if (selfCollision) selfCollision->recordTables(recorder);
+  if (solids) solids->recordTables(recorder);
   recorder.barrier();
   if (!weighed) {
     massChange->record(recorder);
@@ -408,6 +416,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                     .reserved = 0});
     if (attachments) attachments->recordSubstep(recorder, present, substep, substeps, tickRate);
     if (selfCollision) selfCollision->recordSubstep(recorder, present, substep, push.collision);
+    if (collision.solidCount() > 0) solids->record(recorder, present, push.collision, collision.solidCount());
     present = 1 - present;
   }
 }

@@ -146,18 +146,15 @@ void reportContact(uint contact, vec3 gained, float inverseMass) {
   atomicAdd(contactImpulses[contact], uint(units) + 1);
 }
 
-// Moves a free node that comes from `from` out of the collider. Its velocity relative to the surface loses
-// the part into the surface. The part along the surface loses at most friction times that.
-void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush push, CollidingNode node,
-             vec3 from, inout vec3 position, inout vec3 velocity) {
-  Contact contact = findContact(collider, frame, from, position);
-  if (contact.depth <= 0.0) {
-    return;
-  }
+// Moves a free node out of the collider. Its velocity relative to the surface, which moves with
+// `surfaceVelocity` and spins, loses the part into the surface. The part along the surface loses at most
+// friction times that.
+void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity, vec3 spin,
+           CollisionPush push, CollidingNode node, inout vec3 position, inout vec3 velocity) {
   precise vec3 surface = position + contact.depth * contact.normal;
   position = surface;
   precise vec3 arm = surface - collider.after;
-  precise vec3 carried = collider.velocity + crossProduct(frame.spin, arm);
+  precise vec3 carried = surfaceVelocity + crossProduct(spin, arm);
   precise vec3 relative = velocity - carried;
   precise float approach = dotProduct(relative, contact.normal);
   vec3 gained = vec3(0.0);
@@ -173,6 +170,16 @@ void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush p
   if (push.contactClothCount > 0 && node.inverseMass > 0.0) {
     reportContact(index * push.contactClothCount + node.cloth, gained, node.inverseMass);
   }
+}
+
+// Moves a free node that comes from `from` out of the collider, if it touches it.
+void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush push, CollidingNode node,
+             vec3 from, inout vec3 position, inout vec3 velocity) {
+  Contact contact = findContact(collider, frame, from, position);
+  if (contact.depth <= 0.0) {
+    return;
+  }
+  leave(index, collider, contact, collider.velocity, frame.spin, push, node, position, velocity);
 }
 
 // Collides a node with every collider that it may touch, in ascending order. A node that is pushed out of the

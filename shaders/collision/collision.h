@@ -11,6 +11,7 @@ CLOTHSTREAM_SHARED_BEGIN
 const float kRoundShape = 0;   // sphere or capsule
 const float kBoxShape = 1;     // box
 const float kPlanesShape = 2;  // plane or convex hull
+const float kSolidShape = 3;   // closed triangle mesh; solid.h
 
 // The shape of a collider. The meaning of the other members depends on `kind`; the functions below name it.
 struct ShapeRecord {

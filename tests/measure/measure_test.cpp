@@ -85,6 +85,19 @@ TEST(Penetration, HullHasTheDistanceToItsNearestFace) {
   EXPECT_LT(hull.depthOf({0.5, 0.5, 0.5}), 0);
 }
 
+// Two separate bodies: a point between them is in front of faces of both.
+TEST(Penetration, MeshHasTheDistanceToItsNearestTriangle) {
+  std::vector<float> corners{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  std::vector<std::uint32_t> triangles{0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  for (std::size_t i = 0; i < 12; ++i) corners.push_back(corners[i] + (i % 3 == 0 ? 5.0f : 0.0f));
+  for (std::size_t i = 0; i < 12; ++i) triangles.push_back(triangles[i] + 4);
+  const Solid mesh(colliderOf(CS_SHAPE_HULL), corners, triangles);
+  EXPECT_NEAR(mesh.depthOf({0.2, 0.1, 0.3}), 0.1, 1e-12);
+  EXPECT_NEAR(mesh.depthOf({5.3, 0.3, 0.3}), 0.1 / std::sqrt(3.0), 1e-12);
+  EXPECT_LE(mesh.depthOf({3, 0.1, 0.1}), 0);
+  EXPECT_LE(mesh.depthOf({0.5, 0.5, 0.5}), 0);
+}
+
 TEST(Penetration, IsThatOfTheDeepestVertex) {
   cs_collider plane = colliderOf(CS_SHAPE_PLANE);
   cs_collider sphere = colliderOf(CS_SHAPE_SPHERE);

@@ -12,6 +12,7 @@
 #include "server/reference/reference_simulation.h"
 #include "server/simulation/cloth_simulation.h"
 #include "tests/model/meshes.h"
+#include "tests/model/solids.h"
 #include "tests/vulkan/gpu_test.h"
 
 namespace clothstream::tests {

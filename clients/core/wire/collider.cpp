@@ -3,6 +3,8 @@
 #include "clients/core/wire/collider.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 
 namespace clothstream::client {
 namespace {
@@ -21,6 +23,21 @@ bool readFace(Bytes message, std::vector<std::uint32_t>& triangles) {
   for (std::size_t i = 2; i < corners.size(); ++i)
     triangles.insert(triangles.end(), {corners[0], corners[i - 1], corners[i]});
   return read;
+}
+
+bool cornersExist(const Hull& hull) {
+  return std::all_of(hull.triangles.begin(), hull.triangles.end(),
+                     [&](std::uint32_t corner) { return corner < hull.vertices.size() / 3; });
+}
+
+// Copies little-endian numbers, three of each element.
+template <typename Number>
+bool copy(Bytes bytes, std::size_t most, std::vector<Number>& numbers) {
+  constexpr std::size_t kElement = 3 * sizeof(Number);
+  if (bytes.size() % kElement != 0 || bytes.size() / kElement > most) return false;
+  numbers.resize(bytes.size() / sizeof(Number));
+  if (!numbers.empty()) std::memcpy(numbers.data(), bytes.data(), bytes.size());
+  return true;
 }
 
 }  // namespace
@@ -49,7 +66,7 @@ bool readCollider(Bytes message, Collider& collider) {
   collider.shape = CS_SHAPE_HULL;
   collider.radius = collider.length = 0;
   collider.size = {};
-  collider.hull = {};
+  collider.hull = collider.mesh = {};
   collider.participantId = 0;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
     switch (tag) {
@@ -76,6 +93,8 @@ bool readCollider(Bytes message, Collider& collider) {
         return set(collider.shape, CS_SHAPE_BOX) && readBox(reader.get_view(), collider.size);
       case F::kHull.tag:
         return set(collider.shape, CS_SHAPE_HULL) && set(collider.hull, reader.get_view());
+      case F::kMesh.tag:
+        return set(collider.shape, CS_SHAPE_HULL) && set(collider.mesh, reader.get_view());
       default:
         return skip(reader);
     }
@@ -93,10 +112,20 @@ std::optional<Hull> readHull(Bytes message) {
     out.vertices.insert(out.vertices.end(), vertex.begin(), vertex.end());
     return out.vertices.size() <= 3 * kMaxHullParts;
   });
-  if (hull && std::any_of(hull->triangles.begin(), hull->triangles.end(),
-                          [&](std::uint32_t corner) { return corner >= hull->vertices.size() / 3; }))
-    hull.reset();
-  return hull;
+  return hull && cornersExist(*hull) ? hull : std::nullopt;
+}
+
+std::optional<Hull> readMesh(Bytes message) {
+  using F = field::ColliderMeshDescription;
+  std::optional<Hull> mesh = readMessage<Hull>(message, [&](Hull& out, std::uint32_t tag, Reader& reader) {
+    if (tag == F::kPositions.tag) return copy(reader.get_view(), kMaxMeshVertices, out.vertices);
+    return tag == F::kTriangles.tag ? copy(reader.get_view(), kMaxMeshTriangles, out.triangles)
+                                    : skip(reader);
+  });
+  const auto isFinite = [](float coordinate) { return std::isfinite(coordinate); };
+  return mesh && cornersExist(*mesh) && std::all_of(mesh->vertices.begin(), mesh->vertices.end(), isFinite)
+             ? mesh
+             : std::nullopt;
 }
 
 }  // namespace clothstream::client

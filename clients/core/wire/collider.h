@@ -21,11 +21,12 @@ struct Collider {
   cs_shape shape = CS_SHAPE_HULL;
   float radius = 0, length = 0;
   Vec3 size{};
-  Bytes hull;  // serialised ConvexHull, points into the message; empty in frames
+  // Serialised ConvexHull or ColliderMeshDescription, which point into the message; both are empty in frames.
+  Bytes hull, mesh;
   std::uint64_t participantId = 0;
 };
 
-// Convex hull in the collider's own frame.
+// Convex hull or closed mesh in the collider's own frame.
 struct Hull {
   std::vector<float> vertices;  // 3 floats each
   std::vector<std::uint32_t> triangles;
@@ -35,6 +36,7 @@ struct Hull {
 // number is not finite, or there are more elements than the protocol allows.
 [[nodiscard]] bool readCollider(Bytes message, Collider& collider);
 [[nodiscard]] std::optional<Hull> readHull(Bytes message);
+[[nodiscard]] std::optional<Hull> readMesh(Bytes message);
 // Reads radius and length of a Sphere or a Capsule. A Sphere is a Capsule without a length.
 [[nodiscard]] bool readRound(Bytes message, Collider& collider);
 [[nodiscard]] bool readBox(Bytes message, Vec3& size);
@@ -43,5 +45,7 @@ struct Hull {
 inline constexpr std::size_t kMaxSceneColliders = 4096;
 // Limit for the vertices, the faces, and the vertices of a face.
 inline constexpr std::size_t kMaxHullParts = 128;
+// Limits of a collider that is a mesh.
+inline constexpr std::size_t kMaxMeshVertices = 60'000, kMaxMeshTriangles = 20'000;
 
 }  // namespace clothstream::client

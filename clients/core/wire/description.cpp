@@ -287,11 +287,11 @@ tl::expected<Description, std::string> readDescription(Bytes message, const Limi
     return tl::unexpected(std::move(problem));
 
   for (Collider& collider : description.colliders) {
-    if (collider.hull.empty()) continue;
-    std::optional<Hull> hull = readHull(collider.hull);
-    if (!hull) return tl::unexpected("collider \"" + collider.name + "\" has a malformed hull");
+    if (collider.hull.empty() && collider.mesh.empty()) continue;
+    std::optional<Hull> hull = collider.mesh.empty() ? readHull(collider.hull) : readMesh(collider.mesh);
+    if (!hull) return tl::unexpected("collider \"" + collider.name + "\" has a malformed hull or mesh");
     description.hulls[collider.name] = std::move(*hull);
-    collider.hull = {};
+    collider.hull = collider.mesh = {};
   }
 
   std::uint32_t firstVertex = 0;

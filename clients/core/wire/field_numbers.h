@@ -204,6 +204,7 @@ struct Collider {
   static constexpr Field kPlane{4, WireType::kBytes};
   static constexpr Field kBox{5, WireType::kBytes};
   static constexpr Field kHull{6, WireType::kBytes};
+  static constexpr Field kMesh{30, WireType::kBytes};
   static constexpr Field kPose{8, WireType::kBytes};
   static constexpr Field kFriction{9, WireType::kFixed32};
   static constexpr Field kMotion{10, WireType::kBytes};
@@ -224,6 +225,31 @@ struct ConvexHull {
 };
 struct Face {
   static constexpr Field kVertices{1, WireType::kBytes};
+};
+struct ColliderMesh {
+  static constexpr Field kFile{1, WireType::kBytes};
+  static constexpr Field kPositions{2, WireType::kBytes};
+  static constexpr Field kTriangles{3, WireType::kBytes};
+  static constexpr Field kScale{4, WireType::kFixed32};
+  static constexpr Field kSkin{5, WireType::kBytes};
+};
+struct Skin {
+  static constexpr Field kJoints{1, WireType::kBytes};
+  static constexpr Field kVertexJoints{2, WireType::kBytes};
+  static constexpr Field kVertexWeights{3, WireType::kBytes};
+  static constexpr Field kAnimation{4, WireType::kBytes};
+};
+struct Joint {
+  static constexpr Field kName{1, WireType::kBytes};
+  static constexpr Field kParent{2, WireType::kVarint};
+  static constexpr Field kRest{3, WireType::kBytes};
+};
+struct JointAnimation {
+  static constexpr Field kKeys{1, WireType::kBytes};
+};
+struct JointKey {
+  static constexpr Field kTime{1, WireType::kFixed32};
+  static constexpr Field kJoints{2, WireType::kBytes};
 };
 struct Motion {
   static constexpr Field kKeys{1, WireType::kBytes};
@@ -517,6 +543,15 @@ struct ColliderState {
   static constexpr Field kPlane{7, WireType::kBytes};
   static constexpr Field kBox{8, WireType::kBytes};
   static constexpr Field kHull{9, WireType::kBytes};
+  static constexpr Field kMesh{30, WireType::kBytes};
+  static constexpr Field kJoints{31, WireType::kBytes};
+};
+struct ColliderMeshDescription {
+  static constexpr Field kPositions{1, WireType::kBytes};
+  static constexpr Field kTriangles{2, WireType::kBytes};
+  static constexpr Field kJoints{3, WireType::kBytes};
+  static constexpr Field kWeights{4, WireType::kBytes};
+  static constexpr Field kRest{5, WireType::kBytes};
 };
 struct OperatingPoint {
   static constexpr Field kQuality{1, WireType::kVarint};
@@ -537,6 +572,11 @@ struct ColliderPoses {
   static constexpr Field kContactEvents{5, WireType::kVarint};
   static constexpr Field kServerTimeUs{60, WireType::kVarint};
   static constexpr Field kHands{61, WireType::kBytes};
+  static constexpr Field kJoints{81, WireType::kBytes};
+};
+struct ColliderJoints {
+  static constexpr Field kCollider{1, WireType::kBytes};
+  static constexpr Field kJoints{2, WireType::kBytes};
 };
 struct HandJoints {
   static constexpr Field kSide{1, WireType::kVarint};
@@ -786,6 +826,8 @@ struct AppliedCollider {
   static constexpr Field kCapsule{7, WireType::kBytes};
   static constexpr Field kPlane{8, WireType::kBytes};
   static constexpr Field kBox{9, WireType::kBytes};
+  static constexpr Field kJointsStart{29, WireType::kBytes};
+  static constexpr Field kJointsEnd{30, WireType::kBytes};
 };
 struct AppliedGrip {
   static constexpr Field kState{1, WireType::kVarint};

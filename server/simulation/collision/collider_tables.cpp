@@ -17,7 +17,7 @@ constexpr std::size_t kRecordTexels = sizeof(shared::ColliderRecord) / sizeof(ve
 constexpr float kFar = 1e15f;
 
 // Appends the planes of the shape. `firstPlane` is the texel of the first plane of all shapes.
-shared::ShapeRecord shapeRecord(const model::Shape& shape, std::size_t firstPlane,
+shared::ShapeRecord shapeRecord(const model::Shape& shape, const SolidTables& solids, std::size_t firstPlane,
                                 std::vector<vec4>& planes) {
   const auto first = static_cast<float>(firstPlane + planes.size());
   return std::visit(
@@ -34,12 +34,15 @@ shared::ShapeRecord shapeRecord(const model::Shape& shape, std::size_t firstPlan
                             for (const model::HalfSpace& plane : hull->planes)
                               planes.push_back(texel(plane.normal, plane.offset));
                             return shared::planesShape(first, static_cast<float>(hull->planes.size()));
+                          },
+                          [&](const model::Solid& solid) {
+                            return shared::solidShape(static_cast<float>(solids.placeOf(solid)));
                           }},
       shape);
 }
 
-shared::ColliderRecord recordOf(const MovingCollider& collider, std::size_t firstPlane,
-                                std::vector<vec4>& planes) {
+shared::ColliderRecord recordOf(const MovingCollider& collider, const SolidTables& solids,
+                                std::size_t firstPlane, std::vector<vec4>& planes) {
   const model::Quaternion& from = collider.start.orientation;
   const model::Quaternion& to = collider.end.orientation;
   const float sign = from.dot(to) < 0 ? -1.0f : 1.0f;
@@ -50,7 +53,7 @@ shared::ColliderRecord recordOf(const MovingCollider& collider, std::size_t firs
           .orientation = texel(from),
           .orientationChange = {sign * to.x() - from.x(), sign * to.y() - from.y(), sign * to.z() - from.z(),
                                 sign * to.w() - from.w()},
-          .shape = shapeRecord(collider.shape, firstPlane, planes)};
+          .shape = shapeRecord(collider.shape, solids, firstPlane, planes)};
 }
 
 shared::ColliderBounds boundsOf(const MovingCollider& collider, float reach) {
@@ -73,19 +76,23 @@ shared::ColliderBounds unite(const shared::ColliderBounds& a, const shared::Coll
 
 }  // namespace
 
-void fill(ColliderTables& tables, std::span<const MovingCollider> colliders) {
+void fill(ColliderTables& tables, std::span<const MovingCollider* const> colliders,
+          const SolidTables& solids) {
   assert(colliders.size() <= kMaxColliders);
   tables.records.clear();
   tables.planes.clear();
-  for (const MovingCollider& collider : colliders)
-    tables.records.push_back(recordOf(collider, kRecordTexels * colliders.size(), tables.planes));
+  for (const MovingCollider* const collider : colliders)
+    tables.records.push_back(recordOf(*collider, solids, kRecordTexels * colliders.size(), tables.planes));
   assert(tables.planes.size() <= kMaxColliderPlanes);
 
-  const std::size_t groups = (colliders.size() + shared::kColliderGroup - 1) / shared::kColliderGroup;
+  const auto others = static_cast<std::size_t>(
+      std::ranges::find_if(colliders, [](const MovingCollider* collider) { return isSolid(*collider); }) -
+      colliders.begin());
+  const std::size_t groups = (others + shared::kColliderGroup - 1) / shared::kColliderGroup;
   tables.bounds.clear();
   tables.bounds.resize(groups);
-  for (std::size_t i = 0; i < colliders.size(); ++i) {
-    const shared::ColliderBounds own = boundsOf(colliders[i], tables.records[i].reach);
+  for (std::size_t i = 0; i < others; ++i) {
+    const shared::ColliderBounds own = boundsOf(*colliders[i], tables.records[i].reach);
     shared::ColliderBounds& group = tables.bounds[i / shared::kColliderGroup];
     group = i % shared::kColliderGroup == 0 ? own : unite(group, own);
     tables.bounds.push_back(own);

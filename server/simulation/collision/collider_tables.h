@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/simulation/collision/moving_collider.h"
+#include "server/simulation/collision/solid_tables.h"
 #include "shaders/collision/collision.h"
 
 namespace clothstream::simulation {
@@ -19,7 +20,8 @@ struct ColliderTables {
 };
 
 // Replaces the contents of `tables` and reuses its memory. At most kMaxColliders, with kMaxColliderPlanes in
-// total.
-void fill(ColliderTables& tables, std::span<const MovingCollider> colliders);
+// total. Triangle meshes are the last of the colliders, and `solids` has them; they have no bounds.
+void fill(ColliderTables& tables, std::span<const MovingCollider* const> colliders,
+          const SolidTables& solids);
 
 }  // namespace clothstream::simulation

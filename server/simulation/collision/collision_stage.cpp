@@ -2,7 +2,9 @@
 // Upload of colliders, and the kernel that finds those near a tile.
 #include "server/simulation/collision/collision_stage.h"
 
+#include <algorithm>
 #include <cstring>
+#include <tuple>
 #include <vector>
 
 #include "kernels/gather_near_colliders.h"
@@ -37,10 +39,12 @@ std::size_t upload(vulkan::Recorder& recorder, const std::vector<Record>& record
 
 }  // namespace
 
-CollisionStage::CollisionStage(const vulkan::Device& device, std::uint32_t nodeCount,
-                               std::uint32_t clothCount, std::array<const Buffer*, 2> positions,
+CollisionStage::CollisionStage(const vulkan::Device& device, const SolidTables& solids,
+                               std::uint32_t nodeCount, std::uint32_t clothCount,
+                               std::array<const Buffer*, 2> positions,
                                std::array<const Buffer*, 2> velocities)
-    : nodeCount_(nodeCount),
+    : solidTables_(solids),
+      nodeCount_(nodeCount),
       clothCount_(clothCount),
       colliders_(device, BufferPurpose::texels, kColliderBytes),
       bounds_(device, BufferPurpose::texels, kBoundsBytes),
@@ -61,17 +65,26 @@ CollisionStage::CollisionStage(const vulkan::Device& device, std::uint32_t nodeC
 
 void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders,
                                   bool reportsContacts) {
-  fill(tables_, colliders);
-  count_ = static_cast<std::uint32_t>(colliders.size());
+  ordered_.clear();
+  indices_.clear();
   double work = 1;
-  for (const MovingCollider& collider : colliders) work += model::colliderWork(collider.shape);
+  for (const bool solids : {false, true}) {
+    for (std::uint32_t i = 0; i < colliders.size(); ++i) {
+      if (isSolid(colliders[i]) != solids) continue;
+      ordered_.push_back(&colliders[i]);
+      indices_.push_back(i);
+      if (!solids) work += model::colliderWork(colliders[i].shape);
+    }
+    if (!solids) count_ = static_cast<std::uint32_t>(ordered_.size());
+  }
+  fill(tables_, ordered_, solidTables_);
   nodeWork_ = static_cast<std::uint32_t>(work);
   slot_ = 1 - slot_;
   const Buffer& through = uploads_[slot_];
   std::size_t offset = upload(recorder, tables_.records, through, 0, colliders_, 0);
   offset = upload(recorder, tables_.planes, through, offset, colliders_, offset);
   upload(recorder, tables_.bounds, through, offset, bounds_, 0);
-  reportsContacts_ = reportsContacts && count_ > 0;
+  reportsContacts_ = reportsContacts && !colliders.empty();
   if (reportsContacts_) recorder.fill(contactImpulses_, 0, contactBytes());
 }
 
@@ -86,9 +99,12 @@ std::vector<ContactStatus> CollisionStage::contacts() const {
   std::vector<ContactStatus> statuses;
   if (!reportsContacts_) return statuses;
   const auto units = contactReadbacks_[slot_].mapped<const std::uint32_t>();
-  for (std::uint32_t i = 0; i < count_ * clothCount_; ++i)
+  for (std::uint32_t i = 0; i < indices_.size() * clothCount_; ++i)
     if (units[i] != 0)
-      statuses.push_back({i / clothCount_, i % clothCount_, units[i] / double{shared::kImpulseUnits}});
+      statuses.push_back(
+          {indices_[i / clothCount_], i % clothCount_, units[i] / double{shared::kImpulseUnits}});
+  std::ranges::sort(statuses, {},
+                    [](const ContactStatus& status) { return std::tuple(status.collider, status.cloth); });
   return statuses;
 }
 

@@ -23,8 +23,9 @@ namespace clothstream::simulation {
 class CollisionStage {
  public:
   // `positions` and `velocities` are the two state buffers of the scene: texels that outlive the stage.
-  CollisionStage(const vulkan::Device& device, std::uint32_t nodeCount, std::uint32_t clothCount,
-                 std::array<const vulkan::Buffer*, 2> positions,
+  // `solids` has the meshes of all colliders and outlives the stage.
+  CollisionStage(const vulkan::Device& device, const SolidTables& solids, std::uint32_t nodeCount,
+                 std::uint32_t clothCount, std::array<const vulkan::Buffer*, 2> positions,
                  std::array<const vulkan::Buffer*, 2> velocities);
 
   // Uploads the colliders of the next tick. At most one tick may be in flight. `reportsContacts`: count their
@@ -37,8 +38,10 @@ class CollisionStage {
   // no colliders.
   void recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds, float thickness);
 
-  // True if the tick has colliders.
+  // True if the tick has colliders that are not triangle meshes.
   bool active() const { return count_ > 0; }
+  // Number of colliders that are triangle meshes. Their numbers on the device follow those of the others.
+  std::uint32_t solidCount() const { return static_cast<std::uint32_t>(indices_.size()) - count_; }
   shared::CollisionPush push(std::uint32_t substep, std::uint32_t substeps, float tickRate) const;
 
   // Copies the contacts to the CPU, after the tick's substeps and a barrier.
@@ -52,12 +55,15 @@ class CollisionStage {
 
  private:
   std::size_t contactBytes() const {
-    return reportsContacts_ ? std::size_t{count_} * clothCount_ * sizeof(std::uint32_t) : 0;
+    return reportsContacts_ ? indices_.size() * clothCount_ * sizeof(std::uint32_t) : 0;
   }
 
+  const SolidTables& solidTables_;
   std::uint32_t nodeCount_, clothCount_;
   bool reportsContacts_ = false;
-  std::uint32_t count_ = 0;
+  std::uint32_t count_ = 0;                     // of colliders that are not triangle meshes
+  std::vector<const MovingCollider*> ordered_;  // while inputs are recorded: as the device numbers them
+  std::vector<std::uint32_t> indices_;          // of these colliders among the inputs of the tick
   std::uint32_t nodeWork_ = 1;
   std::uint32_t slot_ = 0;
   ColliderTables tables_;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <variant>
 
 #include "server/model/collider.h"
 
@@ -16,6 +17,10 @@ struct MovingCollider {
   model::Pose start = {}, end = {};
   float friction = 1;  // Coulomb; multiplied with the cloth's
 };
+
+inline bool isSolid(const MovingCollider& collider) {
+  return std::holds_alternative<model::Solid>(collider.shape);
+}
 
 // Effect of a collider on a cloth in a tick.
 struct ContactStatus {

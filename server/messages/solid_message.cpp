@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+#include "server/messages/solid_message.h"
+
+#include <bit>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/messages/limits.h"
+
+namespace clothstream::messages {
+namespace {
+
+// Vertices and triangles as the message or the file has them.
+struct Surface {
+  std::vector<model::Vec3> vertices;
+  std::vector<model::TriangleCorners> triangles;
+};
+
+void checkCounts(Checks& checks, const Path& path, std::size_t vertices, std::size_t triangles) {
+  checks.count(path / "positions", vertices, 4, limits::kMaxSolidVertices);
+  checks.count(path / "triangles", triangles, 4, model::kMaxClosedMeshTriangles);
+}
+
+Surface ofMessage(Checks& checks, const Path& path, const v1::ColliderMesh& message) {
+  if (message.positions_size() % 3 != 0)
+    checks.fail(path / "positions", "",
+                fmt::format("has {} numbers; must have 3 for each vertex", message.positions_size()));
+  if (message.triangles_size() % 3 != 0)
+    checks.fail(path / "triangles", "",
+                fmt::format("has {} numbers; must have 3 for each triangle", message.triangles_size()));
+  checkCounts(checks, path, static_cast<std::size_t>(message.positions_size() / 3),
+              static_cast<std::size_t>(message.triangles_size() / 3));
+  Surface surface;
+  if (checks.failed()) return surface;
+  for (int i = 0; i < message.positions_size(); i += 3)
+    surface.vertices.emplace_back(message.positions(i), message.positions(i + 1), message.positions(i + 2));
+  for (int i = 0; i < message.triangles_size(); i += 3)
+    surface.triangles.push_back({message.triangles(i), message.triangles(i + 1), message.triangles(i + 2)});
+  return surface;
+}
+
+// Divides faces with more than three corners into a fan.
+Surface ofFile(Checks& checks, const Path& path, const v1::ColliderMesh& message,
+               const MeshReader& readMesh) {
+  const std::string shown = '"' + message.file() + '"';
+  if (message.positions_size() > 0 || message.triangles_size() > 0)
+    checks.fail(path / "file", shown, "is given together with positions or triangles; give one or the other");
+  if (!readMesh)
+    checks.fail(path / "file", shown,
+                "files can only be named in scene files; send positions and triangles instead");
+  Surface surface;
+  if (checks.failed()) return surface;
+  auto source = readMesh(message.file());
+  if (!source) {
+    checks.fail(path / "file", shown, source.error());
+    return surface;
+  }
+  std::size_t triangles = 0;
+  for (const meshes::SourceFace& face : source->faces)
+    triangles += face.cornerCount < 3 ? 0 : face.cornerCount - 2;
+  checkCounts(checks, path, source->vertices.size(), triangles);
+  if (checks.failed()) return surface;
+  surface.vertices = std::move(source->vertices);
+  for (const meshes::SourceFace& face : source->faces)
+    for (std::uint32_t corner = 2; corner < face.cornerCount; ++corner)
+      surface.triangles.push_back({source->cornerOf(face, 0).vertex,
+                                   source->cornerOf(face, corner - 1).vertex,
+                                   source->cornerOf(face, corner).vertex});
+  return surface;
+}
+
+// Scales the vertices and checks that they are in the world.
+void place(Checks& checks, const Path& path, float scale, std::vector<model::Vec3>& vertices) {
+  for (std::size_t i = 0; i < vertices.size() && !checks.failed(); ++i) {
+    vertices[i] *= scale;
+    for (int axis = 0; axis < 3; ++axis)
+      checks.number(path.at("positions", static_cast<int>(3 * i) + axis), vertices[i][axis],
+                    limits::kPosition);
+  }
+}
+
+template <typename Element>
+std::string littleEndian(const std::vector<Element>& elements) {
+  static_assert(std::endian::native == std::endian::little && sizeof(Element) == 12);
+  return {reinterpret_cast<const char*>(elements.data()), elements.size() * sizeof(Element)};
+}
+
+}  // namespace
+
+model::Solid toSolid(Checks& checks, const Path& path, const v1::ColliderMesh& message,
+                     const MeshReader& readMesh) {
+  const float scale =
+      message.has_scale() ? checks.number(path / "scale", message.scale(), limits::kScale) : 1.0f;
+  Surface surface =
+      message.file().empty() ? ofMessage(checks, path, message) : ofFile(checks, path, message, readMesh);
+  if (!checks.failed()) place(checks, path, scale, surface.vertices);
+  if (checks.failed()) return nullptr;
+  auto made = model::makeClosedMesh(std::move(surface.vertices), std::move(surface.triangles));
+  if (const auto* problem = std::get_if<model::ClosedMeshProblem>(&made)) {
+    if (problem->triangle)
+      checks.fail(path, "", fmt::format("triangle {} {}", *problem->triangle, problem->text));
+    else
+      checks.fail(path, "", problem->text);
+    return nullptr;
+  }
+  return std::make_shared<const model::ClosedMesh>(std::get<model::ClosedMesh>(std::move(made)));
+}
+
+void write(const model::ClosedMesh& mesh, v1::ColliderMesh& message) {
+  message.Clear();
+  for (const model::Vec3& p : mesh.vertices) message.mutable_positions()->Add(p.data(), p.data() + 3);
+  for (const model::TriangleCorners& t : mesh.triangles) message.mutable_triangles()->Add(t.begin(), t.end());
+}
+
+void write(const model::ClosedMesh& mesh, v1::ColliderMeshDescription& message) {
+  message.set_positions(littleEndian(mesh.vertices));
+  message.set_triangles(littleEndian(mesh.triangles));
+}
+
+std::size_t geometryBytes(const model::ClosedMesh& mesh) {
+  return 12 * (mesh.vertices.size() + mesh.triangles.size());
+}
+
+}  // namespace clothstream::messages

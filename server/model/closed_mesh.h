@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Solid bodies as closed triangle meshes, made from vertices and triangles and checked.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "server/model/pose.h"
+
+namespace clothstream::model {
+
+// Largest number of triangles of a closed mesh.
+inline constexpr std::size_t kMaxClosedMeshTriangles = 20'000;
+// Smallest area of a triangle, m^2. The products in the kernels stay far above the smallest floats.
+inline constexpr double kMinTriangleArea = 1e-9;
+
+using TriangleCorners = std::array<std::uint32_t, 3>;
+
+// Surface of a solid. Each edge has exactly two triangles, which traverse it in opposite directions. The
+// solid need not be convex or connected.
+struct ClosedMesh {
+  std::vector<Vec3> vertices;              // m; each has a triangle
+  std::vector<TriangleCorners> triangles;  // counter-clockwise seen from outside
+  // The triangles across the edges from corner 0 to 1, 1 to 2 and 2 to 0 of each triangle.
+  std::vector<TriangleCorners> neighbours;
+  float reach = 0;  // m, of a sphere around the origin that contains the mesh
+};
+
+struct ClosedMeshProblem {
+  std::optional<std::size_t> triangle;  // absent: the problem concerns the whole mesh
+  std::string text;
+};
+
+// Vertices must be finite. Vertices in the same place become one, and the order of the others stays. Returns
+// a problem if a triangle has an unknown corner or no area, if the surface is not closed or not oriented, if
+// it is inside out, or if it has more than kMaxClosedMeshTriangles. Takes time in proportion to the number of
+// triangles, apart from sorting.
+std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> vertices,
+                                                           std::vector<TriangleCorners> triangles);
+
+// Normals at the vertices that tell inside from outside: the sum of the unit normals of the triangles around
+// a vertex, each weighted by its angle there. Baerentzen and Aanaes, "Signed distance computation using the
+// angle weighted pseudonormal", 2005. Not normalised.
+std::vector<Eigen::Vector3d> vertexPseudonormals(const ClosedMesh& mesh);
+
+}  // namespace clothstream::model

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+#include "server/reference/solid.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace clothstream::reference {
+namespace {
+
+using Vec3 = Eigen::Vector3d;
+using Corners = std::array<Vec3, 3>;
+
+constexpr double kTouching = 1e-4;  // m
+constexpr double kSame = 1e-9;      // m, difference of distances from the same point
+
+Corners cornersOf(const model::ClosedMesh& mesh, const model::TriangleCorners& triangle) {
+  return {mesh.vertices[triangle[0]].cast<double>(), mesh.vertices[triangle[1]].cast<double>(),
+          mesh.vertices[triangle[2]].cast<double>()};
+}
+
+Vec3 unitNormal(const Corners& t) {
+  return (t[1] - t[0]).cross(t[2] - t[0]).normalized();
+}
+
+Vec3 nearestOnSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const double part = (p - a).dot(b - a) / (b - a).squaredNorm();
+  return a + std::clamp(part, 0.0, 1.0) * (b - a);
+}
+
+// The foot of the perpendicular if it is in the triangle, else the nearest point of the edges.
+Vec3 nearestOnTriangle(const Vec3& p, const Corners& t) {
+  const Vec3 normal = unitNormal(t);
+  const Vec3 foot = p - normal.dot(p - t[0]) * normal;
+  bool inside = true;
+  Vec3 nearest = t[0];
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec3 &a = t[i], &b = t[(i + 1) % 3];
+    inside = inside && normal.cross(b - a).dot(foot - a) >= 0;
+    const Vec3 onEdge = nearestOnSegment(p, a, b);
+    if ((p - onEdge).squaredNorm() < (p - nearest).squaredNorm()) nearest = onEdge;
+  }
+  return inside ? foot : nearest;
+}
+
+// Angle of the triangle around one of its points: all around in its middle, half at an edge.
+double angleAt(const Corners& t, const Vec3& point) {
+  const double pi = std::acos(-1.0);
+  for (std::size_t i = 0; i < 3; ++i)
+    if ((point - t[i]).norm() < kSame)
+      return std::acos(std::clamp(
+          (t[(i + 1) % 3] - t[i]).normalized().dot((t[(i + 2) % 3] - t[i]).normalized()), -1.0, 1.0));
+  for (std::size_t i = 0; i < 3; ++i)
+    if ((point - nearestOnSegment(point, t[i], t[(i + 1) % 3])).norm() < kSame) return pi;
+  return 2 * pi;
+}
+
+double solidAngle(const Vec3& p, const Corners& t) {
+  const Vec3 a = t[0] - p, b = t[1] - p, c = t[2] - p;
+  const double la = a.norm(), lb = b.norm(), lc = c.norm();
+  return 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+}
+
+}  // namespace
+
+NearestPoint nearestOn(const model::ClosedMesh& mesh, const Vec3& p) {
+  NearestPoint nearest;
+  double least = std::numeric_limits<double>::infinity(), angle = 0;
+  for (const model::TriangleCorners& triangle : mesh.triangles) {
+    const Corners corners = cornersOf(mesh, triangle);
+    const Vec3 point = nearestOnTriangle(p, corners);
+    angle += solidAngle(p, corners);
+    if ((p - point).norm() < least) {
+      least = (p - point).norm();
+      nearest.point = point;
+    }
+  }
+  const double sign = angle > 2 * std::acos(-1.0) ? -1 : 1;
+  nearest.distance = sign * least;
+  nearest.normal = sign * (p - nearest.point) / std::max(least, 1e-300);
+  if (least >= kTouching) return nearest;
+  nearest.normal = Vec3::Zero();
+  for (const model::TriangleCorners& triangle : mesh.triangles) {
+    const Corners corners = cornersOf(mesh, triangle);
+    if ((nearestOnTriangle(p, corners) - nearest.point).norm() < kSame)
+      nearest.normal += angleAt(corners, nearest.point) * unitNormal(corners);
+  }
+  nearest.normal.normalize();
+  return nearest;
+}
+
+std::optional<Crossing> firstCrossing(const model::ClosedMesh& mesh, const Vec3& from, const Vec3& to) {
+  std::optional<Crossing> first;
+  for (const model::TriangleCorners& triangle : mesh.triangles) {
+    const Corners t = cornersOf(mesh, triangle);
+    const Vec3 normal = unitNormal(t);
+    const double before = normal.dot(from - t[0]), after = normal.dot(to - t[0]);
+    if (before < 0 || after >= 0) continue;
+    const double part = before / (before - after);
+    if (first && part >= first->part) continue;
+    const Vec3 point = from + part * (to - from);
+    bool inside = true;
+    for (std::size_t i = 0; i < 3; ++i)
+      inside = inside && normal.cross(t[(i + 1) % 3] - t[i]).dot(point - t[i]) >= -kSame;
+    if (inside) first = Crossing{part, normal};
+  }
+  return first;
+}
+
+}  // namespace clothstream::reference

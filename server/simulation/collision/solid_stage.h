@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// Collision with the triangle meshes of a scene, at the end of each substep.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "server/model/scene.h"
+#include "server/simulation/collision/solid_tables.h"
+#include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
+#include "server/simulation/state_buffers.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// Meshes of a scene on the device. Belongs to the device's thread.
+class SolidStage {
+ public:
+  // `tables` are those of the scene's colliders.
+  SolidStage(const vulkan::Device& device, const SolidTables& tables, std::span<const model::Cloth> cloths,
+             const StateBuffers& state, std::uint32_t workgroupSize);
+
+  void recordTables(vulkan::Recorder& recorder) const;
+  // Collides all nodes with the meshes. The state at the substep's start is in the buffers `present`, its end
+  // in the others. Begins with a barrier. The colliders from number collision.colliderCount on are
+  // `solidCount` meshes.
+  void record(vulkan::Recorder& recorder, std::uint32_t present, const shared::CollisionPush& collision,
+              std::uint32_t solidCount) const;
+
+  const vulkan::Buffer& solids() const { return solids_.texels(); }
+
+ private:
+  std::uint32_t workgroupSize_;
+  std::uint32_t tileCount_;
+  DeviceTable solids_, tiles_;
+  Stage collide_;
+};
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+#include "server/simulation/collision/solid_tables.h"
+
+#include <algorithm>
+#include <cassert>
+
+#include "server/simulation/collision/triangle_tree.h"
+#include "server/simulation/texel.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using shared::vec4;
+
+vec4 numbers(const model::TriangleCorners& triangle) {
+  return {static_cast<float>(triangle[0]), static_cast<float>(triangle[1]), static_cast<float>(triangle[2]),
+          0};
+}
+
+// Appends a mesh and its tree.
+void append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
+  const TriangleTree tree = makeTriangleTree(mesh);
+  const std::size_t record = texels.size();
+  const std::size_t firstTriangle = record + CLOTHSTREAM_SOLID_TEXELS;
+  const std::size_t firstVertex = firstTriangle + CLOTHSTREAM_TRIANGLE_TEXELS * mesh.triangles.size();
+  const std::size_t firstBox = firstVertex + CLOTHSTREAM_VERTEX_TEXELS * mesh.vertices.size();
+  texels.push_back({static_cast<float>(firstTriangle), static_cast<float>(firstVertex),
+                    static_cast<float>(firstBox), static_cast<float>(tree.leafCount)});
+  texels.push_back({static_cast<float>(mesh.triangles.size()), 0, 0, 0});
+
+  std::vector<std::uint32_t> rank(tree.order.size());
+  for (std::uint32_t i = 0; i < rank.size(); ++i) rank[tree.order[i]] = i;
+  for (const std::uint32_t triangle : tree.order) {
+    model::TriangleCorners neighbours = mesh.neighbours[triangle];
+    for (std::uint32_t& neighbour : neighbours) neighbour = rank[neighbour];
+    texels.push_back(numbers(mesh.triangles[triangle]));
+    texels.push_back(numbers(neighbours));
+  }
+  const std::vector<Eigen::Vector3d> normals = model::vertexPseudonormals(mesh);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    texels.push_back(texel(mesh.vertices[i], 0));
+    texels.push_back(texel(model::Vec3(normals[i].cast<float>()), 0));
+  }
+  for (const TriangleTree::Box& box : tree.boxes) {
+    texels.push_back(texel(box.low, 0));
+    texels.push_back(texel(box.high, 0));
+  }
+}
+
+}  // namespace
+
+std::uint32_t SolidTables::placeOf(const model::Solid& solid) const {
+  const auto found = std::ranges::find(solids, solid);
+  assert(found != solids.end());
+  return places[static_cast<std::size_t>(found - solids.begin())];
+}
+
+SolidTables solidTables(std::span<const model::Collider> colliders) {
+  SolidTables tables;
+  for (const model::Collider& collider : colliders) {
+    const auto* solid = std::get_if<model::Solid>(&collider.shape);
+    if (solid == nullptr || std::ranges::find(tables.solids, *solid) != tables.solids.end()) continue;
+    tables.solids.push_back(*solid);
+    tables.places.push_back(static_cast<std::uint32_t>(tables.texels.size()));
+    append(**solid, tables.texels);
+  }
+  assert(tables.texels.size() < 1u << 24);  // numbers of texels are floats
+  return tables;
+}
+
+std::vector<shared::NodeTileRecord> nodeTiles(std::span<const model::Cloth> cloths, std::uint32_t size) {
+  std::vector<shared::NodeTileRecord> tiles;
+  for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth)
+    for (std::uint32_t first = 0; first < cloths[cloth].nodeCount(); first += size)
+      tiles.push_back({static_cast<float>(cloth), static_cast<float>(first), 0, 0});
+  return tiles;
+}
+
+}  // namespace clothstream::simulation

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+// The contact of a path with a closed triangle solid, in the frame of the mesh.
+//
+// A path that begins outside and crosses the surface is stopped where it first crosses it, however thin the
+// mesh is there. A path that begins inside leaves by the nearest way at its beginning. All other paths end
+// at the distance `thickness` from the nearest point of the solid, or farther away.
+#ifndef CLOTHSTREAM_SHADERS_COLLISION_SOLID_CONTACT_GLSL
+#define CLOTHSTREAM_SHADERS_COLLISION_SOLID_CONTACT_GLSL
+
+#include "shaders/collision/contact.glsl"
+#include "shaders/collision/solid_nearest.glsl"
+
+// A path is searched for its first crossing in at most this number of strides.
+const uint kStrides = 32u;
+const float kLeastStride = 1.0 / 32.0;  // as a share of the path
+
+// The contact that keeps `to` outside, if the path crossed the surface near `entry` or began inside there.
+Contact leaveAt(Nearest entry, Nearest end, vec3 to, float thickness) {
+  if (end.found && dotProduct(entry.normal, end.normal) > 0.0) {
+    precise float depth = thickness - end.distance;
+    if (depth > 0.0) {
+      return Contact(end.normal, depth);
+    }
+    if (entry.distance < 0.0) {
+      return kNoContact;
+    }
+  }
+  precise vec3 beyond = to - entry.point;
+  precise float depth = thickness - dotProduct(entry.normal, beyond);
+  return Contact(entry.normal, depth);
+}
+
+// The distance from the mesh changes at most by the length of the path. So a path whose ends are far enough
+// outside cannot cross the surface. Any other path is followed in strides of the distance from the solid, or
+// of kLeastStride of the path if that is longer.
+Contact touchSolid(SolidRecord solid, vec3 from, vec3 to, float thickness) {
+  precise vec3 path = to - from;
+  float squared = dotProduct(path, path);
+  float inverse = reciprocalSquareRoot(max(squared, 1e-24));
+  precise float way = squared * inverse;
+  precise float bound = way + max(thickness, kSolidDepth);
+  Nearest entry = Nearest(false, 0.0, vec3(0.0), vec3(0.0));
+  Nearest end = entry;
+  bool entered = false;
+  float part = 0.0;
+  uint queries = kStrides + 2u;
+  for (uint query = 0u; query < queries; ++query) {
+    float share = query == 1u ? 1.0 : part;
+    precise vec3 between = from + share * path;
+    Nearest here = nearestOnSolid(solid, query == 1u ? to : between, bound);
+    if (query == 0u) {
+      entry = here;
+      precise float least = here.distance - way;
+      if (!here.found || least >= thickness) {
+        return kNoContact;
+      }
+      entered = here.distance < 0.0;
+    } else if (query == 1u) {
+      end = here;
+      precise float both = entry.distance + end.distance;
+      bool mayCross = !entered && end.found && (end.distance < 0.0 || both < way);
+      queries = mayCross ? queries : 0u;
+    } else if (here.found && here.distance < 0.0) {
+      entered = true;
+      queries = 0u;
+    } else {
+      if (here.found) {
+        entry = here;
+      }
+      queries = part >= 1.0 ? 0u : queries;
+    }
+    if (query > 0u) {
+      float stride = here.found && query > 1u ? here.distance : entry.distance;
+      precise float next = part + max(stride * inverse, kLeastStride);
+      part = next < 1.0 ? next : 1.0;
+    }
+  }
+  if (entered) {
+    return leaveAt(entry, end, to, thickness);
+  }
+  precise float depth = thickness - end.distance;
+  return Contact(end.normal, end.found ? depth : 0.0);
+}
+
+#endif

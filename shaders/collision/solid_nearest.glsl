@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+// The point of a closed triangle mesh that is nearest to a point, and on which side of the surface the point
+// is: Baerentzen and Aanaes, "Signed distance computation using the angle weighted pseudonormal", 2005.
+//
+// The including kernel defines kSolidBinding.
+#ifndef CLOTHSTREAM_SHADERS_COLLISION_SOLID_NEAREST_GLSL
+#define CLOTHSTREAM_SHADERS_COLLISION_SOLID_NEAREST_GLSL
+
+#include "shaders/collision/solid.h"
+#include "shaders/shared/arithmetic.glsl"
+
+layout(binding = kSolidBinding) uniform samplerBuffer solids;
+
+// Nearer to the surface than this, the pseudonormal is the normal: the direction from the nearest point has
+// too few digits. Metres.
+const float kTouching = 1e-4;
+
+// Parts of a triangle. Corner k is kCorner + k; the edge from corner k to the next one is kEdge + k.
+const uint kFace = 0u;
+const uint kCorner = 1u;
+const uint kEdge = 4u;
+
+struct Nearest {
+  bool found;      // false: the mesh is farther away than the bound
+  float distance;  // m, negative inside
+  vec3 point;
+  vec3 normal;  // length 1, out of the mesh
+};
+
+struct Corners {
+  vec3 a;
+  vec3 b;
+  vec3 c;
+};
+
+// A point a + second (b - a) + third (c - a) of a triangle.
+struct TrianglePoint {
+  float second;
+  float third;
+  uint part;
+};
+
+vec3 vertexAt(SolidRecord solid, uint vertex) {
+  return texelFetch(solids, int(uint(solid.firstVertex) + CLOTHSTREAM_VERTEX_TEXELS * vertex)).xyz;
+}
+
+vec3 vertexNormalAt(SolidRecord solid, uint vertex) {
+  return texelFetch(solids, int(uint(solid.firstVertex) + CLOTHSTREAM_VERTEX_TEXELS * vertex) + 1).xyz;
+}
+
+Corners fetchCorners(SolidRecord solid, uint triangle) {
+  uvec3 vertices = cornersAt(solids, solid, triangle);
+  return Corners(vertexAt(solid, vertices.x), vertexAt(solid, vertices.y), vertexAt(solid, vertices.z));
+}
+
+// Quotient of two numbers that are not negative.
+float quotient(float a, float b) {
+  precise float q = a * reciprocal(max(b, 1e-30));
+  return q;
+}
+
+// Ericson, "Real-Time Collision Detection", 2005, 5.1.5.
+TrianglePoint nearestOnTriangle(vec3 p, Corners t) {
+  precise vec3 ab = t.b - t.a;
+  precise vec3 ac = t.c - t.a;
+  precise vec3 ap = p - t.a;
+  precise vec3 bp = p - t.b;
+  precise vec3 cp = p - t.c;
+  float d1 = dotProduct(ab, ap), d2 = dotProduct(ac, ap);
+  float d3 = dotProduct(ab, bp), d4 = dotProduct(ac, bp);
+  float d5 = dotProduct(ab, cp), d6 = dotProduct(ac, cp);
+  precise float vc = d1 * d4 - d3 * d2;
+  precise float vb = d5 * d2 - d1 * d6;
+  precise float va = d3 * d6 - d5 * d4;
+  precise float fromB = d4 - d3;
+  precise float fromC = d5 - d6;
+  precise float otherB = -d3;
+  precise float otherC = -d6;
+  if (d1 <= 0.0 && d2 <= 0.0) {
+    return TrianglePoint(0.0, 0.0, kCorner);
+  }
+  if (d3 >= 0.0 && d4 <= d3) {
+    return TrianglePoint(1.0, 0.0, kCorner + 1u);
+  }
+  if (d6 >= 0.0 && d5 <= d6) {
+    return TrianglePoint(0.0, 1.0, kCorner + 2u);
+  }
+  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) {
+    precise float both = d1 + otherB;
+    return TrianglePoint(quotient(d1, both), 0.0, kEdge);
+  }
+  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) {
+    precise float both = d2 + otherC;
+    return TrianglePoint(0.0, quotient(d2, both), kEdge + 2u);
+  }
+  if (va <= 0.0 && fromB >= 0.0 && fromC >= 0.0) {
+    precise float both = fromB + fromC;
+    float third = quotient(fromB, both);
+    precise float second = 1.0 - third;
+    return TrianglePoint(second, third, kEdge + 1u);
+  }
+  precise float all_ = va + vb + vc;
+  float inverse = reciprocal(max(all_, 1e-30));
+  precise float second = vb * inverse;
+  precise float third = vc * inverse;
+  return TrianglePoint(second, third, kFace);
+}
+
+vec3 pointOf(Corners t, TrianglePoint at) {
+  precise vec3 point = t.a + at.second * (t.b - t.a) + at.third * (t.c - t.a);
+  return point;
+}
+
+vec3 unitNormal(Corners t) {
+  precise vec3 ab = t.b - t.a;
+  precise vec3 ac = t.c - t.a;
+  vec3 normal = crossProduct(ab, ac);
+  precise vec3 unit_ = normal * reciprocalSquareRoot(max(dotProduct(normal, normal), 1e-30));
+  return unit_;
+}
+
+vec3 pseudonormal(SolidRecord solid, uint triangle, uint part) {
+  if (part >= kCorner && part < kEdge) {
+    return vertexNormalAt(solid, cornersAt(solids, solid, triangle)[part - kCorner]);
+  }
+  precise vec3 normal = unitNormal(fetchCorners(solid, triangle));
+  if (part != kFace) {
+    uint other = neighboursAt(solids, solid, triangle)[part - kEdge];
+    normal = normal + unitNormal(fetchCorners(solid, other));
+  }
+  return normal;
+}
+
+// Square of the distance from a box.
+float squaredFromBox(vec3 p, SolidRecord solid, uint node) {
+  int texel = int(uint(solid.firstBox) + CLOTHSTREAM_BOX_TEXELS * node);
+  precise vec3 below = texelFetch(solids, texel).xyz - p;
+  precise vec3 above = p - texelFetch(solids, texel + 1).xyz;
+  vec3 outside = max(max(below, above), vec3(0.0));
+  return dotProduct(outside, outside);
+}
+
+// The node of the tree that follows a node and all nodes below it; 0 after the last one.
+uint nodeAfter(uint node) {
+  uint next = node + 1u;
+  next >>= uint(findLSB(next));
+  return next == 1u ? 0u : next;
+}
+
+// The nearest point nearer than `bound`. Of points at the same distance, the one of the first triangle.
+Nearest nearestOnSolid(SolidRecord solid, vec3 p, float bound) {
+  uint leaves = uint(solid.leafCount), triangles = uint(solid.triangleCount);
+  uint shift = uint(findMSB(leaves));
+  precise float best = bound * bound;
+  bool found = false;
+  uint triangle = 0u;
+  TrianglePoint at = TrianglePoint(0.0, 0.0, kFace);
+  uint node = 1u;
+  while (node != 0u) {
+    bool near = squaredFromBox(p, solid, node) < best;
+    if (near && node >= leaves) {
+      uint leaf = node - leaves;
+      uint end = ((leaf + 1u) * triangles) >> shift;
+      for (uint t = (leaf * triangles) >> shift; t < end; ++t) {
+        Corners corners = fetchCorners(solid, t);
+        TrianglePoint nearest = nearestOnTriangle(p, corners);
+        precise vec3 apart = p - pointOf(corners, nearest);
+        float squared = dotProduct(apart, apart);
+        if (squared < best) {
+          best = squared;
+          found = true;
+          triangle = t;
+          at = nearest;
+        }
+      }
+    }
+    node = near && node < leaves ? 2u * node : nodeAfter(node);
+  }
+  if (!found) {
+    return Nearest(false, bound, vec3(0.0), vec3(0.0, 1.0, 0.0));
+  }
+  vec3 point = pointOf(fetchCorners(solid, triangle), at);
+  vec3 outwards = pseudonormal(solid, triangle, at.part);
+  precise vec3 apart = p - point;
+  float inverse = reciprocalSquareRoot(max(best, 1e-24));
+  precise float size = best * inverse;
+  bool isOutside = dotProduct(apart, outwards) >= 0.0;
+  precise float distance_ = isOutside ? size : -size;
+  precise float sign_ = isOutside ? inverse : -inverse;
+  precise vec3 away = sign_ * apart;
+  precise vec3 along = outwards * reciprocalSquareRoot(max(dotProduct(outwards, outwards), 1e-24));
+  return Nearest(true, distance_, point, size < kTouching ? along : away);
+}
+
+#endif
