@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Suite colliders: the cost of 1, 100 and 4,000 colliders, which are the hands of a hundred people.
+// Suite colliders: the cost of 1, 100 and 4,000 colliders, which are the hands of a hundred people, and of a
+// hundred spheres that a sheet lies on.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
 
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
@@ -52,6 +58,84 @@ std::vector<simulation::MovingCollider> hands(std::size_t count) {
   return colliders;
 }
 
+// ---- A sheet on spheres
+
+constexpr std::uint32_t kSheet = 64;  // rows and columns
+constexpr int kSpheres = 10;          // in each of two directions
+constexpr int kSettling = 72;         // ticks
+
+// A level sheet with 2 cm between nodes, free at all edges.
+model::Scene sheet() {
+  model::Scene scene = curtain(kSheet);
+  model::Cloth& cloth = scene.cloths.front();
+  cloth.pins.clear();
+  cloth.structural.damping = cloth.shear.damping = 0.05f;
+  cloth.grid.pose = {model::Vec3(0, 0.06f, -cloth.grid.height / 2),
+                     model::Quaternion(Eigen::AngleAxisf(-1.5707964f, model::Vec3::UnitX()))};
+  return scene;
+}
+
+// A bed of spheres, each of which touches the sheet that lies on them. They move up and down by `lift` a
+// tick, half of them against the others.
+std::vector<simulation::MovingCollider> bed(float lift, int tick) {
+  const float pitch = 0.12f;  // m; the sheet reaches 9 cm beyond the outermost spheres
+  std::vector<simulation::MovingCollider> colliders;
+  for (int i = 0; i < kSpheres * kSpheres; ++i) {
+    const auto place = [&](int at) {
+      const bool up = (at + i) % 2 == 0;
+      return model::Pose{
+          model::Vec3(pitch * (static_cast<float>(i % kSpheres) - 0.5f * (kSpheres - 1)), up ? lift : 0,
+                      pitch * (static_cast<float>(i / kSpheres) - 0.5f * (kSpheres - 1))),
+          model::Quaternion::Identity()};
+    };
+    colliders.push_back({model::Sphere{.radius = 0.05f}, place(tick), place(tick + 1), 0.5f});
+  }
+  return colliders;
+}
+
+// Ticks with and without spheres alternate. Both sheets start in the state in which a sheet lies on them.
+void measureBed(vulkan::Device& device, const Settings& settings, float lift, Rows& rows) {
+  const model::Scene scene = sheet();
+  const simulation::SimulationOptions options{settings.rowsPerInvocation, settings.workgroupSize, {}};
+  Simulated touching(device, scene, options), without(device, scene, options);
+  const simulation::TickInputs none{scene.environment, {}};
+  touching.check({scene.environment, bed(lift, 0)});
+  touching.restart();
+  int tick = 0;
+  simulation::TickInputs inputs{scene.environment, {}, true};
+  const auto next = [&] {
+    inputs.colliders = bed(lift, tick++);
+    touching.tick(inputs);
+  };
+  while (tick < kSettling) next();
+  std::vector<bool> touched(kSpheres * kSpheres);
+  for (const simulation::ContactStatus& contact : touching.contacts()) touched[contact.collider] = true;
+  if (const auto count = std::ranges::count(touched, true); count < 95)
+    throw std::runtime_error(fmt::format("only {} of 100 spheres touch the sheet", count));
+  inputs.reportsContacts = false;
+  without.restart(touching.state());
+  next();
+  without.tick(none);
+  touching.forgetTimes();
+  without.forgetTimes();
+  double spent = 0;
+  while (spent < 2 * settings.seconds || without.wall().count() < 7)
+    spent += secondsOf([&] { next(); }) + secondsOf([&] { without.tick(none); });
+  rows.push_back({{"suite", "colliders"},
+                  {"size", kSheet},
+                  {"colliders", kSpheres * kSpheres},
+                  {"touching", lift > 0 ? "moving" : "at rest"},
+                  {"tickMsMin", touching.wall().min() * 1e3},
+                  {"tickMsMedian", touching.wall().median() * 1e3},
+                  {"tickMsP99", touching.wall().p99() * 1e3},
+                  {"nearMsMedian", touching.near().median() * 1e3},
+                  {"withoutMsMin", without.wall().min() * 1e3},
+                  {"withoutMsMedian", without.wall().median() * 1e3},
+                  {"timesWithout", touching.wall().min() / without.wall().min()},
+                  {"ticks", touching.wall().count()},
+                  {"device", device.info().name}});
+}
+
 }  // namespace
 
 Rows runColliders(vulkan::Device& device, const Settings& settings) {
@@ -81,6 +165,8 @@ Rows runColliders(vulkan::Device& device, const Settings& settings) {
                     {"ticks", simulated.wall().count()},
                     {"device", device.info().name}});
   }
+  measureBed(device, settings, 0, rows);
+  measureBed(device, settings, 0.002f, rows);
   return rows;
 }
 

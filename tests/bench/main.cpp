@@ -39,7 +39,7 @@ constexpr std::array kSuites{
     bench::Suite{"acad", "a sheet with 0, 1, 5 and 20 % of its springs as constraints", &bench::runAcad},
     bench::Suite{"curtain", "the scene curtain, served to one client in this process: tick, pose to packet",
                  &bench::runCurtain},
-    bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, most of them far from the cloth",
+    bench::Suite{"colliders", "a tick with 0, 1, 100 and 4,000 colliders, and with 100 spheres under a sheet",
                  &bench::runColliders},
     bench::Suite{"self_collision", "a sheet with and without self-collision, flat and in folds",
                  &bench::runSelfCollision},

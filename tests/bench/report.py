@@ -81,7 +81,12 @@ def paper(rows):
 
 def colliders(rows):
     return [[number(r["colliders"]), number(r["tickMsMin"]), number(r["nearMsMedian"], 2) if r["colliders"] else "",
-             number(r["referenceMs"])] for r in rows]
+             number(r["referenceMs"])] for r in rows if "touching" not in r]
+
+
+def colliders_touching(rows):
+    return [[r["touching"], number(r["tickMsMin"]), number(r["withoutMsMin"]), number(r["timesWithout"], 2)]
+            for r in rows if "touching" in r]
 
 
 def self_collision(rows):
@@ -137,6 +142,8 @@ TABLES = {
                                               "the paper's frames/s", "iterations", "converged"], paper),
     "colliders": ("colliders", [], ["colliders", "tick, min ms", "search for near colliders, ms", "reference, ms"],
                   colliders),
+    "colliders_touching": ("colliders", [], ["a hundred spheres", "tick, min ms", "without them, min ms",
+                                             "times without"], colliders_touching),
     "self_collision": ("self_collision", ["--size", "64"], ["case", "ns a node and substep", "tick, ms, median / p99",
                                                             "touching pairs", "crossings"], self_collision),
     "enforcement": ("enforcement", [], ["nodes", "springs", "workgroups", "frames/s", "best"], enforcement),

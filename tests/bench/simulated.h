@@ -38,6 +38,8 @@ class Simulated {
   simulation::TickStatus status() const { return simulation_.status(); }
 
   simulation::NodeState state();
+  // Contacts of the last tick, if its inputs asked for them.
+  std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
   std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
 
   // Times of ticks in seconds: wall clock of the whole tick, and the advance stage by the device's clock.
