@@ -98,15 +98,18 @@ Collider fetchCollider(uint index, CollisionPush push, float thickness, float fr
   return Collider(index, before, after, velocity, reach, both, thickness);
 }
 
-// False only if a node on this way stays farther from the collider than its reach. For lengths a, b and c,
-// the test a^2 > 2 (b^2 + c^2) is slightly stricter than a > b + c.
+// False only if a node on this way stays farther from the collider than its reach. For lengths a, b and c and
+// any k > 0, the test a^2 > (1 + k) b^2 + (1 + 1 / k) c^2 is slightly stricter than a > b + c. A k of 1 suits
+// long ways, a k of 1/32 short ones.
 bool mayTouch(Collider collider, vec3 from, vec3 to) {
   precise vec3 before = from - collider.before;
   precise vec3 after = to - collider.after;
   precise vec3 path = after - before;
-  precise float limit = collider.reach * collider.reach + dotProduct(path, path);
-  precise float doubled = 2.001 * limit;
-  return dotProduct(after, after) <= doubled;
+  precise float reachSquared = collider.reach * collider.reach;
+  precise float pathSquared = dotProduct(path, path);
+  precise float longWay = 2.001 * (reachSquared + pathSquared);
+  precise float shortWay = 1.032 * reachSquared + 33.1 * pathSquared;
+  return dotProduct(after, after) <= (longWay < shortWay ? longWay : shortWay);
 }
 
 ColliderFrame fetchFrame(Collider collider, CollisionPush push) {
@@ -184,26 +187,37 @@ void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush p
 
 // Collides a node with every collider that it may touch, in ascending order. A node that is pushed out of the
 // list's box continues with the next of all colliders.
+//
+// The inner loop only looks for the next collider, so that a device which runs several nodes together
+// computes contacts of all of them at once. A software device would otherwise compute a contact for each
+// collider that it rejects.
 void collideWithAll(CollidingNode node, CollisionPush push, vec3 from, inout vec3 position,
                     inout vec3 velocity) {
   NearList list = fetchNearList(node.index);
+  if (!covers(list, from, position)) {
+    list = allColliders(push.colliderCount);
+  }
   uint i = 0;
-  uint next = 0;
   do {
-    if (!covers(list, from, position)) {
-      list = allColliders(push.colliderCount);
-      i = next;
-    }
-    if (i < list.count) {
-      uint index = colliderAt(list, i);
-      Collider collider = fetchCollider(index, push, node.thickness, node.friction);
-      if (mayTouch(collider, from, position)) {
-        collide(index, collider, fetchFrame(collider, push), push, node, from, position, velocity);
+    uint index = 0;
+    Collider collider;
+    bool near = false;
+    do {
+      if (i < list.count) {
+        index = colliderAt(list, i);
+        collider = fetchCollider(index, push, node.thickness, node.friction);
+        near = mayTouch(collider, from, position);
+        ++i;
       }
-      next = index + 1;
-      ++i;
+    } while (!near && i < list.count);
+    if (near) {
+      collide(index, collider, fetchFrame(collider, push), push, node, from, position, velocity);
+      if (!covers(list, from, position)) {
+        list = allColliders(push.colliderCount);
+        i = index + 1;
+      }
     }
-  } while (i < list.count || !covers(list, from, position));
+  } while (i < list.count);
 }
 
 #endif

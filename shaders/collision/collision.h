@@ -45,7 +45,7 @@ const uint32_t kColliderGroup = 32;
 // The list of the colliders that kNearNodes consecutive nodes of the scene may touch in a tick, kNearStride
 // floats: the box within which the list is valid (low, count, high, unused), then ascending collider numbers.
 // A count above kMaxNear means that there are too many and none is listed.
-const uint32_t kNearNodes = 64;
+const uint32_t kNearNodes = 16;
 const uint32_t kMaxNear = 120;
 const uint32_t kNearLow = 0;
 const uint32_t kNearCount = 3;

@@ -225,7 +225,7 @@ TEST_F(Collision, FarCollidersChangeNoBit) {
   }
 }
 
-// Each run of 64 nodes has a list. A rag of 21 nodes before the cloth shifts its nodes into other runs, and
+// Each run of 16 nodes has a list. A rag of 21 nodes before the cloth shifts its nodes into other runs, and
 // one run then holds nodes of both. The result is the same for lists that overflow, for nodes that leave the
 // box of their list, and for lists that are valid.
 TEST_F(Collision, ListsOfNearCollidersChangeNoBit) {
