@@ -12,6 +12,7 @@
 #include "server/model/springs.h"
 #include "tests/bench/bytes_moved.h"
 #include "tests/bench/hung_cloth.h"
+#include "tests/bench/reference_check.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/strain.h"
 #include "tests/bench/suite.h"

@@ -11,6 +11,7 @@
 
 #include "tests/bench/picture/picture.h"
 #include "tests/bench/picture/render.h"
+#include "tests/bench/reference_check.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/strain.h"
 #include "tests/bench/suite.h"
@@ -25,6 +26,8 @@ constexpr float kNodeMass = 0.13f, kWidth = 10, kSpringDamping = 0.1f;
 // Ticks of one step. 0.016 s is no whole number of steps a second; this is 0.0161 s.
 constexpr std::uint32_t kShortSteps = 200, kLongSteps = 62;
 constexpr std::uint32_t kSeconds = 6;
+// Seconds after which a step is compared with the reference: in free fall, at the first contact, and draped.
+constexpr double kCompared[] = {0.25, 0.5, 1, 2, 4};
 
 // Strain of a spring at which the sheet counts as torn.
 constexpr double kTorn = 6;
@@ -41,6 +44,7 @@ struct Panel {
 struct Outcome {
   Panel panel;
   bool healthy = true;
+  int compared = 0;  // steps that agree with the reference
   Samples strains = {};
   double lowest = 1000;  // m, lowest node
   double depth = 0;      // m, depth of the deepest node in the ball
@@ -181,7 +185,7 @@ Picture pictureOf(const model::Scene& scene, const simulation::NodeState& state)
 }
 
 // Runs for all seconds, or until the state is not finite. Then the outcome is the state in which a spring
-// first tore.
+// first tore. Compares steps with the reference until then.
 Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
   const model::Scene scene = sceneOf(figure, panel);
   const model::Cloth& cloth = scene.cloths.front();
@@ -192,6 +196,13 @@ Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
   Outcome outcome{panel};
   std::optional<simulation::NodeState> torn;
   for (std::uint32_t tick = 0; tick < kSeconds * figure.stepsASecond && outcome.healthy; ++tick) {
+    const bool isCompared = std::ranges::any_of(kCompared, [&](double seconds) {
+      return tick == static_cast<std::uint32_t>(seconds * figure.stepsASecond);
+    });
+    if (isCompared && !torn) {
+      checkWithReference(device, scene, {}, simulated.state(), inputs);
+      ++outcome.compared;
+    }
     try {
       simulated.tick(inputs);
     } catch (const std::runtime_error&) {
@@ -221,7 +232,12 @@ Rows runBehaviour(vulkan::Device& device, const Settings& settings) {
     std::vector<Outcome> outcomes;
     std::vector<Picture> pictures;
     for (const Panel& panel : figure.panels) {
-      outcomes.push_back(run(device, figure, panel));
+      try {
+        outcomes.push_back(run(device, figure, panel));
+      } catch (const std::runtime_error& error) {
+        throw std::runtime_error(
+            fmt::format("Figure {}, ks {}: {}", figure.number, panel.stiffness, error.what()));
+      }
       pictures.push_back(outcomes.back().picture);
     }
     const auto file = settings.pictures / fmt::format("figure_{}.png", figure.number);
@@ -233,6 +249,7 @@ Rows runBehaviour(vulkan::Device& device, const Settings& settings) {
                       {"stepSeconds", 1.0 / figure.stepsASecond},
                       {"stiffness", outcome.panel.stiffness},
                       {"healthy", outcome.healthy},
+                      {"comparedSteps", outcome.compared},
                       {"strainMean", outcome.strains.mean()},
                       {"strainP99", outcome.strains.p99()},
                       {"strainMax", outcome.strains.quantile(1)},

@@ -11,6 +11,7 @@
 
 #include "server/reference/reference_cloth.h"
 #include "server/simulation/software_threads.h"
+#include "tests/bench/reference_check.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
@@ -138,10 +139,11 @@ std::optional<Rows::value_type> cheapest(vulkan::Device& device, const Settings&
   for (const Setting& setting : ladder.settings) {
     const model::Scene scene = sceneOf(ladder, setting, bound.size);
     const simulation::TickInputs inputs{scene.environment, {}};
-    Simulated simulated(device, scene,
-                        {.rowsPerInvocation = settings.rowsPerInvocation,
-                         .workgroupSize = settings.workgroupSize,
-                         .xpbdWholeNodes = settings.xpbdWholeNodes});
+    const simulation::SimulationOptions options{.rowsPerInvocation = settings.rowsPerInvocation,
+                                                .workgroupSize = settings.workgroupSize,
+                                                .xpbdWholeNodes = settings.xpbdWholeNodes};
+    checkWithReference(device, scene, options);
+    Simulated simulated(device, scene, options);
     for (std::uint32_t frame = 0; frame < kFrames; ++frame) simulated.tick(inputs);
     const reference::ReferenceCloth measured = measuredCloth(scene.cloths.front(), simulated.state());
     if (measured.strain().mean > bound.strain || gravityEnergyLost(scene, measured) < kFallen) continue;

@@ -19,10 +19,4 @@ simulation::TickInputs hungClothInputs(const model::Scene& scene, std::uint64_t 
 // A square metre of 0.2 kg, hung by its upper edge, without springs. The suite chooses the solver.
 model::Scene hungSheet(std::uint32_t size, const model::Solver& solver, std::uint32_t substeps);
 
-// Compares the device with the reference: a tick with mass-spring, or one substep that is solved to the end
-// with another solver. Throws std::runtime_error if a node is farther from its place than the solve and float
-// rounding explain. Returns the iterations of the solve, or 0 for a solver that does not report them.
-std::uint32_t checkWithReference(vulkan::Device& device, model::Scene sheet,
-                                 const simulation::SimulationOptions& options);
-
 }  // namespace clothstream::bench

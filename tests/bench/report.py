@@ -74,8 +74,11 @@ def paper(rows):
     def case(r):
         without = " without compliance" if r.get("compliance") == 0 else ""
         return r["method"] + without
-    return [[r["figure"], case(r), number(r["nodes"]), number(r["springs"]), number(r["framesPerSecond"]),
-             number(r["paperFramesPerSecond"], 5), number(r.get("iterations", "")) if "iterations" in r else "",
+    def of_paper(value):
+        return value if isinstance(value, str) else number(value, 5)
+    return [[r["figure"], case(r), number(r["nodes"]), number(r["springs"]), "yes" if r["ballAndNormals"] else "no",
+             number(r["framesPerSecond"]), of_paper(r["paperFramesPerSecond"]),
+             number(r["iterations"]) if "iterations" in r else "",
              {True: "yes", False: "no"}.get(r.get("converged"), "")] for r in rows]
 
 
@@ -138,8 +141,9 @@ TABLES = {
     "equal_strain": ("equal_strain", [], ["nodes", "bound", "solver", "substeps", "iterations",
                                           "ns a node and frame, median / min", "strain, mean", "p99",
                                           "elastic energy, J"], equal_strain),
-    "paper": ("paper", ["--seconds", "0.4"], ["figure", "solver", "nodes", "springs", "our steps/s",
-                                              "the paper's frames/s", "iterations", "converged"], paper),
+    "paper": ("paper", ["--seconds", "0.4"], ["figure", "solver", "nodes", "springs", "ball and normals",
+                                              "our steps/s", "the paper's frames/s", "iterations", "converged"],
+              paper),
     "colliders": ("colliders", [], ["colliders", "tick, min ms", "search for near colliders, ms", "reference, ms"],
                   colliders),
     "colliders_touching": ("colliders", [], ["a hundred spheres", "tick, min ms", "without them, min ms",

@@ -104,7 +104,7 @@ nlohmann::ordered_json sheet(vulkan::Device& device, const Settings& settings, s
   // A pair that touches in one and just misses in the other gets a contact's impulse a substep earlier and
   // passes it on. That is up to gravity's speed times a few substeps, 1e-4 m. Without contacts the folds
   // would be millimetres off.
-  const double tolerance = kSpacing / 100;
+  const Tolerance tolerance{.node = kSpacing / 100};
   const double referenceSeconds = simulated.check(start, inputs, tolerance);
   simulated.restart(start);
   for (int tick = 0; tick < kSettling; ++tick) simulated.tick(inputs);

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "tests/bench/hung_cloth.h"
+#include "tests/bench/reference_check.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/strain.h"
 #include "tests/bench/suite.h"
