@@ -95,16 +95,38 @@ void readAttachments(Checks& checks, const Path& path, const v1::Cloth& message,
         toAttachment(checks, path.at("attachments", i), message.attachments(i), cloth, nodes));
 }
 
-// Self-collision and tethers with their defaults, if the message has them.
+model::CoarseCorrection toCoarse(Checks& checks, const Path& path, const v1::CoarseCorrection& message) {
+  model::CoarseCorrection coarse;
+  if (message.has_cells())
+    coarse.cells =
+        checks.integer(path / "cells", message.cells(), limits::kMinCoarseCells, limits::kMaxCoarseCells);
+  if (message.has_sweeps())
+    coarse.sweeps = checks.integer(path / "sweeps", message.sweeps(), 1u, limits::kMaxCoarseSweeps);
+  if (message.has_every())
+    coarse.every = checks.integer(path / "every", message.every(), 1u, limits::kMaxCoarseEvery);
+  if (message.has_levels())
+    coarse.levels = checks.integer(path / "levels", message.levels(), 1u, limits::kMaxCoarseLevels);
+  return coarse;
+}
+
+// Self-collision and tethers with their defaults, and the coarse correction, if the message has them.
 void addParts(Checks& checks, const Path& path, const v1::Cloth& message, model::Cloth& cloth) {
   if (message.has_self_collision())
     cloth.selfCollision = model::SelfCollision{.radius = model::shortestSpring(cloth) / 2};
-  if (!message.has_tethers()) return;
-  cloth.tethers.emplace();
-  if (cloth.nodeCount() > limits::kMaxSolverNodes)
-    checks.fail(path / "tethers", "",
-                fmt::format("are for cloths of at most {} nodes; this one has {}", limits::kMaxSolverNodes,
-                            cloth.nodeCount()));
+  const auto bounded = [&](std::string_view field, std::string_view verb) {
+    if (cloth.nodeCount() > limits::kMaxSolverNodes)
+      checks.fail(path / field, "",
+                  fmt::format("{} for cloths of at most {} nodes; this one has {}", verb,
+                              limits::kMaxSolverNodes, cloth.nodeCount()));
+  };
+  if (message.has_tethers()) {
+    cloth.tethers.emplace();
+    bounded("tethers", "are");
+  }
+  if (message.has_coarse()) {
+    cloth.coarse = toCoarse(checks, path / "coarse", message.coarse());
+    bounded("coarse", "is");
+  }
 }
 
 // Mass in kg. The cloth already has the mass of its material.

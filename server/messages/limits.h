@@ -65,6 +65,10 @@ inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // per cloth
 inline constexpr std::uint64_t kMaxAssembledNodes = 65'536;  // per scene, in cloths with an assembled system
 inline constexpr std::uint64_t kMaxAssembledEntries =
     256;  // per node of a cloth with an assembled system; 20 bytes each
+inline constexpr std::uint32_t kMinCoarseCells = 2, kMaxCoarseCells = 16;
+inline constexpr std::uint32_t kMaxCoarseSweeps = 16;
+inline constexpr std::uint32_t kMaxCoarseLevels = 2;
+inline constexpr std::uint32_t kMaxCoarseEvery = 64;              // substeps
 inline constexpr std::uint32_t kMaxSelfCollisionNodes = 524'288;  // per scene
 inline constexpr double kUnitTolerance = 0.001;                   // deviation of a quaternion's length from 1
 

@@ -164,6 +164,9 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
     checkSolvers(checks, path, changed, change);
     checkMasses(checks, path, changed, change);
     if (const auto error = unfitBending(changed)) checks.fail(path / "cloths[].dihedralBending", "", *error);
+    for (const model::Cloth& cloth : changed.cloths)
+      if (const auto error = unfitCoarse(changed, cloth))
+        checks.fail(path, "", fmt::format("the coarse correction of \"{}\" {}", cloth.name, *error));
     if (const auto error = instability(changed, bound))
       checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *error));
   }

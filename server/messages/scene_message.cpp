@@ -14,6 +14,7 @@
 #include "server/messages/solid_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
+#include "server/model/coarse_level.h"
 #include "server/model/hinges.h"
 #include "server/model/mesh.h"
 #include "server/model/springs.h"
@@ -145,6 +146,12 @@ void checkSelfCollision(Checks& checks, const model::Scene& scene) {
   checks.fail(element / "selfCollision", "",
               fmt::format("is for scenes of at most {} nodes; this one has {}",
                           limits::kMaxSelfCollisionNodes, scene.nodeCount()));
+}
+
+void checkCoarse(Checks& checks, const model::Scene& scene) {
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i)
+    if (const auto error = unfitCoarse(scene, scene.cloths[i]))
+      checks.fail(Path().at("cloths", static_cast<int>(i)) / "coarse", "", *error);
 }
 
 // Selecting nodes takes time for every node of a range, and for every node and region. Checked before any
@@ -295,6 +302,21 @@ std::optional<std::string> unfitBending(const model::Scene& scene) {
   return std::nullopt;
 }
 
+std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::Cloth& cloth) {
+  if (!cloth.coarse) return std::nullopt;
+  if (scene.integrator != model::Integrator::semiImplicitEuler)
+    return "must be absent with this integrator: it needs INTEGRATOR_SEMI_IMPLICIT_EULER";
+  const float least = model::leastCoarseDamping(cloth, scene.substepSeconds());
+  const bool forces =
+      cloth.solver.kind == model::SolverKind::massSpring || cloth.solver.kind == model::SolverKind::acad;
+  if (!forces || cloth.structural.damping >= least) return std::nullopt;
+  return fmt::format(
+      "needs structural springs with a damping of at least {:.3g} N s/m with this mass, rate and substeps: "
+      "fast "
+      "colliders make the cloth unstable with less",
+      least);
+}
+
 std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound) {
   const std::uint32_t needed = bound.substeps(scene);
   if (needed != 0 && needed <= scene.substeps) return std::nullopt;
@@ -362,6 +384,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkAttachments(checks, scene);
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);
+  checkCoarse(checks, scene);
   if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
   most.cancellation.check();
   if (!checks.failed())

@@ -40,6 +40,13 @@ void writeAttachment(const model::Attachment& attachment, v1::Attachment& messag
   if (!attachment.motion.keys.empty()) write(attachment.motion, *message.mutable_motion());
 }
 
+void writeCoarse(const model::CoarseCorrection& coarse, v1::CoarseCorrection& message) {
+  message.set_cells(coarse.cells);
+  message.set_sweeps(coarse.sweeps);
+  message.set_every(coarse.every);
+  message.set_levels(coarse.levels);
+}
+
 void writeCloth(const model::Cloth& cloth, v1::Cloth& message) {
   message.set_name(cloth.name);
   if (cloth.mesh)
@@ -51,6 +58,7 @@ void writeCloth(const model::Cloth& cloth, v1::Cloth& message) {
   writeNumbers(cloth, message);
   for (const model::GridRange& range : cloth.pins) write(range, *message.add_pins());
   *message.mutable_solver() = toMessage(cloth.solver);
+  if (cloth.coarse) writeCoarse(*cloth.coarse, *message.mutable_coarse());
   message.mutable_pinned_vertices()->Add(cloth.pinnedVertices.begin(), cloth.pinnedVertices.end());
   for (const model::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
   for (const model::Attachment& attachment : cloth.attachments)

@@ -23,6 +23,9 @@ constexpr double kPrepare = 2, kIteration = 0.5, kActive = 0.25;
 // Each pair of springs that share a node costs these in an assembled system.
 constexpr double kFillPair = 0.6, kMultiplyPair = 0.22;
 constexpr double kCorrection = 0.45;  // of a spring, with xpbd
+// Each node costs kCoarseNode in a coarse correction, and each of about four links of a coarse node
+// kCoarseLink in a sweep.
+constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
 // Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
 constexpr double kTickDispatches = 6, kFrameDispatches = 12;
@@ -35,6 +38,7 @@ constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
 constexpr double kTriangleBytes = 400;  // of a solid
+constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
 
 // Copies of a scene's lists: as it started, as it was accepted, as it runs, and as descriptions.
 constexpr double kListCopies = 6;
@@ -50,6 +54,15 @@ double listsOf(const Cloth& cloth) {
     bytes += listBytes(attachment.ranges) + listBytes(attachment.vertices) + listBytes(attachment.regions) +
              listBytes(attachment.motion.keys);
   return bytes;
+}
+
+Work coarseWork(const CoarseCorrection& coarse, std::uint32_t substeps, double nodeWork) {
+  const double side = coarse.cells + 1;
+  Work work{.nodeSteps = nodeWork,
+            .groupNodeSteps = kCoarseLink * kCoarseLinks * side * side * coarse.sweeps,
+            .dispatches = 3};
+  work.scale(coarse.levels * ((substeps + coarse.every - 1) / coarse.every));
+  return work;
 }
 
 bool isSystem(SolverKind kind) {
@@ -159,6 +172,7 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
     work.nodeSteps +=
         substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
     work += solverWork(scene, cloth, counts);
+    if (cloth.coarse) work += coarseWork(*cloth.coarse, scene.substeps, nodes * (kCoarseNode + collisions));
   }
   if (scene.integrator == Integrator::rungeKutta4) work.dispatches += 11 * substeps;
   const auto any = [&](auto has) { return std::ranges::any_of(scene.cloths, has) ? 1.0 : 0.0; };
@@ -191,6 +205,7 @@ double PriceModel::bytes(const Scene& scene) const {
       bytes += kMeshNodeBytes * nodes + listBytes(cloth.mesh->shape.uvs) +
                listBytes(cloth.mesh->shape.uvTriangles);
     if (cloth.selfCollision) bytes += kSelfCollisionBytes * nodes;
+    if (cloth.coarse) bytes += cloth.coarse->levels * (cloth.mesh ? kCoarseMeshBytes : kCoarseBytes) * nodes;
     if (cloth.dihedralBending != 0) bytes += kHingeBytes * static_cast<double>(counts.hinges);
     if (isSystem(cloth.solver.kind) || cloth.solver.kind == SolverKind::xpbd) bytes += kSystemBytes * springs;
     if (isAssembled(cloth.solver)) bytes += kPairBytes * static_cast<double>(counts.pairs);

@@ -147,6 +147,17 @@ struct Tethers {
   float slack = initial(parameters::ClothNumber::tetherSlack);
 };
 
+// Correction by means of nodes that are never farther apart than at rest: coarse_level.h.
+struct CoarseCorrection {
+  std::uint32_t cells =
+      8;  // coarse cells along the longer side of a grid; a mesh has as many coarse nodes, 2 to 16
+  std::uint32_t sweeps = 4;  // rounds through the coarse links in a correction, 1 to 16
+  std::uint32_t every = 2;   // substeps between two corrections, 1 to 64
+  std::uint32_t levels = 1;  // 2: a level with a quarter of the cells, at least 2, acts first
+
+  bool operator==(const CoarseCorrection&) const = default;
+};
+
 struct Cloth {
   std::string name;
   // Name of the material that the cloth was last made of; empty: none. Its numbers may have changed since.
@@ -168,6 +179,7 @@ struct Cloth {
   std::optional<SelfCollision> selfCollision;  // absent: the cloth passes through cloth
   std::vector<Attachment> attachments;
   std::optional<Tethers> tethers;
+  std::optional<CoarseCorrection> coarse;  // absent: springs alone
 
   std::uint32_t nodeCount() const;
   float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean

@@ -26,7 +26,13 @@ ReferenceSimulation::ReferenceSimulation(const model::Scene& scene)
       cloths_(scene.cloths.begin(), scene.cloths.end()),
       attachments_(scene),
       selfCollision_(scene),
-      before_(scene.cloths.size()) {}
+      coarse_(scene.cloths.size()),
+      before_(scene.cloths.size()) {
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i)
+    if (scene.cloths[i].coarse)
+      for (const model::CoarseLevel& level : coarseLevels(scene.cloths[i]))
+        coarse_[i].emplace_back(scene.cloths[i], level);
+}
 
 void ReferenceSimulation::tick(const TickInputs& inputs) {
   for (std::uint32_t index = 0; index < scene_.substeps; ++index) substep(inputs, index);
@@ -41,6 +47,7 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
   if (index == 0) attachments_.begin(cloths_, inputs.attachments, inputs.grabs, scene_.tickSeconds());
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     ReferenceCloth& cloth = cloths_[i];
+    for (const CoarseCorrection& level : coarse_[i]) correct(level, i, inputs, index);
     before_[i].assign(cloth.positions().begin(), cloth.positions().end());
     cloth.integrate(inputs.environment, scene_.integrator, scene_.substepSeconds());
     collide(inputs, index, i, false);
@@ -58,6 +65,30 @@ void ReferenceSimulation::collide(const TickInputs& inputs, std::uint32_t index,
       cloths_[cloth].collide(
           collider.shape, stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
           collider.friction, before_[cloth], only);
+}
+
+// Nodes take their ways past the colliders, which stand still meanwhile. What they keep becomes velocity.
+void ReferenceSimulation::correct(const CoarseCorrection& level, std::size_t number, const TickInputs& inputs,
+                                  std::uint32_t index) {
+  const std::uint32_t every = scene_.cloths[number].coarse->every;
+  if (index % every != 0) return;
+  ReferenceCloth& cloth = cloths_[number];
+  const std::vector<Vec3> ways = level.ways(cloth.positions());
+  const std::vector<Vec3> start(cloth.positions().begin(), cloth.positions().end());
+  const std::vector<Vec3> velocities(cloth.velocities().begin(), cloth.velocities().end());
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    cloth.velocities()[i] = cloth.inverseMasses()[i] > 0 ? ways[i] : Vec3::Zero();
+    cloth.positions()[i] += cloth.velocities()[i];
+  }
+  for (const MovingCollider& collider : inputs.colliders) {
+    const Pose pose =
+        stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()).before;
+    cloth.collide(collider.shape, {pose, pose}, 0, start);
+  }
+  const std::uint32_t since = index > 0 ? every : scene_.substeps - (scene_.substeps - 1) / every * every;
+  const double rate = 1 / (since * scene_.substepSeconds());
+  for (std::size_t i = 0; i < ways.size(); ++i)
+    cloth.velocities()[i] = velocities[i] + rate * cloth.velocities()[i];
 }
 
 void ReferenceSimulation::collideWithCloth(const TickInputs& inputs, std::uint32_t index) {

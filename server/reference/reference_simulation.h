@@ -7,6 +7,7 @@
 
 #include "server/model/scene.h"
 #include "server/reference/attachments.h"
+#include "server/reference/coarse_correction.h"
 #include "server/reference/reference_cloth.h"
 #include "server/reference/self_collision.h"
 
@@ -38,8 +39,8 @@ class ReferenceSimulation {
   // Simulates the next tick with the scene's own inputs.
   void tick();
 
-  // Simulates substep `index` of a tick: forces, integration and colliders in order; attachments, tethers and
-  // grabs; self-collision, and colliders again; colliders that are triangle meshes.
+  // Simulates substep `index` of a tick: coarse corrections; forces, integration and colliders in order;
+  // attachments, tethers and grabs; self-collision, and colliders again; colliders that are triangle meshes.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
   // Number of simulated ticks.
@@ -53,13 +54,16 @@ class ReferenceSimulation {
   // for each node that collides.
   void collide(const TickInputs& inputs, std::uint32_t index, std::size_t cloth, bool solids,
                std::span<const std::uint8_t> only = {});
+  void correct(const CoarseCorrection& level, std::size_t cloth, const TickInputs& inputs,
+               std::uint32_t index);
   void collideWithCloth(const TickInputs& inputs, std::uint32_t index);
 
   model::Scene scene_;
   std::vector<ReferenceCloth> cloths_;
   Attachments attachments_;
   SelfCollision selfCollision_;
-  std::vector<std::vector<Vec3>> before_;  // each cloth's nodes at the start of a substep
+  std::vector<std::vector<CoarseCorrection>> coarse_;  // by cloth and level
+  std::vector<std::vector<Vec3>> before_;              // each cloth's nodes at the start of a substep
   std::uint64_t ticks_ = 0;
 };
 

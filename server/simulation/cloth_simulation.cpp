@@ -17,6 +17,7 @@
 #include "server/simulation/assembled/assembled_stage.h"
 #include "server/simulation/attachment/attachment_stage.h"
 #include "server/simulation/bending/bending_stage.h"
+#include "server/simulation/coarse/coarse_stage.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/collision/solid_stage.h"
 #include "server/simulation/grid_stage.h"
@@ -173,6 +174,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<AssembledStage> assembled;          // null if no cloth uses it
   std::unique_ptr<BendingStage> bending;              // created when a cloth first uses it
   bool bends = false;                                 // true if a cloth uses it now
+  std::unique_ptr<CoarseStage> coarse;                // null if no cloth uses it
   std::unique_ptr<SelfCollisionStage> selfCollision;  // null if no cloth uses it
   std::vector<model::Solver> solvers;                 // of the cloths in the tables
   std::vector<SpringStiffness> stiffness;             // of the cloths' springs
@@ -228,6 +230,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
   xpbd = makeXpbd(scene.cloths);
   assembled = makeAssembled(scene.cloths);
   makeBending(scene.cloths);
+  if (CoarseStage::isIn(scene.cloths))
+    coarse = std::make_unique<CoarseStage>(on, scene.cloths, stateOf(buffers, collision), workgroupSize);
   if (SelfCollisionStage::isIn(scene))
     selfCollision =
         std::make_unique<SelfCollisionStage>(on, scene, stateOf(buffers, collision), workgroupSize);
@@ -325,6 +329,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (xpbd) xpbd->recordTables(recorder);
   if (assembled) assembled->recordTables(recorder);
   if (bending) bending->recordTables(recorder);
+  if (coarse) coarse->recordTables(recorder);
   if (selfCollision) selfCollision->recordTables(recorder);
   if (solids) solids->recordTables(recorder);
   recorder.barrier();
@@ -392,6 +397,9 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
   for (std::uint32_t substep = 0; substep < substeps; ++substep) {
     push.collision = collision.push(substep, substeps, tickRate);
     recorder.barrier();
+    if (coarse &&
+        coarse->record(recorder, present, {substep, substeps, substepSeconds}, push.collision, records))
+      recorder.barrier();
     if (bends) {
       bending->record(recorder, present, substepSeconds);
       recorder.barrier();

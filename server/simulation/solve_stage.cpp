@@ -128,7 +128,7 @@ struct SolveStage::Kernels {
     const auto weighing = [](std::initializer_list<BindingKind> more) {
       std::vector<BindingKind> bindings = {kTexels, kTexels, kTexels,  kTexels,  kTexels,
                                            kTexels, kTexels, kStorage, kStorage, kStorage};
-      bindings.insert(bindings.end(), more);
+      for (const BindingKind binding : more) bindings.push_back(binding);
       return bindings;
     };
     const std::vector<BindingKind> vectors = {kTexels,  kTexels,  kTexels, kTexels, kTexels,

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "server/model/coarse_level.h"
 #include "server/reference/reference_cloth.h"
 #include "server/simulation/software_threads.h"
 #include "tests/bench/reference_check.h"
@@ -34,6 +35,7 @@ constexpr std::uint32_t kFramesPerSecond = 60, kFrames = 3 * kFramesPerSecond;
 
 struct Setting {
   std::uint32_t substeps, iterations;
+  std::optional<model::CoarseCorrection> coarse = {};
 };
 
 // Ordered from cheap to expensive.
@@ -74,6 +76,15 @@ std::vector<Ladder> ladders() {
        256,
        {{3, 0}, {4, 0}, {5, 0}, {6, 0}, {7, 0}, {8, 0}, {10, 0}, {12, 0}, {16, 0}, {24, 0}, {32, 0}, {48, 0}},
        true},
+      {"mass_spring_coarse",
+       massSpring,
+       256,
+       {{3, 0, {{4, 6, 2}}},
+        {4, 0, {{4, 4, 2}}},
+        {4, 0, {{8, 6, 2}}},
+        {4, 0, {{16, 6, 2}}},
+        {6, 0, {{16, 6, 2}}},
+        {8, 0, {{16, 8, 2}}}}},
       {"implicit_euler", implicitEuler, 64, {{1, 3}, {1, 5}, {1, 8}, {1, 12}, {1, 20}, {1, 40}, {1, 80}}},
       {"constraint", constraint, 32, {{1, 20}, {2, 20}, {4, 20}}}};
 }
@@ -103,6 +114,12 @@ model::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t
   cloth.structural.stiffness = forces ? static_cast<float>(0.36 * bearable) : 1500.0f;
   cloth.shear.stiffness = forces ? static_cast<float>(0.08 * bearable) : 60.0f;
   cloth.bend.stiffness = static_cast<float>(0.04 * bearable);
+  cloth.coarse = setting.coarse;
+  if (cloth.coarse) {
+    // The damping that a coarse correction needs takes 0.8 of the 4.
+    cloth.structural.damping = 1.001f * model::leastCoarseDamping(cloth, h);
+    cloth.structural.stiffness *= 0.79f;
+  }
   scene.cloths = {cloth};
   return scene;
 }
@@ -128,6 +145,9 @@ Rows::value_type rowOf(const Ladder& ladder, const Setting& setting, const Bound
           {"nsPerNodeFrameMin", simulated.wall().min() / nodes * 1e9},
           {"strainMean", measured.strain().mean},
           {"strainP99", measured.strain().p99},
+          {"cells", setting.coarse ? setting.coarse->cells : 0},
+          {"sweeps", setting.coarse ? setting.coarse->sweeps : 0},
+          {"every", setting.coarse ? setting.coarse->every : 0},
           {"kineticEnergy", measured.kineticEnergy()},
           {"elasticEnergy", measured.elasticEnergy()},
           {"gravityEnergyLost", gravityEnergyLost(scene, measured)}};

@@ -34,6 +34,10 @@ constexpr std::array kSuites{
     bench::Suite{"equal_strain",
                  "the cheapest setting of each solver that stretches at most as much as NvCloth's",
                  &bench::runEqualStrain},
+    bench::Suite{
+        "coarse",
+        "a sheet with a coarse correction, and with springs alone and more substeps: hanging, pushed",
+        &bench::runCoarse},
     bench::Suite{"work_precision", "cost of a simulated second and distance from the truth, for every solver",
                  &bench::runWorkPrecision},
     bench::Suite{"acad", "a sheet with 0, 1, 5 and 20 % of its springs as constraints", &bench::runAcad},

@@ -70,6 +70,17 @@ def equal_strain(rows):
              percent(r["strainP99"]), number(r["elasticEnergy"], 2)] for r in rows]
 
 
+def coarse(rows):
+    def case(r):
+        levels = ", 2 levels" if r["levels"] == 2 else ""
+        return f"{r['cells']} cells, {r['sweeps']} sweeps, every {r['every']}{levels}" if r["cells"] else "springs alone"
+    def ball(r):
+        return f"{number(r['ballSpeed'])} m/s" if r["ballSpeed"] else "none"
+    return [[number(r["nodes"]), r["substeps"], case(r), ball(r),
+             f"{number(r['nsPerNodeFrame'])} / {number(r['nsPerNodeFrameMin'])}", percent(r["strainMean"]),
+             percent(r["strainP99"]), percent(r["largestStrainMean"]), f"{r['kineticEnergy']:.4f}"] for r in rows]
+
+
 def paper(rows):
     def case(r):
         without = " without compliance" if r.get("compliance") == 0 else ""
@@ -144,6 +155,8 @@ TABLES = {
     "paper": ("paper", ["--seconds", "0.4"], ["figure", "solver", "nodes", "springs", "ball and normals",
                                               "our steps/s", "the paper's frames/s", "iterations", "converged"],
               paper),
+    "coarse": ("coarse", [], ["nodes", "substeps", "correction", "ball", "ns a node and frame, median / min",
+                              "strain, mean", "p99", "largest mean", "kinetic energy, J"], coarse),
     "colliders": ("colliders", [], ["colliders", "tick, min ms", "search for near colliders, ms", "reference, ms"],
                   colliders),
     "colliders_touching": ("colliders", [], ["a hundred spheres", "tick, min ms", "without them, min ms",

@@ -47,6 +47,7 @@ Rows runMassSpring(vulkan::Device& device, const Settings& settings);
 Rows runPaper(vulkan::Device& device, const Settings& settings);
 Rows runBehaviour(vulkan::Device& device, const Settings& settings);
 Rows runEqualStrain(vulkan::Device& device, const Settings& settings);
+Rows runCoarse(vulkan::Device& device, const Settings& settings);
 Rows runWorkPrecision(vulkan::Device& device, const Settings& settings);
 Rows runSolvers(vulkan::Device& device, const Settings& settings);
 Rows runEnforcement(vulkan::Device& device, const Settings& settings);

@@ -27,6 +27,7 @@ struct Method {
   model::Integrator integrator;
   std::uint32_t iterations;
   std::vector<std::uint32_t> substeps;
+  bool coarse = false;
 };
 
 // Explicit forces start with the fewest substeps that are stable.
@@ -38,7 +39,9 @@ std::vector<Method> methods() {
           {"acad", acad, semiImplicitEuler, 40, {32, 64}},
           {"xpbd", xpbd, semiImplicitEuler, 1, {4, 8, 16, 32, 64, 128}},
           {"implicit_euler", implicitEuler, semiImplicitEuler, 60, {1, 2, 4, 8, 16}},
-          {"constraint", constraint, semiImplicitEuler, 40, {12, 24}}};
+          {"constraint", constraint, semiImplicitEuler, 40, {12, 24}},
+          {"xpbd_coarse", xpbd, semiImplicitEuler, 1, {2, 4, 8, 32}, true},
+          {"implicit_euler_coarse", implicitEuler, semiImplicitEuler, 8, {1, 2, 4}, true}};
 }
 
 // A square metre of 0.2 kg whose springs of 200 N/m stretch by a few percent.
@@ -132,6 +135,7 @@ Measured measure(vulkan::Device& device, model::Scene scene, const Method& metho
   scene.integrator = method.integrator;
   scene.cloths.front().solver.kind = method.kind;
   scene.cloths.front().solver.iterations = method.iterations;
+  if (method.coarse) scene.cloths.front().coarse = model::CoarseCorrection{4, 4, 2};
   Simulated simulated(device, scene, {});
   Measured measured{};
   simulation::NodeState state;

@@ -73,7 +73,7 @@ TEST(ParameterTable, ListsEveryFieldOfAChangeThatIsANumber) {
   EXPECT_THAT(
       unlisted(v1::Cloth::descriptor(), &WireField::inCloth),
       testing::UnorderedElementsAre("name", "grid", "mesh", "mass", "areal_mass", "pins", "pinned_vertices",
-                                    "pinned_regions", "solver", "attachments", "material"));
+                                    "pinned_regions", "solver", "attachments", "material", "coarse"));
   for (const ClothParameter& parameter : kClothParameters) {
     if (parameter.group == nullptr) continue;
     const Descriptor* group = v1::Cloth::descriptor()

@@ -8,7 +8,9 @@
 #include "server/messages/client_message.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/solver_message.h"
+#include "server/model/coarse_level.h"
 #include "server/model/material.h"
+#include "server/model/mesh.h"
 #include "tests/messages/scenes.h"
 
 namespace clothstream::messages {
@@ -81,6 +83,21 @@ TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersOfClothsThatHaveThem) {
   EXPECT_EQ(scene_.cloths[0].selfCollision->radius, 0.01f);
   EXPECT_EQ(scene_.cloths[0].selfCollision->friction, 1);
   EXPECT_EQ(scene_.cloths[0].tethers->slack, 0.5f);
+}
+
+TEST_F(ToParameterChange, RefusesToTakeTheDampingThatACoarseCorrectionNeeds) {
+  model::Cloth& cloth = scene_.cloths[0];
+  cloth.coarse.emplace();
+  const float least = model::leastCoarseDamping(cloth, scene_.substepSeconds());
+  cloth.structural.damping = 1.1f * least;
+  v1::ClothChange& change = *message_.add_cloths();
+  change.mutable_structural()->set_damping(0.9f * least);
+  EXPECT_THAT(error(), StartsWith("parameterChange: the coarse correction of \"" + cloth.name +
+                                  "\" needs structural springs with a damping of at least"));
+  change.mutable_structural()->set_damping(1.01f * least);
+  EXPECT_EQ(error(), "no error");
+  change.set_areal_mass(static_cast<float>(2 * double{cloth.mass} / model::areaOf(cloth)));
+  EXPECT_THAT(error(), StartsWith("parameterChange: the coarse correction of"));
 }
 
 TEST_F(ToParameterChange, RefusesDihedralBendingThatIsUnstableOrUnsupported) {

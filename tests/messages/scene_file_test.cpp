@@ -73,7 +73,7 @@ constexpr const char* kEveryField = R"json({
                                  "pose": {"position": {}, "orientation": {"w": 1}}},
     "mass": 1, "structural": {}, "shear": {}, "bend": {}, "dihedralBending": 0, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
     "thickness": 0.25, "solver": {"implicitEuler": {"iterations": 3, "tolerance": 0.25}},
-    "tethers": {"slack": 0.25},
+    "tethers": {"slack": 0.25}, "coarse": {"cells": 5, "sweeps": 3, "every": 7, "levels": 2},
     "attachments": [{
       "name": "knot", "vertices": [2], "collider": "table"
     }, {

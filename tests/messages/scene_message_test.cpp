@@ -299,6 +299,18 @@ const BadScene kBadScenes[] = {
      },
      "must have at most 16777216"},
     {"cloths[0].tethers.slack = 2:", [](v1::Scene& s) { cloth(s).mutable_tethers()->set_slack(2); }},
+    {"cloths[0].coarse.cells = 1:", [](v1::Scene& s) { cloth(s).mutable_coarse()->set_cells(1); }, "from 2 to 16"},
+    {"cloths[0].coarse.cells = 17:", [](v1::Scene& s) { cloth(s).mutable_coarse()->set_cells(17); }},
+    {"cloths[0].coarse.sweeps = 0:", [](v1::Scene& s) { cloth(s).mutable_coarse()->set_sweeps(0); }, "from 1 to 16"},
+    {"cloths[0].coarse.every = 65:", [](v1::Scene& s) { cloth(s).mutable_coarse()->set_every(65); }, "from 1 to 64"},
+    {"cloths[0].coarse.levels = 3:", [](v1::Scene& s) { cloth(s).mutable_coarse()->set_levels(3); }, "from 1 to 2"},
+    {"cloths[0].coarse:", [](v1::Scene& s) { cloth(s).mutable_coarse(); }, "with a damping of at least"},
+    {"cloths[0].coarse:",
+     [](v1::Scene& s) {
+       cloth(s).mutable_coarse();
+       s.set_integrator(v1::INTEGRATOR_RUNGE_KUTTA_4);
+     },
+     "INTEGRATOR_SEMI_IMPLICIT_EULER"},
     {"simulationRate = 0:", [](v1::Scene& s) { s.set_simulation_rate(0); }, "from 1 to 1000"},
     {"simulationRate = 1001:", [](v1::Scene& s) { s.set_simulation_rate(1001); }},
     {"streamRate = 50:", [](v1::Scene& s) { s.set_stream_rate(50); },

@@ -99,6 +99,7 @@ struct Cloth {
   static constexpr Field kDihedralBending{24, WireType::kFixed32};
   static constexpr Field kMaterial{40, WireType::kBytes};
   static constexpr Field kArealMass{41, WireType::kFixed32};
+  static constexpr Field kCoarse{42, WireType::kBytes};
 };
 struct Attachment {
   static constexpr Field kName{1, WireType::kBytes};
@@ -111,6 +112,11 @@ struct Attachment {
 };
 struct Tethers {
   static constexpr Field kSlack{1, WireType::kFixed32};
+};
+struct CoarseCorrection {
+  static constexpr Field kCells{1, WireType::kVarint};
+  static constexpr Field kSweeps{2, WireType::kVarint};
+  static constexpr Field kEvery{3, WireType::kVarint};
 };
 struct SelfCollision {
   static constexpr Field kRadius{1, WireType::kFixed32};

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// Coarse correction on the device: model/coarse_level.h.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/model/scene.h"
+#include "server/simulation/coarse/coarse_tables.h"
+#include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
+#include "server/simulation/state_buffers.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// Belongs to the device's thread. Changes positions and velocities at the start of a substep, for every
+// solver.
+class CoarseStage {
+ public:
+  // Throws std::runtime_error if the device has too little memory.
+  CoarseStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
+              std::uint32_t workgroupSize);
+
+  static bool isIn(std::span<const model::Cloth> cloths);
+
+  // Uploads the tables, before the next substep.
+  void recordTables(vulkan::Recorder& recorder) const;
+  // Substep `index` of a tick of `count` substeps, `seconds` each.
+  struct Substep {
+    std::uint32_t index, count;
+    double seconds;
+  };
+  // Corrects the start of a substep, which is in the buffers `present`. `collision` is the push of the
+  // substep, and `cloths` are the records of the scene. The caller records a barrier before. Returns true if
+  // the caller must record one after.
+  bool record(vulkan::Recorder& recorder, std::uint32_t present, const Substep& substep,
+              const shared::CollisionPush& collision, std::span<const shared::ClothRecord> cloths) const;
+
+ private:
+  struct Moves {
+    Moves(const vulkan::Device& device, const vulkan::Buffer& shares, const vulkan::Buffer& corrections,
+          const StateBuffers& state, std::uint32_t workgroupSize, bool colliders);
+    Stage mesh, grid;
+  };
+
+  CoarseStage(const vulkan::Device& device, const CoarseTables& tables, const StateBuffers& state,
+              std::uint32_t workgroupSize);
+
+  void recordLevel(vulkan::Recorder& recorder, std::uint32_t present, const shared::CoarsePush& push) const;
+
+  std::vector<CoarseTables::Level> levels_;
+  DeviceTable nodes_, means_, shares_, colours_, links_;
+  vulkan::Buffer parts_, corrections_;
+  Stage averageNodes_, averageRows_, hold_;
+  std::array<Moves, 2> moves_;  // without and with colliders
+};
+
+}  // namespace clothstream::simulation
