@@ -11,8 +11,6 @@ CLOTHSTREAM_SHARED_BEGIN
 
 // Maximum number of coarse nodes of a cloth: model::kMaxCoarseNodes.
 #define CLOTHSTREAM_COARSE_NODES 289
-// Rows that one invocation moves of a grid's column.
-#define CLOTHSTREAM_COARSE_ROWS 8
 
 // Nodes whose weighted mean is a coarse node. A movable coarse node of a grid has no list.
 struct CoarseNodeRecord {

@@ -8,6 +8,8 @@
 #include "shaders/coarse/move.glsl"
 
 layout(local_size_x_id = 0) in;
+// Rows that an invocation moves of a column.
+layout(constant_id = 2) const uint kRows = 8;
 
 // Way of the invocation's column at a coarse row.
 vec3 wayAt(uint coarseRow, uint coarseColumn, float part) {
@@ -26,8 +28,8 @@ void main() {
   uint invocation = gl_GlobalInvocationID.x;
   uint strip = invocation / push.columns;
   uint column = invocation - strip * push.columns;
-  uint row = strip * CLOTHSTREAM_COARSE_ROWS;
-  uint end = min(row + CLOTHSTREAM_COARSE_ROWS, push.rows);
+  uint row = strip * kRows;
+  uint end = min(row + kRows, push.rows);
   if (row >= end) {
     return;
   }

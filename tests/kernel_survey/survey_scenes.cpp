@@ -113,6 +113,15 @@ void addFeatures(std::vector<SurveyScene>& scenes) {
         scenes, mesh ? "runge_kutta/mesh" : "runge_kutta/grid",
         [&](std::uint32_t size) { return mesh ? model::asMesh(grid(size)) : grid(size); }, kLarge,
         [](model::Scene& scene) { scene.integrator = model::Integrator::rungeKutta4; });
+  for (const bool mesh : {false, true})
+    add(
+        scenes, mesh ? "coarse/mesh" : "coarse/grid",
+        [&](std::uint32_t size) {
+          model::Cloth cloth = mesh ? model::asMesh(grid(size)) : grid(size);
+          cloth.coarse.emplace();
+          return cloth;
+        },
+        kLarge);
   add(scenes, "explicit_euler", grid, kLarge,
       [](model::Scene& scene) { scene.integrator = model::Integrator::explicitEuler; });
   add(

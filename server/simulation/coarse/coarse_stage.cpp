@@ -21,11 +21,12 @@ static_assert(model::kMaxCoarseNodes == CLOTHSTREAM_COARSE_NODES);
 
 // Invocations that hold the links of a cloth. A software device runs eight at a time, and barriers between
 // more cost most of its time.
-constexpr std::uint32_t kHoldLanes = 64, kSoftwareHoldLanes = 8;
+constexpr std::uint32_t kGpuHoldLanes = 64, kCpuHoldLanes = 8;
+// Rows that an invocation moves of a column of a grid.
+constexpr std::uint32_t kGpuRows = 1, kCpuRows = 8;
 
 // Work of an invocation (vulkan::Recorder::dispatch).
-constexpr std::uint32_t kAverageWork = 8, kHoldWork = 64, kMoveMeshWork = 1,
-                        kMoveGridWork = CLOTHSTREAM_COARSE_ROWS / 2;
+constexpr std::uint32_t kAverageWork = 8, kHoldWork = 64, kMoveMeshWork = 1;
 
 const std::vector<vulkan::BindingKind> kMoved{kTexels,  kTexels, kTexels, kTexels, kStorage,
                                               kStorage, kTexels, kTexels, kStorage};
@@ -54,6 +55,7 @@ CoarseStage::CoarseStage(const vulkan::Device& device, std::span<const model::Cl
 CoarseStage::CoarseStage(const vulkan::Device& device, const CoarseTables& tables, const StateBuffers& state,
                          std::uint32_t workgroupSize)
     : levels_(tables.levels),
+      rows_(device.hasGpuKernels() ? kGpuRows : kCpuRows),
       nodes_(device, tables.nodes),
       means_(device, tables.means),
       shares_(device, tables.shares),
@@ -69,25 +71,27 @@ CoarseStage::CoarseStage(const vulkan::Device& device, const CoarseTables& table
       averageRows_(device,
                    kernelOf("average_rows", kernels::average_rows, workgroupSize, {kTexels, kStorage}),
                    {state.positions[0], &parts_}, {state.positions[1], &parts_}),
-      hold_(device,
-            kernelOf("hold_links", kernels::hold_links, device.isSoftware() ? kSoftwareHoldLanes : kHoldLanes,
-                     {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage}),
-            {&nodes_.texels(), &parts_, &means_.texels(), &colours_.texels(), &links_.texels(),
-             state.positions[0], &corrections_},
-            {&nodes_.texels(), &parts_, &means_.texels(), &colours_.texels(), &links_.texels(),
-             state.positions[1], &corrections_}),
-      moves_{Moves(device, shares_.texels(), corrections_, state, workgroupSize, false),
-             Moves(device, shares_.texels(), corrections_, state, workgroupSize, true)} {}
+      hold_(
+          device,
+          kernelOf("hold_links", kernels::hold_links, device.hasGpuKernels() ? kGpuHoldLanes : kCpuHoldLanes,
+                   {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage}),
+          {&nodes_.texels(), &parts_, &means_.texels(), &colours_.texels(), &links_.texels(),
+           state.positions[0], &corrections_},
+          {&nodes_.texels(), &parts_, &means_.texels(), &colours_.texels(), &links_.texels(),
+           state.positions[1], &corrections_}),
+      moves_{Moves(device, shares_.texels(), corrections_, state, workgroupSize, rows_, false),
+             Moves(device, shares_.texels(), corrections_, state, workgroupSize, rows_, true)} {}
 
 CoarseStage::Moves::Moves(const vulkan::Device& device, const vulkan::Buffer& shares,
                           const vulkan::Buffer& corrections, const StateBuffers& state,
-                          std::uint32_t workgroupSize, bool colliders)
+                          std::uint32_t workgroupSize, std::uint32_t rows, bool colliders)
     : mesh(device, kernelOf("move_mesh", kernels::move_mesh, workgroupSize, kMoved, {colliders ? 1u : 0u}),
            {&shares, &corrections, state.positions[0], state.velocities[0], state.positions[0],
             state.velocities[0], &state.colliders, &state.nearColliders, &state.contactImpulses},
            {&shares, &corrections, state.positions[1], state.velocities[1], state.positions[1],
             state.velocities[1], &state.colliders, &state.nearColliders, &state.contactImpulses}),
-      grid(device, kernelOf("move_grid", kernels::move_grid, workgroupSize, kMoved, {colliders ? 1u : 0u}),
+      grid(device,
+           kernelOf("move_grid", kernels::move_grid, workgroupSize, kMoved, {colliders ? 1u : 0u, rows}),
            {&shares, &corrections, state.positions[0], state.velocities[0], state.positions[0],
             state.velocities[0], &state.colliders, &state.nearColliders, &state.contactImpulses},
            {&shares, &corrections, state.positions[1], state.velocities[1], state.positions[1],
@@ -145,9 +149,9 @@ void CoarseStage::recordLevel(vulkan::Recorder& recorder, std::uint32_t present,
     recorder.dispatch(moves.mesh.from[present], push, push.nodeCount, kMoveMeshWork + colliding);
     return;
   }
-  const std::uint64_t strips = (push.rows + CLOTHSTREAM_COARSE_ROWS - 1) / CLOTHSTREAM_COARSE_ROWS;
+  const std::uint64_t strips = (push.rows + rows_ - 1) / rows_;
   recorder.dispatch(moves.grid.from[present], push, strips * push.columns,
-                    kMoveGridWork + CLOTHSTREAM_COARSE_ROWS * colliding);
+                    (rows_ + 1) / 2 + rows_ * colliding);
 }
 
 }  // namespace clothstream::simulation

@@ -44,7 +44,7 @@ class CoarseStage {
  private:
   struct Moves {
     Moves(const vulkan::Device& device, const vulkan::Buffer& shares, const vulkan::Buffer& corrections,
-          const StateBuffers& state, std::uint32_t workgroupSize, bool colliders);
+          const StateBuffers& state, std::uint32_t workgroupSize, std::uint32_t rows, bool colliders);
     Stage mesh, grid;
   };
 
@@ -54,6 +54,7 @@ class CoarseStage {
   void recordLevel(vulkan::Recorder& recorder, std::uint32_t present, const shared::CoarsePush& push) const;
 
   std::vector<CoarseTables::Level> levels_;
+  std::uint32_t rows_;  // of a column, that an invocation moves
   DeviceTable nodes_, means_, shares_, colours_, links_;
   vulkan::Buffer parts_, corrections_;
   Stage averageNodes_, averageRows_, hold_;
