@@ -162,8 +162,22 @@ InputLine::Attachment attachmentOf(const Json& object, const std::string& where)
           .orientation = orientationOf(object, where)};
 }
 
+InputLine::Joints jointsOf(const Json& object, const std::string& where) {
+  allowOnly(object, where, {"collider", "poses"});
+  if (!object.contains("collider") || !object["collider"].is_string())
+    throw Wrong(fmt::format("{} must have a \"collider\", a text", where));
+  InputLine::Joints joints{.collider = object["collider"].get<std::string>(), .poses = {}};
+  constexpr std::size_t kMost = 128;  // as in Skin of scene.proto
+  forEach(object.value("poses", Json::array()), where + ".poses", kMost,
+          [&](const Json& pose, const std::string& place) {
+            const auto seven = numbers<7>(pose, place);
+            joints.poses.insert(joints.poses.end(), seven.begin(), seven.end());
+          });
+  return joints;
+}
+
 InputLine lineOf(const Json& object) {
-  allowOnly(object, "a line", {"after", "colliders", "grabs", "head", "hands", "attachments"});
+  allowOnly(object, "a line", {"after", "colliders", "grabs", "head", "hands", "attachments", "joints"});
   InputLine line;
   if (object.contains("after")) {
     line.after = static_cast<double>(number(object["after"], "after"));
@@ -199,6 +213,12 @@ InputLine lineOf(const Json& object) {
               line.attachments.push_back(attachmentOf(attachment, where));
             });
   }
+  if (object.contains("joints")) {
+    constexpr std::size_t kMost = 8;  // as in ColliderPoses of session.proto
+    forEach(object["joints"], "joints", kMost, [&](const Json& joints, const std::string& where) {
+      line.joints.push_back(jointsOf(joints, where));
+    });
+  }
   return line;
 }
 
@@ -220,6 +240,9 @@ void InputLine::send(cs_client* client, std::uint64_t nowUs) const {
   for (const Attachment& attachment : attachments)
     cs_move_attachment(client, attachment.name.c_str(), attachment.position.data(),
                        attachment.orientation ? attachment.orientation->data() : nullptr, nowUs);
+  for (const Joints& moved : joints)
+    cs_move_joints(client, moved.collider.c_str(), moved.poses.data(),
+                   static_cast<std::uint32_t>(moved.poses.size() / 7), nowUs);
 }
 
 tl::expected<InputLine, std::string> parseInputLine(std::string_view line) {

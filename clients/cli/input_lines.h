@@ -34,12 +34,18 @@ struct InputLine {
     std::optional<std::array<float, 4>> orientation;  // quaternion x y z w
   };
 
+  struct Joints {
+    std::string collider;
+    std::vector<float> poses;  // position and quaternion x y z w of each joint
+  };
+
   double after = 0;  // seconds to wait after the line before
   std::optional<std::vector<cs_own_collider>> colliders;
   std::optional<std::vector<cs_grab>> grabs;
   std::optional<std::optional<Head>> head;  // an empty inner value removes the head
   std::vector<Hand> hands;
   std::vector<Attachment> attachments;
+  std::vector<Joints> joints;
 
   void send(cs_client* client, std::uint64_t nowUs) const;
 };

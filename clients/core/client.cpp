@@ -483,8 +483,11 @@ std::optional<cs_playback> Client::playback(std::uint64_t nowUs) const {
 const std::string* Client::nextOutgoing() {
   const std::string* message = outbox_.next();
   if (!message && isConnected()) message = upload_.next(lastRequestId_);
-  // Attachments stay where they were moved, so each pose is sent once.
-  if (outbox_.poses().empty() && isConnected() && mayCollide()) poses_.attachments.clear();
+  // Attachments and joints stay where they were moved, so each pose is sent once.
+  if (outbox_.poses().empty() && isConnected() && mayCollide()) {
+    poses_.attachments.clear();
+    poses_.joints.clear();
+  }
   return message;
 }
 

@@ -71,6 +71,17 @@ void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
   sendPoses(nowUs);
 }
 
+void Client::move(ColliderJoints joints, std::uint64_t nowUs) {
+  const auto known =
+      std::find_if(poses_.joints.begin(), poses_.joints.end(),
+                   [&](const ColliderJoints& waiting) { return waiting.collider == joints.collider; });
+  if (known != poses_.joints.end())
+    *known = std::move(joints);
+  else
+    poses_.joints.push_back(std::move(joints));
+  sendPoses(nowUs);
+}
+
 bool Client::mayCollide() const {
   return (welcomed_ ? welcome_.role : hello_.role) != CS_ROLE_VIEWER;
 }

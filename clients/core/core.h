@@ -365,9 +365,10 @@ int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_s
 uint32_t cs_collider_count(const cs_client* client) CS_NOEXCEPT;
 /* Fails if the index is out of range. */
 int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out) CS_NOEXCEPT;
-/* Returns the corners (3 floats each) of a collider that is a hull, in its own frame. *triangles are its
- * corner indices, counter-clockwise seen from outside. Returns NULL and counts of 0 for other colliders.
- * Valid until the next CS_EVENT_DESCRIPTION. */
+/* Returns the corners (3 floats each) of a collider that is a hull or mesh, in its own frame. *triangles are
+ * its corner indices, counter-clockwise seen from outside. Returns NULL and counts of 0 for other colliders.
+ * Valid until the next CS_EVENT_DESCRIPTION. The corners of a mesh with joints are those of the shown time,
+ * or of the newest frame without play-out, and are valid until the next call. */
 const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vertex_count,
                          const uint32_t** triangles, uint32_t* index_count) CS_NOEXCEPT;
 
@@ -592,6 +593,11 @@ void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint6
 /* Moves an attachment of the scene; it stays there. orientation4 may be NULL: no rotation. */
 void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,
                         const float* orientation4, uint64_t now_us) CS_NOEXCEPT;
+/* Moves the joints of a collider of the scene that is a mesh with joints; they stay there. `poses` has seven
+ * numbers for each joint: position and quaternion x, y, z, w, relative to its parent. At most 128 joints are
+ * used; the rest is ignored. */
+void cs_move_joints(cs_client* client, const char* collider, const float* poses, uint32_t count,
+                    uint64_t now_us) CS_NOEXCEPT;
 
 /* Number of events in the newest CS_EVENT_GRABS, for the grabs of all participants. */
 uint32_t cs_grab_event_count(const cs_client* client) CS_NOEXCEPT;

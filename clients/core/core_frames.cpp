@@ -108,7 +108,14 @@ const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vert
   *vertex_count = hull ? static_cast<std::uint32_t>(hull->vertices.size() / 3) : 0;
   *index_count = hull ? static_cast<std::uint32_t>(hull->triangles.size()) : 0;
   *triangles = hull ? hull->triangles.data() : nullptr;
-  return hull ? hull->vertices.data() : nullptr;
+  if (!hull) return nullptr;
+  // Colliders of the scene have the same indices in the shown state.
+  const Collider* shown = at(client->client.playedColliders(), index);
+  const std::vector<float>& joints =
+      shown && shown->name == collider->name ? shown->joints : collider->joints;
+  if (hull->skin.rest.empty() || joints.size() != hull->skin.rest.size()) return hull->vertices.data();
+  pose(hull->skin, hull->vertices, joints, client->posed);
+  return client->posed.data();
 }
 
 int cs_set_play_out(cs_client* client, const cs_play_out_options* options) noexcept {

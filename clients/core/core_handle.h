@@ -12,7 +12,8 @@
 
 struct cs_client {
   clothstream::client::Client client;
-  std::string resumeToken{};  // text that cs_resume_token has returned
+  std::string resumeToken{};           // text that cs_resume_token has returned
+  mutable std::vector<float> posed{};  // vertices that cs_get_hull has returned
 };
 
 namespace clothstream::client {

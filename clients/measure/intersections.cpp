@@ -11,10 +11,6 @@ namespace {
 
 constexpr std::uint32_t kLeafTriangles = 4;
 
-Point minus(const Point& a, const Point& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
 // Six times the volume of a tetrahedron: its sign says on which side of the triangle abc d lies.
 double side(const Point& a, const Point& b, const Point& c, const Point& d) {
   const Point u = minus(b, a), v = minus(c, a), w = minus(d, a);

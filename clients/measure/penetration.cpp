@@ -25,10 +25,6 @@ Point turnBack(const std::array<double, 4>& q, const Point& v) {
   return {v[0] + q[3] * t[0] + u[0], v[1] + q[3] * t[1] + u[1], v[2] + q[3] * t[2] + u[2]};
 }
 
-Point minus(const Point& a, const Point& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
 // Triangles of the largest hull that the protocol allows, 128 corners. A mesh that small may be a hull.
 constexpr std::size_t kMaxHullTriangles = 252;
 // A corner in front of a face by more than this share of the distances from the origin makes a hull a mesh.

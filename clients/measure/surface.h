@@ -35,6 +35,10 @@ struct Surface {
 // The client must have its description, but no frame yet, because it shows the rest state until then.
 Surface surfaceOf(const cs_client* client);
 
+inline Point minus(const Point& a, const Point& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
 inline Point pointAt(std::span<const float> positions, std::size_t vertex) {
   return {double{positions[3 * vertex]}, double{positions[3 * vertex + 1]},
           double{positions[3 * vertex + 2]}};

@@ -12,6 +12,7 @@
 #include "server/messages/hands.h"
 #include "server/messages/limits.h"
 #include "server/messages/shapes.h"
+#include "server/messages/skin_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 
@@ -91,6 +92,25 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
   }
 }
 
+void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
+                const model::Scene& scene, model::ParticipantPoses& to) {
+  checks.count(poses / "joints", static_cast<std::size_t>(message.joints_size()), 0, limits::kMaxSolids);
+  for (int i = 0; i < message.joints_size() && !checks.failed(); ++i) {
+    const v1::ColliderJoints& from = message.joints(i);
+    const Path path = poses.at("joints", i);
+    checkKnown(checks, path / "collider", from.collider(), scene.colliders);
+    if (checks.failed()) return;
+    const auto found = std::ranges::find(scene.colliders, from.collider(), &model::Collider::name);
+    const auto* solid = std::get_if<model::Solid>(&found->shape);
+    if (solid == nullptr || !(*solid)->skin) {
+      checks.fail(path / "collider", '"' + from.collider() + '"', "has no joints");
+      return;
+    }
+    to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.begin()),
+                         toJoints(checks, path / "joints", from.joints(), (*solid)->skin->joints.size())});
+  }
+}
+
 }  // namespace
 
 Result<v1::ClientMessage> parseClientMessage(std::span<const std::byte> bytes) {
@@ -149,6 +169,7 @@ Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const 
   readColliders(checks, path, message, poses);
   readGrabs(checks, path, message, scene, poses);
   readAttachments(checks, path, message, scene, poses);
+  readJoints(checks, path, message, scene, poses);
   poses.wantsContacts = message.contact_events();
   return std::move(checks).result(std::move(poses));
 }

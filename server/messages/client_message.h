@@ -38,7 +38,8 @@ struct Joining {
 [[nodiscard]] Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_t> codecs);
 
 // At most limits::kMaxParticipantColliders colliders, with the bones of hands last, and
-// limits::kMaxParticipantGrabs grabs. Ids must be unique. Attachments must exist in the scene.
+// limits::kMaxParticipantGrabs grabs. Ids must be unique. Attachments, and colliders with
+// joints, must exist in the scene.
 [[nodiscard]] Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message,
                                                       const model::Scene& scene);
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "server/messages/limits.h"
+#include "server/messages/skin_message.h"
 
 namespace clothstream::messages {
 namespace {
@@ -97,6 +98,7 @@ model::Solid toSolid(Checks& checks, const Path& path, const v1::ColliderMesh& m
       message.file().empty() ? ofMessage(checks, path, message) : ofFile(checks, path, message, readMesh);
   if (!checks.failed()) place(checks, path, scale, surface.vertices);
   if (checks.failed()) return nullptr;
+  const std::size_t vertexCount = surface.vertices.size();
   auto made = model::makeClosedMesh(std::move(surface.vertices), std::move(surface.triangles));
   if (const auto* problem = std::get_if<model::ClosedMeshProblem>(&made)) {
     if (problem->triangle)
@@ -105,22 +107,35 @@ model::Solid toSolid(Checks& checks, const Path& path, const v1::ColliderMesh& m
       checks.fail(path, "", problem->text);
     return nullptr;
   }
-  return std::make_shared<const model::ClosedMesh>(std::get<model::ClosedMesh>(std::move(made)));
+  auto& mesh = std::get<model::ClosedMesh>(made);
+  if (message.has_skin())
+    mesh.skin = toSkin(checks, path / "skin", message.skin(), vertexCount, mesh.sources);
+  if (checks.failed()) return nullptr;
+  return std::make_shared<const model::ClosedMesh>(std::move(mesh));
 }
 
 void write(const model::ClosedMesh& mesh, v1::ColliderMesh& message) {
   message.Clear();
   for (const model::Vec3& p : mesh.vertices) message.mutable_positions()->Add(p.data(), p.data() + 3);
   for (const model::TriangleCorners& t : mesh.triangles) message.mutable_triangles()->Add(t.begin(), t.end());
+  if (mesh.skin) write(*mesh.skin, *message.mutable_skin());
 }
 
 void write(const model::ClosedMesh& mesh, v1::ColliderMeshDescription& message) {
   message.set_positions(littleEndian(mesh.vertices));
   message.set_triangles(littleEndian(mesh.triangles));
+  if (!mesh.skin) return;
+  for (const model::VertexJoints& vertex : mesh.skin->vertices) {
+    message.mutable_joints()->append(reinterpret_cast<const char*>(vertex.joints.data()),
+                                     vertex.joints.size());
+    message.mutable_weights()->append(reinterpret_cast<const char*>(vertex.weights.data()),
+                                      sizeof vertex.weights);
+  }
+  writeJoints(*mesh.skin, model::restJoints(*mesh.skin), *message.mutable_rest());
 }
 
 std::size_t geometryBytes(const model::ClosedMesh& mesh) {
-  return 12 * (mesh.vertices.size() + mesh.triangles.size());
+  return 12 * (mesh.vertices.size() + mesh.triangles.size()) + (mesh.skin ? 20 * mesh.vertices.size() : 0);
 }
 
 }  // namespace clothstream::messages

@@ -2,6 +2,8 @@
 // Converts closed triangle meshes of colliders between messages and the model.
 #pragma once
 
+#include <cstddef>
+
 #include "clothstream/v1/scene.pb.h"
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/mesh_message.h"

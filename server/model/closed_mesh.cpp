@@ -34,7 +34,8 @@ Eigen::Vector3d areaVector(const std::vector<Vec3>& vertices, const TriangleCorn
 }
 
 // Merges vertices in the same place. The first of them stays. Vertices without a triangle are removed.
-void weld(std::vector<Vec3>& vertices, std::vector<TriangleCorners>& triangles) {
+// Returns the index that each of the others had.
+std::vector<std::uint32_t> weld(std::vector<Vec3>& vertices, std::vector<TriangleCorners>& triangles) {
   std::vector<std::uint32_t> order(vertices.size());
   std::iota(order.begin(), order.end(), 0u);
   const auto place = [&](std::uint32_t i) {
@@ -51,14 +52,17 @@ void weld(std::vector<Vec3>& vertices, std::vector<TriangleCorners>& triangles) 
   for (TriangleCorners& triangle : triangles)
     for (std::uint32_t& corner : triangle) number[corner = first[corner]] = 0;
   std::vector<Vec3> kept;
+  std::vector<std::uint32_t> sources;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     if (number[i] == kUnused) continue;
     number[i] = static_cast<std::uint32_t>(kept.size());
     kept.push_back(vertices[i]);
+    sources.push_back(static_cast<std::uint32_t>(i));
   }
   for (TriangleCorners& triangle : triangles)
     for (std::uint32_t& corner : triangle) corner = number[corner];
   vertices = std::move(kept);
+  return sources;
 }
 
 // Sets the neighbours, or returns why there are none.
@@ -110,11 +114,16 @@ std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> ver
       if (corner >= vertices.size())
         return ClosedMeshProblem{t, "has the corner " + std::to_string(corner) + ", but there are " +
                                         std::to_string(vertices.size()) + " vertices"};
-  weld(vertices, triangles);
+  std::vector<std::uint32_t> sources = weld(vertices, triangles);
   for (std::size_t t = 0; t < triangles.size(); ++t)
     if (!(areaVector(vertices, triangles[t]).norm() >= kMinTriangleArea))
       return ClosedMeshProblem{t, "has an area below 1e-9 m^2"};
-  ClosedMesh mesh{std::move(vertices), std::move(triangles), {}, 0};
+  ClosedMesh mesh{.vertices = std::move(vertices),
+                  .triangles = std::move(triangles),
+                  .neighbours = {},
+                  .sources = std::move(sources),
+                  .reach = 0,
+                  .skin = {}};
   if (const auto problem = connect(mesh)) return *problem;
   double volume = 0;
   for (const TriangleCorners& triangle : mesh.triangles)

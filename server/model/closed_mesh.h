@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/model/pose.h"
+#include "server/model/skin.h"
 
 namespace clothstream::model {
 
@@ -28,7 +29,10 @@ struct ClosedMesh {
   std::vector<TriangleCorners> triangles;  // counter-clockwise seen from outside
   // The triangles across the edges from corner 0 to 1, 1 to 2 and 2 to 0 of each triangle.
   std::vector<TriangleCorners> neighbours;
-  float reach = 0;  // m, of a sphere around the origin that contains the mesh
+  // Index of each vertex among those that the mesh was made of.
+  std::vector<std::uint32_t> sources;
+  float reach = 0;           // m, of a sphere around the origin that contains the mesh
+  std::optional<Skin> skin;  // absent: the mesh is rigid
 };
 
 struct ClosedMeshProblem {
@@ -37,9 +41,9 @@ struct ClosedMeshProblem {
 };
 
 // Vertices must be finite. Vertices in the same place become one, and the order of the others stays. Returns
-// a problem if a triangle has an unknown corner or no area, if the surface is not closed or not oriented, if
-// it is inside out, or if it has more than kMaxClosedMeshTriangles. Takes time in proportion to the number of
-// triangles, apart from sorting.
+// a problem if a triangle has an unknown corner or no area, or if there are more than
+// kMaxClosedMeshTriangles. Returns a problem also if the surface is not closed, not oriented or inside out.
+// Takes time in proportion to the number of triangles, apart from sorting.
 std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> vertices,
                                                            std::vector<TriangleCorners> triangles);
 

@@ -47,11 +47,18 @@ struct AttachmentPose {
   Pose pose = {};
 };
 
+// New poses of the joints of a collider that is a mesh with joints.
+struct ColliderJoints {
+  std::size_t collider = 0;  // index among the colliders of the scene
+  std::vector<Pose> joints;  // of all joints, relative to their parents
+};
+
 // Everything that a participant moves, at one time.
 struct ParticipantPoses {
   std::vector<ParticipantCollider> colliders = {};
   std::vector<Grab> grabs = {};
   std::vector<AttachmentPose> attachments = {};
+  std::vector<ColliderJoints> joints = {};
   bool wantsContacts = false;  // subscribes to contact events
 };
 

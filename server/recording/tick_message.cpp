@@ -12,6 +12,7 @@
 
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
+#include "server/messages/skin_message.h"
 #include "server/messages/vectors.h"
 
 namespace clothstream::recording {
@@ -75,6 +76,8 @@ void writeColliders(const scene::AppliedTick& tick, v1::RecordedTick& message) {
     to.set_participant_id(identity.participant);
     to.set_id(identity.id);
     writeShape(collider.shape, to);
+    messages::writePoses(collider.jointsStart, *to.mutable_joints_start());
+    messages::writePoses(collider.jointsEnd, *to.mutable_joints_end());
   }
 }
 
@@ -151,6 +154,27 @@ model::Shape shapeOf(Numbers& numbers, const v1::AppliedCollider& message, const
   return known ? scene.colliders[message.id()].shape : model::Shape{};
 }
 
+// Joints of a mesh, which has `count`.
+std::vector<model::Pose> jointsOf(Numbers& numbers, const google::protobuf::RepeatedField<float>& message,
+                                  std::size_t count) {
+  const bool complete = static_cast<std::size_t>(message.size()) == 7 * count;
+  numbers.require(complete);
+  std::vector<model::Pose> poses;
+  if (!complete) return poses;
+  for (const float* at = message.data(); poses.size() < count; at += 7) {
+    v1::Pose pose;
+    messages::write(model::Vec3(at[0], at[1], at[2]), *pose.mutable_position());
+    messages::write(model::Quaternion(at[6], at[3], at[4], at[5]), *pose.mutable_orientation());
+    poses.push_back(numbers.pose(pose));
+  }
+  return poses;
+}
+
+std::size_t jointCountOf(const model::Shape& shape) {
+  const auto* solid = std::get_if<model::Solid>(&shape);
+  return solid != nullptr && (*solid)->skin ? (*solid)->skin->joints.size() : 0;
+}
+
 std::optional<simulation::WeightedNodes> placeOf(Numbers& numbers, const v1::AppliedGrip& message,
                                                  std::uint32_t nodeCount) {
   if (message.place_nodes().empty() && message.place_weights().empty()) return std::nullopt;
@@ -221,7 +245,9 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
     const model::Shape shape = shapeOf(numbers, collider, scene, known);
     if (!known) return wrong("one of its colliders has no shape");
     inputs.colliders.push_back({shape, numbers.pose(collider.start()), numbers.pose(collider.end()),
-                                numbers.number(collider.friction())});
+                                numbers.number(collider.friction()),
+                                jointsOf(numbers, collider.joints_start(), jointCountOf(shape)),
+                                jointsOf(numbers, collider.joints_end(), jointCountOf(shape))});
   }
   for (const v1::Pose& pose : message.attachments()) inputs.attachments.push_back(numbers.pose(pose));
   for (const v1::AppliedGrip& grab : message.grips())

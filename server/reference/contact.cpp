@@ -81,37 +81,86 @@ std::optional<Vec3> entry(const model::Shape& shape, double thickness, const Vec
   return from + inside * (to - from);
 }
 
+// Normals of a mesh whose product is above this are on one side.
+constexpr double kSameSide = 0.01;
+
+// A mesh in a substep.
+struct MovingMesh {
+  const model::ClosedMesh& before;
+  const model::ClosedMesh& after;
+
+  bool moves() const { return &before != &after; }
+  // Farthest move of a vertex.
+  double farthest() const {
+    double most = 0;
+    for (std::size_t i = 0; i < before.vertices.size() && moves(); ++i)
+      most = std::max(most, double{(after.vertices[i] - before.vertices[i]).norm()});
+    return most;
+  }
+  Vec3 moveAt(const NearestPoint& nearest) const {
+    Vec3 move = Vec3::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = before.triangles[nearest.triangle][k];
+      move += nearest.weights[k] * (after.vertices[vertex] - before.vertices[vertex]).cast<double>();
+    }
+    return move;
+  }
+};
+
+// Where a path that begins outside first enters: the surface's place at the end of the substep, its normal
+// and its move in the substep.
+struct Entry {
+  Vec3 place, normal, move;
+};
+
+std::optional<Entry> entryOf(const MovingMesh& mesh, const Vec3& from, const Vec3& to) {
+  if (!mesh.moves()) {
+    const std::optional<Crossing> crossing = firstCrossing(mesh.before, from, to);
+    if (!crossing) return std::nullopt;
+    return Entry{from + crossing->part * (to - from), crossing->normal, Vec3::Zero()};
+  }
+  constexpr int kSamples = 64;
+  NearestPoint outside = nearestOn(mesh.before, from);
+  double part = 0;
+  for (int i = 1; i <= kSamples; ++i) {
+    const double next = static_cast<double>(i) / kSamples;
+    const NearestPoint here = nearestOn(between(mesh.before, mesh.after, next), from + next * (to - from));
+    if (here.distance < 0)
+      return Entry{outside.point + (1 - part) * mesh.moveAt(outside), outside.normal, mesh.moveAt(outside)};
+    outside = here;
+    part = next;
+  }
+  return std::nullopt;
+}
+
 // A path that crosses the surface, or begins inside, stays on the side of its beginning. Other paths end
 // outside of the thickness.
-std::optional<Contact> contactWithSolid(const model::ClosedMesh& mesh, double thickness, const Vec3& from,
-                                        const Vec3& to) {
-  const double way = (to - from).norm();
-  const NearestPoint begin = nearestOn(mesh, from), end = nearestOn(mesh, to);
+std::optional<Contact> contactWithSolid(const MovingMesh& mesh, double thickness, double seconds,
+                                        const Vec3& from, const Vec3& to) {
+  const double way = (to - from).norm() + mesh.farthest();
+  const NearestPoint begin = nearestOn(mesh.before, from), end = nearestOn(mesh.after, to);
   const double bound = way + std::max(thickness, double{model::kSolidDepth});
   if (std::abs(begin.distance) >= bound || begin.distance - way >= thickness) return std::nullopt;
   const bool begunInside = begin.distance < 0;
-  Vec3 normal = begin.normal, touched = begin.point;
-  if (!begunInside) {
-    const std::optional<Crossing> crossing = firstCrossing(mesh, from, to);
-    if (!crossing)
-      return end.distance < thickness ? std::optional(Contact{end.normal, thickness - end.distance})
-                                      : std::nullopt;
-    normal = crossing->normal;
-    touched = from + crossing->part * (to - from);
+  const Contact atEnd{end.normal, thickness - end.distance, mesh.moveAt(end) / seconds};
+  std::optional<Entry> entry;
+  if (begunInside) {
+    entry = Entry{begin.point + mesh.moveAt(begin), begin.normal, mesh.moveAt(begin)};
+  } else if (end.distance < 0 || begin.distance + end.distance < way) {
+    entry = entryOf(mesh, from, to);
   }
-  if (std::abs(end.distance) < bound && end.normal.dot(normal) > 0) {
-    if (end.distance < thickness) return Contact{end.normal, thickness - end.distance};
+  if (!entry) return atEnd.depth > 0 ? std::optional(atEnd) : std::nullopt;
+  if (std::abs(end.distance) < bound && end.normal.dot(entry->normal) > kSameSide) {
+    if (atEnd.depth > 0) return atEnd;
     if (begunInside) return std::nullopt;
   }
-  const double depth = thickness - normal.dot(to - touched);
-  return depth > 0 ? std::optional(Contact{normal, depth}) : std::nullopt;
+  const double depth = thickness - entry->normal.dot(to - entry->place);
+  return depth > 0 ? std::optional(Contact{entry->normal, depth, entry->move / seconds}) : std::nullopt;
 }
 
 // Both points are in the shape's frame.
 std::optional<Contact> contactOf(const model::Shape& shape, double thickness, const Vec3& from,
                                  const Vec3& to) {
-  if (const auto* solid = std::get_if<model::Solid>(&shape))
-    return contactWithSolid(**solid, thickness, from, to);
   const bool begunInside = over(shape, thickness, from).height <= 0;
   const std::optional<Vec3> entered = begunInside ? from : entry(shape, thickness, from, to);
   if (!entered) return std::nullopt;
@@ -151,6 +200,7 @@ ColliderStep stepOf(const Pose& start, const Pose& end, std::uint32_t index, std
   step.before = between(start, end, static_cast<double>(index) / substeps);
   step.after = between(start, end, (index + 1.0) / substeps);
   step.velocity = (end.position - start.position) / tickSeconds;
+  step.seconds = tickSeconds / substeps;
   const Quaternion turn = step.after.orientation * step.before.orientation.conjugate();
   step.spin = 2 * substeps / tickSeconds * turn.vec();
   return step;
@@ -158,13 +208,22 @@ ColliderStep stepOf(const Pose& start, const Pose& end, std::uint32_t index, std
 
 std::optional<Contact> contactOf(const model::Shape& shape, double thickness, const ColliderStep& step,
                                  const Vec3& from, const Vec3& to) {
-  const Vec3 after = to - step.after.position;
-  const double reach = model::reachOf(shape) + 2 * thickness;
-  const Vec3 before = from - step.before.position;
-  if (after.norm() > reach + (after - before).norm()) return std::nullopt;
-  std::optional<Contact> contact = contactOf(shape, thickness, step.before.orientation.conjugate() * before,
-                                             step.after.orientation.conjugate() * after);
-  if (contact) contact->normal = step.after.orientation * contact->normal;
+  const Vec3 after = to - step.after.position, before = from - step.before.position;
+  const Vec3 start = step.before.orientation.conjugate() * before,
+             end = step.after.orientation.conjugate() * after;
+  std::optional<Contact> contact;
+  if (const auto* solid = std::get_if<model::Solid>(&shape)) {
+    const MovingMesh mesh =
+        step.meshBefore ? MovingMesh{*step.meshBefore, *step.meshAfter} : MovingMesh{**solid, **solid};
+    contact = contactWithSolid(mesh, thickness, step.seconds, start, end);
+  } else {
+    const double reach = model::reachOf(shape) + 2 * thickness;
+    if (after.norm() > reach + (after - before).norm()) return std::nullopt;
+    contact = contactOf(shape, thickness, start, end);
+  }
+  if (!contact) return std::nullopt;
+  contact->normal = step.after.orientation * contact->normal;
+  contact->velocity = step.after.orientation * contact->velocity;
   return contact;
 }
 

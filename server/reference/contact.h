@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <memory>
 #include <optional>
 
 #include "server/model/collider.h"
@@ -30,6 +31,9 @@ Pose between(const Pose& from, const Pose& to, double part);
 struct ColliderStep {
   Pose before, after;
   Vec3 velocity = Vec3::Zero();
+  // A mesh with joints at the start and at the end; null for other shapes.
+  std::shared_ptr<const model::ClosedMesh> meshBefore = nullptr, meshAfter = nullptr;
+  double seconds = 1;        // of the substep
   Vec3 spin = Vec3::Zero();  // axis times twice the sine of half the angle, over the substep's seconds
 };
 
@@ -42,8 +46,9 @@ ColliderStep stepOf(const Pose& start, const Pose& end, std::uint32_t index, std
 double heightOver(const model::Shape& shape, const Pose& pose, const Vec3& point);
 
 struct Contact {
-  Vec3 normal;   // out of the shape
-  double depth;  // distance by which the end of the path has to move along it
+  Vec3 normal;                   // out of the shape
+  double depth;                  // distance by which the end of the path has to move along it
+  Vec3 velocity = Vec3::Zero();  // of the surface there, relative to the collider, m/s
 };
 
 // Cloth keeps `thickness` from the surface (from the planes of shapes with planes). A path that begins

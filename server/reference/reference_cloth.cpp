@@ -271,7 +271,8 @@ void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step
     const std::optional<Contact> contact = contactOf(shape, cloth_.thickness, step, from[i], positions_[i]);
     if (!contact) continue;
     positions_[i] += contact->depth * contact->normal;
-    const Vec3 carried = step.velocity + step.spin.cross(positions_[i] - step.after.position);
+    const Vec3 carried =
+        step.velocity + contact->velocity + step.spin.cross(positions_[i] - step.after.position);
     const Vec3 relative = velocities_[i] - carried;
     const double approach = relative.dot(contact->normal);
     if (approach >= 0) continue;

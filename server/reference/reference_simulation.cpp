@@ -3,8 +3,10 @@
 #include "server/reference/reference_simulation.h"
 
 #include <algorithm>
+#include <memory>
 
 #include "server/model/wind.h"
+#include "server/reference/solid.h"
 
 namespace clothstream::reference {
 
@@ -12,9 +14,20 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   TickInputs inputs{model::environmentAt(scene, tick), {}};
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
-  for (const model::Collider& collider : scene.colliders)
-    inputs.colliders.push_back({collider.shape, toPose(model::poseAt(collider, start)),
-                                toPose(model::poseAt(collider, end)), collider.friction});
+  for (const model::Collider& collider : scene.colliders) {
+    MovingCollider& to = inputs.colliders.emplace_back(
+        MovingCollider{collider.shape, toPose(model::poseAt(collider, start)),
+                       toPose(model::poseAt(collider, end)), collider.friction});
+    const auto* solid = std::get_if<model::Solid>(&collider.shape);
+    if (solid == nullptr || !(*solid)->skin) continue;
+    const auto jointsAt = [&](double seconds, std::vector<model::Pose>& poses) {
+      std::vector<model::Pose> local;
+      model::jointsAt(*(*solid)->skin, seconds, local);
+      model::compose(*(*solid)->skin, local, poses);
+    };
+    jointsAt(start, to.jointsStart);
+    jointsAt(end, to.jointsEnd);
+  }
   for (const model::Cloth& cloth : scene.cloths)
     for (const model::Attachment& attachment : cloth.attachments)
       inputs.attachments.push_back(toPose(model::frameAt(scene, attachment, end)));
@@ -60,11 +73,21 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
 
 void ReferenceSimulation::collide(const TickInputs& inputs, std::uint32_t index, std::size_t cloth,
                                   bool solids, std::span<const std::uint8_t> only) {
-  for (const MovingCollider& collider : inputs.colliders)
-    if (std::holds_alternative<model::Solid>(collider.shape) == solids)
-      cloths_[cloth].collide(
-          collider.shape, stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()),
-          collider.friction, before_[cloth], only);
+  for (const MovingCollider& collider : inputs.colliders) {
+    const auto* solid = std::get_if<model::Solid>(&collider.shape);
+    if ((solid != nullptr) != solids) continue;
+    ColliderStep step = stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds());
+    if (!collider.jointsStart.empty()) {
+      const auto at = [&](std::uint32_t substep) {
+        return std::make_shared<const model::ClosedMesh>(
+            moved(**solid, collider.jointsStart, collider.jointsEnd,
+                  static_cast<double>(substep) / scene_.substeps));
+      };
+      step.meshBefore = at(index);
+      step.meshAfter = at(index + 1);
+    }
+    cloths_[cloth].collide(collider.shape, step, collider.friction, before_[cloth], only);
+  }
 }
 
 // Nodes take their ways past the colliders, which stand still meanwhile. What they keep becomes velocity.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "server/model/scene.h"
@@ -18,6 +19,8 @@ struct MovingCollider {
   model::Shape shape = model::Sphere{};
   Pose start = {}, end = {};
   double friction = 1;  // multiplied with the cloth's
+  // Poses of the joints of a mesh in the frame of the collider, or empty.
+  std::vector<model::Pose> jointsStart = {}, jointsEnd = {};
 };
 
 struct TickInputs {

@@ -57,6 +57,15 @@ double angleAt(const Corners& t, const Vec3& point) {
   return 2 * pi;
 }
 
+// Barycentric coordinates of a point of the triangle: shares of its area.
+std::array<double, 3> weightsOf(const Corners& t, const Vec3& point) {
+  const Vec3 area = (t[1] - t[0]).cross(t[2] - t[0]);
+  std::array<double, 3> weights{};
+  for (std::size_t i = 0; i < 3; ++i)
+    weights[i] = (t[(i + 1) % 3] - point).cross(t[(i + 2) % 3] - point).dot(area) / area.squaredNorm();
+  return weights;
+}
+
 double solidAngle(const Vec3& p, const Corners& t) {
   const Vec3 a = t[0] - p, b = t[1] - p, c = t[2] - p;
   const double la = a.norm(), lb = b.norm(), lc = c.norm();
@@ -68,15 +77,17 @@ double solidAngle(const Vec3& p, const Corners& t) {
 NearestPoint nearestOn(const model::ClosedMesh& mesh, const Vec3& p) {
   NearestPoint nearest;
   double least = std::numeric_limits<double>::infinity(), angle = 0;
-  for (const model::TriangleCorners& triangle : mesh.triangles) {
-    const Corners corners = cornersOf(mesh, triangle);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Corners corners = cornersOf(mesh, mesh.triangles[t]);
     const Vec3 point = nearestOnTriangle(p, corners);
     angle += solidAngle(p, corners);
     if ((p - point).norm() < least) {
       least = (p - point).norm();
       nearest.point = point;
+      nearest.triangle = t;
     }
   }
+  nearest.weights = weightsOf(cornersOf(mesh, mesh.triangles[nearest.triangle]), nearest.point);
   const double sign = angle > 2 * std::acos(-1.0) ? -1 : 1;
   nearest.distance = sign * least;
   nearest.normal = sign * (p - nearest.point) / std::max(least, 1e-300);
@@ -107,6 +118,26 @@ std::optional<Crossing> firstCrossing(const model::ClosedMesh& mesh, const Vec3&
     if (inside) first = Crossing{part, normal};
   }
   return first;
+}
+
+model::ClosedMesh between(const model::ClosedMesh& from, const model::ClosedMesh& to, double part) {
+  model::ClosedMesh mesh = from;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i)
+    mesh.vertices[i] += static_cast<float>(part) * (to.vertices[i] - from.vertices[i]);
+  return mesh;
+}
+
+model::ClosedMesh moved(const model::ClosedMesh& mesh, std::span<const model::Pose> start,
+                        std::span<const model::Pose> end, double progress) {
+  const auto from = model::jointTransforms(*mesh.skin, start), to = model::jointTransforms(*mesh.skin, end);
+  model::ClosedMesh result = mesh;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const model::VertexJoints& joints = mesh.skin->vertices[i];
+    const Vec3 rest = mesh.vertices[i].cast<double>();
+    const Vec3 a = model::skinned(joints, from, rest), b = model::skinned(joints, to, rest);
+    result.vertices[i] = (a + progress * (b - a)).cast<float>();
+  }
+  return result;
 }
 
 }  // namespace clothstream::reference

@@ -4,7 +4,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <optional>
+#include <span>
 
 #include "server/model/closed_mesh.h"
 
@@ -14,6 +17,8 @@ namespace clothstream::reference {
 struct NearestPoint {
   double distance = 0;  // m, negative inside
   Eigen::Vector3d point, normal;
+  std::size_t triangle = 0;                                  // that has the point
+  std::array<double, 3> weights{1.0 / 3, 1.0 / 3, 1.0 / 3};  // of its corners
 };
 
 // Whether the point is inside follows from the solid angle of the mesh: van Oosterom and Strackee, "The solid
@@ -28,5 +33,13 @@ struct Crossing {
 // Where the way first crosses the surface from outside.
 std::optional<Crossing> firstCrossing(const model::ClosedMesh& mesh, const Eigen::Vector3d& from,
                                       const Eigen::Vector3d& to);
+
+// The mesh that its joints move, at a share of the tick. `start` and `end` are the poses of the joints in the
+// frame of the mesh.
+model::ClosedMesh moved(const model::ClosedMesh& mesh, std::span<const model::Pose> start,
+                        std::span<const model::Pose> end, double progress);
+
+// A mesh between two others with the same triangles.
+model::ClosedMesh between(const model::ClosedMesh& from, const model::ClosedMesh& to, double part);
 
 }  // namespace clothstream::reference

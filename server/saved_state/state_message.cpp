@@ -94,12 +94,33 @@ Slot toSlot(const v1::SavedGrab& message) {
   return slot;
 }
 
+// Joints of every collider that has them.
+bool readJoints(const v1::SavedCheckpoint& message, const model::Scene& scene,
+                scene::ColliderSet::State& state) {
+  state.joints.resize(scene.colliders.size());
+  for (const v1::SavedJoints& saved : message.joints()) {
+    if (saved.collider() >= scene.colliders.size()) return false;
+    scene::ColliderSet::Joints& joints = state.joints[saved.collider()];
+    for (const v1::Pose& pose : saved.joints()) joints.now.push_back(toPose(pose));
+    if (saved.moved()) joints.target = joints.now;
+  }
+  for (std::size_t i = 0; i < scene.colliders.size(); ++i) {
+    const auto* solid = std::get_if<model::Solid>(&scene.colliders[i].shape);
+    const bool hasJoints = solid != nullptr && (*solid)->skin;
+    if (state.joints[i].now.size() != (hasJoints ? (*solid)->skin->joints.size() : 0) ||
+        !std::ranges::all_of(state.joints[i].now, isFinite))
+      return false;
+  }
+  return true;
+}
+
 bool readColliders(const v1::SavedCheckpoint& message, const model::Scene& scene,
                    scene::ColliderSet::State& state) {
   if (static_cast<std::size_t>(message.scene_colliders_size()) != scene.colliders.size() ||
       static_cast<std::size_t>(message.colliders_size()) + scene.colliders.size() > simulation::kMaxColliders)
     return false;
   for (const v1::Pose& pose : message.scene_colliders()) state.scenePoses.push_back(toPose(pose));
+  if (!readJoints(message, scene, state)) return false;
   for (const v1::SavedCollider& from : message.colliders()) {
     messages::Checks checks;
     const model::Shape shape = messages::toShape(checks, messages::Path("shape"), from.shape());
@@ -233,6 +254,14 @@ v1::SavedCheckpoint toMessage(const scene::Checkpoint& checkpoint) {
   }
   for (const model::Pose& pose : checkpoint.colliders.scenePoses)
     messages::write(pose, *message.add_scene_colliders());
+  for (std::size_t i = 0; i < checkpoint.colliders.joints.size(); ++i) {
+    const scene::ColliderSet::Joints& joints = checkpoint.colliders.joints[i];
+    if (joints.now.empty()) continue;
+    v1::SavedJoints& to = *message.add_joints();
+    to.set_collider(static_cast<std::uint32_t>(i));
+    for (const model::Pose& pose : joints.now) messages::write(pose, *to.add_joints());
+    to.set_moved(!joints.target.empty());
+  }
   for (const scene::ColliderSet::Placed& placed : checkpoint.colliders.colliders) {
     v1::SavedCollider& to = *message.add_colliders();
     to.set_participant_id(placed.participant);

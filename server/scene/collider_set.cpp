@@ -9,6 +9,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/description.h"
+#include "server/messages/skin_message.h"
 
 namespace clothstream::scene {
 namespace {
@@ -22,11 +23,19 @@ model::Pose startOf(const model::Pose& before, const model::Pose& now, double ti
   return jumped ? now : before;
 }
 
+const model::Skin* skinOf(const model::Collider& collider) {
+  const auto* solid = std::get_if<model::Solid>(&collider.shape);
+  return solid != nullptr && (*solid)->skin ? &*(*solid)->skin : nullptr;
+}
+
 }  // namespace
 
 ColliderSet::ColliderSet(const model::Scene& scene) {
-  for (const model::Collider& collider : scene.colliders)
+  for (const model::Collider& collider : scene.colliders) {
     state_.scenePoses.push_back(model::poseAt(collider, 0));
+    Joints& joints = state_.joints.emplace_back();
+    if (const model::Skin* skin = skinOf(collider)) model::jointsAt(*skin, 0, joints.now);
+  }
 }
 
 void ColliderSet::place(std::uint64_t participant, std::span<const model::ParticipantCollider> colliders) {
@@ -45,28 +54,60 @@ void ColliderSet::place(std::uint64_t participant, std::span<const model::Partic
   }
 }
 
+void ColliderSet::placeJoints(std::span<const model::ColliderJoints> moved) {
+  for (const model::ColliderJoints& put : moved) state_.joints[put.collider].target = put.joints;
+}
+
+// Joints that a message moves too fast appear at their new poses, like colliders.
+void ColliderSet::advanceJoints(const model::Skin& skin, double endSeconds, double tickSeconds,
+                                Joints& joints, simulation::MovingCollider& collider) {
+  const bool byItself = joints.target.empty();
+  if (byItself)
+    model::jointsAt(skin, endSeconds, end_);
+  else
+    end_ = joints.target;
+  model::compose(skin, joints.now, collider.jointsStart);
+  model::compose(skin, end_, collider.jointsEnd);
+  for (std::size_t i = 0; i < end_.size() && !byItself; ++i) {
+    const model::Pose& start = collider.jointsStart[i];
+    const model::Pose& end = collider.jointsEnd[i];
+    if (startOf(start, end, tickSeconds).position == start.position &&
+        startOf(start, end, tickSeconds).orientation.coeffs() == start.orientation.coeffs())
+      continue;
+    collider.jointsStart = collider.jointsEnd;
+    break;
+  }
+  joints.now = end_;
+}
+
+// Elements keep the memory of their joints.
 void ColliderSet::advance(const model::Scene& scene, double endSeconds,
                           std::vector<simulation::MovingCollider>& colliders) {
-  colliders.clear();
-  for (std::size_t i = 0; i < scene.colliders.size(); ++i) {
+  const std::size_t own = scene.colliders.size();
+  colliders.resize(own + state_.colliders.size());
+  for (std::size_t i = 0; i < own; ++i) {
     const model::Collider& collider = scene.colliders[i];
     const model::Pose end = model::poseAt(collider, endSeconds);
     const bool byItself = !collider.motion.keys.empty();
-    colliders.push_back(
-        {collider.shape,
-         byItself ? state_.scenePoses[i] : startOf(state_.scenePoses[i], end, scene.tickSeconds()), end,
-         collider.friction});
+    simulation::MovingCollider& to = colliders[i];
+    to.shape = collider.shape;
+    to.start = byItself ? state_.scenePoses[i] : startOf(state_.scenePoses[i], end, scene.tickSeconds());
+    to.end = end;
+    to.friction = collider.friction;
+    if (const model::Skin* skin = skinOf(collider))
+      advanceJoints(*skin, endSeconds, scene.tickSeconds(), state_.joints[i], to);
     state_.scenePoses[i] = end;
   }
-  for (Placed& collider : state_.colliders) {
+  for (std::size_t i = 0; i < state_.colliders.size(); ++i) {
+    Placed& collider = state_.colliders[i];
     const model::Pose& end = collider.now.pose;
-    colliders.push_back({collider.now.shape, startOf(collider.before, end, scene.tickSeconds()), end, 1});
+    colliders[own + i] = {collider.now.shape, startOf(collider.before, end, scene.tickSeconds()), end, 1};
     collider.before = end;
   }
 }
 
 void ColliderSet::restore(State state) {
-  assert(state.scenePoses.size() == state_.scenePoses.size());
+  assert(state.scenePoses.size() == state_.scenePoses.size() && state.joints.size() == state_.joints.size());
   state_ = std::move(state);
 }
 
@@ -79,8 +120,12 @@ ColliderSet::Identity ColliderSet::identity(std::size_t index) const {
 void ColliderSet::write(const model::Scene& scene, v1::Frame& frame) const {
   auto& states = *frame.mutable_colliders();
   states.Clear();
-  for (std::size_t i = 0; i < scene.colliders.size(); ++i)
-    messages::write(scene.colliders[i], state_.scenePoses[i], *states.Add());
+  for (std::size_t i = 0; i < scene.colliders.size(); ++i) {
+    v1::ColliderState& state = *states.Add();
+    messages::write(scene.colliders[i], state_.scenePoses[i], state);
+    if (const model::Skin* skin = skinOf(scene.colliders[i]))
+      messages::writeJoints(*skin, state_.joints[i].now, *state.mutable_joints());
+  }
   for (const Placed& collider : state_.colliders)
     messages::write(collider.now, collider.participant, *states.Add());
 }

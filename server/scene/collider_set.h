@@ -31,6 +31,9 @@ class ColliderSet {
   // appears at rest, and a missing one is removed.
   void place(std::uint64_t participant, std::span<const model::ParticipantCollider> colliders);
 
+  // Moves joints of colliders of the scene over the next tick. They stay there until they are moved again.
+  void placeJoints(std::span<const model::ColliderJoints> moved);
+
   // Advances to the end of the next tick, in seconds of simulated time. Writes all colliders, each with its
   // start and end pose, to `colliders`.
   void advance(const model::Scene& scene, double endSeconds,
@@ -55,9 +58,15 @@ class ColliderSet {
     model::ParticipantCollider now;
     model::Pose before;
   };
+  // Joints of a collider of the scene, relative to their parents; empty if it has none.
+  struct Joints {
+    std::vector<model::Pose> now;     // at the tick's end
+    std::vector<model::Pose> target;  // given by a message; empty: the animation moves the joints
+  };
   // Everything that a later tick depends on, after a complete tick.
   struct State {
     std::vector<model::Pose> scenePoses;  // at the tick's end
+    std::vector<Joints> joints;           // of the colliders of the scene
     std::vector<Placed> colliders;        // of participants, in their order
   };
   const State& state() const { return state_; }
@@ -65,7 +74,11 @@ class ColliderSet {
   void restore(State state);
 
  private:
+  void advanceJoints(const model::Skin& skin, double endSeconds, double tickSeconds, Joints& joints,
+                     simulation::MovingCollider& collider);
+
   State state_;
+  std::vector<model::Pose> end_;  // reused in every tick
 };
 
 }  // namespace clothstream::scene

@@ -6,6 +6,18 @@
 
 namespace clothstream::scene {
 
+namespace {
+
+// Adds the joints of colliders that newer poses do not move.
+void keepJoints(std::vector<model::ColliderJoints>& before, std::vector<model::ColliderJoints>& now) {
+  for (model::ColliderJoints& joints : before)
+    if (std::ranges::find(now, joints.collider, &model::ColliderJoints::collider) == now.end())
+      now.push_back(std::move(joints));
+  before.clear();
+}
+
+}  // namespace
+
 void Inbox::postPoses(std::uint64_t participant, model::ParticipantPoses poses, Clock::time_point arrival,
                       PoseTime time) {
   const std::lock_guard lock(mutex_);
@@ -20,6 +32,7 @@ void Inbox::postPoses(std::uint64_t participant, model::ParticipantPoses poses, 
   poses.attachments.insert(poses.attachments.begin(), before.begin(), before.end());
   if (poses.attachments.size() > kMaxAttachmentPoses)
     poses.attachments.erase(poses.attachments.begin(), poses.attachments.end() - kMaxAttachmentPoses);
+  keepJoints(last->now.poses.joints, poses.joints);
   if (!time.trueAt) {
     last->earlier.clear();
   } else {

@@ -30,7 +30,7 @@ struct TimedPoses {
 };
 
 // Poses of one participant since the last tick; empty poses once the participant has left. `earlier` has
-// those before the newest, oldest first, without attachments, if their times are known.
+// those before the newest, oldest first, without attachments and joints, if their times are known.
 struct Poses {
   std::uint64_t participant = 0;
   TimedPoses now{};

@@ -49,6 +49,7 @@ void PoseHistory::add(Poses&& poses) {
     track = tracks_.insert(track, std::move(added));
   }
   track->attachments = std::move(poses.now.poses.attachments);
+  track->joints = std::move(poses.now.poses.joints);
   track->wantsContacts = poses.now.poses.wantsContacts;
   track->settled = false;
   for (TimedPoses& earlier : poses.earlier) add(*track, std::move(earlier));
@@ -122,6 +123,8 @@ void PoseHistory::place(
     placeAt(track, time);
     placed_.attachments = std::move(track.attachments);
     track.attachments.clear();
+    placed_.joints = std::move(track.joints);
+    track.joints.clear();
     placed_.wantsContacts = track.wantsContacts;
     place(track.participant, placed_);
   }

@@ -19,8 +19,8 @@ namespace clothstream::scene {
 // more poses because nothing moves ends up exactly at its last pose.
 //
 // Poses without a time act at once and are not extrapolated. Poses with a time are ordered by the client's
-// own clock: late ones are dropped, and one of the same time replaces the older one. Attachments and
-// wantsContacts are not part of the history: they act at once.
+// own clock: late ones are dropped, and one of the same time replaces the older one. Attachments, joints
+// and wantsContacts are not part of the history: they act at once.
 //
 // Belongs to the device's thread. Bounded: kMaxPoses for each participant.
 class PoseHistory {
@@ -37,7 +37,7 @@ class PoseHistory {
   void add(Poses&& poses);
 
   // Calls `place` for each participant whose colliders or grabs may differ from the previous call, with the
-  // poses at this time. Its attachments are those moved since the previous call.
+  // poses at this time. Its attachments and joints are those moved since the previous call.
   void place(Clock::time_point time,
              const std::function<void(std::uint64_t participant, const model::ParticipantPoses&)>& place);
 
@@ -53,6 +53,7 @@ class PoseHistory {
     std::uint64_t participant = 0;
     std::vector<Entry> entries = {};  // never empty after add(); times ascend
     std::vector<model::AttachmentPose> attachments = {};
+    std::vector<model::ColliderJoints> joints = {};
     bool wantsContacts = false;
     bool settled = false;  // nothing changes until more poses arrive
   };

@@ -16,7 +16,7 @@ const char* nameOf(Action action) {
     case Action::grab:
       return "colliderPoses.grabs";
     case Action::moveAttachments:
-      return "colliderPoses.attachments";
+      return "colliderPoses: attachments and joints";
     case Action::changeEnvironment:
       return "parameterChange: gravity, wind, gust and airDensity";
     case Action::changeCloths:
@@ -116,7 +116,7 @@ messages::Result<void> permit(Role role, const v1::ColliderPoses& message, const
   if (!message.colliders().empty() || !message.hands().empty())
     permitted = permit(role, Action::collide, participants);
   if (permitted && !message.grabs().empty()) permitted = permit(role, Action::grab, participants);
-  if (permitted && !message.attachments().empty())
+  if (permitted && (!message.attachments().empty() || !message.joints().empty()))
     permitted = permit(role, Action::moveAttachments, participants);
   return permitted;
 }

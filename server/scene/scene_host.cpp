@@ -237,12 +237,14 @@ void SceneHost::applyInputs() {
   if (!problem.empty()) revertChanges(problem);
   for (Poses& poses : inputs_.poses) {
     const model::ParticipantPoses& now = poses.now.poses;
-    const bool moves = !now.colliders.empty() || !now.grabs.empty() || !now.attachments.empty();
+    const bool moves =
+        !now.colliders.empty() || !now.grabs.empty() || !now.attachments.empty() || !now.joints.empty();
     if (moves && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.now.arrival);
     poses_.add(std::move(poses));
   }
   poses_.place(tickStart_, [this](std::uint64_t participant, const model::ParticipantPoses& poses) {
     colliders_.place(participant, poses.colliders);
+    colliders_.placeJoints(poses.joints);
     grabs_.place(participant, poses.grabs, poses.attachments);
     contacts_.request(participant, poses.wantsContacts);
   });

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -19,6 +20,7 @@
 #include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/coarse/coarse_stage.h"
 #include "server/simulation/collision/collision_stage.h"
+#include "server/simulation/collision/skin_stage.h"
 #include "server/simulation/collision/solid_stage.h"
 #include "server/simulation/grid_stage.h"
 #include "server/simulation/mass_stage.h"
@@ -179,6 +181,7 @@ struct ClothSimulation::Pipeline {
   std::vector<model::Solver> solvers;                 // of the cloths in the tables
   std::vector<SpringStiffness> stiffness;             // of the cloths' springs
   std::unique_ptr<SolidStage> solids;                 // null if no collider is a triangle mesh
+  std::unique_ptr<SkinStage> skins;                   // null if no mesh has joints
   std::unique_ptr<AttachmentStage> attachments;       // created when it is first needed
   std::unique_ptr<ReportStage> report;                // created for the first report
   std::unique_ptr<MassStage> massChange;              // created when a mass first changes
@@ -238,6 +241,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
   if (!solidTables.empty())
     solids = std::make_unique<SolidStage>(on, solidTables, scene.cloths, stateOf(buffers, collision),
                                           workgroupSize);
+  if (SkinTables tables = skinTables(solidTables); !tables.empty())
+    skins = std::make_unique<SkinStage>(on, std::move(tables), solidTables, solids->solids(), workgroupSize);
   if (const AttachmentTables tables = attachmentTables(scene); !tables.empty()) {
     makeAttachments(tables);
     attachments->setSlack(scene.cloths);
@@ -332,6 +337,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (coarse) coarse->recordTables(recorder);
   if (selfCollision) selfCollision->recordTables(recorder);
   if (solids) solids->recordTables(recorder);
+  if (skins) skins->recordTables(recorder);
   recorder.barrier();
   if (!weighed) {
     massChange->record(recorder);
@@ -347,6 +353,7 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   std::memcpy(from.mapped().data(), records.data(), clothBytes);
   recorder.beginStage("inputs");
   recorder.copy(from, buffers.cloths, clothBytes);
+  if (skins) skins->recordInputs(recorder, inputs.colliders);
   collision.recordInputs(recorder, inputs.colliders, inputs.reportsContacts);
   if (!attachments && !inputs.grabs.empty()) makeAttachments({});
   if (attachments) attachments->recordInputs(recorder, inputs.attachments, inputs.grabs);
@@ -392,6 +399,10 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
     recorder.beginStage("near");
     recorder.barrier();
     collision.recordGather(recorder, present, 1 / tickRate, thickness);
+  }
+  if (skins && collision.solidCount() > 0) {
+    recorder.beginStage("skins");
+    skins->record(recorder);
   }
   recorder.beginStage("advance");
   for (std::uint32_t substep = 0; substep < substeps; ++substep) {
@@ -493,12 +504,13 @@ void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
 void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs& inputs) {
   Pipeline& on = *pipeline_;
   if (!on.report)
-    on.report = std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
-                                              on.meshes ? on.meshes->springs() : MeshSprings{},
-                                              on.asked.workgroupSize);
+    on.report =
+        std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
+                                      on.meshes ? on.meshes->springs() : MeshSprings{},
+                                      on.solids ? &on.solids->solids() : nullptr, on.asked.workgroupSize);
   recorder.beginStage("report");
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
-                    on.collision.push(on.substeps - 1, on.substeps, on.tickRate));
+                    on.collision.push(on.substeps - 1, on.substeps, on.tickRate), on.collision.solidCount());
 }
 
 std::vector<ContactStatus> ClothSimulation::contacts() const {

@@ -13,6 +13,7 @@
 #include "kernels/add_up_cloths.h"
 #include "kernels/measure_cloths.h"
 #include "kernels/measure_penetrations.h"
+#include "kernels/measure_solids.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -22,6 +23,9 @@ using vulkan::Buffer;
 using vulkan::BufferPurpose;
 using vulkan::kStorage;
 using vulkan::kTexels;
+
+// Work of a node and a mesh, with a search that is not bounded (vulkan::Recorder::dispatch).
+constexpr std::uint64_t kSolidDepthWork = 100;
 
 ReportBlocks blocksOf(std::span<const shared::ClothRecord> cloths) {
   ReportBlocks blocks;
@@ -69,13 +73,14 @@ std::vector<SpringStiffness> springStiffness(std::span<const model::Cloth> cloth
 }
 
 ReportStage::ReportStage(const vulkan::Device& device, std::span<const shared::ClothRecord> cloths,
-                         const StateBuffers& state, const MeshSprings& meshes, std::uint32_t workgroupSize)
+                         const StateBuffers& state, const MeshSprings& meshes, const Buffer* solids,
+                         std::uint32_t workgroupSize)
     : ReportStage(
-          device, blocksOf(cloths), state, meshes,
+          device, blocksOf(cloths), state, meshes, solids,
           std::min(workgroupSize == 0 ? 64 : workgroupSize, device.limits().maxWorkgroupInvocations)) {}
 
 ReportStage::ReportStage(const vulkan::Device& device, ReportBlocks blocks, const StateBuffers& state,
-                         const MeshSprings& meshes, std::uint32_t workgroupSize)
+                         const MeshSprings& meshes, const Buffer* solids, std::uint32_t workgroupSize)
     : workgroupSize_(workgroupSize),
       of_(std::move(blocks)),
       blockUpload_(uploadOf(device, of_.records)),
@@ -108,7 +113,19 @@ ReportStage::ReportStage(const vulkan::Device& device, ReportBlocks blocks, cons
                       .specialisation = {}}),
       measureIn_{measureIn(device, state, meshes, 0), measureIn(device, state, meshes, 1)},
       penetrationsIn_{penetrationsIn(device, state, 0), penetrationsIn(device, state, 1)},
-      addUpAll_(device, addUp_, {&cloths_, &runs_, &sums_}) {}
+      addUpAll_(device, addUp_, {&cloths_, &runs_, &sums_}) {
+  if (solids != nullptr)
+    solidDepths_ = std::make_unique<Stage>(
+        device,
+        vulkan::KernelDescription{.name = "measure_solids",
+                                  .spirv = kernels::measure_solids,
+                                  .bindings = {kTexels, kTexels, kTexels, kStorage, kTexels, kTexels},
+                                  .pushConstantBytes = sizeof(shared::PenetrationPush),
+                                  .workgroupSize = workgroupSize,
+                                  .specialisation = {}},
+        Stage::Buffers{&state.cloths, &blocks_, state.positions[0], &counts_, solids, &state.colliders},
+        Stage::Buffers{&state.cloths, &blocks_, state.positions[1], &counts_, solids, &state.colliders});
+}
 
 Bindings ReportStage::measureIn(const vulkan::Device& device, const StateBuffers& state,
                                 const MeshSprings& meshes, std::size_t present) const {
@@ -127,7 +144,7 @@ Bindings ReportStage::penetrationsIn(const vulkan::Device& device, const StateBu
 
 void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
                          std::span<const SpringStiffness> stiffness, const model::Vec3& gravity,
-                         const shared::CollisionPush& collision) {
+                         const shared::CollisionPush& collision, std::uint32_t solidCount) {
   assert(stiffness.size() == of_.cloths.size());
   for (std::size_t i = 0; i < stiffness.size(); ++i) {
     of_.cloths[i].structuralStiffness = stiffness[i].structural;
@@ -150,13 +167,15 @@ void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
                                         .reserved1 = 0,
                                         .reserved2 = 0},
                     std::uint64_t{blocks} * shared::kReportRuns);
+  const shared::PenetrationPush penetration{
+      .collision = collision, .blockCount = blocks, .solidCount = solidCount, .reserved0 = 0, .reserved1 = 0};
+  const std::uint64_t depthThreads = std::uint64_t{blocks} * (shared::kReportBlock / shared::kReportDepths);
   if (collision.colliderCount > 0)
-    recorder.dispatch(
-        penetrationsIn_[present],
-        shared::PenetrationPush{
-            .collision = collision, .blockCount = blocks, .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
-        std::uint64_t{blocks} * (shared::kReportBlock / shared::kReportDepths),
-        std::uint64_t{shared::kReportDepths} * collision.nodeWork);
+    recorder.dispatch(penetrationsIn_[present], penetration, depthThreads,
+                      std::uint64_t{shared::kReportDepths} * collision.nodeWork);
+  if (solidCount > 0)
+    recorder.dispatch(solidDepths_->from[present], penetration, depthThreads,
+                      std::uint64_t{shared::kReportDepths} * solidCount * kSolidDepthWork);
   recorder.barrier();
   recorder.dispatch(addUpAll_, of_.cloths.size() * workgroupSize_);
   recorder.barrier();

@@ -4,11 +4,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "server/model/scene.h"
 #include "server/simulation/cloth_report.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
@@ -42,20 +44,22 @@ struct ReportBlocks {
 // workgroup's size nor on the device.
 class ReportStage {
  public:
-  // `cloths` have the nodes of each cloth. `workgroupSize` 0: the measured best for the device.
+  // `cloths` have the nodes of each cloth. `solids` has the triangle meshes of colliders, or is null.
+  // `workgroupSize` 0: the measured best for the device.
   ReportStage(const vulkan::Device& device, std::span<const shared::ClothRecord> cloths,
-              const StateBuffers& state, const MeshSprings& meshes, std::uint32_t workgroupSize);
+              const StateBuffers& state, const MeshSprings& meshes, const vulkan::Buffer* solids,
+              std::uint32_t workgroupSize);
 
-  // Measures the state in the buffers `present` against the colliders at the end of `collision`. Begins with
-  // a barrier. At most one such recording may be in flight.
+  // Measures the state in the buffers `present` against the colliders at the end of `collision`, and
+  // `solidCount` meshes. Begins with a barrier. At most one such recording may be in flight.
   void record(vulkan::Recorder& recorder, std::uint32_t present, std::span<const SpringStiffness> stiffness,
-              const model::Vec3& gravity, const shared::CollisionPush& collision);
+              const model::Vec3& gravity, const shared::CollisionPush& collision, std::uint32_t solidCount);
   // Reports of a complete recording, one per cloth, without the values of a solve.
   std::vector<ClothReport> collect() const;
 
  private:
   ReportStage(const vulkan::Device& device, ReportBlocks blocks, const StateBuffers& state,
-              const MeshSprings& meshes, std::uint32_t workgroupSize);
+              const MeshSprings& meshes, const vulkan::Buffer* solids, std::uint32_t workgroupSize);
   vulkan::Bindings measureIn(const vulkan::Device& device, const StateBuffers& state,
                              const MeshSprings& meshes, std::size_t present) const;
   vulkan::Bindings penetrationsIn(const vulkan::Device& device, const StateBuffers& state,
@@ -71,6 +75,7 @@ class ReportStage {
   vulkan::Kernel measure_, penetrations_, addUp_;
   std::array<vulkan::Bindings, 2> measureIn_, penetrationsIn_;
   vulkan::Bindings addUpAll_;
+  std::unique_ptr<Stage> solidDepths_;  // null if no collider is a triangle mesh
 };
 
 }  // namespace clothstream::simulation

@@ -9,9 +9,18 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   TickInputs inputs{model::environmentAt(scene, tick), {}};
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
-  for (const model::Collider& collider : scene.colliders)
-    inputs.colliders.push_back(
-        {collider.shape, model::poseAt(collider, start), model::poseAt(collider, end), collider.friction});
+  for (const model::Collider& collider : scene.colliders) {
+    MovingCollider& to = inputs.colliders.emplace_back(MovingCollider{
+        collider.shape, model::poseAt(collider, start), model::poseAt(collider, end), collider.friction});
+    const auto* solid = std::get_if<model::Solid>(&collider.shape);
+    if (solid == nullptr || !(*solid)->skin) continue;
+    const model::Skin& skin = *(*solid)->skin;
+    std::vector<model::Pose> local;
+    model::jointsAt(skin, start, local);
+    model::compose(skin, local, to.jointsStart);
+    model::jointsAt(skin, end, local);
+    model::compose(skin, local, to.jointsEnd);
+  }
   for (const model::Cloth& cloth : scene.cloths)
     for (const model::Attachment& attachment : cloth.attachments)
       inputs.attachments.push_back(model::frameAt(scene, attachment, end));

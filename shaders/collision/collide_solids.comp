@@ -37,11 +37,13 @@ void collideWithSolid(uint number, CollidingNode node, vec3 from, inout vec3 pos
   SolidRecord solid = solidRecordAt(solids, solidTexelOf(frame.shape));
   precise vec3 before = from - collider.before;
   precise vec3 after = position - collider.after;
-  Contact contact =
-      touchSolid(solid, rotateBack(frame.before, before), rotateBack(frame.after, after), node.thickness);
-  if (contact.depth > 0.0) {
-    contact.normal = rotate(frame.after, contact.normal);
-    leave(number, collider, contact, collider.velocity, frame.spin, push.collision, node, position, velocity);
+  SolidContact touch = touchSolid(solid, rotateBack(frame.before, before), rotateBack(frame.after, after),
+                                  push.collision.progressBefore, push.collision.progressAfter,
+                                  solidMotionOf(frame.shape), node.thickness);
+  if (touch.contact.depth > 0.0) {
+    touch.contact.normal = rotate(frame.after, touch.contact.normal);
+    precise vec3 surface = collider.velocity + push.collision.tickRate * rotate(frame.after, touch.motion);
+    leave(number, collider, touch.contact, surface, frame.spin, push.collision, node, position, velocity);
   }
 }
 
@@ -62,7 +64,7 @@ void main() {
   vec3 velocity = velocities[index].xyz;
   CollidingNode node = CollidingNode(index, uint(tile.cloth), here.w, cloth.thickness, cloth.friction);
   for (uint solid = 0u; solid < push.solidCount; ++solid) {
-    collideWithSolid(push.firstSolid + solid, node, from, position, velocity);
+    collideWithSolid(push.collision.colliderCount + solid, node, from, position, velocity);
   }
   positions[index].xyz = snapTiny(position);
   velocities[index].xyz = snapTiny(velocity);

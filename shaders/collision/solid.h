@@ -18,7 +18,7 @@ struct SolidRecord {
   float leafCount;
 
   float triangleCount;
-  float motion;  // m, no vertex moves farther in the tick, seen from the collider
+  float vertexTexels;  // CLOTHSTREAM_VERTEX_TEXELS, or CLOTHSTREAM_MOVING_VERTEX_TEXELS if joints move them
   float reserved0, reserved1;
 };
 
@@ -31,8 +31,10 @@ struct TriangleRecord {
   float reserved1;
 };
 
-// A vertex at the start of the tick. The normal need not have the length 1.
+// A vertex. The normal need not have the length 1. A vertex that joints move has two records, for the start
+// and for the end of the tick.
 #define CLOTHSTREAM_VERTEX_TEXELS 2
+#define CLOTHSTREAM_MOVING_VERTEX_TEXELS 4
 struct VertexRecord {
   vec3 position;
   float reserved0;
@@ -55,35 +57,78 @@ struct NodeTileRecord {
   float reserved0, reserved1;
 };
 
+// A vertex as the joints find it at rest, and the joints that move it.
+#define CLOTHSTREAM_SKIN_VERTEX_TEXELS 3
+struct SkinVertexRecord {
+  vec3 position;
+  float reserved;
+  float joints[4];
+  float weights[4];
+};
+
+// A triangle around a vertex: its other corners, counter-clockwise seen from outside.
+struct FanRecord {
+  float next;
+  float last;
+  float reserved0, reserved1;
+};
+
+// Texels of a transform of a joint: the rows of a matrix, rotation and translation.
+#define CLOTHSTREAM_TRANSFORM_TEXELS 3
+
+// Kernels that follow the joints of one mesh. The numbers are texels, and `firstJoint` is a transform.
+struct SkinPush {
+  uint32_t vertexCount;
+  uint32_t firstRest;
+  uint32_t firstFan;
+  uint32_t firstVertex;
+  uint32_t firstJoint;
+  uint32_t jointCount;
+  uint32_t reserved0, reserved1;
+};
+
+// Nodes of a tree: `levels` levels of those below each root, from the root on.
+struct RefitPush {
+  uint32_t solid;  // texel of the SolidRecord
+  uint32_t firstRoot;
+  uint32_t rootCount;
+  uint32_t levels;
+};
+
 // Nodes deeper inside a mesh than this are found only if their way in the substep is as long, m.
 const float kSolidDepth = 0.03f;
 
 struct SolidPush {
   CollisionPush collision;
-  uint32_t firstSolid;  // number of the first collider that is a mesh
-  uint32_t solidCount;
-  uint32_t reserved0, reserved1;
+  uint32_t solidCount;  // colliders that are triangle meshes; their numbers follow those of the others
+  uint32_t reserved0, reserved1, reserved2;
 };
 
 CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-// `record` is the texel of the SolidRecord.
-inline ShapeRecord solidShape(float record) {
-  return {kSolidShape, {record, 0, 0}};
+// `record` is the texel of the SolidRecord. No vertex moves farther than `motion` in the tick, seen from the
+// collider, m.
+inline ShapeRecord solidShape(float record, float motion) {
+  return {kSolidShape, {record, motion, 0}};
 }
 
 static_assert(sizeof(SolidRecord) == CLOTHSTREAM_SOLID_TEXELS * sizeof(vec4));
 static_assert(sizeof(TriangleRecord) == CLOTHSTREAM_TRIANGLE_TEXELS * sizeof(vec4));
 static_assert(sizeof(VertexRecord) == CLOTHSTREAM_VERTEX_TEXELS * sizeof(vec4));
 static_assert(sizeof(BoxRecord) == CLOTHSTREAM_BOX_TEXELS * sizeof(vec4));
+static_assert(sizeof(SkinVertexRecord) == CLOTHSTREAM_SKIN_VERTEX_TEXELS * sizeof(vec4));
+static_assert(sizeof(FanRecord) == 16 && sizeof(SkinPush) == 32 && sizeof(RefitPush) == 16);
 static_assert(sizeof(NodeTileRecord) == 16 && sizeof(SolidPush) == 48);
 }  // namespace clothstream::shared
 #else
 
 uint solidTexelOf(ShapeRecord shape) {
   return uint(shape.sizes.x);
+}
+float solidMotionOf(ShapeRecord shape) {
+  return shape.sizes.y;
 }
 
 SolidRecord solidRecordAt(samplerBuffer table, uint texel) {

@@ -25,6 +25,7 @@ struct Nearest {
   float distance;  // m, negative inside
   vec3 point;
   vec3 normal;  // length 1, out of the mesh
+  vec3 motion;  // m, of that point of the mesh during the tick
 };
 
 struct Corners {
@@ -40,17 +41,31 @@ struct TrianglePoint {
   uint part;
 };
 
-vec3 vertexAt(SolidRecord solid, uint vertex) {
-  return texelFetch(solids, int(uint(solid.firstVertex) + CLOTHSTREAM_VERTEX_TEXELS * vertex)).xyz;
+bool moves(SolidRecord solid) {
+  return solid.vertexTexels > float(CLOTHSTREAM_VERTEX_TEXELS);
 }
 
-vec3 vertexNormalAt(SolidRecord solid, uint vertex) {
-  return texelFetch(solids, int(uint(solid.firstVertex) + CLOTHSTREAM_VERTEX_TEXELS * vertex) + 1).xyz;
+// A vector of a vertex, at a share of the tick: its position, or its normal one texel later.
+vec3 vertexVector(SolidRecord solid, uint vertex, int which, float progress) {
+  int texel = int(uint(solid.firstVertex) + uint(solid.vertexTexels) * vertex) + which;
+  precise vec3 at = texelFetch(solids, texel).xyz;
+  if (moves(solid)) {
+    at = at + progress * (texelFetch(solids, texel + CLOTHSTREAM_VERTEX_TEXELS).xyz - at);
+  }
+  return at;
 }
 
-Corners fetchCorners(SolidRecord solid, uint triangle) {
+vec3 vertexMotion(SolidRecord solid, uint vertex) {
+  int texel = int(uint(solid.firstVertex) + uint(solid.vertexTexels) * vertex);
+  precise vec3 motion =
+      texelFetch(solids, texel + CLOTHSTREAM_VERTEX_TEXELS).xyz - texelFetch(solids, texel).xyz;
+  return motion;
+}
+
+Corners fetchCorners(SolidRecord solid, uint triangle, float progress) {
   uvec3 vertices = cornersAt(solids, solid, triangle);
-  return Corners(vertexAt(solid, vertices.x), vertexAt(solid, vertices.y), vertexAt(solid, vertices.z));
+  return Corners(vertexVector(solid, vertices.x, 0, progress), vertexVector(solid, vertices.y, 0, progress),
+                 vertexVector(solid, vertices.z, 0, progress));
 }
 
 // Quotient of two numbers that are not negative.
@@ -119,14 +134,14 @@ vec3 unitNormal(Corners t) {
   return unit_;
 }
 
-vec3 pseudonormal(SolidRecord solid, uint triangle, uint part) {
+vec3 pseudonormal(SolidRecord solid, uint triangle, uint part, float progress) {
   if (part >= kCorner && part < kEdge) {
-    return vertexNormalAt(solid, cornersAt(solids, solid, triangle)[part - kCorner]);
+    return vertexVector(solid, cornersAt(solids, solid, triangle)[part - kCorner], 1, progress);
   }
-  precise vec3 normal = unitNormal(fetchCorners(solid, triangle));
+  precise vec3 normal = unitNormal(fetchCorners(solid, triangle, progress));
   if (part != kFace) {
     uint other = neighboursAt(solids, solid, triangle)[part - kEdge];
-    normal = normal + unitNormal(fetchCorners(solid, other));
+    normal = normal + unitNormal(fetchCorners(solid, other, progress));
   }
   return normal;
 }
@@ -147,8 +162,9 @@ uint nodeAfter(uint node) {
   return next == 1u ? 0u : next;
 }
 
-// The nearest point nearer than `bound`. Of points at the same distance, the one of the first triangle.
-Nearest nearestOnSolid(SolidRecord solid, vec3 p, float bound) {
+// The nearest point nearer than `bound`, at a share of the tick. Of points at the same distance, the one of
+// the first triangle.
+Nearest nearestOnSolid(SolidRecord solid, float progress, vec3 p, float bound) {
   uint leaves = uint(solid.leafCount), triangles = uint(solid.triangleCount);
   uint shift = uint(findMSB(leaves));
   precise float best = bound * bound;
@@ -162,7 +178,7 @@ Nearest nearestOnSolid(SolidRecord solid, vec3 p, float bound) {
       uint leaf = node - leaves;
       uint end = ((leaf + 1u) * triangles) >> shift;
       for (uint t = (leaf * triangles) >> shift; t < end; ++t) {
-        Corners corners = fetchCorners(solid, t);
+        Corners corners = fetchCorners(solid, t, progress);
         TrianglePoint nearest = nearestOnTriangle(p, corners);
         precise vec3 apart = p - pointOf(corners, nearest);
         float squared = dotProduct(apart, apart);
@@ -177,10 +193,17 @@ Nearest nearestOnSolid(SolidRecord solid, vec3 p, float bound) {
     node = near && node < leaves ? 2u * node : nodeAfter(node);
   }
   if (!found) {
-    return Nearest(false, bound, vec3(0.0), vec3(0.0, 1.0, 0.0));
+    return Nearest(false, bound, vec3(0.0), vec3(0.0, 1.0, 0.0), vec3(0.0));
   }
-  vec3 point = pointOf(fetchCorners(solid, triangle), at);
-  vec3 outwards = pseudonormal(solid, triangle, at.part);
+  vec3 point = pointOf(fetchCorners(solid, triangle, progress), at);
+  vec3 outwards = pseudonormal(solid, triangle, at.part, progress);
+  vec3 motion = vec3(0.0);
+  if (moves(solid)) {
+    uvec3 vertices = cornersAt(solids, solid, triangle);
+    motion = pointOf(Corners(vertexMotion(solid, vertices.x), vertexMotion(solid, vertices.y),
+                             vertexMotion(solid, vertices.z)),
+                     at);
+  }
   precise vec3 apart = p - point;
   float inverse = reciprocalSquareRoot(max(best, 1e-24));
   precise float size = best * inverse;
@@ -189,7 +212,7 @@ Nearest nearestOnSolid(SolidRecord solid, vec3 p, float bound) {
   precise float sign_ = isOutside ? inverse : -inverse;
   precise vec3 away = sign_ * apart;
   precise vec3 along = outwards * reciprocalSquareRoot(max(dotProduct(outwards, outwards), 1e-24));
-  return Nearest(true, distance_, point, size < kTouching ? along : away);
+  return Nearest(true, distance_, point, size < kTouching ? along : away, motion);
 }
 
 #endif

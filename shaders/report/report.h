@@ -63,7 +63,8 @@ struct MeasurePush {
 struct PenetrationPush {
   CollisionPush collision;
   uint32_t blockCount;
-  uint32_t reserved0, reserved1, reserved2;
+  uint32_t solidCount;  // colliders that are triangle meshes; their numbers follow those of the others
+  uint32_t reserved0, reserved1;
 };
 
 CLOTHSTREAM_SHARED_END

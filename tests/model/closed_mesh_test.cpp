@@ -9,17 +9,17 @@
 namespace clothstream::model {
 namespace {
 
-struct Parts {
+struct Pieces {
   std::vector<Vec3> vertices;
   std::vector<TriangleCorners> triangles;
 };
 
-Parts tetrahedron() {
+Pieces tetrahedron() {
   return {{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)},
           {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
 }
 
-std::string problemOf(const Parts& parts) {
+std::string problemOf(const Pieces& parts) {
   const auto made = makeClosedMesh(parts.vertices, parts.triangles);
   const auto* problem = std::get_if<ClosedMeshProblem>(&made);
   return problem == nullptr ? "" : problem->text;
@@ -34,7 +34,7 @@ TEST(ClosedMesh, KnowsTheNeighboursOfATriangle) {
 
 // A file repeats a vertex for each face with its own normal or texture coordinates.
 TEST(ClosedMesh, MergesVerticesInOnePlace) {
-  Parts parts = tetrahedron(), apart;
+  Pieces parts = tetrahedron(), apart;
   for (const TriangleCorners& triangle : parts.triangles) {
     const auto first = static_cast<std::uint32_t>(apart.vertices.size());
     for (const std::uint32_t corner : triangle) apart.vertices.push_back(parts.vertices[corner]);
@@ -46,31 +46,31 @@ TEST(ClosedMesh, MergesVerticesInOnePlace) {
 }
 
 TEST(ClosedMesh, RefusesAnOpenSurface) {
-  Parts parts{torus(1, 0.3f, 8, 6)->vertices, torus(1, 0.3f, 8, 6)->triangles};
+  Pieces parts{torus(1, 0.3f, 8, 6)->vertices, torus(1, 0.3f, 8, 6)->triangles};
   parts.triangles.pop_back();
   EXPECT_EQ(problemOf(parts), "is not closed: one of its edges has no neighbour");
 }
 
 TEST(ClosedMesh, RefusesAFlippedTriangle) {
-  Parts parts = tetrahedron();
+  Pieces parts = tetrahedron();
   std::swap(parts.triangles[1][0], parts.triangles[1][1]);
   EXPECT_EQ(problemOf(parts), "shows its other side than its neighbour");
 }
 
 TEST(ClosedMesh, RefusesAnInsideOutSurface) {
-  Parts parts = tetrahedron();
+  Pieces parts = tetrahedron();
   for (TriangleCorners& triangle : parts.triangles) std::swap(triangle[0], triangle[1]);
   EXPECT_EQ(problemOf(parts).substr(0, 13), "is inside out");
 }
 
 TEST(ClosedMesh, RefusesAnEdgeOfThreeTriangles) {
-  Parts parts = tetrahedron();
+  Pieces parts = tetrahedron();
   parts.triangles.push_back({0, 2, 1});
   EXPECT_EQ(problemOf(parts), "has an edge that two other triangles have");
 }
 
 TEST(ClosedMesh, RefusesUnknownCornersAndFlatTriangles) {
-  Parts parts = tetrahedron();
+  Pieces parts = tetrahedron();
   parts.triangles[0][0] = 4;
   EXPECT_EQ(problemOf(parts), "has the corner 4, but there are 4 vertices");
   parts = tetrahedron();

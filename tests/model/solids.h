@@ -80,4 +80,26 @@ inline Solid ballMesh(float radius, std::uint32_t rings) {
   return solidOf(std::move(vertices), std::move(triangles));
 }
 
+// Rod along X, centred on the origin: `along` times `around` quads, and two ends that are fans.
+inline Solid rodMesh(float radius, float length, std::uint32_t around, std::uint32_t along) {
+  std::vector<Vec3> vertices{Vec3(-length / 2, 0, 0), Vec3(length / 2, 0, 0)};
+  std::vector<TriangleCorners> triangles;
+  const auto at = [&](std::uint32_t i, std::uint32_t k) { return 2 + i * around + k % around; };
+  for (std::uint32_t i = 0; i <= along; ++i)
+    for (std::uint32_t k = 0; k < around; ++k) {
+      const float u = 2 * std::acos(-1.0f) * static_cast<float>(k) / static_cast<float>(around);
+      const float x = length * (static_cast<float>(i) / static_cast<float>(along) - 0.5f);
+      vertices.emplace_back(x, radius * std::cos(u), radius * std::sin(u));
+    }
+  for (std::uint32_t k = 0; k < around; ++k) {
+    triangles.push_back({0, at(0, k + 1), at(0, k)});
+    triangles.push_back({1, at(along, k), at(along, k + 1)});
+    for (std::uint32_t i = 0; i < along; ++i) {
+      triangles.push_back({at(i, k), at(i, k + 1), at(i + 1, k)});
+      triangles.push_back({at(i + 1, k), at(i, k + 1), at(i + 1, k + 1)});
+    }
+  }
+  return solidOf(std::move(vertices), std::move(triangles));
+}
+
 }  // namespace clothstream::model

@@ -77,7 +77,8 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
   reference::TickInputs result{inputs.environment, {}};
   for (const simulation::MovingCollider& collider : inputs.colliders)
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
-                                reference::toPose(collider.end), double{collider.friction}});
+                                reference::toPose(collider.end), double{collider.friction},
+                                collider.jointsStart, collider.jointsEnd});
   for (const model::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
   for (const simulation::Grab& grab : inputs.grabs) {
     result.grabs.push_back({.state = static_cast<reference::Grab::State>(grab.state),

@@ -57,6 +57,7 @@ void move(Collider& moved, const Collider& from, const Collider& to, bool isAtTo
   }
   if (!isUnit(length)) return;
   for (std::size_t i = 0; i < 4; ++i) moved.orientation[i] = turned[i] / std::sqrt(length);
+  if (from.joints.size() == to.joints.size()) moveJoints(from.joints, to.joints, part, moved.joints);
 }
 
 }  // namespace

@@ -168,6 +168,16 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
       attachment.add_string(field::AttachmentPose::kName.number, put.name.data(), put.name.size());
       addPose(attachment, field::AttachmentPose::kPose, put.position, put.orientation);
     }
+    for (const ColliderJoints& moved : poses.joints) {
+      Writer joints(message, F::kJoints.number);
+      joints.add_string(field::ColliderJoints::kCollider.number, moved.collider.data(),
+                        moved.collider.size());
+      for (std::size_t i = 0; i + kJointNumbers <= moved.poses.size(); i += kJointNumbers) {
+        const float* const at = moved.poses.data() + i;
+        addPose(joints, field::ColliderJoints::kJoints, std::span<const float, 3>(at, 3),
+                std::span<const float, 4>(at + 3, 4));
+      }
+    }
     if (poses.wantsContacts) message.add_bool(F::kContactEvents.number, true);
     if (serverTimeUs != 0) message.add_uint64(F::kServerTimeUs.number, serverTimeUs);
     addHand(message, CS_HAND_LEFT, poses.leftHand);

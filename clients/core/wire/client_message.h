@@ -14,6 +14,7 @@
 #include "clients/core/wire/description.h"
 #include "clients/core/wire/parameter_change.h"
 #include "clients/core/wire/server_message.h"
+#include "clients/core/wire/skin.h"
 
 namespace clothstream::client {
 
@@ -43,6 +44,12 @@ struct AttachmentPose {
   std::array<float, 4> orientation{};  // x y z w; all zero means no rotation
 };
 
+// Joints of a collider of the scene, relative to their parents: kJointNumbers for each.
+struct ColliderJoints {
+  std::string collider;
+  std::vector<float> poses;
+};
+
 struct OwnGrab {
   cs_grab given{};
   std::optional<ClothTriangle> place;  // absent: the grab has no place
@@ -55,6 +62,7 @@ struct Poses {
   std::optional<cs_own_collider> head;     // its id is CS_HEAD_ID
   std::vector<OwnGrab> grabs;
   std::vector<AttachmentPose> attachments;
+  std::vector<ColliderJoints> joints;
   bool wantsContacts = false;
 };
 // Both times are the same instant, on the client's and on the server's clock. serverTimeUs is 0 if unknown.

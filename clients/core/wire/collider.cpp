@@ -30,14 +30,19 @@ bool cornersExist(const Hull& hull) {
                      [&](std::uint32_t corner) { return corner < hull.vertices.size() / 3; });
 }
 
-// Copies little-endian numbers, three of each element.
+// Copies little-endian numbers, `each` of at most `most` elements.
 template <typename Number>
-bool copy(Bytes bytes, std::size_t most, std::vector<Number>& numbers) {
-  constexpr std::size_t kElement = 3 * sizeof(Number);
-  if (bytes.size() % kElement != 0 || bytes.size() / kElement > most) return false;
+bool copy(Bytes bytes, std::size_t each, std::size_t most, std::vector<Number>& numbers) {
+  const std::size_t element = each * sizeof(Number);
+  if (bytes.size() % element != 0 || bytes.size() / element > most) return false;
   numbers.resize(bytes.size() / sizeof(Number));
   if (!numbers.empty()) std::memcpy(numbers.data(), bytes.data(), bytes.size());
   return true;
+}
+
+bool copyJoints(Bytes bytes, std::vector<float>& joints) {
+  return copy(bytes, kJointNumbers, kMaxJoints, joints) &&
+         std::all_of(joints.begin(), joints.end(), [](float number) { return std::isfinite(number); });
 }
 
 }  // namespace
@@ -67,6 +72,7 @@ bool readCollider(Bytes message, Collider& collider) {
   collider.radius = collider.length = 0;
   collider.size = {};
   collider.hull = collider.mesh = {};
+  collider.joints.clear();
   collider.participantId = 0;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
     switch (tag) {
@@ -95,6 +101,8 @@ bool readCollider(Bytes message, Collider& collider) {
         return set(collider.shape, CS_SHAPE_HULL) && set(collider.hull, reader.get_view());
       case F::kMesh.tag:
         return set(collider.shape, CS_SHAPE_HULL) && set(collider.mesh, reader.get_view());
+      case F::kJoints.tag:
+        return copyJoints(reader.get_view(), collider.joints);
       default:
         return skip(reader);
     }
@@ -118,14 +126,20 @@ std::optional<Hull> readHull(Bytes message) {
 std::optional<Hull> readMesh(Bytes message) {
   using F = field::ColliderMeshDescription;
   std::optional<Hull> mesh = readMessage<Hull>(message, [&](Hull& out, std::uint32_t tag, Reader& reader) {
-    if (tag == F::kPositions.tag) return copy(reader.get_view(), kMaxMeshVertices, out.vertices);
-    return tag == F::kTriangles.tag ? copy(reader.get_view(), kMaxMeshTriangles, out.triangles)
+    if (tag == F::kPositions.tag) return copy(reader.get_view(), 3, kMaxMeshVertices, out.vertices);
+    if (tag == F::kJoints.tag)
+      return copy(reader.get_view(), kVertexJoints, kMaxMeshVertices, out.skin.joints);
+    if (tag == F::kWeights.tag)
+      return copy(reader.get_view(), kVertexJoints, kMaxMeshVertices, out.skin.weights);
+    if (tag == F::kRest.tag) return copyJoints(reader.get_view(), out.skin.rest);
+    return tag == F::kTriangles.tag ? copy(reader.get_view(), 3, kMaxMeshTriangles, out.triangles)
                                     : skip(reader);
   });
   const auto isFinite = [](float coordinate) { return std::isfinite(coordinate); };
-  return mesh && cornersExist(*mesh) && std::all_of(mesh->vertices.begin(), mesh->vertices.end(), isFinite)
-             ? mesh
-             : std::nullopt;
+  const bool isComplete = mesh && cornersExist(*mesh) &&
+                          std::all_of(mesh->vertices.begin(), mesh->vertices.end(), isFinite) &&
+                          (mesh->skin.rest.empty() || mesh->skin.fits(mesh->vertices.size() / 3));
+  return isComplete ? mesh : std::nullopt;
 }
 
 }  // namespace clothstream::client

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/core/wire/skin.h"
 #include "clients/core/wire/wire.h"
 
 namespace clothstream::client {
@@ -23,6 +24,7 @@ struct Collider {
   Vec3 size{};
   // Serialised ConvexHull or ColliderMeshDescription, which point into the message; both are empty in frames.
   Bytes hull, mesh;
+  std::vector<float> joints;  // of a mesh, in the frame of the collider: skin.h
   std::uint64_t participantId = 0;
 };
 
@@ -30,6 +32,7 @@ struct Collider {
 struct Hull {
   std::vector<float> vertices;  // 3 floats each
   std::vector<std::uint32_t> triangles;
+  Skin skin;  // of a mesh with joints; then `vertices` are at rest
 };
 
 // Reuses the memory of `collider`. The functions return false or nullopt if the message is not well formed, a

@@ -36,9 +36,16 @@ shared::ShapeRecord shapeRecord(const model::Shape& shape, const SolidTables& so
                             return shared::planesShape(first, static_cast<float>(hull->planes.size()));
                           },
                           [&](const model::Solid& solid) {
-                            return shared::solidShape(static_cast<float>(solids.placeOf(solid)));
+                            const std::size_t index = solids.indexOf(solid);
+                            return shared::solidShape(static_cast<float>(solids.places[index]),
+                                                      solids.motions[index]);
                           }},
       shape);
+}
+
+float reachOf(const model::Shape& shape, const SolidTables& solids) {
+  const auto* solid = std::get_if<model::Solid>(&shape);
+  return solid == nullptr ? model::reachOf(shape) : solids.reaches[solids.indexOf(*solid)];
 }
 
 shared::ColliderRecord recordOf(const MovingCollider& collider, const SolidTables& solids,
@@ -47,7 +54,7 @@ shared::ColliderRecord recordOf(const MovingCollider& collider, const SolidTable
   const model::Quaternion& to = collider.end.orientation;
   const float sign = from.dot(to) < 0 ? -1.0f : 1.0f;
   return {.position = vectorOf(collider.start.position),
-          .reach = std::min(model::reachOf(collider.shape), kFar),
+          .reach = std::min(reachOf(collider.shape, solids), kFar),
           .motion = vectorOf(collider.end.position - collider.start.position),
           .friction = collider.friction,
           .orientation = texel(from),

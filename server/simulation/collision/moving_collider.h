@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <variant>
+#include <vector>
 
 #include "server/model/collider.h"
 
@@ -16,6 +17,8 @@ struct MovingCollider {
   model::Shape shape = model::Sphere{};
   model::Pose start = {}, end = {};
   float friction = 1;  // Coulomb; multiplied with the cloth's
+  // Poses of the joints of a mesh in the frame of the collider, or empty. Vertices move in straight lines.
+  std::vector<model::Pose> jointsStart = {}, jointsEnd = {};
 };
 
 inline bool isSolid(const MovingCollider& collider) {

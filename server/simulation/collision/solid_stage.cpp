@@ -36,14 +36,12 @@ void SolidStage::recordTables(vulkan::Recorder& recorder) const {
 void SolidStage::record(vulkan::Recorder& recorder, std::uint32_t present,
                         const shared::CollisionPush& collision, std::uint32_t solidCount) const {
   recorder.barrier();
-  recorder.dispatch(collide_.from[present],
-                    shared::SolidPush{.collision = collision,
-                                      .firstSolid = collision.colliderCount,
-                                      .solidCount = solidCount,
-                                      .reserved0 = 0,
-                                      .reserved1 = 0},
-                    std::uint64_t{tileCount_} * workgroupSize_,
-                    1 + solidCount * static_cast<std::uint64_t>(model::kSolidWork));
+  recorder.dispatch(
+      collide_.from[present],
+      shared::SolidPush{
+          .collision = collision, .solidCount = solidCount, .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
+      std::uint64_t{tileCount_} * workgroupSize_,
+      1 + solidCount * static_cast<std::uint64_t>(model::kSolidWork));
 }
 
 }  // namespace clothstream::simulation

@@ -17,16 +17,17 @@ vec4 numbers(const model::TriangleCorners& triangle) {
           0};
 }
 
-// Appends a mesh and its tree.
-void append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
+// Appends a mesh and its tree. Returns the number of its leaves.
+std::uint32_t append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
   const TriangleTree tree = makeTriangleTree(mesh);
   const std::size_t record = texels.size();
   const std::size_t firstTriangle = record + CLOTHSTREAM_SOLID_TEXELS;
   const std::size_t firstVertex = firstTriangle + CLOTHSTREAM_TRIANGLE_TEXELS * mesh.triangles.size();
-  const std::size_t firstBox = firstVertex + CLOTHSTREAM_VERTEX_TEXELS * mesh.vertices.size();
+  const std::size_t vertexTexels = mesh.skin ? CLOTHSTREAM_MOVING_VERTEX_TEXELS : CLOTHSTREAM_VERTEX_TEXELS;
+  const std::size_t firstBox = firstVertex + vertexTexels * mesh.vertices.size();
   texels.push_back({static_cast<float>(firstTriangle), static_cast<float>(firstVertex),
                     static_cast<float>(firstBox), static_cast<float>(tree.leafCount)});
-  texels.push_back({static_cast<float>(mesh.triangles.size()), 0, 0, 0});
+  texels.push_back({static_cast<float>(mesh.triangles.size()), static_cast<float>(vertexTexels), 0, 0});
 
   std::vector<std::uint32_t> rank(tree.order.size());
   for (std::uint32_t i = 0; i < rank.size(); ++i) rank[tree.order[i]] = i;
@@ -38,21 +39,24 @@ void append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
   }
   const std::vector<Eigen::Vector3d> normals = model::vertexPseudonormals(mesh);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    texels.push_back(texel(mesh.vertices[i], 0));
-    texels.push_back(texel(model::Vec3(normals[i].cast<float>()), 0));
+    for (std::size_t k = 0; k < vertexTexels; k += CLOTHSTREAM_VERTEX_TEXELS) {
+      texels.push_back(texel(mesh.vertices[i], 0));
+      texels.push_back(texel(model::Vec3(normals[i].cast<float>()), 0));
+    }
   }
   for (const TriangleTree::Box& box : tree.boxes) {
     texels.push_back(texel(box.low, 0));
     texels.push_back(texel(box.high, 0));
   }
+  return tree.leafCount;
 }
 
 }  // namespace
 
-std::uint32_t SolidTables::placeOf(const model::Solid& solid) const {
+std::size_t SolidTables::indexOf(const model::Solid& solid) const {
   const auto found = std::ranges::find(solids, solid);
   assert(found != solids.end());
-  return places[static_cast<std::size_t>(found - solids.begin())];
+  return static_cast<std::size_t>(found - solids.begin());
 }
 
 SolidTables solidTables(std::span<const model::Collider> colliders) {
@@ -62,7 +66,9 @@ SolidTables solidTables(std::span<const model::Collider> colliders) {
     if (solid == nullptr || std::ranges::find(tables.solids, *solid) != tables.solids.end()) continue;
     tables.solids.push_back(*solid);
     tables.places.push_back(static_cast<std::uint32_t>(tables.texels.size()));
-    append(**solid, tables.texels);
+    tables.leafCounts.push_back(append(**solid, tables.texels));
+    tables.reaches.push_back((*solid)->reach);
+    tables.motions.push_back(0);
   }
   assert(tables.texels.size() < 1u << 24);  // numbers of texels are floats
   return tables;

@@ -15,11 +15,20 @@ namespace clothstream::simulation {
 struct SolidTables {
   std::vector<model::Solid> solids;   // one for each mesh, in the order of the first colliders that have it
   std::vector<std::uint32_t> places;  // texel of the SolidRecord of each mesh
-  std::vector<shared::vec4> texels;   // records, triangles, vertices and boxes
+  std::vector<std::uint32_t> leafCounts;
+  std::vector<shared::vec4> texels;  // records, triangles, vertices and boxes
+  // In the tick that is recorded, m: the radius of a sphere around the collider's origin that contains the
+  // mesh, and a bound on the moves of its vertices, seen from the collider.
+  std::vector<float> reaches, motions;
 
   bool empty() const { return solids.empty(); }
-  // Texel of the record of a mesh that the tables have.
-  std::uint32_t placeOf(const model::Solid& solid) const;
+  // Index of a mesh that the tables have.
+  std::size_t indexOf(const model::Solid& solid) const;
+  // Texel of the first vertex of a mesh.
+  std::uint32_t firstVertexOf(std::size_t index) const {
+    return places[index] + CLOTHSTREAM_SOLID_TEXELS +
+           CLOTHSTREAM_TRIANGLE_TEXELS * static_cast<std::uint32_t>(solids[index]->triangles.size());
+  }
 };
 
 // Takes time in proportion to the triangles and their logarithm.

@@ -145,7 +145,14 @@ export class Frames {
     return this.shown.read(exports.cs_collider_count(pointer), exports.cs_get_collider);
   }
 
-  // Copies the geometry of a hull collider.
+  // Vertices of a hull or mesh at the shown time, until the next call of this client. A mesh with joints moves them.
+  hullVertices(collider: Collider): Float32Array {
+    const { core, pointer, scratch } = this.handle;
+    const vertices = core.exports.cs_get_hull(pointer, collider.index, scratch, scratch + 4, scratch + 8);
+    return core.floats(vertices, 3 * core.view().getUint32(scratch, true));
+  }
+
+  // Copies the geometry of a collider that is a hull or a mesh.
   hull(collider: Collider): Hull {
     const { cs_get_hull } = this.handle.core.exports;
     const [vertexCount, triangles, indexCount] = [this.handle.scratch, this.handle.scratch + 4, this.handle.scratch + 8];

@@ -9,6 +9,8 @@ export type ColliderMesh = THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMa
 
 // Scale of drawn colliders. Slightly smaller, because triangles between nodes that touch a shape cut into it.
 const kShrink = 0.985;
+// A hull has at most this number of corners. More are those of a mesh, which is drawn smooth and in its true size.
+const kMostHullCorners = 128;
 // Half the edge of the drawn part of a plane, metres.
 const kPlaneReach = 4;
 
@@ -54,6 +56,7 @@ export class ColliderMeshes {
       mesh.name = collider.name;
       mesh.position.fromArray(collider.position);
       mesh.quaternion.fromArray(collider.orientation);
+      if (collider.shape === Shape.hull) follow(mesh, client.frames.hullVertices(collider));
       ++count;
     }
     while (this.meshes.length > count) this.remove(this.meshes.pop()!);
@@ -122,11 +125,28 @@ function geometryOf(client: Client, collider: Collider): THREE.BufferGeometry {
   }
 }
 
+// Moves the vertices of a mesh with joints to where they are now.
+function follow({ geometry }: ColliderMesh, vertices: Float32Array): void {
+  const position = geometry.getAttribute("position") as THREE.BufferAttribute;
+  if (geometry.index === null || position.array.length !== vertices.length) return;
+  let same = true;
+  for (let i = 0; same && i < vertices.length; ++i) same = vertices[i] === position.array[i];
+  if (same) return;
+  (position.array as Float32Array).set(vertices);
+  position.needsUpdate = true;
+  geometry.computeVertexNormals();
+  geometry.computeBoundingSphere();
+}
+
 function hullGeometry(client: Client, collider: Collider): THREE.BufferGeometry {
   const { vertices, triangles } = client.frames.hull(collider);
   const indexed = new THREE.BufferGeometry();
   indexed.setAttribute("position", new THREE.BufferAttribute(vertices, 3));
   indexed.setIndex(new THREE.BufferAttribute(triangles, 1));
+  if (vertices.length > 3 * kMostHullCorners) {
+    indexed.computeVertexNormals();
+    return indexed;
+  }
   // Faces do not share vertices, so that edges are sharp.
   const geometry = indexed.toNonIndexed().scale(kShrink, kShrink, kShrink);
   geometry.computeVertexNormals();

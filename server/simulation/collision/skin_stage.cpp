@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+#include "server/simulation/collision/skin_stage.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "kernels/refit_solid.h"
+#include "kernels/skin_solid.h"
+#include "kernels/weigh_solid.h"
+#include "server/simulation/texel.h"
+
+namespace clothstream::simulation {
+namespace {
+
+using vulkan::Buffer;
+using vulkan::BufferPurpose;
+using vulkan::kStorage;
+using vulkan::kTexels;
+
+// Nodes of a tree below which one invocation refits all nodes.
+constexpr std::uint32_t kRefitRoots = 64;
+constexpr std::size_t kTransformBytes = CLOTHSTREAM_TRANSFORM_TEXELS * kTexelBytes;
+
+shared::SkinVertexRecord restOf(const model::Vec3& vertex, const model::VertexJoints& by) {
+  shared::SkinVertexRecord record{.position = vectorOf(vertex), .reserved = 0, .joints = {}, .weights = {}};
+  for (std::size_t k = 0; k < model::kVertexJoints; ++k) {
+    record.joints[k] = static_cast<float>(by.joints[k]);
+    record.weights[k] = by.weights[k];
+  }
+  return record;
+}
+
+void appendFans(const model::ClosedMesh& mesh, std::vector<shared::vec4>& fans) {
+  std::vector<std::vector<shared::vec4>> around(mesh.vertices.size());
+  for (const model::TriangleCorners& triangle : mesh.triangles)
+    for (std::size_t i = 0; i < 3; ++i)
+      around[triangle[i]].push_back(
+          {static_cast<float>(triangle[(i + 1) % 3]), static_cast<float>(triangle[(i + 2) % 3]), 0, 0});
+  std::size_t next = fans.size() + mesh.vertices.size();
+  for (const std::vector<shared::vec4>& fan : around) {
+    fans.push_back({static_cast<float>(next), static_cast<float>(fan.size()), 0, 0});
+    next += fan.size();
+  }
+  for (const std::vector<shared::vec4>& fan : around) fans.insert(fans.end(), fan.begin(), fan.end());
+}
+
+void write(const std::vector<model::Transform>& transforms, std::span<float> to) {
+  std::size_t at = 0;
+  for (const model::Transform& transform : transforms)
+    for (const double number : transform) to[at++] = static_cast<float>(number);
+}
+
+vulkan::KernelDescription kernelOf(const char* name, std::span<const std::uint32_t> spirv,
+                                   std::vector<vulkan::BindingKind> bindings, std::uint32_t pushBytes,
+                                   std::uint32_t workgroupSize) {
+  return {.name = name,
+          .spirv = spirv,
+          .bindings = std::move(bindings),
+          .pushConstantBytes = pushBytes,
+          .workgroupSize = workgroupSize,
+          .specialisation = {}};
+}
+
+}  // namespace
+
+SkinTables skinTables(const SolidTables& solids) {
+  SkinTables tables;
+  for (std::uint32_t i = 0; i < solids.solids.size(); ++i) {
+    const model::ClosedMesh& mesh = *solids.solids[i];
+    if (!mesh.skin) continue;
+    const auto joints = static_cast<std::uint32_t>(mesh.skin->joints.size());
+    tables.skinned.push_back({.solid = i,
+                              .push = {.vertexCount = static_cast<std::uint32_t>(mesh.vertices.size()),
+                                       .firstRest = CLOTHSTREAM_SKIN_VERTEX_TEXELS *
+                                                    static_cast<std::uint32_t>(tables.rests.size()),
+                                       .firstFan = static_cast<std::uint32_t>(tables.fans.size()),
+                                       .firstVertex = solids.firstVertexOf(i),
+                                       .firstJoint = tables.transformCount,
+                                       .jointCount = joints,
+                                       .reserved0 = 0,
+                                       .reserved1 = 0},
+                              .bounds = model::skinBounds(*mesh.skin, mesh.vertices)});
+    for (std::size_t k = 0; k < mesh.vertices.size(); ++k)
+      tables.rests.push_back(restOf(mesh.vertices[k], mesh.skin->vertices[k]));
+    appendFans(mesh, tables.fans);
+    tables.transformCount += 2 * joints;
+  }
+  return tables;
+}
+
+SkinStage::SkinStage(const vulkan::Device& device, SkinTables tables, SolidTables& solids,
+                     const Buffer& texels, std::uint32_t workgroupSize)
+    : tables_(std::move(tables)),
+      solids_(solids),
+      rests_(device, tables_.rests),
+      fans_(device, tables_.fans),
+      transforms_(device, BufferPurpose::texels, tables_.transformCount * kTransformBytes),
+      uploads_{Buffer(device, BufferPurpose::upload, transforms_.bytes()),
+               Buffer(device, BufferPurpose::upload, transforms_.bytes())},
+      skin_(device, kernelOf("skin_solid", kernels::skin_solid, {kTexels, kTexels, kStorage},
+                             sizeof(shared::SkinPush), workgroupSize)),
+      weigh_(device, kernelOf("weigh_solid", kernels::weigh_solid, {kTexels, kTexels, kStorage},
+                              sizeof(shared::SkinPush), workgroupSize)),
+      refit_(device, kernelOf("refit_solid", kernels::refit_solid, {kTexels, kStorage},
+                              sizeof(shared::RefitPush), workgroupSize)),
+      skinIn_(device, skin_, {&rests_.texels(), &transforms_, &texels}),
+      weighIn_(device, weigh_, {&fans_.texels(), &texels, &texels}),
+      refitIn_(device, refit_, {&texels, &texels}) {}
+
+void SkinStage::recordTables(vulkan::Recorder& recorder) const {
+  rests_.recordUpload(recorder);
+  fans_.recordUpload(recorder);
+}
+
+void SkinStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders) {
+  slot_ = 1 - slot_;
+  const Buffer& upload = uploads_[slot_];
+  for (const SkinTables::Skinned& skinned : tables_.skinned) {
+    const model::Solid& solid = solids_.solids[skinned.solid];
+    const auto collider = std::ranges::find_if(colliders, [&](const MovingCollider& one) {
+      const auto* own = std::get_if<model::Solid>(&one.shape);
+      return own != nullptr && *own == solid;
+    });
+    if (collider == colliders.end()) continue;
+    std::vector<model::Pose> rest;
+    if (collider->jointsStart.empty()) model::compose(*solid->skin, model::restJoints(*solid->skin), rest);
+    const auto start = model::jointTransforms(*solid->skin, rest.empty() ? collider->jointsStart : rest);
+    const auto end = model::jointTransforms(*solid->skin, rest.empty() ? collider->jointsEnd : rest);
+    const auto floats = upload.mapped<float>().subspan(std::size_t{12} * skinned.push.firstJoint,
+                                                       std::size_t{24} * skinned.push.jointCount);
+    write(start, floats.first(floats.size() / 2));
+    write(end, floats.last(floats.size() / 2));
+    const model::SkinMotion motion = model::motionBetween(skinned.bounds, start, end);
+    solids_.reaches[skinned.solid] = motion.reach;
+    solids_.motions[skinned.solid] = motion.farthest;
+  }
+  recorder.copy(upload, transforms_, transforms_.bytes());
+}
+
+void SkinStage::recordRefit(vulkan::Recorder& recorder, const SkinTables::Skinned& skinned,
+                            bool upperLevels) const {
+  const std::uint32_t leaves = solids_.leafCounts[skinned.solid];
+  const std::uint32_t roots = std::min(leaves, kRefitRoots);
+  const auto levelsBelow = [](std::uint32_t nodes) {
+    return static_cast<std::uint32_t>(std::countr_zero(nodes));
+  };
+  const shared::RefitPush push{.solid = solids_.places[skinned.solid],
+                               .firstRoot = upperLevels ? 1 : roots,
+                               .rootCount = upperLevels ? 1 : roots,
+                               .levels = upperLevels ? levelsBelow(roots) : levelsBelow(leaves / roots) + 1};
+  recorder.dispatch(refitIn_, push, push.rootCount);
+}
+
+// Every dispatch writes to the buffer of all meshes, so barriers are between them.
+void SkinStage::record(vulkan::Recorder& recorder) const {
+  for (const SkinTables::Skinned& skinned : tables_.skinned) {
+    recorder.barrier();
+    recorder.dispatch(skinIn_, skinned.push, skinned.push.vertexCount);
+    recorder.barrier();
+    recorder.dispatch(weighIn_, skinned.push, skinned.push.vertexCount);
+    recorder.barrier();
+    recordRefit(recorder, skinned, false);
+    recorder.barrier();
+    recordRefit(recorder, skinned, true);
+  }
+}
+
+}  // namespace clothstream::simulation

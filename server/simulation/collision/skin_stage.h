@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// Moves the vertices of meshes by their joints, once in each tick.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/simulation/collision/moving_collider.h"
+#include "server/simulation/collision/solid_tables.h"
+#include "server/simulation/device_table.h"
+#include "server/vulkan/kernel.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// Rest vertices, and the triangles around them, as the kernels read them.
+struct SkinTables {
+  struct Skinned {
+    std::uint32_t solid = 0;  // index in SolidTables
+    shared::SkinPush push = {};
+    model::SkinBounds bounds;
+  };
+  std::vector<Skinned> skinned;
+  std::vector<shared::SkinVertexRecord> rests;
+  std::vector<shared::vec4> fans;    // of each vertex: first texel and count; then FanRecords
+  std::uint32_t transformCount = 0;  // of all joints, at the start and at the end of a tick
+
+  bool empty() const { return skinned.empty(); }
+};
+SkinTables skinTables(const SolidTables& solids);
+
+// Belongs to the device's thread.
+//
+// A tick:   recordInputs -> barrier -> record -> substeps
+class SkinStage {
+ public:
+  // `solids` outlives the stage. The buffer `texels` has its texels.
+  SkinStage(const vulkan::Device& device, SkinTables tables, SolidTables& solids,
+            const vulkan::Buffer& texels, std::uint32_t workgroupSize);
+
+  void recordTables(vulkan::Recorder& recorder) const;
+  // Uploads the joints of the colliders, and sets the reach and the motion of their meshes in the tables. At
+  // most one tick may be in flight. A mesh with joints belongs to one collider.
+  void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders);
+  // Moves vertices, their normals and the boxes of the trees. Has its own barriers, except at the end.
+  void record(vulkan::Recorder& recorder) const;
+
+ private:
+  void recordRefit(vulkan::Recorder& recorder, const SkinTables::Skinned& skinned, bool upperLevels) const;
+
+  SkinTables tables_;
+  SolidTables& solids_;
+  DeviceTable rests_, fans_;
+  vulkan::Buffer transforms_;
+  std::array<vulkan::Buffer, 2> uploads_;  // used alternately: a tick may be in flight
+  std::uint32_t slot_ = 0;
+  vulkan::Kernel skin_, weigh_, refit_;
+  vulkan::Bindings skinIn_, weighIn_, refitIn_;
+};
+
+}  // namespace clothstream::simulation

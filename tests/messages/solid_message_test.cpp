@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+// Colliders that are meshes, and their joints, in messages.
+#include <functional>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/client_message.h"
+#include "server/messages/description.h"
+#include "server/messages/scene_message.h"
+#include "tests/messages/scenes.h"
+
+namespace clothstream::messages {
+namespace {
+
+using testing::StartsWith;
+
+// smallScene() with a tetrahedron of two joints as the collider.
+v1::Scene sceneWithMesh() {
+  v1::Scene scene = smallScene();
+  v1::ColliderMesh& mesh = *scene.mutable_colliders(0)->mutable_mesh();
+  for (const float number : {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}) mesh.add_positions(number);
+  for (const std::uint32_t corner : {0u, 2u, 1u, 0u, 1u, 3u, 0u, 3u, 2u, 1u, 2u, 3u})
+    mesh.add_triangles(corner);
+  v1::Skin& skin = *mesh.mutable_skin();
+  skin.add_joints()->set_name("root");
+  v1::Joint& tip = *skin.add_joints();
+  tip.set_parent(0);
+  tip.mutable_rest()->mutable_position()->set_z(0.5f);
+  for (int i = 0; i < 4; ++i)
+    for (const float weight : {0.75f, 0.25f, 0.0f, 0.0f}) {
+      skin.add_vertex_joints(weight == 0.25f ? 1 : 0);
+      skin.add_vertex_weights(weight);
+    }
+  for (const float time : {0.0f, 2.0f}) {
+    v1::JointKey& key = *skin.mutable_animation()->add_keys();
+    key.set_time(time);
+    key.add_joints()->mutable_position()->set_y(time);
+    *key.add_joints() = tip.rest();
+  }
+  return scene;
+}
+
+const model::ClosedMesh& meshOf(const model::Scene& scene) {
+  return *std::get<model::Solid>(scene.colliders[0].shape);
+}
+
+TEST(SolidMessage, KeepsMeshAndJointsThroughAMessage) {
+  const Result<model::Scene> scene = toScene(sceneWithMesh());
+  ASSERT_TRUE(scene) << scene.error().text;
+  const v1::Scene message = toMessage(*scene);
+  const Result<model::Scene> again = toScene(message);
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_EQ(toMessage(*again).SerializeAsString(), message.SerializeAsString());
+  EXPECT_EQ(meshOf(*again).vertices, meshOf(*scene).vertices);
+  EXPECT_EQ(meshOf(*again).skin->joints.size(), 2u);
+  EXPECT_EQ(meshOf(*again).skin->keys[1].joints[0].position.y(), 2);
+}
+
+TEST(SolidMessage, DescriptionsHaveTheMeshOnce) {
+  const model::Scene scene = *toScene(sceneWithMesh());
+  const v1::StreamDescription description = toDescription(scene, 1, 2, 0);
+  EXPECT_EQ(description.colliders(0).mesh().positions().size(), 4u * 12);
+  EXPECT_EQ(description.colliders(0).mesh().triangles().size(), 4u * 12);
+  EXPECT_EQ(description.colliders(0).mesh().joints().size(), 16u);
+  EXPECT_EQ(description.colliders(0).mesh().weights().size(), 64u);
+  EXPECT_EQ(description.colliders(0).mesh().rest_size(), 14);
+  EXPECT_EQ(description.definition().colliders(0).mesh().positions_size(), 0);
+}
+
+std::string errorOf(const std::function<void(v1::Scene&, v1::ColliderMesh&)>& spoil) {
+  v1::Scene scene = sceneWithMesh();
+  spoil(scene, *scene.mutable_colliders(0)->mutable_mesh());
+  const Result<model::Scene> made = toScene(scene);
+  return made ? "no error" : made.error().text;
+}
+
+TEST(SolidMessage, RefusesWrongMeshesWithTheFieldAndTheReason) {
+  using S = v1::Scene;
+  using M = v1::ColliderMesh;
+  EXPECT_EQ(errorOf([](S&, M&) {}), "no error");
+  EXPECT_THAT(errorOf([](S&, M& m) { m.add_positions(1); }),
+              StartsWith("colliders[0].mesh.positions: has 13"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.set_positions(4, 2000); }),
+              StartsWith("colliders[0].mesh.positions[4] = 2000:"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.set_triangles(0, 4); }),
+              StartsWith("colliders[0].mesh: triangle 0 has the corner 4"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_triangles()->Truncate(9); }),
+              StartsWith("colliders[0].mesh.triangles: has 3 elements; must have 4 to 20000"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.set_file("a.obj"); }), StartsWith("colliders[0].mesh.file"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.set_scale(0); }), StartsWith("colliders[0].mesh.scale = 0:"));
+  EXPECT_THAT(errorOf([](S& s, M&) {
+                for (int i = 1; i < 9; ++i) {
+                  *s.add_colliders() = s.colliders(0);
+                  s.mutable_colliders(i)->set_name("mesh" + std::to_string(i));
+                }
+              }),
+              StartsWith("colliders: have 9 meshes; must have at most 8"));
+}
+
+TEST(SolidMessage, RefusesWrongJointsWithTheFieldAndTheReason) {
+  using S = v1::Scene;
+  using M = v1::ColliderMesh;
+  EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_skin()->clear_joints(); }),
+              StartsWith("colliders[0].mesh.skin.joints: has 0 elements; must have 1 to 128"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_skin()->mutable_joints(0)->set_parent(0); }),
+              StartsWith("colliders[0].mesh.skin.joints[0].parent = 0: must be less than"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_skin()->set_vertex_joints(5, 2); }),
+              StartsWith("colliders[0].mesh.skin.vertexJoints[5] = 2:"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_skin()->set_vertex_weights(4, 0.5f); }),
+              StartsWith("colliders[0].mesh.skin.vertexWeights[4]: and the next three add up to 0.75"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_skin()->add_vertex_weights(1); }),
+              StartsWith("colliders[0].mesh.skin.vertexWeights: has 17 elements"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_skin()->mutable_animation()->mutable_keys(1)->set_time(0); }),
+              StartsWith("colliders[0].mesh.skin.animation.keys[1].time = 0:"));
+  EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_skin()->mutable_animation()->mutable_keys(1)->add_joints(); }),
+              StartsWith("colliders[0].mesh.skin.animation.keys[1].joints: has 3 elements"));
+}
+
+TEST(SolidMessage, PosesOfJointsAreOfAColliderThatHasThem) {
+  const model::Scene scene = *toScene(sceneWithMesh());
+  v1::ColliderPoses message;
+  v1::ColliderJoints& joints = *message.add_joints();
+  joints.set_collider("ball");
+  joints.add_joints()->mutable_position()->set_x(1);
+  joints.add_joints();
+  const auto poses = toPoses(message, scene);
+  ASSERT_TRUE(poses) << poses.error().text;
+  EXPECT_EQ(poses->joints[0].collider, 0u);
+  EXPECT_EQ(poses->joints[0].joints[0].position.x(), 1);
+  joints.add_joints();
+  EXPECT_THAT(toPoses(message, scene).error().text,
+              StartsWith("colliderPoses.joints[0].joints: has 3 elements; must have 2"));
+  EXPECT_THAT(toPoses(message, *toScene(smallScene())).error().text,
+              StartsWith("colliderPoses.joints[0].collider = \"ball\": has no joints"));
+  joints.set_collider("nobody");
+  EXPECT_THAT(toPoses(message, scene).error().text,
+              StartsWith("colliderPoses.joints[0].collider = \"nobody\": must be one of ball"));
+}
+
+}  // namespace
+}  // namespace clothstream::messages
