@@ -51,6 +51,23 @@ void writeConstraint(const model::Solver& solver, v1::ConstraintSolver& message)
                                                                    : v1::CONSTRAINT_PATH_MATRIX_FREE);
 }
 
+void readMode(Checks& checks, const Path& path, v1::AcadMode mode, model::Solver& solver) {
+  switch (mode) {
+    case v1::ACAD_MODE_UNSPECIFIED:
+    case v1::ACAD_MODE_HOLD:
+      break;
+    case v1::ACAD_MODE_PAPER:
+      solver.acadMode = model::AcadMode::paper;
+      break;
+    case v1::ACAD_MODE_LIMIT:
+      solver.acadMode = model::AcadMode::limit;
+      break;
+    default:
+      checks.fail(path, fmt::format("{}", static_cast<int>(mode)),
+                  "must be ACAD_MODE_HOLD, ACAD_MODE_PAPER or ACAD_MODE_LIMIT");
+  }
+}
+
 }  // namespace
 
 model::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& message) {
@@ -65,6 +82,7 @@ model::Solver toSolver(Checks& checks, const Path& path, const v1::Solver& messa
     if (acad.has_activation())
       solver.activation = checks.number(at / "activation", acad.activation(), parameters::kActivation.range);
     readConstraint(checks, at / "constraint", acad.constraint(), solver);
+    readMode(checks, at / "mode", acad.mode(), solver);
   } else if (message.has_xpbd()) {
     const v1::XpbdSolver& xpbd = message.xpbd();
     const Path at = path / "xpbd";
@@ -93,6 +111,9 @@ v1::Solver toMessage(const model::Solver& solver) {
       break;
     case model::SolverKind::acad:
       message.mutable_acad()->set_activation(solver.activation);
+      if (solver.acadMode != model::AcadMode::hold)
+        message.mutable_acad()->set_mode(solver.acadMode == model::AcadMode::paper ? v1::ACAD_MODE_PAPER
+                                                                                   : v1::ACAD_MODE_LIMIT);
       writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
       break;
     case model::SolverKind::xpbd:

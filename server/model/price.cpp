@@ -141,6 +141,10 @@ Work PriceModel::solverWork(const Scene& scene, const Cloth& cloth, const ClothC
     work.nodeSteps = active * prepare;
     (group ? work.groupNodeSteps : work.nodeSteps) += active * iterate;
     work.dispatches = group ? 5 : 4 + 2 * iterations;
+    if (isAcad(solver, AcadMode::limit)) {
+      work.nodeSteps += active * prepare * (kLimitRounds - 1);
+      work.dispatches += 5 * (kLimitRounds - 1);
+    }
   }
   work.scale(scene.substeps);
   return work;

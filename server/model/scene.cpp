@@ -35,7 +35,16 @@ std::uint32_t Scene::nodeCount() const {
 }
 
 float correctionFraction(const Solver& solver) {
-  return solver.correctionFraction.value_or(solver.kind == SolverKind::acad ? kCorrectionFraction : 1.0f);
+  return solver.correctionFraction.value_or(isAcad(solver, AcadMode::hold) ? kCorrectionFraction : 1.0f);
+}
+
+bool isAcad(const Solver& solver, AcadMode mode) {
+  return solver.kind == SolverKind::acad && solver.acadMode == mode;
+}
+
+std::uint32_t iterationsOf(const Solver& solver) {
+  if (!isAcad(solver, AcadMode::limit)) return solver.iterations;
+  return (solver.iterations + kLimitRounds - 1) / kLimitRounds;
 }
 
 bool isAssembled(const Solver& solver) {

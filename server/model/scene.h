@@ -59,6 +59,20 @@ enum class SolverKind : std::uint8_t {
   implicitEuler,
 };
 
+// How acad chooses and holds constraints.
+enum class AcadMode : std::uint8_t {
+  // A spring that forces alone would stretch beyond the activation is held at that length. Its force stays.
+  hold,
+  // [Va21] 3.3 and Fig. 5 to the letter. A spring that is longer than the activation at the start of a
+  // substep
+  // has no force in it, and is a constraint to its rest length instead.
+  paper,
+  // Springs pull and never push to keep the activation's length, in rounds that follow the motion. Springs
+  // are
+  // no stiffer than the substep bears.
+  limit,
+};
+
 // Storage of a constraint system during a solve. Both paths give the same motion except for rounding.
 enum class ConstraintPath : std::uint8_t {
   matrixFree,  // products are gathered from the springs
@@ -70,7 +84,8 @@ struct Solver {
   SolverKind kind = SolverKind::massSpring;
   bool bendConstraints = false;  // bend springs are constraints too: "all springs" in [Va21]
   // m/N. For xpbd it applies to structural and shear springs; absent means 1 / stiffness. For the other
-  // solvers absent means kRelativeCompliance * h^2 / m.
+  // solvers absent means kRelativeCompliance * h^2 / m. For AcadMode::paper absent means 0, and for
+  // AcadMode::limit kLimitCompliance * h^2 / m.
   std::optional<float> compliance;
   // Per substep: maximum conjugate gradient iterations; for xpbd the rounds through all springs.
   std::uint32_t iterations = parameters::kIterations.initial;
@@ -79,13 +94,25 @@ struct Solver {
   float activation = parameters::kActivation.initial;
   // Fraction of an existing length error that a substep corrects (Baumgarte stabilisation). The error is
   // stretch; for `constraint` also compression. The correction gives the nodes speed. Absent means 1 for
-  // `constraint` and kCorrectionFraction for acad.
+  // `constraint` and AcadMode::paper, and kCorrectionFraction for AcadMode::hold. Not for AcadMode::limit.
   std::optional<float> correctionFraction = {};
   ConstraintPath path = ConstraintPath::matrixFree;  // for `constraint`
+  AcadMode acadMode = AcadMode::hold;                // for acad
 };
 
 inline constexpr float kCorrectionFraction = 0.15f;
+
+// For AcadMode::limit: rounds per substep, which share the iterations, and the default compliance as a
+// fraction of h^2 / m. A tenth of this compliance holds no better, and the cloth does not come to rest.
+inline constexpr std::uint32_t kLimitRounds = 3;
+inline constexpr float kLimitCompliance = 0.2f;
 float correctionFraction(const Solver& solver);
+
+// True if the solver is acad with this mode.
+bool isAcad(const Solver& solver, AcadMode mode);
+
+// Iterations of one solve: AcadMode::limit divides those of a substep among its rounds.
+std::uint32_t iterationsOf(const Solver& solver);
 
 // True if the solver multiplies sparse matrices.
 bool isAssembled(const Solver& solver);

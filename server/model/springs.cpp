@@ -90,7 +90,9 @@ Spring forceOf(const Cloth& cloth, SpringKind kind) {
 
 double scaledCompliance(const Cloth& cloth, double h) {
   if (cloth.solver.compliance) return *cloth.solver.compliance / (h * h);
-  return double{kRelativeCompliance} / cloth.nodeMass();
+  if (isAcad(cloth.solver, AcadMode::paper)) return 0;
+  const float relative = isAcad(cloth.solver, AcadMode::limit) ? kLimitCompliance : kRelativeCompliance;
+  return double{relative} / cloth.nodeMass();
 }
 
 XpbdSpring xpbdSpring(const Cloth& cloth, SpringKind kind, double h) {

@@ -206,6 +206,27 @@ std::uint32_t StabilityBound::substeps(const Scene& scene) const {
   return substeps;
 }
 
+double bearableStiffness(const Cloth& cloth, double h) {
+  double share = 1;
+  for (const NodeSprings& node : cloth.mesh ? meshSprings(cloth) : gridSprings(cloth)) {
+    const auto sum = [&](auto&& of) {
+      return node.structural * of(cloth.structural) + node.shear * of(cloth.shear) +
+             node.bend * of(cloth.bend);
+    };
+    const double perMass = 2 * node.perMass / cloth.mass;
+    const double elastic = h * h * perMass * sum([](const Spring& s) { return double{s.stiffness}; });
+    const double viscous =
+        2 * h * (perMass * sum([](const Spring& s) { return double{s.damping}; }) + cloth.damping);
+    // s + 2c < 4, as in semiImplicitStable().
+    if (elastic > 0) share = std::min(share, std::max(0.0, 0.9 * (4 - viscous) / elastic));
+  }
+  return share;
+}
+
+double stiffnessShare(const Cloth& cloth, double h) {
+  return isAcad(cloth.solver, AcadMode::limit) ? bearableStiffness(cloth, h) : 1;
+}
+
 std::uint32_t stableSubsteps(const Scene& scene) {
   return StabilityBound(scene).substeps(scene);
 }

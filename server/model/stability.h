@@ -47,6 +47,15 @@ class StabilityBound {
   std::vector<ClothBound> cloths_;
 };
 
+// Largest factor, at most 1, by which the springs' stiffness can be multiplied so that semi-implicit Euler is
+// stable with substeps of h seconds, with a tenth to spare. 0 if the damping alone is too much. Takes time
+// linear in nodes and springs.
+double bearableStiffness(const Cloth& cloth, double h);
+
+// Factor of the stiffness with which the solver takes springs as forces: bearableStiffness() for
+// AcadMode::limit, else 1.
+double stiffnessShare(const Cloth& cloth, double h);
+
 // StabilityBound(scene).substeps(scene).
 std::uint32_t stableSubsteps(const Scene& scene);
 

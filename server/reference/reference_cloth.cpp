@@ -8,8 +8,10 @@
 #include <cassert>
 #include <cmath>
 
+#include "server/model/stability.h"
 #include "server/reference/constraint_system.h"
 #include "server/reference/implicit_system.h"
+#include "server/reference/limit_system.h"
 
 namespace clothstream::reference {
 namespace {
@@ -73,12 +75,20 @@ void ReferenceCloth::setParameters(const model::Cloth& cloth) {
   setMass(cloth.mass);
 }
 
+bool ReferenceCloth::isReplaced(const model::SpringLink& link, double length) const {
+  return model::isAcad(cloth_.solver, model::AcadMode::paper) &&
+         model::isConstraint(cloth_.solver, link.kind) &&
+         length > (1 + double{cloth_.solver.activation}) * link.restLength;
+}
+
 void ReferenceCloth::accumulateSpringForces(std::span<Vec3> forces) const {
   for (const model::SpringLink& link : links_) {
     const model::Spring spring = model::forceOf(cloth_, link.kind);
     const Vec3 d = positions_[link.b] - positions_[link.a];
+    if (isReplaced(link, d.norm())) continue;
     const double square = std::max(d.squaredNorm(), kTinyLengthSquared);
-    const double elastic = spring.stiffness * (1 - double{link.restLength} / std::sqrt(square));
+    const double elastic =
+        stiffnessShare_ * spring.stiffness * (1 - double{link.restLength} / std::sqrt(square));
     const double viscous = spring.damping * (velocities_[link.b] - velocities_[link.a]).dot(d) / square;
     const Vec3 force = (elastic + viscous) * d;
     forces[link.a] += force;
@@ -177,6 +187,7 @@ void ReferenceCloth::integrate(const model::Environment& environment, model::Int
                                double h) {
   if (integrator == model::Integrator::rungeKutta4) return integrateRungeKutta(environment, h);
   bend(h);
+  stiffnessShare_ = model::stiffnessShare(cloth_, h);
   const std::vector<Vec3>& rates = accelerations(environment);
   const model::SolverKind solver = cloth_.solver.kind;
   if (solver != model::SolverKind::massSpring) start_ = positions_;
@@ -190,7 +201,10 @@ void ReferenceCloth::integrate(const model::Environment& environment, model::Int
       positions_[i] += h * velocities_[i];
     }
   }
-  if (solver == model::SolverKind::constraint || solver == model::SolverKind::acad) enforceConstraints(h);
+  if (model::isAcad(cloth_.solver, model::AcadMode::limit))
+    limitStretch(h);
+  else if (solver == model::SolverKind::constraint || solver == model::SolverKind::acad)
+    enforceConstraints(h);
   if (solver == model::SolverKind::implicitEuler) takeImplicitVelocities(h);
   if (solver == model::SolverKind::xpbd) correctSprings(h);
 }
@@ -248,6 +262,10 @@ void ReferenceCloth::enforceConstraints(double h) {
     const Vec3 d = start_[link.b] - start_[link.a];
     if (solver.kind == model::SolverKind::constraint) {
       constraints.push_back({link.a, link.b, correctionFraction * (d.norm() - rest)});
+    } else if (solver.acadMode == model::AcadMode::paper) {
+      if (isReplaced(link, d.norm()))
+        constraints.push_back(
+            {link.a, link.b, correctionFraction * (d.squaredNorm() - rest * rest) / (2 * d.norm())});
     } else if ((d + h * (velocities_[link.b] - velocities_[link.a])).norm() > longest) {
       const double excess = d.norm() - longest;
       constraints.push_back({link.a, link.b, excess > 0 ? correctionFraction * excess : excess});
@@ -261,6 +279,22 @@ void ReferenceCloth::enforceConstraints(double h) {
     positions_[i] += moves[i];
     velocities_[i] += moves[i] / h;
   }
+}
+
+void ReferenceCloth::limitStretch(double h) {
+  const std::vector<Vec3> free = positions_;
+  const double compliance = model::scaledCompliance(cloth_, h);
+  const std::uint32_t iterations = model::iterationsOf(cloth_.solver);
+  for (std::uint32_t round = 0; round < model::kLimitRounds; ++round) {
+    std::vector<LimitedSpring> springs;
+    for (const model::SpringLink& link : links_)
+      if (model::isConstraint(cloth_.solver, link.kind))
+        springs.push_back({link.a, link.b, link.restLength * (1 + double{cloth_.solver.activation})});
+    if (!limitRound(springs, free, inverseMasses_, compliance, iterations, double{cloth_.solver.tolerance},
+                    positions_))
+      break;
+  }
+  for (std::size_t i = 0; i < positions_.size(); ++i) velocities_[i] += (positions_[i] - free[i]) / h;
 }
 
 void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step, double friction,

@@ -80,7 +80,10 @@ class ReferenceCloth {
   const std::vector<Vec3>& accelerations(const model::Environment& environment);
   void integrateRungeKutta(const model::Environment& environment, double h);
   void bend(double h);
+  // True if a spring of this length, m, is a constraint instead of a force: model::AcadMode::paper.
+  bool isReplaced(const model::SpringLink& link, double length) const;
   void enforceConstraints(double h);
+  void limitStretch(double h);
   void takeImplicitVelocities(double h);
   void correctSprings(double h);
   std::vector<Vec3> gridNormals() const;
@@ -94,6 +97,7 @@ class ReferenceCloth {
   std::vector<Vec3> start_, startVelocities_;  // at the substep's start, for solvers of linear systems
   model::SpringColours colours_;               // of xpbd, created at first use
   std::vector<double> masses_, inverseMasses_;
+  double stiffnessShare_ = 1;  // model::stiffnessShare() of the last substep
 };
 
 }  // namespace clothstream::reference

@@ -68,6 +68,7 @@ struct Buffers {
   StateMemory state;
   Buffer normals;
   Buffer cloths, status;
+  Buffer stretches;  // dispatch sizes by Follow: StateBuffers::stretches
   // Buffers that the CPU writes and reads. Inputs and status alternate between two copies, because a tick may
   // be in flight while the next one is recorded.
   std::array<Buffer, 2> inputs;  // cloths
@@ -79,6 +80,7 @@ Buffers::Buffers(const vulkan::Device& device, std::uint32_t nodes, std::size_t 
       normals(device, BufferPurpose::texels, nodes * kTexelBytes),
       cloths(device, BufferPurpose::texels, clothCount * sizeof(shared::ClothRecord)),
       status(device, BufferPurpose::state, sizeof(shared::StatusRecord)),
+      stretches(device, BufferPurpose::indirect, 3 * kFollows.size() * sizeof(std::uint32_t)),
       statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)) {
   for (Buffer& buffer : inputs) buffer = Buffer(device, BufferPurpose::upload, cloths.bytes());
 }
@@ -88,6 +90,7 @@ StateBuffers stateOf(const Buffers& b, const CollisionStage& collision) {
           .colliders = collision.colliders(),
           .nearColliders = collision.nearLists(),
           .contactImpulses = collision.contactImpulses(),
+          .stretches = b.stretches,
           .positions = {&b.state.positions[0], &b.state.positions[1]},
           .velocities = {&b.state.velocities[0], &b.state.velocities[1]}};
 }
@@ -107,6 +110,7 @@ std::vector<float> massesOf(std::span<const model::Cloth> cloths) {
 // True if two solvers need the same tables. The way in which systems are solved may differ.
 bool sameTables(const model::Solver& a, const model::Solver& b) {
   return a.kind == b.kind && a.bendConstraints == b.bendConstraints && a.path == b.path &&
+         a.acadMode == b.acadMode &&
          (a.kind == model::SolverKind::massSpring || a.iterations == b.iterations);
 }
 
@@ -116,7 +120,10 @@ AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airD
   const bool springs = follow != Follow::corrections;
   return {springs && std::any_of(cloths.begin(), cloths.end(), isDamped),
           airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown),
-          colliders && follow == Follow::nothing, springs};
+          colliders && follow == Follow::nothing,
+          springs,
+          follow == Follow::hold || follow == Follow::paper || follow == Follow::limit,
+          follow == Follow::paper};
 }
 
 Stage makeHash(const vulkan::Device& device, const Buffers& b, std::uint32_t workgroupSize) {
@@ -148,7 +155,7 @@ struct ClothSimulation::Pipeline {
   void recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordSubsteps(vulkan::Recorder& recorder, const TickInputs& inputs);
   void recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,
-                     Follow follow, const shared::AdvancePush& push);
+                     Follow follow, shared::AdvancePush push);
   void recordRungeKutta(vulkan::Recorder& recorder, const TickInputs& inputs, shared::AdvancePush push);
   void recordStatus(vulkan::Recorder& recorder);
 
@@ -363,7 +370,9 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
 
 void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from,
                                               const AdvanceVariant& variant, Follow follow,
-                                              const shared::AdvancePush& push) {
+                                              shared::AdvancePush push) {
+  push.stretchSize = firstStretchSize(follow);
+  push.stretchChunks = solves.gridChunks(follow);
   grids.recordAdvance(recorder, from, variant, follow, push);
   if (meshes) meshes->recordAdvance(recorder, from, variant, follow, push);
 }
@@ -385,9 +394,9 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                            .airFactor = environment.airDensity / 6,
                            .collision = {},
                            .firstTile = 0,
-                           .reserved0 = 0,
-                           .reserved1 = 0,
-                           .reserved2 = 0};
+                           .stretchSize = 0,
+                           .stretchChunks = 0,
+                           .reserved = 0};
   if (attachments && attachments->aims()) {
     recorder.beginStage("attachments");
     recorder.barrier();

@@ -57,14 +57,14 @@ const Stage& GridStage::advance(const AdvanceVariant& variant) {
           .spirv = advanceSpirv_,
           .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::texels,
                        BindingKind::storage, BindingKind::storage, BindingKind::texels, BindingKind::texels,
-                       BindingKind::storage},
+                       BindingKind::storage, BindingKind::storage},
           .pushConstantBytes = sizeof(shared::AdvancePush),
           .workgroupSize = cut_.workgroupSize,
           .specialisation = variant.specialisation(cut_.rowsPerInvocation, integrator_)},
       Stage::Buffers{&s.cloths, &tiles_.texels(), s.positions[0], s.velocities[0], s.positions[1],
-                     s.velocities[1], &s.colliders, &s.nearColliders, &s.contactImpulses},
+                     s.velocities[1], &s.colliders, &s.nearColliders, &s.contactImpulses, &s.stretches},
       Stage::Buffers{&s.cloths, &tiles_.texels(), s.positions[1], s.velocities[1], s.positions[0],
-                     s.velocities[0], &s.colliders, &s.nearColliders, &s.contactImpulses});
+                     s.velocities[0], &s.colliders, &s.nearColliders, &s.contactImpulses, &s.stretches});
   return *made;
 }
 

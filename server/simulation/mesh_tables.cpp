@@ -68,7 +68,7 @@ MeshTiles meshTiles(std::span<const model::Cloth> cloths, std::uint32_t workgrou
     std::size_t nodes = 0;
     for (std::uint32_t i = 0; i < cloths.size(); ++i) {
       if (!cloths[i].mesh) continue;
-      if (followOf(cloths[i].solver.kind) == follow)
+      if (followOf(cloths[i].solver) == follow)
         appendTiles(i, cloths[i].nodeCount(), nodes, workgroupSize, tiles.records);
       nodes += cloths[i].nodeCount();
     }

@@ -8,6 +8,7 @@
 #include <cstddef>
 
 #include "server/model/springs.h"
+#include "server/model/stability.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -34,8 +35,8 @@ void setSolver(const model::Cloth& cloth, double substepSeconds, shared::ClothRe
   for (const model::SpringKind kind : {structural, shear, bend})
     record.xpbdSprings[static_cast<std::size_t>(kind)] = xpbdSpringOf(cloth, kind, substepSeconds);
   if (solver.kind == model::SolverKind::massSpring) return;
-  record.solverIterations = static_cast<float>(solver.iterations);
-  if (followOf(solver.kind) != Follow::solve) return;
+  record.solverIterations = static_cast<float>(model::iterationsOf(solver));
+  if (followOf(solver) == Follow::corrections) return;
   record.scaledCompliance = static_cast<float>(model::scaledCompliance(cloth, substepSeconds));
   record.squaredTolerance = solver.tolerance * solver.tolerance;
   record.solvesBend = solver.kind == model::SolverKind::implicitEuler || solver.bendConstraints ? 1.0f : 0.0f;
@@ -43,9 +44,15 @@ void setSolver(const model::Cloth& cloth, double substepSeconds, shared::ClothRe
 
 }  // namespace
 
-Follow followOf(model::SolverKind kind) {
-  if (kind == model::SolverKind::massSpring) return Follow::nothing;
-  return kind == model::SolverKind::xpbd ? Follow::corrections : Follow::solve;
+Follow followOf(const model::Solver& solver) {
+  if (solver.kind == model::SolverKind::massSpring) return Follow::nothing;
+  if (solver.kind == model::SolverKind::xpbd) return Follow::corrections;
+  return solver.kind == model::SolverKind::acad ? followOf(solver.acadMode) : Follow::solve;
+}
+
+Follow followOf(model::AcadMode mode) {
+  if (mode == model::AcadMode::paper) return Follow::paper;
+  return mode == model::AcadMode::limit ? Follow::limit : Follow::hold;
 }
 
 std::vector<std::uint32_t> clothOffsets(std::span<const model::Cloth> cloths) {
@@ -67,6 +74,7 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const model::Cloth> clot
     const model::Spring structuralForce = model::forceOf(cloth, structural);
     const model::Spring shearForce = model::forceOf(cloth, shear);
     const model::Spring bendForce = model::forceOf(cloth, bend);
+    const auto borne = static_cast<float>(model::stiffnessShare(cloth, substepSeconds));
     shared::ClothRecord record{};
     record.firstNodeLow = shared::lowHalf(firstNode);
     record.firstNodeHigh = shared::highHalf(firstNode);
@@ -76,9 +84,9 @@ std::vector<shared::ClothRecord> clothRecords(std::span<const model::Cloth> clot
     record.rowSpacing = spacing.row;
     record.diagonalSpacing = spacing.diagonal;
     record.velocityDecay = cloth.damping;
-    record.structuralStiffness = structuralForce.stiffness;
-    record.shearStiffness = shearForce.stiffness;
-    record.bendStiffness = bendForce.stiffness;
+    record.structuralStiffness = borne * structuralForce.stiffness;
+    record.shearStiffness = borne * shearForce.stiffness;
+    record.bendStiffness = borne * bendForce.stiffness;
     record.friction = cloth.friction;
     record.structuralDamping = structuralForce.damping;
     record.shearDamping = shearForce.damping;
@@ -103,7 +111,7 @@ Tiles makeTiles(std::span<const model::Cloth> cloths, std::uint32_t rowsPerInvoc
   Tiles tiles;
   for (const Follow follow : kFollows) {
     for (std::uint32_t cloth = 0; cloth < cloths.size(); ++cloth) {
-      if (cloths[cloth].mesh || followOf(cloths[cloth].solver.kind) != follow) continue;
+      if (cloths[cloth].mesh || followOf(cloths[cloth].solver) != follow) continue;
       const model::Grid& grid = cloths[cloth].grid;
       const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
       const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;

@@ -24,12 +24,23 @@ struct TileRange {
 
 // The stage that follows a cloth's forces in a substep.
 enum class Follow : std::uint8_t {
-  nothing,      // no stage: the advance kernel also collides
-  solve,        // SolveStage
+  nothing,  // no stage: the advance kernel also collides
+  solve,    // SolveStage
+  hold,     // SolveStage with acad, by its mode
+  paper,
+  limit,
   corrections,  // XpbdStage: springs are no forces
 };
-inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::corrections};
-Follow followOf(model::SolverKind kind);
+inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::hold,
+                                     Follow::paper,   Follow::limit, Follow::corrections};
+Follow followOf(const model::Solver& solver);
+// The Follow of acad with this mode.
+Follow followOf(model::AcadMode mode);
+
+// Index of the first number of a dispatch size in StateBuffers::stretches.
+constexpr std::uint32_t firstStretchSize(Follow follow) {
+  return 3 * static_cast<std::uint32_t>(follow);
+}
 
 // End of the tiles of each kind, in the order of kFollows.
 struct TileRanges {

@@ -31,17 +31,29 @@ using vulkan::kStorage;
 using vulkan::kTexels;
 
 constexpr std::uint32_t kSolveLanes = CLOTHSTREAM_SOLVE_LANES;
-constexpr std::uint32_t kVectors = 5;  // shaders/solve/linear_system.glsl
-// Dispatch sizes, x, y, z each: of a group's chunks, of its small systems, of the iterations of large
-// systems.
-constexpr std::uint32_t kSize = 3, kSmallSystems = kSize, kIteration = 2 * kSize;
+constexpr std::uint32_t kVectors = 6;  // shaders/solve/linear_system.glsl
+// Dispatch sizes of a round, x, y, z each: of a group's prepared chunks, of its small systems, of all chunks
+// in the next round, of the iterations of large systems.
+constexpr std::uint32_t kSize = 3, kSmallSystems = kSize, kNextRound = 2 * kSize, kIteration = 3 * kSize;
 
-std::uint32_t sizesOf(const SolveGroup& group) {
+std::uint32_t sizesOfRound(const SolveGroup& group) {
   return kIteration + kSize * (group.iterations + 1);
 }
 
 bool isAdaptive(const SolveGroup& group) {
   return group.kind == model::SolverKind::acad;
+}
+
+bool isPaper(const SolveGroup& group) {
+  return isAdaptive(group) && group.acadMode == model::AcadMode::paper;
+}
+
+bool isLimit(const SolveGroup& group) {
+  return isAdaptive(group) && group.acadMode == model::AcadMode::limit;
+}
+
+std::uint32_t roundsOf(const SolveGroup& group) {
+  return isLimit(group) ? model::kLimitRounds : 1;
 }
 
 bool isImplicit(const SolveGroup& group) {
@@ -118,11 +130,13 @@ struct SolveStage::Kernels {
             .pushConstantBytes = static_cast<std::uint32_t>(push),
             .workgroupSize = iterates ? cut.iterationWorkgroup : cut.workgroup,
             .specialisation = {isImplicit(group) ? 1u : 0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u,
-                               isAdaptive(group) ? 1u : 0u, measure ? 1u : 0u, cut.spread ? 1u : 0u}});
+                               isAdaptive(group) ? 1u : 0u, measure ? 1u : 0u, cut.spread ? 1u : 0u,
+                               isPaper(group) ? 1u : 0u, isLimit(group) ? 1u : 0u}});
   }
 
   const GroupKernels& of(const SolveGroup& group) {
-    const std::size_t kind = isImplicit(group) ? 2 : (isAdaptive(group) ? 1 : 0);
+    const std::size_t mode = static_cast<std::size_t>(group.acadMode);
+    const std::size_t kind = isImplicit(group) ? 1 : (isAdaptive(group) ? 2 + mode : 0);
     GroupKernels& on = groups[(2 * kind + (group.mesh ? 1 : 0)) * 2 + (group.bend ? 1 : 0)];
     // All kernels that compute spring terms have the same first bindings.
     const auto weighing = [](std::initializer_list<BindingKind> more) {
@@ -168,14 +182,14 @@ struct SolveStage::Kernels {
     if (!kernel)
       kernel = make("apply_velocities", kernels::apply_velocities,
                     {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage,
-                     kStorage, kStorage},
+                     kStorage, kStorage, kStorage},
                     sizeof(shared::ApplyPush), group);
     return *kernel;
   }
 
   const vulkan::Device& device;
   SolveCut cut;
-  std::array<GroupKernels, 12> groups;
+  std::array<GroupKernels, 20> groups;
   std::array<std::unique_ptr<Kernel>, 2> applies;
 };
 
@@ -186,6 +200,7 @@ struct SolveStage::Systems {
     SolveGroup on;
     std::uint32_t iterationsPerDispatch;
     std::uint32_t firstSize;  // index of its first dispatch size
+    std::uint32_t firstSizeOf(std::uint32_t round) const { return firstSize + round * sizesOfRound(on); }
     std::vector<Bindings> check{}, springs{}, prepare{}, whole{}, multiply{}, measure{}, update{}, apply{};
   };
 
@@ -193,6 +208,7 @@ struct SolveStage::Systems {
           Kernels& kernels)
       : nodes(tables.nodes),
         cut(kernels.cut),
+        stretches(state.stretches),
         systems(device, tables.systems),
         chunks(device, tables.chunks),
         springs(device, tables.springs),
@@ -207,7 +223,7 @@ struct SolveStage::Systems {
         impulses(device, BufferPurpose::texels, rows.bytes()),
         vectors(device, BufferPurpose::texels, texels(kVectors * std::size_t{nodes}, true)),
         sums(device, BufferPurpose::state, tables.chunks.size() * 2 * sizeof(float)),
-        actives(device, BufferPurpose::state, 2 * tables.chunks.size() * sizeof(std::uint32_t)),
+        actives(device, BufferPurpose::state, 3 * tables.chunks.size() * sizeof(std::uint32_t)),
         solves(device, BufferPurpose::state, tables.systems.size() * sizeof(shared::SolveRecord)),
         solvesReadback(device, BufferPurpose::readback, solves.bytes()) {
     const std::span<std::uint32_t> numbers = emptyGroups.mapped<std::uint32_t>();
@@ -220,14 +236,14 @@ struct SolveStage::Systems {
           {.on = on,
            .iterationsPerDispatch = simulation::iterationsPerDispatch(device, on, tables.listed, cut),
            .firstSize = size});
-      size += sizesOf(on);
+      size += roundsOf(on) * sizesOfRound(on);
       for (const std::size_t from : {0, 1}) bind(device, kernels, state, from, groups.back());
     }
   }
 
   static std::size_t allSizes(const SolveTables& tables) {
     std::size_t sizes = 0;
-    for (const SolveGroup& group : tables.groups) sizes += sizesOf(group);
+    for (const SolveGroup& group : tables.groups) sizes += roundsOf(group) * sizesOfRound(group);
     return sizes;
   }
   static bool has(const SolveTables& tables, auto what) { return std::ranges::any_of(tables.groups, what); }
@@ -244,9 +260,13 @@ struct SolveStage::Systems {
       first.insert(first.end(), more);
       bindings.emplace_back(device, *kernel, first);
     };
-    const std::vector<const Buffer*> weighing = {
-        &state.cloths, &systems.texels(), &chunks.texels(), &position, &velocity,
-        &freeVelocity, &freePosition,     &solves,          &actives,  &groupSizes};
+    // The lengths that decide which springs ACAD constrains.
+    const Buffer& decisive = isPaper(group.on) ? position : freePosition;
+    // The positions where constraints are linearised.
+    const Buffer& linear = isLimit(group.on) ? freePosition : position;
+    const std::vector<const Buffer*> weighing = {&state.cloths, &systems.texels(), &chunks.texels(), &linear,
+                                                 &velocity,     &freeVelocity,     &decisive,        &solves,
+                                                 &actives,      &groupSizes};
     if (with.check) bindTo(group.check, with.check, weighing, {});
     if (group.on.mesh) {
       bindTo(group.springs, with.springs, weighing, {&springs.texels(), &rows, &impulses});
@@ -258,7 +278,7 @@ struct SolveStage::Systems {
     const std::vector<const Buffer*> iterating = {&state.cloths,
                                                   &systems.texels(),
                                                   &chunks.texels(),
-                                                  &position,
+                                                  &linear,
                                                   &incidences.texels(),
                                                   &lists.texels(),
                                                   group.on.mesh ? &rows : &along,
@@ -278,15 +298,22 @@ struct SolveStage::Systems {
         device, kernels.apply(group.on),
         std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &vectors,
                                              &state.colliders, &state.nearColliders, &position, &freePosition,
-                                             &freeVelocity, &actives, &state.contactImpulses});
+                                             &freeVelocity, &actives, &state.contactImpulses, &groupSizes});
   }
 
-  void recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, double h) const;
-  void recordSmall(vulkan::Recorder& recorder, const Group& group, std::uint32_t from) const;
-  void recordLarge(vulkan::Recorder& recorder, const Group& group, std::uint32_t from) const;
+  void recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, std::uint32_t round,
+                     double h) const;
+  void recordSmall(vulkan::Recorder& recorder, const Group& group, std::uint32_t from,
+                   std::uint32_t round) const;
+  void recordLarge(vulkan::Recorder& recorder, const Group& group, std::uint32_t from,
+                   std::uint32_t round) const;
+
+  void recordApply(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, std::uint32_t round,
+                   const shared::CollisionPush& collision, double h) const;
 
   std::uint32_t nodes;
   SolveCut cut;
+  const Buffer& stretches;  // StateBuffers::stretches
   std::vector<std::uint32_t> cloths;
   DeviceTable systems, chunks, springs, incidences, lists;
   Buffer emptyGroups, groupSizes;
@@ -320,13 +347,14 @@ void SolveStage::recordTables(vulkan::Recorder& recorder) const {
   for (const DeviceTable* table :
        {&systems_->systems, &systems_->chunks, &systems_->springs, &systems_->incidences, &systems_->lists})
     table->recordUpload(recorder);
+  recorder.fill(state_.stretches, 0, state_.stretches.bytes());
   // Springs that ACAD does not prepare have no weight.
   for (const Buffer* buffer : {&systems_->along, &systems_->vectors, &systems_->actives})
     recorder.fill(*buffer, 0, buffer->bytes());
 }
 
 void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from,
-                                        double h) const {
+                                        std::uint32_t round, double h) const {
   const SolveGroup& on = group.on;
   const shared::PreparePush push{.nodes = nodes,
                                  .firstChunk = on.firstChunk,
@@ -334,11 +362,12 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
                                  .smallSystems = on.smallSystems,
                                  .firstLargeChunk = on.firstLargeChunk,
                                  .largeChunks = on.endChunk - on.firstLargeChunk,
-                                 .firstGroup = group.firstSize,
+                                 .firstGroup = group.firstSizeOf(round),
                                  .substepSeconds = static_cast<float>(h),
                                  .substepRate = static_cast<float>(1 / h),
                                  .firstSpring = on.firstSpring,
-                                 .endSpring = on.endSpring};
+                                 .endSpring = on.endSpring,
+                                 .round = round};
   const std::uint64_t all = std::uint64_t{push.chunks} * cut.workgroup;
   recorder.barrier();
   if (on.mesh) {
@@ -350,14 +379,22 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
                       workPerInvocation(kChunkNodes * kPrepareWork, cut.workgroup));
     return;
   }
-  recorder.dispatch(group.check[from], push, all);
+  constexpr std::size_t kBytes = sizeof(std::uint32_t);
+  if (round == 0)
+    recorder.dispatchIndirect(group.check[from], push, stretches,
+                              firstStretchSize(followOf(on.acadMode)) * kBytes, all);
+  else
+    recorder.dispatchIndirect(group.check[from], push, groupSizes,
+                              (group.firstSizeOf(round - 1) + kNextRound) * kBytes, all);
   recorder.barrier();
-  recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSize * sizeof(std::uint32_t),
-                            all);
+  if (round == 0)
+    recorder.fill(stretches, 0, kSize * kBytes, firstStretchSize(followOf(on.acadMode)) * kBytes);
+  recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSizeOf(round) * kBytes,
+                            all * kPrepareWork);
 }
 
-void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& group,
-                                      std::uint32_t from) const {
+void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& group, std::uint32_t from,
+                                      std::uint32_t round) const {
   if (group.on.smallSystems == 0) return;
   for (std::uint32_t first = 0; first < group.on.iterations;) {
     const std::uint32_t end = first + std::min(group.iterationsPerDispatch, group.on.iterations - first);
@@ -374,19 +411,20 @@ void SolveStage::Systems::recordSmall(vulkan::Recorder& recorder, const Group& g
     // ACAD may have nothing to solve. Indirect dispatches cannot be divided.
     if (isAdaptive(group.on) && !recorder.divides(group.whole[from], threads, work))
       recorder.dispatchIndirect(group.whole[from], push, groupSizes,
-                                (group.firstSize + kSmallSystems) * sizeof(std::uint32_t), threads * work);
+                                (group.firstSizeOf(round) + kSmallSystems) * sizeof(std::uint32_t),
+                                threads * work);
     else
       recorder.dispatch(group.whole[from], push, threads, work);
     first = end;
   }
 }
 
-void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& group,
-                                      std::uint32_t from) const {
+void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& group, std::uint32_t from,
+                                      std::uint32_t round) const {
   const SolveGroup& on = group.on;
   if (!on.hasLarge()) return;
   const auto number = [&](std::uint32_t iteration) {
-    return group.firstSize + kIteration + kSize * iteration;
+    return group.firstSizeOf(round) + kIteration + kSize * iteration;
   };
   const std::uint64_t most = std::uint64_t{on.endChunk - on.firstLargeChunk} * cut.iterationWorkgroup;
   shared::SolvePush push{.nodes = nodes,
@@ -415,25 +453,54 @@ void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
   recorder.copy(all.emptyGroups, all.groupSizes, all.groupSizes.bytes());
   recorder.fill(all.solves, 0, all.solves.bytes());
   for (const Systems::Group& group : all.groups) {
-    all.recordPrepare(recorder, group, from, substepSeconds);
-    all.recordSmall(recorder, group, from);
-    all.recordLarge(recorder, group, from);
-    const shared::ApplyPush push{.collision = collision,
-                                 .nodes = all.nodes,
-                                 .firstChunk = group.on.firstChunk,
-                                 .substepSeconds = static_cast<float>(substepSeconds),
-                                 .reserved = 0};
-    recorder.barrier();
-    // Nodes that ACAD leaves alone stay in place, unless they may collide.
-    const std::uint64_t threads = std::uint64_t{group.on.endChunk - group.on.firstChunk} * all.cut.workgroup;
-    if (isAdaptive(group.on) && collision.colliderCount == 0)
-      recorder.dispatchIndirect(group.apply[from], push, all.groupSizes,
-                                group.firstSize * sizeof(std::uint32_t), threads);
-    else
-      recorder.dispatch(
-          group.apply[from], push, threads,
-          workPerInvocation(std::uint64_t{kChunkNodes} * collision.nodeWork, all.cut.workgroup));
+    const std::uint32_t rounds = roundsOf(group.on);
+    for (std::uint32_t round = 0; round < rounds; ++round) {
+      if (round > 0) {
+        recorder.barrier();
+        recorder.fill(all.solves, 0,
+                      (group.on.endSystem - group.on.firstSystem) * sizeof(shared::SolveRecord),
+                      group.on.firstSystem * sizeof(shared::SolveRecord));
+      }
+      all.recordPrepare(recorder, group, from, round, substepSeconds);
+      all.recordSmall(recorder, group, from, round);
+      all.recordLarge(recorder, group, from, round);
+      all.recordApply(recorder, group, from, round, collision, substepSeconds);
+    }
   }
+}
+
+void SolveStage::Systems::recordApply(vulkan::Recorder& recorder, const Group& group, std::uint32_t from,
+                                      std::uint32_t round, const shared::CollisionPush& collision,
+                                      double h) const {
+  const SolveGroup& on = group.on;
+  const bool collides = collision.colliderCount > 0 && round + 1 == roundsOf(on);
+  // Nodes that ACAD leaves alone stay in place, unless they may collide.
+  const bool listed = isAdaptive(on) && !collides;
+  const shared::ApplyPush push{.collision = collides ? collision : shared::CollisionPush{},
+                               .nodes = nodes,
+                               .firstChunk = on.firstChunk,
+                               .substepSeconds = static_cast<float>(h),
+                               .firstGroup = group.firstSizeOf(round),
+                               .listed = listed ? 1u : 0u,
+                               .reserved0 = 0,
+                               .reserved1 = 0,
+                               .reserved2 = 0};
+  recorder.barrier();
+  const std::uint64_t threads = std::uint64_t{on.endChunk - on.firstChunk} * cut.workgroup;
+  if (listed)
+    recorder.dispatchIndirect(group.apply[from], push, groupSizes,
+                              group.firstSizeOf(round) * sizeof(std::uint32_t), threads);
+  else
+    recorder.dispatch(group.apply[from], push, threads,
+                      workPerInvocation(std::uint64_t{kChunkNodes} * collision.nodeWork, cut.workgroup));
+}
+
+std::uint32_t SolveStage::gridChunks(Follow follow) const {
+  if (!active()) return 0;
+  for (const Systems::Group& group : systems_->groups)
+    if (isAdaptive(group.on) && !group.on.mesh && followOf(group.on.acadMode) == follow)
+      return group.on.endChunk - group.on.firstChunk;
+  return 0;
 }
 
 void SolveStage::recordReport(vulkan::Recorder& recorder) const {

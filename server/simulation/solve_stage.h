@@ -9,6 +9,7 @@
 #include <span>
 
 #include "server/model/scene.h"
+#include "server/simulation/scene_tables.h"
 #include "server/simulation/solve_tables.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/device.h"
@@ -47,6 +48,9 @@ class SolveStage {
   // recording is complete.
   void recordReport(vulkan::Recorder& recorder) const;
   std::span<const shared::SolveRecord> report() const;
+
+  // Chunks of the systems of grids whose forces this kind follows; 0 unless it is a mode of acad.
+  std::uint32_t gridChunks(Follow follow) const;
 
   // The cloth of each system.
   std::span<const std::uint32_t> cloths() const;

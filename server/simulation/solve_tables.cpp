@@ -3,6 +3,7 @@
 #include "server/simulation/solve_tables.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "server/model/springs.h"
 #include "server/simulation/scene_tables.h"
@@ -78,12 +79,13 @@ void appendCloths(std::span<const model::Cloth> cloths, SolveGroup& group, bool 
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     const model::Cloth& cloth = cloths[i];
-    if (cloth.solver.kind != group.kind || model::isAssembled(cloth.solver) ||
-        (cloth.mesh != nullptr) != group.mesh || (cloth.nodeCount() > wholeNodes) != large)
+    if (cloth.solver.kind != group.kind || cloth.solver.acadMode != group.acadMode ||
+        model::isAssembled(cloth.solver) || (cloth.mesh != nullptr) != group.mesh ||
+        (cloth.nodeCount() > wholeNodes) != large)
       continue;
     appendSystem(cloth, i, firstNode, tables);
     group.bend = group.bend || group.kind == model::SolverKind::implicitEuler || cloth.solver.bendConstraints;
-    group.iterations = std::max(group.iterations, cloth.solver.iterations);
+    group.iterations = std::max(group.iterations, model::iterationsOf(cloth.solver));
     if (large) continue;
     ++group.smallSystems;
     group.smallChunks = std::max(group.smallChunks, chunksOf(cloth));
@@ -98,9 +100,14 @@ SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t whol
   tables.incidences.resize(tables.nodes, {0, 0, 0, 0});
   const auto count = [](const auto& table) { return static_cast<std::uint32_t>(table.size()); };
   using enum model::SolverKind;
-  for (const model::SolverKind kind : {constraint, acad, implicitEuler})
+  constexpr std::pair<model::SolverKind, model::AcadMode> kKinds[] = {{constraint, model::AcadMode::hold},
+                                                                      {acad, model::AcadMode::hold},
+                                                                      {acad, model::AcadMode::paper},
+                                                                      {acad, model::AcadMode::limit},
+                                                                      {implicitEuler, model::AcadMode::hold}};
+  for (const auto& [kind, mode] : kKinds)
     for (const bool mesh : {false, true}) {
-      SolveGroup group{.kind = kind, .mesh = mesh};
+      SolveGroup group{.kind = kind, .acadMode = mode, .mesh = mesh};
       group.firstSystem = count(tables.systems);
       group.firstChunk = count(tables.chunks);
       group.firstSpring = count(tables.springs);
@@ -109,6 +116,7 @@ SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t whol
       appendCloths(cloths, group, true, wholeNodes, tables);
       group.endChunk = count(tables.chunks);
       group.endSpring = count(tables.springs);
+      group.endSystem = count(tables.systems);
       if (group.firstSystem < tables.systems.size()) tables.groups.push_back(group);
     }
   return tables;

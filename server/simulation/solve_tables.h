@@ -15,12 +15,13 @@ namespace clothstream::simulation {
 // come first, then the large ones.
 struct SolveGroup {
   model::SolverKind kind = model::SolverKind::constraint;
+  model::AcadMode acadMode = model::AcadMode::hold;  // for acad
   bool mesh = false;
   bool bend = false;  // a grid has bend springs in its system
-  std::uint32_t firstSystem = 0, smallSystems = 0;
+  std::uint32_t firstSystem = 0, smallSystems = 0, endSystem = 0;
   std::uint32_t firstChunk = 0, firstLargeChunk = 0, endChunk = 0;
   std::uint32_t firstSpring = 0, endSpring = 0;  // of meshes
-  std::uint32_t iterations = 0;                  // the largest of any cloth
+  std::uint32_t iterations = 0;                  // of one solve: the largest of any cloth
   std::uint32_t smallChunks = 0;                 // of the largest small system
 
   bool hasLarge() const { return firstLargeChunk < endChunk; }

@@ -14,6 +14,9 @@ struct StateBuffers {
   const vulkan::Buffer& colliders;        // CollisionStage::colliders()
   const vulkan::Buffer& nearColliders;    // CollisionStage::nearLists()
   const vulkan::Buffer& contactImpulses;  // CollisionStage::contactImpulses()
+  // Dispatch sizes, x, y, z by Follow. The forces of grids with acad set x to the chunks of their SolveGroup
+  // if a spring may become too long.
+  const vulkan::Buffer& stretches;
   std::array<const vulkan::Buffer*, 2> positions, velocities;
 };
 

@@ -26,6 +26,38 @@ Node nodeOf(Node window, uint index) {
   return fetchNode(index);
 }
 
+layout(std430, binding = 9) writeonly buffer Stretches {
+  uint stretches[];  // dispatch sizes, x, y, z
+};
+
+// ACAD's limits of the springs of a grid, squared, each less a margin for the accelerations of its ends.
+struct Limits {
+  float right, below, shear, right2, below2;
+  float margin;  // m
+};
+
+float shortened(float longestSquared_, float restLength, float activation, float margin) {
+  precise float longest = restLength + activation * restLength;
+  precise float most = (longest - margin) * 0.99999;
+  precise float squared = most > 0.0 ? most * most : 0.0;
+  return longestSquared_ < kNoLimit ? squared : kNoLimit;
+}
+
+// True if the motion without accelerations makes a spring longer than its limit.
+bool exceeds(Node here, Node other, float limit) {
+  precise vec3 d = other.position - here.position + push.stepSeconds * (other.velocity - here.velocity);
+  return dotProduct(d, d) > limit;
+}
+
+// The paper decides by the length at the substep's start.
+bool isLong(Node here, Node other, Spring spring, float limit) {
+  if (kTestsMotion) {
+    return exceeds(here, other, limit);
+  }
+  precise vec3 d = other.position - here.position;
+  return dotProduct(d, d) > spring.longestSquared;
+}
+
 void main() {
   Strip strip = locateStrip(push.firstTile);
   if (strip.row >= strip.rows) {
@@ -46,11 +78,28 @@ void main() {
   uint toRight2 = hasRight2 ? 2 : 0;
   uint start = strip.firstNode + strip.column;
 
-  Spring alongRow = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.columnSpacing);
-  Spring alongColumn = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.rowSpacing);
-  Spring shear = Spring(cloth.shearStiffness, cloth.shearDamping, cloth.diagonalSpacing);
-  Spring bendRow = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.columnSpacing);
-  Spring bendColumn = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.rowSpacing);
+  bool bendLimited = cloth.solvesBend != 0.0;
+  Spring alongRow = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.columnSpacing,
+                           longestSquared(cloth.columnSpacing, cloth.activation, true));
+  Spring alongColumn = Spring(cloth.structuralStiffness, cloth.structuralDamping, cloth.rowSpacing,
+                              longestSquared(cloth.rowSpacing, cloth.activation, true));
+  Spring shear = Spring(cloth.shearStiffness, cloth.shearDamping, cloth.diagonalSpacing,
+                        longestSquared(cloth.diagonalSpacing, cloth.activation, true));
+  Spring bendRow = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.columnSpacing,
+                          longestSquared(2.0 * cloth.columnSpacing, cloth.activation, bendLimited));
+  Spring bendColumn = Spring(cloth.bendStiffness, cloth.bendDamping, 2.0 * cloth.rowSpacing,
+                             longestSquared(2.0 * cloth.rowSpacing, cloth.activation, bendLimited));
+  // A node's acceleration a adds at most h^2 |a| to the length of its springs. A quarter of the activation is
+  // left for both ends. If a node accelerates more, its springs count as stretched.
+  float shortest = min(cloth.columnSpacing, cloth.rowSpacing);
+  precise float margin = 0.25 * cloth.activation * shortest;
+  Limits limits =
+      Limits(shortened(alongRow.longestSquared, alongRow.restLength, cloth.activation, margin),
+             shortened(alongColumn.longestSquared, alongColumn.restLength, cloth.activation, margin),
+             shortened(shear.longestSquared, shear.restLength, cloth.activation, margin),
+             shortened(bendRow.longestSquared, bendRow.restLength, cloth.activation, margin),
+             shortened(bendColumn.longestSquared, bendColumn.restLength, cloth.activation, margin), margin);
+  bool stretched = false;
   precise float drag = push.airFactor * cloth.drag;
   precise float lift = push.airFactor * cloth.lift;
   Air air = Air(push.wind, drag, lift);
@@ -137,6 +186,17 @@ void main() {
     }
 
     moved[k] = moveNode(here, force, cloth.velocityDecay);
+    if (kTestsStretch) {
+      bool isRight = isLong(here, right, alongRow, limits.right);
+      bool isBelow = isLong(here, below, alongColumn, limits.below);
+      bool isLeftBelow = isLong(here, leftBelow, shear, limits.shear);
+      bool isRightBelow = isLong(here, rightBelow, shear, limits.shear);
+      bool isRight2 = isLong(here, fetchNode(index + toRight2), bendRow, limits.right2);
+      bool isBelow2 = isLong(here, below2, bendColumn, limits.below2);
+      precise vec3 gained = (2.0 * push.stepSeconds) * (moved[k].velocity - here.velocity);
+      bool isFast = kTestsMotion && dotProduct(gained, gained) > limits.margin * limits.margin;
+      stretched = stretched || isRight || isBelow || isLeftBelow || isRightBelow || isRight2 || isBelow2 || isFast;
+    }
     if (kColliders) {
       origins[k] = here.position;
       NearList list = fetchNearList(index);
@@ -153,11 +213,18 @@ void main() {
     rightAbove = right;
     right = rightBelow;
     here = below;
-    if (!kSpringDamping && !kAir) {
+    if (!kSpringDamping && !kAir && !kTestsMotion) {
       here.velocity = fetchVelocity(belowIndex);
     }
     below = below2;
     ++row;
+  }
+
+  // All invocations store the same numbers.
+  if (kTestsStretch && stretched) {
+    stretches[push.stretchSize] = push.stretchChunks;
+    stretches[push.stretchSize + 1] = 1;
+    stretches[push.stretchSize + 2] = 1;
   }
 
   if (kColliders) {

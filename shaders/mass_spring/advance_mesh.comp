@@ -18,7 +18,8 @@ vec3 signedSpringForce(Node here, SignedSpring end, ClothRecord cloth) {
   Spring spring =
       Spring(isShear ? cloth.shearStiffness : (isBend ? cloth.bendStiffness : cloth.structuralStiffness),
              isShear ? cloth.shearDamping : (isBend ? cloth.bendDamping : cloth.structuralDamping),
-             abs(end.signedLength));
+             abs(end.signedLength),
+             longestSquared(abs(end.signedLength), cloth.activation, !isBend || cloth.solvesBend != 0.0));
   return springForce(here, fetchNode(uint(abs(end.signedOther)) - 1), spring);
 }
 

@@ -16,6 +16,9 @@ layout(constant_id = 4) const bool kColliders = true;
 // True: explicit Euler as in [Va21]. False: semi-implicit Euler.
 layout(constant_id = 5) const bool kExplicitEuler = false;
 
+// The forces decide from the motion whether a spring may become too long.
+const bool kTestsMotion = kTestsStretch && !kOmitsStretched;
+
 layout(binding = 2) uniform samplerBuffer positions;  // w: inverse mass
 layout(binding = 3) uniform samplerBuffer velocities;
 layout(std430, binding = 4) writeonly buffer NextPositions {
@@ -36,7 +39,8 @@ vec3 fetchVelocity(uint index) {
 // Reads the velocity of a neighbour only if a force depends on it.
 Node fetchNode(uint index) {
   vec4 position = texelFetch(positions, int(index));
-  return Node(position.xyz, position.w, kSpringDamping || kAir ? fetchVelocity(index) : vec3(0.0));
+  bool moves = kSpringDamping || kAir || kTestsMotion;
+  return Node(position.xyz, position.w, moves ? fetchVelocity(index) : vec3(0.0));
 }
 
 void store(uint index, Node node) {

@@ -136,7 +136,9 @@ struct AdvancePush {
   float airFactor;    // air density / 6: half of it, for each of a triangle's three nodes
   CollisionPush collision;
   uint32_t firstTile;
-  uint32_t reserved0, reserved1, reserved2;
+  uint32_t stretchSize;    // of grids with ACAD: index of the dispatch size that a stretched spring sets
+  uint32_t stretchChunks;  // the x of that size
+  uint32_t reserved;
 };
 
 struct RungeKuttaPush {
@@ -159,6 +161,7 @@ struct PreparePush {
   float substepRate;     // 1/s
   uint32_t firstSpring;  // of meshes
   uint32_t endSpring;
+  uint32_t round;  // of this substep, from 0
 };
 
 struct SolvePush {
@@ -175,7 +178,9 @@ struct ApplyPush {
   uint32_t nodes;  // in the scene
   uint32_t firstChunk;
   float substepSeconds;
-  uint32_t reserved;
+  uint32_t firstGroup;  // as in PreparePush
+  uint32_t listed;      // 1: the workgroups handle the listed chunks
+  uint32_t reserved0, reserved1, reserved2;
 };
 
 struct XpbdPush {
@@ -222,8 +227,8 @@ static_assert(sizeof(XpbdGridTile) == 16 && sizeof(XpbdMeshTile) == 16 && sizeof
               sizeof(ColourRecord) == 16 && sizeof(XpbdLinkRecord) == 16);
 static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, wind) == 16 &&
               offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);
-static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 44 && sizeof(SolvePush) == 24 &&
-              sizeof(ApplyPush) == 48 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&
+static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 48 && sizeof(SolvePush) == 24 &&
+              sizeof(ApplyPush) == 64 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&
               sizeof(FinishPush) == 48 && sizeof(HashPush) == 4);
 static_assert(sizeof(StatusRecord) == 16 && offsetof(StatusRecord, unhealthy) == 8);
 }  // namespace clothstream::shared

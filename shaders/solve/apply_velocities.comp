@@ -15,7 +15,11 @@ const int kContactImpulseBinding = 10;
 layout(binding = 3) uniform samplerBuffer vectors;
 
 layout(std430, binding = 9) readonly buffer Actives {
-  uint actives[];  // by chunk: kActive
+  uint actives[];  // spring_terms.glsl
+};
+
+layout(std430, binding = 11) readonly buffer Groups {
+  uint groups[];  // dispatch sizes
 };
 
 layout(push_constant) uniform Push {
@@ -23,9 +27,14 @@ layout(push_constant) uniform Push {
 };
 
 void main() {
-  ChunkRecord part = chunkAt(chunks, push.firstChunk + gl_WorkGroupID.x);
+  uint place = push.firstChunk + gl_WorkGroupID.x;
+  if (push.listed != 0) {
+    place = actives[2 * (actives.length() / 3) + place];
+  }
+  ChunkRecord part = chunkAt(chunks, place);
   System system = systemAt(uint(part.system));
-  bool solved = (actives[system.firstChunk + uint(part.chunk)] & kActive) != 0;
+  // Without any prepared chunk the flags are those of an earlier substep.
+  bool solved = groups[push.firstGroup] != 0 && (actives[place] & kActive) != 0;
   uint lane = self();
   do {
     Walk walk = walkAt(system, uint(part.chunk) * kLanes + lane);

@@ -14,7 +14,7 @@ layout(constant_id = 6) const bool kSpread = false;
 const uint kRows = kSpread ? 1 : kWalk;  // nodes of a walk that an invocation handles
 const uint kParts = kWalk / kRows;       // invocations that share a walk
 
-layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
+layout(binding = 3) uniform samplerBuffer positions;   // as in spring_terms.glsl
 layout(binding = 4) uniform samplerBuffer incidences;  // ListRecord by node of a mesh
 layout(binding = 5) uniform samplerBuffer lists;       // SpringEndsRecord
 layout(binding = 6) uniform samplerBuffer along;       // SpringWeights of a grid, WeightedSprings of a mesh
@@ -32,7 +32,7 @@ layout(std430, binding = 11) coherent buffer Solves {
   SolveRecord solves[];
 };
 layout(std430, binding = 12) readonly buffer Actives {
-  uint actives[];  // by chunk: kActive, kPrepared; then the numbers of the active chunks, group by group
+  uint actives[];  // spring_terms.glsl
 };
 
 layout(push_constant) uniform Push {
@@ -340,7 +340,7 @@ void measureChunk(System system, uint chunk) {
 
 // The chunk of a workgroup if several workgroups solve a system.
 ChunkRecord ownChunk() {
-  return chunkAt(chunks, actives[actives.length() / 2 + push.firstChunk + gl_WorkGroupID.x]);
+  return chunkAt(chunks, actives[actives.length() / 3 + push.firstChunk + gl_WorkGroupID.x]);
 }
 
 // Decides whether to continue, and by which step, after all chunks have their sums. One workgroup calls this.
@@ -379,11 +379,15 @@ void updateChunk(System system, uint chunk, SolveRecord solve) {
       precise vec3 image = fetch(kProducts, node).xyz + solve.directionShare * oldImage;
       precise vec3 residual = before.residual - solve.stepLength * image;
       precise vec3 correction = fetch(kCorrections, node).xyz + solve.stepLength * direction;
+      precise vec3 total = kLimit ? fetch(kTotals, node).xyz + solve.stepLength * direction : vec3(0.0);
       if (k < walk.count && place < end) {
         vectors[vectorAt(kDirections, node)].xyz = direction;
         vectors[vectorAt(kImages, node)].xyz = image;
         vectors[vectorAt(kResiduals, node)].xyz = residual;
         vectors[vectorAt(kCorrections, node)].xyz = correction;
+        if (kLimit) {
+          vectors[vectorAt(kTotals, node)].xyz = total;
+        }
       }
     }
     place += width();

@@ -25,6 +25,10 @@ layout(constant_id = 2) const bool kMesh = false;
 layout(constant_id = 3) const bool kBend = true;
 // ACAD, [Va21] 3.3: only springs that would be stretched too far are constraints.
 layout(constant_id = 4) const bool kAdaptive = false;
+// The paper's ACAD: such a spring is a constraint to its rest length and has no force.
+layout(constant_id = 7) const bool kPaper = false;
+// ACAD's one-sided limit: rounds of a solve, each from where the last one led.
+layout(constant_id = 8) const bool kLimit = false;
 
 layout(binding = 0) uniform samplerBuffer cloths;   // ClothRecord
 layout(binding = 1) uniform samplerBuffer systems;  // SystemRecord
@@ -33,8 +37,8 @@ layout(binding = 2) uniform samplerBuffer chunks;   // ChunkRecord
 const uint kWalk = CLOTHSTREAM_SOLVE_WALK;
 
 // The vectors of a solve, one after the other in their buffer: residual r (ResidualRecord), direction p, A p,
-// A z with z the preconditioned residual, and the solution u.
-const uint kResiduals = 0, kDirections = 1, kImages = 2, kProducts = 3, kCorrections = 4;
+// A z with z the preconditioned residual, the solution u, and with kLimit its sum over the rounds.
+const uint kResiduals = 0, kDirections = 1, kImages = 2, kProducts = 3, kCorrections = 4, kTotals = 5;
 
 // The residual of a node.
 struct ResidualRecord {
@@ -82,8 +86,9 @@ WeightedSpring weightedSpringAt(samplerBuffer table, uint spring) {
   return WeightedSpring(CLOTHSTREAM_VECTOR(texel));
 }
 
-// Flags of a chunk: it has something to solve; its vectors must be prepared (or cleared).
-const uint kActive = 1, kPrepared = 2;
+// Flags of a chunk: it has something to solve; its vectors must be prepared (or cleared); it was solved in
+// the round before.
+const uint kActive = 1, kPrepared = 2, kContinued = 4;
 
 // A software device also runs the masked-out side of a branch, and runs a loop that tests first once more
 // than needed. Loops over lanes and chunks therefore test last, with a bound of 0 if there is nothing to do.

@@ -13,7 +13,7 @@ layout(std430, binding = 10) writeonly buffer Along {
 layout(std430, binding = 11) writeonly buffer Across {
   vec4 across[];
 };
-layout(std430, binding = 12) writeonly buffer Vectors {
+layout(std430, binding = 12) buffer Vectors {
   vec4 vectors[];
 };
 
@@ -49,7 +49,7 @@ Weight springTo(Grid grid, End here, int row, int column, SpringKind kind, bool 
   return weightOf(here, endAt(nodeAt(grid, row, column)), kind, grid.cloth, exists && inside);
 }
 
-void prepareNode(Grid grid, int row, int column, bool stored) {
+void prepareNode(Grid grid, int row, int column, bool stored, bool continued) {
   uint node = nodeAt(grid, row, column);
   End here = endAt(node);
   Weight right = springTo(grid, here, row, column + 1, grid.alongRow, true);
@@ -79,7 +79,8 @@ void prepareNode(Grid grid, int row, int column, bool stored) {
   trace = trace + above2.trace;
   all = all + above2.along;
 
-  Start start = startOf(here, impulse, trace, grid.cloth.scaledCompliance);
+  vec3 total = kLimit && continued ? vectors[kTotals * push.nodes + node].xyz : vec3(0.0);
+  Start start = startOf(here, impulse, trace, grid.cloth.scaledCompliance, total);
   if (stored) {
     SpringWeights weights = SpringWeights(right.along, below.along, rightBelow.along, fromRight.along,
                                           right2.along, below2.along, start.mass, 0.0);
@@ -93,6 +94,9 @@ void prepareNode(Grid grid, int row, int column, bool stored) {
     }
     vectors[kResiduals * push.nodes + node] = start.residual;
     vectors[kCorrections * push.nodes + node] = vec4(start.correction, 0.0);
+    if (kLimit) {
+      vectors[kTotals * push.nodes + node] = vec4(total, 0.0);
+    }
     if (kImplicit || all > 0.0) {
       atomicOr(touched, 1);
     }
@@ -106,24 +110,27 @@ void prepareNode(Grid grid, int row, int column, bool stored) {
 }
 
 void main() {
-  ChunkRecord part = chunkAt(chunks, push.firstChunk + gl_WorkGroupID.x);
+  // check_stretch.comp has listed the chunks of ACAD.
+  uint place = push.firstChunk + gl_WorkGroupID.x;
+  if (kAdaptive) {
+    place = actives[2 * (actives.length() / 3) + place];
+  }
+  ChunkRecord part = chunkAt(chunks, place);
   System system = systemAt(uint(part.system));
   uint chunk = uint(part.chunk);
   Grid grid = gridOf(system);
-  // check_stretch.comp has marked the chunks of ACAD.
-  bool wanted = !kAdaptive || (actives[system.firstChunk + chunk] & kPrepared) != 0;
-  uint end = wanted ? kLanes : 0;
+  bool continued = kLimit && (actives[place] & kContinued) != 0;
   beginChunk();
   uint lane = self();
   do {
     Walk walk = walkAt(system, chunk * kLanes + lane);
     uint k = 0;
     do {
-      prepareNode(grid, int(walk.row + k), int(walk.column), k < walk.count && lane < end);
+      prepareNode(grid, int(walk.row + k), int(walk.column), k < walk.count, continued);
       ++k;
     } while (k < kWalk);
     lane += width();
-  } while (lane < end);
+  } while (lane < kLanes);
   if (!kAdaptive) {
     keepActive(system, chunk);
   }

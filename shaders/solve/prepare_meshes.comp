@@ -10,11 +10,11 @@ layout(binding = 10) uniform samplerBuffer incidences;  // ListRecord by node
 layout(binding = 11) uniform samplerBuffer lists;       // SpringEndsRecord
 layout(binding = 12) uniform samplerBuffer rows;        // WeightedSpring
 layout(binding = 13) uniform samplerBuffer impulses;
-layout(std430, binding = 14) writeonly buffer Vectors {
+layout(std430, binding = 14) buffer Vectors {
   vec4 vectors[];
 };
 
-void prepareNode(System system, uint node, float compliance, bool stored) {
+void prepareNode(System system, uint node, float compliance, bool stored, bool continued) {
   precise vec3 impulse = vec3(0.0);
   precise float trace = 0.0;
   uint active_ = 0;  // counted at the spring's first end
@@ -35,10 +35,14 @@ void prepareNode(System system, uint node, float compliance, bool stored) {
     }
     ++list.first;
   }
-  Start start = startOf(endAt(node), impulse, trace, compliance);
+  vec3 total = kLimit && continued ? vectors[kTotals * push.nodes + node].xyz : vec3(0.0);
+  Start start = startOf(endAt(node), impulse, trace, compliance, total);
   if (stored) {
     vectors[kResiduals * push.nodes + node] = start.residual;
     vectors[kCorrections * push.nodes + node] = vec4(start.correction, 0.0);
+    if (kLimit) {
+      vectors[kTotals * push.nodes + node] = vec4(total, 0.0);
+    }
     if (kImplicit || any) {
       atomicOr(touched, 1);
     }
@@ -53,13 +57,14 @@ void main() {
   System system = systemAt(uint(part.system));
   uint chunk = uint(part.chunk);
   float compliance = clothAt(cloths, system.cloth).scaledCompliance;
+  bool continued = isContinued(system, chunk);
   beginChunk();
   uint lane = self();
   do {
     Walk walk = walkAt(system, chunk * kLanes + lane);
     uint k = 0;
     do {
-      prepareNode(system, walk.first + min(k, max(walk.count, 1) - 1), compliance, k < walk.count);
+      prepareNode(system, walk.first + min(k, max(walk.count, 1) - 1), compliance, k < walk.count, continued);
       ++k;
     } while (k < kWalk);
     lane += width();

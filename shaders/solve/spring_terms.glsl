@@ -12,23 +12,34 @@
 // unknowns as the nodes have coordinates, needs one gather per product, has the same eigenvalues, and has a
 // solution if c is 0. b = C + h J v_free, with C the length minus r. With ACAD a spring takes part only if
 // v_free would stretch it too far ([Va21] 3.3). The kernels solve for the velocity move / h.
+//
+// ACAD as the paper has it: a spring takes part if it is too long at the substep's start. v_free is without
+// its force, and C is (l^2 - r^2) / (2 l), the paper's Eq. 3 divided by the length of its Jacobian's row.
+//
+// ACAD's limit: u minimises c u M u / 2 + sum of max(0, C(x_free + h u) / h)^2 / 2, with C the length minus
+// the longest. The multiplier max(0, C) / c pulls and never pushes. A round is a step of Newton's method: it
+// linearises C where the last round led, and solves for the change of u,
+//   (c M + J^T J) change = -c M u - J^T max(0, C) / h.
 #ifndef CLOTHSTREAM_SHADERS_SOLVE_SPRING_TERMS_GLSL
 #define CLOTHSTREAM_SHADERS_SOLVE_SPRING_TERMS_GLSL
 
 #include "shaders/solve/linear_system.glsl"
 
-layout(binding = 3) uniform samplerBuffer positions;   // at the substep's start; w: inverse mass
+layout(binding = 3) uniform samplerBuffer positions;  // at the substep's start; w: inverse mass
+// With kLimit: `freePositions`.
 layout(binding = 4) uniform samplerBuffer velocities;  // at the substep's start
 layout(binding = 5) uniform samplerBuffer freeVelocities;
-layout(binding = 6) uniform samplerBuffer freePositions;
+layout(binding = 6) uniform samplerBuffer freePositions;  // with kPaper: `positions`
 layout(std430, binding = 7) buffer Solves {
   SolveRecord solves[];
 };
 layout(std430, binding = 8) buffer Actives {
-  uint actives[];  // by chunk: kActive, kPrepared; then the numbers of the active chunks, group by group
+  // Three numbers a chunk, group by group: its flags, then the active chunks of large systems, then the
+  // prepared chunks.
+  uint actives[];
 };
 layout(std430, binding = 9) buffer Groups {
-  uint groups[];  // dispatch sizes, three numbers per iteration
+  uint groups[];  // dispatch sizes, three numbers each: SolveStage
 };
 
 layout(push_constant) uniform Push {
@@ -98,6 +109,18 @@ Weight weightOf(End here, End other, SpringKind kind, ClothRecord cloth, bool ex
   precise float inverseMasses = here.inverseMass + other.inverseMass;
   bool isActive =
       exists && inverseMasses > 0.0 && (!kAdaptive || isTooLong(here.freePlace, other.freePlace, longest));
+  if (kPaper) {
+    // Half of the paper's constraint l^2 - r^2 and of its Jacobian: Eq. 3 and 5.
+    precise float half_ = 0.5 * cloth.correctionFraction * (squared - kind.restLength * kind.restLength);
+    precise float paperSide = (push.substepRate * half_ + dotProduct(d, relative)) * inverseSquared;
+    precise vec3 paperImpulse = paperSide * d;
+    return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? paperImpulse : vec3(0.0), 0.0);
+  }
+  if (kLimit) {
+    precise float limitSide = push.substepRate * (squared * inverseLength - longest);
+    precise vec3 limitImpulse = (limitSide * inverseLength) * d;
+    return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? limitImpulse : vec3(0.0), 0.0);
+  }
   precise float excess = squared * inverseLength - longest;
   precise float corrected = excess > 0.0 || !kAdaptive ? cloth.correctionFraction * excess : excess;
   precise float side = push.substepRate * corrected + inverseLength * dotProduct(d, relative);
@@ -113,8 +136,9 @@ struct Start {
 };
 
 // `impulse` and `trace` are sums over the node's springs. A solve for implicit velocities starts from v' = v.
-// If it ends early, it leaves out motion instead of leaving forces without damping.
-Start startOf(End here, vec3 impulse, float trace, float compliance) {
+// If it ends early, it leaves out motion instead of leaving forces without damping. `total` is the solution
+// of the rounds before.
+Start startOf(End here, vec3 impulse, float trace, float compliance, vec3 total) {
   float inverseMass = here.inverseMass;
   float mass = reciprocal(max(inverseMass, 1e-30));
   if (kImplicit) {
@@ -126,7 +150,8 @@ Start startOf(End here, vec3 impulse, float trace, float compliance) {
     bool pinned = inverseMass == 0.0;
     return Start(pinned ? vec4(0.0) : vec4(residual, preconditioner), -gained, share);
   }
-  return Start(inverseMass == 0.0 ? vec4(0.0) : vec4(impulse, inverseMass), vec3(0.0), compliance);
+  precise vec3 residual = kLimit ? impulse - (compliance * mass) * total : impulse;
+  return Start(inverseMass == 0.0 ? vec4(0.0) : vec4(residual, inverseMass), vec3(0.0), compliance);
 }
 
 shared uint activeSprings, touched;
@@ -138,25 +163,39 @@ void beginChunk() {
   barrier();
 }
 
+// True if the round before solved the chunk. Such a chunk stays in the solve, because springs that are no
+// longer active must give back what they did.
+bool isContinued(System system, uint chunk) {
+  return kLimit && push.round > 0 && (actives[system.firstChunk + chunk] & kActive) != 0;
+}
+
 // Stores whether a chunk has anything to solve, which follows from all of its nodes. Updates the dispatch
-// sizes of the group: of all chunks, of the small systems, of the chunks of large systems. The latter are
-// listed in arbitrary order, because it does not matter which workgroup handles which chunk.
+// sizes of the group: of the prepared chunks, of the small systems, of all chunks in the next round, of the
+// active chunks of large systems. Chunks are listed in arbitrary order, because it does not matter which
+// workgroup handles which chunk.
 void keepActive(System system, uint chunk) {
   barrier();
   if (self() == 0) {
     uint place = system.firstChunk + chunk;
     bool before = kAdaptive && (actives[place] & kActive) != 0;
-    actives[place] = (touched != 0 ? kActive | kPrepared : 0) | (before ? kPrepared : 0);
-    if (touched != 0 || before) {
-      atomicMax(groups[push.firstGroup], push.chunks);
+    bool continued = isContinued(system, chunk);
+    bool active_ = touched != 0 || continued;
+    actives[place] =
+        (active_ ? kActive | kPrepared : 0) | (before ? kPrepared : 0) | (continued ? kContinued : 0);
+    if (active_ || before) {
+      uint listed = atomicAdd(groups[push.firstGroup], 1);
+      actives[2 * (actives.length() / 3) + push.firstChunk + listed] = place;
     }
-    if (touched != 0 && place < push.firstLargeChunk) {
+    if (active_) {
+      atomicMax(groups[push.firstGroup + 6], push.chunks);
+    }
+    if (active_ && place < push.firstLargeChunk) {
       atomicMax(groups[push.firstGroup + 3], push.smallSystems);
     }
-    if (touched != 0 && place >= push.firstLargeChunk) {
+    if (active_ && place >= push.firstLargeChunk) {
       atomicAdd(solves[system.number].arrived, 0x10000);
-      uint listed = atomicAdd(groups[push.firstGroup + 6], 1);
-      actives[actives.length() / 2 + push.firstLargeChunk + listed] = place;
+      uint listed = atomicAdd(groups[push.firstGroup + 9], 1);
+      actives[actives.length() / 3 + push.firstLargeChunk + listed] = place;
     }
   }
 }

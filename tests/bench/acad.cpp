@@ -34,6 +34,7 @@ struct Case {
   std::string method;
   model::SolverKind kind;
   double active = 0;  // part of the springs that are constraints
+  model::AcadMode mode = model::AcadMode::hold;
 };
 
 constexpr float kMass = 0.2f, kActivation = 0.1f;
@@ -47,6 +48,7 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
   cloth.solver.kind = experiment.kind;
   cloth.solver.activation = kActivation;
+  cloth.solver.acadMode = experiment.mode;
   model::Scene scene;
   const double h = scene.substepSeconds();
   cloth.structural.stiffness = static_cast<float>(0.25 * double{cloth.nodeMass()} / (h * h));
@@ -104,7 +106,12 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
   std::vector<Candidate> candidates;
   for (const Case& experiment :
        {Case{"mass_spring", massSpring}, Case{"acad", acad, 0}, Case{"acad", acad, 0.01},
-        Case{"acad", acad, 0.05}, Case{"acad", acad, 0.2}, Case{"constraint", constraint}}) {
+        Case{"acad", acad, 0.05}, Case{"acad", acad, 0.2},
+        Case{"acad_paper", acad, 0, model::AcadMode::paper},
+        Case{"acad_limit", acad, 0, model::AcadMode::limit},
+        Case{"acad_limit", acad, 0.01, model::AcadMode::limit},
+        Case{"acad_limit", acad, 0.05, model::AcadMode::limit},
+        Case{"acad_limit", acad, 0.2, model::AcadMode::limit}, Case{"constraint", constraint}}) {
     Candidate candidate{experiment, sceneOf(experiment, size), nullptr};
     check(device, experiment, std::min(size, kLargestCompared), options);
     candidate.simulated = std::make_unique<Simulated>(device, candidate.scene, options);

@@ -51,6 +51,10 @@ std::vector<Case> cases() {
   model::Solver acad = constraints(true, {});
   acad.kind = model::SolverKind::acad;
   acad.iterations = 100;
+  model::Solver paperAcad = acad;
+  paperAcad.acadMode = model::AcadMode::paper;
+  model::Solver limitAcad = acad;
+  limitAcad.acadMode = model::AcadMode::limit;
   return {{7, "mass_spring", 96, 96, "above 200"},
           {7, "mass_spring", 256, 256, "above 200"},
           {7, "mass_spring on the CPU", 96, 96, 44.83, {}, true},
@@ -65,7 +69,9 @@ std::vector<Case> cases() {
           {10, "mass_spring", 32, 32, 222.46},
           {10, "constraint", 32, 32, "barely 30", constraints(true, 0.0f)},
           {10, "constraint", 32, 32, "barely 30", constraints(true, {})},
-          {10, "acad", 32, 32, 206.44, acad}};
+          {10, "acad", 32, 32, 206.44, acad},
+          {10, "acad_paper", 32, 32, 206.44, paperAcad},
+          {10, "acad_limit", 32, 32, 206.44, limitAcad}};
 }
 
 model::Scene sceneOf(const Case& experiment) {

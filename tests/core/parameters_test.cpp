@@ -176,6 +176,7 @@ TEST(ClothSettings, ShowCurrentValuesAndChangeOnlyGivenOnes) {
   definition.set_friction(0.5f);
   definition.set_thickness(0.02f);
   definition.mutable_solver()->mutable_acad()->set_activation(0.25f);
+  definition.mutable_solver()->mutable_acad()->set_mode(v1::ACAD_MODE_PAPER);
   definition.mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(7);
   definition.mutable_solver()->mutable_acad()->mutable_constraint()->set_tolerance(0.5f);
   ClientUnderTest client;
@@ -220,6 +221,7 @@ TEST(ClothSettings, ShowCurrentValuesAndChangeOnlyGivenOnes) {
   cs_change_cloth(client.get(), "curtain", &change);
   const v1::Solver solver = sent().solver();
   EXPECT_EQ(solver.acad().activation(), 0.25f);
+  EXPECT_EQ(solver.acad().mode(), v1::ACAD_MODE_PAPER);  // does not change
   EXPECT_EQ(solver.acad().constraint().iterations(), 30u);
   EXPECT_EQ(solver.acad().constraint().tolerance(), 0.5f);
   EXPECT_FALSE(solver.acad().constraint().has_compliance());

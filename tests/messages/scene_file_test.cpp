@@ -60,7 +60,7 @@ constexpr const char* kEveryField = R"json({
                                  "pose": {"position": {}, "orientation": {"w": 1}}},
     "mass": 1, "structural": {}, "shear": {}, "bend": {}, "dihedralBending": 0, "damping": 0, "drag": 0, "lift": 0, "friction": 0.5,
     "thickness": 0.25,
-    "solver": {"acad": {"activation": 0.25,
+    "solver": {"acad": {"activation": 0.25, "mode": "ACAD_MODE_PAPER",
                         "constraint": {"bendConstraints": true, "compliance": 0, "iterations": 30, "tolerance": 0,
                                        "path": "CONSTRAINT_PATH_MATRIX_FREE"}}}
   }, {

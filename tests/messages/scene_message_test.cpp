@@ -521,6 +521,11 @@ const BadScene kBadScenes[] = {
      [](v1::Scene& s) {
        cloth(s).mutable_solver()->mutable_acad()->mutable_constraint()->set_iterations(0);
      }},
+    {"cloths[0].solver.acad.mode = 9:",
+     [](v1::Scene& s) {
+       cloth(s).mutable_solver()->mutable_acad()->set_mode(static_cast<v1::AcadMode>(9));
+     },
+     "ACAD_MODE_PAPER"},
     {"cloths[0].solver.xpbd.iterations = 0:",
      [](v1::Scene& s) { cloth(s).mutable_solver()->mutable_xpbd()->set_iterations(0); }, "from 1 to 1000"},
     {"cloths[0].solver.xpbd.iterations = 1001:",

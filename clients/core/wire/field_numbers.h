@@ -132,6 +132,7 @@ struct Solver {
 struct AcadSolver {
   static constexpr Field kActivation{1, WireType::kFixed32};
   static constexpr Field kConstraint{2, WireType::kBytes};
+  static constexpr Field kMode{12, WireType::kVarint};
 };
 struct ImplicitEulerSolver {
   static constexpr Field kIterations{1, WireType::kVarint};

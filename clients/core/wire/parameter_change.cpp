@@ -75,6 +75,7 @@ bool readAcadSolver(Bytes message, Solver& solver) {
   using F = field::AcadSolver;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
     if (tag == F::kActivation.tag) return setFinite(solver.activation, reader);
+    if (tag == F::kMode.tag) return solver.acadMode = reader.get_uint32(), true;
     return tag == F::kConstraint.tag ? readConstraintSolver(reader.get_view(), solver) : skip(reader);
   });
 }
@@ -138,6 +139,7 @@ std::string solverMessage(const Solver& solver) {
     Writer writer(settings);
     writer.add_float(field::AcadSolver::kActivation.number, solver.activation);
     writer.add_message(field::AcadSolver::kConstraint.number, constraintMessage(solver));
+    if (solver.acadMode != 0) writer.add_uint32(field::AcadSolver::kMode.number, solver.acadMode);
   }
   if (solver.kind == CS_SOLVER_XPBD) {
     settings.clear();

@@ -30,7 +30,8 @@ struct Solver {
   std::optional<float> compliance;
   float activation = parameters::kActivation.initial;
   std::uint32_t path = kMatrixFree;
-  std::string settings;  // message of the kind as received
+  std::uint32_t acadMode = 0;  // AcadMode of scene.proto, as received
+  std::string settings;        // message of the kind as received
 };
 
 struct Gust {
