@@ -24,6 +24,12 @@ struct Integrator {
   static constexpr std::uint32_t kExplicitEuler = 2;
   static constexpr std::uint32_t kRungeKutta4 = 3;
 };
+struct AcadMode {
+  static constexpr std::uint32_t kUnspecified = 0;
+  static constexpr std::uint32_t kHold = 1;
+  static constexpr std::uint32_t kPaper = 2;
+  static constexpr std::uint32_t kLimit = 3;
+};
 struct ConstraintPath {
   static constexpr std::uint32_t kUnspecified = 0;
   static constexpr std::uint32_t kMatrixFree = 1;
@@ -117,6 +123,7 @@ struct CoarseCorrection {
   static constexpr Field kCells{1, WireType::kVarint};
   static constexpr Field kSweeps{2, WireType::kVarint};
   static constexpr Field kEvery{3, WireType::kVarint};
+  static constexpr Field kLevels{4, WireType::kVarint};
 };
 struct SelfCollision {
   static constexpr Field kRadius{1, WireType::kFixed32};
