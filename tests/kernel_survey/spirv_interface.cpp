@@ -93,6 +93,7 @@ SpirvInterface interfaceOf(std::span<const std::uint32_t> spirv) {
   for (const auto& [variable, number] : module.bindings) {
     const std::uint32_t type = module.pointees.at(module.types.at(variable));
     BindingAccess access;
+    if (const auto name = module.names.find(variable); name != module.names.end()) access.name = name->second;
     for (const std::uint32_t id : {variable, type})
       if (const auto known = module.access.find(id); known != module.access.end()) {
         access.reads = access.reads && known->second.reads;

@@ -15,6 +15,7 @@ struct SpecialisationConstant {
 };
 
 struct BindingAccess {
+  std::string name = {};  // of the variable; empty for a block
   bool reads = true, writes = true;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <string_view>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -35,11 +36,15 @@ std::string settingsOf(const vulkan::Kernel& kernel, const SpirvInterface& spirv
   return text;
 }
 
+// Lists of the colliders near a run of nodes. Most of their room is empty.
+constexpr std::string_view kSparse = "nearColliders";
+
 // Bytes of the bound buffers. A buffer that is bound twice is read and written once.
 double bytesOf(const vulkan::Bindings& bindings, const SpirvInterface& spirv) {
   std::set<const void*> read, written;
   double bytes = 0;
   for (const auto& [number, access] : spirv.bindings) {
+    if (access.name == kSparse) continue;
     const vulkan::BoundBuffer& buffer = bindings.buffers()[number];
     if (access.reads && read.insert(buffer.identity).second) bytes += static_cast<double>(buffer.bytes);
     if (access.writes && written.insert(buffer.identity).second) bytes += static_cast<double>(buffer.bytes);

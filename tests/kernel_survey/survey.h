@@ -25,7 +25,8 @@ struct SurveyedKernel {
   std::uint32_t scenes = 0;         // scenes that need it
   std::vector<vulkan::KernelStatistic> statistics = {};  // empty if the driver does not tell
   // Per node of a scene and dispatch, for kernels whose work grows with the nodes: bytes of the bound
-  // buffers, each read or written once, and invocations. Tables of fixed size count nothing.
+  // buffers, each read or written once, and invocations. Tables of fixed size count nothing, nor do lists of
+  // near colliders.
   std::optional<double> bytesPerNode = {}, invocationsPerNode = {};
 
   // Value of the statistic with this name, if the driver tells it.
