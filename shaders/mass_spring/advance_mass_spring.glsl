@@ -195,7 +195,8 @@ void main() {
       bool isBelow2 = isLong(here, below2, bendColumn, limits.below2);
       precise vec3 gained = (2.0 * push.stepSeconds) * (moved[k].velocity - here.velocity);
       bool isFast = kTestsMotion && dotProduct(gained, gained) > limits.margin * limits.margin;
-      stretched = stretched || isRight || isBelow || isLeftBelow || isRightBelow || isRight2 || isBelow2 || isFast;
+      stretched =
+          stretched || isRight || isBelow || isLeftBelow || isRightBelow || isRight2 || isBelow2 || isFast;
     }
     if (kColliders) {
       origins[k] = here.position;

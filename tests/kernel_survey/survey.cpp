@@ -67,6 +67,7 @@ class CompiledScene {
       simulation_.recordReport(recorder_, inputs);
       if (scene.stream.normals == model::Normals::octahedral) simulation_.recordNormals(recorder_);
       encoder_.discard(encoder_.record(recorder_, static_cast<std::uint64_t>(tick + 1), false));
+      inputs = simulation::inputsAt(scene, 1);
       inputs.colliders.emplace_back();
       inputs.grabs.push_back({.state = simulation::Grab::State::takes});
     }

@@ -34,8 +34,8 @@ struct SurveyedKernel {
 };
 
 // Kernels of two ticks, a report, normals, a change of mass and two frames of the stream, in the order in
-// which they appear first. The second tick has a collider and a grab. `device` only compiles. Throws
-// std::runtime_error if it refuses a kernel.
+// which they appear first. The second tick has the scene's colliders, a sphere and a grab. `device` only
+// compiles. Throws std::runtime_error if it refuses a kernel.
 std::vector<SurveyedKernel> survey(vulkan::Device& device, std::span<const SurveyScene> scenes,
                                    const simulation::SimulationOptions& options = {});
 
