@@ -100,6 +100,12 @@ void main() {
              shortened(bendRow.longestSquared, bendRow.restLength, cloth.activation, margin),
              shortened(bendColumn.longestSquared, bendColumn.restLength, cloth.activation, margin), margin);
   bool stretched = false;
+  Spring leftSpring = where(hasLeft, alongRow);
+  Spring rightSpring = where(hasRight, alongRow);
+  Spring left2Spring = where(hasLeft2, bendRow);
+  Spring right2Spring = where(hasRight2, bendRow);
+  Spring leftShear = where(hasLeft, shear);
+  Spring rightShear = where(hasRight, shear);
   precise float drag = push.airFactor * cloth.drag;
   precise float lift = push.airFactor * cloth.lift;
   Air air = Air(push.wind, drag, lift);
@@ -150,21 +156,21 @@ void main() {
     below = nodeOf(below, belowIndex);
     vec3 belowForce = springForce(here, below, where(hasBelow, alongColumn));
     left = nodeOf(left, index - toLeft);
-    precise vec3 force = springForce(here, left, where(hasLeft, alongRow));
+    precise vec3 force = springForce(here, left, leftSpring);
     right = nodeOf(right, index + toRight);
-    force = force + springForce(here, right, where(hasRight, alongRow));
+    force = force + springForce(here, right, rightSpring);
     force = force + aboveForce;
     force = force + belowForce;
     leftAbove = nodeOf(leftAbove, aboveIndex - toLeft);
-    force = force + springForce(here, leftAbove, where(row > 0 && hasLeft, shear));
+    force = force + springForce(here, leftAbove, where(row > 0, leftShear));
     rightAbove = nodeOf(rightAbove, aboveIndex + toRight);
-    force = force + springForce(here, rightAbove, where(row > 0 && hasRight, shear));
+    force = force + springForce(here, rightAbove, where(row > 0, rightShear));
     Node leftBelow = fetchNode(belowIndex - toLeft);
-    force = force + springForce(here, leftBelow, where(hasBelow && hasLeft, shear));
+    force = force + springForce(here, leftBelow, where(hasBelow, leftShear));
     Node rightBelow = fetchNode(belowIndex + toRight);
-    force = force + springForce(here, rightBelow, where(hasBelow && hasRight, shear));
-    force = force + springForce(here, fetchNode(index - toLeft2), where(hasLeft2, bendRow));
-    force = force + springForce(here, fetchNode(index + toRight2), where(hasRight2, bendRow));
+    force = force + springForce(here, rightBelow, where(hasBelow, rightShear));
+    force = force + springForce(here, fetchNode(index - toLeft2), left2Spring);
+    force = force + springForce(here, fetchNode(index + toRight2), right2Spring);
     force = force + above2Force;
     force = force + below2Force;
 
