@@ -82,7 +82,11 @@ std::vector<Row> rowsOf(const model::Cloth& cloth, const reference::ReferenceClo
     const Vec3 change = h * (free.velocities()[link.b] - free.velocities()[link.a]);
     const Vec3 direction = d.normalized();
     double excess = d.norm() - double{link.restLength};
-    if (solver.kind == SolverKind::acad) {
+    if (model::isAcad(solver, model::AcadMode::paper)) {
+      const double rest = link.restLength;
+      if (d.norm() <= rest * (1 + double{solver.activation})) continue;
+      excess = (d.squaredNorm() - rest * rest) / (2 * d.norm());
+    } else if (solver.kind == SolverKind::acad) {
       const double longest = double{link.restLength} * (1 + double{solver.activation});
       if ((d + change).norm() <= longest) continue;
       excess = d.norm() - longest;
@@ -256,6 +260,11 @@ std::uint32_t compare(vulkan::Device& device, const model::Scene& given,
       checkResidual(device, own, options, start, inputs);
     }
     solver.compliance.reset();
+    if (model::isAcad(solver, model::AcadMode::paper)) {
+      const double h = scene.substepSeconds();
+      solver.compliance = static_cast<float>(double{model::kRelativeCompliance} * h * h /
+                                             double{scene.cloths.front().nodeMass()});
+    }
     tolerance = toleranceOfConstraints(scene, start, inputs.environment);
   }
   // A contact projects the end of a path on a plane, which depends on the path.

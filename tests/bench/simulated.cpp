@@ -29,14 +29,19 @@ simulation::NodeState displacedState(const model::Scene& scene) {
 }
 
 // A tick moves a position by sums of rounded terms. Each substep rounds it once, to 2^-24 of the cloth's
-// extent, and twelve spring forces pass on the rounding of their ends. An eighth of a thousandth of the
-// nodes' distance is far above that and far below the effect of any missing term.
+// extent, and twelve spring forces pass on the rounding of their ends: 20 roundings. A coarse correction sums
+// along the rows and columns of two cells, and a sweep corrects eight links of a coarse node.
 Tolerance toleranceOfTick(const model::Scene& scene, const simulation::NodeState& start) {
-  const model::Grid& grid = scene.cloths.front().grid;
+  const model::Cloth& cloth = scene.cloths.front();
+  const model::Grid& grid = cloth.grid;
   float extent = std::max(grid.width, grid.height);
   for (const model::Vec3& position : start.positions)
     extent = std::max(extent, position.cwiseAbs().maxCoeff());
-  return {.node = scene.substeps * 20 * double{extent} / (1 << 24) + model::spacing(grid).column / 8000.0};
+  double roundings = 20;
+  if (const auto& coarse = cloth.coarse)
+    roundings +=
+        coarse->levels * (4.0 * std::max(grid.rows, grid.columns) / coarse->cells + 8 * coarse->sweeps);
+  return {.node = scene.substeps * roundings * double{extent} / (1 << 24)};
 }
 
 reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {

@@ -14,10 +14,10 @@ using simulation::NodeState;
 
 class LongRuns : public GpuTest {};
 
-// A step conserves E - h k x v / 2 of a linear spring exactly, so E varies by omega h / 2 = 0.63 % and does not
-// drift. The phase of (x, -v / omega) is off by as much, which does not grow either; the frequency is higher by
-// (omega h)^2 / 24 = 7e-6. Each of 1e5 steps rounds the position to 2e-9 m of an amplitude of 2 mm, and the velocity
-// alike. As a random walk that changes E by 0.1 %.
+// A step conserves E - h k x v / 2 of a linear spring exactly, so E varies by omega h / 2 = 0.63 % and does
+// not drift. The phase of (x, -v / omega) is off by as much, which does not grow either; the frequency is
+// higher by (omega h)^2 / 24 = 7e-6. Each of 1e5 steps rounds the position to 2e-9 m of an amplitude of 2 mm,
+// and the velocity alike. As a random walk that changes E by 0.1 %.
 TEST_F(LongRuns, ASpringKeepsItsEnergyAndPeriodOver100000Steps) {
   model::Cloth cloth = calmCloth(2, 2);
   cloth.structural.damping = cloth.damping = 0;
@@ -106,11 +106,13 @@ TEST_F(LongRuns, ASheetDroppedOnABallRestsAfterTenSeconds) {
   for (int tick = 0; tick < 792; ++tick) {
     const simulation::ClothReport report =
         running
-            .tickAndReport(inputsOf(scene, {{model::Sphere{static_cast<float>(radius)}, {centre}, {centre}, 1}}))
+            .tickAndReport(
+                inputsOf(scene, {{model::Sphere{static_cast<float>(radius)}, {centre}, {centre}, 1}}))
             .front();
     deepest = std::max(deepest, double{report.penetration});
     if (tick < 720 || tick % 8 != 0) continue;
-    for (const model::Vec3& velocity : running.state().velocities) fastest = std::max(fastest, velocity.norm());
+    for (const model::Vec3& velocity : running.state().velocities)
+      fastest = std::max(fastest, velocity.norm());
   }
   double nearest = 1, lowest = 1;
   for (const model::Vec3& position : running.state().positions) {

@@ -13,9 +13,11 @@ namespace clothstream::tests {
 
 NewtonSheet::NewtonSheet(const Settings& settings, const std::vector<Vec3>& rest, std::vector<bool> pinned)
     : settings_(settings), pinned_(std::move(pinned)) {
-  const auto join = [&](std::size_t row, std::size_t column, std::size_t down, std::ptrdiff_t right, double stiffness) {
+  const auto join = [&](std::size_t row, std::size_t column, std::size_t down, std::ptrdiff_t right,
+                        double stiffness) {
     const auto toColumn = static_cast<std::ptrdiff_t>(column) + right;
-    if (row + down >= settings.rows || toColumn < 0 || toColumn >= static_cast<std::ptrdiff_t>(settings.columns))
+    if (row + down >= settings.rows || toColumn < 0 ||
+        toColumn >= static_cast<std::ptrdiff_t>(settings.columns))
       return;
     const std::size_t a = row * settings.columns + column;
     const std::size_t b = (row + down) * settings.columns + static_cast<std::size_t>(toColumn);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A sheet of springs in double precision, solved by Newton's method. It is written apart from server/model and
-// server/reference, to test both.
+// A sheet of springs in double precision, solved by Newton's method. It is written apart from server/model
+// and server/reference, to test both.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,8 +9,8 @@
 
 namespace clothstream::tests {
 
-// rows x columns nodes of equal mass with the springs of [Va21] Fig. 1. Springs of an equal kind have an equal
-// stiffness and no damping.
+// rows x columns nodes of equal mass with the springs of [Va21] Fig. 1. Springs of an equal kind have an
+// equal stiffness and no damping.
 class NewtonSheet {
  public:
   using Vec3 = Eigen::Vector3d;
@@ -25,11 +25,12 @@ class NewtonSheet {
   // `rest` are the places at rest, row by row; `pinned` has one entry a node.
   NewtonSheet(const Settings& settings, const std::vector<Vec3>& rest, std::vector<bool> pinned);
 
-  // Places at which the forces on every free node balance to 1e-9 of its weight. Starts the search at `start`.
+  // Places at which the forces on every free node balance to 1e-9 of its weight. Starts the search at
+  // `start`.
   std::vector<Vec3> balance(std::vector<Vec3> start) const;
 
-  // One step of implicit Euler: v' = v + h a(x + h v') - h c v with the damping rate c, x' = x + h v'. Newton's
-  // method solves it to 1e-9 of the weight.
+  // One step of implicit Euler: v' = v + h a(x + h v') - h c v with the damping rate c, x' = x + h v'.
+  // Newton's method solves it to 1e-9 of the weight.
   void step(std::vector<Vec3>& positions, std::vector<Vec3>& velocities, double damping, double h) const;
 
  private:

@@ -86,9 +86,9 @@ std::vector<double> structuralLengths(const model::Cloth& cloth, const std::vect
   return lengths;
 }
 
-// At rest the linearised forces of a step are the forces themselves, so the step does not matter. Within 0.1 %:
-// the sag of every node, as part of the largest one, and the stretch of every spring that carries a tenth of the
-// largest one.
+// At rest the linearised forces of a step are the forces themselves, so the step does not matter. Within 0.1
+// %: the sag of every node, as part of the largest one, and the stretch of every spring that carries a tenth
+// of the largest one.
 void expectBalanceOfNewton(const model::Cloth& still, std::uint32_t ticks) {
   model::Cloth cloth = still;
   cloth.damping = 4;
@@ -98,7 +98,8 @@ void expectBalanceOfNewton(const model::Cloth& still, std::uint32_t ticks) {
   const simulation::NodeState state = running.state();
   for (const model::Vec3& velocity : state.velocities) ASSERT_LT(velocity.norm(), 1e-4f);
 
-  const std::vector<Vec3> rest = placesInDouble(model::restPositions(cloth)), found = placesInDouble(state.positions);
+  const std::vector<Vec3> rest = placesInDouble(model::restPositions(cloth)),
+                          found = placesInDouble(state.positions);
   const std::vector<Vec3> expected = solvedByNewton(scene).balance(rest);
   const double sag = farthestNode(rest, expected);
   EXPECT_GT(sag, 0.005);
@@ -107,7 +108,8 @@ void expectBalanceOfNewton(const model::Cloth& still, std::uint32_t ticks) {
   testing::Test::RecordProperty("farthest", std::to_string(farthestNode(found, expected) / sag));
 
   const double spacing = model::spacing(cloth.grid).column;
-  const std::vector<double> lengths = structuralLengths(cloth, found), exact = structuralLengths(cloth, expected);
+  const std::vector<double> lengths = structuralLengths(cloth, found),
+                            exact = structuralLengths(cloth, expected);
   const double most = *std::ranges::max_element(exact) - spacing;
   double worst = 0;
   for (std::size_t i = 0; i < exact.size(); ++i)
