@@ -2,7 +2,6 @@
 // Suite price: the price of a tick, computed from the scene, and the tick that was measured.
 #include "server/model/price.h"
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -11,7 +10,6 @@
 
 #include "server/simulation/speed_meter.h"
 #include "tests/bench/hung_cloth.h"
-#include "tests/bench/reference_check.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
@@ -102,13 +100,6 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   return scene;
 }
 
-// Compares with the reference where that is cheap. Suite self_collision compares contacts of cloth.
-void check(vulkan::Device& device, const Case& experiment, std::uint32_t size) {
-  if (experiment.selfCollision) return;
-  const model::Scene scene = sceneOf(experiment, std::min(size, 32u));
-  checkWithReference(device, scene, {}, displacedState(scene), simulation::inputsAt(scene, 0));
-}
-
 }  // namespace
 
 Rows runPrice(vulkan::Device& device, const Settings& settings) {
@@ -118,7 +109,6 @@ Rows runPrice(vulkan::Device& device, const Settings& settings) {
   Rows rows;
   for (const std::uint32_t size : sizes)
     for (const Case& experiment : cases()) {
-      check(device, experiment, size);
       const model::Scene scene = sceneOf(experiment, size);
       const std::uint64_t before = device.allocatedBytes();
       Simulated simulated(device, scene, {});

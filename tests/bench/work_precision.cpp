@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "server/reference/reference_simulation.h"
-#include "tests/bench/reference_check.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
@@ -137,7 +136,6 @@ Measured measure(vulkan::Device& device, model::Scene scene, const Method& metho
   scene.cloths.front().solver.kind = method.kind;
   scene.cloths.front().solver.iterations = method.iterations;
   if (method.coarse) scene.cloths.front().coarse = model::CoarseCorrection{4, 4, 2};
-  checkWithReference(device, scene, {});
   Simulated simulated(device, scene, {});
   Measured measured{};
   simulation::NodeState state;
