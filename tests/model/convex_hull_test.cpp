@@ -113,7 +113,7 @@ TEST(ConvexHull, RefusesAFlatSurface) {
 }
 
 TEST(ConvexHull, RefusesAnEmptySurface) {
-  EXPECT_THAT(problemOf({}).text, HasSubstr("is flat"));
+  EXPECT_THAT(problemOf(Parts{}).text, HasSubstr("is flat"));
 }
 
 }  // namespace

@@ -101,6 +101,7 @@ class Lists {
                 .colliders = none_,
                 .nearColliders = none_,
                 .contactImpulses = none_,
+                .stretches = none_,
                 .positions = {&positions_, &positions_},
                 .velocities = {&velocities_, &velocities_}},
                workgroupSize),

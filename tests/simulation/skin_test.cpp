@@ -39,7 +39,7 @@ std::vector<model::Pose> bent(const model::Solid& rod, float degrees) {
   return poses;
 }
 
-model::Cloth dust(std::uint32_t rows, std::uint32_t columns) {
+model::Cloth skinDust(std::uint32_t rows, std::uint32_t columns) {
   model::Cloth cloth = calmCloth(rows, columns);
   cloth.structural = cloth.shear = cloth.bend = {};
   cloth.damping = 0;
@@ -47,7 +47,7 @@ model::Cloth dust(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
-model::Scene sceneWith(model::Cloth cloth, const model::Solid& solid) {
+model::Scene skinScene(model::Cloth cloth, const model::Solid& solid) {
   model::Scene scene = sceneOf({std::move(cloth)});
   scene.colliders.push_back({.name = "solid", .shape = solid});
   return scene;
@@ -63,7 +63,7 @@ MovingCollider bending(const model::Solid& rod, float from, float to) {
 
 TEST_F(SkinCollision, NodesTouchABendingMeshAsInTheReference) {
   const model::Solid rod = bendingRod();
-  model::Scene scene = sceneWith(dust(33, 33), rod);
+  model::Scene scene = skinScene(skinDust(33, 33), rod);
   scene.substeps = 2;
   scene.simulationRate = 360;
   scene.environment.gravity = model::Vec3::Zero();
@@ -93,9 +93,9 @@ TEST_F(SkinCollision, NodesTouchABendingMeshAsInTheReference) {
 // The outer half of the rod sweeps through the nodes at up to 12 m/s and takes those in its way along.
 TEST_F(SkinCollision, ASwingingLimbPassesThroughNoNode) {
   const model::Solid rod = bendingRod();
-  model::Cloth cloth = dust(21, 21);
+  model::Cloth cloth = skinDust(21, 21);
   cloth.thickness = 0.002f;
-  model::Scene scene = sceneWith(cloth, rod);
+  model::Scene scene = skinScene(cloth, rod);
   scene.environment.gravity = model::Vec3::Zero();
   NodeState start = simulation::restState(scene.cloths);
   for (std::size_t i = 0; i < start.positions.size(); ++i)
@@ -127,7 +127,7 @@ TEST_F(SkinCollision, ASwingingLimbPassesThroughNoNode) {
 }
 
 TEST_F(SkinCollision, GivesTheSameBitsForEveryPartitionOfTheWork) {
-  const model::Scene scene = sceneWith(calmCloth(21, 19), bendingRod());
+  const model::Scene scene = skinScene(calmCloth(21, 19), bendingRod());
   const InputsAt inputs = [](const model::Scene& in, int tick) {
     const auto angle = [](int t) { return 60 * std::sin(0.1f * static_cast<float>(t)); };
     return inputsOf(in,

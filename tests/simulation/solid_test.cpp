@@ -21,7 +21,7 @@ using simulation::NodeState;
 class SolidCollision : public GpuTest {};
 
 // Nodes that only contacts move.
-model::Cloth dust(std::uint32_t rows, std::uint32_t columns) {
+model::Cloth solidDust(std::uint32_t rows, std::uint32_t columns) {
   model::Cloth cloth = calmCloth(rows, columns);
   cloth.structural = cloth.shear = cloth.bend = {};
   cloth.damping = 0;
@@ -29,7 +29,7 @@ model::Cloth dust(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
-model::Scene sceneWith(model::Cloth cloth, const std::vector<model::Shape>& shapes) {
+model::Scene solidScene(model::Cloth cloth, const std::vector<model::Shape>& shapes) {
   model::Scene scene = sceneOf({std::move(cloth)});
   for (const model::Shape& shape : shapes) scene.colliders.push_back({.name = "solid", .shape = shape});
   return scene;
@@ -41,7 +41,7 @@ TEST_F(SolidCollision, NodesTouchMeshesAsInTheReference) {
   const model::Shape shapes[] = {torus(0.12f, 0.04f, 24, 12), boxMesh(model::Vec3(0.2f, 0.1f, 0.15f)),
                                  ballMesh(0.12f, 10)};
   for (const model::Shape& shape : shapes) {
-    model::Scene scene = sceneWith(dust(33, 33), {shape});
+    model::Scene scene = solidScene(solidDust(33, 33), {shape});
     scene.substeps = 1;
     scene.simulationRate = 720;
     scene.environment.gravity = model::Vec3::Zero();
@@ -79,9 +79,9 @@ TEST_F(SolidCollision, NodesTouchMeshesAsInTheReference) {
 // ring stay where they are.
 TEST_F(SolidCollision, AFastThinRingTakesTheNodesInItsWayAndNoOthers) {
   const model::Shape ring = torus(0.12f, 0.004f, 48, 8);
-  model::Cloth cloth = dust(33, 33);
+  model::Cloth cloth = solidDust(33, 33);
   cloth.thickness = 0;
-  model::Scene scene = sceneWith(cloth, {ring});
+  model::Scene scene = solidScene(cloth, {ring});
   scene.environment.gravity = model::Vec3::Zero();
   const float step = 25.0f / 72;
   const auto at = [&](int tick) {
@@ -114,7 +114,7 @@ TEST_F(SolidCollision, ClothOnARingStaysOutside) {
   cloth.grid.pose = {model::Vec3(0, 0.06f, -cloth.grid.height / 2), turned(-90, model::Vec3::UnitX())};
   cloth.damping = 3;
   cloth.thickness = 0.004f;
-  const model::Scene scene = sceneWith(cloth, {ring});
+  const model::Scene scene = solidScene(cloth, {ring});
   const model::Pose still{};
   Running running(scene);
   double deepest = 0;
@@ -142,7 +142,7 @@ TEST_F(SolidCollision, ReportsImpulsesUnderTheNumbersOfTheInputs) {
   cloth.thickness = 0;
   cloth.friction = 0;
   const model::Solid slab = boxMesh(model::Vec3(1, 0.1f, 1));
-  const model::Scene scene = sceneWith(cloth, {slab});
+  const model::Scene scene = solidScene(cloth, {slab});
   const model::Pose below{model::Vec3(0, -0.05f, 0), model::Quaternion::Identity()};
   const model::Pose far{model::Vec3(0, -9, 0), model::Quaternion::Identity()};
   simulation::TickInputs inputs =
@@ -162,7 +162,7 @@ TEST_F(SolidCollision, ReportsImpulsesUnderTheNumbersOfTheInputs) {
 }
 
 TEST_F(SolidCollision, GivesTheSameBitsForEveryPartitionOfTheWork) {
-  model::Scene scene = sceneWith(calmCloth(21, 19), {torus(0.12f, 0.04f, 24, 12)});
+  model::Scene scene = solidScene(calmCloth(21, 19), {torus(0.12f, 0.04f, 24, 12)});
   const InputsAt inputs = [](const model::Scene& in, int tick) {
     const auto at = [](int t) {
       return model::Pose{model::Vec3(0, -0.2f, 0.2f - 0.004f * static_cast<float>(t)),

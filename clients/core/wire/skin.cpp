@@ -7,24 +7,24 @@
 namespace clothstream::client {
 namespace {
 
-using Vector = std::array<float, 3>;
-using Quaternion = std::array<float, 4>;  // x y z w
+using Triple = std::array<float, 3>;
+using Quadruple = std::array<float, 4>;  // x y z w
 
-Vector turned(const Quaternion& q, const Vector& v) {
-  const auto cross = [](const Vector& a, const Vector& b) {
-    return Vector{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+Triple turned(const Quadruple& q, const Triple& v) {
+  const auto cross = [](const Triple& a, const Triple& b) {
+    return Triple{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
   };
-  const Vector axis{q[0], q[1], q[2]};
-  Vector twice = cross(axis, v);
+  const Triple axis{q[0], q[1], q[2]};
+  Triple twice = cross(axis, v);
   for (float& number : twice) number *= 2;
-  const Vector again = cross(axis, twice);
+  const Triple again = cross(axis, twice);
   return {v[0] + q[3] * twice[0] + again[0], v[1] + q[3] * twice[1] + again[1],
           v[2] + q[3] * twice[2] + again[2]};
 }
 
 struct JointFrame {
-  Vector position;
-  Quaternion orientation;
+  Triple position;
+  Quadruple orientation;
 };
 
 JointFrame jointAt(std::span<const float> numbers, std::size_t joint) {
@@ -46,16 +46,16 @@ void pose(const Skin& skin, std::span<const float> rest, std::span<const float> 
           std::vector<float>& vertices) {
   vertices.resize(rest.size());
   for (std::size_t i = 0; i < rest.size() / 3; ++i) {
-    Vector sum{};
+    Triple sum{};
     for (std::size_t k = 0; k < kVertexJoints; ++k) {
       const float weight = skin.weights[kVertexJoints * i + k];
       if (weight == 0) continue;
       const std::size_t joint = skin.joints[kVertexJoints * i + k];
       const JointFrame from = jointAt(skin.rest, joint), to = jointAt(joints, joint);
-      const Vector arm{rest[3 * i] - from.position[0], rest[3 * i + 1] - from.position[1],
+      const Triple arm{rest[3 * i] - from.position[0], rest[3 * i + 1] - from.position[1],
                        rest[3 * i + 2] - from.position[2]};
-      const Quaternion& q = from.orientation;
-      const Vector moved = turned(to.orientation, turned({-q[0], -q[1], -q[2], q[3]}, arm));
+      const Quadruple& q = from.orientation;
+      const Triple moved = turned(to.orientation, turned({-q[0], -q[1], -q[2], q[3]}, arm));
       for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += weight * (to.position[axis] + moved[axis]);
     }
     std::copy(sum.begin(), sum.end(), vertices.begin() + static_cast<std::ptrdiff_t>(3 * i));
