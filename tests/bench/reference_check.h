@@ -13,7 +13,8 @@ namespace clothstream::bench {
 // Compares the device with the reference, for a scene with one cloth.
 // - mass-spring: the nodes after one tick, with its coarse correction. The others are compared without it.
 // - xpbd: the nodes after one substep.
-// - constraint and acad: the nodes after one substep that is solved to the end, with the default compliance of
+// - constraint and acad: the nodes after one substep that is solved to the end, with the default compliance
+// of
 //   the constraint solver; for acad's mode limit with its own.
 // - implicit Euler: the residual that the device's solution leaves in the reference's system. This is sharp
 //   even if the system is ill-conditioned, where distances are not.

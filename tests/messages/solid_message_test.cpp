@@ -20,7 +20,8 @@ using testing::StartsWith;
 v1::Scene sceneWithMesh() {
   v1::Scene scene = smallScene();
   v1::ColliderMesh& mesh = *scene.mutable_colliders(0)->mutable_mesh();
-  for (const float number : {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f}) mesh.add_positions(number);
+  for (const float number : {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f})
+    mesh.add_positions(number);
   for (const std::uint32_t corner : {0u, 2u, 1u, 0u, 1u, 3u, 0u, 3u, 2u, 1u, 2u, 3u})
     mesh.add_triangles(corner);
   v1::Skin& skin = *mesh.mutable_skin();
