@@ -200,7 +200,8 @@ void main() {
       bool isRight2 = isLong(here, fetchNode(index + toRight2), bendRow, limits.right2);
       bool isBelow2 = isLong(here, below2, bendColumn, limits.below2);
       precise vec3 gained = (2.0 * push.stepSeconds) * (moved[k].velocity - here.velocity);
-      bool isFast = kTestsMotion && dotProduct(gained, gained) > limits.margin * limits.margin;
+      precise float allowed = limits.margin * limits.margin;
+      bool isFast = kTestsMotion && dotProduct(gained, gained) > allowed;
       stretched =
           stretched || isRight || isBelow || isLeftBelow || isRightBelow || isRight2 || isBelow2 || isFast;
     }

@@ -447,6 +447,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--metrics-host=::1",
                                        "--device=1",
                                        "--software-threads=0",
+                                       "--kernels=cpu",
                                        "--cache-dir",
                                        "",
                                        "--log-level=off",

@@ -103,6 +103,21 @@ constexpr const char* kEveryField = R"json({
     }, "pose": {"position": {"x": 1, "y": 0, "z": 0},
     "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
   }, {
+    "name": "limb", "mesh": {
+      "positions": [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1],
+      "triangles": [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3],
+      "skin": {
+        "joints": [{"name": "root", "rest": {"position": {"x": 0, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}},
+                   {"name": "tip", "parent": 0,
+                    "rest": {"position": {"x": 0, "y": 0, "z": 0.5}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}}],
+        "vertexJoints": [0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0],
+        "vertexWeights": [0.75, 0.25, 0, 0, 0.75, 0.25, 0, 0, 0.75, 0.25, 0, 0, 0.75, 0.25, 0, 0],
+        "animation": {"keys": [{"time": 0, "joints": [{"position": {}, "orientation": {"w": 1}}, {"position": {}, "orientation": {"w": 1}}]},
+                               {"time": 2, "joints": [{"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}},
+                                                      {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}]}]}
+      }
+    }, "pose": {"position": {"x": 1, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
+  }, {
     "name": "ball", "sphere": {"radius": 0.5},
     "pose": {"position": {"x": 4, "y": 5, "z": 6}, "orientation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}},
     "friction": 0.25,
@@ -150,6 +165,7 @@ void expectEveryFieldSet(const v1::Scene& message) {
   // A mesh is written as it is in the scene, placed and repaired, not as its file (mesh_message_test.cpp).
   for (const char* field : {"file", "pose", "scale", "repair", "fit"})
     all.erase(std::string("clothstream.v1.Mesh.") + field);
+  for (const char* field : {"file", "scale"}) all.erase(std::string("clothstream.v1.ColliderMesh.") + field);
   all.erase("clothstream.v1.Cloth.areal_mass");  // comes back as `mass`
   EXPECT_THAT(set, testing::ContainerEq(all));
 }

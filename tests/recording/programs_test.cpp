@@ -86,12 +86,19 @@ class RecordingPrograms : public ::testing::Test {
     });
     ASSERT_TRUE(client.has_value()) << client.error().text;
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
-    std::error_code none;
-    while (serversRecording(directory).empty() ||
-           std::filesystem::file_size(serversRecording(directory), none) < 150'000) {
-      ASSERT_LT(std::chrono::steady_clock::now(), deadline);
-      std::this_thread::sleep_for(20ms);
-    }
+    const auto waitForBytes = [&](std::uintmax_t least) {
+      std::error_code none;
+      while (serversRecording(directory).empty() ||
+             std::filesystem::file_size(serversRecording(directory), none) < least) {
+        ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+        std::this_thread::sleep_for(20ms);
+      }
+    };
+    // Schemas come first, then chunks.
+    ASSERT_NO_FATAL_FAILURE(waitForBytes(1));
+    std::this_thread::sleep_for(20ms);
+    const std::uintmax_t schemas = std::filesystem::file_size(serversRecording(directory));
+    ASSERT_NO_FATAL_FAILURE(waitForBytes(schemas + 10'000));
     // A chunk was closed just before.
     std::this_thread::sleep_for(170ms);
     server_->signal(SIGKILL);
