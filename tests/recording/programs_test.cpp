@@ -350,9 +350,9 @@ TEST_F(RecordingPrograms, FullDiskEndsTheClientsRecording) {
   startServer();
   if (IsSkipped() || HasFatalFailure()) return;
   const std::string path = pathOf("stream.mcap");
-  // 150 KiB, in blocks of 1024 bytes.
+  // 250 KiB, in blocks of 1024 bytes, of which schemas take 150.
   const Ended recorded = run({"/bin/bash", "-c",
-                              "ulimit -f 150; exec " + std::string(CLOTHSTREAM) + " record -o " + path +
+                              "ulimit -f 250; exec " + std::string(CLOTHSTREAM) + " record -o " + path +
                                   " --server " + address_ + " --seconds 50"});
   EXPECT_EQ(recorded.code, 6);
   EXPECT_THAT(recorded.errors, HasSubstr("File too large"));
