@@ -155,7 +155,8 @@ test("rays press the panel in space: people, quality, figures, pause, reset, and
     await enter(page, "vr");
     await page.waitForFunction(() => window.clothstream.headset.limbs.length === 2);
     await page.evaluate(() => window.device.quaternion.set(0, 0.5, 0, Math.sqrt(0.75)));
-    await untilPanelText(page, /\d+ frames\/s, round trip \d+ ms/);
+    // A busy machine says instead that frames are late.
+    await untilPanelText(page, /\d+ frames\/s, round trip \d+ ms|Frames arrive late/);
     await takePicture(page, "vr_panel_scenes");
     await pressButton(page, "People");
     await untilPanelText(page, /Ada \(you\)/);

@@ -158,7 +158,7 @@ TEST_F(RecordingPrograms, InterruptCompletesRecordings) {
   Process record({CLOTHSTREAM, "record", "-o", path, "--server", address_});
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   std::error_code none;
-  while (std::filesystem::file_size(path, none) < 150'000 || none) {
+  while (std::filesystem::file_size(path, none) < 250'000 || none) {
     ASSERT_LT(std::chrono::steady_clock::now(), deadline);
     std::this_thread::sleep_for(20ms);
   }
