@@ -208,8 +208,9 @@ TEST(InputLines, ErrorsNameThePartThatIsWrong) {
   };
   EXPECT_EQ(errorOf("{"), "is not JSON");
   EXPECT_EQ(errorOf("[]"), "a line must be an object");
-  EXPECT_EQ(errorOf(R"({"collider": []})"),
-            "\"collider\" is not a key of a line; use after, colliders, grabs, head, hands, attachments, joints");
+  EXPECT_EQ(
+      errorOf(R"({"collider": []})"),
+      "\"collider\" is not a key of a line; use after, colliders, grabs, head, hands, attachments, joints");
   EXPECT_EQ(errorOf(R"({"after": -1})"), "after must be 0 to 86400 s");
   EXPECT_EQ(errorOf(R"({"colliders": [{"position": [0, 0, 0]}]})"),
             "colliders[0] must have one of \"sphere\", \"capsule\" and \"box\"");
