@@ -67,7 +67,7 @@ void expectConsistent(const CoarseLevel& level) {
   }
 }
 
-TEST(CoarseLevel, OfAGridIsALatticeWithRowsColumnsAndDiagonals) {
+TEST(CoarseLevel, LinksRowsColumnsAndDiagonalsOfAGrid) {
   const CoarseLevel level = levelOf(coarse(model::grid(17, 9), 4));
   expectConsistent(level);
   EXPECT_EQ(level.lattice.rows, 5u);
@@ -146,7 +146,7 @@ TEST(CoarseLevel, EveryShapeOfGridHasOne) {
     }
 }
 
-TEST(CoarseLevel, OfAMeshCoversAllItsNodes) {
+TEST(CoarseLevel, CoversAllNodesOfAMesh) {
   const model::Cloth cloth = coarse(meshOf(model::disc(12, 1)), 6);
   const CoarseLevel level = levelOf(cloth);
   expectConsistent(level);

@@ -178,8 +178,8 @@ reference::Vec3 angularMomentum(const NodeState& state) {
   return sum;
 }
 
-// The velocities that a correction gives have no sum but for roundings of 2^-24 of a metre, and no moment
-// around the middle but for the turn of the links during the correction.
+// The velocities that a correction gives have no sum, but for roundings of 2^-24 of a metre. They have no
+// moment around the middle, but for the turn of the links during the correction.
 TEST_F(Coarse, KeepsMomentumAndAngularMomentumOfAFreeCloth) {
   model::Cloth cloth = hung(21, 30);
   cloth.pins.clear();

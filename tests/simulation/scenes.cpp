@@ -24,6 +24,14 @@ model::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns) {
   return cloth;
 }
 
+model::Cloth looseCloth(std::uint32_t rows, std::uint32_t columns) {
+  model::Cloth cloth = calmCloth(rows, columns);
+  cloth.structural = cloth.shear = cloth.bend = {};
+  cloth.damping = 0;
+  cloth.thickness = 0.004f;
+  return cloth;
+}
+
 model::Cloth assembled(model::Cloth cloth, bool bendConstraints) {
   cloth.solver.kind = model::SolverKind::constraint;
   cloth.solver.path = model::ConstraintPath::assembled;

@@ -29,6 +29,8 @@ inline constexpr std::uint32_t kSolveIterations = 2000;
 // rows x columns nodes with 2 cm between them, 10 g a node, springs and damping far inside the stability
 // bound.
 model::Cloth calmCloth(std::uint32_t rows, std::uint32_t columns);
+// The same nodes without springs and damping, 4 mm thick: only contacts and gravity move them.
+model::Cloth looseCloth(std::uint32_t rows, std::uint32_t columns);
 // Enforced by constraints, with the matrices assembled.
 model::Cloth assembled(model::Cloth cloth, bool bendConstraints = false);
 // A disc of rings 2 cm apart with the springs of a calm cloth; its lightest node has more than 10 g.

@@ -39,14 +39,6 @@ std::vector<model::Pose> bent(const model::Solid& rod, float degrees) {
   return poses;
 }
 
-model::Cloth skinDust(std::uint32_t rows, std::uint32_t columns) {
-  model::Cloth cloth = calmCloth(rows, columns);
-  cloth.structural = cloth.shear = cloth.bend = {};
-  cloth.damping = 0;
-  cloth.thickness = 0.004f;
-  return cloth;
-}
-
 model::Scene skinScene(model::Cloth cloth, const model::Solid& solid) {
   model::Scene scene = sceneOf({std::move(cloth)});
   scene.colliders.push_back({.name = "solid", .shape = solid});
@@ -63,7 +55,7 @@ MovingCollider bending(const model::Solid& rod, float from, float to) {
 
 TEST_F(SkinCollision, NodesTouchABendingMeshAsInTheReference) {
   const model::Solid rod = bendingRod();
-  model::Scene scene = skinScene(skinDust(33, 33), rod);
+  model::Scene scene = skinScene(looseCloth(33, 33), rod);
   scene.substeps = 2;
   scene.simulationRate = 360;
   scene.environment.gravity = model::Vec3::Zero();
@@ -93,7 +85,7 @@ TEST_F(SkinCollision, NodesTouchABendingMeshAsInTheReference) {
 // The outer half of the rod sweeps through the nodes at up to 12 m/s and takes those in its way along.
 TEST_F(SkinCollision, ASwingingLimbPassesThroughNoNode) {
   const model::Solid rod = bendingRod();
-  model::Cloth cloth = skinDust(21, 21);
+  model::Cloth cloth = looseCloth(21, 21);
   cloth.thickness = 0.002f;
   model::Scene scene = skinScene(cloth, rod);
   scene.environment.gravity = model::Vec3::Zero();

@@ -20,15 +20,6 @@ using simulation::NodeState;
 
 class SolidCollision : public GpuTest {};
 
-// Nodes that only contacts move.
-model::Cloth solidDust(std::uint32_t rows, std::uint32_t columns) {
-  model::Cloth cloth = calmCloth(rows, columns);
-  cloth.structural = cloth.shear = cloth.bend = {};
-  cloth.damping = 0;
-  cloth.thickness = 0.004f;
-  return cloth;
-}
-
 model::Scene solidScene(model::Cloth cloth, const std::vector<model::Shape>& shapes) {
   model::Scene scene = sceneOf({std::move(cloth)});
   for (const model::Shape& shape : shapes) scene.colliders.push_back({.name = "solid", .shape = shape});
@@ -41,7 +32,7 @@ TEST_F(SolidCollision, NodesTouchMeshesAsInTheReference) {
   const model::Shape shapes[] = {torus(0.12f, 0.04f, 24, 12), boxMesh(model::Vec3(0.2f, 0.1f, 0.15f)),
                                  ballMesh(0.12f, 10)};
   for (const model::Shape& shape : shapes) {
-    model::Scene scene = solidScene(solidDust(33, 33), {shape});
+    model::Scene scene = solidScene(looseCloth(33, 33), {shape});
     scene.substeps = 1;
     scene.simulationRate = 720;
     scene.environment.gravity = model::Vec3::Zero();
@@ -79,7 +70,7 @@ TEST_F(SolidCollision, NodesTouchMeshesAsInTheReference) {
 // ring stay where they are.
 TEST_F(SolidCollision, AFastThinRingTakesTheNodesInItsWayAndNoOthers) {
   const model::Shape ring = torus(0.12f, 0.004f, 48, 8);
-  model::Cloth cloth = solidDust(33, 33);
+  model::Cloth cloth = looseCloth(33, 33);
   cloth.thickness = 0;
   model::Scene scene = solidScene(cloth, {ring});
   scene.environment.gravity = model::Vec3::Zero();
