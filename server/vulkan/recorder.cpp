@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -25,6 +26,17 @@ constexpr std::string_view kBetweenSlices;
 // Least work of a dispatch that shares a larger one. A dispatch costs a software device up to 0.1 ms, and
 // this work about 1 ms.
 constexpr std::uint64_t kLeastDispatch = 1 << 16;
+
+// Stage, reads and writes of a command, by Recorder::Command.
+struct CommandAccess {
+  Stage stage;
+  vk::AccessFlags writes, uses;
+};
+constexpr CommandAccess kAccess[] = {
+    {Stage::eComputeShader, Access::eShaderWrite, Access::eShaderRead | Access::eShaderWrite},
+    {Stage::eTransfer, Access::eTransferWrite, Access::eTransferRead | Access::eTransferWrite},
+    {Stage::eDrawIndirect, {}, Access::eIndirectCommandRead},
+};
 
 constexpr vk::AccessFlags kUses = Access::eShaderRead | Access::eShaderWrite | Access::eTransferRead |
                                   Access::eTransferWrite | Access::eIndirectCommandRead;
@@ -79,6 +91,8 @@ void Recorder::beginSlice() {
   }
   ++handles_->used;
   invocations_ = 0;
+  since_ = 0;
+  before_.fill(0);
   handles_->current().begin(vk::CommandBufferBeginInfo{});
 }
 
@@ -180,6 +194,7 @@ void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push,
   assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
   if (rehearses_) return note(bindings, most);
   count(most);
+  waitBefore(sizeCommand);
   bind(bindings, push, pushBytes);
   handles_->current().dispatchIndirect(*groups.handles().buffer, offset);
 }
@@ -193,6 +208,7 @@ void Recorder::touch(const Bindings& bindings) {
 void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes) {
   const Kernel& kernel = bindings.kernel();
   assert(open_ && pushBytes == kernel.pushConstantBytes());
+  waitBefore(kernelCommand);
   handles_->current().bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.handles().pipeline);
   if (*bindings.handles().set)
     handles_->current().bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.handles().layout, 0,
@@ -204,15 +220,30 @@ void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pu
 
 void Recorder::barrier() {
   assert(open_);
-  if (!device_->executes()) return;
-  const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses};
-  handles_->current().pipelineBarrier(kWork, kWork | Stage::eDrawIndirect, {}, memory, nullptr, nullptr);
+  for (std::uint8_t& before : before_) before |= since_;
+  since_ = 0;
+}
+
+void Recorder::waitBefore(Command command) {
+  const std::uint8_t before = std::exchange(before_[command], std::uint8_t{0});
+  since_ |= static_cast<std::uint8_t>(1u << command);
+  if (before == 0) return;
+  vk::PipelineStageFlags stages;
+  vk::AccessFlags writes;
+  for (std::uint32_t type = 0; type < kCommands; ++type) {
+    if ((before >> type & 1u) == 0) continue;
+    stages |= kAccess[type].stage;
+    writes |= kAccess[type].writes;
+  }
+  const vk::MemoryBarrier memory{.srcAccessMask = writes, .dstAccessMask = kAccess[command].uses};
+  handles_->current().pipelineBarrier(stages, kAccess[command].stage, {}, memory, nullptr, nullptr);
 }
 
 void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset,
                     std::size_t toOffset) {
   assert(open_ && fromOffset + bytes <= from.bytes() && toOffset + bytes <= to.bytes());
   if (bytes == 0 || !device_->executes()) return;
+  waitBefore(copyCommand);
   handles_->current().copyBuffer(
       *from.handles().buffer, *to.handles().buffer,
       vk::BufferCopy{.srcOffset = fromOffset, .dstOffset = toOffset, .size = bytes});
@@ -221,6 +252,7 @@ void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std
 void Recorder::fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset) {
   assert(open_ && bytes % 4 == 0 && offset % 4 == 0 && offset + bytes <= buffer.bytes());
   if (bytes == 0 || !device_->executes()) return;
+  waitBefore(copyCommand);
   handles_->current().fillBuffer(*buffer.handles().buffer, offset, bytes, value);
 }
 

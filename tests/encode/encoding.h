@@ -52,8 +52,7 @@ class Encoding {
         encoder(device(), simulation, layout, prediction),
         recorder_(device()),
         normals_(device(), vulkan::BufferPurpose::readback, simulation.normals().bytes()),
-        reference_(codec::Encoder::make(
-            layout, {.weightLag = prediction == encode::Prediction::onDevice ? encode::kWeightLag : 0})),
+        reference_(codec::Encoder::make(layout, {.weightLag = isOnDevice(prediction) ? encode::kWeightLag : 0})),
         decoder_(codec::Decoder::make(layout)),
         packet_(encoder.packetBound()),
         expected_(reference_->packetBound()) {}
@@ -77,6 +76,11 @@ class Encoding {
   double kilobytes() const { return bytes_ / 1000; }
 
  private:
+  static bool isOnDevice(encode::Prediction prediction) {
+    return prediction == encode::Prediction::onDevice ||
+           (prediction == encode::Prediction::automatic && !device().isSoftware());
+  }
+
   encode::RecordedFrame encodeAndCompare(std::uint64_t tick, bool forceKey) {
     simulation.recordNormals(recorder_);
     const encode::RecordedFrame frame = encoder.record(recorder_, tick, forceKey);
