@@ -13,6 +13,7 @@
 #include "server/reference/reference_cloth.h"
 #include "server/simulation/software_threads.h"
 #include "tests/bench/reference_check.h"
+#include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 
@@ -89,23 +90,13 @@ std::vector<Ladder> ladders() {
       {"constraint", constraint, 32, {{1, 20}, {2, 20}, {4, 20}}}};
 }
 
-// A square metre of 0.2 kg that starts level and swings down from two corners.
 model::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t size) {
-  model::Scene scene;
-  scene.name = "equal_strain";
-  scene.simulationRate = scene.streamRate = kFramesPerSecond;
-  scene.substeps = setting.substeps;
-  model::Cloth cloth;
-  cloth.name = "sheet";
-  cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
-  cloth.grid.pose.orientation = model::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0);
-  cloth.mass = kMass;
-  cloth.damping = 1;
-  cloth.pins = {
-      {.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1, .columnStep = size - 1}};
+  model::Solver solver;
+  solver.kind = ladder.kind;
+  solver.iterations = std::max(1u, setting.iterations);
+  model::Scene scene = swingingSheet(size, solver, setting.substeps);
+  model::Cloth& cloth = scene.cloths.front();
   if (ladder.tethers) cloth.tethers = model::Tethers{};
-  cloth.solver.kind = ladder.kind;
-  cloth.solver.iterations = std::max(1u, setting.iterations);
   // Forces are as stiff as the step allows: 8 (0.36 + 0.08 + 0.04) k h^2 / m = 3.84 of 4, with k = m / h^2.
   // The other solvers have the stiffness of cloth.
   const double h = scene.substepSeconds();
@@ -120,7 +111,6 @@ model::Scene sceneOf(const Ladder& ladder, const Setting& setting, std::uint32_t
     cloth.structural.damping = 1.001f * model::leastCoarseDamping(cloth, h);
     cloth.structural.stiffness *= 0.79f;
   }
-  scene.cloths = {cloth};
   return scene;
 }
 

@@ -49,4 +49,13 @@ model::Scene hungSheet(std::uint32_t size, const model::Solver& solver, std::uin
   return scene;
 }
 
+model::Scene swingingSheet(std::uint32_t size, const model::Solver& solver, std::uint32_t substeps) {
+  model::Scene scene = hungSheet(size, solver, substeps);
+  scene.simulationRate = scene.streamRate = 60;
+  model::Cloth& cloth = scene.cloths.front();
+  cloth.grid.pose.orientation = model::Quaternion(std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0);
+  cloth.pins.front().columnStep = size - 1;
+  return scene;
+}
+
 }  // namespace clothstream::bench

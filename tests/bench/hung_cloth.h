@@ -19,4 +19,7 @@ simulation::TickInputs hungClothInputs(const model::Scene& scene, std::uint64_t 
 // A square metre of 0.2 kg, hung by its upper edge, without springs. The suite chooses the solver.
 model::Scene hungSheet(std::uint32_t size, const model::Solver& solver, std::uint32_t substeps);
 
+// The same sheet, which starts level and swings down from two corners. 60 ticks a second.
+model::Scene swingingSheet(std::uint32_t size, const model::Solver& solver, std::uint32_t substeps);
+
 }  // namespace clothstream::bench
