@@ -30,8 +30,10 @@ constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
 constexpr double kTick = 2, kFrame = 8;
 constexpr double kTickDispatches = 6, kFrameDispatches = 12;
 
-// Nodes of the largest cloth that one workgroup simulates on a software device (SolveStage, XpbdStage).
-constexpr std::uint32_t kGroupSolve = 4096, kGroupGrid = 2048, kGroupMesh = 8192;
+// Nodes of the largest cloth that one workgroup simulates (SolveStage, XpbdStage): on every device, and with
+// the settings for CPUs alone.
+constexpr std::uint32_t kGroupSolve = 1024, kGroupMesh = 8192;
+constexpr std::uint32_t kCpuGroupSolve = 4096, kCpuGroupGrid = 2048;
 
 // Bytes on device and host, measured like the weights.
 constexpr double kSceneBytes = 8e6;
@@ -124,13 +126,17 @@ Work PriceModel::solverWork(const Scene& scene, const Cloth& cloth, const ClothC
   const double all = static_cast<double>(counts.allSprings());
   Work work;
   if (solver.kind == SolverKind::xpbd) {
-    const bool group = counts.nodes <= (cloth.mesh ? kGroupMesh : kGroupGrid);
-    (group ? work.groupNodeSteps : work.nodeSteps) = mesh * kCorrection * all * iterations;
-    work.dispatches = group ? 2 : 1 + iterations * (cloth.mesh ? 2.0 * counts.mostAtNode : 3);
+    const double corrections = mesh * kCorrection * all * iterations;
+    const double dispatches = 1 + iterations * (cloth.mesh ? 2.0 * counts.mostAtNode : 3);
+    const bool group = cloth.mesh && counts.nodes <= kGroupMesh;
+    const bool cpuGroup = !cloth.mesh && counts.nodes <= kCpuGroupGrid;
+    (group ? work.groupNodeSteps : cpuGroup ? work.cpuGroupNodeSteps : work.nodeSteps) = corrections;
+    work.dispatches = group || cpuGroup ? 2 : dispatches;
+    work.gpuDispatches = cpuGroup ? dispatches - 2 : 0;
   } else if (isSystem(solver.kind)) {
     const bool bend = solver.kind == SolverKind::implicitEuler || solver.bendConstraints;
     const double constraints = bend ? all : static_cast<double>(counts.springs[0] + counts.springs[1]);
-    const bool group = counts.nodes <= kGroupSolve;
+    const bool group = counts.nodes <= kGroupSolve, cpuGroup = !group && counts.nodes <= kCpuGroupSolve;
     const double active = solver.kind == SolverKind::acad ? kActive : 1;
     double prepare = mesh * kPrepare * constraints, iterate = mesh * kIteration * constraints * iterations;
     if (isAssembled(solver)) {
@@ -139,8 +145,10 @@ Work PriceModel::solverWork(const Scene& scene, const Cloth& cloth, const ClothC
       iterate = kMultiplyPair * pairs * iterations;
     }
     work.nodeSteps = active * prepare;
-    (group ? work.groupNodeSteps : work.nodeSteps) += active * iterate;
-    work.dispatches = group ? 5 : 4 + 2 * iterations;
+    (group ? work.groupNodeSteps : cpuGroup ? work.cpuGroupNodeSteps : work.nodeSteps) += active * iterate;
+    const double dispatches = 4 + 2 * iterations;
+    work.dispatches = group || cpuGroup ? 5 : dispatches;
+    work.gpuDispatches = cpuGroup ? std::max(0.0, dispatches - 5) : 0;
     if (isAcad(solver, AcadMode::limit)) {
       work.nodeSteps += active * prepare * (kLimitRounds - 1);
       work.dispatches += 5 * (kLimitRounds - 1);
@@ -159,9 +167,8 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
   if (colliderCount > scene.colliders.size())
     collisions += static_cast<double>(colliderCount - scene.colliders.size()) * colliderWork(Box{});
   const double framesPerTick = static_cast<double>(scene.streamRate) / scene.simulationRate;
-  Work work{.nodeSteps = 0,
-            .groupNodeSteps = 0,
-            .dispatches = kTickDispatches + kFrameDispatches * framesPerTick + substeps};
+  Work work{.dispatches = kTickDispatches + kFrameDispatches * framesPerTick + substeps,
+            .serialSteps = substeps * collisions};
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     const Cloth& cloth = scene.cloths[i];
     const ClothCounts& counts = cloths_[i];

@@ -17,28 +17,41 @@ struct DeviceSpeed {
   double nodeStepSeconds = 0;  // one node in one substep of a large grid that only springs move
   double dispatchSeconds = 0;  // a kernel call that waits for the one before it
   double workgroupFactor = 1;  // time of work in one workgroup, relative to the same work on the whole device
+  bool gpu = false;            // the kernels have the settings for GPUs
+  // A node-step for each node, however few these are: an invocation does its steps one after the other.
+  double serialStepSeconds = 0;
 };
 
 // Work of one tick.
 struct Work {
   double nodeSteps = 0;       // over the whole device, in node-steps (DeviceSpeed)
   double groupNodeSteps = 0;  // in single workgroups
+  // In single workgroups with the settings for CPUs, over the whole device with those for GPUs, which need
+  // gpuDispatches more.
+  double cpuGroupNodeSteps = 0, gpuDispatches = 0;
   double dispatches = 0;
+  double serialSteps = 0;  // colliders of a node, in node-steps; part of nodeSteps
 
   Work& operator+=(const Work& other) {
     nodeSteps += other.nodeSteps;
     groupNodeSteps += other.groupNodeSteps;
+    cpuGroupNodeSteps += other.cpuGroupNodeSteps;
+    gpuDispatches += other.gpuDispatches;
     dispatches += other.dispatches;
+    serialSteps += other.serialSteps;
     return *this;
   }
   void scale(double factor) {
-    nodeSteps *= factor;
-    groupNodeSteps *= factor;
-    dispatches *= factor;
+    for (double* part :
+         {&nodeSteps, &groupNodeSteps, &cpuGroupNodeSteps, &gpuDispatches, &dispatches, &serialSteps})
+      *part *= factor;
   }
   double seconds(const DeviceSpeed& speed) const {
-    return (nodeSteps + groupNodeSteps * speed.workgroupFactor) * speed.nodeStepSeconds +
-           dispatches * speed.dispatchSeconds;
+    const double whole = nodeSteps + (speed.gpu ? cpuGroupNodeSteps : 0);
+    const double groups = groupNodeSteps + (speed.gpu ? 0 : cpuGroupNodeSteps);
+    return (whole + groups * speed.workgroupFactor) * speed.nodeStepSeconds +
+           (dispatches + (speed.gpu ? gpuDispatches : 0)) * speed.dispatchSeconds +
+           serialSteps * speed.serialStepSeconds;
   }
 };
 
@@ -53,7 +66,7 @@ double colliderWork(const Shape& shape);
 // cloths, so parameters can be priced often.
 //
 // Solvers that end early are priced with all their iterations. The weights in the .cpp are fitted to measured
-// ticks (clothstream-bench price).
+// ticks on software Vulkan (clothstream-bench price) and were compared with an NVIDIA H200.
 class PriceModel {
  public:
   explicit PriceModel(const Scene& scene);

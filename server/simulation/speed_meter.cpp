@@ -12,11 +12,16 @@ namespace clothstream::simulation {
 namespace {
 
 // The few nodes show the time of a dispatch, the many nodes the time of a node. Both take about a
-// millisecond on two processors.
-constexpr std::uint32_t kFewSize = 2, kFewSubsteps = 64, kManySize = 96, kManySubsteps = 8;
+// millisecond, on two processors and on a GPU. A GPU takes as long for 256x256 nodes as for a few (measured:
+// NVIDIA H200).
+constexpr std::uint32_t kFewSize = 2, kFewSubsteps = 64, kManySize = 96, kManyOnGpu = 512, kManySubsteps = 8;
 constexpr int kTicks = 3;
-// A GPU has about this many times the speed of one workgroup: NVIDIA's H100 has 132 multiprocessors.
+// A GPU has about this many times the speed of one workgroup: NVIDIA's H100 and H200 have 132
+// multiprocessors.
 constexpr double kGpuWorkgroups = 128;
+// Measured with 64 spheres, 8 boxes and 8 hulls of 32 and 128 faces on grids of 16x16 to 256x256 nodes: a
+// sphere takes 1.5 us and a hull of 128 faces 33 us a substep (NVIDIA H200).
+constexpr double kGpuSerialStep = 4e-6;
 
 model::Scene sheetOf(std::uint32_t size, std::uint32_t substeps) {
   model::Cloth cloth;
@@ -61,21 +66,25 @@ double SpeedMeter::Sheet::measure() {
 }
 
 SpeedMeter::SpeedMeter(vulkan::Device& device)
-    : workgroupFactor_(workgroupFactorOf(device)),
+    : gpu_(device.hasGpuKernels()),
+      workgroupFactor_(workgroupFactorOf(device)),
       few_(device, kFewSize, kFewSubsteps),
-      many_(device, kManySize, kManySubsteps) {
+      many_(device, device.isSoftware() ? kManySize : kManyOnGpu, kManySubsteps) {
   // A software device compiles the kernels when they first run.
   measure();
 }
 
 model::DeviceSpeed SpeedMeter::measure() {
   const double dispatch = few_.measure() / kFewSubsteps;
-  const double nodes = double{kManySize} * kManySize * kManySubsteps;
+  const double nodes = static_cast<double>(many_.scene.nodeCount()) * kManySubsteps;
   const double many = many_.measure();
   // At least half of the time is the nodes', also if a disturbance has lengthened the few nodes' tick.
   const double forNodes = std::max(many - kManySubsteps * dispatch, many / 2);
-  return {
-      .nodeStepSeconds = forNodes / nodes, .dispatchSeconds = dispatch, .workgroupFactor = workgroupFactor_};
+  return {.nodeStepSeconds = forNodes / nodes,
+          .dispatchSeconds = dispatch,
+          .workgroupFactor = workgroupFactor_,
+          .gpu = gpu_,
+          .serialStepSeconds = few_.device.isSoftware() ? 0 : kGpuSerialStep};
 }
 
 }  // namespace clothstream::simulation

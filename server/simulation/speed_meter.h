@@ -12,7 +12,7 @@ namespace clothstream::simulation {
 // Belongs to the device's thread.
 class SpeedMeter {
  public:
-  // Uploads two small grids. Throws std::runtime_error if the device has no room for them.
+  // Uploads two grids. Throws std::runtime_error if the device has no room for them.
   explicit SpeedMeter(vulkan::Device& device);
 
   // Runs a few ticks of each grid and takes the shortest of each. Takes some milliseconds on an idle device.
@@ -32,6 +32,7 @@ class SpeedMeter {
     vulkan::Recorder recorder;
   };
 
+  const bool gpu_;
   double workgroupFactor_;
   Sheet few_, many_;
 };

@@ -99,10 +99,10 @@ class Recorder {
     dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset, most);
   }
 
-  // Makes earlier work (kernels, copies, fills, dispatch sizes) visible to later work. The device waits when a
-  // later command needs it, and only for the types of commands that there were: between kernels alone, a GPU
-  // need not wait for copies and dispatch sizes. No barrier is needed at the start or the end of a recording:
-  // recordings on one device always see each other's work.
+  // Makes earlier work (kernels, copies, fills, dispatch sizes) visible to later work. The device waits when
+  // a later command needs it, and only for the types of commands that there were: between kernels alone, a
+  // GPU need not wait for copies and dispatch sizes. No barrier is needed at the start or the end of a
+  // recording: recordings on one device always see each other's work.
   void barrier();
 
   void copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset = 0,
@@ -150,8 +150,8 @@ class Recorder {
   std::uint64_t sliceInvocations_ = ~std::uint64_t{0}, invocations_ = 0;  // limit, and of the current slice
   std::uint64_t largestDispatch_ = 0;
   std::uint32_t timedSlices_ = 0;  // slices whose start was marked
-  // Types of the commands since the last call of barrier(), and of those before it that a command of a type has
-  // not waited for, as bits.
+  // Types of the commands since the last call of barrier(), and of those before it that a command of a type
+  // has not waited for, as bits.
   std::uint8_t since_ = 0;
   std::array<std::uint8_t, kCommands> before_{};
   bool open_ = false, rehearses_ = false;

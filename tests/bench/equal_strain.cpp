@@ -12,8 +12,8 @@
 #include "server/model/coarse_level.h"
 #include "server/reference/reference_cloth.h"
 #include "server/simulation/software_threads.h"
-#include "tests/bench/reference_check.h"
 #include "tests/bench/hung_cloth.h"
+#include "tests/bench/reference_check.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
 

@@ -52,7 +52,8 @@ class Encoding {
         encoder(device(), simulation, layout, prediction),
         recorder_(device()),
         normals_(device(), vulkan::BufferPurpose::readback, simulation.normals().bytes()),
-        reference_(codec::Encoder::make(layout, {.weightLag = isOnDevice(prediction) ? encode::kWeightLag : 0})),
+        reference_(
+            codec::Encoder::make(layout, {.weightLag = isOnDevice(prediction) ? encode::kWeightLag : 0})),
         decoder_(codec::Decoder::make(layout)),
         packet_(encoder.packetBound()),
         expected_(reference_->packetBound()) {}

@@ -53,6 +53,35 @@ TEST(Price, TimeGrowsWithNodesSubstepsIterationsAndColliders) {
   }
 }
 
+// A GPU sweeps cloths of 33 to 64 nodes a side with all of its workgroups (XpbdStage, SolveStage).
+TEST(Price, GpusDivideClothsThatOneThreadOfASoftwareDeviceSolves) {
+  DeviceSpeed gpu = kSpeed;
+  gpu.gpu = true;
+  gpu.workgroupFactor = 100;
+  const auto on = [](const DeviceSpeed& speed, const Scene& scene) {
+    return PriceModel(scene).work(scene).seconds(speed);
+  };
+  DeviceSpeed software = gpu;
+  software.gpu = false;
+  for (const SolverKind kind : {SolverKind::constraint, SolverKind::acad, SolverKind::implicitEuler}) {
+    EXPECT_LT(on(gpu, sheet(64, kind)), 0.2 * on(software, sheet(64, kind))) << static_cast<int>(kind);
+    EXPECT_EQ(on(gpu, sheet(32, kind)), on(software, sheet(32, kind))) << static_cast<int>(kind);
+    EXPECT_EQ(on(gpu, sheet(65, kind)), on(software, sheet(65, kind))) << static_cast<int>(kind);
+  }
+  EXPECT_LT(on(gpu, sheet(32, SolverKind::xpbd)), 0.2 * on(software, sheet(32, SolverKind::xpbd)));
+}
+
+// Few nodes take as long as many, because each tests all colliders.
+TEST(Price, CollidersCostTheTimeOfAnInvocation) {
+  DeviceSpeed gpu = kSpeed;
+  gpu.serialStepSeconds = 1e-6;
+  Scene scene = sheet(2);
+  scene.colliders.resize(64);
+  const Work work = PriceModel(scene).work(scene);
+  EXPECT_DOUBLE_EQ(work.seconds(gpu) - work.seconds(kSpeed),
+                   scene.substeps * 64 * colliderWork(scene.colliders.front().shape) * 1e-6);
+}
+
 // Collision with a polyhedron tests its planes, one after the other.
 TEST(Price, CollidersCostMoreWithMorePlanes) {
   const auto priceWith = [](const Shape& shape) {
