@@ -46,12 +46,12 @@ const uint32_t kColliderGroup = 32;
 // floats: the box within which the list is valid (low, count, high, unused), then ascending collider numbers.
 // A count above kMaxNear means that there are too many and none is listed.
 const uint32_t kNearNodes = 16;
-const uint32_t kMaxNear = 120;
+const uint32_t kMaxNear = 56;
 const uint32_t kNearLow = 0;
 const uint32_t kNearCount = 3;
 const uint32_t kNearHigh = 4;
 const uint32_t kNearHeader = 8;
-const uint32_t kNearStride = 8 + 120;
+const uint32_t kNearStride = 8 + 56;
 
 // The thickness of a cloth adds at most this multiple of itself to a shape's reach (at the corner of a box).
 const float kThicknessReach = 1.75;

@@ -6,6 +6,7 @@ A page holds a table between the lines "<!-- report: NAME -->" and "<!-- end -->
 command, machine, commit and date.
 
   report.py --bench PROGRAM [SUITE...]   run the suites (default: all) and rewrite their tables
+  report.py --kept DEVICE                rewrite the tables NAME_on_DEVICE from the rows in tests/bench/results/DEVICE
   report.py --check                      check that the tables in docs/ are known and have the right columns
 """
 import argparse
@@ -184,8 +185,9 @@ def pages():
     return sorted((ROOT / "docs").glob("*.md"))
 
 
+# A table of another device has the name of its table on this machine, "_on_" and the device.
 def header(name):
-    columns = TABLES[name][2]
+    columns = TABLES[name.partition("_on_")[0]][2]
     return "| " + " | ".join(columns) + " |\n|" + "---|" * len(columns) + "\n"
 
 
@@ -199,7 +201,7 @@ def check():
     found = set()
     for page in pages():
         for name, content in sections(page.read_text()):
-            if name not in TABLES:
+            if name.partition("_on_")[0] not in TABLES:
                 sys.exit(f"{page.name}: report.py has no table {name}; it has {', '.join(TABLES)}")
             if header(name) not in content:
                 sys.exit(f"{page.name}: the table {name} must have the header\n{header(name)}")
@@ -250,6 +252,22 @@ def report(program, suites):
         replace(name, table)
 
 
+def keep(device):
+    """Tables from the rows of an earlier run elsewhere. run.json has its commit, date and machine."""
+    folder = RESULTS / device
+    run = json.loads((folder / "run.json").read_text())
+    for page in pages():
+        for name, _ in sections(page.read_text()):
+            base, _, of = name.partition("_on_")
+            if of != device:
+                continue
+            suite, _, _, cells = TABLES[base]
+            rows = json.loads((folder / f"{suite}.json").read_text())
+            replace(name, f"`tests/bench/results/{device}/{suite}.json`; {run['machine']}; commit {run['commit']}; "
+                          f"{run['date']}\n\n" + header(name)
+                          + "".join("| " + " | ".join(map(str, row)) + " |\n" for row in cells(rows)))
+
+
 def replace(name, table):
     for page in pages():
         text = page.read_text()
@@ -264,15 +282,18 @@ def replace(name, table):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bench", help="path of clothstream-bench")
+    parser.add_argument("--kept", metavar="DEVICE", help="rewrite the tables of this device from its kept rows")
     parser.add_argument("--check", action="store_true", help="only check the tables of docs/")
     parser.add_argument("suites", nargs="*")
     options = parser.parse_args()
     if options.check:
         check()
+    elif options.kept:
+        keep(options.kept)
     elif options.bench:
         report(options.bench, options.suites)
     else:
-        parser.error("--bench PROGRAM or --check is required")
+        parser.error("--bench PROGRAM, --kept DEVICE or --check is required")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,9 @@ constexpr std::size_t kColliderBytes =
 constexpr std::size_t kBoundsBytes =
     (kMaxColliders + kMaxColliders / shared::kColliderGroup) * sizeof(shared::ColliderBounds);
 
+// The lists are no larger than the positions, so that they limit no cloth's size (Limits::maxStorageRange).
+static_assert(shared::kNearStride * sizeof(float) <= shared::kNearNodes * sizeof(shared::vec4));
+
 constexpr std::size_t listsOf(std::uint32_t nodes) {
   return (std::size_t{nodes} + shared::kNearNodes - 1) / shared::kNearNodes;
 }
