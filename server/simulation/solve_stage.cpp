@@ -433,17 +433,24 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
                          .endIteration = 0,
                          .firstChunk = on.firstLargeChunk,
                          .nextGroup = 0};
+  // A GPU waits longer for the size of a dispatch than for workgroups that find nothing to do.
+  const bool direct = cut.spread && !isAdaptive(on);
+  const auto dispatch = [&](const Bindings& bindings) {
+    recorder.barrier();
+    if (direct)
+      recorder.dispatch(bindings, push, most);
+    else
+      recorder.dispatchIndirect(bindings, push, groupSizes,
+                                number(push.firstIteration) * sizeof(std::uint32_t), most);
+  };
   for (std::uint32_t iteration = 0; iteration < on.iterations; ++iteration) {
-    const std::size_t size = number(iteration) * sizeof(std::uint32_t);
+    push.firstIteration = iteration;
     push.nextGroup = number(iteration + 1);
-    recorder.barrier();
-    recorder.dispatchIndirect(group.multiply[from], push, groupSizes, size, most);
-    recorder.barrier();
-    recorder.dispatchIndirect(group.update[from], push, groupSizes, size, most);
+    dispatch(group.multiply[from]);
+    dispatch(group.update[from]);
   }
-  recorder.barrier();
-  recorder.dispatchIndirect(group.measure[from], push, groupSizes,
-                            number(on.iterations) * sizeof(std::uint32_t), most);
+  push.firstIteration = on.iterations;
+  dispatch(group.measure[from]);
 }
 
 void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,

@@ -19,6 +19,9 @@ shared bool last;
 void main() {
   ChunkRecord part = ownChunk();
   System system = systemAt(uint(part.system));
+  if (push.firstIteration > 0 && solves[system.number].running == 0) {
+    return;
+  }
   if (kMeasure) {
     measureChunk(system, uint(part.chunk));
   } else {

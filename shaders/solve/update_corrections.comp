@@ -8,5 +8,8 @@
 void main() {
   ChunkRecord part = ownChunk();
   System system = systemAt(uint(part.system));
-  updateChunk(system, uint(part.chunk), solves[system.number]);
+  SolveRecord solve = solves[system.number];
+  if (solve.running != 0) {
+    updateChunk(system, uint(part.chunk), solve);
+  }
 }
