@@ -33,12 +33,13 @@ server/recording   | server/encode server/model server/vulkan server/simulation 
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls
 server/discovery   | proto/discovery
+server/doctor      | server/endpoint/listen server/encode server/messages server/model server/simulation server/tls server/vulkan
 server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | proto/recording server/hosting server/recording server/step server/scene server/model
-server/program     | proto/recording server/options server/identity server/tls server/discovery server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
+server/program     | proto/recording server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
 server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec

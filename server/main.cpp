@@ -29,6 +29,8 @@ int run(const ProgramOptions& options, const program::Signals& signals) {
       return program::printScene(options);
     case Command::token:
       return program::runToken(options);
+    case Command::doctor:
+      return program::runDoctor(options, signals);
     case Command::listDevices:
       return program::listDevices();
     case Command::listMaterials:

@@ -22,6 +22,7 @@ namespace {
 
 constexpr NumberRange kPort{.min = 0, .max = 65535, .type = "PORT", .noun = "a port"};
 constexpr NumberRange kRate{.min = 1, .max = 1000};
+constexpr NumberRange kDoctorSeconds{.min = 0, .max = 600};
 constexpr NumberRange kSubsteps{.min = 1, .max = 256};
 constexpr NumberRange kTicks{.min = 1, .max = 1e9};
 constexpr NumberRange kThreads{.min = 0, .max = 64};
@@ -371,6 +372,24 @@ CLI::App& addStepCommand(OptionTable& table, Parsed& parsed) {
   return command;
 }
 
+CLI::App& addDoctorCommand(OptionTable& table, Parsed& parsed) {
+  DoctorOptions& options = parsed.options.doctor;
+  CLI::App& command = table.command(
+      "doctor", "Check the device, the machine and the configuration of a server, and say what to do");
+  table.number("--seconds", options.seconds, kDoctorSeconds,
+               "Time for measuring the sizes of cloth that the device carries. 0 leaves it out");
+  table.flag("--accept", options.accepts,
+             "Also simulate a thousand ticks of each built-in scene, and compare the states with those that "
+             "every device must reach. Takes about two minutes on two processors");
+  table.text("--report", options.report, "FILE", "Write the findings to this file, as JSON");
+  table.flag("--json", parsed.options.json, "Print the findings as JSON");
+  command.footer(
+      fmt::format("Options of the server come before the command: clothstream-server --config FILE doctor.\n"
+                  "Exit code: 0 without problems, 1 with problems, {} if interrupted.",
+                  kInterrupted));
+  return command;
+}
+
 CLI::App& addResimulateCommand(OptionTable& table, Parsed& parsed) {
   ProgramOptions& options = parsed.options;
   CLI::App& command =
@@ -560,6 +579,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   const CLI::App& resimulate = addResimulateCommand(table, parsed);
   const CLI::App& play = addPlayCommand(table, options);
   const CLI::App& token = addTokenCommand(table, parsed);
+  const CLI::App& doctor = addDoctorCommand(table, parsed);
   // For `resimulate`, 1 means a difference.
   const auto wrongArguments = [&] { return resimulate.parsed() ? recording::kWrongArguments : 1; };
 
@@ -613,6 +633,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
                     : resimulate.parsed()  ? Command::resimulate
                     : printScene.parsed()  ? Command::printScene
                     : token.parsed()       ? Command::token
+                    : doctor.parsed()      ? Command::doctor
                     : parsed.listDevices   ? Command::listDevices
                     : parsed.listMaterials ? Command::listMaterials
                                            : Command::serve;

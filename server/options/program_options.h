@@ -23,7 +23,7 @@ inline constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VER
 // Exit code after SIGINT or SIGTERM, as shells use it.
 inline constexpr int kInterrupted = 130;
 
-enum class Command { serve, play, resimulate, step, printScene, token, listDevices, listMaterials };
+enum class Command { serve, play, resimulate, step, printScene, token, doctor, listDevices, listMaterials };
 
 // Options of the command `token`.
 struct TokenOptions {
@@ -32,6 +32,13 @@ struct TokenOptions {
   std::string scene, name, subject, tenant;
   scene::Role role = scene::Role::participant;
   std::chrono::seconds valid{0};
+};
+
+// Options of the command `doctor`.
+struct DoctorOptions {
+  double seconds = 10;           // for measuring the capacity; 0 leaves it out
+  bool accepts = false;          // compares states of the built-in scenes
+  std::filesystem::path report;  // as JSON; empty: none
 };
 
 struct ProgramOptions {
@@ -92,7 +99,8 @@ struct ProgramOptions {
   std::string recording;         // file of `play` and `resimulate`
   std::string printScene;        // name or file
   std::filesystem::path states;  // file of states that `resimulate` writes; empty: none
-  bool json = false;             // `resimulate` prints one JSON object
+  bool json = false;             // `resimulate` and `doctor` print JSON
+  DoctorOptions doctor;
   TokenOptions token;
 };
 

@@ -20,6 +20,9 @@ int runSteps(const ProgramOptions& options, const Signals& signals);
 // Makes a token or a key of tokens.
 int runToken(const ProgramOptions& options);
 
+// Checks the devices, the machine and the configuration.
+int runDoctor(const ProgramOptions& options, const Signals& signals);
+
 int printScene(const ProgramOptions& options);
 int listDevices();
 int listMaterials();

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The Vulkan device of the program: its options, and its name for people.
+// The options of the Vulkan device of the program.
 #pragma once
 
 #include <cstdint>
-#include <string>
 
 #include "server/options/program_options.h"
 #include "server/vulkan/device.h"
@@ -12,8 +11,5 @@ namespace clothstream::program {
 
 // `nodes` is the size of the scene that the device will simulate.
 vulkan::DeviceOptions deviceOptions(const ProgramOptions& options, std::uint32_t nodes);
-
-// Name, kind, driver and version.
-std::string describe(const vulkan::DeviceInfo& device);
 
 }  // namespace clothstream::program

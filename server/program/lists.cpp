@@ -5,7 +5,6 @@
 #include "server/messages/scene_file.h"
 #include "server/model/material.h"
 #include "server/program/commands.h"
-#include "server/program/devices.h"
 #include "server/program/scenes.h"
 #include "server/vulkan/device.h"
 
@@ -18,7 +17,7 @@ int printScene(const ProgramOptions& options) {
 
 int listDevices() {
   for (const vulkan::DeviceInfo& device : vulkan::listDevices())
-    fmt::print("{}  {}\n", device.index, describe(device));
+    fmt::print("{}  {}\n", device.index, vulkan::describe(device));
   return 0;
 }
 

@@ -73,9 +73,9 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   serverOptions.guestScenes = std::move(builtIn);
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  guard = openEndpoints(server, options, signals, start, authenticator.get(), monitoring.get(),
-                        fmt::format("device  {}\nscenes  {}\n", describe(server.deviceInfo()), sceneList),
-                        report);
+  guard = openEndpoints(
+      server, options, signals, start, authenticator.get(), monitoring.get(),
+      fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.deviceInfo()), sceneList), report);
   return 0;
 }
 

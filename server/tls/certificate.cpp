@@ -231,6 +231,34 @@ std::chrono::system_clock::time_point expiryOf(const Certificate& certificate) {
   return expiryOf(*first);
 }
 
+bool covers(const Certificate& certificate, const std::string& name) {
+  const X509Certificate first = firstCertificate(certificate.chain);
+  return first && hasName(*first, name);
+}
+
+std::vector<std::string> namesOf(const Certificate& certificate) {
+  const X509Certificate first = firstCertificate(certificate.chain);
+  if (!first) return {};
+  std::vector<std::string> names;
+  const Names all(
+      static_cast<GENERAL_NAMES*>(X509_get_ext_d2i(first.get(), NID_subject_alt_name, nullptr, nullptr)));
+  for (int i = 0; all && i < sk_GENERAL_NAME_num(all.get()); ++i) {
+    int kind = 0;
+    const void* value = GENERAL_NAME_get0_value(sk_GENERAL_NAME_value(all.get(), i), &kind);
+    if (kind != GEN_DNS && kind != GEN_IPADD) continue;
+    const auto* string = static_cast<const ASN1_STRING*>(value);
+    const unsigned char* bytes = ASN1_STRING_get0_data(string);
+    const int size = ASN1_STRING_length(string);
+    std::array<char, INET6_ADDRSTRLEN> text{};
+    if (kind == GEN_DNS)
+      names.emplace_back(bytes, bytes + size);
+    else if ((size == 4 || size == 16) &&
+             ::inet_ntop(size == 4 ? AF_INET : AF_INET6, bytes, text.data(), text.size()) != nullptr)
+      names.emplace_back(text.data());
+  }
+  return names;
+}
+
 std::vector<std::string> namesOfThisMachine() {
   std::vector<std::string> names{"localhost"};
   std::array<char, 256> host{};

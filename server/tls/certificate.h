@@ -28,6 +28,12 @@ std::string readCertificates(const std::filesystem::path& file);
 // End of the validity of the first certificate.
 std::chrono::system_clock::time_point expiryOf(const Certificate& certificate);
 
+// Whether the first certificate is for this host name or IP address.
+bool covers(const Certificate& certificate, const std::string& name);
+
+// Host names, some with a *, and IP addresses of the first certificate.
+std::vector<std::string> namesOf(const Certificate& certificate);
+
 // Host names and IP addresses of this machine under which a home network reaches it: the name of the machine
 // with and without ".local", localhost, and the addresses of all interfaces.
 std::vector<std::string> namesOfThisMachine();

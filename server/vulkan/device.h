@@ -82,6 +82,9 @@ class DeviceLost : public std::runtime_error {
 
 std::vector<DeviceInfo> listDevices();
 
+// Name, kind, driver and version, for people.
+std::string describe(const DeviceInfo& device);
+
 // Thread-safe, except for destruction. An object created on the device belongs to one thread at a time.
 class Device {
  public:

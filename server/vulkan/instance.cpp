@@ -260,6 +260,12 @@ std::size_t select(const std::vector<Candidate>& candidates, std::string_view wa
       matches.empty() ? "no" : "more than one", wanted, listText(candidates)));
 }
 
+std::string describe(const DeviceInfo& device) {
+  constexpr const char* kKinds[] = {"discrete GPU", "integrated GPU", "virtual GPU", "software", "other"};
+  return fmt::format("{} ({}, {}, Vulkan {})", device.name, kKinds[static_cast<std::size_t>(device.kind)],
+                     device.driver, device.apiVersion);
+}
+
 std::vector<DeviceInfo> listDevices() {
   const SoftwareThreads threads(std::nullopt);
   const vk::raii::Context context = openLoader();

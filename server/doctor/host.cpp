@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+#include "server/doctor/host.h"
+
+#include <sys/timex.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <system_error>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "server/endpoint/listen/listen.h"
+#include "server/tls/certificate.h"
+
+namespace clothstream::doctor {
+namespace {
+
+constexpr double kDaysOfAdvice = 21;  // automatic renewal acts a month before the end
+
+}  // namespace
+
+Finding checkPort(const std::string& host, std::uint16_t port, const char* option) {
+  Finding finding{.level = Level::good, .topic = "port", .text = fmt::format("{}: {} port {} is free", option, host, port)};
+  if (port == 0) {
+    finding.text = fmt::format("{}: any free port", option);
+    return finding;
+  }
+  try {
+    boost::asio::io_context io;
+    endpoint::listen(io, host, port, option);
+  } catch (const std::exception& error) {
+    finding.level = Level::problem;
+    finding.text = error.what();
+    finding.fix = fmt::format("ss -ltnp shows who has a port; {} chooses another", option);
+  }
+  return finding;
+}
+
+Finding checkCertificate(const std::filesystem::path& chain, const std::filesystem::path& key,
+                         const std::vector<std::string>& names) {
+  Finding finding{.level = Level::good, .topic = "certificate", .text = {}};
+  try {
+    const tls::Certificate certificate = tls::readCertificate(chain, key);
+    const std::chrono::duration<double, std::ratio<86400>> left =
+        tls::expiryOf(certificate) - std::chrono::system_clock::now();
+    const std::vector<std::string> covered = tls::namesOf(certificate);
+    finding.figures = {{"daysLeft", left.count()}, {"names", covered}};
+    finding.text = fmt::format("{}: valid for {:.0f} more days, for {}", chain.string(), std::max(0.0, left.count()),
+                               fmt::join(covered, ", "));
+    if (left.count() <= 0) {
+      finding.level = Level::problem;
+      finding.text = fmt::format("{}: ended {:.0f} days ago; clients refuse it", chain.string(), -left.count());
+      finding.fix = "Renew it, then send SIGHUP to the server, which reads it again";
+      return finding;
+    }
+    std::vector<std::string> missing;
+    for (const std::string& name : names)
+      if (name != "*" && !tls::covers(certificate, name)) missing.push_back(name);
+    if (!missing.empty()) {
+      finding.level = Level::problem;
+      finding.text += fmt::format("; not for {} (--public-name)", fmt::join(missing, ", "));
+      finding.fix = "Get a certificate that has these names too";
+    } else if (left.count() < kDaysOfAdvice) {
+      finding.level = Level::advice;
+      finding.fix = "Renew it, then send SIGHUP to the server, which reads it again";
+    }
+  } catch (const std::exception& error) {
+    finding.level = Level::problem;
+    finding.text = error.what();
+    finding.fix = "Give --tls-certificate and --tls-key PEM files that belong together";
+  }
+  return finding;
+}
+
+Finding checkDirectory(const std::filesystem::path& directory, const char* option, double keepFreeMegabytes) {
+  Finding finding{.level = Level::good, .topic = "directory", .text = {}};
+  std::filesystem::path place = std::filesystem::absolute(directory);
+  std::error_code error;
+  while (!std::filesystem::exists(place, error) && place.has_relative_path()) place = place.parent_path();
+  if (access(place.c_str(), W_OK | X_OK) != 0 || !std::filesystem::is_directory(place, error)) {
+    finding.level = Level::problem;
+    finding.text = fmt::format("{}: nothing can be written in {}: {}", option, place.string(),
+                               std::filesystem::is_directory(place, error) ? std::strerror(errno) : "not a directory");
+    finding.fix = fmt::format("Give the server's account the right to write there, or choose another with {}", option);
+    return finding;
+  }
+  const std::filesystem::space_info space = std::filesystem::space(place, error);
+  const double free = error ? 0 : static_cast<double>(space.available) / 1e6;
+  finding.figures = {{"freeMegabytes", free}};
+  finding.text = fmt::format("{}: {} can be written, {:.0f} MB are free", option, directory.string(), free);
+  if (free < keepFreeMegabytes) {
+    finding.level = Level::problem;
+    finding.text += fmt::format(", but the server leaves {:.0f} MB free (--keep-free)", keepFreeMegabytes);
+    finding.fix = "Free some room on this disk: below this limit nothing is recorded, and no states are kept";
+  }
+  return finding;
+}
+
+Finding checkClock() {
+  Finding finding{.level = Level::good, .topic = "clock", .text = {}};
+  timex request{};
+  const int state = adjtimex(&request);
+  const auto now = std::chrono::system_clock::now();
+  finding.text = fmt::format("{:%F %T} UTC, synchronised", fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
+  if (state == TIME_ERROR || (request.status & STA_UNSYNC) != 0) {
+    finding.level = Level::advice;
+    finding.text = fmt::format("{:%F %T} UTC; the kernel does not know whether this is right",
+                               fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
+    finding.fix = "Install an NTP client, such as Debian's systemd-timesyncd or chrony: tokens and certificates "
+                  "need the right time";
+  }
+  return finding;
+}
+
+}  // namespace clothstream::doctor

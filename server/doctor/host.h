@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+// Checks of the machine and its configuration that need no device.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "server/doctor/finding.h"
+
+namespace clothstream::doctor {
+
+// Whether a server can listen there. `option` names the port in texts; port 0 is any free port.
+Finding checkPort(const std::string& host, std::uint16_t port, const char* option);
+
+// Validity and names of a certificate in PEM files. `names` are those by which clients reach the server.
+Finding checkCertificate(const std::filesystem::path& chain, const std::filesystem::path& key,
+                         const std::vector<std::string>& names);
+
+// Whether files can be written there, or in the nearest parent that exists, and how much room the disk has.
+// `keepFreeMegabytes` is what the server leaves free.
+Finding checkDirectory(const std::filesystem::path& directory, const char* option, double keepFreeMegabytes);
+
+// Whether the kernel says that the clock is synchronised. Tokens and certificates need the right time.
+Finding checkClock();
+
+}  // namespace clothstream::doctor

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// `clothstream-server doctor`: what an operator should know before others use the server.
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/doctor/acceptance.h"
+#include "server/doctor/device.h"
+#include "server/doctor/host.h"
+#include "server/program/commands.h"
+#include "server/program/devices.h"
+
+namespace clothstream::program {
+namespace {
+
+void add(doctor::Findings& all, doctor::Findings more) {
+  for (doctor::Finding& finding : more) all.push_back(std::move(finding));
+}
+
+doctor::Findings checkHost(const ProgramOptions& options) {
+  doctor::Findings findings = {doctor::checkPort(options.host, options.port, "--port"),
+                               doctor::checkPort(options.host, options.grpcPort, "--grpc-port")};
+  if (options.metricsPort)
+    findings.push_back(doctor::checkPort(options.metricsHost, *options.metricsPort, "--metrics-port"));
+  if (!options.tlsCertificate.empty())
+    findings.push_back(
+        doctor::checkCertificate(options.tlsCertificate, options.tlsKey, options.publicNames));
+  if (!options.stateDirectory.empty())
+    findings.push_back(doctor::checkDirectory(options.stateDirectory, "--state-dir", options.keepFreeMb));
+  if (!options.recordDirectory.empty())
+    findings.push_back(doctor::checkDirectory(
+        options.recordDirectory, options.recordsOnRequest ? "--recordings" : "--record", options.keepFreeMb));
+  findings.push_back(doctor::checkClock());
+  return findings;
+}
+
+void write(const std::filesystem::path& path, const nlohmann::ordered_json& report) {
+  std::ofstream file(path);
+  file << report.dump(1) << '\n';
+  if (!file.flush()) throw std::runtime_error(fmt::format("--report: {} cannot be written", path.string()));
+}
+
+}  // namespace
+
+int runDoctor(const ProgramOptions& options, const Signals& signals) {
+  doctor::Findings findings;
+  bool interrupted = false;
+  // Findings appear as they come, because some take long.
+  const auto tell = [&](doctor::Findings more) {
+    if (!options.json) fmt::print("{}", doctor::toText(more));
+    std::fflush(stdout);
+    add(findings, std::move(more));
+  };
+  tell(checkHost(options));
+  const auto optionsFor = [&](std::uint32_t nodes) { return deviceOptions(options, nodes); };
+  tell(doctor::checkDevices(optionsFor(0)));
+  if (!doctor::hasProblem(findings) && options.doctor.seconds > 0)
+    tell(doctor::measureCapacity(optionsFor, std::chrono::duration<double>(options.doctor.seconds)));
+  if (options.doctor.accepts)
+    for (const doctor::AcceptedState& expected : doctor::acceptedStates()) {
+      const auto stop = [&] { return interrupted = interrupted || signals.interrupted(); };
+      try {
+        tell({doctor::accept(optionsFor, expected, stop)});
+      } catch (const std::exception& error) {
+        if (interrupted) break;
+        tell({{.level = doctor::Level::problem,
+               .topic = "acceptance",
+               .text = fmt::format("{}: {}", expected.scene, error.what())}});
+      }
+    }
+  const nlohmann::ordered_json report{{"server", kServerName}, {"findings", doctor::toJson(findings)}};
+  if (options.json) fmt::print("{}\n", report.dump(1));
+  if (!options.doctor.report.empty()) write(options.doctor.report, report);
+  if (interrupted) return kInterrupted;
+  return doctor::hasProblem(findings) ? 1 : 0;
+}
+
+}  // namespace clothstream::program

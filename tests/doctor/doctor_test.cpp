@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+// The checks of `clothstream-server doctor`, each with a machine that is well and one that is not.
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <boost/asio/io_context.hpp>
+#include <gmock/gmock.h>
+
+#include "server/doctor/acceptance.h"
+#include "server/doctor/device.h"
+#include "server/doctor/host.h"
+#include "server/endpoint/listen/listen.h"
+#include "server/messages/scene_file.h"
+#include "server/tls/certificate.h"
+#include "tests/vulkan/gpu_test.h"
+
+namespace clothstream::tests {
+namespace {
+
+namespace fs = std::filesystem;
+using doctor::Finding;
+using doctor::Level;
+using testing::HasSubstr;
+
+class Doctor : public testing::Test {
+ protected:
+  void SetUp() override { fs::create_directories(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  // A certificate of its own for these names, and the finding about it.
+  Finding certificateFor(const std::vector<std::string>& names, const std::vector<std::string>& wanted) {
+    tls::selfSigned(folder_, names);
+    return doctor::checkCertificate(folder_ / "self.pem", folder_ / "self.key", wanted);
+  }
+
+  const fs::path folder_ = fs::temp_directory_path() / ("doctor" + std::to_string(getpid()));
+};
+
+TEST_F(Doctor, SeesWhetherAPortIsFree) {
+  boost::asio::io_context io;
+  auto other = endpoint::listen(io, "127.0.0.1", 0, "--port");
+  const std::uint16_t port = other.local_endpoint().port();
+  const Finding taken = doctor::checkPort("127.0.0.1", port, "--port");
+  EXPECT_EQ(taken.level, Level::problem);
+  EXPECT_THAT(taken.text, HasSubstr("already in use"));
+  EXPECT_THAT(taken.fix, HasSubstr("--port"));
+  other.close();
+  EXPECT_EQ(doctor::checkPort("127.0.0.1", port, "--port").level, Level::good);
+  EXPECT_EQ(doctor::checkPort("127.0.0.1", 0, "--port").level, Level::good);
+  EXPECT_EQ(doctor::checkPort("203.0.113.1", port, "--port").level, Level::problem);
+}
+
+TEST_F(Doctor, SeesTheDaysAndNamesOfACertificate) {
+  const Finding good = certificateFor({"cloth.example", "127.0.0.1"}, {"cloth.example", "*"});
+  EXPECT_EQ(good.level, Level::good) << good.text;
+  EXPECT_THAT(good.figures["names"], testing::UnorderedElementsAre("cloth.example", "127.0.0.1"));
+  EXPECT_GT(good.figures["daysLeft"].get<double>(), 30);
+  const Finding other = certificateFor({"cloth.example"}, {"other.example"});
+  EXPECT_EQ(other.level, Level::problem);
+  EXPECT_THAT(other.text, HasSubstr("not for other.example"));
+}
+
+TEST_F(Doctor, SeesACertificateThatCannotBeRead) {
+  const Finding finding = doctor::checkCertificate(folder_ / "none.pem", folder_ / "none.key", {});
+  EXPECT_EQ(finding.level, Level::problem);
+  EXPECT_THAT(finding.text, HasSubstr("none.pem"));
+}
+
+TEST_F(Doctor, SeesWhetherADirectoryCanBeWrittenAndHasRoom) {
+  const Finding good = doctor::checkDirectory(folder_ / "not" / "there" / "yet", "--state-dir", 0);
+  EXPECT_EQ(good.level, Level::good) << good.text;
+  EXPECT_FALSE(fs::exists(folder_ / "not"));
+  const Finding full = doctor::checkDirectory(folder_, "--state-dir", 1e12);
+  EXPECT_EQ(full.level, Level::problem);
+  EXPECT_THAT(full.text, HasSubstr("--keep-free"));
+  std::ofstream(folder_ / "file") << "x";
+  EXPECT_EQ(doctor::checkDirectory(folder_ / "file", "--state-dir", 0).level, Level::problem);
+}
+
+TEST_F(Doctor, PrintsLevelTopicTextAndFix) {
+  const doctor::Findings findings = {{.level = Level::good, .topic = "clock", .text = "right"},
+                                     {.level = Level::problem, .topic = "port", .text = "taken", .fix = "free it"}};
+  EXPECT_EQ(doctor::toText(findings),
+            "ok       clock        right\nproblem  port         taken\n                      free it\n");
+  EXPECT_EQ(doctor::toJson(findings).dump(),
+            R"([{"level":"ok","topic":"clock","text":"right"},)"
+            R"({"level":"problem","topic":"port","text":"taken","fix":"free it"}])");
+  EXPECT_TRUE(doctor::hasProblem(findings));
+  EXPECT_FALSE(doctor::hasProblem({findings.front()}));
+}
+
+class DoctorOfDevices : public GpuTest {
+ protected:
+  static vulkan::DeviceOptions options(std::uint32_t) { return {.validation = true}; }
+};
+
+TEST_F(DoctorOfDevices, NamesTheDeviceThatTheServerUses) {
+  const doctor::Findings findings = doctor::checkDevices({});
+  ASSERT_GE(findings.size(), 2u);
+  EXPECT_EQ(findings.back().figures["name"], device().info().name);
+  EXPECT_EQ(findings.back().level, device().isSoftware() ? Level::advice : Level::good);
+  const doctor::Findings none = doctor::checkDevices({.select = "no such device"});
+  EXPECT_TRUE(doctor::hasProblem(none));
+}
+
+TEST_F(DoctorOfDevices, MeasuresWhatADeviceCarries) {
+  const doctor::Findings findings = doctor::measureCapacity(options, std::chrono::milliseconds(300));
+  ASSERT_EQ(findings.size(), 2u);
+  for (const Finding& finding : findings) {
+    const auto& ticks = finding.figures["ticks"];
+    ASSERT_FALSE(ticks.empty());
+    EXPECT_EQ(ticks[0]["size"], 32);
+    EXPECT_GT(ticks[0]["tickMs"].get<double>(), 0);
+  }
+}
+
+TEST_F(DoctorOfDevices, AcceptsADeviceWithTheRightStatesAlone) {
+  const auto states = doctor::acceptedStates();
+  const auto small = std::ranges::find(states, "figure_11", &doctor::AcceptedState::scene);
+  ASSERT_NE(small, states.end());
+  const auto never = [] { return false; };
+  EXPECT_EQ(doctor::accept(options, *small, never).level, Level::good);
+  const Finding wrong = doctor::accept(options, {small->scene, small->hash ^ 1}, never);
+  EXPECT_EQ(wrong.level, Level::problem);
+  EXPECT_FALSE(wrong.fix.empty());
+  EXPECT_THROW(doctor::accept(options, *small, [] { return true; }), std::runtime_error);
+}
+
+TEST(AcceptedStates, AreThoseOfAllBuiltInScenes) {
+  std::vector<std::string> names;
+  for (const doctor::AcceptedState& state : doctor::acceptedStates()) names.emplace_back(state.scene);
+  EXPECT_THAT(names, testing::UnorderedElementsAreArray(messages::namedScenes()));
+}
+
+}  // namespace
+}  // namespace clothstream::tests
