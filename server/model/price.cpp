@@ -26,6 +26,8 @@ constexpr double kCorrection = 0.45;  // of a spring, with xpbd
 // Each node costs kCoarseNode in a coarse correction, and each of about four links of a coarse node
 // kCoarseLink in a sweep.
 constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
+// Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
+constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
 // Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
 constexpr double kTickDispatches = 6, kFrameDispatches = 12;
@@ -40,6 +42,7 @@ constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
 constexpr double kTriangleBytes = 400;  // of a solid
+constexpr double kSkinVertexBytes = 500;
 constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
 
 // Copies of a scene's lists: as it started, as it was accepted, as it runs, and as descriptions.
@@ -65,6 +68,24 @@ Work coarseWork(const CoarseCorrection& coarse, std::uint32_t substeps, double n
             .dispatches = 3};
   work.scale(coarse.levels * ((substeps + coarse.every - 1) / coarse.every));
   return work;
+}
+
+// Work of the kernels that move the vertices of a solid, in each tick.
+Work skinWork(const Shape& shape) {
+  const auto* solid = std::get_if<Solid>(&shape);
+  if (solid == nullptr || !(*solid)->skin) return {};
+  return {.nodeSteps = kSkinVertex * static_cast<double>((*solid)->vertices.size()) +
+                       kRefitTriangle * static_cast<double>((*solid)->triangles.size()),
+          .groupNodeSteps = 0,
+          .dispatches = kSkinDispatches};
+}
+
+// Tables of the joints of a solid, and the keys of its animation.
+double skinBytes(const ClosedMesh& mesh) {
+  if (!mesh.skin) return 0;
+  double bytes = kSkinVertexBytes * static_cast<double>(mesh.vertices.size());
+  for (const JointKey& key : mesh.skin->keys) bytes += listBytes(key.joints);
+  return bytes;
 }
 
 bool isSystem(SolverKind kind) {
@@ -185,6 +206,7 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
     work += solverWork(scene, cloth, counts);
     if (cloth.coarse) work += coarseWork(*cloth.coarse, scene.substeps, nodes * (kCoarseNode + collisions));
   }
+  for (const Collider& collider : scene.colliders) work += skinWork(collider.shape);
   if (scene.integrator == Integrator::rungeKutta4) work.dispatches += 11 * substeps;
   const auto any = [&](auto has) { return std::ranges::any_of(scene.cloths, has) ? 1.0 : 0.0; };
   work.dispatches += 3 * substeps * any([](const Cloth& cloth) { return cloth.dihedralBending != 0; });
@@ -203,7 +225,7 @@ double PriceModel::bytes(const Scene& scene) const {
   for (const Collider& collider : scene.colliders) {
     bytes += listBytes(collider.motion.keys);
     if (const auto* solid = std::get_if<Solid>(&collider.shape))
-      bytes += kTriangleBytes * static_cast<double>((*solid)->triangles.size());
+      bytes += kTriangleBytes * static_cast<double>((*solid)->triangles.size()) + skinBytes(**solid);
   }
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     const Cloth& cloth = scene.cloths[i];

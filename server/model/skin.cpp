@@ -27,11 +27,7 @@ Four product(const Four& a, const Four& b) {
           a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
 }
 
-// Rotation and position in double precision.
-struct Frame {
-  Four rotation;
-  std::array<double, 3> position;
-};
+using Frame = JointFrame;
 
 Frame frameOf(const Pose& pose) {
   return {unit(fourOf(pose.orientation)),
@@ -65,14 +61,14 @@ Frame inverse(const Frame& frame) {
   return back;
 }
 
-std::vector<Frame> composed(const Skin& skin, std::span<const Pose> local) {
-  assert(local.size() == skin.joints.size());
-  std::vector<Frame> frames;
+using Frames = std::array<Frame, kMaxJoints>;
+
+void composeFrames(const Skin& skin, std::span<const Pose> local, Frames& frames) {
+  assert(local.size() == skin.joints.size() && local.size() <= frames.size());
   for (std::size_t i = 0; i < local.size(); ++i) {
     const Frame own = frameOf(local[i]);
-    frames.push_back(skin.joints[i].parent ? inFrame(frames[*skin.joints[i].parent], own) : own);
+    frames[i] = skin.joints[i].parent ? inFrame(frames[*skin.joints[i].parent], own) : own;
   }
-  return frames;
 }
 
 Pose poseOf(const Frame& frame) {
@@ -101,8 +97,10 @@ Pose between(const Pose& a, const Pose& b, double part) {
 }  // namespace
 
 void compose(const Skin& skin, std::span<const Pose> local, std::vector<Pose>& poses) {
+  Frames frames;
+  composeFrames(skin, local, frames);
   poses.clear();
-  for (const Frame& frame : composed(skin, local)) poses.push_back(poseOf(frame));
+  for (std::size_t i = 0; i < local.size(); ++i) poses.push_back(poseOf(frames[i]));
 }
 
 std::vector<Pose> restJoints(const Skin& skin) {
@@ -127,12 +125,24 @@ void jointsAt(const Skin& skin, double seconds, std::vector<Pose>& local) {
     local.push_back(between(from.joints[i], to.joints[i], part));
 }
 
-std::vector<Transform> jointTransforms(const Skin& skin, std::span<const Pose> poses) {
-  assert(poses.size() == skin.joints.size());
-  const std::vector<Frame> rest = composed(skin, restJoints(skin));
-  std::vector<Transform> transforms;
+std::vector<JointFrame> inverseRests(const Skin& skin) {
+  Frames frames;
+  composeFrames(skin, restJoints(skin), frames);
+  std::vector<JointFrame> inverses;
+  for (std::size_t i = 0; i < skin.joints.size(); ++i) inverses.push_back(inverse(frames[i]));
+  return inverses;
+}
+
+void jointTransforms(std::span<const JointFrame> inverseRests, std::span<const Pose> poses,
+                     std::span<Transform> transforms) {
+  assert(poses.size() == inverseRests.size() && transforms.size() == poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i)
-    transforms.push_back(matrixOf(inFrame(frameOf(poses[i]), inverse(rest[i]))));
+    transforms[i] = matrixOf(inFrame(frameOf(poses[i]), inverseRests[i]));
+}
+
+std::vector<Transform> jointTransforms(const Skin& skin, std::span<const Pose> poses) {
+  std::vector<Transform> transforms(poses.size());
+  jointTransforms(inverseRests(skin), poses, transforms);
   return transforms;
 }
 

@@ -27,6 +27,7 @@ struct JointKey {
 };
 
 inline constexpr std::size_t kVertexJoints = 4;
+inline constexpr std::size_t kMaxJoints = 128;  // of a skin
 
 struct VertexJoints {
   std::array<std::uint8_t, kVertexJoints> joints{};
@@ -42,7 +43,7 @@ struct Skin {
 };
 
 // Poses of the joints in the frame of the collider, from poses relative to their parents. Only + - * / and
-// sqrt in double are used, so every machine gives the same values.
+// sqrt in double are used, so every machine gives the same values. Allocates nothing if `poses` has room.
 void compose(const Skin& skin, std::span<const Pose> local, std::vector<Pose>& poses);
 // Poses at rest and at a simulated time of the animation, relative to the parents.
 std::vector<Pose> restJoints(const Skin& skin);
@@ -51,7 +52,17 @@ void jointsAt(const Skin& skin, double seconds, std::vector<Pose>& local);
 // Rotation and translation of points: row-major, three rows of four numbers.
 using Transform = std::array<double, 12>;
 
-// How each joint moves the points of the mesh from its rest to a pose in the frame of the collider.
+// Rotation, as a quaternion x y z w of length 1, and position.
+struct JointFrame {
+  std::array<double, 4> rotation;
+  std::array<double, 3> position;
+};
+// The frame of the collider at rest, seen from each joint.
+std::vector<JointFrame> inverseRests(const Skin& skin);
+// How each joint moves the points of the mesh from its rest to a pose in the frame of the collider. All three
+// have one element for each joint.
+void jointTransforms(std::span<const JointFrame> inverseRests, std::span<const Pose> poses,
+                     std::span<Transform> transforms);
 std::vector<Transform> jointTransforms(const Skin& skin, std::span<const Pose> poses);
 Eigen::Vector3d transformed(const Transform& transform, const Eigen::Vector3d& point);
 

@@ -2,16 +2,19 @@
 // Suite price: the price of a tick, computed from the scene, and the tick that was measured.
 #include "server/model/price.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/simulation/speed_meter.h"
 #include "tests/bench/hung_cloth.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
+#include "tests/model/solids.h"
 
 namespace clothstream::bench {
 namespace {
@@ -44,6 +47,22 @@ model::Shape prism(std::uint32_t sides) {
       std::get<model::ConvexHull>(model::makeConvexHull(std::move(vertices), std::move(faces))));
 }
 
+// A ball of radius 0.3 m with `rings` rings of quads, which two joints move if it is `skinned`.
+model::Shape ball(std::uint32_t rings, bool skinned) {
+  model::ClosedMesh mesh = *model::ballMesh(0.3f, rings);
+  if (!skinned) return std::make_shared<const model::ClosedMesh>(std::move(mesh));
+  const auto at = [](float y) { return model::Pose{model::Vec3(0, y, 0), model::Quaternion::Identity()}; };
+  model::Skin skin;
+  skin.joints = {{"root", std::nullopt, at(0)}, {"top", 0, at(0.1f)}};
+  for (const model::Vec3& vertex : mesh.vertices) {
+    const float top = std::clamp(0.5f + vertex.y(), 0.0f, 1.0f);
+    skin.vertices.push_back({{0, 1, 0, 0}, {1 - top, top, 0, 0}});
+  }
+  skin.keys = {{0, {at(0), at(0.1f)}}, {0.5f, {at(0), at(0.12f)}}, {1, {at(0), at(0.1f)}}};
+  mesh.skin = std::move(skin);
+  return std::make_shared<const model::ClosedMesh>(std::move(mesh));
+}
+
 // Solvers that may end early never do: the tolerance is 0.
 std::vector<Case> cases() {
   std::vector<Case> all = {
@@ -58,7 +77,11 @@ std::vector<Case> cases() {
       {.method = "8 capsules", .colliders = 8, .shape = model::Capsule{.radius = 0.3f}},
       {.method = "8 boxes", .colliders = 8, .shape = model::Box{.size = {0.5, 0.5, 0.5}}},
       {.method = "8 hulls of 32 faces", .colliders = 8, .shape = prism(30)},
-      {.method = "8 hulls of 128 faces", .colliders = 8, .shape = prism(126)}};
+      {.method = "8 hulls of 128 faces", .colliders = 8, .shape = prism(126)},
+      {.method = "mesh of 1,848 triangles", .colliders = 1, .shape = ball(22, false)},
+      {.method = "mesh of 19,320 triangles", .colliders = 1, .shape = ball(70, false)},
+      {.method = "skin of 1,848 triangles", .colliders = 1, .shape = ball(22, true)},
+      {.method = "skin of 19,320 triangles", .colliders = 1, .shape = ball(70, true)}};
   const auto solver = [&](const char* method, model::SolverKind kind, std::uint32_t iterations) {
     all.push_back({.method = method});
     all.back().solver.kind = kind;

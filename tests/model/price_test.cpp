@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/model/meshes.h"
+#include "tests/model/solids.h"
 
 namespace clothstream::model {
 namespace {
@@ -105,6 +106,27 @@ TEST(Price, CollidersCostMoreWithMorePlanes) {
   boxes.colliders.resize(8);
   for (Collider& collider : boxes.colliders) collider.shape = Box{};
   EXPECT_DOUBLE_EQ(PriceModel(plain).work(plain, 8).nodeSteps, PriceModel(boxes).work(boxes).nodeSteps);
+}
+
+TEST(Price, MeshesWithJointsCostMoreWithMoreTriangles) {
+  const auto scene = [](std::uint32_t rings, bool skinned) {
+    ClosedMesh mesh = *ballMesh(0.3f, rings);
+    if (skinned) {
+      mesh.skin.emplace();
+      mesh.skin->joints = {{"root", std::nullopt, {}}};
+      mesh.skin->vertices.resize(mesh.vertices.size(), {{}, {1, 0, 0, 0}});
+      mesh.skin->keys = {{0, {Pose{}}}, {1, {Pose{}}}};
+    }
+    Scene made = sheet(32);
+    made.colliders.resize(1);
+    made.colliders[0].shape = std::make_shared<const ClosedMesh>(std::move(mesh));
+    return made;
+  };
+  const Scene rigid = scene(70, false), few = scene(10, true), many = scene(70, true);
+  EXPECT_EQ(secondsOf(scene(10, false)), secondsOf(rigid));
+  EXPECT_GT(secondsOf(few), secondsOf(scene(10, false)));
+  EXPECT_GT(secondsOf(many), 3 * secondsOf(few));
+  EXPECT_GT(PriceModel(many).bytes(many), PriceModel(rigid).bytes(rigid) + 200.0 * 9000);
 }
 
 TEST(Price, MemoryGrowsWithListsKeysAndTextureCoordinates) {

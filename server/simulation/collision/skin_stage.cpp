@@ -45,7 +45,7 @@ void appendFans(const model::ClosedMesh& mesh, std::vector<shared::vec4>& fans) 
   for (const std::vector<shared::vec4>& fan : around) fans.insert(fans.end(), fan.begin(), fan.end());
 }
 
-void write(const std::vector<model::Transform>& transforms, std::span<float> to) {
+void write(std::span<const model::Transform> transforms, std::span<float> to) {
   std::size_t at = 0;
   for (const model::Transform& transform : transforms)
     for (const double number : transform) to[at++] = static_cast<float>(number);
@@ -70,6 +70,8 @@ SkinTables skinTables(const SolidTables& solids) {
     const model::ClosedMesh& mesh = *solids.solids[i];
     if (!mesh.skin) continue;
     const auto joints = static_cast<std::uint32_t>(mesh.skin->joints.size());
+    std::vector<model::Pose> rest;
+    model::compose(*mesh.skin, model::restJoints(*mesh.skin), rest);
     tables.skinned.push_back({.solid = i,
                               .push = {.vertexCount = static_cast<std::uint32_t>(mesh.vertices.size()),
                                        .firstRest = CLOTHSTREAM_SKIN_VERTEX_TEXELS *
@@ -80,7 +82,9 @@ SkinTables skinTables(const SolidTables& solids) {
                                        .jointCount = joints,
                                        .reserved0 = 0,
                                        .reserved1 = 0},
-                              .bounds = model::skinBounds(*mesh.skin, mesh.vertices)});
+                              .bounds = model::skinBounds(*mesh.skin, mesh.vertices),
+                              .inverseRests = model::inverseRests(*mesh.skin),
+                              .rest = std::move(rest)});
     for (std::size_t k = 0; k < mesh.vertices.size(); ++k)
       tables.rests.push_back(restOf(mesh.vertices[k], mesh.skin->vertices[k]));
     appendFans(mesh, tables.fans);
@@ -95,16 +99,17 @@ SkinStage::SkinStage(const vulkan::Device& device, SkinTables tables, SolidTable
       solids_(solids),
       rests_(device, tables_.rests),
       fans_(device, tables_.fans),
-      transforms_(device, BufferPurpose::texels, tables_.transformCount * kTransformBytes),
-      uploads_{Buffer(device, BufferPurpose::upload, transforms_.bytes()),
-               Buffer(device, BufferPurpose::upload, transforms_.bytes())},
+      transformTexels_(device, BufferPurpose::texels, tables_.transformCount * kTransformBytes),
+      uploads_{Buffer(device, BufferPurpose::upload, transformTexels_.bytes()),
+               Buffer(device, BufferPurpose::upload, transformTexels_.bytes())},
+      transforms_(2 * model::kMaxJoints),
       skin_(device, kernelOf("skin_solid", kernels::skin_solid, {kTexels, kTexels, kStorage},
                              sizeof(shared::SkinPush), workgroupSize)),
       weigh_(device, kernelOf("weigh_solid", kernels::weigh_solid, {kTexels, kTexels, kStorage},
                               sizeof(shared::SkinPush), workgroupSize)),
       refit_(device, kernelOf("refit_solid", kernels::refit_solid, {kTexels, kStorage},
                               sizeof(shared::RefitPush), workgroupSize)),
-      skinIn_(device, skin_, {&rests_.texels(), &transforms_, &texels}),
+      skinIn_(device, skin_, {&rests_.texels(), &transformTexels_, &texels}),
       weighIn_(device, weigh_, {&fans_.texels(), &texels, &texels}),
       refitIn_(device, refit_, {&texels, &texels}) {}
 
@@ -123,19 +128,19 @@ void SkinStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingC
       return own != nullptr && *own == solid;
     });
     if (collider == colliders.end()) continue;
-    std::vector<model::Pose> rest;
-    if (collider->jointsStart.empty()) model::compose(*solid->skin, model::restJoints(*solid->skin), rest);
-    const auto start = model::jointTransforms(*solid->skin, rest.empty() ? collider->jointsStart : rest);
-    const auto end = model::jointTransforms(*solid->skin, rest.empty() ? collider->jointsEnd : rest);
-    const auto floats = upload.mapped<float>().subspan(std::size_t{12} * skinned.push.firstJoint,
-                                                       std::size_t{24} * skinned.push.jointCount);
-    write(start, floats.first(floats.size() / 2));
-    write(end, floats.last(floats.size() / 2));
+    const bool rests = collider->jointsStart.empty();
+    const std::size_t joints = skinned.push.jointCount;
+    transforms_.resize(2 * joints);
+    const auto start = std::span(transforms_).first(joints), end = std::span(transforms_).last(joints);
+    model::jointTransforms(skinned.inverseRests, rests ? skinned.rest : collider->jointsStart, start);
+    model::jointTransforms(skinned.inverseRests, rests ? skinned.rest : collider->jointsEnd, end);
+    write(transforms_, upload.mapped<float>().subspan(std::size_t{12} * skinned.push.firstJoint,
+                                                      std::size_t{24} * joints));
     const model::SkinMotion motion = model::motionBetween(skinned.bounds, start, end);
     solids_.reaches[skinned.solid] = motion.reach;
     solids_.motions[skinned.solid] = motion.farthest;
   }
-  recorder.copy(upload, transforms_, transforms_.bytes());
+  recorder.copy(upload, transformTexels_, transformTexels_.bytes());
 }
 
 void SkinStage::recordRefit(vulkan::Recorder& recorder, const SkinTables::Skinned& skinned,

@@ -21,6 +21,8 @@ struct SkinTables {
     std::uint32_t solid = 0;  // index in SolidTables
     shared::SkinPush push = {};
     model::SkinBounds bounds;
+    std::vector<model::JointFrame> inverseRests;
+    std::vector<model::Pose> rest;  // of the joints, in the frame of the collider
   };
   std::vector<Skinned> skinned;
   std::vector<shared::SkinVertexRecord> rests;
@@ -42,7 +44,7 @@ class SkinStage {
 
   void recordTables(vulkan::Recorder& recorder) const;
   // Uploads the joints of the colliders, and sets the reach and the motion of their meshes in the tables. At
-  // most one tick may be in flight. A mesh with joints belongs to one collider.
+  // most one tick may be in flight. A mesh with joints belongs to one collider. Allocates nothing.
   void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders);
   // Moves vertices, their normals and the boxes of the trees. Has its own barriers, except at the end.
   void record(vulkan::Recorder& recorder) const;
@@ -53,9 +55,11 @@ class SkinStage {
   SkinTables tables_;
   SolidTables& solids_;
   DeviceTable rests_, fans_;
-  vulkan::Buffer transforms_;
+  vulkan::Buffer transformTexels_;
   std::array<vulkan::Buffer, 2> uploads_;  // used alternately: a tick may be in flight
   std::uint32_t slot_ = 0;
+  std::vector<model::Transform>
+      transforms_;  // of the joints of one mesh, at the start and at the end of a tick
   vulkan::Kernel skin_, weigh_, refit_;
   vulkan::Bindings skinIn_, weighIn_, refitIn_;
 };
