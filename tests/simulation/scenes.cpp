@@ -220,8 +220,8 @@ simulation::TickInputs passingBall(const model::Scene& scene, int tick) {
 }
 
 std::uint64_t hashAfter(const model::Scene& scene, InputsAt inputs, int ticks,
-                        const simulation::SimulationOptions& options) {
-  Running running(scene, options);
+                        const simulation::SimulationOptions& options, vulkan::Device& device) {
+  Running running(scene, options, device);
   simulation::TickStatus status;
   for (int tick = 0; tick < ticks; ++tick) status = running.tick(inputs(scene, tick));
   EXPECT_TRUE(status.healthy);

@@ -110,7 +110,8 @@ Reports expectSameReports(const model::Scene& scene, InputsAt inputs,
                           const simulation::SimulationOptions& one,
                           const simulation::SimulationOptions& other);
 std::uint64_t hashAfter(const model::Scene& scene, InputsAt inputs, int ticks,
-                        const simulation::SimulationOptions& options = {});
+                        const simulation::SimulationOptions& options = {},
+                        vulkan::Device& device = tests::device());
 
 // Gives a running scene the cloths of `changed`. Expects that the state keeps every bit, and that the motion
 // then has the same bits as that of a simulation that always had these cloths and continues from that state.

@@ -2,6 +2,9 @@
 // Cloth against meshes whose vertices follow joints.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -17,8 +20,8 @@ using simulation::NodeState;
 class SkinCollision : public GpuTest {};
 
 // A rod along X from -0.2 to 0.2 m, of two joints: the first at the origin, the second at its middle.
-model::Solid bendingRod() {
-  model::ClosedMesh rod = *model::rodMesh(0.03f, 0.4f, 16, 24);
+model::Solid bendingRod(const model::Solid& straight = model::rodMesh(0.03f, 0.4f, 16, 24)) {
+  model::ClosedMesh rod = *straight;
   model::Skin skin;
   skin.joints = {{"root", std::nullopt, {}},
                  {"elbow", 0, {model::Vec3(0.01f, 0, 0), model::Quaternion::Identity()}}};
@@ -127,6 +130,63 @@ TEST_F(SkinCollision, GivesTheSameBitsForEveryPartitionOfTheWork) {
   };
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 32}, {.workgroupSize = 128}};
   expectSameBits(scene, inputs, 60, ways);
+}
+
+// A turn whose quaternion has the same bits on every machine, in contrast to sine and cosine. The axis has
+// length 1, and `k` is the tangent of a quarter of the angle.
+model::Quaternion exactTurn(float k, const model::Vec3& axis) {
+  const float scale = 1 / (1 + k * k), sine = 2 * k * scale;
+  return {(1 - k * k) * scale, sine * axis.x(), sine * axis.y(), sine * axis.z()};
+}
+
+// A mesh whose vertices have the same bits on every machine: they are multiples of 1/4096 m.
+model::Solid snapped(const model::Solid& solid) {
+  std::vector<model::Vec3> vertices = solid->vertices;
+  for (model::Vec3& vertex : vertices)
+    for (int axis = 0; axis < 3; ++axis) vertex[axis] = std::round(vertex[axis] * 4096) / 4096;
+  return model::solidOf(std::move(vertices), solid->triangles);
+}
+
+// A rod that bends, and a rigid ring that flies through the cloth. The bits do not depend on the device, nor
+// on its vector width (CMakeLists.txt), nor on its kernel settings.
+TEST_F(SkinCollision, ReachesTheHashOfEveryOtherDevice) {
+  model::Scene scene = skinScene(calmCloth(21, 19), bendingRod(snapped(model::rodMesh(0.03f, 0.4f, 16, 24))));
+  scene.cloths[0].pins = {topRow(scene.cloths[0])};
+  scene.colliders.push_back({.name = "ring", .shape = snapped(model::torus(0.12f, 0.02f, 24, 8))});
+  const InputsAt inputs = [](const model::Scene& in, int tick) {
+    const auto& rod = std::get<model::Solid>(in.colliders[0].shape);
+    const auto joints = [&](int t) {
+      std::vector<model::Pose> local = model::restJoints(*rod->skin), poses;
+      local[1].orientation = exactTurn(0.0125f * static_cast<float>(t), model::Vec3::UnitZ());
+      model::compose(*rod->skin, local, poses);
+      return poses;
+    };
+    const auto at = [](int t) {
+      return model::Pose{model::Vec3(0, -0.3f, 0.1f - 0.005f * static_cast<float>(t)),
+                         exactTurn(0.01f * static_cast<float>(t), model::Vec3(0.6f, 0, 0.8f))};
+    };
+    const auto rodAt = [](int t) {
+      return model::Pose{model::Vec3(0, -0.1f, 0.06f - 0.002f * static_cast<float>(t)),
+                         model::Quaternion::Identity()};
+    };
+    return inputsOf(in, {{rod, rodAt(tick), rodAt(tick + 1), 1, joints(tick), joints(tick + 1)},
+                         {in.colliders[1].shape, at(tick), at(tick + 1), 1}});
+  };
+  Running running(scene);
+  std::vector<bool> touched(2);
+  for (int tick = 0; tick < 40; ++tick) {
+    simulation::TickInputs now = inputs(scene, tick);
+    now.reportsContacts = true;
+    running.tick(now);
+    for (const simulation::ContactStatus& contact : running.contacts()) touched[contact.collider] = true;
+  }
+  EXPECT_TRUE(touched[0] && touched[1]);
+  constexpr std::uint64_t kHash = 0xb41ee68d4008bfdeu;
+  EXPECT_EQ(hashAfter(scene, inputs, 40), kHash);
+  for (const vulkan::KernelSettings kernels : {vulkan::KernelSettings::cpu, vulkan::KernelSettings::gpu}) {
+    vulkan::Device device({.kernels = kernels});
+    EXPECT_EQ(hashAfter(scene, inputs, 40, {}, device), kHash);
+  }
 }
 
 }  // namespace
