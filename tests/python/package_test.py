@@ -22,9 +22,9 @@ SMALL = TESTS / "e2e/small.json"
 
 
 @contextlib.contextmanager
-def running_server(*options):
-    """Starts a server with the scene `small` on a free port, and gives its address."""
-    command = [SERVER, "--port", "0", "--grpc-port", "0", "--scene", "small", "--scene-file", str(SMALL), *options]
+def running_server(*options, scene="small"):
+    """Starts a server with a scene of tests/e2e on a free port, and gives its address."""
+    command = [SERVER, "--port", "0", "--grpc-port", "0", "--scene", scene, "--scene-file", str(TESTS / f"e2e/{scene}.json"), *options]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         printed = ""
@@ -209,6 +209,26 @@ class Streams(unittest.TestCase):
             stream.reset()
             stream.pause(False)
             stream.next_frame()
+
+    def test_joints_move_a_mesh_and_the_cloth(self):
+        with running_server(scene="arm") as address, clothstream.join(address) as stream:
+            vertices, triangles = stream.next_frame().mesh(0)
+            self.assertEqual((vertices.shape, triangles.shape), ((8, 3), (12, 3)))
+            self.assertEqual(vertices[:, 2].max(), np.float32(0.1))
+            for z in (0.1, 0.25, 0.4):
+                poses = np.zeros((2, 7))
+                poses[:, 6], poses[1, 2] = 1, z
+                stream.next_frame()
+                stream.move_joints("block", poses)
+            for frame in stream:
+                if frame.mesh(0)[0][:, 2].max() > 0.499 and frame.positions[:, 2].max() > 0.19:
+                    break
+            self.assertEqual(stream.next_frame().mesh(99)[0].shape, (0, 3))
+            with self.assertRaisesRegex(ValueError, "8 numbers"):
+                stream.move_joints("block", [range(8)])
+            stream.move_joints("leg", poses)
+            while clothstream.Event.ERROR not in stream.wait(10):
+                pass
 
     def test_joining_says_why_it_fails(self):
         with self.assertRaisesRegex(ValueError, "HOST"):

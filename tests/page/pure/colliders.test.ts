@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Reach of colliders, which the view must show.
+// Reach of colliders, which the view must show, and meshes that joints move.
 
 import { assert, test } from "vitest";
 import { Shape, type Client, type Collider } from "@clothstream/client";
-import { reachOf } from "@clothstream/three";
+import { ColliderMeshes, reachOf } from "@clothstream/three";
 
 const vertices = Float32Array.of(0.1, 0, 0, 0, -3, 4, 1, 1, 1);
 const client = { frames: { hull: () => ({ vertices, triangles: Uint32Array.of(0, 1, 2) }) } } as unknown as Client;
@@ -19,4 +19,18 @@ test("the reach of a collider is its farthest point, and nothing for a plane", (
   assert.equal(reachOf(client, collider(Shape.box)), 3.5);
   assert.equal(reachOf(client, collider(Shape.hull)), 5);
   assert.equal(reachOf(client, collider(Shape.plane)), 0);
+});
+
+test("the drawn vertices of a small mesh follow its joints", () => {
+  const triangles = Uint32Array.of(0, 1, 2, 2, 1, 0);
+  let now = vertices;
+  const moving = { frames: { hull: () => ({ vertices: now.slice(), triangles }), hullVertices: () => now } } as unknown as Client;
+  const drawn = new ColliderMeshes();
+  const places = () => [...drawn.meshes[0]!.geometry.getAttribute("position").array];
+  const expected = () => [...triangles].flatMap((corner) => [...now.subarray(3 * corner, 3 * corner + 3)].map((value) => Math.fround(0.985 * value)));
+  drawn.place(moving, [collider(Shape.hull)]);
+  places().forEach((value, i) => assert.closeTo(value, expected()[i]!, 1e-6));
+  now = Float32Array.of(0.1, 0, 0, 0, 3, 4, 1, 2, 1);
+  drawn.place(moving, [collider(Shape.hull)]);
+  assert.deepEqual(places(), expected());
 });

@@ -52,6 +52,16 @@ class Frame:
         """Colliders of the scene and of all participants in this frame."""
         return self._current._list("cs_collider_count", "cs_get_collider", b.cs_collider, Collider)
 
+    def mesh(self, collider: int) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices, float32 of shape (vertices, 3), and triangles, uint32 of shape (triangles, 3), of a collider that is a hull
+        or a mesh: the index counts in `colliders`. They are in the frame of the collider, where joints have moved them.
+        Copies. Both are empty for other shapes."""
+        with self._current._client() as client:
+            vertices, indices, triangles = c.c_uint32(), c.c_uint32(), c.POINTER(c.c_uint32)()
+            corners = lib.cs_get_hull(client, collider, c.byref(vertices), c.byref(triangles), c.byref(indices))
+            return (array(corners, (vertices.value, 3), np.float32).copy(),
+                    array(triangles, (indices.value // 3, 3), np.uint32).copy())
+
     def _end(self) -> None:
         self._state = None
 

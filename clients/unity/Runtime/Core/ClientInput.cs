@@ -70,5 +70,15 @@ namespace ClothStream.Core
                 lock (Gate) Native.cs_move_attachment(Handle, name, at, turned, timeUs);
             Flush();
         }
+
+        /// <summary>Moves the joints of a collider of the scene that is a mesh with joints; they stay there.</summary>
+        /// <param name="poses">Seven numbers for each joint: position and quaternion x y z w, relative to its parent.</param>
+        public void MoveJoints(string collider, float[] poses, ulong timeUs)
+        {
+            fixed (byte* name = Utf8.Bytes(collider))
+            fixed (float* first = poses)
+                lock (Gate) Native.cs_move_joints(Handle, name, first, (uint)(poses.Length / 7), timeUs);
+            Flush();
+        }
     }
 }

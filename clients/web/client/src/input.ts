@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Colliders, hands and grabs of this participant.
+// Colliders, hands and grabs of this participant, and joints of the scene's colliders.
 
 import { cs_cloth_point, cs_grab, cs_grab_event, cs_own_collider } from "./layout";
 import { nowUs, type CoreHandle } from "./handle";
@@ -7,6 +7,7 @@ import { HandSide, kMaxColliders, kMaxGrabs, type Grab, type GrabEvent, type Hea
 
 const kJointFloats = 4; // x, y, z, radius
 const kHandJoints = 25; // of WebXR
+const kPoseFloats = 7; // position, quaternion x, y, z, w
 
 // Events of all participants' grabs in the newest ClientEvent.grabs.
 export function readGrabEvents(handle: CoreHandle): (GrabEvent & { participant: bigint })[] {
@@ -84,6 +85,15 @@ export class Input {
     if (!head) return core.exports.cs_set_head(pointer, 0, 0, 0, nowUs());
     core.with([head.position, head.orientation], (position, orientation) =>
       core.exports.cs_set_head(pointer, position!, orientation!, head.radius, nowUs()),
+    );
+  }
+
+  // Moves the joints of a collider of the scene that is a mesh with joints; they stay there. `poses` has seven numbers for
+  // each joint: position, then the quaternion x, y, z, w, relative to the parent.
+  moveJoints(collider: string, poses: readonly number[] | Float32Array): void {
+    const { core, pointer } = this.handle;
+    core.with([collider, Array.from(poses)], (name, numbers) =>
+      core.exports.cs_move_joints(pointer, name!, numbers!, Math.floor(poses.length / kPoseFloats), nowUs()),
     );
   }
 

@@ -40,6 +40,7 @@ export interface CoreExports {
   cs_set_shapes(client: Pointer, colliders: Pointer, count: number, nowUs: bigint): void;
   cs_set_head(client: Pointer, position3: Pointer, orientation4: Pointer, radius: number, nowUs: bigint): void;
   cs_set_hand(client: Pointer, side: number, joints: Pointer, count: number, nowUs: bigint): number;
+  cs_move_joints(client: Pointer, collider: Pointer, poses: Pointer, count: number, nowUs: bigint): void;
   cs_destroy(client: Pointer): void;
   cs_receive(client: Pointer, message: Pointer, bytes: number, nowUs: bigint): number;
   cs_update(client: Pointer, nowUs: bigint): void;

@@ -30,6 +30,8 @@ export interface Probe {
   readonly people: View["shownPeople"];
   // Drawn positions of the scene's colliders.
   readonly drawnColliders: Vec3[];
+  // Drawn vertices of the scene's colliders, in their frames.
+  readonly drawnColliderVertices: Float32Array[];
   readonly participants: Participant[];
   // Defined if the scene is a recording.
   readonly playback: Playback | undefined;
@@ -129,6 +131,9 @@ export function expose(session: Session, view: View, { headset, panel, work, his
     },
     get drawnColliders() {
       return view.colliders.map(({ position }) => position.toArray());
+    },
+    get drawnColliderVertices() {
+      return view.colliders.map(({ geometry }) => new Float32Array(geometry.getAttribute("position").array));
     },
     get participants() {
       return session.client.people.participants();

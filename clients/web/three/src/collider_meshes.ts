@@ -128,11 +128,22 @@ function geometryOf(client: Client, collider: Collider): THREE.BufferGeometry {
 // Moves the vertices of a mesh with joints to where they are now.
 function follow({ geometry }: ColliderMesh, vertices: Float32Array): void {
   const position = geometry.getAttribute("position") as THREE.BufferAttribute;
-  if (geometry.index === null || position.array.length !== vertices.length) return;
+  const corners = geometry.userData["corners"] as Uint32Array;
+  const places = position.array as Float32Array;
+  if (places.length !== (geometry.index ? vertices.length : 3 * corners.length)) return;
   let same = true;
-  for (let i = 0; same && i < vertices.length; ++i) same = vertices[i] === position.array[i];
-  if (same) return;
-  (position.array as Float32Array).set(vertices);
+  if (geometry.index) {
+    for (let i = 0; same && i < vertices.length; ++i) same = vertices[i] === places[i];
+    if (same) return;
+    places.set(vertices);
+  } else {
+    for (let i = 0; i < places.length; ++i) {
+      const place = Math.fround(kShrink * vertices[3 * corners[Math.floor(i / 3)]! + (i % 3)]!);
+      same = same && place === places[i];
+      places[i] = place;
+    }
+    if (same) return;
+  }
   position.needsUpdate = true;
   geometry.computeVertexNormals();
   geometry.computeBoundingSphere();
@@ -149,6 +160,7 @@ function hullGeometry(client: Client, collider: Collider): THREE.BufferGeometry 
   }
   // Faces do not share vertices, so that edges are sharp.
   const geometry = indexed.toNonIndexed().scale(kShrink, kShrink, kShrink);
+  geometry.userData["corners"] = triangles; // vertex of each corner
   geometry.computeVertexNormals();
   return geometry;
 }

@@ -17,6 +17,8 @@ export interface FollowOptions {
   WebSocket?: SocketConstructor;
   // Name of the scene. Default: the default scene of the server.
   scene?: string;
+  // Role to ask for: 1 is a viewer, 2 a participant, 3 an owner. Default 1.
+  role?: number;
 }
 
 export interface ReceivedFrame {
@@ -31,13 +33,13 @@ export interface ReceivedFrame {
   client: Client;
 }
 
-// Joins as a viewer and yields every frame that the server sends, until a played recording is at its end. In lockstep the
+// Joins, as a viewer by default, and yields every frame that the server sends, until a played recording is at its end. In lockstep the
 // next frame comes when the loop asks for it. Throws if the connection or the stream fails.
 export async function* frames(url: string, options: FollowOptions = {}): AsyncGenerator<ReceivedFrame, void, void> {
   const Socket = options.WebSocket ?? (globalThis as { WebSocket?: SocketConstructor }).WebSocket;
   if (!Socket) throw new Error("This Node has no WebSocket: use Node 22, or give that of the package ws");
   const module = await WebAssembly.compile(new Uint8Array(await readFile(new URL("../clothstream_core.wasm", import.meta.url))));
-  const client = new Client(await CoreModule.start(module), "whole", options.scene ?? "", "test", { name: "", role: kViewer });
+  const client = new Client(await CoreModule.start(module), "whole", options.scene ?? "", "test", { name: "", role: options.role ?? kViewer });
   const arrivals = new Arrivals(new Socket(url));
   const flush = () => {
     for (let message = client.nextOutgoing(); message; message = client.nextOutgoing()) arrivals.socket.send(message);
