@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Reads glTF 2.0 with tinygltf. Checks nodes and extensions.
+// Reads glTF 2.0 with tinygltf. Checks nodes, skins and extensions.
 #include "server/meshes/gltf_file.h"
 
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -14,6 +16,7 @@
 #include "server/meshes/file_bytes.h"
 #include "server/meshes/gltf_container.h"
 #include "server/meshes/gltf_primitive.h"
+#include "server/meshes/gltf_skeleton.h"
 
 namespace clothstream::meshes {
 namespace {
@@ -39,8 +42,8 @@ Affine localTransform(const tinygltf::Node& node) {
 
 class Gatherer {
  public:
-  Gatherer(const tinygltf::Model& model, std::uint64_t maxVertices)
-      : model_(model), maxVertices_(maxVertices), visited_(model.nodes.size(), false) {}
+  Gatherer(const tinygltf::Model& model, std::uint64_t maxVertices, const JointRequest* joints)
+      : model_(model), maxVertices_(maxVertices), joints_(joints), visited_(model.nodes.size(), false) {}
 
   Expected<MeshSource> gather() {
     const tinygltf::Scene* scene = elementAt(model_.scenes, std::max(0, model_.defaultScene));
@@ -54,6 +57,13 @@ class Gatherer {
     if (!everyPartHasUvs_) {
       source_.uvs.clear();
     }
+    if (skeleton_ && !rigidMesh_.empty())
+      return tl::unexpected(fmt::format(
+          "{} has no skin, in contrast to others: remove it, or give it the same joints", rigidMesh_));
+    if (skeleton_)
+      source_.skin = std::move(skeleton_->skin);
+    else if (joints_ && !joints_->animation.empty())
+      return tl::unexpected(noJointsError());
     return std::move(source_);
   }
 
@@ -73,12 +83,31 @@ class Gatherer {
       if (node->mesh >= 0) {
         const tinygltf::Mesh* mesh = elementAt(model_.meshes, node->mesh);
         if (!mesh) return tl::unexpected(fmt::format("mesh {} does not exist", node->mesh));
+        if (auto done = takeSkin(*node, *mesh); !done) return done;
         if (auto done = addMesh(*mesh, transform); !done) return done;
       }
       // NOLINTNEXTLINE(modernize-loop-convert): backwards
       for (auto child = node->children.rbegin(); child != node->children.rend(); ++child)
         open.emplace_back(*child, transform);
     }
+    return {};
+  }
+
+  // The first mesh with a skin decides on the skeleton.
+  Expected<void> takeSkin(const tinygltf::Node& node, const tinygltf::Mesh& mesh) {
+    if (!joints_) return {};
+    if (node.skin < 0) {
+      rigidMesh_ = fmt::format("mesh \"{}\"", mesh.name.substr(0, 64));
+      return {};
+    }
+    if (skeleton_ && node.skin != skinIndex_)
+      return tl::unexpected(
+          fmt::format("mesh \"{}\" has another skin than the meshes before: join the meshes", mesh.name));
+    if (skeleton_) return {};
+    auto read = readSkeleton(model_, node.skin, *joints_);
+    if (!read) return tl::unexpected(std::move(read.error()));
+    skeleton_ = std::move(*read);
+    skinIndex_ = node.skin;
     return {};
   }
 
@@ -90,14 +119,21 @@ class Gatherer {
   }
 
   Expected<void> addPrimitive(const tinygltf::Mesh& mesh, const tinygltf::Primitive& primitive,
-                              const Affine& transform) {
+                              const Affine& ofNode) {
     const std::size_t firstVertex = source_.vertices.size(), firstUv = source_.uvs.size();
     const Expected<GltfPrimitive> read = readPrimitive(
         model_, primitive,
         {.vertices = maxVertices_ - firstVertex, .triangles = 2 * maxVertices_ - source_.faces.size()});
     if (!read) return tl::unexpected(read.error());
+    // Joints replace the transform of the node.
+    const Affine transform = skeleton_ ? Affine(Eigen::Scaling(skeleton_->scale)) : ofNode;
     for (const model::Vec3& vertex : read->positions)
       source_.vertices.push_back((transform * vertex.cast<double>()).cast<float>());
+    if (skeleton_) {
+      const auto vertices = readVertexJoints(model_, primitive, read->positions.size(), *skeleton_);
+      if (!vertices) return tl::unexpected(vertices.error());
+      skeleton_->skin.vertices.insert(skeleton_->skin.vertices.end(), vertices->begin(), vertices->end());
+    }
     everyPartHasUvs_ = everyPartHasUvs_ && !read->uvs.empty();
     // v runs downwards in glTF and upwards here.
     for (const model::Uv& uv : read->uvs) source_.uvs.emplace_back(uv.x(), 1 - uv.y());
@@ -126,6 +162,10 @@ class Gatherer {
 
   const tinygltf::Model& model_;
   std::uint64_t maxVertices_;
+  const JointRequest* joints_;  // null: skins are ignored
+  std::optional<GltfSkeleton> skeleton_;
+  int skinIndex_ = -1;
+  std::string rigidMesh_;  // a mesh without a skin
   std::vector<bool> visited_;
   MeshSource source_;
   bool everyPartHasUvs_ = true;
@@ -183,8 +223,13 @@ class NeighbourFiles {
 
 }  // namespace
 
+std::string noJointsError() {
+  return "has no joints, so it has no animation: export it with its skin, or remove \"animation\"";
+}
+
 tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::filesystem::path& folder,
-                                               bool binary, const FileLimits& limits) {
+                                               bool binary, const FileLimits& limits,
+                                               const JointRequest* joints) {
   tinygltf::TinyGLTF loader;
   NeighbourFiles files(folder, limits.bytes - std::min<std::uint64_t>(limits.bytes, bytes.size()));
   loader.SetFsCallbacks(files.callbacks());
@@ -209,7 +254,7 @@ tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::fil
     return tl::unexpected(fmt::format("is not glTF 2.0: {}", error.empty() ? "cannot be parsed" : error));
   for (const std::string& extension : model.extensionsRequired)
     if (auto problem = unsupportedExtension(extension)) return tl::unexpected(std::move(*problem));
-  return Gatherer(model, limits.vertices).gather();
+  return Gatherer(model, limits.vertices, joints).gather();
 }
 
 }  // namespace clothstream::meshes

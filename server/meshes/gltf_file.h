@@ -16,6 +16,10 @@ namespace clothstream::meshes {
 // below. All files together are within the limit of bytes. mesh_file.h describes the result.
 [[nodiscard]] tl::expected<MeshSource, std::string> readGltf(std::string bytes,
                                                              const std::filesystem::path& folder, bool binary,
-                                                             const FileLimits& limits);
+                                                             const FileLimits& limits,
+                                                             const JointRequest* joints);
+
+// Says that an animation was named, but the file has no joints.
+std::string noJointsError();
 
 }  // namespace clothstream::meshes

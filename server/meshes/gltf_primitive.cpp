@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "server/meshes/gltf_primitive.h"
 
-#include <algorithm>
-#include <cstring>
-#include <limits>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -12,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "server/meshes/draco_mesh.h"
+#include "server/meshes/gltf_accessor.h"
 
 namespace clothstream::meshes {
 namespace {
@@ -21,77 +19,8 @@ using model::Vec3;
 template <typename T>
 using Expected = tl::expected<T, std::string>;
 
-// Elements of an accessor in its buffer. The bounds are checked.
-struct Elements {
-  const unsigned char* first = nullptr;
-  std::size_t stride = 0, count = 0;
-  int componentType = 0;
-  bool isNormalized = false;
-
-  template <typename T>
-  T at(std::size_t index, std::size_t component) const {
-    T value;
-    std::memcpy(&value, first + index * stride + component * sizeof(T), sizeof(T));
-    return value;
-  }
-};
-
-Expected<Elements> elementsOf(const tinygltf::Model& model, int index, int type) {
-  const tinygltf::Accessor* accessor = elementAt(model.accessors, index);
-  if (!accessor) return tl::unexpected(fmt::format("accessor {} does not exist", index));
-  const auto refuse = [&](std::string_view what) {
-    return tl::unexpected(fmt::format("accessor {} {}", index, what));
-  };
-  if (accessor->sparse.isSparse)
-    return refuse("is sparse, which is not supported: export it without sparse accessors");
-  if (accessor->type != type) return refuse("has the wrong number of components");
-  const tinygltf::BufferView* view = elementAt(model.bufferViews, accessor->bufferView);
-  if (view && view->extensions.contains(kMeshoptExtension)) return tl::unexpected(meshoptError());
-  const tinygltf::Buffer* buffer = view ? elementAt(model.buffers, view->buffer) : nullptr;
-  if (!buffer) return refuse("has no buffer");
-  const int stride = accessor->ByteStride(*view);
-  const std::int64_t size =
-      std::int64_t{tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(accessor->componentType))} *
-      tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor->type));
-  if (stride <= 0 || size <= 0) return refuse("has a component type or stride that glTF does not have");
-  const std::size_t bytes = buffer->data.size();
-  const bool viewFits = view->byteOffset <= bytes && view->byteLength <= bytes - view->byteOffset;
-  const bool startFits = viewFits && accessor->byteOffset <= view->byteLength;
-  const std::size_t room = startFits ? view->byteLength - accessor->byteOffset : 0;
-  const auto step = static_cast<std::size_t>(stride), last = static_cast<std::size_t>(size);
-  if (accessor->count == 0 || last > room || accessor->count - 1 > (room - last) / step)
-    return refuse(
-        fmt::format("has {} elements, which its buffer of {} bytes does not hold", accessor->count, bytes));
-  return Elements{buffer->data.data() + view->byteOffset + accessor->byteOffset, step, accessor->count,
-                  accessor->componentType, accessor->normalized};
-}
-
-// Component of an element as a float. Integers of KHR_mesh_quantization are normalised where the accessor
-// says so.
-std::optional<float> component(const Elements& elements, std::size_t i, std::size_t c) {
-  const auto number = [&]<typename T>(T value) {
-    constexpr auto kMost = static_cast<float>(std::numeric_limits<T>::max());
-    return elements.isNormalized ? std::max(static_cast<float>(value) / kMost, -1.0f)
-                                 : static_cast<float>(value);
-  };
-  switch (elements.componentType) {
-    case TINYGLTF_COMPONENT_TYPE_FLOAT:
-      return elements.at<float>(i, c);
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-      return number(elements.at<std::int8_t>(i, c));
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return number(elements.at<std::uint8_t>(i, c));
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-      return number(elements.at<std::int16_t>(i, c));
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return number(elements.at<std::uint16_t>(i, c));
-    default:
-      return std::nullopt;
-  }
-}
-
 template <typename Vector>
-Expected<std::vector<Vector>> readVectors(const Elements& elements, std::string_view what) {
+Expected<std::vector<Vector>> readVectors(const GltfElements& elements, std::string_view what) {
   std::vector<Vector> values;
   values.reserve(elements.count);
   for (std::size_t i = 0; i < elements.count; ++i) {
@@ -105,7 +34,7 @@ Expected<std::vector<Vector>> readVectors(const Elements& elements, std::string_
   return values;
 }
 
-Expected<std::vector<std::uint32_t>> readIndices(const Elements& elements) {
+Expected<std::vector<std::uint32_t>> readIndices(const GltfElements& elements) {
   std::vector<std::uint32_t> indices;
   indices.reserve(elements.count);
   for (std::size_t i = 0; i < elements.count; ++i) {
@@ -142,7 +71,7 @@ Expected<GltfPrimitive> readPlain(const tinygltf::Model& model, const tinygltf::
                                   int position, const PrimitiveLimits& limits) {
   const auto vertices = elementsOf(model, position, TINYGLTF_TYPE_VEC3);
   if (!vertices) return tl::unexpected(vertices.error());
-  std::optional<Elements> corners;
+  std::optional<GltfElements> corners;
   if (primitive.indices >= 0) {
     const auto elements = elementsOf(model, primitive.indices, TINYGLTF_TYPE_SCALAR);
     if (!elements) return tl::unexpected(elements.error());

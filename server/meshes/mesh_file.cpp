@@ -20,22 +20,24 @@ std::string ending(const std::filesystem::path& path) {
   return text;
 }
 
-tl::expected<MeshSource, std::string> read(const std::filesystem::path& path, const FileLimits& limits) {
+tl::expected<MeshSource, std::string> read(const std::filesystem::path& path, const FileLimits& limits,
+                                           const JointRequest* joints) {
   auto content = readBytes(path, limits.bytes);
   if (!content) return tl::unexpected(std::move(content.error()));
   const std::string kindOfFile = ending(path);
   if (kindOfFile != ".obj" && kindOfFile != ".gltf" && kindOfFile != ".glb")
     return tl::unexpected(
         std::string("has an unknown extension; must be .obj, .gltf or .glb: export it as one of these"));
+  if (kindOfFile == ".obj" && joints && !joints->animation.empty()) return tl::unexpected(noJointsError());
   if (kindOfFile == ".obj") return parseObj(*content);
-  return readGltf(std::move(*content), path.parent_path(), kindOfFile == ".glb", limits);
+  return readGltf(std::move(*content), path.parent_path(), kindOfFile == ".glb", limits, joints);
 }
 
 }  // namespace
 
 tl::expected<MeshSource, std::string> readMeshFile(const std::filesystem::path& path,
-                                                   const FileLimits& limits) {
-  return read(path, limits).map_error([&](const std::string& text) {
+                                                   const FileLimits& limits, const JointRequest* joints) {
+  return read(path, limits, joints).map_error([&](const std::string& text) {
     return fmt::format("{}: {}", path.string(), text);
   });
 }

@@ -2,6 +2,7 @@
 // Reads mesh files: Wavefront OBJ and glTF 2.0.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -22,11 +23,23 @@ struct FileLimits {
   std::uint64_t vertices = 0;  // of all instances in a glTF scene; buildMesh() checks those of OBJ
 };
 
+// Asks for the joints of a glTF file.
+struct JointRequest {
+  std::string animation;                        // name; empty: the first one, or none if the file has none
+  std::size_t joints = 0, keys = 0, poses = 0;  // limits; `poses` is that of the keys times the joints
+};
+
 // Reads an .obj, .gltf or .glb file. The result of a glTF file contains the triangles of all meshes in its
 // scene, transformed by its nodes. Primitives may be compressed with Draco. Each primitive is a part with the
-// name of its material, or else of its mesh. Texture coordinates are TEXCOORD_0. The error starts with the
-// path.
+// name of its material, or else of its mesh. Texture coordinates are TEXCOORD_0.
+//
+// With `joints`, the vertices of a file with a skin are where the skin binds them, and the result has the
+// skin. All meshes of the scene must have that skin then. A file without a skin is read as usual, and refused
+// if an animation is named. Without `joints`, skins are ignored.
+//
+// The error starts with the path.
 [[nodiscard]] tl::expected<MeshSource, std::string> readMeshFile(const std::filesystem::path& path,
-                                                                 const FileLimits& limits);
+                                                                 const FileLimits& limits,
+                                                                 const JointRequest* joints = nullptr);
 
 }  // namespace clothstream::meshes

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 
 #include "server/meshes/repairs.h"
 #include "server/model/mesh.h"
+#include "server/model/skin.h"
 
 namespace clothstream::meshes {
 
@@ -42,6 +44,7 @@ struct MeshSource {
   };
   std::vector<Part>
       parts;  // in the order of their faces, the first starts at face 0; empty: one part without name
+  std::optional<model::Skin> skin;  // joints of the vertices of a glTF file, if they were requested
 
   // Corner of a face, less than its cornerCount.
   SourceCorner cornerOf(const SourceFace& face, std::uint32_t corner) const {

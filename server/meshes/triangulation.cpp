@@ -11,31 +11,31 @@ namespace {
 
 using model::Triangle;
 using model::Vec3;
-using Point = Eigen::Vector2d;
+using PlanePoint = Eigen::Vector2d;
 
 // Ratio of doubled area to squared longest side below which a triangle counts as flat, as in isFlat().
 constexpr double kFlat = 1e-5;
 // Distance from the border of an ear, in terms of the same ratio, within which a corner counts as inside.
 constexpr double kOnBorder = 1e-6;
 
-double cross(const Point& a, const Point& b, const Point& c) {
+double cross(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c) {
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
 }
 
-double longestSquared(const Point& a, const Point& b, const Point& c) {
+double longestSquared(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c) {
   return std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
 }
 
 // Doubled area over the square of the longest side: 0.87 for an equilateral triangle, negative if it is
 // clockwise.
-double shapeOf(const Point& a, const Point& b, const Point& c) {
+double shapeOf(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c) {
   const double longest = longestSquared(a, b, c);
   return longest > 0 ? cross(a, b, c) / longest : 0;
 }
 
 // Projects the corners along the axis of the largest component of the polygon's normal (Newell's method). The
 // result is counter-clockwise.
-std::vector<Point> projected(std::span<const Vec3> corners) {
+std::vector<PlanePoint> projected(std::span<const Vec3> corners) {
   const Eigen::Vector3d origin = corners[0].cast<double>();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -46,7 +46,7 @@ std::vector<Point> projected(std::span<const Vec3> corners) {
   normal.cwiseAbs().maxCoeff(&axis);
   const Eigen::Index u = (axis + 1) % 3, v = (axis + 2) % 3;
   const double sign = normal[axis] < 0 ? -1 : 1;
-  std::vector<Point> points;
+  std::vector<PlanePoint> points;
   points.reserve(corners.size());
   for (const Vec3& corner : corners)
     points.emplace_back(double{corner[u]} - origin[u], sign * (double{corner[v]} - origin[v]));
@@ -54,7 +54,7 @@ std::vector<Point> projected(std::span<const Vec3> corners) {
 }
 
 // Whether every corner is convex and the polygon goes around once.
-bool isConvex(const std::vector<Point>& p) {
+bool isConvex(const std::vector<PlanePoint>& p) {
   const std::size_t n = p.size();
   for (std::size_t i = 0; i < n; ++i)
     if (shapeOf(p[i], p[(i + 1) % n], p[(i + 2) % n]) <= kFlat) return false;
@@ -80,7 +80,7 @@ std::vector<Triangle> strip(std::uint32_t count) {
 // stopped until the ear itself changes. The time is thus in proportion to the square of the corners.
 class EarClipper {
  public:
-  explicit EarClipper(const std::vector<Point>& points) : p_(points), ears_(points.size()) {
+  explicit EarClipper(const std::vector<PlanePoint>& points) : p_(points), ears_(points.size()) {
     const auto n = static_cast<std::uint32_t>(points.size());
     for (std::uint32_t i = 0; i < n; ++i) ears_[i] = {.previous = (i + n - 1) % n, .next = (i + 1) % n};
     for (std::uint32_t i = 0; i < n; ++i) {
@@ -123,7 +123,7 @@ class EarClipper {
   bool isObstacle(std::uint32_t i) const { return !ears_[i].isClipped && ears_[i].shape <= kFlat; }
 
   bool contains(std::uint32_t ear, std::uint32_t corner) const {
-    const Point &a = p_[ears_[ear].previous], &b = p_[ear], &c = p_[ears_[ear].next], &q = p_[corner];
+    const PlanePoint &a = p_[ears_[ear].previous], &b = p_[ear], &c = p_[ears_[ear].next], &q = p_[corner];
     if (q == a || q == b || q == c) return false;
     const double border = -kOnBorder * longestSquared(a, b, c);
     return cross(a, b, q) >= border && cross(b, c, q) >= border && cross(c, a, q) >= border;
@@ -149,7 +149,7 @@ class EarClipper {
     return shape > kFlat ? ear : other;
   }
 
-  const std::vector<Point>& p_;
+  const std::vector<PlanePoint>& p_;
   std::vector<Ear> ears_;
   std::vector<std::uint32_t> obstacles_;
 };
@@ -163,7 +163,7 @@ bool isFlat(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 std::vector<Triangle> triangulate(std::span<const Vec3> corners) {
   if (corners.size() == 3) return {{0, 1, 2}};
-  const std::vector<Point> points = projected(corners);
+  const std::vector<PlanePoint> points = projected(corners);
   if (isConvex(points)) return strip(static_cast<std::uint32_t>(points.size()));
   if (points.size() > kMaxConcaveCorners) return {};
   return EarClipper(points).clip();

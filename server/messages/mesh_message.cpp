@@ -87,7 +87,7 @@ meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& 
                 "files can only be named in scene files; send positions and triangles instead");
     return {};
   }
-  auto source = readMesh(message.file());
+  auto source = readMesh(message.file(), nullptr);
   if (source) return std::move(*source);
   checks.fail(path / "file", shown, source.error());
   return {};

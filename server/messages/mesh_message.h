@@ -10,6 +10,7 @@
 #include <tl/expected.hpp>
 
 #include "clothstream/v1/scene.pb.h"
+#include "server/meshes/mesh_file.h"
 #include "server/meshes/mesh_source.h"
 #include "server/messages/scene_limits.h"
 #include "server/messages/validation.h"
@@ -17,8 +18,10 @@
 
 namespace clothstream::messages {
 
-// Reads the mesh file that a scene names. The error names the file and the problem.
-using MeshReader = std::function<tl::expected<meshes::MeshSource, std::string>(const std::string& file)>;
+// Reads the mesh file that a scene names, with its joints unless `joints` is null. The error names the file
+// and the problem.
+using MeshReader = std::function<tl::expected<meshes::MeshSource, std::string>(
+    const std::string& file, const meshes::JointRequest* joints)>;
 
 // Nodes of the vertices of a mesh.
 struct VertexNodes {

@@ -13,7 +13,8 @@ namespace clothstream::messages {
 
 namespace {
 
-tl::expected<meshes::MeshSource, std::string> readEmbeddedMesh(const std::string& file) {
+tl::expected<meshes::MeshSource, std::string> readEmbeddedMesh(const std::string& file,
+                                                               const meshes::JointRequest* /*joints*/) {
   const auto all = embeddedMeshes();
   const auto mesh = std::ranges::find(all, file, &EmbeddedMesh::file);
   if (mesh == all.end()) return tl::unexpected(std::string("is not built into the program"));

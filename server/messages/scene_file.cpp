@@ -70,9 +70,9 @@ Result<model::Scene> readSceneFile(const std::filesystem::path& path, std::vecto
   if (text.size() > limits::kMaxSceneFileBytes)
     return refuse(v1::ERROR_CODE_RESOURCE_EXHAUSTED, source,
                   fmt::format("is too large: must have at most {} bytes", limits::kMaxSceneFileBytes));
-  const auto readMesh = [&](const std::string& mesh) {
+  const auto readMesh = [&](const std::string& mesh, const meshes::JointRequest* joints) {
     return meshes::readMeshFile(path.parent_path() / mesh,
-                                {.bytes = limits::kMaxMeshFileBytes, .vertices = limits::kMaxNodes});
+                                {.bytes = limits::kMaxMeshFileBytes, .vertices = limits::kMaxNodes}, joints);
   };
   return parseScene(text, source, readMesh, limits::kMaxNodes, repairs);
 }

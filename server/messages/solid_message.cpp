@@ -3,6 +3,8 @@
 
 #include <bit>
 #include <memory>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -17,6 +19,7 @@ namespace {
 struct Surface {
   std::vector<model::Vec3> vertices;
   std::vector<model::TriangleCorners> triangles;
+  std::optional<model::Skin> skin;  // of the file
 };
 
 void checkCounts(Checks& checks, const Path& path, std::size_t vertices, std::size_t triangles) {
@@ -53,7 +56,11 @@ Surface ofFile(Checks& checks, const Path& path, const v1::ColliderMesh& message
                 "files can only be named in scene files; send positions and triangles instead");
   Surface surface;
   if (checks.failed()) return surface;
-  auto source = readMesh(message.file());
+  const meshes::JointRequest joints{.animation = message.animation(),
+                                    .joints = limits::kMaxJoints,
+                                    .keys = limits::kMaxMotionKeys,
+                                    .poses = limits::kMaxAnimationPoses};
+  auto source = readMesh(message.file(), message.has_skin() ? nullptr : &joints);
   if (!source) {
     checks.fail(path / "file", shown, source.error());
     return surface;
@@ -64,6 +71,7 @@ Surface ofFile(Checks& checks, const Path& path, const v1::ColliderMesh& message
   checkCounts(checks, path, source->vertices.size(), triangles);
   if (checks.failed()) return surface;
   surface.vertices = std::move(source->vertices);
+  surface.skin = std::move(source->skin);
   for (const meshes::SourceFace& face : source->faces)
     for (std::uint32_t corner = 2; corner < face.cornerCount; ++corner)
       surface.triangles.push_back({source->cornerOf(face, 0).vertex,
@@ -82,6 +90,29 @@ void place(Checks& checks, const Path& path, float scale, std::vector<model::Vec
   }
 }
 
+// Gives the skin of a file the names, the scale and the vertices of the mesh, and checks that the joints are
+// in the world.
+std::optional<model::Skin> ofFile(Checks& checks, const Path& path, float scale, model::Skin skin,
+                                  std::span<const std::uint32_t> sources) {
+  const auto place = [&](model::Pose& pose) {
+    pose.position *= scale;
+    for (int axis = 0; axis < 3; ++axis) checks.number(path, pose.position[axis], limits::kPosition);
+  };
+  for (model::Joint& joint : skin.joints) {
+    joint.name = checks.text(path, joint.name);
+    place(joint.rest);
+  }
+  for (model::JointKey& key : skin.keys) {
+    checks.number(path, key.time, limits::kMotionTime);
+    for (model::Pose& pose : key.joints) place(pose);
+  }
+  std::vector<model::VertexJoints> vertices;
+  for (const std::uint32_t source : sources) vertices.push_back(skin.vertices[source]);
+  skin.vertices = std::move(vertices);
+  if (checks.failed()) return std::nullopt;
+  return skin;
+}
+
 template <typename Element>
 std::string littleEndian(const std::vector<Element>& elements) {
   static_assert(std::endian::native == std::endian::little && sizeof(Element) == 12);
@@ -92,6 +123,9 @@ std::string littleEndian(const std::vector<Element>& elements) {
 
 model::Solid toSolid(Checks& checks, const Path& path, const v1::ColliderMesh& message,
                      const MeshReader& readMesh) {
+  if (message.has_animation() && (message.file().empty() || message.has_skin()))
+    checks.fail(path / "animation", '"' + message.animation() + '"',
+                "is an animation of a file; give it together with \"file\", and without \"skin\"");
   const float scale =
       message.has_scale() ? checks.number(path / "scale", message.scale(), limits::kScale) : 1.0f;
   Surface surface =
@@ -110,6 +144,8 @@ model::Solid toSolid(Checks& checks, const Path& path, const v1::ColliderMesh& m
   auto& mesh = std::get<model::ClosedMesh>(made);
   if (message.has_skin())
     mesh.skin = toSkin(checks, path / "skin", message.skin(), vertexCount, mesh.sources);
+  else if (surface.skin)
+    mesh.skin = ofFile(checks, path / "file", scale, std::move(*surface.skin), mesh.sources);
   if (checks.failed()) return nullptr;
   return std::make_shared<const model::ClosedMesh>(std::move(mesh));
 }

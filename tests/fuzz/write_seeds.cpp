@@ -21,6 +21,7 @@
 #include "tests/core/scripted_server.h"
 #include "tests/fuzz/target.h"
 #include "tests/meshes/draco_sheet.h"
+#include "tests/meshes/skinned_glb.h"
 
 namespace clothstream::fuzz {
 namespace {
@@ -418,6 +419,11 @@ void writeMeshes(const std::filesystem::path& directory) {
     gltf.add(meshes::glbOf(sheet, (kSide + 1) * (kSide + 1), 6 * kSide * kSide));
   }
   draco.add(meshes::compressedSheet(meshes::kDracoCodings[0], kSide, true));
+  // Two joints that an animation moves; and without the animation.
+  meshes::SkinnedGlb skinned;
+  gltf.add(skinned.bytes());
+  skinned.root.erase("animations");
+  gltf.add(skinned.bytes());
 }
 
 void writeFiles(const std::filesystem::path& directory) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Colliders that are meshes, and their joints, in messages.
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 
@@ -9,11 +11,14 @@
 #include "server/messages/client_message.h"
 #include "server/messages/description.h"
 #include "server/messages/scene_message.h"
+#include "tests/meshes/skinned_glb.h"
 #include "tests/messages/scenes.h"
 
 namespace clothstream::messages {
 namespace {
 
+using testing::AllOf;
+using testing::HasSubstr;
 using testing::StartsWith;
 
 // smallScene() with a tetrahedron of two joints as the collider.
@@ -117,6 +122,66 @@ TEST(SolidMessage, RefusesWrongJointsWithTheFieldAndTheReason) {
               StartsWith("colliders[0].mesh.skin.animation.keys[1].time = 0:"));
   EXPECT_THAT(errorOf([](S&, M& m) { m.mutable_skin()->mutable_animation()->mutable_keys(1)->add_joints(); }),
               StartsWith("colliders[0].mesh.skin.animation.keys[1].joints: has 3 elements"));
+}
+
+// Reads an avatar from a file, with the animation and the scale of the message.
+class AvatarFile : public testing::Test {
+ protected:
+  AvatarFile() {
+    std::ofstream(path_, std::ios::binary) << meshes::SkinnedGlb().bytes();
+    mesh_.set_file("rod.glb");
+    reader_ = [this](const std::string&, const meshes::JointRequest* joints) {
+      return meshes::readMeshFile(path_, {.bytes = 1'000'000, .vertices = 1000}, joints);
+    };
+  }
+  ~AvatarFile() override { std::filesystem::remove(path_); }
+
+  Result<model::Scene> scene() const {
+    v1::Scene scene = smallScene();
+    *scene.mutable_colliders(0)->mutable_mesh() = mesh_;
+    return toScene(scene, reader_);
+  }
+
+  std::filesystem::path path_ = std::filesystem::temp_directory_path() / "clothstream_avatar_file.glb";
+  v1::ColliderMesh mesh_;
+  MeshReader reader_;
+};
+
+TEST_F(AvatarFile, GivesTheColliderItsJointsAndItsAnimation) {
+  const Result<model::Scene> whole = scene();
+  ASSERT_TRUE(whole) << whole.error().text;
+  ASSERT_TRUE(meshOf(*whole).skin);
+  EXPECT_EQ(meshOf(*whole).skin->vertices.size(), meshOf(*whole).vertices.size());
+  EXPECT_GT(meshOf(*whole).skin->keys.size(), 3u);
+  // The scene that clients get has no file, and the same bits.
+  const v1::Scene message = toMessage(*whole);
+  EXPECT_EQ(message.colliders(0).mesh().file(), "");
+  const Result<model::Scene> again = toScene(message);
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_EQ(toMessage(*again).SerializeAsString(), message.SerializeAsString());
+  mesh_.set_scale(0.5f);
+  mesh_.set_animation("lift");
+  const Result<model::Scene> half = scene();
+  ASSERT_TRUE(half) << half.error().text;
+  EXPECT_EQ(meshOf(*half).skin->keys.size(), 2u);
+  EXPECT_EQ(meshOf(*half).vertices[5], 0.5f * meshOf(*whole).vertices[5]);
+  EXPECT_EQ(meshOf(*half).skin->joints[0].rest.position, 0.5f * meshOf(*whole).skin->joints[0].rest.position);
+}
+
+TEST_F(AvatarFile, IsRefusedWithTheFieldAndTheReason) {
+  const auto errorOf = [&] {
+    const Result<model::Scene> made = scene();
+    return made ? std::string("no error") : made.error().text;
+  };
+  mesh_.set_animation("run");
+  EXPECT_THAT(errorOf(), AllOf(StartsWith("colliders[0].mesh.file = \"rod.glb\": "),
+                               HasSubstr("has no animation \"run\"; must be one of bend, lift")));
+  mesh_.clear_animation();
+  mesh_.set_scale(10'000);
+  EXPECT_THAT(errorOf(), StartsWith("colliders[0].mesh.positions"));
+  mesh_ = sceneWithMesh().colliders(0).mesh();
+  mesh_.set_animation("bend");
+  EXPECT_THAT(errorOf(), StartsWith("colliders[0].mesh.animation = \"bend\": is an animation of a file"));
 }
 
 TEST(SolidMessage, PosesOfJointsAreOfAColliderThatHasThem) {

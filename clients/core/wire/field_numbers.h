@@ -242,6 +242,7 @@ struct Face {
 };
 struct ColliderMesh {
   static constexpr Field kFile{1, WireType::kBytes};
+  static constexpr Field kAnimation{25, WireType::kBytes};
   static constexpr Field kPositions{2, WireType::kBytes};
   static constexpr Field kTriangles{3, WireType::kBytes};
   static constexpr Field kScale{4, WireType::kFixed32};

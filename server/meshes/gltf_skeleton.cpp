@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: MIT
+#include "server/meshes/gltf_skeleton.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/meshes/gltf_accessor.h"
+#include "server/meshes/gltf_channels.h"
+#include "server/meshes/gltf_primitive.h"
+
+namespace clothstream::meshes {
+namespace {
+
+template <typename T>
+using Expected = tl::expected<T, std::string>;
+
+// Joints and the nodes above them.
+constexpr std::size_t kMaxNodes = 1024;
+constexpr int kNoParent = -1;
+// Deviations of a matrix from a rotation with a scale, and of the scales of joints, relative.
+constexpr double kSimilar = 1e-3;
+// Largest rotation between two keys, as the cosine of half the angle (30 degrees): the normalised mean of two
+// quaternions then differs by less than 0.04 degrees from the arc.
+constexpr double kLargestTurn = 0.9659;
+constexpr double kShortest = 1e-4;  // s; a step between closer keys is no rotation
+constexpr float kStillSeconds = 1;  // period of an animation without motion
+
+std::optional<Similarity> similarityOf(const Eigen::Matrix4d& matrix) {
+  const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
+  const double determinant = linear.determinant();
+  if (!(determinant > 0) || !std::isfinite(determinant)) return std::nullopt;
+  const double scale = std::cbrt(determinant);
+  const Eigen::Matrix3d turn = linear / scale;
+  if (!((turn.transpose() * turn - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kSimilar))
+    return std::nullopt;
+  return Similarity{matrix.topRightCorner<3, 1>(), Eigen::Quaterniond(turn).normalized(), scale};
+}
+
+std::optional<Similarity> poseOf(const tinygltf::Node& node) {
+  if (node.matrix.size() == 16) return similarityOf(Eigen::Map<const Eigen::Matrix4d>(node.matrix.data()));
+  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+  if (node.translation.size() == 3)
+    transform.translate(Eigen::Map<const Eigen::Vector3d>(node.translation.data()));
+  if (node.rotation.size() == 4) {
+    const Eigen::Quaterniond q(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]);
+    if (!(q.norm() > kSimilar)) return std::nullopt;
+    transform.rotate(q.normalized());
+  }
+  if (node.scale.size() == 3) transform.scale(Eigen::Map<const Eigen::Vector3d>(node.scale.data()));
+  return similarityOf(transform.matrix());
+}
+
+model::Pose rigid(const Similarity& pose) {
+  return {pose.translation.cast<float>(), pose.rotation.cast<float>()};
+}
+
+bool isFinite(const model::Pose& pose) {
+  return pose.position.allFinite() && pose.orientation.coeffs().allFinite();
+}
+
+class SkeletonReader {
+ public:
+  SkeletonReader(const tinygltf::Model& model, const tinygltf::Skin& skin, const JointRequest& request)
+      : model_(model), skin_(skin), request_(request) {}
+
+  Expected<GltfSkeleton> read() {
+    for (const auto step : {&SkeletonReader::findNodes, &SkeletonReader::readPoses,
+                            &SkeletonReader::orderJoints, &SkeletonReader::bind, &SkeletonReader::animate})
+      if (auto done = (this->*step)(); !done) return tl::unexpected(std::move(done.error()));
+    return std::move(result_);
+  }
+
+ private:
+  using Done = Expected<void>;
+
+  // Lists the joints and the nodes above them, parents first.
+  Done findNodes() {
+    if (skin_.joints.empty() || skin_.joints.size() > request_.joints)
+      return tl::unexpected(
+          fmt::format("has {} joints; must have 1 to {}", skin_.joints.size(), request_.joints));
+    std::vector<int> parents(model_.nodes.size(), kNoParent);
+    for (std::size_t i = 0; i < model_.nodes.size(); ++i)
+      for (const int child : model_.nodes[i].children) {
+        if (!elementAt(model_.nodes, child))
+          return tl::unexpected(fmt::format("node {} does not exist", child));
+        int& parent = parents[static_cast<std::size_t>(child)];
+        if (parent != kNoParent) return tl::unexpected(fmt::format("node {} has two parents", child));
+        parent = static_cast<int>(i);
+      }
+    for (const int joint : skin_.joints) {
+      if (!elementAt(model_.nodes, joint))
+        return tl::unexpected(fmt::format("node {} does not exist", joint));
+      std::vector<int> branch;
+      for (int node = joint; node != kNoParent && !places_.contains(node);
+           node = parents[static_cast<std::size_t>(node)]) {
+        branch.push_back(node);
+        if (branch.size() + nodes_.size() > kMaxNodes)
+          return tl::unexpected(fmt::format("has more than {} nodes above its joints", kMaxNodes));
+        if (std::ranges::count(branch, node) > 1)
+          return tl::unexpected(fmt::format("node {} is its own ancestor", node));
+      }
+      for (; !branch.empty(); branch.pop_back()) {
+        const int node = branch.back(), parent = parents[static_cast<std::size_t>(node)];
+        places_.emplace(node, nodes_.size());
+        nodes_.push_back(node);
+        parents_.push_back(parent == kNoParent ? std::nullopt : std::optional(places_.at(parent)));
+      }
+    }
+    return {};
+  }
+
+  Done readPoses() {
+    for (const int node : nodes_) {
+      const std::optional<Similarity> pose = poseOf(model_.nodes[static_cast<std::size_t>(node)]);
+      if (!pose)
+        return tl::unexpected(
+            fmt::format("node {} is mirrored, or scaled differently along its axes: apply its scale", node));
+      poses_.push_back(*pose);
+    }
+    return {};
+  }
+
+  // Numbers the joints in the order of the file, but parents before children.
+  Done orderJoints() {
+    constexpr std::size_t kNone = ~std::size_t{0};
+    std::vector<std::size_t> fileNumber(nodes_.size(), kNone), number(nodes_.size(), kNone);
+    for (std::size_t i = 0; i < skin_.joints.size(); ++i) {
+      std::size_t& own = fileNumber[places_.at(skin_.joints[i])];
+      if (own != kNone) return tl::unexpected(fmt::format("has node {} twice as a joint", skin_.joints[i]));
+      own = i;
+    }
+    const auto parentOf = [&](std::size_t place) {
+      std::optional<std::size_t> above = parents_[place];
+      while (above && fileNumber[*above] == kNone) above = parents_[*above];
+      return above;
+    };
+    result_.numberOf.resize(skin_.joints.size());
+    while (jointPlaces_.size() < skin_.joints.size())
+      for (const int joint : skin_.joints) {
+        const std::size_t place = places_.at(joint);
+        const std::optional<std::size_t> parent = parentOf(place);
+        if (number[place] != kNone || (parent && number[*parent] == kNone)) continue;
+        number[place] = jointPlaces_.size();
+        result_.numberOf[fileNumber[place]] = static_cast<std::uint8_t>(jointPlaces_.size());
+        jointPlaces_.push_back(place);
+        model::Joint& to = result_.skin.joints.emplace_back();
+        to.name = model_.nodes[static_cast<std::size_t>(joint)].name;
+        if (parent) to.parent = static_cast<std::uint32_t>(number[*parent]);
+      }
+    return {};
+  }
+
+  // Sets the poses at which the joints are bound to the vertices, and the scale of the vertices.
+  //
+  // A joint with the matrix G moves the point v to G N v, where N is its inverse bind matrix. With the scales
+  // g and n, the point a v with a = g n moves rigidly: from the pose that has the rotation of the inverse of
+  // N and a times its translation, to the rotation and translation of G.
+  Done bind() {
+    std::vector<float> matrices;
+    if (skin_.inverseBindMatrices >= 0) {
+      auto read = readFloats(model_, skin_.inverseBindMatrices, TINYGLTF_TYPE_MAT4, request_.joints,
+                             "inverse bind matrices");
+      if (!read) return tl::unexpected(std::move(read.error()));
+      matrices = std::move(*read);
+      if (matrices.size() < 16 * skin_.joints.size())
+        return tl::unexpected(fmt::format("has {} inverse bind matrices for {} joints", matrices.size() / 16,
+                                          skin_.joints.size()));
+    }
+    const std::vector<Similarity> globals = globalsOf(poses_);
+    std::vector<Similarity> rests(jointPlaces_.size());
+    for (std::size_t i = 0; i < skin_.joints.size(); ++i) {
+      Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+      if (!matrices.empty()) matrix = Eigen::Map<const Eigen::Matrix4f>(&matrices[16 * i]).cast<double>();
+      const std::optional<Similarity> back = similarityOf(matrix);
+      if (!back)
+        return tl::unexpected(
+            fmt::format("inverse bind matrix {} mirrors, or scales differently along the axes", i));
+      const std::size_t number = result_.numberOf[i];
+      const double scale = globals[jointPlaces_[number]].scale * back->scale;
+      if (i == 0) result_.scale = scale;
+      if (!(std::abs(scale - result_.scale) < kSimilar * result_.scale))
+        return tl::unexpected(fmt::format("joint {} has another scale than joint 0: apply the scale", i));
+      rests[number] = back->inverse();
+      rests[number].translation *= result_.scale;
+      rests[number].scale = 1;
+    }
+    for (std::size_t i = 0; i < rests.size(); ++i) {
+      result_.skin.joints[i].rest = rigid(local(rests, i));
+      if (!isFinite(result_.skin.joints[i].rest))
+        return tl::unexpected(fmt::format("inverse bind matrix {} is too large", i));
+    }
+    return {};
+  }
+
+  Done animate() {
+    std::vector<GltfChannel> channels;
+    const tinygltf::Animation* animation = nullptr;
+    if (!request_.animation.empty()) {
+      const auto found = std::ranges::find(model_.animations, request_.animation, &tinygltf::Animation::name);
+      if (found == model_.animations.end())
+        return tl::unexpected(
+            fmt::format("has no animation \"{}\"; must be one of {}", request_.animation, animationNames()));
+      animation = &*found;
+    } else if (!model_.animations.empty()) {
+      animation = &model_.animations.front();
+    }
+    if (animation) {
+      auto read = readChannels(model_, *animation, nodes_, poses_, request_.keys);
+      if (!read) return tl::unexpected(std::move(read.error()));
+      channels = std::move(*read);
+    }
+    return sample(channels);
+  }
+
+  std::string animationNames() const {
+    constexpr std::size_t kMost = 20;
+    std::string names;
+    for (std::size_t i = 0; i < std::min(kMost, model_.animations.size()); ++i)
+      names += (names.empty() ? "" : ", ") + model_.animations[i].name.substr(0, 64);
+    return names.empty() ? "none, because the file has no animations" : names;
+  }
+
+  // Times of all channels. A step gets a key just before it.
+  static std::vector<float> timesOf(const std::vector<GltfChannel>& channels) {
+    std::vector<float> times;
+    for (const GltfChannel& channel : channels)
+      for (std::size_t i = 0; i < channel.times.size(); ++i) {
+        if (channel.inSteps && i > 0) times.push_back(std::nextafter(channel.times[i], 0.0f));
+        times.push_back(channel.times[i]);
+      }
+    std::ranges::sort(times);
+    const auto repeated = std::ranges::unique(times);
+    times.erase(repeated.begin(), repeated.end());
+    return times;
+  }
+
+  Done sample(const std::vector<GltfChannel>& channels) {
+    std::vector<float> times = timesOf(channels);
+    std::vector<model::JointKey>& keys = result_.skin.keys;
+    if (times.size() < 2) {
+      // Nothing moves, but the nodes may have other poses than the bound ones.
+      keys = {keyAt(channels, times.empty() ? 0 : times[0]), {}};
+      keys[0].time = 0;
+      keys[1] = {kStillSeconds, keys[0].joints};
+    } else {
+      for (std::size_t i = 0; i < times.size(); ++i) {
+        model::JointKey key = keyAt(channels, times[i]);
+        if (i > 0) addBetween(channels, times[i - 1], key);
+        key.time = times[i] - times[0];
+        keys.push_back(std::move(key));
+        if (keys.size() > request_.keys || keys.size() * jointPlaces_.size() > request_.poses)
+          return tl::unexpected(
+              fmt::format("has an animation of more than {} keys, or of more than {} poses of joints: export "
+                          "it with fewer keys",
+                          request_.keys, request_.poses));
+      }
+    }
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      if (i > 0 && !(keys[i].time > keys[i - 1].time))
+        return tl::unexpected(
+            std::string("has keys that are too close to each other: begin the animation at 0 s"));
+      if (!std::ranges::all_of(keys[i].joints, isFinite))
+        return tl::unexpected(std::string("has poses of joints that are not finite"));
+    }
+    return {};
+  }
+
+  // Adds keys between the newest one, at the time `from` of the file, and `to`.
+  void addBetween(const std::vector<GltfChannel>& channels, float from, const model::JointKey& to) {
+    const model::JointKey before = result_.skin.keys.back();
+    double cosine = 1;
+    for (std::size_t i = 0; i < to.joints.size(); ++i)
+      cosine = std::min(cosine, std::abs(double{before.joints[i].orientation.dot(to.joints[i].orientation)}));
+    const double seconds = double{to.time} - from;
+    if (cosine >= kLargestTurn || seconds < kShortest) return;
+    const int pieces = static_cast<int>(std::ceil(std::acos(cosine) / std::acos(kLargestTurn)));
+    for (int i = 1; i < pieces; ++i) {
+      model::JointKey key = keyAt(channels, from + seconds * i / pieces);
+      key.time = static_cast<float>(before.time + seconds * i / pieces);
+      result_.skin.keys.push_back(std::move(key));
+    }
+  }
+
+  // Its time is that of the file.
+  model::JointKey keyAt(const std::vector<GltfChannel>& channels, double seconds) const {
+    std::vector<Similarity> poses = poses_;
+    for (const GltfChannel& channel : channels) channel.apply(seconds, poses[channel.node]);
+    const std::vector<Similarity> globals = globalsOf(poses);
+    std::vector<Similarity> joints;
+    for (const std::size_t place : jointPlaces_) joints.push_back(globals[place]);
+    model::JointKey key{static_cast<float>(seconds), {}};
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      joints[i].scale = 1;
+      key.joints.push_back(rigid(local(joints, i)));
+    }
+    return key;
+  }
+
+  // `poses` are in the frame of the file, and joints before this one have no scale.
+  Similarity local(const std::vector<Similarity>& poses, std::size_t joint) const {
+    const std::optional<std::uint32_t> parent = result_.skin.joints[joint].parent;
+    return parent ? poses[*parent].inverse() * poses[joint] : poses[joint];
+  }
+
+  std::vector<Similarity> globalsOf(const std::vector<Similarity>& poses) const {
+    std::vector<Similarity> globals;
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      globals.push_back(parents_[i] ? globals[*parents_[i]] * poses[i] : poses[i]);
+    return globals;
+  }
+
+  const tinygltf::Model& model_;
+  const tinygltf::Skin& skin_;
+  const JointRequest& request_;
+  // Nodes, parents first; the place of each in this list, of its parent, and its pose relative to that.
+  std::vector<int> nodes_;
+  std::unordered_map<int, std::size_t> places_;
+  std::vector<std::optional<std::size_t>> parents_;
+  std::vector<Similarity> poses_;
+  std::vector<std::size_t> jointPlaces_;  // of the joints, in the order of the result
+  GltfSkeleton result_;
+};
+
+}  // namespace
+
+Expected<GltfSkeleton> readSkeleton(const tinygltf::Model& model, int skin, const JointRequest& request) {
+  const tinygltf::Skin* found = elementAt(model.skins, skin);
+  if (!found) return tl::unexpected(fmt::format("skin {} does not exist", skin));
+  return SkeletonReader(model, *found, request).read().map_error([&](const std::string& text) {
+    return fmt::format("skin \"{}\": {}", found->name.substr(0, 64), text);
+  });
+}
+
+Expected<std::vector<model::VertexJoints>> readVertexJoints(const tinygltf::Model& model,
+                                                            const tinygltf::Primitive& primitive,
+                                                            std::size_t vertices,
+                                                            const GltfSkeleton& skeleton) {
+  const auto& attributes = primitive.attributes;
+  if (attributes.contains("JOINTS_1"))
+    return tl::unexpected(std::string("has more than four joints for a vertex: export it with at most four"));
+  if (primitive.extensions.contains(kDracoExtension))
+    return tl::unexpected(
+        std::string("has joints and is compressed with Draco: export it without compression"));
+  const auto jointsAt = attributes.find("JOINTS_0"), weightsAt = attributes.find("WEIGHTS_0");
+  if (jointsAt == attributes.end() || weightsAt == attributes.end())
+    return tl::unexpected(std::string("has a skin, but no JOINTS_0 and WEIGHTS_0"));
+  const auto joints = elementsOf(model, jointsAt->second, TINYGLTF_TYPE_VEC4);
+  if (!joints) return tl::unexpected(joints.error());
+  const auto weights = readFloats(model, weightsAt->second, TINYGLTF_TYPE_VEC4, vertices, "weights");
+  if (!weights) return tl::unexpected(weights.error());
+  if (joints->count != vertices || weights->size() != model::kVertexJoints * vertices)
+    return tl::unexpected(fmt::format("has {} joints and {} weights for {} vertices", joints->count,
+                                      weights->size() / model::kVertexJoints, vertices));
+  const bool isByte = joints->componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
+  if (!isByte && joints->componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)
+    return tl::unexpected(std::string("has joints that are not unsigned bytes or shorts"));
+  std::vector<model::VertexJoints> result(vertices);
+  for (std::size_t i = 0; i < vertices; ++i) {
+    double sum = 0;
+    for (std::size_t k = 0; k < model::kVertexJoints; ++k) {
+      const float weight = (*weights)[model::kVertexJoints * i + k];
+      const std::uint32_t joint = isByte ? joints->at<std::uint8_t>(i, k) : joints->at<std::uint16_t>(i, k);
+      if (weight < 0 || weight > 1)
+        return tl::unexpected(fmt::format("vertex {} has the weight {}; must be 0 to 1", i, weight));
+      if (weight > 0 && joint >= skeleton.numberOf.size())
+        return tl::unexpected(fmt::format("vertex {} has joint {}; the skin has {} joints", i, joint,
+                                          skeleton.numberOf.size()));
+      result[i].joints[k] = weight > 0 ? skeleton.numberOf[joint] : 0;
+      result[i].weights[k] = weight;
+      sum += double{weight};
+    }
+    if (!(sum > 0)) return tl::unexpected(fmt::format("vertex {} has no weight", i));
+    for (float& weight : result[i].weights) weight = static_cast<float>(double{weight} / sum);
+  }
+  return result;
+}
+
+}  // namespace clothstream::meshes
