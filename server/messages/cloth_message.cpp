@@ -112,7 +112,8 @@ model::CoarseCorrection toCoarse(Checks& checks, const Path& path, const v1::Coa
 // Self-collision and tethers with their defaults, and the coarse correction, if the message has them.
 void addParts(Checks& checks, const Path& path, const v1::Cloth& message, model::Cloth& cloth) {
   if (message.has_self_collision())
-    cloth.selfCollision = model::SelfCollision{.radius = model::shortestSpring(cloth) / 2};
+    cloth.selfCollision = model::SelfCollision{.radius = model::shortestSpring(cloth) / 2,
+                                               .nothingPasses = message.self_collision().nothing_passes()};
   const auto bounded = [&](std::string_view field, std::string_view verb) {
     if (cloth.nodeCount() > limits::kMaxSolverNodes)
       checks.fail(path / field, "",

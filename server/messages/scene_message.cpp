@@ -154,6 +154,20 @@ void checkCoarse(Checks& checks, const model::Scene& scene) {
       checks.fail(Path().at("cloths", static_cast<int>(i)) / "coarse", "", *error);
 }
 
+void checkMotionBound(Checks& checks, const model::Scene& scene) {
+  const Path root;
+  std::uint64_t nodes = 0;
+  for (std::size_t i = 0; i < scene.cloths.size() && !checks.failed(); ++i) {
+    const model::Cloth& cloth = scene.cloths[i];
+    if (!cloth.selfCollision || !cloth.selfCollision->nothingPasses) continue;
+    nodes += cloth.nodeCount();
+    if (nodes > limits::kMaxBoundNodes)
+      checks.fail(root.at("cloths", static_cast<int>(i)) / "selfCollision" / "nothingPasses", "true",
+                  fmt::format("is for at most {} nodes in all cloths that have it; with this one they are {}",
+                              limits::kMaxBoundNodes, nodes));
+  }
+}
+
 // Selecting nodes takes time for every node of a range, and for every node and region. Checked before any
 // node is selected.
 void checkSelections(Checks& checks, const model::Scene& scene) {
@@ -385,6 +399,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);
   checkCoarse(checks, scene);
+  checkMotionBound(checks, scene);
   if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
   most.cancellation.check();
   if (!checks.failed())

@@ -15,7 +15,7 @@ namespace {
 // A node of a grid has six springs.
 constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
 constexpr double kRungeKutta = 14;  // as a factor
-constexpr double kAir = 0.5, kHinge = 2, kSelfCollision = 20;
+constexpr double kAir = 0.5, kHinge = 2, kSelfCollision = 20, kMotionBound = 120;
 // Each node and collider costs these. Each plane of a shape costs kPlane more.
 constexpr double kCollider = 0.5, kPlane = 0.05, kBoxPlanes = 6, kGatherCollider = 0.1;
 // Each spring of the linear system costs these. ACAD is assumed to have a quarter of its springs active.
@@ -30,7 +30,7 @@ constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
 // Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
-constexpr double kTickDispatches = 6, kFrameDispatches = 12;
+constexpr double kTickDispatches = 6, kFrameDispatches = 12, kBoundDispatches = 14;
 
 // Nodes of the largest cloth that one workgroup simulates (SolveStage, XpbdStage): on every device, and with
 // the settings for CPUs alone.
@@ -40,7 +40,7 @@ constexpr std::uint32_t kCpuGroupSolve = 4096, kCpuGroupGrid = 2048;
 // Bytes on device and host, measured like the weights.
 constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
-constexpr double kSelfCollisionBytes = 600, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
+constexpr double kSelfCollisionBytes = 600, kMotionBoundBytes = 1000, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
 constexpr double kTriangleBytes = 400;  // of a solid
 constexpr double kSkinVertexBytes = 500;
 constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
@@ -86,6 +86,10 @@ double skinBytes(const ClosedMesh& mesh) {
   double bytes = kSkinVertexBytes * static_cast<double>(mesh.vertices.size());
   for (const JointKey& key : mesh.skin->keys) bytes += listBytes(key.joints);
   return bytes;
+}
+
+bool boundsMotion(const Cloth& cloth) {
+  return cloth.selfCollision && cloth.selfCollision->nothingPasses;
 }
 
 bool isSystem(SolverKind kind) {
@@ -199,7 +203,7 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
     if (scene.integrator == Integrator::rungeKutta4) step *= kRungeKutta;
     if (scene.environment.airDensity != 0 && (cloth.drag != 0 || cloth.lift != 0)) step += kAir * nodes;
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
-    if (cloth.selfCollision) step += kSelfCollision * nodes;
+    if (cloth.selfCollision) step += (boundsMotion(cloth) ? kSelfCollision + kMotionBound : kSelfCollision) * nodes;
     step += collisions * nodes;
     work.nodeSteps +=
         substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
@@ -216,6 +220,7 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
   work.dispatches += substeps * (solids ? 1 : 0);
   work.dispatches +=
       (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
+  work.dispatches += kBoundDispatches * substeps * any(boundsMotion);
   return work;
 }
 
@@ -239,6 +244,7 @@ double PriceModel::bytes(const Scene& scene) const {
                listBytes(cloth.mesh->shape.uvTriangles);
     if (cloth.selfCollision) bytes += kSelfCollisionBytes * nodes;
     if (cloth.coarse) bytes += cloth.coarse->levels * (cloth.mesh ? kCoarseMeshBytes : kCoarseBytes) * nodes;
+    if (boundsMotion(cloth)) bytes += kMotionBoundBytes * nodes;
     if (cloth.dihedralBending != 0) bytes += kHingeBytes * static_cast<double>(counts.hinges);
     if (isSystem(cloth.solver.kind) || cloth.solver.kind == SolverKind::xpbd) bytes += kSystemBytes * springs;
     if (isAssembled(cloth.solver)) bytes += kPairBytes * static_cast<double>(counts.pairs);

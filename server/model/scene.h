@@ -127,6 +127,9 @@ struct SelfCollision {
   float radius = 0;  // m, above 0
   // Coulomb. Two cloths use the mean of their values.
   float friction = initial(parameters::ClothNumber::ballFriction);
+  // True: motions are shortened so that no triangle of the cloth passes through one of a cloth with the same
+  // setting, or of its own.
+  bool nothingPasses = false;
 };
 inline constexpr float kNeighbours = 1.1f;
 

@@ -39,6 +39,7 @@ ReferenceSimulation::ReferenceSimulation(const model::Scene& scene)
       cloths_(scene.cloths.begin(), scene.cloths.end()),
       attachments_(scene),
       selfCollision_(scene),
+      motionBound_(scene),
       coarse_(scene.cloths.size()),
       before_(scene.cloths.size()) {
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
@@ -69,6 +70,7 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
   if (selfCollision_.exists())
     for (int i = 0; i < model::kContactIterations; ++i) collideWithCloth(inputs, index);
   for (std::size_t i = 0; i < cloths_.size(); ++i) collide(inputs, index, i, true);
+  if (motionBound_.exists()) boundMotion();
 }
 
 void ReferenceSimulation::collide(const TickInputs& inputs, std::uint32_t index, std::size_t cloth,
@@ -112,6 +114,28 @@ void ReferenceSimulation::correct(const CoarseCorrection& level, std::size_t num
   const double rate = 1 / (since * scene_.substepSeconds());
   for (std::size_t i = 0; i < ways.size(); ++i)
     cloth.velocities()[i] = velocities[i] + rate * cloth.velocities()[i];
+}
+
+void ReferenceSimulation::boundMotion() {
+  std::vector<Vec3> before, positions, velocities;
+  std::vector<double> inverseMasses;
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    const ReferenceCloth& cloth = cloths_[i];
+    before.insert(before.end(), before_[i].begin(), before_[i].end());
+    positions.insert(positions.end(), cloth.positions().begin(), cloth.positions().end());
+    velocities.insert(velocities.end(), cloth.velocities().begin(), cloth.velocities().end());
+    inverseMasses.insert(inverseMasses.end(), cloth.inverseMasses().begin(), cloth.inverseMasses().end());
+  }
+  motionBound_.apply(before, positions, velocities, inverseMasses, scene_.substepSeconds());
+  auto position = positions.begin();
+  auto velocity = velocities.begin();
+  for (ReferenceCloth& cloth : cloths_) {
+    const auto nodes = static_cast<std::ptrdiff_t>(cloth.nodeCount());
+    std::copy_n(position, nodes, cloth.positions().begin());
+    std::copy_n(velocity, nodes, cloth.velocities().begin());
+    position += nodes;
+    velocity += nodes;
+  }
 }
 
 void ReferenceSimulation::collideWithCloth(const TickInputs& inputs, std::uint32_t index) {

@@ -9,6 +9,7 @@
 #include "server/model/scene.h"
 #include "server/reference/attachments.h"
 #include "server/reference/coarse_correction.h"
+#include "server/reference/motion_bound.h"
 #include "server/reference/reference_cloth.h"
 #include "server/reference/self_collision.h"
 
@@ -43,7 +44,8 @@ class ReferenceSimulation {
   void tick();
 
   // Simulates substep `index` of a tick: coarse corrections; forces, integration and colliders in order;
-  // attachments, tethers and grabs; self-collision, and colliders again; colliders that are triangle meshes.
+  // attachments, tethers and grabs; self-collision, and colliders again; colliders that are triangle meshes; the
+  // bound on motion.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
   // Number of simulated ticks.
@@ -60,11 +62,13 @@ class ReferenceSimulation {
   void correct(const CoarseCorrection& level, std::size_t cloth, const TickInputs& inputs,
                std::uint32_t index);
   void collideWithCloth(const TickInputs& inputs, std::uint32_t index);
+  void boundMotion();
 
   model::Scene scene_;
   std::vector<ReferenceCloth> cloths_;
   Attachments attachments_;
   SelfCollision selfCollision_;
+  MotionBound motionBound_;
   std::vector<std::vector<CoarseCorrection>> coarse_;  // by cloth and level
   std::vector<std::vector<Vec3>> before_;              // each cloth's nodes at the start of a substep
   std::uint64_t ticks_ = 0;

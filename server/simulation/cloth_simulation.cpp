@@ -25,6 +25,7 @@
 #include "server/simulation/grid_stage.h"
 #include "server/simulation/mass_stage.h"
 #include "server/simulation/mesh_stage.h"
+#include "server/simulation/motion_bound/motion_bound_stage.h"
 #include "server/simulation/report_stage.h"
 #include "server/simulation/runge_kutta_stage.h"
 #include "server/simulation/self_collision/self_collision_stage.h"
@@ -185,6 +186,7 @@ struct ClothSimulation::Pipeline {
   bool bends = false;                                 // true if a cloth uses it now
   std::unique_ptr<CoarseStage> coarse;                // null if no cloth uses it
   std::unique_ptr<SelfCollisionStage> selfCollision;  // null if no cloth uses it
+  std::unique_ptr<MotionBoundStage> motionBound;      // null if no cloth uses it
   std::vector<model::Solver> solvers;                 // of the cloths in the tables
   std::vector<SpringStiffness> stiffness;             // of the cloths' springs
   std::unique_ptr<SolidStage> solids;                 // null if no collider is a triangle mesh
@@ -250,6 +252,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
                                           workgroupSize);
   if (SkinTables tables = skinTables(solidTables); !tables.empty())
     skins = std::make_unique<SkinStage>(on, std::move(tables), solidTables, solids->solids(), workgroupSize);
+  if (MotionBoundStage::isIn(scene))
+    motionBound = std::make_unique<MotionBoundStage>(on, scene, stateOf(buffers, collision), workgroupSize);
   if (const AttachmentTables tables = attachmentTables(scene); !tables.empty()) {
     makeAttachments(tables);
     attachments->setSlack(scene.cloths);
@@ -345,6 +349,7 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (selfCollision) selfCollision->recordTables(recorder);
   if (solids) solids->recordTables(recorder);
   if (skins) skins->recordTables(recorder);
+  if (motionBound) motionBound->recordTables(recorder);
   recorder.barrier();
   if (!weighed) {
     massChange->record(recorder);
@@ -366,6 +371,7 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   if (attachments) attachments->recordInputs(recorder, inputs.attachments, inputs.grabs);
   recorder.fill(buffers.status, 0, buffers.status.bytes());
   if (selfCollision) selfCollision->recordClear(recorder);
+  if (motionBound) motionBound->recordClear(recorder);
 }
 
 void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from,
@@ -445,6 +451,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
     if (attachments) attachments->recordSubstep(recorder, present, substep, substeps, tickRate);
     if (selfCollision) selfCollision->recordSubstep(recorder, present, substep, push.collision);
     if (collision.solidCount() > 0) solids->record(recorder, present, push.collision, collision.solidCount());
+    if (motionBound) motionBound->recordSubstep(recorder, present);
     present = 1 - present;
   }
 }
@@ -459,6 +466,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   if (solves.active()) solves.recordReport(recorder);
   if (assembled) assembled->recordReport(recorder);
   if (selfCollision) selfCollision->recordReport(recorder, slot);
+  if (motionBound) motionBound->recordReport(recorder, slot);
   if (attachments) attachments->recordReport(recorder);
   collision.recordContacts(recorder);
 }
@@ -482,6 +490,7 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
   pipeline_->setSolvers(cloths);
   if (heavier) pipeline_->setMasses(cloths);
   if (pipeline_->selfCollision) pipeline_->selfCollision->setCloths(cloths);
+  if (pipeline_->motionBound) pipeline_->motionBound->setCloths(cloths);
   if (pipeline_->attachments) pipeline_->attachments->setSlack(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
@@ -493,6 +502,7 @@ void ClothSimulation::setSubsteps(std::uint32_t substeps, std::span<const model:
   on.substepSeconds = 1.0 / on.simulationRate / substeps;
   on.records = clothRecords(cloths, on.substepSeconds);
   if (on.selfCollision) on.selfCollision->setSubsteps(substeps, on.substepSeconds);
+  if (on.motionBound) on.motionBound->setSubstepSeconds(on.substepSeconds);
 }
 
 void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inputs) {
@@ -559,6 +569,7 @@ TickStatus ClothSimulation::status() const {
     const shared::CrowdReport& report = pipeline_->selfCollision->report(pipeline_->slot);
     status.crowded = report.lists + report.balls;
   }
+  if (pipeline_->motionBound) status.crowded += pipeline_->motionBound->report(pipeline_->slot).overflows;
   return status;
 }
 

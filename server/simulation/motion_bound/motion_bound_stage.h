@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// Bound on the motion of nodes that keeps cloth from passing through itself and other cloth.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "server/model/scene.h"
+#include "server/simulation/device_table.h"
+#include "server/simulation/motion_bound/motion_bound_tables.h"
+#include "server/simulation/stage.h"
+#include "server/simulation/state_buffers.h"
+#include "server/vulkan/buffer.h"
+#include "server/vulkan/device.h"
+#include "server/vulkan/kernel.h"
+#include "server/vulkan/recorder.h"
+
+namespace clothstream::simulation {
+
+// Belongs to the device's thread. The last stage of a substep: it finds all pairs of a node and a triangle
+// and of two edges that could meet on the way from the substep's start to its end, separates those that come
+// too near, and then shortens the motion of nodes so that no pair meets. docs/simulation.md explains why none
+// can.
+class MotionBoundStage {
+ public:
+  // At least one cloth must have boundsMotion(). Throws std::runtime_error if the device has too little
+  // memory. Results do not depend on `workgroupSize`.
+  MotionBoundStage(const vulkan::Device& device, const model::Scene& scene, const StateBuffers& state,
+                   std::uint32_t workgroupSize);
+
+  static bool isIn(const model::Scene& scene);
+
+  // Sets the gap, which follows from the radii of the cloths. No tick may be in flight.
+  void setCloths(std::span<const model::Cloth> cloths);
+  // Sets the duration of a substep. No tick may be in flight.
+  void setSubstepSeconds(double seconds);
+
+  // Uploads the tables, once, before the first tick.
+  void recordTables(vulkan::Recorder& recorder) const;
+  // Resets the tick's report. The caller records a barrier after it.
+  void recordClear(vulkan::Recorder& recorder) const;
+  // Records a substep, which led from state `from` to the other state. Begins with a barrier.
+  void recordSubstep(vulkan::Recorder& recorder, std::uint32_t from) const;
+
+  struct Report {
+    std::uint32_t overflows = 0;  // substeps in which a list of pairs was too short and no node moved
+    std::uint32_t shortened = 0;  // motions that were shortened
+  };
+  // Copies the report to the CPU, after a barrier; report() has it once the recording is complete.
+  void recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const;
+  Report report(std::uint32_t slot) const;
+
+ public:  // DEBUG
+  // Kernels that find and limit one kind of pairs, and their list.
+  struct Pairs {
+    Pairs(const vulkan::Device& device, const StateBuffers& state, const MotionBoundStage& stage, bool edges,
+          std::uint32_t capacity, std::uint32_t workgroupSize);
+
+    std::uint32_t capacity;
+    vulkan::Buffer list, groups;
+    Stage find, slide, limit;
+  };
+
+  const Pairs& dbgNode() const { return nodePairs_; }
+  const Pairs& dbgEdge() const { return edgePairs_; }
+  const vulkan::Buffer& dbgShares() const { return shares_; }
+  const vulkan::Buffer& dbgBoxes() const { return boxes_; }
+  const MotionBoundTables& dbgTables() const { return tables_; }
+  void recordTree(vulkan::Recorder& recorder, std::uint32_t from) const;
+
+  MotionBoundTables tables_;
+  float gap_, substepSeconds_;
+  DeviceTable parts_, faces_, branches_;
+  vulkan::Buffer boxes_, corrections_, shares_, report_, reportReadback_;
+  Stage boxFaces_;
+  vulkan::Kernel boxBranches_;
+  vulkan::Bindings branchBindings_;
+  Pairs nodePairs_, edgePairs_;
+  Stage slideNodes_, shortenMotions_;
+};
+
+}  // namespace clothstream::simulation

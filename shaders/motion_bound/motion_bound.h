@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+// Tables and push constants of the bound on motion that keeps cloth from passing through cloth. C++ and GLSL
+// use the same layout.
+#ifndef CLOTHSTREAM_SHADERS_MOTION_BOUND_MOTION_BOUND_H
+#define CLOTHSTREAM_SHADERS_MOTION_BOUND_MOTION_BOUND_H
+
+#include "shaders/shared/types.h"
+
+CLOTHSTREAM_SHARED_BEGIN
+
+// What is checked against triangles or edges: a node (both ends are the same) or an edge.
+struct PartRecord {
+  float first;
+  float second;
+  float reserved0, reserved1;
+};
+
+// A triangle, and the edges that it checks for its neighbours: each edge of the cloths belongs to one
+// triangle. An edge is its place among the parts, or -1.
+#define CLOTHSTREAM_FACE_TEXELS 2
+struct FaceRecord {
+  vec3 corners;
+  float box;  // its leaf in the tree of boxes
+  vec3 edges;
+  float reserved;
+};
+
+// An inner box of the tree, with what a search visits next if the box is missed. Boxes are in the order of a
+// depth-first search: the first child of a box follows it.
+struct BranchRecord {
+  float box;
+  float next;
+  float reserved0, reserved1;
+};
+
+// A box of the tree during a substep: low corner, next box if it is missed, high corner, triangle (negative
+// in an inner box).
+#define CLOTHSTREAM_TREE_BOX_TEXELS 2
+
+// Dispatch sizes of the kernel that limits pairs, and the number of pairs: of nodes and triangles, then of
+// two edges.
+struct PairGroups {
+  uint32_t x, y, z;
+  uint32_t count;
+};
+
+struct TreePush {
+  uint32_t first;  // record
+  uint32_t count;  // records
+  float gap;       // m, the distance that the cloth keeps from itself
+};
+
+struct PairPush {
+  uint32_t firstPart;
+  uint32_t partCount;
+  uint32_t boxCount;
+  uint32_t capacity;  // of the list of pairs
+  float gap;          // m
+};
+
+struct NodePush {
+  uint32_t nodeCount;
+  uint32_t nodePairs;  // capacities of the lists
+  uint32_t edgePairs;
+  float gap;
+  float substepRate;  // 1/s
+};
+
+// Corrections of nodes are sums of whole numbers in units of 1 / kCorrectionUnits m.
+const float kCorrectionUnits = 16777216.0;
+
+CLOTHSTREAM_SHARED_END
+
+#ifdef __cplusplus
+namespace clothstream::shared {
+static_assert(sizeof(PartRecord) == 16 && sizeof(BranchRecord) == 16);
+static_assert(sizeof(FaceRecord) == CLOTHSTREAM_FACE_TEXELS * sizeof(vec4) && offsetof(FaceRecord, edges) == 16);
+static_assert(sizeof(PairGroups) == 16 && sizeof(PairPush) == 20 && sizeof(NodePush) == 20);
+}  // namespace clothstream::shared
+#else
+
+PartRecord partAt(samplerBuffer table, uint part) {
+  vec4 texel = texelFetch(table, int(part));
+  return PartRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+FaceRecord faceAt(samplerBuffer table, uint face) {
+  int first = CLOTHSTREAM_FACE_TEXELS * int(face);
+  vec4 corners = texelFetch(table, first);
+  vec4 edges = texelFetch(table, first + 1);
+  return FaceRecord(CLOTHSTREAM_VECTOR(corners), CLOTHSTREAM_VECTOR(edges));
+}
+
+BranchRecord branchAt(samplerBuffer table, uint branch) {
+  vec4 texel = texelFetch(table, int(branch));
+  return BranchRecord(CLOTHSTREAM_FLOATS(texel));
+}
+
+#endif
+
+#endif

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: MIT
+// Cloth that nothing passes through.
+#include "server/reference/motion_bound.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <set>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "server/simulation/motion_bound/motion_bound_stage.h"
+#include "tests/simulation/intersections.h"
+#include "tests/simulation/scenes.h"
+#include "tests/simulation/stress_scenes.h"
+
+namespace clothstream::tests {
+namespace {
+
+using simulation::NodeState;
+using simulation::TickStatus;
+
+class MotionBound : public GpuTest {};
+
+model::Cloth bounded(model::Cloth cloth) {
+  cloth.selfCollision = model::SelfCollision{.radius = 0.01f, .friction = 0.3f, .nothingPasses = true};
+  return cloth;
+}
+
+// Two sheets and a disc in layers of 8 to 12 mm, and the ends of random motions of up to `speed` times a
+// substep.
+struct Motion {
+  model::Scene scene;
+  NodeState start, end;
+};
+
+Motion layeredMotion(unsigned seed, float speed) {
+  model::Cloth upper = bounded(calmCloth(9, 8)), lower = bounded(calmCloth(10, 9));
+  upper.pins = {topRow(upper)};
+  lower.grid.pose.position = model::Vec3(0.003f, -0.004f, -0.008f);
+  model::Scene scene = sceneOf({upper, lower});
+  Motion motion{scene, simulation::restState(scene.cloths), {}};
+  const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  const auto vector = [&] { return model::Vec3(unit(random), unit(random), unit(random)); };
+  for (model::Vec3& p : motion.start.positions) p += 0.0025f * vector();
+  motion.end = motion.start;
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    if (masses[i] == 0) continue;
+    motion.end.velocities[i] = speed * vector();
+    motion.end.positions[i] += static_cast<float>(scene.substepSeconds()) * motion.end.velocities[i];
+  }
+  return motion;
+}
+
+// Runs only the stage, on a given motion, twice: the second time everything that it keeps is that of the
+// first.
+class Bound {
+ public:
+  explicit Bound(const Motion& motion, std::uint32_t workgroupSize = 64)
+      : nodes_(motion.scene.nodeCount()),
+        stage_(device(), motion.scene,
+               {.cloths = none_,
+                .colliders = none_,
+                .nearColliders = none_,
+                .contactImpulses = none_,
+                .positions = {&positions_[0], &positions_[1]},
+                .velocities = {&velocities_[0], &velocities_[1]}},
+               workgroupSize) {
+    for (int run = 0; run < 2; ++run) {
+      recorder_.begin();
+      if (run == 0) stage_.recordTables(recorder_);
+      const std::vector<float> masses = simulation::inverseMasses(motion.scene.cloths);
+      std::size_t offset = 0;
+      const auto load = [&](const std::vector<model::Vec3>& vectors, const vulkan::Buffer& to, bool weighed) {
+        const auto texels = upload_.mapped<shared::vec4>().subspan(offset, nodes_);
+        for (std::size_t i = 0; i < nodes_; ++i)
+          texels[i] = {vectors[i].x(), vectors[i].y(), vectors[i].z(), weighed ? masses[i] : 0};
+        recorder_.copy(upload_, to, nodes_ * sizeof(shared::vec4), offset * sizeof(shared::vec4));
+        offset += nodes_;
+      };
+      load(motion.start.positions, positions_[0], true);
+      load(motion.end.positions, positions_[1], true);
+      load(motion.end.velocities, velocities_[1], false);
+      stage_.recordClear(recorder_);
+      stage_.recordSubstep(recorder_, 0);
+      recorder_.barrier();
+      stage_.recordReport(recorder_, 0);
+      recorder_.copy(positions_[1], readback_, nodes_ * sizeof(shared::vec4));
+      recorder_.copy(velocities_[1], readback_, nodes_ * sizeof(shared::vec4), 0, nodes_ * sizeof(shared::vec4));
+      submitAndWait(device(), recorder_);
+    }
+    vulkan::Buffer back(device(), vulkan::BufferPurpose::readback, 1 << 20);
+    recorder_.begin();
+    recorder_.copy(stage_.dbgNode().groups, back, 16, 0, 0);
+    recorder_.copy(stage_.dbgEdge().groups, back, 16, 0, 16);
+    recorder_.copy(stage_.dbgNode().list, back, stage_.dbgNode().list.bytes(), 0, 1 << 16);
+    recorder_.copy(stage_.dbgEdge().list, back, stage_.dbgEdge().list.bytes(), 0, 1 << 17);
+    recorder_.copy(stage_.dbgBoxes(), back, stage_.dbgBoxes().bytes(), 0, 1 << 19);
+    submitAndWait(device(), recorder_);
+    const auto words = back.mapped<const std::uint32_t>();
+    const auto& t = stage_.dbgTables();
+    std::printf("nodes %u edges %u faces %zu boxes %u levels %zu; node pairs x %u n %u; edge pairs x %u n %u\n", t.nodeCount,
+                t.edgeCount(), t.faces.size(), t.boxCount, t.levels.size(), words[0], words[3], words[4], words[7]);
+    std::set<std::pair<unsigned, unsigned>> vt, ee;
+    for (unsigned i = 0; i < words[3]; ++i) vt.insert({words[(1 << 14) + 2 * i], words[(1 << 14) + 2 * i + 1]});
+    for (unsigned i = 0; i < words[7]; ++i) ee.insert({words[(1 << 15) + 2 * i], words[(1 << 15) + 2 * i + 1]});
+    const auto P = [&](float n) { return reference::Vec3(motion.start.positions[static_cast<std::size_t>(n)].cast<double>()); };
+    const auto W = [&](float n) { return double{(motion.end.positions[static_cast<std::size_t>(n)] - motion.start.positions[static_cast<std::size_t>(n)]).norm()}; };
+    int missVt = 0, missEe = 0, nearVt = 0, nearEe = 0;
+    for (unsigned v = 0; v < t.nodeCount; ++v)
+      for (unsigned f = 0; f < t.faces.size(); ++f) {
+        const auto& c = t.faces[f].corners;
+        const float n = t.parts[v].first;
+        if (n == c.x || n == c.y || n == c.z) continue;
+        if (reference::shortestToTriangle({P(n), P(c.x), P(c.y), P(c.z)}).line.norm() > W(n) + std::max({W(c.x), W(c.y), W(c.z)})) continue;
+        ++nearVt;
+        if (!vt.contains({v, f})) ++missVt;
+      }
+    for (unsigned e = t.nodeCount; e < t.parts.size(); ++e)
+      for (unsigned g = e + 1; g < t.parts.size(); ++g) {
+        const auto &a = t.parts[e], &b = t.parts[g];
+        if (a.first == b.first || a.first == b.second || a.second == b.first || a.second == b.second) continue;
+        if (reference::shortestBetweenEdges({P(a.first), P(a.second), P(b.first), P(b.second)}).line.norm() > std::max(W(a.first), W(a.second)) + std::max(W(b.first), W(b.second))) continue;
+        ++nearEe;
+        if (!ee.contains({e, g})) { if (missEe < 5) std::printf("  miss %u %u\n", e, g); ++missEe; }
+      }
+    std::printf("near vt %d missing %d; near ee %d missing %d\n", nearVt, missVt, nearEe, missEe);
+    const float* boxes = reinterpret_cast<const float*>(words.data() + (1 << 17));
+    for (unsigned b = 0; b < 12; ++b) std::printf("  box %u low %g %g %g next %g high %g %g %g face %g\n", b, boxes[8*b], boxes[8*b+1], boxes[8*b+2], boxes[8*b+3], boxes[8*b+4], boxes[8*b+5], boxes[8*b+6], boxes[8*b+7]);
+  }
+
+  NodeState state() const {
+    NodeState state;
+    const auto texels = readback_.mapped<const shared::vec4>();
+    for (std::size_t i = 0; i < nodes_; ++i) {
+      state.positions.emplace_back(texels[i].x, texels[i].y, texels[i].z);
+      state.velocities.emplace_back(texels[nodes_ + i].x, texels[nodes_ + i].y, texels[nodes_ + i].z);
+    }
+    return state;
+  }
+  simulation::MotionBoundStage::Report report() const { return stage_.report(0); }
+
+ private:
+  vulkan::Buffer buffer(vulkan::BufferPurpose purpose, std::size_t copies = 1) const {
+    return vulkan::Buffer(device(), purpose, copies * nodes_ * sizeof(shared::vec4));
+  }
+
+  std::size_t nodes_;
+  vulkan::Buffer none_ = buffer(vulkan::BufferPurpose::texels);
+  std::array<vulkan::Buffer, 2> positions_{buffer(vulkan::BufferPurpose::texels),
+                                           buffer(vulkan::BufferPurpose::texels)};
+  std::array<vulkan::Buffer, 2> velocities_{buffer(vulkan::BufferPurpose::texels),
+                                            buffer(vulkan::BufferPurpose::texels)};
+  vulkan::Buffer upload_ = buffer(vulkan::BufferPurpose::upload, 3);
+  vulkan::Buffer readback_ = buffer(vulkan::BufferPurpose::readback, 2);
+  vulkan::Recorder recorder_{device()};
+  simulation::MotionBoundStage stage_;
+};
+
+// Rounding of a position (2^-24 of 0.3 m), over a distance of at least half a floor (0.1 mm), turns a
+// direction by 3e-4. That moves the end of a motion of 7 mm by 2e-6 m; separate pairs add up.
+constexpr double kTolerance = 1e-5;
+
+TEST_F(MotionBound, EndsMotionsWhereTheReferenceEndsThem) {
+  for (const float speed : {0.2f, 1.5f, 3.0f}) {
+    const Motion motion = layeredMotion(3, speed);
+    const Bound bound(motion);
+    ASSERT_EQ(bound.report().overflows, 0u);
+    const NodeState state = bound.state();
+    std::vector<reference::Vec3> start, positions, velocities;
+    std::vector<double> masses;
+    for (const model::Vec3& p : motion.start.positions) start.push_back(p.cast<double>());
+    for (const model::Vec3& p : motion.end.positions) positions.push_back(p.cast<double>());
+    for (const model::Vec3& v : motion.end.velocities) velocities.push_back(v.cast<double>());
+    for (const float mass : simulation::inverseMasses(motion.scene.cloths)) masses.push_back(double{mass});
+    reference::MotionBound(motion.scene)
+        .apply(start, positions, velocities, masses, motion.scene.substepSeconds());
+    double largest = 0, moved = 0;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      largest = std::max(largest, (state.positions[i].cast<double>() - positions[i]).norm());
+      moved = std::max(moved, (motion.end.positions[i].cast<double>() - positions[i]).norm());
+      EXPECT_NEAR((state.velocities[i].cast<double>() - velocities[i]).norm(), 0, 720 * kTolerance);
+    }
+    EXPECT_LT(largest, kTolerance) << speed << " m/s";
+    EXPECT_GT(moved, speed > 1 ? 100 * kTolerance : 0) << speed << " m/s";
+  }
+}
+
+TEST_F(MotionBound, WildMotionsLeaveNoIntersection) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Motion motion = layeredMotion(seed, 5);
+    ASSERT_EQ(intersections(motion.scene, motion.start.positions), 0u);
+    EXPECT_GT(intersections(motion.scene, motion.end.positions), 20u);
+    const Bound bound(motion);
+    {
+      std::vector<reference::Vec3> start, positions, velocities;
+      std::vector<double> masses;
+      for (const model::Vec3& p : motion.start.positions) start.push_back(p.cast<double>());
+      for (const model::Vec3& p : motion.end.positions) positions.push_back(p.cast<double>());
+      for (const model::Vec3& v : motion.end.velocities) velocities.push_back(v.cast<double>());
+      for (const float mass : simulation::inverseMasses(motion.scene.cloths)) masses.push_back(double{mass});
+      reference::MotionBound(motion.scene).apply(start, positions, velocities, masses, motion.scene.substepSeconds());
+      std::vector<model::Vec3> ref;
+      int moved = 0, dev = 0;
+      const NodeState st = bound.state();
+      for (std::size_t i = 0; i < positions.size(); ++i) {
+        ref.push_back(positions[i].cast<float>());
+        moved += (ref[i] - motion.end.positions[i]).norm() > 1e-6f;
+        dev += (st.positions[i] - motion.end.positions[i]).norm() > 1e-6f;
+      }
+      std::printf("seed %u end %zu ref %zu device %zu moved ref %d dev %d shortened %u over %u\n", seed,
+                  intersections(motion.scene, motion.end.positions), intersections(motion.scene, ref),
+                  intersections(motion.scene, st.positions), moved, dev, bound.report().shortened, bound.report().overflows);
+    }
+    EXPECT_EQ(intersections(motion.scene, bound.state().positions), 0u) << "seed " << seed;
+    EXPECT_GT(bound.report().shortened, 10u);
+    EXPECT_EQ(bound.report().overflows, 0u);
+  }
+}
+
+TEST_F(MotionBound, GivesTheSameBitsForEveryWorkgroup) {
+  const Motion motion = layeredMotion(5, 3);
+  const NodeState usual = Bound(motion).state();
+  for (const std::uint32_t size : {8u, 32u, 128u}) {
+    const NodeState state = Bound(motion, size).state();
+    EXPECT_TRUE(state.positions == usual.positions) << size << " invocations";
+    EXPECT_TRUE(state.velocities == usual.velocities) << size << " invocations";
+  }
+}
+
+TEST_F(MotionBound, CalmClothKeepsItsMotion) {
+  model::Scene scene = sceneOf({calmCloth(20, 20)});
+  scene.cloths[0].pins = {topRow(scene.cloths[0])};
+  model::Scene with = scene;
+  scene.cloths[0].selfCollision = model::SelfCollision{.radius = 0.01f};
+  with.cloths[0] = bounded(scene.cloths[0]);
+  Running one(scene), other(with);
+  for (int tick = 0; tick < 72; ++tick) {
+    const TickStatus status = one.tick(inputsOf(scene));
+    ASSERT_EQ(other.tick(inputsOf(with)).stateHash, status.stateHash) << "tick " << tick;
+  }
+}
+
+TEST_F(MotionBound, MovesNodesAsTheReferenceInATick) {
+  model::Scene scene = sceneOf({bounded(calmCloth(9, 8)), bounded(calmCloth(8, 9))});
+  scene.substeps = 1;
+  scene.simulationRate = 720;
+  scene.cloths[1].grid.pose.position = model::Vec3(0.003f, -0.004f, -0.012f);
+  std::mt19937 random(8);
+  const NodeState start = randomState(scene, random, 0.002f, 3);
+  Running running(scene);
+  running.restore(start);
+  running.tick(inputsOf(scene));
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, start);
+  reference.tick(referenceInputs(inputsOf(scene)));
+  EXPECT_LT(largestDistance(running.state(), reference), kTolerance);
+}
+
+// ---- Stress
+
+// Checks every tick of a scene. Without the bound, cloth passes through cloth.
+void expectNoIntersection(std::size_t number) {
+  std::uint64_t crowded = 0;
+  const StressScene stress = stressScenes(true)[number];
+  SCOPED_TRACE(stress.name);
+  ASSERT_EQ(intersections(stress.scene, stress.start.positions), 0u);
+  Running running(stress.scene);
+  running.restore(stress.start);
+  for (int tick = 0; tick < stress.ticks; ++tick) {
+    const TickStatus status = running.tick(inputsOf(stress.scene, stress.colliders(tick)));
+    ASSERT_TRUE(status.healthy) << "tick " << tick;
+    ASSERT_EQ(intersections(stress.scene, running.state().positions), 0u) << "tick " << tick;
+    crowded += status.crowded;
+  }
+  ::testing::Test::RecordProperty(stress.name, static_cast<int>(crowded));
+}
+
+TEST_F(MotionBound, AFastHandLeavesNoIntersection) {
+  expectNoIntersection(0);
+}
+TEST_F(MotionBound, PressedFoldsLeaveNoIntersection) {
+  expectNoIntersection(1);
+}
+TEST_F(MotionBound, ACrumpledPileLeavesNoIntersection) {
+  expectNoIntersection(2);
+}
+TEST_F(MotionBound, ThrownSheetsLeaveNoIntersection) {
+  expectNoIntersection(3);
+}
+TEST_F(MotionBound, AStruckHeapLeavesNoIntersection) {
+  expectNoIntersection(4);
+}
+
+TEST_F(MotionBound, BallsAloneLetClothPassInTheSameScenes) {
+  for (const StressScene& stress : stressScenes(false)) {
+    Running running(stress.scene);
+    running.restore(stress.start);
+    std::size_t worst = 0;
+    for (int tick = 0; tick < stress.ticks; ++tick) {
+      running.tick(inputsOf(stress.scene, stress.colliders(tick)));
+      worst = std::max(worst, intersections(stress.scene, running.state().positions));
+    }
+    EXPECT_GT(worst, 0u) << stress.name;
+    RecordProperty(stress.name, static_cast<int>(worst));
+  }
+}
+
+}  // namespace
+}  // namespace clothstream::tests
