@@ -51,7 +51,7 @@ class MotionBoundStage {
   void recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const;
   Report report(std::uint32_t slot) const;
 
- public:  // DEBUG
+ private:
   // Kernels that find and limit one kind of pairs, and their list.
   struct Pairs {
     Pairs(const vulkan::Device& device, const StateBuffers& state, const MotionBoundStage& stage, bool edges,
@@ -62,11 +62,6 @@ class MotionBoundStage {
     Stage find, slide, limit;
   };
 
-  const Pairs& dbgNode() const { return nodePairs_; }
-  const Pairs& dbgEdge() const { return edgePairs_; }
-  const vulkan::Buffer& dbgShares() const { return shares_; }
-  const vulkan::Buffer& dbgBoxes() const { return boxes_; }
-  const MotionBoundTables& dbgTables() const { return tables_; }
   void recordTree(vulkan::Recorder& recorder, std::uint32_t from) const;
 
   MotionBoundTables tables_;
