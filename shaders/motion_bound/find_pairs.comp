@@ -99,25 +99,21 @@ void main() {
   precise float reach = max(a.way, b.way) + 0.5 * push.gap;
   precise vec3 low = min(a.at, b.at) - reach;
   precise vec3 high = max(a.at, b.at) + reach;
-  uint box = 0;
-  do {
-    float face = -1.0;
-    do {
-      vec4 otherLow = boxes[CLOTHSTREAM_TREE_BOX_TEXELS * box];
-      vec4 otherHigh = boxes[CLOTHSTREAM_TREE_BOX_TEXELS * box + 1];
-      bool meets = all(lessThanEqual(low, otherHigh.xyz)) && all(greaterThanEqual(high, otherLow.xyz));
-      face = meets ? otherHigh.w : -1.0;
-      box = meets ? box + 1 : uint(otherLow.w);
-    } while (face < 0.0 && box < push.boxCount);
-    if (face >= 0.0) {
+  for (uint box = 0; box < push.boxCount;) {
+    vec4 otherLow = boxes[CLOTHSTREAM_TREE_BOX_TEXELS * box];
+    vec4 otherHigh = boxes[CLOTHSTREAM_TREE_BOX_TEXELS * box + 1];
+    bool meets = all(lessThanEqual(low, otherHigh.xyz)) && all(greaterThanEqual(high, otherLow.xyz));
+    box = meets ? box + 1 : uint(otherLow.w);
+    if (meets && otherHigh.w >= 0.0) {
+      uint face = uint(otherHigh.w);
       if (kEdges) {
-        vec3 edges = faceAt(faces, uint(face)).edges;
+        vec3 edges = faceAt(faces, face).edges;
         addEdges(part, nodes, a, b, edges.x);
         addEdges(part, nodes, a, b, edges.y);
         addEdges(part, nodes, a, b, edges.z);
       } else {
-        addNode(part, nodes.x, a, uint(face));
+        addNode(part, nodes.x, a, face);
       }
     }
-  } while (box < push.boxCount);
+  }
 }
