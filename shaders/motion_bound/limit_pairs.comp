@@ -62,18 +62,18 @@ void limitTo(uint node, float share) {
 }
 
 void main() {
-  if (gl_GlobalInvocationID.x >= min(groups.count, push.capacity)) {
+  if (gl_GlobalInvocationID.x >= min(groups.count, kEdges ? push.edgePairs : push.nodePairs)) {
     return;
   }
   uvec2 pair = pairs[gl_GlobalInvocationID.x];
-  PartRecord part = partAt(parts, pair.x);
   uint nodes[4];
   if (kEdges) {
+    PartRecord part = partAt(parts, pair.x);
     PartRecord other = partAt(parts, pair.y);
     nodes = uint[4](uint(part.first), uint(part.second), uint(other.first), uint(other.second));
   } else {
     vec3 corners = faceAt(faces, pair.y).corners;
-    nodes = uint[4](uint(part.first), uint(corners.x), uint(corners.y), uint(corners.z));
+    nodes = uint[4](pair.x, uint(corners.x), uint(corners.y), uint(corners.z));
   }
   vec3 from[4], to[4];
   float masses[4];

@@ -15,14 +15,14 @@ struct PartRecord {
   float reserved0, reserved1;
 };
 
-// A triangle, and the edges that it checks for its neighbours: each edge of the cloths belongs to one
-// triangle. An edge is its place among the parts, or -1.
+// A triangle with the edges and corners that belong to it: each edge and each node of the cloths belongs to one
+// triangle. An edge is its place among the parts, or -1. Edge k is from corner k to the next one.
 #define CLOTHSTREAM_FACE_TEXELS 2
 struct FaceRecord {
   vec3 corners;
   float box;  // its leaf in the tree of boxes
   vec3 edges;
-  float reserved;
+  float owned;  // bit k: corner k
 };
 
 // An inner box of the tree, with what a search visits next if the box is missed. Boxes are in the order of a
@@ -37,8 +37,7 @@ struct BranchRecord {
 // in an inner box).
 #define CLOTHSTREAM_TREE_BOX_TEXELS 2
 
-// Dispatch sizes of the kernel that limits pairs, and the number of pairs: of nodes and triangles, then of
-// two edges.
+// Dispatch sizes of the kernels that work on a list of pairs, and the number of pairs.
 struct PairGroups {
   uint32_t x, y, z;
   uint32_t count;
@@ -51,16 +50,18 @@ struct TreePush {
 };
 
 struct PairPush {
-  uint32_t firstPart;
-  uint32_t partCount;
+  uint32_t faceCount;
   uint32_t boxCount;
-  uint32_t capacity;  // of the list of pairs
-  float gap;          // m
+  uint32_t facePairs;  // capacities of the lists
+  uint32_t nodePairs;
+  uint32_t edgePairs;
+  float gap;  // m
 };
 
 struct NodePush {
   uint32_t nodeCount;
-  uint32_t nodePairs;  // capacities of the lists
+  uint32_t facePairs;  // capacities of the lists
+  uint32_t nodePairs;
   uint32_t edgePairs;
   float gap;
   float substepRate;  // 1/s
@@ -75,7 +76,7 @@ CLOTHSTREAM_SHARED_END
 namespace clothstream::shared {
 static_assert(sizeof(PartRecord) == 16 && sizeof(BranchRecord) == 16);
 static_assert(sizeof(FaceRecord) == CLOTHSTREAM_FACE_TEXELS * sizeof(vec4) && offsetof(FaceRecord, edges) == 16);
-static_assert(sizeof(PairGroups) == 16 && sizeof(PairPush) == 20 && sizeof(NodePush) == 20);
+static_assert(sizeof(PairGroups) == 16 && sizeof(PairPush) == 24 && sizeof(NodePush) == 24);
 }  // namespace clothstream::shared
 #else
 

@@ -22,13 +22,16 @@ layout(std430, binding = 3) buffer Velocities {
 layout(std430, binding = 4) buffer Shares {
   uint shares[];
 };
-layout(std430, binding = 5) readonly buffer NodeGroups {
+layout(std430, binding = 5) readonly buffer FaceGroups {
+  PairGroups faceGroups;
+};
+layout(std430, binding = 6) readonly buffer NodeGroups {
   PairGroups nodeGroups;
 };
-layout(std430, binding = 6) readonly buffer EdgeGroups {
+layout(std430, binding = 7) readonly buffer EdgeGroups {
   PairGroups edgeGroups;
 };
-layout(std430, binding = 7) buffer Report {
+layout(std430, binding = 8) buffer Report {
   uint report[];  // overflows, shortened motions
 };
 
@@ -41,7 +44,8 @@ void main() {
     return;
   }
   uint node = uint(partAt(parts, gl_GlobalInvocationID.x).first);
-  bool overflows = nodeGroups.count > push.nodePairs || edgeGroups.count > push.edgePairs;
+  bool overflows = faceGroups.count > push.facePairs || nodeGroups.count > push.nodePairs ||
+                   edgeGroups.count > push.edgePairs;
   if (gl_GlobalInvocationID.x == 0 && overflows) {
     atomicAdd(report[0], 1u);
   }

@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <cstddef>
+#include <utility>
+#include <vector>
 
 #include "kernels/box_branches.h"
 #include "kernels/box_faces.h"
+#include "kernels/find_faces.h"
 #include "kernels/find_pairs.h"
 #include "kernels/limit_pairs.h"
 #include "kernels/shorten_motions.h"
@@ -21,10 +25,11 @@ using vulkan::BufferPurpose;
 using vulkan::kStorage;
 using vulkan::kTexels;
 
-// Work of an invocation (vulkan::Recorder::dispatch).
-constexpr std::uint32_t kFindWork = 16, kPairWork = 2;
+// Work of an invocation (vulkan::Recorder::dispatch): of a triangle that searches the tree, and of the expected
+// pairs of a triangle or a node.
+constexpr std::uint32_t kSearchWork = 32, kFindWork = 24, kLimitWork = 24;
 // Places for pairs, for each node of the cloths.
-constexpr std::uint32_t kNodePairs = 16, kEdgePairs = 48;
+constexpr std::uint64_t kFacePairs = 128, kNodePairs = 16, kEdgePairs = 48;
 // The gap, as a share of the smallest radius.
 constexpr float kGap = 0.25f;
 
@@ -35,51 +40,50 @@ float gapOf(std::span<const model::Cloth> cloths) {
   return kGap * radius;
 }
 
+vulkan::KernelDescription kernelOf(const char* name, std::span<const std::uint32_t> spirv,
+                                   std::uint32_t workgroupSize, std::uint32_t pushBytes,
+                                   std::vector<vulkan::BindingKind> bindings,
+                                   std::vector<std::uint32_t> specialisation = {}) {
+  return {.name = name,
+          .spirv = spirv,
+          .bindings = std::move(bindings),
+          .pushConstantBytes = pushBytes,
+          .workgroupSize = workgroupSize,
+          .specialisation = std::move(specialisation)};
+}
+
+vulkan::KernelDescription limitKernel(std::uint32_t workgroupSize, bool edges, bool slide) {
+  return kernelOf("limit_pairs", kernels::limit_pairs, workgroupSize, sizeof(shared::PairPush),
+                  {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage},
+                  {edges ? 1u : 0u, slide ? 1u : 0u});
+}
+
 }  // namespace
 
 bool MotionBoundStage::isIn(const model::Scene& scene) {
   return std::ranges::any_of(scene.cloths, boundsMotion);
 }
 
-MotionBoundStage::Pairs::Pairs(const vulkan::Device& device, const StateBuffers& state,
-                               const MotionBoundStage& stage, bool edges, std::uint32_t places,
-                               std::uint32_t workgroupSize)
-    : capacity(places),
-      list(device, BufferPurpose::state, std::size_t{places} * 2 * sizeof(std::uint32_t)),
-      groups(device, BufferPurpose::indirect, sizeof(shared::PairGroups)),
-      find(device,
-           {.name = "find_pairs",
-            .spirv = kernels::find_pairs,
-            .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage},
-            .pushConstantBytes = sizeof(shared::PairPush),
-            .workgroupSize = workgroupSize,
-            .specialisation = {edges ? 1u : 0u}},
-           {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[0], state.positions[1], &stage.boxes_,
-            &list, &groups},
-           {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[1], state.positions[0], &stage.boxes_,
-            &list, &groups}),
-      slide(device,
-            {.name = "limit_pairs",
-             .spirv = kernels::limit_pairs,
-             .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage},
-             .pushConstantBytes = sizeof(shared::PairPush),
-             .workgroupSize = workgroupSize,
-             .specialisation = {edges ? 1u : 0u, 1}},
-            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[0], state.positions[1], &list, &groups,
-             &stage.corrections_, &stage.shares_},
-            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[1], state.positions[0], &list, &groups,
-             &stage.corrections_, &stage.shares_}),
-      limit(device,
-            {.name = "limit_pairs",
-             .spirv = kernels::limit_pairs,
-             .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage},
-             .pushConstantBytes = sizeof(shared::PairPush),
-             .workgroupSize = workgroupSize,
-             .specialisation = {edges ? 1u : 0u, 0}},
-            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[0], state.positions[1], &list, &groups,
-             &stage.corrections_, &stage.shares_},
-            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[1], state.positions[0], &list, &groups,
-             &stage.corrections_, &stage.shares_}) {}
+// A dispatch has an invocation for each pair.
+MotionBoundStage::List::List(const vulkan::Device& device, std::uint64_t places, std::uint32_t workgroupSize)
+    : capacity(static_cast<std::uint32_t>(
+          std::min(places, std::uint64_t{device.limits().maxDispatchX} * workgroupSize))),
+      pairs(device, BufferPurpose::state, std::size_t{capacity} * 2 * sizeof(std::uint32_t)),
+      groups(device, BufferPurpose::indirect, sizeof(shared::PairGroups)) {}
+
+MotionBoundStage::Limits::Limits(const vulkan::Device& device, const StateBuffers& state,
+                                 const MotionBoundStage& stage, const List& list, bool edges,
+                                 std::uint32_t workgroupSize)
+    : slide(device, limitKernel(workgroupSize, edges, true),
+            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[0], state.positions[1],
+             &list.pairs, &list.groups, &stage.corrections_, &stage.shares_},
+            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[1], state.positions[0],
+             &list.pairs, &list.groups, &stage.corrections_, &stage.shares_}),
+      limit(device, limitKernel(workgroupSize, edges, false),
+            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[0], state.positions[1],
+             &list.pairs, &list.groups, &stage.corrections_, &stage.shares_},
+            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[1], state.positions[0],
+             &list.pairs, &list.groups, &stage.corrections_, &stage.shares_}) {}
 
 MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Scene& scene,
                                    const StateBuffers& state, std::uint32_t workgroupSize)
@@ -95,44 +99,43 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
       shares_(device, BufferPurpose::state, std::size_t{scene.nodeCount()} * sizeof(std::uint32_t)),
       report_(device, BufferPurpose::state, sizeof(Report)),
       reportReadback_(device, BufferPurpose::readback, 2 * sizeof(Report)),
+      facePairs_(device, kFacePairs * tables_.nodeCount, workgroupSize),
+      nodePairs_(device, kNodePairs * tables_.nodeCount, workgroupSize),
+      edgePairs_(device, kEdgePairs * tables_.nodeCount, workgroupSize),
       boxFaces_(device,
-                {.name = "box_faces",
-                 .spirv = kernels::box_faces,
-                 .bindings = {kTexels, kTexels, kTexels, kStorage},
-                 .pushConstantBytes = sizeof(shared::TreePush),
-                 .workgroupSize = workgroupSize,
-                 .specialisation = {}},
+                kernelOf("box_faces", kernels::box_faces, workgroupSize, sizeof(shared::TreePush),
+                         {kTexels, kTexels, kTexels, kStorage}),
                 {&faces_.texels(), state.positions[0], state.positions[1], &boxes_},
                 {&faces_.texels(), state.positions[1], state.positions[0], &boxes_}),
-      boxBranches_(device, {.name = "box_branches",
-                            .spirv = kernels::box_branches,
-                            .bindings = {kTexels, kStorage},
-                            .pushConstantBytes = sizeof(shared::TreePush),
-                            .workgroupSize = workgroupSize,
-                            .specialisation = {}}),
+      boxBranches_(device, kernelOf("box_branches", kernels::box_branches, workgroupSize,
+                                    sizeof(shared::TreePush), {kTexels, kStorage})),
       branchBindings_(device, boxBranches_, {&branches_.texels(), &boxes_}),
-      nodePairs_(device, state, *this, false, kNodePairs * tables_.nodeCount, workgroupSize),
-      edgePairs_(device, state, *this, true, kEdgePairs * tables_.nodeCount, workgroupSize),
+      findFaces_(device, kernelOf("find_faces", kernels::find_faces, workgroupSize, sizeof(shared::PairPush),
+                                  {kTexels, kStorage, kStorage, kStorage})),
+      findBindings_(device, findFaces_, {&faces_.texels(), &boxes_, &facePairs_.pairs, &facePairs_.groups}),
+      findPairs_(
+          device,
+          kernelOf("find_pairs", kernels::find_pairs, workgroupSize, sizeof(shared::PairPush),
+                   {kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage}),
+          {&faces_.texels(), state.positions[0], state.positions[1], &facePairs_.pairs, &facePairs_.groups,
+           &nodePairs_.pairs, &nodePairs_.groups, &edgePairs_.pairs, &edgePairs_.groups},
+          {&faces_.texels(), state.positions[1], state.positions[0], &facePairs_.pairs, &facePairs_.groups,
+           &nodePairs_.pairs, &nodePairs_.groups, &edgePairs_.pairs, &edgePairs_.groups}),
+      nodeLimits_(device, state, *this, nodePairs_, false, workgroupSize),
+      edgeLimits_(device, state, *this, edgePairs_, true, workgroupSize),
       slideNodes_(device,
-                  {.name = "slide_nodes",
-                   .spirv = kernels::slide_nodes,
-                   .bindings = {kTexels, kStorage, kStorage, kStorage, kStorage},
-                   .pushConstantBytes = sizeof(shared::NodePush),
-                   .workgroupSize = workgroupSize,
-                   .specialisation = {}},
+                  kernelOf("slide_nodes", kernels::slide_nodes, workgroupSize, sizeof(shared::NodePush),
+                           {kTexels, kStorage, kStorage, kStorage, kStorage}),
                   {&parts_.texels(), state.positions[0], state.positions[1], state.velocities[1], &corrections_},
                   {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &corrections_}),
-      shortenMotions_(device,
-                      {.name = "shorten_motions",
-                       .spirv = kernels::shorten_motions,
-                       .bindings = {kTexels, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage},
-                       .pushConstantBytes = sizeof(shared::NodePush),
-                       .workgroupSize = workgroupSize,
-                       .specialisation = {}},
-                      {&parts_.texels(), state.positions[0], state.positions[1], state.velocities[1], &shares_,
-                       &nodePairs_.groups, &edgePairs_.groups, &report_},
-                      {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &shares_,
-                       &nodePairs_.groups, &edgePairs_.groups, &report_}) {
+      shortenMotions_(
+          device,
+          kernelOf("shorten_motions", kernels::shorten_motions, workgroupSize, sizeof(shared::NodePush),
+                   {kTexels, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage}),
+          {&parts_.texels(), state.positions[0], state.positions[1], state.velocities[1], &shares_,
+           &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_},
+          {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &shares_,
+           &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_}) {
   assert(isIn(scene));
 }
 
@@ -150,7 +153,8 @@ void MotionBoundStage::recordTables(vulkan::Recorder& recorder) const {
   branches_.recordUpload(recorder);
   recorder.fill(corrections_, 0, corrections_.bytes());
   recorder.fill(shares_, std::bit_cast<std::uint32_t>(1.0f), shares_.bytes());
-  for (const Pairs* pairs : {&nodePairs_, &edgePairs_}) recorder.fill(pairs->groups, 1, pairs->groups.bytes());
+  for (const List* list : {&facePairs_, &nodePairs_, &edgePairs_})
+    recorder.fill(list->groups, 1, list->groups.bytes());
 }
 
 void MotionBoundStage::recordClear(vulkan::Recorder& recorder) const {
@@ -168,40 +172,40 @@ void MotionBoundStage::recordTree(vulkan::Recorder& recorder, std::uint32_t from
 }
 
 void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t from) const {
-  const auto pushOf = [&](const Pairs& pairs) {
-    const bool edges = &pairs == &edgePairs_;
-    return shared::PairPush{.firstPart = edges ? tables_.nodeCount : 0,
-                            .partCount = edges ? tables_.edgeCount() : tables_.nodeCount,
-                            .boxCount = tables_.boxCount,
-                            .capacity = pairs.capacity,
-                            .gap = gap_};
-  };
+  const auto faceCount = static_cast<std::uint32_t>(tables_.faces.size());
+  const shared::PairPush push{.faceCount = faceCount,
+                              .boxCount = tables_.boxCount,
+                              .facePairs = facePairs_.capacity,
+                              .nodePairs = nodePairs_.capacity,
+                              .edgePairs = edgePairs_.capacity,
+                              .gap = gap_};
   const shared::NodePush nodePush{.nodeCount = tables_.nodeCount,
+                                  .facePairs = facePairs_.capacity,
                                   .nodePairs = nodePairs_.capacity,
                                   .edgePairs = edgePairs_.capacity,
                                   .gap = gap_,
                                   .substepRate = 1 / substepSeconds_};
-  const auto onPairs = [&](Stage Pairs::* kernel) {
+  const auto onPairs = [&](Stage Limits::* kernel) {
+    const std::uint64_t most = std::uint64_t{tables_.nodeCount} * kLimitWork;
     recorder.barrier();
-    for (const Pairs* pairs : {&nodePairs_, &edgePairs_})
-      recorder.dispatchIndirect((pairs->*kernel).from[from], pushOf(*pairs), pairs->groups, 0,
-                                std::uint64_t{tables_.nodeCount} * kPairWork);
+    recorder.dispatchIndirect((nodeLimits_.*kernel).from[from], push, nodePairs_.groups, 0, most);
+    recorder.dispatchIndirect((edgeLimits_.*kernel).from[from], push, edgePairs_.groups, 0, most);
   };
   recorder.barrier();
-  for (const Pairs* pairs : {&nodePairs_, &edgePairs_}) {
-    recorder.fill(pairs->groups, 0, sizeof(std::uint32_t), offsetof(shared::PairGroups, x));
-    recorder.fill(pairs->groups, 0, sizeof(std::uint32_t), offsetof(shared::PairGroups, count));
+  for (const List* list : {&facePairs_, &nodePairs_, &edgePairs_}) {
+    recorder.fill(list->groups, 0, sizeof(std::uint32_t), offsetof(shared::PairGroups, x));
+    recorder.fill(list->groups, 0, sizeof(std::uint32_t), offsetof(shared::PairGroups, count));
   }
   recordTree(recorder, from);
   recorder.barrier();
-  for (const Pairs* pairs : {&nodePairs_, &edgePairs_}) {
-    const shared::PairPush push = pushOf(*pairs);
-    recorder.dispatch(pairs->find.from[from], push, push.partCount, kFindWork);
-  }
-  onPairs(&Pairs::slide);
+  recorder.dispatch(findBindings_, push, faceCount, kSearchWork);
+  recorder.barrier();
+  recorder.dispatchIndirect(findPairs_.from[from], push, facePairs_.groups, 0,
+                            std::uint64_t{faceCount} * kFindWork);
+  onPairs(&Limits::slide);
   recorder.barrier();
   recorder.dispatch(slideNodes_.from[from], nodePush, tables_.nodeCount);
-  onPairs(&Pairs::limit);
+  onPairs(&Limits::limit);
   recorder.barrier();
   recorder.dispatch(shortenMotions_.from[from], nodePush, tables_.nodeCount);
 }

@@ -52,14 +52,19 @@ class MotionBoundStage {
   Report report(std::uint32_t slot) const;
 
  private:
-  // Kernels that find and limit one kind of pairs, and their list.
-  struct Pairs {
-    Pairs(const vulkan::Device& device, const StateBuffers& state, const MotionBoundStage& stage, bool edges,
-          std::uint32_t capacity, std::uint32_t workgroupSize);
+  // A list of pairs, and its dispatch sizes.
+  struct List {
+    List(const vulkan::Device& device, std::uint64_t places, std::uint32_t workgroupSize);
 
     std::uint32_t capacity;
-    vulkan::Buffer list, groups;
-    Stage find, slide, limit;
+    vulkan::Buffer pairs, groups;
+  };
+  // Kernels that separate and limit one kind of pairs.
+  struct Limits {
+    Limits(const vulkan::Device& device, const StateBuffers& state, const MotionBoundStage& stage,
+           const List& list, bool edges, std::uint32_t workgroupSize);
+
+    Stage slide, limit;
   };
 
   void recordTree(vulkan::Recorder& recorder, std::uint32_t from) const;
@@ -68,10 +73,14 @@ class MotionBoundStage {
   float gap_, substepSeconds_;
   DeviceTable parts_, faces_, branches_;
   vulkan::Buffer boxes_, corrections_, shares_, report_, reportReadback_;
+  List facePairs_, nodePairs_, edgePairs_;
   Stage boxFaces_;
   vulkan::Kernel boxBranches_;
   vulkan::Bindings branchBindings_;
-  Pairs nodePairs_, edgePairs_;
+  vulkan::Kernel findFaces_;
+  vulkan::Bindings findBindings_;
+  Stage findPairs_;
+  Limits nodeLimits_, edgeLimits_;
   Stage slideNodes_, shortenMotions_;
 };
 

@@ -99,10 +99,14 @@ MotionBoundTables motionBoundTables(std::span<const model::Cloth> cloths) {
   tables.nodeCount = static_cast<std::uint32_t>(tables.parts.size());
 
   std::unordered_map<std::uint64_t, std::uint32_t> edges;
+  std::vector<bool> seen(offsets.back());
   std::vector<model::Vec3> middles;
   for (const model::Triangle& triangle : triangles) {
     std::array<float, 3> owned{-1, -1, -1};
+    std::uint32_t corners = 0;
     for (std::size_t k = 0; k < 3; ++k) {
+      if (!seen[triangle[k]]) corners |= 1u << k;
+      seen[triangle[k]] = true;
       const auto [a, b] = std::minmax(triangle[k], triangle[(k + 1) % 3]);
       const auto number = static_cast<std::uint32_t>(tables.parts.size());
       if (!edges.try_emplace(std::uint64_t{a} << 32 | b, number).second) continue;
@@ -111,7 +115,7 @@ MotionBoundTables motionBoundTables(std::span<const model::Cloth> cloths) {
     }
     const auto corner = [&](std::size_t k) { return static_cast<float>(triangle[k]); };
     tables.faces.push_back(
-        {{corner(0), corner(1), corner(2)}, 0, {owned[0], owned[1], owned[2]}, 0});
+        {{corner(0), corner(1), corner(2)}, 0, {owned[0], owned[1], owned[2]}, static_cast<float>(corners)});
     middles.push_back(
         (rest.positions[triangle[0]] + rest.positions[triangle[1]] + rest.positions[triangle[2]]) / 3);
   }
