@@ -34,6 +34,10 @@ model::ClothChange toClothChange(Checks& checks, const Path& path, const v1::Clo
   change.name = message.name();
   if (!change.name.empty()) checkKnown(checks, path / "name", change.name, scene.cloths);
   change.numbers = readNumbers(checks, path, message, addressed(scene, change.name));
+  if (message.self_collision().nothing_passes() &&
+      !std::ranges::all_of(addressed(scene, change.name), [](const model::Cloth* c) { return model::boundsMotion(*c); }))
+    checks.fail(path / "selfCollision" / "nothingPasses", "true",
+                "must be absent: it cannot change while the scene runs");
   if (message.has_solver()) change.solver = toSolver(checks, path / "solver", message.solver());
   if (message.has_material() && toMaterial(checks, path / "material", message.material()) != nullptr)
     change.material = message.material();

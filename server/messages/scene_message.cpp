@@ -159,12 +159,15 @@ void checkMotionBound(Checks& checks, const model::Scene& scene) {
   std::uint64_t nodes = 0;
   for (std::size_t i = 0; i < scene.cloths.size() && !checks.failed(); ++i) {
     const model::Cloth& cloth = scene.cloths[i];
-    if (!cloth.selfCollision || !cloth.selfCollision->nothingPasses) continue;
+    if (!model::boundsMotion(cloth)) continue;
     nodes += cloth.nodeCount();
+    const Path field = root.at("cloths", static_cast<int>(i)) / "selfCollision" / "nothingPasses";
     if (nodes > limits::kMaxBoundNodes)
-      checks.fail(root.at("cloths", static_cast<int>(i)) / "selfCollision" / "nothingPasses", "true",
+      checks.fail(field, "true",
                   fmt::format("is for at most {} nodes in all cloths that have it; with this one they are {}",
                               limits::kMaxBoundNodes, nodes));
+    if (cloth.coarse)
+      checks.fail(field, "true", "is for cloths without \"coarse\", whose corrections nothing bounds");
   }
 }
 

@@ -56,7 +56,7 @@ void writeCloth(const model::Cloth& cloth, v1::Cloth& message) {
   message.set_mass(cloth.mass);
   message.set_material(cloth.material);
   writeNumbers(cloth, message);
-  if (cloth.selfCollision && cloth.selfCollision->nothingPasses)
+  if (model::boundsMotion(cloth))
     message.mutable_self_collision()->set_nothing_passes(true);
   for (const model::GridRange& range : cloth.pins) write(range, *message.add_pins());
   *message.mutable_solver() = toMessage(cloth.solver);

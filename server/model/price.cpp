@@ -88,10 +88,6 @@ double skinBytes(const ClosedMesh& mesh) {
   return bytes;
 }
 
-bool boundsMotion(const Cloth& cloth) {
-  return cloth.selfCollision && cloth.selfCollision->nothingPasses;
-}
-
 bool isSystem(SolverKind kind) {
   return kind == SolverKind::constraint || kind == SolverKind::acad || kind == SolverKind::implicitEuler;
 }

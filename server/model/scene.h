@@ -215,6 +215,11 @@ struct Cloth {
   float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean
 };
 
+// True if nothing passes through this cloth.
+inline bool boundsMotion(const Cloth& cloth) {
+  return cloth.selfCollision && cloth.selfCollision->nothingPasses;
+}
+
 // Variation of the wind; wind.h describes it.
 struct Gust {
   float strength = parameters::kGustStrength.initial;  // maximum deviation of each component; 0: no gusts

@@ -74,7 +74,7 @@ MotionBound::MotionBound(const model::Scene& scene) {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::set<std::array<std::uint32_t, 2>> edges;
   for (const model::Cloth& cloth : scene.cloths) {
-    if (cloth.selfCollision && cloth.selfCollision->nothingPasses) {
+    if (model::boundsMotion(cloth)) {
       const double gap = kGap * double{cloth.selfCollision->radius};
       gap_ = gap_ == 0 ? gap : std::min(gap_, gap);
       for (std::uint32_t i = 0; i < cloth.nodeCount(); ++i) nodes.push_back(first + i);

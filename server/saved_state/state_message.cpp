@@ -127,7 +127,9 @@ bool readColliders(const v1::SavedCheckpoint& message, const model::Scene& scene
     if (!std::move(checks).result(true)) return false;
     state.colliders.push_back({from.participant_id(),
                                {.id = from.id(), .pose = toPose(from.pose()), .shape = shape},
-                               toPose(from.before())});
+                               toPose(from.before()),
+                               toPose(from.before()),
+                               {}});
   }
   return std::ranges::all_of(state.scenePoses, isFinite) &&
          std::ranges::all_of(state.colliders, [](const scene::ColliderSet::Placed& placed) {

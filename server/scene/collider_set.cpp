@@ -23,6 +23,33 @@ model::Pose startOf(const model::Pose& before, const model::Pose& now, double ti
   return jumped ? now : before;
 }
 
+// Least and largest distance of the surface from the middle. Shapes of participants are spheres, capsules and boxes.
+float leastRadius(const model::Shape& shape) {
+  if (const auto* box = std::get_if<model::Box>(&shape)) return box->size.minCoeff() / 2;
+  if (const auto* capsule = std::get_if<model::Capsule>(&shape)) return capsule->radius;
+  if (const auto* sphere = std::get_if<model::Sphere>(&shape)) return sphere->radius;
+  return 0;
+}
+float largestRadius(const model::Shape& shape) {
+  if (const auto* box = std::get_if<model::Box>(&shape)) return box->size.norm() / 2;
+  if (const auto* capsule = std::get_if<model::Capsule>(&shape)) return capsule->radius + capsule->length / 2;
+  return leastRadius(shape);
+}
+
+// At least the longest way of a point of the shape from one pose to another.
+float wayOf(const model::Shape& shape, const model::Pose& from, const model::Pose& to) {
+  return (to.position - from.position).norm() +
+         largestRadius(shape) * to.orientation.angularDistance(from.orientation);
+}
+
+// The pose on the way from `from` to `to` after at most `step` metres.
+model::Pose towards(const model::Shape& shape, const model::Pose& from, const model::Pose& to, float step) {
+  const float way = wayOf(shape, from, to);
+  if (way <= step) return to;
+  const float share = step / way;
+  return {from.position + share * (to.position - from.position), from.orientation.slerp(share, to.orientation)};
+}
+
 const model::Skin* skinOf(const model::Collider& collider) {
   const auto* solid = std::get_if<model::Solid>(&collider.shape);
   return solid != nullptr && (*solid)->skin ? &*(*solid)->skin : nullptr;
@@ -50,7 +77,7 @@ void ColliderSet::place(std::uint64_t participant, std::span<const model::Partic
     if (place != state_.colliders.end() && key(*place) == std::tuple(participant, collider.id))
       place->now = collider;
     else
-      state_.colliders.insert(place, {participant, collider, collider.pose});
+      state_.colliders.insert(place, {participant, collider, collider.pose, collider.pose, {}});
   }
 }
 
@@ -100,9 +127,47 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
   }
   for (std::size_t i = 0; i < state_.colliders.size(); ++i) {
     Placed& collider = state_.colliders[i];
-    const model::Pose& end = collider.now.pose;
+    model::Pose end = collider.now.pose;
+    if (collider.yield) {
+      Yield& yield = *collider.yield;
+      end = yield.refused ? yield.accepted : towards(collider.now.shape, collider.before, end, yield.step);
+      yield.stands = wayOf(collider.now.shape, end, collider.now.pose) > 0;
+    }
     colliders[own + i] = {collider.now.shape, startOf(collider.before, end, scene.tickSeconds()), end, 1};
+    collider.start = colliders[own + i].start;
     collider.before = end;
+  }
+}
+
+void ColliderSet::settle(std::span<const float> depths) {
+  const std::size_t own = state_.scenePoses.size();
+  assert(depths.size() == own + state_.colliders.size());
+  for (std::size_t i = 0; i < state_.colliders.size(); ++i) {
+    Placed& collider = state_.colliders[i];
+    const float depth = depths[own + i];
+    const bool fits = depth <= std::min(kYieldDepth, kYieldShare * leastRadius(collider.now.shape));
+    if (!collider.yield) {
+      if (fits) continue;
+      const float moved = wayOf(collider.now.shape, collider.start, collider.before);
+      collider.yield = Yield{.accepted = collider.start,
+                             .depth = depth,
+                             .step = std::max(moved / 2, kLeastStep),
+                             .refused = true};
+      continue;
+    }
+    Yield& yield = *collider.yield;
+    if (std::exchange(yield.refused, false)) {
+      // It is back at its accepted pose. What is inside now was there before.
+      yield.depth = depth;
+    } else if (fits || depth < yield.depth) {
+      yield.accepted = collider.before;
+      yield.depth = depth;
+      yield.step *= 1.5f;
+      if (fits && !yield.stands) collider.yield.reset();
+    } else {
+      yield.refused = true;
+      yield.step = std::max(yield.step / 2, kLeastStep);
+    }
   }
 }
 
@@ -126,8 +191,15 @@ void ColliderSet::write(const model::Scene& scene, v1::Frame& frame) const {
     if (const model::Skin* skin = skinOf(scene.colliders[i]))
       messages::writeJoints(*skin, state_.joints[i].now, *state.mutable_joints());
   }
-  for (const Placed& collider : state_.colliders)
-    messages::write(collider.now, collider.participant, *states.Add());
+  for (const Placed& collider : state_.colliders) {
+    v1::ColliderState& state = *states.Add();
+    model::ParticipantCollider shown = collider.now;
+    if (collider.yield && collider.yield->stands) {
+      shown.pose = collider.before;
+      state.set_yields(true);
+    }
+    messages::write(shown, collider.participant, state);
+  }
 }
 
 }  // namespace clothstream::scene

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <vector>
@@ -19,6 +20,13 @@ namespace clothstream::scene {
 // pose, at rest.
 inline constexpr float kMaxColliderSpeed = 30;
 inline constexpr float kMaxColliderTurn = 0.5f;
+
+// A collider of a participant yields to cloth that nothing passes through. It yields if a node is deeper inside than
+// kYieldDepth (m), or than kYieldShare of the shape's least radius. It then returns to its last accepted pose, and
+// approaches the pose that the participant gives in smaller steps. kLeastStep (m) is the least step in a tick.
+inline constexpr float kYieldDepth = 0.005f;
+inline constexpr float kYieldShare = 0.3f;
+inline constexpr float kLeastStep = 0.001f;
 
 // Belongs to the device's thread. The order does not depend on the order of arrival: the scene's colliders as
 // defined, then the participants' by participant number and id.
@@ -39,6 +47,11 @@ class ColliderSet {
   void advance(const model::Scene& scene, double endSeconds,
                std::vector<simulation::MovingCollider>& colliders);
 
+  // Accepts or refuses the poses of the newest advance(). `depths` has, for each collider that it wrote, the depth of
+  // the deepest node of cloth that nothing passes through at the tick's end, in metres. Do not call it for scenes
+  // without such cloth.
+  void settle(std::span<const float> depths);
+
   // A collider of the scene has participant 0, and its index in the scene as id.
   struct Identity {
     std::uint64_t participant;
@@ -53,10 +66,20 @@ class ColliderSet {
   // Replaces the colliders of `frame` by the present ones. `scene` must be that of the newest advance().
   void write(const model::Scene& scene, v1::Frame& frame) const;
 
+  // A collider that cloth has hindered.
+  struct Yield {
+    model::Pose accepted;  // the newest pose that cloth had room for
+    float depth = 0;       // m, of the deepest node there
+    float step = 0;        // m, the longest motion in the next tick
+    bool refused = false;  // true: it returns in the next tick
+    bool stands = false;   // true: in the newest tick it did not reach the participant's pose
+  };
   struct Placed {
     std::uint64_t participant;
     model::ParticipantCollider now;
-    model::Pose before;
+    model::Pose before;          // at the end of the newest tick
+    model::Pose start;           // at its start
+    std::optional<Yield> yield;  // absent: it has moved as the participant said
   };
   // Joints of a collider of the scene, relative to their parents; empty if it has none.
   struct Joints {

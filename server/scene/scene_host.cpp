@@ -425,6 +425,7 @@ void SceneHost::finish() {
                            .scene = scene_,
                            .inputs = tickInputs_,
                            .colliders = colliders_});
+  if (const std::vector<float> depths = on.simulation.depths(); !depths.empty()) colliders_.settle(depths);
   clothsChanged_ = false;
   if (status_.healthy) {
     ++sinceHealthy_;

@@ -460,6 +460,7 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.beginStage("hash");
   recorder.barrier();
   recorder.dispatch(hash.from[present], shared::HashPush{nodes}, hashInvocations(device, nodes));
+  if (motionBound) motionBound->recordDepths(recorder, present, collision.push(substeps - 1, substeps, tickRate));
   recorder.barrier();
   recorder.copy(buffers.status, buffers.statusReadback, sizeof(shared::StatusRecord), 0,
                 slot * sizeof(shared::StatusRecord));
@@ -534,6 +535,11 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
 
 std::vector<ContactStatus> ClothSimulation::contacts() const {
   return pipeline_->collision.contacts();
+}
+
+std::vector<float> ClothSimulation::depths() const {
+  if (!pipeline_->motionBound) return {};
+  return pipeline_->collision.inOrder(pipeline_->motionBound->depths(pipeline_->slot));
 }
 
 std::vector<GrabStatus> ClothSimulation::grabs() const {

@@ -4,6 +4,7 @@
 #ifndef CLOTHSTREAM_SHADERS_MOTION_BOUND_MOTION_BOUND_H
 #define CLOTHSTREAM_SHADERS_MOTION_BOUND_MOTION_BOUND_H
 
+#include "shaders/collision/collision.h"
 #include "shaders/shared/types.h"
 
 CLOTHSTREAM_SHARED_BEGIN
@@ -67,6 +68,12 @@ struct NodePush {
   float substepRate;  // 1/s
 };
 
+struct DepthPush {
+  CollisionPush collision;
+  uint32_t nodeCount;
+  uint32_t reserved0, reserved1, reserved2;
+};
+
 // Corrections of nodes are sums of whole numbers in units of 1 / kCorrectionUnits m.
 const float kCorrectionUnits = 16777216.0;
 
@@ -76,6 +83,7 @@ CLOTHSTREAM_SHARED_END
 namespace clothstream::shared {
 static_assert(sizeof(PartRecord) == 16 && sizeof(BranchRecord) == 16);
 static_assert(sizeof(FaceRecord) == CLOTHSTREAM_FACE_TEXELS * sizeof(vec4) && offsetof(FaceRecord, edges) == 16);
+static_assert(sizeof(DepthPush) == 48);
 static_assert(sizeof(PairGroups) == 16 && sizeof(PairPush) == 24 && sizeof(NodePush) == 24);
 }  // namespace clothstream::shared
 #else

@@ -8,7 +8,7 @@
 const int kColliderBinding = 4;
 const int kContactImpulseBinding = 6;  // unused: this kernel changes no node
 
-#include "shaders/collision/collide.glsl"
+#include "shaders/collision/depth.glsl"
 #include "shaders/report/report.h"
 #include "shaders/shared/arithmetic.glsl"
 #include "shaders/shared/simulation.h"
@@ -25,29 +25,6 @@ layout(std430, binding = 3) buffer Counts {
 layout(push_constant) uniform Push {
   PenetrationPush push;
 };
-
-// Depth below the shape's surface, along the nearest of its planes. At most 0 outside.
-float depthIn(Collider collider, ColliderFrame frame, vec3 position) {
-  precise vec3 offset = position - collider.after;
-  precise vec3 p = rotateBack(frame.after, offset);
-  if (frame.shape.kind == kRoundShape) {
-    precise vec3 out_ = p - onSegment(p.y, halfLengthOf(frame.shape));
-    precise float squared = max(dotProduct(out_, out_), 1e-24);
-    precise float depth = radiusOf(frame.shape) - squared * reciprocalSquareRoot(squared);
-    return depth;
-  }
-  bool isBox = frame.shape.kind == kBoxShape;
-  uint count = isBox ? 6u : planeCountOf(frame.shape);
-  float highest = -1e30;
-  for (uint i = 0; i < count; ++i) {
-    vec4 plane = isBox ? boxPlane(halfSizeOf(frame.shape), i)
-                       : texelFetch(colliders, int(firstPlaneOf(frame.shape) + i));
-    precise float height = dotProduct(plane.xyz, p) - plane.w;
-    highest = max(highest, height);
-  }
-  precise float depth = -highest;
-  return depth;
-}
 
 float deepest(uint node, vec3 position) {
   NearList list = fetchNearList(node);

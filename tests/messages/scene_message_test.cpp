@@ -179,6 +179,16 @@ TEST(ToScene, DefaultsBallRadiusToHalfTheShortestSpring) {
   EXPECT_EQ(again->cloths[0].selfCollision->friction, 0);
 }
 
+TEST(ToScene, KeepsThroughAMessageThatNothingPassesThroughACloth) {
+  v1::Scene message = smallScene();
+  message.mutable_cloths(0)->mutable_self_collision();
+  EXPECT_FALSE(model::boundsMotion(toScene(message)->cloths[0]));
+  message.mutable_cloths(0)->mutable_self_collision()->set_nothing_passes(true);
+  const Result<model::Scene> again = toScene(toMessage(toScene(message).value()));
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_TRUE(model::boundsMotion(again->cloths[0]));
+}
+
 TEST(ToScene, KeepsAttachmentsAndTethersThroughAMessage) {
   v1::Scene message = smallScene();
   v1::Cloth& cloth = *message.mutable_cloths(0);
@@ -362,6 +372,20 @@ const BadScene kBadScenes[] = {
      [](v1::Scene& s) { cloth(s).mutable_self_collision()->set_radius(0); }},
     {"cloths[0].selfCollision.friction = -1:",
      [](v1::Scene& s) { cloth(s).mutable_self_collision()->set_friction(-1); }},
+    {"cloths[0].selfCollision.nothingPasses = true:",
+     [](v1::Scene& s) {
+       cloth(s).mutable_self_collision()->set_nothing_passes(true);
+       grid(s).set_rows(257);
+       grid(s).set_columns(257);
+     },
+     "at most 65536 nodes"},
+    {"cloths[0].selfCollision.nothingPasses = true:",
+     [](v1::Scene& s) {
+       cloth(s).mutable_self_collision()->set_nothing_passes(true);
+       cloth(s).mutable_coarse();
+       cloth(s).set_damping(10);
+     },
+     "without \"coarse\""},
     {"cloths[0].selfCollision:",
      [](v1::Scene& s) {
        cloth(s).mutable_self_collision();

@@ -44,6 +44,9 @@ TEST(Price, TimeGrowsWithNodesSubstepsIterationsAndColliders) {
   scene = plain;
   scene.cloths[0].selfCollision = SelfCollision{.radius = 0.001f};
   EXPECT_GT(secondsOf(scene), 5 * before);
+  const double balls = secondsOf(scene);
+  scene.cloths[0].selfCollision->nothingPasses = true;
+  EXPECT_GT(secondsOf(scene), 4 * balls);
   for (const SolverKind kind :
        {SolverKind::constraint, SolverKind::acad, SolverKind::xpbd, SolverKind::implicitEuler}) {
     Scene few = sheet(100, kind), many = sheet(100, kind);

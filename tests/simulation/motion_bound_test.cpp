@@ -25,7 +25,7 @@ model::Cloth bounded(model::Cloth cloth) {
   return cloth;
 }
 
-// Two sheets and a disc in layers of 8 to 12 mm, and the ends of random motions of up to `speed` times a
+// Two sheets in layers of 2 to 6 mm, whose edges are not parallel, and the ends of random motions of up to `speed` times a
 // substep.
 struct Motion {
   model::Scene scene;
@@ -35,14 +35,14 @@ struct Motion {
 Motion layeredMotion(unsigned seed, float speed) {
   model::Cloth upper = bounded(calmCloth(9, 8)), lower = bounded(calmCloth(10, 9));
   upper.pins = {topRow(upper)};
-  lower.grid.pose.position = model::Vec3(0.003f, -0.004f, -0.008f);
+  lower.grid.pose = {model::Vec3(0.003f, -0.004f, -0.004f), turned(25, model::Vec3::UnitZ())};
   model::Scene scene = sceneOf({upper, lower});
   Motion motion{scene, simulation::restState(scene.cloths), {}};
   const std::vector<float> masses = simulation::inverseMasses(scene.cloths);
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(-1, 1);
   const auto vector = [&] { return model::Vec3(unit(random), unit(random), unit(random)); };
-  for (model::Vec3& p : motion.start.positions) p += 0.0025f * vector();
+  for (model::Vec3& p : motion.start.positions) p += 0.001f * vector();
   motion.end = motion.start;
   for (std::size_t i = 0; i < masses.size(); ++i) {
     if (masses[i] == 0) continue;
@@ -125,7 +125,7 @@ class Bound {
 constexpr double kTolerance = 1e-5;
 
 TEST_F(MotionBound, EndsMotionsWhereTheReferenceEndsThem) {
-  for (const float speed : {0.2f, 1.5f, 3.0f}) {
+  for (const float speed : {0.2f, 1.0f, 3.0f}) {
     const Motion motion = layeredMotion(3, speed);
     const Bound bound(motion);
     ASSERT_EQ(bound.report().overflows, 0u);
@@ -145,7 +145,7 @@ TEST_F(MotionBound, EndsMotionsWhereTheReferenceEndsThem) {
       EXPECT_NEAR((state.velocities[i].cast<double>() - velocities[i]).norm(), 0, 720 * kTolerance);
     }
     EXPECT_LT(largest, kTolerance) << speed << " m/s";
-    EXPECT_GT(moved, speed > 1 ? 100 * kTolerance : 0) << speed << " m/s";
+    EXPECT_GT(moved, 20 * kTolerance) << speed << " m/s";
   }
 }
 

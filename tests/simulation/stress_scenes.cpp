@@ -17,7 +17,6 @@ using simulation::MovingCollider;
 constexpr float kTick = 1.0f / 72;   // s
 constexpr float kSpacing = 0.02f;    // m
 constexpr float kFast = 5;           // m/s
-constexpr float kThickness = 0.005f; // m, distance of nodes from colliders
 
 model::Cloth stressCloth(std::uint32_t rows, std::uint32_t columns, bool nothingPasses) {
   model::Cloth cloth = calmCloth(rows, columns);
@@ -73,9 +72,11 @@ StressScene fastHand(bool nothingPasses) {
   return stress;
 }
 
-// Five folds between two boxes, which close to the room of five layers and then shear them.
+// Five folds of thin cloth between two plates, which close to the room of five layers and then shear them.
 StressScene pressedFolds(bool nothingPasses) {
+  constexpr float kRadius = 0.3f * kSpacing, kRoom = 5 * 2 * kRadius + 0.01f;
   model::Cloth cloth = stressCloth(60, 20, nothingPasses);
+  cloth.selfCollision->radius = kRadius;
   StressScene stress{"pressed folds", sceneOf({cloth}), {}, {}, 144};
   stress.start = simulation::restState(stress.scene.cloths);
   for (std::uint32_t row = 0; row < 60; ++row)
@@ -89,7 +90,7 @@ StressScene pressedFolds(bool nothingPasses) {
     const model::Box plate{model::Vec3(1, 0.2f, 1)};
     const auto above = [](int t) {
       const float shear = t < 72 ? 0 : 0.1f * std::sin(0.2f * static_cast<float>(t - 72));
-      return model::Vec3(shear, approach(t, 0.3f, 0.2f + 5 * kSpacing, 0.5f), 0);
+      return model::Vec3(shear, approach(t, 0.3f, 0.1f + kRoom, 2), 0);
     };
     return std::vector{ground(0), moving(plate, above, tick)};
   };
@@ -151,7 +152,7 @@ StressScene struckHeap(bool nothingPasses) {
   const std::size_t nodes = stress.start.positions.size() / 3;
   for (std::size_t i = 0; i < stress.start.positions.size(); ++i) {
     const auto disc = static_cast<float>(i / nodes);
-    const model::Vec3 turnedPosition = turned(-84 + 9 * disc, model::Vec3::UnitX()) * stress.start.positions[i];
+    const model::Vec3 turnedPosition = turned(6 + 9 * disc, model::Vec3::UnitX()) * stress.start.positions[i];
     stress.start.positions[i] = turnedPosition + model::Vec3(0.03f * disc, 0.2f + 0.09f * disc, 0);
   }
   stress.colliders = [](int tick) {

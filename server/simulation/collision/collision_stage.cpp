@@ -111,6 +111,12 @@ std::vector<ContactStatus> CollisionStage::contacts() const {
   return statuses;
 }
 
+std::vector<float> CollisionStage::inOrder(std::span<const float> numbers) const {
+  std::vector<float> values(indices_.size());
+  for (std::size_t i = 0; i < indices_.size(); ++i) values[indices_[i]] = numbers[i];
+  return values;
+}
+
 void CollisionStage::recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds,
                                   float thickness) {
   if (!active()) return;

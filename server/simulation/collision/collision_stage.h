@@ -49,6 +49,10 @@ class CollisionStage {
   // Contacts of the last recorded tick, once it is complete.
   std::vector<ContactStatus> contacts() const;
 
+  // Values of the colliders of the last recorded tick, in the order of its inputs. `numbers` has them as the device
+  // numbers colliders.
+  std::vector<float> inOrder(std::span<const float> numbers) const;
+
   const vulkan::Buffer& colliders() const { return colliders_; }
   const vulkan::Buffer& nearLists() const { return nearLists_; }
   const vulkan::Buffer& contactImpulses() const { return contactImpulses_; }

@@ -14,8 +14,10 @@
 #include "kernels/find_faces.h"
 #include "kernels/find_pairs.h"
 #include "kernels/limit_pairs.h"
+#include "kernels/measure_depths.h"
 #include "kernels/shorten_motions.h"
 #include "kernels/slide_nodes.h"
+#include "server/simulation/collision/moving_collider.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -36,7 +38,7 @@ constexpr float kGap = 0.25f;
 float gapOf(std::span<const model::Cloth> cloths) {
   float radius = 1e30f;
   for (const model::Cloth& cloth : cloths)
-    if (boundsMotion(cloth)) radius = std::min(radius, cloth.selfCollision->radius);
+    if (model::boundsMotion(cloth)) radius = std::min(radius, cloth.selfCollision->radius);
   return kGap * radius;
 }
 
@@ -61,7 +63,7 @@ vulkan::KernelDescription limitKernel(std::uint32_t workgroupSize, bool edges, b
 }  // namespace
 
 bool MotionBoundStage::isIn(const model::Scene& scene) {
-  return std::ranges::any_of(scene.cloths, boundsMotion);
+  return std::ranges::any_of(scene.cloths, model::boundsMotion);
 }
 
 // A dispatch has an invocation for each pair.
@@ -99,6 +101,8 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
       shares_(device, BufferPurpose::state, std::size_t{scene.nodeCount()} * sizeof(std::uint32_t)),
       report_(device, BufferPurpose::state, sizeof(Report)),
       reportReadback_(device, BufferPurpose::readback, 2 * sizeof(Report)),
+      depths_(device, BufferPurpose::state, kMaxColliders * sizeof(float)),
+      depthReadback_(device, BufferPurpose::readback, 2 * kMaxColliders * sizeof(float)),
       facePairs_(device, kFacePairs * tables_.nodeCount, workgroupSize),
       nodePairs_(device, kNodePairs * tables_.nodeCount, workgroupSize),
       edgePairs_(device, kEdgePairs * tables_.nodeCount, workgroupSize),
@@ -135,7 +139,12 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
           {&parts_.texels(), state.positions[0], state.positions[1], state.velocities[1], &shares_,
            &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_},
           {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &shares_,
-           &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_}) {
+           &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_}),
+      measureDepths_(device,
+                     kernelOf("measure_depths", kernels::measure_depths, workgroupSize, sizeof(shared::DepthPush),
+                              {kTexels, kTexels, kStorage, kTexels, kTexels}),
+                     {&parts_.texels(), state.positions[0], &depths_, &state.colliders, &state.nearColliders},
+                     {&parts_.texels(), state.positions[1], &depths_, &state.colliders, &state.nearColliders}) {
   assert(isIn(scene));
 }
 
@@ -159,6 +168,7 @@ void MotionBoundStage::recordTables(vulkan::Recorder& recorder) const {
 
 void MotionBoundStage::recordClear(vulkan::Recorder& recorder) const {
   recorder.fill(report_, 0, report_.bytes());
+  recorder.fill(depths_, 0, depths_.bytes());
 }
 
 void MotionBoundStage::recordTree(vulkan::Recorder& recorder, std::uint32_t from) const {
@@ -210,12 +220,29 @@ void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t f
   recorder.dispatch(shortenMotions_.from[from], nodePush, tables_.nodeCount);
 }
 
+void MotionBoundStage::recordDepths(vulkan::Recorder& recorder, std::uint32_t present,
+                                    const shared::CollisionPush& collision) const {
+  if (collision.colliderCount == 0) return;
+  recorder.dispatch(measureDepths_.from[present],
+                    shared::DepthPush{.collision = collision,
+                                      .nodeCount = tables_.nodeCount,
+                                      .reserved0 = 0,
+                                      .reserved1 = 0,
+                                      .reserved2 = 0},
+                    tables_.nodeCount, collision.nodeWork);
+}
+
 void MotionBoundStage::recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const {
+  recorder.copy(depths_, depthReadback_, depths_.bytes(), 0, slot * depths_.bytes());
   recorder.copy(report_, reportReadback_, report_.bytes(), 0, slot * report_.bytes());
 }
 
 MotionBoundStage::Report MotionBoundStage::report(std::uint32_t slot) const {
   return reportReadback_.mapped<const Report>()[slot];
+}
+
+std::span<const float> MotionBoundStage::depths(std::uint32_t slot) const {
+  return depthReadback_.mapped<const float>().subspan(std::size_t{slot} * kMaxColliders, kMaxColliders);
 }
 
 }  // namespace clothstream::simulation

@@ -15,6 +15,7 @@
 #include "server/vulkan/device.h"
 #include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
+#include "shaders/collision/collision.h"
 
 namespace clothstream::simulation {
 
@@ -24,7 +25,7 @@ namespace clothstream::simulation {
 // can.
 class MotionBoundStage {
  public:
-  // At least one cloth must have boundsMotion(). Throws std::runtime_error if the device has too little
+  // At least one cloth must have model::boundsMotion(). Throws std::runtime_error if the device has too little
   // memory. Results do not depend on `workgroupSize`.
   MotionBoundStage(const vulkan::Device& device, const model::Scene& scene, const StateBuffers& state,
                    std::uint32_t workgroupSize);
@@ -43,6 +44,10 @@ class MotionBoundStage {
   // Records a substep, which led from state `from` to the other state. Begins with a barrier.
   void recordSubstep(vulkan::Recorder& recorder, std::uint32_t from) const;
 
+  // Records, after the last substep and a barrier, how deep the nodes are inside the colliders. `present` has the
+  // state, and `collision` is that of the last substep.
+  void recordDepths(vulkan::Recorder& recorder, std::uint32_t present, const shared::CollisionPush& collision) const;
+
   struct Report {
     std::uint32_t overflows = 0;  // substeps in which a list of pairs was too short and no node moved
     std::uint32_t shortened = 0;  // motions that were shortened
@@ -50,6 +55,8 @@ class MotionBoundStage {
   // Copies the report to the CPU, after a barrier; report() has it once the recording is complete.
   void recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const;
   Report report(std::uint32_t slot) const;
+  // Depth of the deepest node in each collider, as the device numbers them, in metres. 0: none is inside.
+  std::span<const float> depths(std::uint32_t slot) const;
 
  private:
   // A list of pairs, and its dispatch sizes.
@@ -72,7 +79,7 @@ class MotionBoundStage {
   MotionBoundTables tables_;
   float gap_, substepSeconds_;
   DeviceTable parts_, faces_, branches_;
-  vulkan::Buffer boxes_, corrections_, shares_, report_, reportReadback_;
+  vulkan::Buffer boxes_, corrections_, shares_, report_, reportReadback_, depths_, depthReadback_;
   List facePairs_, nodePairs_, edgePairs_;
   Stage boxFaces_;
   vulkan::Kernel boxBranches_;
@@ -81,7 +88,7 @@ class MotionBoundStage {
   vulkan::Bindings findBindings_;
   Stage findPairs_;
   Limits nodeLimits_, edgeLimits_;
-  Stage slideNodes_, shortenMotions_;
+  Stage slideNodes_, shortenMotions_, measureDepths_;
 };
 
 }  // namespace clothstream::simulation

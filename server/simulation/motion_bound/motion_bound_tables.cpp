@@ -80,17 +80,13 @@ class Tree {
 
 }  // namespace
 
-bool boundsMotion(const model::Cloth& cloth) {
-  return cloth.selfCollision && cloth.selfCollision->nothingPasses;
-}
-
 MotionBoundTables motionBoundTables(std::span<const model::Cloth> cloths) {
   MotionBoundTables tables;
   const NodeState rest = restState(cloths);
   const std::vector<std::uint32_t> offsets = clothOffsets(cloths);
   std::vector<model::Triangle> triangles;
   for (std::size_t i = 0; i < cloths.size(); ++i) {
-    if (!boundsMotion(cloths[i])) continue;
+    if (!model::boundsMotion(cloths[i])) continue;
     for (std::uint32_t node = offsets[i]; node < offsets[i + 1]; ++node)
       tables.parts.push_back({static_cast<float>(node), static_cast<float>(node), 0, 0});
     for (const model::Triangle& triangle : model::clothTriangles(cloths[i]))

@@ -24,10 +24,7 @@ struct MotionBoundTables {
   std::uint32_t edgeCount() const { return static_cast<std::uint32_t>(parts.size()) - nodeCount; }
 };
 
-// True if nothing passes through this cloth.
-bool boundsMotion(const model::Cloth& cloth);
-
-// Tables of the cloths with boundsMotion(). The tree divides triangles at the medians of their middles at
+// Tables of the cloths with model::boundsMotion(). The tree divides triangles at the medians of their middles at
 // rest.
 MotionBoundTables motionBoundTables(std::span<const model::Cloth> cloths);
 

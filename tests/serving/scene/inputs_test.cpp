@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Path from a participant's message to the colliders of a tick.
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "clothstream/v1/session.pb.h"
 #include "server/scene/collider_set.h"
 #include "server/scene/grabs_and_attachments.h"
 #include "server/scene/inbox.h"
@@ -101,6 +104,46 @@ TEST_F(ColliderSetTest, RotationIsSweptUnlessItIsAJump) {
   EXPECT_EQ(some.end.orientation.coeffs(), finger.pose.orientation.coeffs());
   const MovingCollider jump = turned(-130);
   EXPECT_EQ(jump.start.orientation.coeffs(), finger.pose.orientation.coeffs());
+}
+
+// Cloth is held behind x = 1: it is as deep inside a collider as that is beyond.
+TEST_F(ColliderSetTest, ColliderYieldsWhereClothHasNoRoom) {
+  v1::Frame frame;
+  const auto move = [&](float x) {
+    colliders.place(7, std::vector{handAt(1, x)});
+    advance();
+    colliders.settle(std::vector{0.0f, std::max(moving[1].end.position.x() - 1, 0.0f)});
+    colliders.write(scene, frame);
+    EXPECT_EQ(frame.colliders(1).position().x(), moving[1].end.position.x());
+    return moving[1].end.position.x();
+  };
+  for (const float x : {0.7f, 0.8f, 0.9f, 1.0f}) {
+    EXPECT_EQ(move(x), x);
+    EXPECT_FALSE(frame.colliders(1).yields());
+  }
+  for (int i = 0; i < 40; ++i) EXPECT_LE(move(1.1f), 1.1f);
+  for (int i = 0; i < 40; ++i) {
+    EXPECT_NEAR(move(1.1f), 1, 0.008);
+    EXPECT_TRUE(frame.colliders(1).yields());
+  }
+  for (int i = 0; i < 20; ++i) move(0.8f);
+  EXPECT_EQ(move(0.8f), 0.8f);
+  EXPECT_FALSE(frame.colliders(1).yields());
+  EXPECT_EQ(move(0.5f), 0.5f);
+}
+
+// Cloth that another body presses into a collider, or in which it appeared, lets it go out and not farther in.
+TEST_F(ColliderSetTest, ColliderLeavesClothThatIsInsideIt) {
+  const auto move = [&](float x) {
+    colliders.place(7, std::vector{handAt(1, x)});
+    advance();
+    colliders.settle(std::vector{0.0f, std::max(moving[1].end.position.x() - 1, 0.0f)});
+    return moving[1].end.position.x();
+  };
+  EXPECT_EQ(move(1.02f), 1.02f);
+  for (int i = 0; i < 40; ++i) EXPECT_NEAR(move(1.1f), 1.02, 0.0011);
+  for (int i = 0; i < 40; ++i) move(0.9f);
+  EXPECT_EQ(move(0.9f), 0.9f);
 }
 
 TEST_F(ColliderSetTest, MissingColliderIsRemoved) {
