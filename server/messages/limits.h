@@ -72,8 +72,8 @@ inline constexpr std::uint32_t kMaxCoarseSweeps = 16;
 inline constexpr std::uint32_t kMaxCoarseLevels = 2;
 inline constexpr std::uint32_t kMaxCoarseEvery = 64;              // substeps
 inline constexpr std::uint32_t kMaxSelfCollisionNodes = 524'288;  // per scene
-inline constexpr std::uint32_t kMaxBoundNodes = 65'536;           // per scene, in cloths that nothing passes through
-inline constexpr double kUnitTolerance = 0.001;                   // deviation of a quaternion's length from 1
+inline constexpr std::uint32_t kMaxBoundNodes = 65'536;  // per scene, in cloths that nothing passes through
+inline constexpr double kUnitTolerance = 0.001;          // deviation of a quaternion's length from 1
 
 inline constexpr float kDefaultWeldDistance = 1e-5f;  // m
 inline constexpr float kDefaultArealMass = 0.2f;      // kg/m^2

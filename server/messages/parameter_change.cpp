@@ -35,7 +35,8 @@ model::ClothChange toClothChange(Checks& checks, const Path& path, const v1::Clo
   if (!change.name.empty()) checkKnown(checks, path / "name", change.name, scene.cloths);
   change.numbers = readNumbers(checks, path, message, addressed(scene, change.name));
   if (message.self_collision().nothing_passes() &&
-      !std::ranges::all_of(addressed(scene, change.name), [](const model::Cloth* c) { return model::boundsMotion(*c); }))
+      !std::ranges::all_of(addressed(scene, change.name),
+                           [](const model::Cloth* c) { return model::boundsMotion(*c); }))
     checks.fail(path / "selfCollision" / "nothingPasses", "true",
                 "must be absent: it cannot change while the scene runs");
   if (message.has_solver()) change.solver = toSolver(checks, path / "solver", message.solver());

@@ -56,8 +56,7 @@ void writeCloth(const model::Cloth& cloth, v1::Cloth& message) {
   message.set_mass(cloth.mass);
   message.set_material(cloth.material);
   writeNumbers(cloth, message);
-  if (model::boundsMotion(cloth))
-    message.mutable_self_collision()->set_nothing_passes(true);
+  if (model::boundsMotion(cloth)) message.mutable_self_collision()->set_nothing_passes(true);
   for (const model::GridRange& range : cloth.pins) write(range, *message.add_pins());
   *message.mutable_solver() = toMessage(cloth.solver);
   if (cloth.coarse) writeCoarse(*cloth.coarse, *message.mutable_coarse());

@@ -40,7 +40,8 @@ constexpr std::uint32_t kCpuGroupSolve = 4096, kCpuGroupGrid = 2048;
 // Bytes on device and host, measured like the weights.
 constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
-constexpr double kSelfCollisionBytes = 600, kMotionBoundBytes = 1000, kHingeBytes = 200, kSystemBytes = 64, kPairBytes = 40;
+constexpr double kSelfCollisionBytes = 600, kMotionBoundBytes = 2000, kHingeBytes = 200, kSystemBytes = 64,
+                 kPairBytes = 40;
 constexpr double kTriangleBytes = 400;  // of a solid
 constexpr double kSkinVertexBytes = 500;
 constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
@@ -199,7 +200,8 @@ Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
     if (scene.integrator == Integrator::rungeKutta4) step *= kRungeKutta;
     if (scene.environment.airDensity != 0 && (cloth.drag != 0 || cloth.lift != 0)) step += kAir * nodes;
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
-    if (cloth.selfCollision) step += (boundsMotion(cloth) ? kSelfCollision + kMotionBound : kSelfCollision) * nodes;
+    if (cloth.selfCollision)
+      step += (boundsMotion(cloth) ? kSelfCollision + kMotionBound : kSelfCollision) * nodes;
     step += collisions * nodes;
     work.nodeSteps +=
         substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);

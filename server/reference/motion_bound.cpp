@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "server/model/mesh.h"
@@ -11,12 +12,13 @@
 namespace clothstream::reference {
 namespace {
 
-constexpr double kGap = 0.25;       // of the smallest radius
-constexpr double kSlide = 0.4;      // of the gap, by which a correction may lengthen a motion
-constexpr double kApproach = 0.1;   // of the gap, by which a pair that is too near separates
-constexpr double kFloor = 0.1;      // of the gap, which no pair gives up
-constexpr double kUsed = 0.999;     // of a limit
-constexpr double kCorrection = 0.05;  // m, the largest of a pair
+constexpr double kGap = 0.25;                // of the smallest radius
+constexpr double kSlide = 0.4;               // of the gap, by which a correction may lengthen a motion
+constexpr double kApproach = 0.1;            // of the gap, by which a pair that is too near separates
+constexpr double kFloor = 0.1;               // of the gap, which no pair gives up
+constexpr double kLeastShare = 1.0 / 65536;  // of a node in a pair's line that counts
+constexpr double kUsed = 0.999;              // of a limit
+constexpr double kCorrection = 0.05;         // m, the largest of a pair
 
 Vec3 pointOf(const std::array<Vec3, 4>& corners, const std::array<double, 4>& weights, std::size_t first,
              std::size_t end) {
@@ -98,8 +100,8 @@ MotionBound::MotionBound(const model::Scene& scene) {
 }
 
 ShortestLine MotionBound::lineOf(const Pair& pair, std::span<const Vec3> positions) const {
-  const std::array<Vec3, 4> corners{positions[pair.nodes[0]], positions[pair.nodes[1]], positions[pair.nodes[2]],
-                                    positions[pair.nodes[3]]};
+  const std::array<Vec3, 4> corners{positions[pair.nodes[0]], positions[pair.nodes[1]],
+                                    positions[pair.nodes[2]], positions[pair.nodes[3]]};
   return pair.second == 1 ? shortestToTriangle(corners) : shortestBetweenEdges(corners);
 }
 
@@ -121,9 +123,10 @@ double MotionBound::leastDistance(const Pair& pair, std::span<const Vec3> positi
 }
 
 void MotionBound::separate(std::span<const Pair> near, std::span<const Vec3> start, std::span<Vec3> positions,
-                           std::span<Vec3> velocities, std::span<const double> inverseMasses, double h) const {
+                           std::span<Vec3> velocities, std::span<const double> inverseMasses,
+                           double h) const {
   std::vector<Vec3> sums(positions.size(), Vec3::Zero());
-  std::vector<int> counts(positions.size(), 0);
+  std::vector<double> totals(positions.size(), 0);
   for (const Pair& pair : near) {
     const ShortestLine shortest = lineOf(pair, start);
     const double distance = shortest.line.norm();
@@ -140,15 +143,16 @@ void MotionBound::separate(std::span<const Pair> near, std::span<const Vec3> sta
     for (std::size_t k = 0; k < 4; ++k) {
       const double side = k < pair.second ? 1 : -1;
       const double along = side * shortest.weights[k] * inverseMasses[pair.nodes[k]] * lacking / give;
-      if (along == 0) continue;
-      sums[pair.nodes[k]] += along * normal;
-      ++counts[pair.nodes[k]];
+      const double share = std::abs(shortest.weights[k]);
+      if (along == 0 || share < kLeastShare) continue;
+      sums[pair.nodes[k]] += share * along * normal;
+      totals[pair.nodes[k]] += share;
     }
   }
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (counts[i] == 0) continue;
+    if (totals[i] == 0) continue;
     const Vec3 way = positions[i] - start[i];
-    Vec3 corrected = way + sums[i] / counts[i];
+    Vec3 corrected = way + sums[i] / totals[i];
     const double longest = way.norm() + kSlide * gap_;
     if (corrected.norm() > longest) corrected *= longest / corrected.norm();
     positions[i] = start[i] + corrected;
@@ -178,13 +182,16 @@ void MotionBound::apply(std::span<const Vec3> start, std::span<Vec3> positions, 
     const Vec3 normal = shortest.line / distance;
     // Demand of each side: how far its foremost node passes the foremost place of its start.
     double front[2] = {-1e30, -1e30}, frontAfter[2] = {-1e30, -1e30};
-    const auto towards = [&](std::size_t k, const Vec3& p) { return (k < pair.second ? -1 : 1) * normal.dot(p); };
+    const auto towards = [&](std::size_t k, const Vec3& p) {
+      return (k < pair.second ? -1 : 1) * normal.dot(p);
+    };
     for (std::size_t k = 0; k < 4; ++k) {
       const std::size_t side = k < pair.second ? 0 : 1;
       front[side] = std::max(front[side], towards(k, start[pair.nodes[k]]));
       frontAfter[side] = std::max(frontAfter[side], towards(k, positions[pair.nodes[k]]));
     }
-    const double demand[2] = {std::max(frontAfter[0] - front[0], 0.0), std::max(frontAfter[1] - front[1], 0.0)};
+    const double demand[2] = {std::max(frontAfter[0] - front[0], 0.0),
+                              std::max(frontAfter[1] - front[1], 0.0)};
     const double free = std::max(-front[0] - front[1] - kFloor * gap_, 0.0);
     if (demand[0] + demand[1] <= free) continue;
     for (std::size_t k = 0; k < 4; ++k) {

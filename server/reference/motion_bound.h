@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Bound on the motion of nodes that keeps cloth from passing through cloth, in double precision. Every pair is
-// checked; there is no tree.
+// Bound on the motion of nodes that keeps cloth from passing through cloth, in double precision. Every pair
+// is checked; there is no tree.
 #pragma once
 
 #include <array>

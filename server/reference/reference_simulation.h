@@ -44,8 +44,8 @@ class ReferenceSimulation {
   void tick();
 
   // Simulates substep `index` of a tick: coarse corrections; forces, integration and colliders in order;
-  // attachments, tethers and grabs; self-collision, and colliders again; colliders that are triangle meshes; the
-  // bound on motion.
+  // attachments, tethers and grabs; self-collision, and colliders again; colliders that are triangle meshes;
+  // the bound on motion.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
   // Number of simulated ticks.

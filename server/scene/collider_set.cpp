@@ -23,7 +23,8 @@ model::Pose startOf(const model::Pose& before, const model::Pose& now, double ti
   return jumped ? now : before;
 }
 
-// Least and largest distance of the surface from the middle. Shapes of participants are spheres, capsules and boxes.
+// Least and largest distance of the surface from the middle. Shapes of participants are spheres, capsules and
+// boxes.
 float leastRadius(const model::Shape& shape) {
   if (const auto* box = std::get_if<model::Box>(&shape)) return box->size.minCoeff() / 2;
   if (const auto* capsule = std::get_if<model::Capsule>(&shape)) return capsule->radius;
@@ -47,7 +48,8 @@ model::Pose towards(const model::Shape& shape, const model::Pose& from, const mo
   const float way = wayOf(shape, from, to);
   if (way <= step) return to;
   const float share = step / way;
-  return {from.position + share * (to.position - from.position), from.orientation.slerp(share, to.orientation)};
+  return {from.position + share * (to.position - from.position),
+          from.orientation.slerp(share, to.orientation)};
 }
 
 const model::Skin* skinOf(const model::Collider& collider) {

@@ -21,9 +21,10 @@ namespace clothstream::scene {
 inline constexpr float kMaxColliderSpeed = 30;
 inline constexpr float kMaxColliderTurn = 0.5f;
 
-// A collider of a participant yields to cloth that nothing passes through. It yields if a node is deeper inside than
-// kYieldDepth (m), or than kYieldShare of the shape's least radius. It then returns to its last accepted pose, and
-// approaches the pose that the participant gives in smaller steps. kLeastStep (m) is the least step in a tick.
+// A collider of a participant yields to cloth that nothing passes through. It yields if a node is deeper
+// inside than kYieldDepth (m), or than kYieldShare of the shape's least radius. It then returns to its last
+// accepted pose, and approaches the pose that the participant gives in smaller steps. kLeastStep (m) is the
+// least step in a tick.
 inline constexpr float kYieldDepth = 0.005f;
 inline constexpr float kYieldShare = 0.3f;
 inline constexpr float kLeastStep = 0.001f;
@@ -47,9 +48,9 @@ class ColliderSet {
   void advance(const model::Scene& scene, double endSeconds,
                std::vector<simulation::MovingCollider>& colliders);
 
-  // Accepts or refuses the poses of the newest advance(). `depths` has, for each collider that it wrote, the depth of
-  // the deepest node of cloth that nothing passes through at the tick's end, in metres. Do not call it for scenes
-  // without such cloth.
+  // Accepts or refuses the poses of the newest advance(). `depths` has, for each collider that it wrote, the
+  // depth of the deepest node of cloth that nothing passes through at the tick's end, in metres. Do not call
+  // it for scenes without such cloth.
   void settle(std::span<const float> depths);
 
   // A collider of the scene has participant 0, and its index in the scene as id.

@@ -460,7 +460,8 @@ void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.beginStage("hash");
   recorder.barrier();
   recorder.dispatch(hash.from[present], shared::HashPush{nodes}, hashInvocations(device, nodes));
-  if (motionBound) motionBound->recordDepths(recorder, present, collision.push(substeps - 1, substeps, tickRate));
+  if (motionBound)
+    motionBound->recordDepths(recorder, present, collision.push(substeps - 1, substeps, tickRate));
   recorder.barrier();
   recorder.copy(buffers.status, buffers.statusReadback, sizeof(shared::StatusRecord), 0,
                 slot * sizeof(shared::StatusRecord));

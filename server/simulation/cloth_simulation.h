@@ -99,9 +99,9 @@ class ClothSimulation {
   // without contact are left out.
   std::vector<ContactStatus> contacts() const;
 
-  // Depth of the deepest free node of a cloth that nothing passes through in each collider at the end of the last
-  // recorded tick, once it is complete: m, in the order of TickInputs::colliders, 0 in a triangle mesh. Empty if
-  // the scene has no such cloth.
+  // Depth of the deepest free node of a cloth that nothing passes through in each collider at the end of the
+  // last recorded tick, once it is complete: m, in the order of TickInputs::colliders, 0 in a triangle mesh.
+  // Empty if the scene has no such cloth.
   std::vector<float> depths() const;
 
   // Status of the grabs of the last recorded tick, once it is complete.

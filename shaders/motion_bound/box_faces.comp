@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Computes the box that contains a triangle during the substep, in whatever direction its nodes move. Writes cannot race: each leaf belongs to one
-// invocation.
+// Computes the box that contains a triangle during the substep, in whatever direction its nodes move. Writes
+// cannot race: each leaf belongs to one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

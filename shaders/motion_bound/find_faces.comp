@@ -25,8 +25,8 @@ layout(push_constant) uniform Push {
   PairPush push;
 };
 
-// One loop, without an inner search for the next triangle: lavapipe of Mesa 22.3 leaves nested do-while loops too
-// early. A loop that runs at most once is a branch that lavapipe skips if no invocation takes it.
+// One loop, without an inner search for the next triangle: lavapipe of Mesa 22.3 leaves nested do-while loops
+// too early. A loop that runs at most once is a branch that lavapipe skips if no invocation takes it.
 void main() {
   uint face = gl_GlobalInvocationID.x;
   if (face >= push.faceCount) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Lists the pairs of a node and a triangle, and of two edges, without a common node, that could meet in the
-// substep: those of two triangles whose boxes overlap. Each node and each edge belongs to one triangle. A pair
-// farther apart than its longest motions and the gap is omitted.
+// substep: those of two triangles whose boxes overlap. Each node and each edge belongs to one triangle. A
+// pair farther apart than its longest motions and the gap is omitted.
 //
 // The order of the pairs is arbitrary, and does not change the result. If there are more than a list holds,
 // their number says so.
@@ -84,8 +84,10 @@ bool edgesMayMeet(Moving a, Moving b, Moving c, Moving d) {
 void addNodes(Face one, Face other) {
   [[unroll]] for (int i = 0; i < 3; ++i) {
     uint node = one.nodes[i];
-    bool apart = (one.owned >> i & 1u) != 0 && node != other.nodes[0] && node != other.nodes[1] && node != other.nodes[2];
-    for (bool found = apart && nodeMayMeet(one.corners[i], other.corners[0], other.corners[1], other.corners[2]);
+    bool apart = (one.owned >> i & 1u) != 0 && node != other.nodes[0] && node != other.nodes[1] &&
+                 node != other.nodes[2];
+    for (bool found =
+             apart && nodeMayMeet(one.corners[i], other.corners[0], other.corners[1], other.corners[2]);
          found; found = false) {
       uint place = atomicAdd(nodeGroups.count, 1u);
       if (place < push.nodePairs) {
@@ -103,7 +105,8 @@ void addEdges(Face one, Face other) {
       bool apart = one.edges[i] >= 0.0 && other.edges[k] >= 0.0 && one.nodes[i] != other.nodes[k] &&
                    one.nodes[i] != other.nodes[k2] && one.nodes[i2] != other.nodes[k] &&
                    one.nodes[i2] != other.nodes[k2];
-      for (bool found = apart && edgesMayMeet(one.corners[i], one.corners[i2], other.corners[k], other.corners[k2]);
+      for (bool found =
+               apart && edgesMayMeet(one.corners[i], one.corners[i2], other.corners[k], other.corners[k2]);
            found; found = false) {
         uint place = atomicAdd(edgeGroups.count, 1u);
         if (place < push.edgePairs) {

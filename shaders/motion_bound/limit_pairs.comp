@@ -3,7 +3,7 @@
 // shortest line between its sides at the substep's start.
 //
 // Separation: what would bring the nearest points closer than the gap is shared among the nodes by weight and
-// inverse mass; slide_nodes.comp takes the mean of a node's corrections.
+// inverse mass; slide_nodes.comp takes the weighted mean of a node's corrections.
 //
 // Limit: a plane across that direction separates both sides at the start. Each side may advance up to the
 // plane, which stands where both demand the same share of the room. A node gets the largest share of its
@@ -32,7 +32,7 @@ layout(std430, binding = 5) readonly buffer Groups {
   PairGroups groups;
 };
 layout(std430, binding = 6) buffer Corrections {
-  int corrections[];  // x, y, z in units, number, by node
+  int corrections[];  // x, y, z in units and weight, by node
 };
 layout(std430, binding = 7) buffer Shares {
   uint shares[];  // bits of a float from 0 to 1, by node
@@ -42,18 +42,21 @@ layout(push_constant) uniform Push {
   PairPush push;
 };
 
-const float kIntersecting = 1e-12;   // m^2, squared distance of a pair that already intersects
-const float kApproach = 0.1;         // share of the gap by which a pair that is too near separates
-const float kFloor = 0.1;            // share of the gap that no pair gives up
+const float kIntersecting = 1e-12;  // m^2, squared distance of a pair that already intersects
+const float kApproach = 0.1;        // share of the gap by which a pair that is too near separates
+const float kFloor = 0.1;           // share of the gap that no pair gives up
+const float kLeastShare = 1.0 / kCorrectionWeight;
 const float kRounding = 0.999;       // share of a limit that is used
 const float kMostCorrection = 0.05;  // m
 
-void correct(uint node, vec3 by) {
+// The weight of a correction is the share of the node in the end of the pair's line.
+void correct(uint node, float share, vec3 by) {
   precise vec3 units = kCorrectionUnits * by;
+  precise float weight = kCorrectionWeight * share;
   atomicAdd(corrections[4 * node], int(units.x));
   atomicAdd(corrections[4 * node + 1], int(units.y));
   atomicAdd(corrections[4 * node + 2], int(units.z));
-  atomicAdd(corrections[4 * node + 3], 1);
+  atomicAdd(corrections[4 * node + 3], int(weight));
 }
 
 void limitTo(uint node, float share) {
@@ -104,7 +107,8 @@ void main() {
   }
 
   if (kSlide) {
-    precise float apart = weights.x * after[0] + weights.y * after[1] + weights.z * after[2] + weights.w * after[3];
+    precise float apart =
+        weights.x * after[0] + weights.y * after[1] + weights.z * after[2] + weights.w * after[3];
     precise float further = distance + kApproach * push.gap;
     precise float lacking = (further < push.gap ? further : push.gap) - apart;
     precise vec4 moved = weights * vec4(masses[0], masses[1], masses[2], masses[3]);
@@ -114,10 +118,11 @@ void main() {
       precise float most = lacking < kMostCorrection ? lacking : kMostCorrection;
       precise float strength = most * reciprocal(max(give, 1e-20));
       [[unroll]] for (int k = 0; k < 4; ++k) {
-        precise float along = strength * moved[k];
-        if (along != 0.0) {
+        float share = abs(weights[k]);
+        precise float along = share * (strength * moved[k]);
+        if (along != 0.0 && share >= kLeastShare) {
           precise vec3 by = along * normal;
-          correct(nodes[k], by);
+          correct(nodes[k], share, by);
         }
       }
     }

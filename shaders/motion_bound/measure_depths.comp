@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Measures how deep free nodes of cloths that nothing passes through are inside each collider at the tick's end.
-// The deepest node follows from an atomic maximum of the depths' bits, which order as the depths do.
+// Measures how deep free nodes of cloths that nothing passes through are inside each collider at the tick's
+// end. The deepest node follows from an atomic maximum of the depths' bits, which order as the depths do.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

@@ -9,15 +9,15 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// What is checked against triangles or edges: a node (both ends are the same) or an edge.
+// A node (both ends are the same) or an edge of the cloths.
 struct PartRecord {
   float first;
   float second;
   float reserved0, reserved1;
 };
 
-// A triangle with the edges and corners that belong to it: each edge and each node of the cloths belongs to one
-// triangle. An edge is its place among the parts, or -1. Edge k is from corner k to the next one.
+// A triangle with the edges and corners that belong to it: each edge and each node of the cloths belongs to
+// one triangle. An edge is its place among the parts, or -1. Edge k is from corner k to the next one.
 #define CLOTHSTREAM_FACE_TEXELS 2
 struct FaceRecord {
   vec3 corners;
@@ -74,15 +74,18 @@ struct DepthPush {
   uint32_t reserved0, reserved1, reserved2;
 };
 
-// Corrections of nodes are sums of whole numbers in units of 1 / kCorrectionUnits m.
-const float kCorrectionUnits = 16777216.0;
+// Corrections of nodes are sums of whole numbers in units of 1 / kCorrectionUnits m, and their weights in
+// units of 1 / kCorrectionWeight.
+const float kCorrectionUnits = 16777216.0f;
+const float kCorrectionWeight = 65536.0f;
 
 CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
 static_assert(sizeof(PartRecord) == 16 && sizeof(BranchRecord) == 16);
-static_assert(sizeof(FaceRecord) == CLOTHSTREAM_FACE_TEXELS * sizeof(vec4) && offsetof(FaceRecord, edges) == 16);
+static_assert(sizeof(FaceRecord) == CLOTHSTREAM_FACE_TEXELS * sizeof(vec4) &&
+              offsetof(FaceRecord, edges) == 16);
 static_assert(sizeof(DepthPush) == 48);
 static_assert(sizeof(PairGroups) == 16 && sizeof(PairPush) == 24 && sizeof(NodePush) == 24);
 }  // namespace clothstream::shared

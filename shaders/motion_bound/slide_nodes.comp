@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Moves each node by the mean of its corrections, and changes its velocity accordingly. The way of a node gets
-// longer by at most half of the gap, as find_pairs.comp assumes. Writes cannot race: each node belongs to one
-// invocation.
+// Moves each node by the weighted mean of its corrections, and changes its velocity accordingly. The way of a
+// node gets longer by at most 0.4 gaps, as find_pairs.comp assumes. Writes cannot race: each node belongs to
+// one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -44,14 +44,15 @@ void main() {
     return;
   }
   uint node = uint(partAt(parts, gl_GlobalInvocationID.x).first);
-  int number = corrections[4 * node + 3];
-  if (number == 0) {
+  int weight = corrections[4 * node + 3];
+  if (weight == 0) {
     return;
   }
   vec4 here = positions[node];
   vec3 start = starts[node].xyz;
-  vec3 sum = vec3(metres(corrections[4 * node]), metres(corrections[4 * node + 1]), metres(corrections[4 * node + 2]));
-  precise vec3 by = reciprocal(float(number)) * sum;
+  vec3 sum = vec3(metres(corrections[4 * node]), metres(corrections[4 * node + 1]),
+                  metres(corrections[4 * node + 2]));
+  precise vec3 by = (kCorrectionWeight * reciprocal(float(max(weight, 1)))) * sum;
   precise vec3 way = here.xyz - start;
   precise vec3 corrected = way + by;
   precise float longest = lengthOf(way) + 0.4 * push.gap;

@@ -50,6 +50,14 @@ TEST_P(SolverSettings, GiveTheSameBits) {
 // The scenes of built_in_settings_test.cpp have the other solvers.
 INSTANTIATE_TEST_SUITE_P(Solvers, SolverSettings, ::testing::Values(massSpring, xpbd, implicitEuler));
 
+TEST_F(KernelSettings, GiveTheSameBitsOfClothThatNothingPassesThrough) {
+  model::Cloth grid = tests::calmCloth(13, 18), mesh = model::asMesh(tests::calmCloth(12, 14));
+  grid.selfCollision = mesh.selfCollision = model::SelfCollision{.radius = 0.01f, .nothingPasses = true};
+  grid.grid.pose.position.z() = 0.03f;
+  SettingsPair pair(tests::sceneOf({grid, mesh}));
+  for (int tick = 0; tick < 8; ++tick) pair.expectSameTick(tests::passingBall(pair.scene(), tick), tick);
+}
+
 TEST_F(KernelSettings, GiveTheSameBitsAndNormalsOfUndampedSprings) {
   model::Cloth cloth = tests::calmCloth(33, 18);
   cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;

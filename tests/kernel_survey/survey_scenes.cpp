@@ -163,6 +163,15 @@ void addFeatures(std::vector<SurveyScene>& scenes) {
           scene.cloths.push_back(scene.cloths.front());
           scene.cloths.back().selfCollision->friction *= 2;
         });
+  add(
+      scenes, "nothing_passes",
+      [&](std::uint32_t size) {
+        model::Cloth cloth = grid(size);
+        cloth.selfCollision =
+            model::SelfCollision{.radius = 0.4f / static_cast<float>(size), .nothingPasses = true};
+        return cloth;
+      },
+      kLarge);
   add(scenes, "normals", grid, kLarge,
       [](model::Scene& scene) { scene.stream.normals = model::Normals::octahedral; });
   add(

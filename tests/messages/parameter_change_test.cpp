@@ -80,8 +80,9 @@ TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersOfClothsThatHaveThem) {
   EXPECT_THAT(error(), StartsWith("parameterChange.cloths[0].selfCollision.radius = 10: must be"));
   change.mutable_self_collision()->clear_radius();
   change.mutable_self_collision()->set_nothing_passes(true);
-  EXPECT_EQ(error(), "parameterChange.cloths[0].selfCollision.nothingPasses = true: must be absent: it cannot change "
-                     "while the scene runs");
+  EXPECT_EQ(error(),
+            "parameterChange.cloths[0].selfCollision.nothingPasses = true: must be absent: it cannot change "
+            "while the scene runs");
   change.mutable_self_collision()->set_nothing_passes(false);
   model::applyChange(scene_, toParameterChange(message_, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(scene_.cloths[0].selfCollision->radius, 0.01f);

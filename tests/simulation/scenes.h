@@ -75,6 +75,7 @@ class Running {
   std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
   std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
   std::vector<simulation::GrabStatus> grabs() const { return simulation_.grabs(); }
+  std::vector<float> depths() const { return simulation_.depths(); }
   // Runs one tick with a report. Returns the reports of all cloths.
   std::vector<simulation::ClothReport> tickAndReport(const simulation::TickInputs& inputs);
   void setCloths(std::span<const model::Cloth> cloths) { simulation_.setCloths(cloths); }

@@ -4,28 +4,48 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "server/simulation/scene_tables.h"
-#include "tests/simulation/scenes.h"
+#include "tests/model/meshes.h"
 
 namespace clothstream::tests {
 namespace {
 
 using simulation::MovingCollider;
 
-constexpr float kTick = 1.0f / 72;   // s
-constexpr float kSpacing = 0.02f;    // m
-constexpr float kFast = 5;           // m/s
+constexpr float kTick = 1.0f / 72;  // s
+constexpr float kSpacing = 0.02f;   // m
+constexpr float kFast = 5;          // m/s
 
 model::Cloth stressCloth(std::uint32_t rows, std::uint32_t columns, bool nothingPasses) {
-  model::Cloth cloth = calmCloth(rows, columns);
+  model::Cloth cloth;
+  cloth.name = "cloth";
+  cloth.grid = {.rows = rows,
+                .columns = columns,
+                .width = kSpacing * static_cast<float>(columns - 1),
+                .height = kSpacing * static_cast<float>(rows - 1),
+                .pose = {}};
+  cloth.mass = 0.01f * static_cast<float>(rows * columns);
   cloth.structural = {100, 0.1f};
   cloth.shear = {50, 0.05f};
   cloth.bend = {1, 0.01f};
-  cloth.selfCollision = model::SelfCollision{
-      .radius = kSpacing / 2, .friction = 0.3f, .nothingPasses = nothingPasses};
+  cloth.damping = 0.5f;
+  cloth.selfCollision =
+      model::SelfCollision{.radius = kSpacing / 2, .friction = 0.3f, .nothingPasses = nothingPasses};
   return cloth;
+}
+
+model::Scene sceneOf(const char* name, std::vector<model::Cloth> cloths) {
+  model::Scene scene;
+  scene.name = name;
+  scene.cloths = std::move(cloths);
+  return scene;
+}
+
+model::Quaternion turned(float degrees, const model::Vec3& axis) {
+  return model::Quaternion(Eigen::AngleAxisf(degrees * std::acos(-1.0f) / 180, axis.normalized()));
 }
 
 model::Pose at(const model::Vec3& position, const model::Quaternion& turn = model::Quaternion::Identity()) {
@@ -58,16 +78,23 @@ float approach(int tick, float start, float end, float speed) {
 // A hand of 20 cm strikes two curtains, one behind the other, to and fro at 5 m/s.
 StressScene fastHand(bool nothingPasses) {
   model::Cloth front = stressCloth(36, 36, nothingPasses), back = front;
-  front.pins = back.pins = {topRow(front)};
+  front.name = "front";
+  back.name = "back";
+  front.pins = back.pins = {{.firstRow = 0,
+                             .lastRow = 0,
+                             .rowStep = 1,
+                             .firstColumn = 0,
+                             .lastColumn = front.grid.columns - 1,
+                             .columnStep = 1}};
   back.grid.pose.position.z() = -0.03f;
-  StressScene stress{"fast hand", sceneOf({front, back}), {}, {}, 144};
+  StressScene stress{sceneOf("fast hand", {front, back}), {}, {}, 144};
   stress.start = simulation::restState(stress.scene.cloths);
   stress.colliders = [](int tick) {
     const auto place = [](int t) {
       return model::Vec3(swing(t, 0.25f, 1.3f), -0.45f, swing(t, 0.5f, kFast));
     };
-    return std::vector{
-        moving(model::Capsule{.radius = 0.05f, .length = 0.1f}, place, tick, turned(60, model::Vec3::UnitZ()))};
+    return std::vector{moving(model::Capsule{.radius = 0.05f, .length = 0.1f}, place, tick,
+                              turned(60, model::Vec3::UnitZ()))};
   };
   return stress;
 }
@@ -77,7 +104,7 @@ StressScene pressedFolds(bool nothingPasses) {
   constexpr float kRadius = 0.3f * kSpacing, kRoom = 5 * 2 * kRadius + 0.01f;
   model::Cloth cloth = stressCloth(60, 20, nothingPasses);
   cloth.selfCollision->radius = kRadius;
-  StressScene stress{"pressed folds", sceneOf({cloth}), {}, {}, 144};
+  StressScene stress{sceneOf("pressed folds", {cloth}), {}, {}, 144};
   stress.start = simulation::restState(stress.scene.cloths);
   for (std::uint32_t row = 0; row < 60; ++row)
     for (std::uint32_t column = 0; column < 20; ++column) {
@@ -101,7 +128,7 @@ StressScene pressedFolds(bool nothingPasses) {
 StressScene crumpledPile(bool nothingPasses) {
   model::Cloth cloth = stressCloth(40, 40, nothingPasses);
   cloth.grid.pose = {model::Vec3(0, 0.82f, 0), turned(7, model::Vec3(1, 0.3f, 0.2f).normalized())};
-  StressScene stress{"crumpled pile", sceneOf({cloth}), {}, {}, 180};
+  StressScene stress{sceneOf("crumpled pile", {cloth}), {}, {}, 180};
   stress.start = simulation::restState(stress.scene.cloths);
   stress.colliders = [](int tick) {
     std::vector colliders{ground(0)};
@@ -126,7 +153,7 @@ StressScene thrownSheets(bool nothingPasses) {
   model::Cloth one = stressCloth(30, 30, nothingPasses), other = one;
   one.grid.pose = {model::Vec3(0, 1, 0.1f), turned(20, model::Vec3::UnitY())};
   other.grid.pose = {model::Vec3(0.1f, 1.1f, -0.15f), turned(35, model::Vec3::UnitZ())};
-  StressScene stress{"thrown sheets", sceneOf({one, other}), {}, {}, 108};
+  StressScene stress{sceneOf("thrown sheets", {one, other}), {}, {}, 108};
   stress.start = simulation::restState(stress.scene.cloths);
   for (std::size_t i = 0; i < stress.start.velocities.size(); ++i)
     stress.start.velocities[i] = model::Vec3(0, 1, i < 900 ? -4.0f : 4.0f);
@@ -138,16 +165,17 @@ StressScene thrownSheets(bool nothingPasses) {
 StressScene struckHeap(bool nothingPasses) {
   std::vector<model::Cloth> cloths;
   for (int i = 0; i < 3; ++i) {
-    model::Cloth cloth = discCloth(8);
-    const model::Cloth numbers = stressCloth(2, 2, nothingPasses);
+    model::Cloth cloth = stressCloth(2, 2, nothingPasses);
     cloth.name = "disc" + std::to_string(i);
-    cloth.selfCollision = model::SelfCollision{
-        .radius = 0.008f, .friction = 0.3f, .nothingPasses = nothingPasses};
-    cloth.bend = numbers.bend;
+    cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::disc(8, 8 * kSpacing)));
+    cloth.mass = 0.02f * static_cast<float>(cloth.nodeCount());
+    cloth.structural = {200, 0.2f};
+    cloth.shear = {100, 0.1f};
+    cloth.selfCollision->radius = 0.4f * kSpacing;
     cloth.solver.kind = model::SolverKind::xpbd;
     cloths.push_back(cloth);
   }
-  StressScene stress{"struck heap", sceneOf(cloths), {}, {}, 144};
+  StressScene stress{sceneOf("struck heap", cloths), {}, {}, 144};
   stress.start = simulation::restState(stress.scene.cloths);
   const std::size_t nodes = stress.start.positions.size() / 3;
   for (std::size_t i = 0; i < stress.start.positions.size(); ++i) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <functional>
-#include <string>
 #include <vector>
 
 #include "server/model/scene.h"
@@ -12,7 +11,6 @@
 namespace clothstream::tests {
 
 struct StressScene {
-  std::string name;
   model::Scene scene;  // its cloths have self-collision
   simulation::NodeState start;
   std::function<std::vector<simulation::MovingCollider>(int tick)> colliders;

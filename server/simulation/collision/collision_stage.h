@@ -49,8 +49,8 @@ class CollisionStage {
   // Contacts of the last recorded tick, once it is complete.
   std::vector<ContactStatus> contacts() const;
 
-  // Values of the colliders of the last recorded tick, in the order of its inputs. `numbers` has them as the device
-  // numbers colliders.
+  // Values of the colliders of the last recorded tick, in the order of its inputs. `numbers` has them as the
+  // device numbers colliders.
   std::vector<float> inOrder(std::span<const float> numbers) const;
 
   const vulkan::Buffer& colliders() const { return colliders_; }

@@ -27,8 +27,8 @@ using vulkan::BufferPurpose;
 using vulkan::kStorage;
 using vulkan::kTexels;
 
-// Work of an invocation (vulkan::Recorder::dispatch): of a triangle that searches the tree, and of the expected
-// pairs of a triangle or a node.
+// Work of an invocation (vulkan::Recorder::dispatch): of a triangle that searches the tree, and of the
+// expected pairs of a triangle or a node.
 constexpr std::uint32_t kSearchWork = 32, kFindWork = 24, kLimitWork = 24;
 // Places for pairs, for each node of the cloths.
 constexpr std::uint64_t kFacePairs = 128, kNodePairs = 16, kEdgePairs = 48;
@@ -127,11 +127,12 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
            &nodePairs_.pairs, &nodePairs_.groups, &edgePairs_.pairs, &edgePairs_.groups}),
       nodeLimits_(device, state, *this, nodePairs_, false, workgroupSize),
       edgeLimits_(device, state, *this, edgePairs_, true, workgroupSize),
-      slideNodes_(device,
-                  kernelOf("slide_nodes", kernels::slide_nodes, workgroupSize, sizeof(shared::NodePush),
-                           {kTexels, kStorage, kStorage, kStorage, kStorage}),
-                  {&parts_.texels(), state.positions[0], state.positions[1], state.velocities[1], &corrections_},
-                  {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &corrections_}),
+      slideNodes_(
+          device,
+          kernelOf("slide_nodes", kernels::slide_nodes, workgroupSize, sizeof(shared::NodePush),
+                   {kTexels, kStorage, kStorage, kStorage, kStorage}),
+          {&parts_.texels(), state.positions[0], state.positions[1], state.velocities[1], &corrections_},
+          {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &corrections_}),
       shortenMotions_(
           device,
           kernelOf("shorten_motions", kernels::shorten_motions, workgroupSize, sizeof(shared::NodePush),
@@ -140,11 +141,12 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
            &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_},
           {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &shares_,
            &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_}),
-      measureDepths_(device,
-                     kernelOf("measure_depths", kernels::measure_depths, workgroupSize, sizeof(shared::DepthPush),
-                              {kTexels, kTexels, kStorage, kTexels, kTexels}),
-                     {&parts_.texels(), state.positions[0], &depths_, &state.colliders, &state.nearColliders},
-                     {&parts_.texels(), state.positions[1], &depths_, &state.colliders, &state.nearColliders}) {
+      measureDepths_(
+          device,
+          kernelOf("measure_depths", kernels::measure_depths, workgroupSize, sizeof(shared::DepthPush),
+                   {kTexels, kTexels, kStorage, kTexels, kTexels}),
+          {&parts_.texels(), state.positions[0], &depths_, &state.colliders, &state.nearColliders},
+          {&parts_.texels(), state.positions[1], &depths_, &state.colliders, &state.nearColliders}) {
   assert(isIn(scene));
 }
 
@@ -195,7 +197,7 @@ void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t f
                                   .edgePairs = edgePairs_.capacity,
                                   .gap = gap_,
                                   .substepRate = 1 / substepSeconds_};
-  const auto onPairs = [&](Stage Limits::* kernel) {
+  const auto onPairs = [&](Stage Limits::*kernel) {
     const std::uint64_t most = std::uint64_t{tables_.nodeCount} * kLimitWork;
     recorder.barrier();
     recorder.dispatchIndirect((nodeLimits_.*kernel).from[from], push, nodePairs_.groups, 0, most);

@@ -25,8 +25,8 @@ namespace clothstream::simulation {
 // can.
 class MotionBoundStage {
  public:
-  // At least one cloth must have model::boundsMotion(). Throws std::runtime_error if the device has too little
-  // memory. Results do not depend on `workgroupSize`.
+  // At least one cloth must have model::boundsMotion(). Throws std::runtime_error if the device has too
+  // little memory. Results do not depend on `workgroupSize`.
   MotionBoundStage(const vulkan::Device& device, const model::Scene& scene, const StateBuffers& state,
                    std::uint32_t workgroupSize);
 
@@ -44,9 +44,10 @@ class MotionBoundStage {
   // Records a substep, which led from state `from` to the other state. Begins with a barrier.
   void recordSubstep(vulkan::Recorder& recorder, std::uint32_t from) const;
 
-  // Records, after the last substep and a barrier, how deep the nodes are inside the colliders. `present` has the
-  // state, and `collision` is that of the last substep.
-  void recordDepths(vulkan::Recorder& recorder, std::uint32_t present, const shared::CollisionPush& collision) const;
+  // Records, after the last substep and a barrier, how deep the nodes are inside the colliders. `present` has
+  // the state, and `collision` is that of the last substep.
+  void recordDepths(vulkan::Recorder& recorder, std::uint32_t present,
+                    const shared::CollisionPush& collision) const;
 
   struct Report {
     std::uint32_t overflows = 0;  // substeps in which a list of pairs was too short and no node moved

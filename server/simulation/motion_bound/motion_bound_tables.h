@@ -24,8 +24,8 @@ struct MotionBoundTables {
   std::uint32_t edgeCount() const { return static_cast<std::uint32_t>(parts.size()) - nodeCount; }
 };
 
-// Tables of the cloths with model::boundsMotion(). The tree divides triangles at the medians of their middles at
-// rest.
+// Tables of the cloths with model::boundsMotion(). The tree divides triangles at the medians of their middles
+// at rest.
 MotionBoundTables motionBoundTables(std::span<const model::Cloth> cloths);
 
 }  // namespace clothstream::simulation

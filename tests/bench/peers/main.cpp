@@ -24,6 +24,9 @@ int main(int argc, char** argv) {
       app.add_subcommand("mass_spring", "A frame of 1/60 s of a hung sheet: Bullet's soft body, and ours");
   bench::Settings settings;
   std::uint32_t size = 0;
+  CLI::App* nothingPasses = app.add_subcommand(
+      "nothing_passes",
+      "Stress scenes: balls, cloth that nothing passes through, and Bullet's deformable cloth");
   CLI::App* codec =
       app.add_subcommand("codec", "Motions by raw floats, Draco, meshoptimizer, zstd, and ours");
   CLI::App* curves = app.add_subcommand("codec_curves", "Bits against errors of the same");
@@ -37,9 +40,10 @@ int main(int argc, char** argv) {
   if (size > 0) settings.size = size;
   try {
     vulkan::Device device(options);
-    const bench::Rows rows = *massSpring ? bench::compareMassSpring(options)
-                             : *codec    ? bench::compareCodecs(device, settings)
-                                         : bench::codecCurves(device, settings);
+    const bench::Rows rows = *massSpring      ? bench::compareMassSpring(options)
+                             : *nothingPasses ? bench::compareNothingPasses(options)
+                             : *codec         ? bench::compareCodecs(device, settings)
+                                              : bench::codecCurves(device, settings);
     if (json)
       fmt::print("{}\n", nlohmann::ordered_json(rows).dump(2));
     else

@@ -132,7 +132,8 @@ TEST_F(ColliderSetTest, ColliderYieldsWhereClothHasNoRoom) {
   EXPECT_EQ(move(0.5f), 0.5f);
 }
 
-// Cloth that another body presses into a collider, or in which it appeared, lets it go out and not farther in.
+// Cloth that another body presses into a collider, or in which it appeared, lets it go out and not farther
+// in.
 TEST_F(ColliderSetTest, ColliderLeavesClothThatIsInsideIt) {
   const auto move = [&](float x) {
     colliders.place(7, std::vector{handAt(1, x)});

@@ -51,7 +51,8 @@ Press press(tests::HostedScene& hosted, float from, float to, int ticks) {
   for (int tick = 0; tick < 2 * ticks; ++tick) {
     const float part = std::min(static_cast<float>(tick + 1) / static_cast<float>(ticks), 1.0f);
     const model::Pose pose{Vec3(0, 0.05f + from + part * (to - from), 0), model::Quaternion::Identity()};
-    hosted.live.inbox.postPoses(7, {.colliders = {{1, pose, model::Box{Vec3(0.4f, 0.1f, 0.4f)}}}}, hosted.now);
+    hosted.live.inbox.postPoses(7, {.colliders = {{1, pose, model::Box{Vec3(0.4f, 0.1f, 0.4f)}}}},
+                                hosted.now);
     hosted.tick();
     press.last = hosted.frames.back().colliders(1);
     press.lowest = std::min(press.lowest, press.last.position().y() - 0.05f);
