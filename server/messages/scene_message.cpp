@@ -161,13 +161,13 @@ void checkMotionBound(Checks& checks, const model::Scene& scene) {
     const model::Cloth& cloth = scene.cloths[i];
     if (!model::boundsMotion(cloth)) continue;
     nodes += cloth.nodeCount();
-    const Path field = root.at("cloths", static_cast<int>(i)) / "selfCollision" / "nothingPasses";
+    const auto refuse = [&](const std::string& reason) {
+      checks.fail(root.at("cloths", static_cast<int>(i)) / "selfCollision" / "nothingPasses", "true", reason);
+    };
     if (nodes > limits::kMaxBoundNodes)
-      checks.fail(field, "true",
-                  fmt::format("is for at most {} nodes in all cloths that have it; with this one they are {}",
-                              limits::kMaxBoundNodes, nodes));
-    if (cloth.coarse)
-      checks.fail(field, "true", "is for cloths without \"coarse\", whose corrections nothing bounds");
+      refuse(fmt::format("is for at most {} nodes in all cloths that have it; with this one they are {}",
+                         limits::kMaxBoundNodes, nodes));
+    if (cloth.coarse) refuse("is for cloths without \"coarse\", whose corrections nothing bounds");
   }
 }
 

@@ -184,7 +184,7 @@ StressScene struckHeap(bool nothingPasses) {
     stress.start.positions[i] = turnedPosition + model::Vec3(0.03f * disc, 0.2f + 0.09f * disc, 0);
   }
   stress.colliders = [](int tick) {
-    const auto place = [](int t) { return model::Vec3(swing(t, 0.6f, kFast), 0.06f, 0.03f); };
+    const auto place = [](int t) { return model::Vec3(swing(t, 0.6f, kFast), 0.11f, 0.03f); };
     return std::vector{ground(0), moving(model::Box{model::Vec3(0.1f, 0.1f, 0.3f)}, place, tick,
                                          turned(25, model::Vec3::UnitY()))};
   };

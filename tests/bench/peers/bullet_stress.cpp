@@ -35,7 +35,7 @@ btTransform transformAt(const simulation::MovingCollider& collider, float share)
   const model::Quaternion turn = collider.start.orientation.slerp(share, collider.end.orientation);
   model::Vec3 position = collider.start.position + share * (collider.end.position - collider.start.position);
   if (std::holds_alternative<model::Plane>(collider.shape)) position.y() -= kGround;
-  return {btQuaternion(turn.x(), turn.y(), turn.z(), turn.w()), vectorOf(position)};
+  return btTransform(btQuaternion(turn.x(), turn.y(), turn.z(), turn.w()), vectorOf(position));
 }
 
 std::unique_ptr<btCollisionShape> shapeOf(const model::Shape& shape) {

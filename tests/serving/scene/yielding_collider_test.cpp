@@ -15,18 +15,18 @@ using model::Vec3;
 
 class YieldingCollider : public tests::GpuTest {};
 
-// Three sheets of 11x11 nodes lie on the ground, in layers of 2 cm.
+// Three sheets of 9x9 nodes lie on the ground, in layers of 2 cm.
 model::Scene layersOnGround(bool nothingPasses) {
   model::Scene scene;
   scene.name = "layers";
   for (int i = 0; i < 3; ++i) {
     model::Cloth& cloth = scene.cloths.emplace_back();
     cloth.name = "layer" + std::to_string(i);
-    cloth.grid.rows = cloth.grid.columns = 11;
-    cloth.grid.width = cloth.grid.height = 0.2f;
+    cloth.grid.rows = cloth.grid.columns = 9;
+    cloth.grid.width = cloth.grid.height = 0.16f;
     cloth.grid.pose.position = Vec3(0, 0.006f + 0.02f * static_cast<float>(i), -0.1f);
     cloth.grid.pose.orientation = model::Quaternion(Eigen::AngleAxisf(1.5707963f, Vec3::UnitX()));
-    cloth.mass = 0.02f;
+    cloth.mass = 0.4f;
     cloth.structural = {50, 0.05f};
     cloth.shear = {25, 0.02f};
     cloth.damping = 1;
@@ -63,18 +63,18 @@ Press press(tests::HostedScene& hosted, float from, float to, int ticks) {
 
 TEST_F(YieldingCollider, StopsBeforeLayersThatHaveNoRoomAndSaysSo) {
   tests::HostedScene hosted(layersOnGround(true));
-  const Press pressed = press(hosted, 0.12f, -0.02f, 40);
+  const Press pressed = press(hosted, 0.12f, -0.02f, 20);
   EXPECT_TRUE(pressed.yields);
   EXPECT_TRUE(pressed.last.yields());
   EXPECT_GT(pressed.last.position().y() - 0.05f, 0);
-  const Press lifted = press(hosted, -0.02f, 0.2f, 40);
+  const Press lifted = press(hosted, -0.02f, 0.2f, 20);
   EXPECT_FALSE(lifted.last.yields());
   EXPECT_NEAR(lifted.last.position().y(), 0.25, 1e-4);
 }
 
 TEST_F(YieldingCollider, GoesThroughClothWithoutTheSetting) {
   tests::HostedScene hosted(layersOnGround(false));
-  const Press pressed = press(hosted, 0.12f, -0.02f, 40);
+  const Press pressed = press(hosted, 0.12f, -0.02f, 20);
   EXPECT_FALSE(pressed.yields);
   EXPECT_NEAR(pressed.last.position().y() - 0.05f, -0.02, 1e-4);
 }
