@@ -69,7 +69,7 @@ struct Buffers {
   StateMemory state;
   Buffer normals;
   Buffer cloths, status;
-  Buffer stretches;  // dispatch sizes by Follow: StateBuffers::stretches
+  Buffer stretches;  // StateBuffers::stretches
   // Buffers that the CPU writes and reads. Inputs and status alternate between two copies, because a tick may
   // be in flight while the next one is recorded.
   std::array<Buffer, 2> inputs;  // cloths
@@ -81,7 +81,7 @@ Buffers::Buffers(const vulkan::Device& device, std::uint32_t nodes, std::size_t 
       normals(device, BufferPurpose::texels, nodes * kTexelBytes),
       cloths(device, BufferPurpose::texels, clothCount * sizeof(shared::ClothRecord)),
       status(device, BufferPurpose::state, sizeof(shared::StatusRecord)),
-      stretches(device, BufferPurpose::indirect, 3 * kFollows.size() * sizeof(std::uint32_t)),
+      stretches(device, BufferPurpose::indirect, (kFirstMark + std::size_t{nodes}) * sizeof(std::uint32_t)),
       statusReadback(device, BufferPurpose::readback, 2 * sizeof(shared::StatusRecord)) {
   for (Buffer& buffer : inputs) buffer = Buffer(device, BufferPurpose::upload, cloths.bytes());
 }
@@ -378,7 +378,7 @@ void ClothSimulation::Pipeline::recordAdvance(vulkan::Recorder& recorder, std::u
                                               const AdvanceVariant& variant, Follow follow,
                                               shared::AdvancePush push) {
   push.stretchSize = firstStretchSize(follow);
-  push.stretchChunks = solves.gridChunks(follow);
+  push.stretchGroups = solves.stretchGroups(follow);
   grids.recordAdvance(recorder, from, variant, follow, push);
   if (meshes) meshes->recordAdvance(recorder, from, variant, follow, push);
 }
@@ -401,8 +401,8 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                            .collision = {},
                            .firstTile = 0,
                            .stretchSize = 0,
-                           .stretchChunks = 0,
-                           .reserved = 0};
+                           .stretchGroups = 0,
+                           .firstMark = kFirstMark};
   if (attachments && attachments->aims()) {
     recorder.beginStage("attachments");
     recorder.barrier();
@@ -438,7 +438,8 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
                       variantOf(records, inputs.environment.airDensity, collision.active(), follow), follow,
                       push);
     }
-    if (solves.active()) solves.record(recorder, present, push.collision, substepSeconds);
+    if (solves.active())
+      solves.record(recorder, present, push.collision, substepSeconds, substep + 1 == substeps);
     if (assembled)
       assembled->record(recorder, present, push.collision, substepSeconds, substep + 1 == substeps);
     if (xpbd)

@@ -37,10 +37,15 @@ Follow followOf(const model::Solver& solver);
 // The Follow of acad with this mode.
 Follow followOf(model::AcadMode mode);
 
-// Index of the first number of a dispatch size in StateBuffers::stretches.
+// StateBuffers::stretches: index of the first number of a dispatch size, of the size of the kernel that
+// continues long solves, and of the mark of the scene's first node.
 constexpr std::uint32_t firstStretchSize(Follow follow) {
   return 3 * static_cast<std::uint32_t>(follow);
 }
+constexpr std::uint32_t firstContinuedSize(Follow follow) {
+  return 3 * kFollows.size() + firstStretchSize(follow);
+}
+constexpr std::uint32_t kFirstMark = 6 * kFollows.size();
 
 // End of the tiles of each kind, in the order of kFollows.
 struct TileRanges {

@@ -16,6 +16,7 @@
 #include "kernels/solve_velocities.h"
 #include "kernels/update_corrections.h"
 #include "server/simulation/device_table.h"
+#include "server/simulation/stretched_systems.h"
 #include "server/simulation/workgroup_work.h"
 
 namespace clothstream::simulation {
@@ -31,12 +32,14 @@ using vulkan::kStorage;
 using vulkan::kTexels;
 
 constexpr std::uint32_t kSolveLanes = CLOTHSTREAM_SOLVE_LANES;
-constexpr std::uint32_t kVectors = 6;  // shaders/solve/linear_system.glsl
+// shaders/solve/linear_system.glsl, and solve_stretched.comp.
+constexpr std::uint32_t kVectors = 6, kStretchedVectors = 7;
 // Dispatch sizes of a round, x, y, z each: of a group's prepared chunks, of its small systems, of all chunks
 // in the next round, of the iterations of large systems.
 constexpr std::uint32_t kSize = 3, kSmallSystems = kSize, kNextRound = 2 * kSize, kIteration = 3 * kSize;
 
 std::uint32_t sizesOfRound(const SolveGroup& group) {
+  if (group.stretched) return kSize;
   return kIteration + kSize * (group.iterations + 1);
 }
 
@@ -52,8 +55,8 @@ bool isLimit(const SolveGroup& group) {
   return isAdaptive(group) && group.acadMode == model::AcadMode::limit;
 }
 
-std::uint32_t roundsOf(const SolveGroup& group) {
-  return isLimit(group) ? model::kLimitRounds : 1;
+bool isStretched(const SolveGroup& group) {
+  return group.stretched;
 }
 
 bool isImplicit(const SolveGroup& group) {
@@ -116,7 +119,8 @@ struct GroupKernels {
 };
 
 struct SolveStage::Kernels {
-  Kernels(const vulkan::Device& on, const SolveCut& partition) : device(on), cut(partition) {}
+  Kernels(const vulkan::Device& on, const SolveCut& partition, const StretchedLimits& limits)
+      : device(on), cut(partition), stretched(on, limits) {}
 
   std::unique_ptr<Kernel> make(const char* name, std::span<const std::uint32_t> spirv,
                                std::vector<BindingKind> bindings, std::size_t push, const SolveGroup& group,
@@ -191,6 +195,7 @@ struct SolveStage::Kernels {
   SolveCut cut;
   std::array<GroupKernels, 20> groups;
   std::array<std::unique_ptr<Kernel>, 2> applies;
+  StretchedKernels stretched;
 };
 
 // Everything whose size follows from the cloths, and its bindings.
@@ -216,12 +221,14 @@ struct SolveStage::Systems {
         lists(device, tables.lists),
         emptyGroups(device, BufferPurpose::upload, allSizes(tables) * sizeof(std::uint32_t)),
         groupSizes(device, BufferPurpose::indirect, emptyGroups.bytes()),
-        along(device, BufferPurpose::texels, texels(2 * nodes, has(tables, [](auto& g) { return !g.mesh; }))),
+        along(device, BufferPurpose::texels,
+              texels(2 * nodes, has(tables, [](auto& g) { return !g.mesh && !g.stretched; }))),
         across(device, BufferPurpose::texels,
                texels(2 * nodes, has(tables, [](auto& g) { return !g.mesh && isImplicit(g); }))),
         rows(device, BufferPurpose::texels, texels(tables.springs.size(), !tables.springs.empty())),
         impulses(device, BufferPurpose::texels, rows.bytes()),
-        vectors(device, BufferPurpose::texels, texels(kVectors * std::size_t{nodes}, true)),
+        vectors(device, BufferPurpose::texels,
+                texels((has(tables, isStretched) ? kStretchedVectors : kVectors) * std::size_t{nodes}, true)),
         sums(device, BufferPurpose::state, tables.chunks.size() * 2 * sizeof(float)),
         actives(device, BufferPurpose::state, 3 * tables.chunks.size() * sizeof(std::uint32_t)),
         solves(device, BufferPurpose::state, tables.systems.size() * sizeof(shared::SolveRecord)),
@@ -230,6 +237,11 @@ struct SolveStage::Systems {
     for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = i % kSize == 0 ? 0 : 1;
     for (const shared::SystemRecord& system : tables.systems)
       cloths.push_back(static_cast<std::uint32_t>(system.cloth));
+    if (has(tables, isStretched))
+      stretched = std::make_unique<StretchedSystems>(
+          device, kernels.stretched, tables, state,
+          StretchedSystems::Buffers{systems.texels(), chunks.texels(), vectors, solves});
+    onlyStretched = std::ranges::all_of(tables.groups, isStretched);
     std::uint32_t size = 0;
     for (const SolveGroup& on : tables.groups) {
       groups.push_back(
@@ -252,9 +264,15 @@ struct SolveStage::Systems {
 
   void bind(const vulkan::Device& device, Kernels& kernels, const StateBuffers& state, std::size_t from,
             Group& group) {
-    const GroupKernels& with = kernels.of(group.on);
     const Buffer &position = *state.positions[from], &freePosition = *state.positions[1 - from],
                  &velocity = *state.velocities[from], &freeVelocity = *state.velocities[1 - from];
+    group.apply.emplace_back(
+        device, kernels.apply(group.on),
+        std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &vectors,
+                                             &state.colliders, &state.nearColliders, &position, &freePosition,
+                                             &freeVelocity, &actives, &state.contactImpulses, &groupSizes});
+    if (group.on.stretched) return;
+    const GroupKernels& with = kernels.of(group.on);
     const auto bindTo = [&](std::vector<Bindings>& bindings, const std::unique_ptr<Kernel>& kernel,
                             std::vector<const Buffer*> first, std::initializer_list<const Buffer*> more) {
       first.insert(first.end(), more);
@@ -294,11 +312,6 @@ struct SolveStage::Systems {
       bindTo(group.measure, with.measure, iterating, {&groupSizes});
       bindTo(group.update, with.update, iterating, {});
     }
-    group.apply.emplace_back(
-        device, kernels.apply(group.on),
-        std::initializer_list<const Buffer*>{&state.cloths, &systems.texels(), &chunks.texels(), &vectors,
-                                             &state.colliders, &state.nearColliders, &position, &freePosition,
-                                             &freeVelocity, &actives, &state.contactImpulses, &groupSizes});
   }
 
   void recordPrepare(vulkan::Recorder& recorder, const Group& group, std::uint32_t from, std::uint32_t round,
@@ -319,6 +332,8 @@ struct SolveStage::Systems {
   Buffer emptyGroups, groupSizes;
   Buffer along, across, rows, impulses, vectors, sums, actives, solves, solvesReadback;
   std::vector<Group> groups;
+  std::unique_ptr<StretchedSystems> stretched;  // null if no group uses it
+  bool onlyStretched = false;
 };
 
 SolveStage::SolveStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
@@ -326,7 +341,10 @@ SolveStage::SolveStage(const vulkan::Device& device, std::span<const model::Clot
                        std::optional<std::uint32_t> wholeNodes)
     : device_(device),
       state_(state),
-      kernels_(std::make_unique<Kernels>(device, cutSolves(device, workgroupSize, wholeNodes))) {
+      kernels_(std::make_unique<Kernels>(
+          device, cutSolves(device, workgroupSize, wholeNodes),
+          stretchedLimits(device, workgroupSize,
+                          wholeNodes.value_or(CLOTHSTREAM_STRETCHED_CHUNKS * kChunkNodes)))) {
   makeTables(cloths);
   takeTables();
 }
@@ -335,7 +353,7 @@ SolveStage::~SolveStage() = default;
 
 void SolveStage::makeTables(std::span<const model::Cloth> cloths) {
   nextSystems_.reset();
-  const SolveTables tables = solveTables(cloths, kernels_->cut.wholeNodes);
+  const SolveTables tables = solveTables(cloths, kernels_->cut.wholeNodes, kernels_->stretched.limits());
   if (!tables.systems.empty()) nextSystems_ = std::make_unique<Systems>(device_, tables, state_, *kernels_);
 }
 
@@ -348,6 +366,11 @@ void SolveStage::recordTables(vulkan::Recorder& recorder) const {
        {&systems_->systems, &systems_->chunks, &systems_->springs, &systems_->incidences, &systems_->lists})
     table->recordUpload(recorder);
   recorder.fill(state_.stretches, 0, state_.stretches.bytes());
+  if (systems_->stretched) systems_->stretched->recordTables(recorder);
+  recorder.barrier();
+  for (std::uint32_t size = 0; size < kFirstMark; size += kSize)
+    recorder.fill(state_.stretches, 1, (kSize - 1) * sizeof(std::uint32_t),
+                  (size + 1) * sizeof(std::uint32_t));
   // Springs that ACAD does not prepare have no weight.
   for (const Buffer* buffer : {&systems_->along, &systems_->vectors, &systems_->actives})
     recorder.fill(*buffer, 0, buffer->bytes());
@@ -387,8 +410,7 @@ void SolveStage::Systems::recordPrepare(vulkan::Recorder& recorder, const Group&
     recorder.dispatchIndirect(group.check[from], push, groupSizes,
                               (group.firstSizeOf(round - 1) + kNextRound) * kBytes, all);
   recorder.barrier();
-  if (round == 0)
-    recorder.fill(stretches, 0, kSize * kBytes, firstStretchSize(followOf(on.acadMode)) * kBytes);
+  if (round == 0) recorder.fill(stretches, 0, kBytes, firstStretchSize(followOf(on.acadMode)) * kBytes);
   recorder.dispatchIndirect(group.prepare[from], push, groupSizes, group.firstSizeOf(round) * kBytes,
                             all * kPrepareWork);
 }
@@ -454,12 +476,23 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
 }
 
 void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
-                        const shared::CollisionPush& collision, double substepSeconds) const {
+                        const shared::CollisionPush& collision, double substepSeconds, bool last) const {
   const Systems& all = *systems_;
   recorder.barrier();
-  recorder.copy(all.emptyGroups, all.groupSizes, all.groupSizes.bytes());
-  recorder.fill(all.solves, 0, all.solves.bytes());
+  // Without springs to hold, systems of stretched springs need nothing; only the report reads their records.
+  if (!all.onlyStretched) recorder.copy(all.emptyGroups, all.groupSizes, all.groupSizes.bytes());
+  bool barred = all.onlyStretched && !last;
+  if (!barred) recorder.fill(all.solves, 0, all.solves.bytes());
   for (const Systems::Group& group : all.groups) {
+    if (group.on.stretched) {
+      if (!barred) recorder.barrier();
+      barred = false;
+      const bool collides = collision.colliderCount > 0;
+      all.stretched->record(recorder, group.on, from, collides, substepSeconds);
+      if (collides) all.recordApply(recorder, group, from, 0, collision, substepSeconds);
+      continue;
+    }
+    barred = false;
     const std::uint32_t rounds = roundsOf(group.on);
     for (std::uint32_t round = 0; round < rounds; ++round) {
       if (round > 0) {
@@ -480,7 +513,7 @@ void SolveStage::Systems::recordApply(vulkan::Recorder& recorder, const Group& g
                                       std::uint32_t round, const shared::CollisionPush& collision,
                                       double h) const {
   const SolveGroup& on = group.on;
-  const bool collides = collision.colliderCount > 0 && round + 1 == roundsOf(on);
+  const bool collides = collision.colliderCount > 0 && (on.stretched || round + 1 == roundsOf(on));
   // Nodes that ACAD leaves alone stay in place, unless they may collide.
   const bool listed = isAdaptive(on) && !collides;
   const shared::ApplyPush push{.collision = collides ? collision : shared::CollisionPush{},
@@ -502,11 +535,13 @@ void SolveStage::Systems::recordApply(vulkan::Recorder& recorder, const Group& g
                       workPerInvocation(std::uint64_t{kChunkNodes} * collision.nodeWork, cut.workgroup));
 }
 
-std::uint32_t SolveStage::gridChunks(Follow follow) const {
+std::uint32_t SolveStage::stretchGroups(Follow follow) const {
   if (!active()) return 0;
-  for (const Systems::Group& group : systems_->groups)
-    if (isAdaptive(group.on) && !group.on.mesh && followOf(group.on.acadMode) == follow)
-      return group.on.endChunk - group.on.firstChunk;
+  for (const Systems::Group& group : systems_->groups) {
+    const SolveGroup& on = group.on;
+    if (isAdaptive(on) && !on.mesh && followOf(on.acadMode) == follow)
+      return on.stretched ? on.endSystem - on.firstSystem : on.endChunk - on.firstChunk;
+  }
   return 0;
 }
 

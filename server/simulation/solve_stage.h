@@ -18,7 +18,7 @@
 namespace clothstream::simulation {
 
 // Belongs to the device's thread. The forces have given every node a free velocity and position. This stage
-// solves for the change of the velocities (shaders/solve/spring_terms.glsl has the systems). It moves the
+// solves for the change of the velocities (shaders/solve/spring_weight.glsl has the systems). It moves the
 // nodes by h times that change and lets them collide. Several workgroups solve a large cloth, with one or two
 // dispatches per iteration; these are empty after all systems have converged. The bits are those of a solve
 // by one workgroup.
@@ -40,17 +40,18 @@ class SolveStage {
   // Uploads the tables, before the first substep with them.
   void recordTables(vulkan::Recorder& recorder) const;
   // Records one substep of `substepSeconds`. The free motion led from state `from` to the other state, which
-  // is corrected in place. Begins with a barrier.
+  // is corrected in place. Begins with a barrier. `last`: the tick's last substep, which the report is about.
   void record(vulkan::Recorder& recorder, std::uint32_t from, const shared::CollisionPush& collision,
-              double substepSeconds) const;
+              double substepSeconds, bool last) const;
 
   // Copies the records of the tick's last substep to the CPU, one per system; report() has them once the
   // recording is complete.
   void recordReport(vulkan::Recorder& recorder) const;
   std::span<const shared::SolveRecord> report() const;
 
-  // Chunks of the systems of grids whose forces this kind follows; 0 unless it is a mode of acad.
-  std::uint32_t gridChunks(Follow follow) const;
+  // Workgroups that look for stretched springs of the grids that follow these forces; 0 unless `follow` is a
+  // mode of acad.
+  std::uint32_t stretchGroups(Follow follow) const;
 
   // The cloth of each system.
   std::span<const std::uint32_t> cloths() const;

@@ -73,16 +73,18 @@ void appendSystem(const model::Cloth& cloth, std::size_t number, std::uint32_t f
     tables.chunks.push_back({system, static_cast<float>(chunk), 0, 0});
 }
 
+bool isOf(const model::Cloth& cloth, const SolveGroup& group) {
+  return cloth.solver.kind == group.kind && cloth.solver.acadMode == group.acadMode &&
+         !model::isAssembled(cloth.solver) && (cloth.mesh != nullptr) == group.mesh;
+}
+
 // Appends the small or the large cloths of a group.
 void appendCloths(std::span<const model::Cloth> cloths, SolveGroup& group, bool large,
                   std::uint32_t wholeNodes, SolveTables& tables) {
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     const model::Cloth& cloth = cloths[i];
-    if (cloth.solver.kind != group.kind || cloth.solver.acadMode != group.acadMode ||
-        model::isAssembled(cloth.solver) || (cloth.mesh != nullptr) != group.mesh ||
-        (cloth.nodeCount() > wholeNodes) != large)
-      continue;
+    if (!isOf(cloth, group) || (!group.stretched && cloth.nodeCount() > wholeNodes) != large) continue;
     appendSystem(cloth, i, firstNode, tables);
     group.bend = group.bend || group.kind == model::SolverKind::implicitEuler || cloth.solver.bendConstraints;
     group.iterations = std::max(group.iterations, model::iterationsOf(cloth.solver));
@@ -92,9 +94,42 @@ void appendCloths(std::span<const model::Cloth> cloths, SolveGroup& group, bool 
   }
 }
 
+// Rounds of loops of an invocation that solves for every spring of a cloth: solve_stretched.comp.
+std::uint64_t mostLoops(const model::Cloth& cloth, std::uint32_t width) {
+  constexpr std::uint64_t kWalk = CLOTHSTREAM_SOLVE_WALK, kLanes = CLOTHSTREAM_SOLVE_LANES;
+  const std::uint64_t texels = cloth.solver.bendConstraints ? 6 : 4;
+  const std::uint64_t chunks = chunksOf(cloth), batches = (chunks + 15) / 16;
+  const std::uint64_t walks = chunks * kLanes;
+  const auto share = [&](std::uint64_t count) { return (count + width - 1) / width; };
+  const std::uint64_t iteration = share(walks * kWalk) * (4 + texels) + share(walks) +
+                                  batches * (3 * 16 * kLanes / width + 24) + 4 * kLanes / width + 28;
+  const std::uint64_t round = iteration * (model::iterationsOf(cloth.solver) + 1) + 8 * share(walks);
+  return round * (model::isAcad(cloth.solver, model::AcadMode::limit) ? model::kLimitRounds : 1);
+}
+
+// Decides whether one workgroup solves each system of a group for its stretched springs only.
+void chooseStretched(std::span<const model::Cloth> cloths, SolveGroup& group, const StretchedLimits& limits) {
+  if (group.kind != model::SolverKind::acad || group.mesh) return;
+  group.stretched = true;
+  for (const model::Cloth& cloth : cloths) {
+    if (!isOf(cloth, group)) continue;
+    const bool fits = cloth.nodeCount() <= limits.wholeNodes &&
+                      chunksOf(cloth) <= CLOTHSTREAM_STRETCHED_CHUNKS &&
+                      mostLoops(cloth, limits.wideWorkgroup) <= limits.mostLoops;
+    group.stretched = group.stretched && fits;
+    group.continues = group.continues || mostLoops(cloth, limits.workgroup) > limits.mostLoops;
+  }
+}
+
 }  // namespace
 
-SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes) {
+std::uint32_t roundsOf(const SolveGroup& group) {
+  const bool limit = group.kind == model::SolverKind::acad && group.acadMode == model::AcadMode::limit;
+  return limit ? model::kLimitRounds : 1;
+}
+
+SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes,
+                        const StretchedLimits& stretched) {
   SolveTables tables;
   for (const model::Cloth& cloth : cloths) tables.nodes += cloth.nodeCount();
   tables.incidences.resize(tables.nodes, {0, 0, 0, 0});
@@ -111,6 +146,7 @@ SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t whol
       group.firstSystem = count(tables.systems);
       group.firstChunk = count(tables.chunks);
       group.firstSpring = count(tables.springs);
+      chooseStretched(cloths, group, stretched);
       appendCloths(cloths, group, false, wholeNodes, tables);
       group.firstLargeChunk = count(tables.chunks);
       appendCloths(cloths, group, true, wholeNodes, tables);

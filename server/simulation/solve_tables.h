@@ -23,6 +23,9 @@ struct SolveGroup {
   std::uint32_t firstSpring = 0, endSpring = 0;  // of meshes
   std::uint32_t iterations = 0;                  // of one solve: the largest of any cloth
   std::uint32_t smallChunks = 0;                 // of the largest small system
+  // One workgroup per system solves for the ends of stretched springs only (StretchedSystems). A wide one may
+  // have to continue.
+  bool stretched = false, continues = false;
 
   bool hasLarge() const { return firstLargeChunk < endChunk; }
 };
@@ -38,8 +41,20 @@ struct SolveTables {
   std::uint32_t listed = 0;  // texels of the longest list
 };
 
-// `wholeNodes` is the number of nodes of the largest cloth that one workgroup solves. Cloths with assembled
-// systems are left out (AssembledStage). Springs of meshes between two pinned nodes are left out.
-SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes);
+// Limits of a workgroup that solves for stretched springs only (stretchedLimits()).
+struct StretchedLimits {
+  std::uint32_t wholeNodes;  // of the largest cloth
+  std::uint32_t workgroup, wideWorkgroup;
+  std::uint32_t mostLoops;  // rounds of loops of an invocation
+};
+
+// `wholeNodes` is the number of nodes of the largest cloth that one workgroup solves.
+// Cloths with assembled systems are left out (AssembledStage). Springs of meshes between two pinned nodes are
+// left out.
+SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes,
+                        const StretchedLimits& stretched);
+
+// Rounds of a group's solve.
+std::uint32_t roundsOf(const SolveGroup& group);
 
 }  // namespace clothstream::simulation

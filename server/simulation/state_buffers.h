@@ -14,8 +14,10 @@ struct StateBuffers {
   const vulkan::Buffer& colliders;        // CollisionStage::colliders()
   const vulkan::Buffer& nearColliders;    // CollisionStage::nearLists()
   const vulkan::Buffer& contactImpulses;  // CollisionStage::contactImpulses()
-  // Dispatch sizes, x, y, z by Follow. The forces of grids with acad set x to the chunks of their SolveGroup
-  // if a spring may become too long.
+  // Two dispatch sizes by Follow, x, y, z each. If a spring may become too long, the forces of grids with
+  // acad set the first x to the workgroups that find out (SolveStage::stretchGroups). A number for each node
+  // follows. The forces set that of a walk to 1 if a spring at its nodes may be too long. Walks have
+  // CLOTHSTREAM_SOLVE_WALK rows of a column. They are counted row by row from the cloth's first node.
   const vulkan::Buffer& stretches;
   std::array<const vulkan::Buffer*, 2> positions, velocities;
 };

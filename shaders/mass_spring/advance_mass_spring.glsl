@@ -27,35 +27,56 @@ Node nodeOf(Node window, uint index) {
 }
 
 layout(std430, binding = 9) writeonly buffer Stretches {
-  uint stretches[];  // dispatch sizes, x, y, z
+  uint stretches[];  // dispatch sizes, x, y, z; then the marks of walks (StateBuffers)
 };
 
 // ACAD's limits of the springs of a grid, squared, each less a margin for the accelerations of its ends.
 struct Limits {
-  float right, below, shear, right2, below2;
-  float margin;  // m
+  float right, below, shear;
+  float allowed;  // square of what the accelerations of a spring's ends may add, m^2
 };
 
-float shortened(float longestSquared_, float restLength, float activation, float margin) {
+float shortened(float restLength, float activation, float margin) {
   precise float longest = restLength + activation * restLength;
   precise float most = (longest - margin) * 0.99999;
   precise float squared = most > 0.0 ? most * most : 0.0;
-  return longestSquared_ < kNoLimit ? squared : kNoLimit;
+  return squared;
 }
 
-// True if the motion without accelerations makes a spring longer than its limit.
-bool exceeds(Node here, Node other, float limit) {
-  precise vec3 d = other.position - here.position + push.stepSeconds * (other.velocity - here.velocity);
+// Where a node is at the end of the substep without acceleration. The paper decides by the substep's start.
+vec3 expectedPlace(vec3 position, vec3 velocity) {
+  precise vec3 place = kTestsMotion ? position + push.stepSeconds * velocity : position;
+  return place;
+}
+
+bool isLong(vec3 a, vec3 b, float limit) {
+  precise vec3 d = b - a;
   return dotProduct(d, d) > limit;
 }
 
-// The paper decides by the length at the substep's start.
-bool isLong(Node here, Node other, Spring spring, float limit) {
-  if (kTestsMotion) {
-    return exceeds(here, other, limit);
+// True if a structural or shear spring of the quad below and to the right of `here` may become too long. A
+// bend spring is only too long if one of the two structural springs along it is.
+bool isQuadLong(vec3 here, vec3 right, vec3 below, vec3 rightBelow, Limits limits) {
+  return isLong(here, right, limits.right) || isLong(here, below, limits.below) ||
+         isLong(here, rightBelow, limits.shear) || isLong(right, below, limits.shear);
+}
+
+// Walks of kSolveWalk rows that a strip may touch.
+const uint kSolveWalk = CLOTHSTREAM_SOLVE_WALK;
+// Not 0 if a strip may begin inside a walk and end in another; below 4 * kSolveWalk.
+const uint kOffset = (kRowsPerInvocation % kSolveWalk) * (kSolveWalk % kRowsPerInvocation);
+const uint kMarks =
+    (kRowsPerInvocation + kSolveWalk - 1) / kSolveWalk + (kOffset + 4 * kSolveWalk - 1) / (4 * kSolveWalk);
+
+// Marks the walks of a strip. All invocations store the same numbers.
+void markStretched(Strip strip) {
+  stretches[push.stretchSize] = push.stretchGroups;
+  uint first = strip.row / kSolveWalk;
+  [[unroll]] for (uint i = 0; i < kMarks; ++i) {
+    uint last = min(strip.row + kRowsPerInvocation, strip.rows) - 1;
+    uint walk = min(first + i, last / kSolveWalk);
+    stretches[push.firstMark + strip.firstNode + walk * strip.columns + strip.column] = 1;
   }
-  precise vec3 d = other.position - here.position;
-  return dotProduct(d, d) > spring.longestSquared;
 }
 
 void main() {
@@ -92,13 +113,11 @@ void main() {
   // A node's acceleration a adds at most h^2 |a| to the length of its springs. A quarter of the activation is
   // left for both ends. If a node accelerates more, its springs count as stretched.
   float shortest = min(cloth.columnSpacing, cloth.rowSpacing);
-  precise float margin = 0.25 * cloth.activation * shortest;
-  Limits limits =
-      Limits(shortened(alongRow.longestSquared, alongRow.restLength, cloth.activation, margin),
-             shortened(alongColumn.longestSquared, alongColumn.restLength, cloth.activation, margin),
-             shortened(shear.longestSquared, shear.restLength, cloth.activation, margin),
-             shortened(bendRow.longestSquared, bendRow.restLength, cloth.activation, margin),
-             shortened(bendColumn.longestSquared, bendColumn.restLength, cloth.activation, margin), margin);
+  precise float margin = kTestsMotion ? 0.25 * cloth.activation * shortest : 0.0;
+  precise float allowed = margin * margin;
+  Limits limits = Limits(shortened(alongRow.restLength, cloth.activation, margin),
+                         shortened(alongColumn.restLength, cloth.activation, margin),
+                         shortened(shear.restLength, cloth.activation, margin), allowed);
   bool stretched = false;
   Spring leftSpring = where(hasLeft, alongRow);
   Spring rightSpring = where(hasRight, alongRow);
@@ -126,6 +145,13 @@ void main() {
   Node above = fetchNode(aboveIndex);
   Node here = fetchNode(index);
   here.velocity = fetchVelocity(index);
+  vec3 expected, expectedRight;
+  if (kTestsStretch) {
+    uint rightIndex = index + toRight;
+    expected = expectedPlace(here.position, here.velocity);
+    expectedRight = expectedPlace(texelFetch(positions, int(rightIndex)).xyz,
+                                  kTestsMotion ? fetchVelocity(rightIndex) : vec3(0.0));
+  }
 
   // Forces from rows before the strip: upward springs of its first row, the bend spring of its second row,
   // and the triangles above.
@@ -193,17 +219,18 @@ void main() {
 
     moved[k] = moveNode(here, force, cloth.velocityDecay);
     if (kTestsStretch) {
-      bool isRight = isLong(here, right, alongRow, limits.right);
-      bool isBelow = isLong(here, below, alongColumn, limits.below);
-      bool isLeftBelow = isLong(here, leftBelow, shear, limits.shear);
-      bool isRightBelow = isLong(here, rightBelow, shear, limits.shear);
-      bool isRight2 = isLong(here, fetchNode(index + toRight2), bendRow, limits.right2);
-      bool isBelow2 = isLong(here, below2, bendColumn, limits.below2);
+      if (kTestsMotion && !kSpringDamping && !kAir) {
+        below.velocity = fetchVelocity(belowIndex);
+        rightBelow.velocity = fetchVelocity(belowIndex + toRight);
+      }
+      vec3 expectedBelow = expectedPlace(below.position, below.velocity);
+      vec3 expectedRightBelow = expectedPlace(rightBelow.position, rightBelow.velocity);
       precise vec3 gained = (2.0 * push.stepSeconds) * (moved[k].velocity - here.velocity);
-      precise float allowed = limits.margin * limits.margin;
-      bool isFast = kTestsMotion && dotProduct(gained, gained) > allowed;
-      stretched =
-          stretched || isRight || isBelow || isLeftBelow || isRightBelow || isRight2 || isBelow2 || isFast;
+      stretched = stretched ||
+                  isQuadLong(expected, expectedRight, expectedBelow, expectedRightBelow, limits) ||
+                  (kTestsMotion && dotProduct(gained, gained) > limits.allowed);
+      expected = expectedBelow;
+      expectedRight = expectedRightBelow;
     }
     if (kColliders) {
       origins[k] = here.position;
@@ -228,11 +255,8 @@ void main() {
     ++row;
   }
 
-  // All invocations store the same numbers.
   if (kTestsStretch && stretched) {
-    stretches[push.stretchSize] = push.stretchChunks;
-    stretches[push.stretchSize + 1] = 1;
-    stretches[push.stretchSize + 2] = 1;
+    markStretched(strip);
   }
 
   if (kColliders) {

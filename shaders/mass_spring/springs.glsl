@@ -29,7 +29,7 @@ layout(constant_id = 8) const bool kTestsStretch = false;
 // A length that no spring reaches.
 const float kNoLimit = 1e18;
 
-// Longest length of a spring with a force, squared. solve/spring_terms.glsl computes the same bits.
+// Longest length of a spring with a force, squared. solve/spring_weight.glsl computes the same bits.
 float longestSquared(float restLength, float activation, bool limited) {
   precise float longest = restLength + activation * restLength;
   precise float squared = longest * longest;

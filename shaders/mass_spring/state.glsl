@@ -39,7 +39,7 @@ vec3 fetchVelocity(uint index) {
 // Reads the velocity of a neighbour only if a force depends on it.
 Node fetchNode(uint index) {
   vec4 position = texelFetch(positions, int(index));
-  bool moves = kSpringDamping || kAir || kTestsMotion;
+  bool moves = kSpringDamping || kAir;
   return Node(position.xyz, position.w, moves ? fetchVelocity(index) : vec3(0.0));
 }
 

@@ -137,8 +137,8 @@ struct AdvancePush {
   CollisionPush collision;
   uint32_t firstTile;
   uint32_t stretchSize;    // of grids with ACAD: index of the dispatch size that a stretched spring sets
-  uint32_t stretchChunks;  // the x of that size
-  uint32_t reserved;
+  uint32_t stretchGroups;  // the x of that size
+  uint32_t firstMark;      // index of the mark of the scene's first node (StateBuffers)
 };
 
 struct RungeKuttaPush {
@@ -171,6 +171,25 @@ struct SolvePush {
   uint32_t endIteration;
   uint32_t firstChunk;  // if several workgroups solve a system
   uint32_t nextGroup;   // index of the dispatch size of the next iteration
+};
+
+// Most invocations of a workgroup that solves only for stretched springs, and chunks of its cloth.
+#define CLOTHSTREAM_STRETCHED_INVOCATIONS 512
+#define CLOTHSTREAM_STRETCHED_CHUNKS 256
+
+struct StretchedPush {
+  uint32_t nodes;  // in the scene
+  uint32_t firstSystem;
+  uint32_t systems;
+  uint32_t rounds;       // of a solve
+  uint32_t stretchSize;  // index of the dispatch size of this kernel: the kernel clears it
+  uint32_t nextSize;     // of the kernel that continues long solves
+  uint32_t firstMark;    // as in AdvancePush
+  uint32_t mostLoops;    // rounds of loops that an invocation may take
+  float substepSeconds;
+  float substepRate;  // 1/s
+  uint32_t collides;  // 1: the nodes collide afterwards
+  uint32_t reserved;
 };
 
 struct ApplyPush {
@@ -229,7 +248,7 @@ static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, wind) == 16 &&
               offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);
 static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 48 && sizeof(SolvePush) == 24 &&
               sizeof(ApplyPush) == 64 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&
-              sizeof(FinishPush) == 48 && sizeof(HashPush) == 4);
+              sizeof(FinishPush) == 48 && sizeof(StretchedPush) == 48 && sizeof(HashPush) == 4);
 static_assert(sizeof(StatusRecord) == 16 && offsetof(StatusRecord, unhealthy) == 8);
 }  // namespace clothstream::shared
 #else

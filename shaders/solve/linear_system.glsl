@@ -3,7 +3,7 @@
 //
 // The unknown is the change u of the nodes' velocities. With d from one end of a spring to the other,
 //   (c M + sum of along d d^T + across I) u = side,
-// where c and the `along` and `across` of each spring follow from the solver: spring_terms.glsl.
+// where c and the `along` and `across` of each spring follow from the solver: spring_weight.glsl.
 //
 // A walk has kWalk nodes (rows of a column, or consecutive nodes), and a chunk has kLanes walks. Dot products
 // add up along the walk, then the lanes of a chunk in a tree, then the chunks in lanes and a tree. This order

@@ -32,7 +32,9 @@ constexpr double kMegabyte = 1e6;
 struct Tables {
   explicit Tables(const model::Scene& scene)
       : meshes(simulation::meshTables(scene.cloths, 64)),
-        solve(simulation::solveTables(scene.cloths, 1024)),
+        solve(simulation::solveTables(
+            scene.cloths, 1024,
+            {.wholeNodes = 65'536, .workgroup = 8, .wideWorkgroup = 256, .mostLoops = 60'000})),
         assembled(simulation::assembledTables(scene.cloths,
                                               {.workgroup = 64, .wholeNodes = 1024, .rounds = 1 << 20})),
         xpbd(simulation::xpbdTables(scene.cloths, {.wholeWorkgroup = 64,
