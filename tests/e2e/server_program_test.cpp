@@ -271,6 +271,20 @@ TEST_F(ServerProgram, ExplainsWrongOptionsOfAStep) {
     EXPECT_THAT(help.output(), HasSubstr(word));
 }
 
+TEST_F(ServerProgram, DoctorReadsTheOptionsOfTheServerAndReportsProblems) {
+  const std::filesystem::path report = sceneFile().replace_filename("doctor.json");
+  ServerProcess well({"--port", "0", "--grpc-port", "0", "doctor", "--seconds", "0", "--report", report});
+  ASSERT_EQ(well.exitCode(), 0) << well.output();
+  EXPECT_THAT(well.output(), HasSubstr("the server uses"));
+  EXPECT_EQ(nlohmann::json::parse(std::ifstream(report))["findings"][0]["level"], "ok");
+
+  ServerProcess server(options({}));
+  const std::uint16_t port = server.portIn(server.lineWith("page"));
+  ServerProcess ill({"--port", std::to_string(port), "--grpc-port", "0", "doctor", "--seconds", "0", "--json"});
+  EXPECT_EQ(ill.exitCode(), 1);
+  EXPECT_THAT(ill.output(), HasSubstr("is already in use"));
+}
+
 TEST_F(ServerProgram, ListsDevicesAndRefusesAnUnknownOne) {
   ServerProcess list({"--list-devices"});
   EXPECT_EQ(list.exitCode(), 0);
