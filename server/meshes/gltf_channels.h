@@ -2,7 +2,6 @@
 // Translations and rotations of nodes in an animation of a glTF file.
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -10,6 +9,8 @@
 
 #include <tiny_gltf.h>
 #include <tl/expected.hpp>
+
+#include "server/model/pose.h"
 
 namespace clothstream::meshes {
 

@@ -141,7 +141,7 @@ TEST_F(MovedJoints, ComeFromTheAnimationOfAFileThatIsCreatedAsAScene) {
   }));
 }
 
-TEST_F(MovedJoints, OfAnUnknownColliderAreRefusedWithTheKnownNames) {
+TEST_F(MovedJoints, AreRefusedForAnUnknownColliderWithTheKnownNames) {
   if (IsSkipped()) return;
   const auto mover = move(R"({"joints": [{"collider": "leg", "poses": []}]})"
                           "\n");
