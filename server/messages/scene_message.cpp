@@ -401,8 +401,8 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkAttachments(checks, scene);
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);
-  checkCoarse(checks, scene);
   checkMotionBound(checks, scene);
+  checkCoarse(checks, scene);
   if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
   most.cancellation.check();
   if (!checks.failed())

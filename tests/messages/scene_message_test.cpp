@@ -383,7 +383,6 @@ const BadScene kBadScenes[] = {
      [](v1::Scene& s) {
        cloth(s).mutable_self_collision()->set_nothing_passes(true);
        cloth(s).mutable_coarse();
-       cloth(s).set_damping(10);
      },
      "without \"coarse\""},
     {"cloths[0].selfCollision:",
