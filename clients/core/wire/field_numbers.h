@@ -128,6 +128,7 @@ struct CoarseCorrection {
 struct SelfCollision {
   static constexpr Field kRadius{1, WireType::kFixed32};
   static constexpr Field kFriction{2, WireType::kFixed32};
+  static constexpr Field kNothingPasses{42, WireType::kVarint};
 };
 struct Solver {
   static constexpr Field kMassSpring{1, WireType::kBytes};
@@ -560,6 +561,7 @@ struct ColliderState {
   static constexpr Field kHull{9, WireType::kBytes};
   static constexpr Field kMesh{30, WireType::kBytes};
   static constexpr Field kJoints{31, WireType::kBytes};
+  static constexpr Field kYields{71, WireType::kVarint};
 };
 struct ColliderMeshDescription {
   static constexpr Field kPositions{1, WireType::kBytes};

@@ -70,5 +70,5 @@ export const SceneFields = { name: 1, description: 2, simulationRate: 3, streamR
 export const EnvironmentFields = { gravity: 1, wind: 2, airDensity: 3, gust: 4 } as const;
 export const ClothFields = { name: 1, grid: 2, mesh: 14, mass: 4, structural: 5, shear: 6, bend: 7, damping: 8, drag: 9, lift: 10, friction: 11, thickness: 12, pins: 13, pinnedVertices: 15, pinnedRegions: 16, solver: 20, selfCollision: 21, attachments: 22, tethers: 23, dihedralBending: 24, material: 40, arealMass: 41, coarse: 42 } as const;
 export const MeshFields = { file: 1, positions: 2, triangles: 3, quads: 4, uvs: 5, uvTriangles: 6, submeshes: 7, pose: 8, scale: 9, weldDistance: 10, repair: 70, fit: 71 } as const;
-export const SelfCollisionFields = { radius: 1, friction: 2 } as const;
+export const SelfCollisionFields = { radius: 1, friction: 2, nothingPasses: 42 } as const;
 export const ColliderFields = { name: 1, sphere: 2, capsule: 3, plane: 4, box: 5, hull: 6, mesh: 30, pose: 8, friction: 9, motion: 10 } as const;
