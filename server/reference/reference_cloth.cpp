@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "server/model/stability.h"
+#include "server/model/strain_limit.h"
 #include "server/reference/constraint_system.h"
 #include "server/reference/implicit_system.h"
 #include "server/reference/limit_system.h"
@@ -289,7 +290,7 @@ void ReferenceCloth::limitStretch(double h) {
     std::vector<LimitedSpring> springs;
     for (const model::SpringLink& link : links_)
       if (model::isConstraint(cloth_.solver, link.kind))
-        springs.push_back({link.a, link.b, link.restLength * (1 + double{cloth_.solver.activation})});
+        springs.push_back({link.a, link.b, link.restLength * (1 + double{model::heldStrain(cloth_.solver)})});
     if (!limitRound(springs, free, inverseMasses_, compliance, iterations, double{cloth_.solver.tolerance},
                     positions_))
       break;

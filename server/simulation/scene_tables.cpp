@@ -9,6 +9,7 @@
 
 #include "server/model/springs.h"
 #include "server/model/stability.h"
+#include "server/model/strain_limit.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -30,7 +31,7 @@ shared::XpbdSpringRecord xpbdSpringOf(const model::Cloth& cloth, model::SpringKi
 void setSolver(const model::Cloth& cloth, double substepSeconds, shared::ClothRecord& record) {
   const model::Solver& solver = cloth.solver;
   using enum model::SpringKind;
-  record.activation = solver.kind == model::SolverKind::acad ? solver.activation : 0;
+  record.activation = solver.kind == model::SolverKind::acad ? model::heldStrain(solver) : 0;
   record.correctionFraction = model::correctionFraction(solver);
   for (const model::SpringKind kind : {structural, shear, bend})
     record.xpbdSprings[static_cast<std::size_t>(kind)] = xpbdSpringOf(cloth, kind, substepSeconds);

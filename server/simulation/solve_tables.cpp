@@ -115,9 +115,12 @@ void chooseStretched(std::span<const model::Cloth> cloths, SolveGroup& group, co
     if (!isOf(cloth, group)) continue;
     const bool fits = cloth.nodeCount() <= limits.wholeNodes &&
                       chunksOf(cloth) <= CLOTHSTREAM_STRETCHED_CHUNKS &&
-                      mostLoops(cloth, limits.wideWorkgroup) <= limits.mostLoops;
+                      mostLoops(cloth, limits.widestWorkgroup) <= limits.mostLoops;
     group.stretched = group.stretched && fits;
-    group.continues = group.continues || mostLoops(cloth, limits.workgroup) > limits.mostLoops;
+    // A software device is slower with wider workgroups.
+    std::uint32_t width = limits.workgroup;
+    while (width < limits.widestWorkgroup && mostLoops(cloth, width) > limits.mostLoops) width *= 2;
+    if (width > limits.workgroup) group.continuedWorkgroup = std::max(group.continuedWorkgroup, width);
   }
 }
 

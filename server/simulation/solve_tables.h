@@ -23,9 +23,10 @@ struct SolveGroup {
   std::uint32_t firstSpring = 0, endSpring = 0;  // of meshes
   std::uint32_t iterations = 0;                  // of one solve: the largest of any cloth
   std::uint32_t smallChunks = 0;                 // of the largest small system
-  // One workgroup per system solves for the ends of stretched springs only (StretchedSystems). A wide one may
-  // have to continue.
-  bool stretched = false, continues = false;
+  // One workgroup per system solves for the ends of stretched springs only (StretchedSystems).
+  bool stretched = false;
+  // Width of the workgroups that continue long solves of such systems; 0 if no solve is too long.
+  std::uint32_t continuedWorkgroup = 0;
 
   bool hasLarge() const { return firstLargeChunk < endChunk; }
 };
@@ -44,7 +45,7 @@ struct SolveTables {
 // Limits of a workgroup that solves for stretched springs only (stretchedLimits()).
 struct StretchedLimits {
   std::uint32_t wholeNodes;  // of the largest cloth
-  std::uint32_t workgroup, wideWorkgroup;
+  std::uint32_t workgroup, widestWorkgroup;
   std::uint32_t mostLoops;  // rounds of loops of an invocation
 };
 

@@ -39,13 +39,14 @@ StretchedLimits stretchedLimits(const vulkan::Device& device, std::uint32_t work
   const std::uint32_t narrow = width(workgroupSize != 0 ? workgroupSize : (device.hasGpuKernels() ? 512 : 8));
   return {.wholeNodes = std::min(wholeNodes, kStretchedNodes),
           .workgroup = narrow,
-          .wideWorkgroup = std::max(narrow, width(256)),
+          .widestWorkgroup = width(CLOTHSTREAM_STRETCHED_INVOCATIONS),
           .mostLoops = device.isSoftware() ? kSoftwareLoops : kNoLoopLimit};
 }
 
 const Kernel& StretchedKernels::of(const SolveGroup& group, bool continues) {
   const std::size_t mode = static_cast<std::size_t>(group.acadMode);
-  std::unique_ptr<Kernel>& kernel = kernels_[(2 * mode + (group.bend ? 1 : 0)) * 2 + (continues ? 1 : 0)];
+  const std::uint32_t workgroup = continues ? group.continuedWorkgroup : limits_.workgroup;
+  std::unique_ptr<Kernel>& kernel = kernels_[{mode, group.bend, continues, workgroup}];
   if (!kernel)
     kernel = std::make_unique<Kernel>(
         device_, vulkan::KernelDescription{
@@ -54,7 +55,7 @@ const Kernel& StretchedKernels::of(const SolveGroup& group, bool continues) {
                      .bindings = {kTexels, kTexels, kTexels, kTexels, kImages, kStorage, kTexels, kStorage,
                                   kImages, kStorage, kImages, kStorage, kStorage, kStorage, kStorage},
                      .pushConstantBytes = sizeof(shared::StretchedPush),
-                     .workgroupSize = continues ? limits_.wideWorkgroup : limits_.workgroup,
+                     .workgroupSize = workgroup,
                      .specialisation = {0u, 0u, group.bend ? 1u : 0u, 1u, continues ? 1u : 0u, 0u,
                                         group.acadMode == model::AcadMode::paper ? 1u : 0u,
                                         group.acadMode == model::AcadMode::limit ? 1u : 0u}});
@@ -94,7 +95,7 @@ StretchedSystems::StretchedSystems(const vulkan::Device& device, StretchedKernel
                                               &buffers.solves,
                                               &stretches_};
       group.solve.emplace_back(device, kernels.of(on, false), all);
-      if (on.continues) group.next.emplace_back(device, kernels.of(on, true), all);
+      if (on.continuedWorkgroup != 0) group.next.emplace_back(device, kernels.of(on, true), all);
     }
     groups_.push_back(std::move(group));
   }

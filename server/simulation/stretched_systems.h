@@ -2,9 +2,10 @@
 // Systems of ACAD's grids that one workgroup solves for the ends of stretched springs only.
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <tuple>
 #include <vector>
 
 #include "server/simulation/solve_tables.h"
@@ -33,7 +34,8 @@ class StretchedKernels {
  private:
   const vulkan::Device& device_;
   StretchedLimits limits_;
-  std::array<std::unique_ptr<vulkan::Kernel>, 16> kernels_;
+  // By mode, bend springs, `continues` and width.
+  std::map<std::tuple<std::size_t, bool, bool, std::uint32_t>, std::unique_ptr<vulkan::Kernel>> kernels_;
 };
 
 // Belongs to SolveStage and refers to its buffers. A substep has one dispatch per group, whose size is 0 if

@@ -179,14 +179,18 @@ void multiplyNode(uint place, bool exists) {
   Point here = pointAt(position.xyz, own);
   uint count = exists ? uint(position.w) : 1;
   precise vec3 sum = cloth.scaledCompliance * own.residual;
-  for (uint texel = 0; texel < count; ++texel) {
-    vec4 two = imageLoad(springTexels, int(texel * push.nodes + system.firstNode + place));
+  // All nodes take as many rounds: a software device would run one more to find the end of each.
+  uint texel = 0;
+  do {
+    vec4 two = imageLoad(springTexels, int(min(texel, count - 1) * push.nodes + system.firstNode + place));
+    vec2 along = texel < count ? two.xz : vec2(0.0);
     [[unroll]] for (uint j = 0; j < 2; ++j) {
       uint other = uint(j == 0 ? two.y : two.w);
       Point point = pointAt(fetch(kPlaces, other).xyz, residualFrom(fetch(kResiduals, other)));
-      sum = sum + pull(here, point, j == 0 ? two.x : two.z);
+      sum = sum + pull(here, point, along[j]);
     }
-  }
+    ++texel;
+  } while (texel < mostTexels);
   precise vec3 kept = own.preconditioner > 0.0 ? sum : vec3(0.0);
   if (exists) {
     vectors[vectorAt(kProducts, place)] = vec4(kept, dotProduct(here.z, kept));

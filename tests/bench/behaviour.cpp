@@ -131,9 +131,10 @@ void checkAcadModes(std::span<const Outcome> outcomes) {
   for (std::size_t i = 0; i < count; ++i) expectJumping(outcomes[count + i], outcomes[i]);
   checkAcad(outcomes.last(count));
   for (const Outcome& outcome : outcomes.last(count))
-    expect(outcome.strains.quantile(1) < 0.11 && outcome.largestStrain < 0.12,
-           fmt::format("ks {}, limit: a spring stretched by {}, and by {} while it fell",
-                       outcome.panel.stiffness, outcome.strains.quantile(1), outcome.largestStrain));
+    expect(
+        outcome.largestStrain < 0.11,
+        fmt::format("ks {}, limit: a spring stretched by {} after {} s, and by {} in some tick",
+                    outcome.panel.stiffness, outcome.strains.quantile(1), kSeconds, outcome.largestStrain));
 }
 
 void checkBlowUp(std::span<const Outcome> outcomes) {
@@ -259,8 +260,7 @@ Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
       break;
     }
     if (figure.number == 13)
-      outcome.largestStrain =
-          std::max(outcome.largestStrain, structuralStrains(cloth, simulated.state()).quantile(1));
+      outcome.largestStrain = std::max(outcome.largestStrain, largestStrain(cloth, simulated.state()));
     if (figure.number != 15 || torn) continue;
     simulation::NodeState state = simulated.state();
     if (structuralStrains(cloth, state).quantile(1) > kTorn) torn = std::move(state);

@@ -124,7 +124,9 @@ def solvers(rows):
 
 
 def acad(rows):
-    return [[number(r["nodes"]), r["method"], percent(r["active"]) if "active" in r else "", number(r["nsPerNodeSubstep"]),
+    def case(r):
+        return r["method"] + (", coarse" if r.get("coarse") else "")
+    return [[number(r["nodes"]), case(r), percent(r["active"]) if "active" in r else "", number(r["nsPerNodeSubstep"]),
              number(r["timesMassSpring"], 2), number(r["timesFasterThanConstraint"], 2)] for r in rows]
 
 

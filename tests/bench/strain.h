@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Strain of a cloth's structural springs.
+// Strain of a cloth's springs.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,16 @@ inline Samples structuralStrains(const model::Cloth& cloth, const simulation::No
   Samples strains;
   for (const double strain : measure::strainsOf(edges, positions)) strains.add(strain);
   return strains;
+}
+
+// The largest strain of any spring, also of shear and bend springs.
+inline double largestStrain(const model::Cloth& cloth, const simulation::NodeState& state) {
+  double largest = 0;
+  for (const model::SpringLink& link : model::springLinks(cloth)) {
+    const double length = (state.positions[link.b] - state.positions[link.a]).norm();
+    largest = std::max(largest, length / double{link.restLength} - 1);
+  }
+  return largest;
 }
 
 }  // namespace clothstream::bench

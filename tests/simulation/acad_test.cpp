@@ -324,5 +324,37 @@ TEST_F(LimitAcad, SolvesInTheSubstepInWhichASpringFirstBecomesTooLong) {
   }
 }
 
+std::uint64_t dispatchesOf(const model::Scene& scene) {
+  Running running(scene);
+  return running.dispatches(inputsOf(scene, {}));
+}
+
+// A solve that is not needed is one dispatch without workgroups.
+TEST_F(LimitAcad, NeedsOneDispatchInASubstepMoreThanMassSpring) {
+  model::Cloth cloth = calmCloth(40, 41);
+  const model::Scene free = sceneOf({cloth});
+  for (const model::AcadMode mode : {model::AcadMode::hold, model::AcadMode::paper, model::AcadMode::limit}) {
+    cloth.solver = limitSolver();
+    cloth.solver.acadMode = mode;
+    EXPECT_EQ(dispatchesOf(sceneOf({cloth})), dispatchesOf(free) + free.substeps);
+  }
+}
+
+// A sheet falls until nearly all of its springs are stretched. A software device then takes wide workgroups.
+TEST_F(LimitAcad, ContinuesLongSolvesWithTheSameBits) {
+  model::Cloth sheet = softCloth(13, 14, true);
+  sheet.solver.iterations = 240;
+  sheet.solver.tolerance = 1e-9f;
+  sheet.structural.stiffness = sheet.shear.stiffness = 2;
+  for (const model::AcadMode mode : {model::AcadMode::hold, model::AcadMode::limit}) {
+    sheet.solver.acadMode = mode;
+    sheet.solver.compliance = 1e-5f;
+    const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000},
+                                                  {.workgroupSize = 8, .solveWholeNodes = 0},
+                                                  {.workgroupSize = 64, .solveWholeNodes = 1'000}};
+    expectSameBits(sceneOf({sheet}), passingBall, 8, ways);
+  }
+}
+
 }  // namespace
 }  // namespace clothstream::tests

@@ -170,6 +170,14 @@ simulation::TickStatus Running::tick(const simulation::TickInputs& inputs) {
   return simulation_.status();
 }
 
+std::uint64_t Running::dispatches(const simulation::TickInputs& inputs) {
+  recorder_.beginRehearsal();
+  simulation_.recordTick(recorder_, inputs);
+  std::uint64_t sum = 0;
+  for (const vulkan::RehearsedKernel& kernel : recorder_.rehearsed()) sum += kernel.dispatches;
+  return sum;
+}
+
 std::vector<simulation::ClothReport> Running::tickAndReport(const simulation::TickInputs& inputs) {
   run([&] {
     simulation_.recordTick(recorder_, inputs);

@@ -76,6 +76,8 @@ class Running {
   std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
   std::vector<simulation::GrabStatus> grabs() const { return simulation_.grabs(); }
   std::vector<float> depths() const { return simulation_.depths(); }
+  // Dispatches of a tick, also those that the device makes empty. The tick does not run.
+  std::uint64_t dispatches(const simulation::TickInputs& inputs);
   // Runs one tick with a report. Returns the reports of all cloths.
   std::vector<simulation::ClothReport> tickAndReport(const simulation::TickInputs& inputs);
   void setCloths(std::span<const model::Cloth> cloths) { simulation_.setCloths(cloths); }

@@ -34,7 +34,7 @@ struct Tables {
       : meshes(simulation::meshTables(scene.cloths, 64)),
         solve(simulation::solveTables(
             scene.cloths, 1024,
-            {.wholeNodes = 65'536, .workgroup = 8, .wideWorkgroup = 256, .mostLoops = 60'000})),
+            {.wholeNodes = 65'536, .workgroup = 8, .widestWorkgroup = 512, .mostLoops = 60'000})),
         assembled(simulation::assembledTables(scene.cloths,
                                               {.workgroup = 64, .wholeNodes = 1024, .rounds = 1 << 20})),
         xpbd(simulation::xpbdTables(scene.cloths, {.wholeWorkgroup = 64,
