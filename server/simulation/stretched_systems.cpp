@@ -23,9 +23,9 @@ namespace {
 
 // shaders/solve/stretched_nodes.glsl and solve_stretched.comp: numbers of a node and of a system in `lists`.
 constexpr std::size_t kTables = 6, kHead = 8;
-// lavapipe allows an invocation 65,535 loop rounds. Some are left for the short loops.
-constexpr std::uint32_t kSoftwareLoops = 60'000;
-constexpr std::uint32_t kNoLoopLimit = ~0u;
+// lavapipe allows an invocation 65,535 loop rounds. Some are left for the short loops. On other devices the
+// same number keeps a dispatch below some tens of milliseconds.
+constexpr std::uint32_t kMostLoops = 60'000;
 constexpr std::uint32_t kStretchedNodes = 65'536;
 
 }  // namespace
@@ -40,7 +40,7 @@ StretchedLimits stretchedLimits(const vulkan::Device& device, std::uint32_t work
   return {.wholeNodes = std::min(wholeNodes, kStretchedNodes),
           .workgroup = narrow,
           .widestWorkgroup = width(CLOTHSTREAM_STRETCHED_INVOCATIONS),
-          .mostLoops = device.isSoftware() ? kSoftwareLoops : kNoLoopLimit};
+          .mostLoops = kMostLoops};
 }
 
 const Kernel& StretchedKernels::of(const SolveGroup& group, bool continues) {
