@@ -35,13 +35,22 @@ void main() {
   if (!covers(list, here.xyz, here.xyz)) {
     list = allColliders(push.collision.colliderCount);
   }
+  float deepest = 0.0;
   for (uint i = 0; i < list.count; ++i) {
     Collider collider = fetchCollider(colliderAt(list, i), push.collision, 0.0, 0.0);
     if (mayTouch(collider, here.xyz, here.xyz)) {
-      float depth = depthIn(collider, fetchFrame(collider, push.collision), here.xyz);
-      if (depth > 0.0) {
-        atomicMax(depths[collider.number], floatBitsToUint(depth));
-      }
+      deepest = max(deepest, depthIn(collider, fetchFrame(collider, push.collision), here.xyz));
+    }
+  }
+  if (deepest <= 0.0) {
+    return;
+  }
+  precise float outside = -push.touch;
+  for (uint i = 0; i < list.count; ++i) {
+    Collider collider = fetchCollider(colliderAt(list, i), push.collision, push.touch, 0.0);
+    if (mayTouch(collider, here.xyz, here.xyz) &&
+        depthIn(collider, fetchFrame(collider, push.collision), here.xyz) > outside) {
+      atomicMax(depths[collider.number], floatBitsToUint(deepest));
     }
   }
 }

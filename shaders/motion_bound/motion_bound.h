@@ -71,7 +71,8 @@ struct NodePush {
 struct DepthPush {
   CollisionPush collision;
   uint32_t nodeCount;
-  uint32_t reserved0, reserved1, reserved2;
+  float touch;  // m, distance at which a node touches a collider
+  uint32_t reserved0, reserved1;
 };
 
 // Corrections of nodes are sums of whole numbers in units of 1 / kCorrectionUnits m, and their weights in

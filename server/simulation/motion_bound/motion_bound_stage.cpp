@@ -60,6 +60,14 @@ vulkan::KernelDescription limitKernel(std::uint32_t workgroupSize, bool edges, b
                   {edges ? 1u : 0u, slide ? 1u : 0u});
 }
 
+// Twice the thickness of the thickest cloth.
+float touchOf(std::span<const model::Cloth> cloths) {
+  float thickness = 0;
+  for (const model::Cloth& cloth : cloths)
+    if (model::boundsMotion(cloth)) thickness = std::max(thickness, cloth.thickness);
+  return 2 * thickness;
+}
+
 }  // namespace
 
 bool MotionBoundStage::isIn(const model::Scene& scene) {
@@ -91,6 +99,7 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
                                    const StateBuffers& state, std::uint32_t workgroupSize)
     : tables_(motionBoundTables(scene.cloths)),
       gap_(gapOf(scene.cloths)),
+      touch_(touchOf(scene.cloths)),
       substepSeconds_(static_cast<float>(scene.substepSeconds())),
       parts_(device, tables_.parts),
       faces_(device, tables_.faces),
@@ -152,6 +161,7 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
 
 void MotionBoundStage::setCloths(std::span<const model::Cloth> cloths) {
   gap_ = gapOf(cloths);
+  touch_ = touchOf(cloths);
 }
 
 void MotionBoundStage::setSubstepSeconds(double seconds) {
@@ -228,9 +238,9 @@ void MotionBoundStage::recordDepths(vulkan::Recorder& recorder, std::uint32_t pr
   recorder.dispatch(measureDepths_.from[present],
                     shared::DepthPush{.collision = collision,
                                       .nodeCount = tables_.nodeCount,
+                                      .touch = touch_,
                                       .reserved0 = 0,
-                                      .reserved1 = 0,
-                                      .reserved2 = 0},
+                                      .reserved1 = 0},
                     tables_.nodeCount, collision.nodeWork);
 }
 

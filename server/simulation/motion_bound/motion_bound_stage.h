@@ -56,7 +56,8 @@ class MotionBoundStage {
   // Copies the report to the CPU, after a barrier; report() has it once the recording is complete.
   void recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const;
   Report report(std::uint32_t slot) const;
-  // Depth of the deepest node in each collider, as the device numbers them, in metres. 0: none is inside.
+  // For each collider, as the device numbers them: depth inside any collider of the deepest node that touches
+  // it, in metres. 0: none is inside.
   std::span<const float> depths(std::uint32_t slot) const;
 
  private:
@@ -78,7 +79,7 @@ class MotionBoundStage {
   void recordTree(vulkan::Recorder& recorder, std::uint32_t from) const;
 
   MotionBoundTables tables_;
-  float gap_, substepSeconds_;
+  float gap_, touch_, substepSeconds_;
   DeviceTable parts_, faces_, branches_;
   vulkan::Buffer boxes_, corrections_, shares_, report_, reportReadback_, depths_, depthReadback_;
   List facePairs_, nodePairs_, edgePairs_;
