@@ -22,13 +22,16 @@ tl::expected<v1::Scene, std::string> readScene(const std::string& path) {
   v1::Scene scene;
   const auto status = google::protobuf::util::JsonStringToMessage(json, &scene);
   if (!status.ok()) return tl::unexpected(fmt::format("{}: {}", path, std::string(status.message())));
+  const auto refuse = [&](std::string_view what, const std::string& name, const std::string& mesh) {
+    return tl::unexpected(
+        fmt::format("{}: the {} '{}' refers to the mesh file {}, which the server does not have; "
+                    "`clothstream-server print-scene {}` prints the scene with its geometry",
+                    path, what, name, mesh, path));
+  };
   for (const v1::Cloth& cloth : scene.cloths())
-    if (!cloth.mesh().file().empty())
-      return tl::unexpected(
-          fmt::format("{}: the cloth '{}' refers to the mesh file {}, which the server does not have; "
-                      "`clothstream-server "
-                      "print-scene {}` prints the scene with its geometry",
-                      path, cloth.name(), cloth.mesh().file(), path));
+    if (!cloth.mesh().file().empty()) return refuse("cloth", cloth.name(), cloth.mesh().file());
+  for (const v1::Collider& collider : scene.colliders())
+    if (!collider.mesh().file().empty()) return refuse("collider", collider.name(), collider.mesh().file());
   return scene;
 }
 

@@ -114,7 +114,15 @@ TEST_F(MovedJoints, ComeFromTheAnimationOfAFileThatIsCreatedAsAScene) {
   std::ofstream(scene) << R"({"name": "avatar",
     "cloths": [{"name": "sheet", "grid": {"rows": 5, "columns": 5, "width": 0.2, "height": 0.2}}],
     "colliders": [{"name": "rod", "mesh": {"file": "rod.glb", "animation": "bend"}}]})";
-  Process create({CLOTHSTREAM, "create", scene, "--server", address_});
+  // The server does not have the file, so the scene is sent with what the file holds.
+  Process refused({CLOTHSTREAM, "create", scene, "--server", address_});
+  EXPECT_NE(refused.waitForEnd(kPatience), 0);
+  EXPECT_THAT(refused.errors(), HasSubstr("the collider 'rod' refers to the mesh file rod.glb"));
+  Process print({CLOTHSTREAM_SERVER, "print-scene", scene});
+  ASSERT_EQ(print.waitForEnd(kPatience), 0) << print.errors();
+  const auto whole = directory_.path() / "whole.json";
+  std::ofstream(whole) << print.output();
+  Process create({CLOTHSTREAM, "create", whole, "--server", address_});
   ASSERT_EQ(create.waitForEnd(kPatience), 0) << create.errors();
   NativeClientOptions options;
   options.scene = "avatar";
