@@ -185,7 +185,7 @@ std::optional<std::string> unsupportedExtension(const std::string& name) {
 class NeighbourFiles {
  public:
   NeighbourFiles(const std::filesystem::path& folder, std::uint64_t most)
-      : folder_(std::filesystem::absolute(folder).lexically_normal()), left_(most) {}
+      : folder_(std::filesystem::absolute(folder.empty() ? "." : folder).lexically_normal()), left_(most) {}
 
   tinygltf::FsCallbacks callbacks() {
     return {.FileExists = [](const std::string& path,
