@@ -62,15 +62,16 @@ Finding accept(const OptionsFor& options, const AcceptedState& expected,
     }
     saved = run.simulation.collectState(end);
     found = simulation::statusOf(saved).stateHash;
-    if (again) price = model::PriceModel(scene).work(scene).seconds(simulation::SpeedMeter(run.device).measure());
+    if (again)
+      price = model::PriceModel(scene).work(scene).seconds(simulation::SpeedMeter(run.device).measure());
   }
   std::ranges::nth_element(times, times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2));
   const double tick = times[times.size() / 2];
   Finding finding{
       .level = Level::good,
       .topic = "acceptance",
-      .text = fmt::format("{}: the state after {} ticks is right; {:.3f} ms a tick, priced {:.3f} ms", expected.scene,
-                          kAcceptedTicks, 1e3 * tick, 1e3 * price),
+      .text = fmt::format("{}: the state after {} ticks is right; {:.3f} ms a tick, priced {:.3f} ms",
+                          expected.scene, kAcceptedTicks, 1e3 * tick, 1e3 * price),
       .figures = {{"scene", expected.scene},
                   {"nodes", scene.nodeCount()},
                   {"hash", fmt::format("{:016x}", found)},
@@ -79,9 +80,10 @@ Finding accept(const OptionsFor& options, const AcceptedState& expected,
                   {"priceMs", 1e3 * price}}};
   if (found != expected.hash) {
     finding.level = Level::problem;
-    finding.text = fmt::format("{}: after {} ticks the state has the hash {:016x} instead of {:016x}", expected.scene,
-                               kAcceptedTicks, found, expected.hash);
-    finding.fix = "Recordings will not repeat on this device. Update its driver; if that does not help, report it";
+    finding.text = fmt::format("{}: after {} ticks the state has the hash {:016x} instead of {:016x}",
+                               expected.scene, kAcceptedTicks, found, expected.hash);
+    finding.fix =
+        "Recordings will not repeat on this device. Update its driver; if that does not help, report it";
   }
   return finding;
 }

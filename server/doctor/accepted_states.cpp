@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Hashes after a thousand ticks, equal on Mesa's software device (lavapipe of Mesa 22.3.6) and an NVIDIA H200
-// (driver 580.159). `clothstream-server step --scene NAME --ticks 1000 --every 1000 --out FILE` prints one into
-// FILE.json.
+// (driver 580.159). `clothstream-server step --scene NAME --ticks 1000 --every 1000 --out FILE` prints one
+// into FILE.json.
 #include "server/doctor/acceptance.h"
 
 namespace clothstream::doctor {

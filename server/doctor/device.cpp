@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
 constexpr std::uint32_t kRate = 72, kFirstSize = 32, kMaxSize = 4096, kTicks = 12;
-constexpr double kShare = 0.8;  // of the period that a tick may take
+constexpr double kShare = 0.8;          // of the period that a tick may take
 constexpr std::size_t kNodeBytes = 16;  // of the largest binding of a scene
 
 // A square metre that hangs by its upper edge.
@@ -67,8 +67,8 @@ double tickSeconds(const vulkan::DeviceOptions& options, const model::Scene& sce
   return times[times.size() / 2];
 }
 
-Finding capacityOf(const OptionsFor& options, const char* method, model::SolverKind kind, std::uint32_t substeps,
-                   Clock::time_point end) {
+Finding capacityOf(const OptionsFor& options, const char* method, model::SolverKind kind,
+                   std::uint32_t substeps, Clock::time_point end) {
   std::uint32_t fits = 0, size = kFirstSize;
   double fitting = 0;
   bool measuredAll = true;
@@ -92,15 +92,15 @@ Finding capacityOf(const OptionsFor& options, const char* method, model::SolverK
   }
   Finding finding{.level = Level::good,
                   .topic = "capacity",
-                  .text = fmt::format("{}: {}x{} nodes at {} Hz, in {:.2f} ms a tick with its packet", method, fits,
-                                      fits, kRate, 1e3 * fitting),
+                  .text = fmt::format("{}: {}x{} nodes at {} Hz, in {:.2f} ms a tick with its packet", method,
+                                      fits, fits, kRate, 1e3 * fitting),
                   .figures = {{"method", method}, {"size", fits}, {"ticks", std::move(rows)}}};
   if (!stopped.empty()) finding.text += fmt::format("; {}x{} is not possible: {}", size, size, stopped);
   if (!measuredAll) finding.text += "; larger ones were not tried in this time";
   if (fits == 0) {
     finding.level = Level::problem;
-    finding.text = fmt::format("{}: not even {}x{} nodes run at {} Hz{}{}", method, kFirstSize, kFirstSize, kRate,
-                               stopped.empty() ? "" : ": ", stopped);
+    finding.text = fmt::format("{}: not even {}x{} nodes run at {} Hz{}{}", method, kFirstSize, kFirstSize,
+                               kRate, stopped.empty() ? "" : ": ", stopped);
     finding.fix = "Stop other programs that use the device, or use a faster one (--device)";
   }
   return finding;
@@ -119,21 +119,22 @@ Findings checkDevices(const vulkan::DeviceOptions& options) {
     const vulkan::Limits& limits = device.limits();
     const std::uint64_t nodes =
         std::min<std::uint64_t>(limits.maxStorageRange / kNodeBytes, limits.maxTexelElements);
-    Finding chosen{.level = Level::good,
-                   .topic = "device",
-                   .text = fmt::format("the server uses {}: {:.1f} GB of memory, scenes of up to {} nodes",
-                                       device.info().name, static_cast<double>(limits.deviceMemoryBytes) / 1e9,
-                                       nodes),
-                   .figures = {{"name", device.info().name},
-                               {"driver", device.info().driver},
-                               {"software", device.isSoftware()},
-                               {"memoryBytes", limits.deviceMemoryBytes},
-                               {"maxNodes", nodes}}};
+    Finding chosen{
+        .level = Level::good,
+        .topic = "device",
+        .text = fmt::format("the server uses {}: {:.1f} GB of memory, scenes of up to {} nodes",
+                            device.info().name, static_cast<double>(limits.deviceMemoryBytes) / 1e9, nodes),
+        .figures = {{"name", device.info().name},
+                    {"driver", device.info().driver},
+                    {"software", device.isSoftware()},
+                    {"memoryBytes", limits.deviceMemoryBytes},
+                    {"maxNodes", nodes}}};
     if (device.isSoftware()) {
       chosen.level = Level::advice;
       chosen.text += "; it is software and computes on the CPU";
-      chosen.fix = "If this machine has a GPU, its driver is missing. Debian: mesa-vulkan-drivers for AMD and Intel, "
-                   "nvidia-driver and nvidia-vulkan-icd for NVIDIA. In a container, also pass the device in";
+      chosen.fix =
+          "If this machine has a GPU, its driver is missing. Debian: mesa-vulkan-drivers for AMD and Intel, "
+          "nvidia-driver and nvidia-vulkan-icd for NVIDIA. In a container, also pass the device in";
     }
     findings.push_back(std::move(chosen));
   } catch (const std::exception& error) {
@@ -147,7 +148,9 @@ Findings checkDevices(const vulkan::DeviceOptions& options) {
 
 Findings measureCapacity(const OptionsFor& options, std::chrono::duration<double> time) {
   const Clock::time_point start = Clock::now();
-  const auto until = [&](double part) { return start + std::chrono::duration_cast<Clock::duration>(part * time); };
+  const auto until = [&](double part) {
+    return start + std::chrono::duration_cast<Clock::duration>(part * time);
+  };
   return {capacityOf(options, "mass-spring, 10 substeps", model::SolverKind::massSpring, 10, until(0.5)),
           capacityOf(options, "implicit Euler, 2 substeps", model::SolverKind::implicitEuler, 2, until(1))};
 }

@@ -18,8 +18,8 @@ Findings checkDevices(const vulkan::DeviceOptions& options);
 using OptionsFor = std::function<vulkan::DeviceOptions(std::uint32_t nodes)>;
 
 // The largest square sheet that the device simulates and encodes at 72 ticks per second: mass-spring with ten
-// substeps, and implicit Euler with two. Ticks may take 80 % of their period. Grids grow from 32x32 by a half of
-// their side until one does not fit, or until `time` has passed; the first is always tried.
+// substeps, and implicit Euler with two. Ticks may take 80 % of their period. Grids grow from 32x32 by a half
+// of their side until one does not fit, or until `time` has passed; the first is always tried.
 Findings measureCapacity(const OptionsFor& options, std::chrono::duration<double> time);
 
 }  // namespace clothstream::doctor

@@ -38,7 +38,8 @@ nlohmann::ordered_json toJson(const Findings& findings) {
 }
 
 bool hasProblem(const Findings& findings) {
-  return std::ranges::any_of(findings, [](const Finding& finding) { return finding.level == Level::problem; });
+  return std::ranges::any_of(findings,
+                             [](const Finding& finding) { return finding.level == Level::problem; });
 }
 
 }  // namespace clothstream::doctor

@@ -16,8 +16,8 @@ struct Finding {
   Level level = Level::good;
   std::string topic;  // device, capacity, port, certificate, directory, clock
   std::string text;
-  std::string fix = {};                   // what to do; empty if all is well
-  nlohmann::ordered_json figures = {};    // null if there are none
+  std::string fix = {};                 // what to do; empty if all is well
+  nlohmann::ordered_json figures = {};  // null if there are none
 };
 
 using Findings = std::vector<Finding>;

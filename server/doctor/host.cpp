@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "server/doctor/host.h"
 
-#include <sys/timex.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
@@ -15,6 +12,8 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sys/timex.h>
+#include <unistd.h>
 
 #include "server/endpoint/listen/listen.h"
 #include "server/tls/certificate.h"
@@ -27,7 +26,9 @@ constexpr double kDaysOfAdvice = 21;  // automatic renewal acts a month before t
 }  // namespace
 
 Finding checkPort(const std::string& host, std::uint16_t port, const char* option) {
-  Finding finding{.level = Level::good, .topic = "port", .text = fmt::format("{}: {} port {} is free", option, host, port)};
+  Finding finding{.level = Level::good,
+                  .topic = "port",
+                  .text = fmt::format("{}: {} port {} is free", option, host, port)};
   if (port == 0) {
     finding.text = fmt::format("{}: any free port", option);
     return finding;
@@ -52,11 +53,12 @@ Finding checkCertificate(const std::filesystem::path& chain, const std::filesyst
         tls::expiryOf(certificate) - std::chrono::system_clock::now();
     const std::vector<std::string> covered = tls::namesOf(certificate);
     finding.figures = {{"daysLeft", left.count()}, {"names", covered}};
-    finding.text = fmt::format("{}: valid for {:.0f} more days, for {}", chain.string(), std::max(0.0, left.count()),
-                               fmt::join(covered, ", "));
+    finding.text = fmt::format("{}: valid for {:.0f} more days, for {}", chain.string(),
+                               std::max(0.0, left.count()), fmt::join(covered, ", "));
     if (left.count() <= 0) {
       finding.level = Level::problem;
-      finding.text = fmt::format("{}: ended {:.0f} days ago; clients refuse it", chain.string(), -left.count());
+      finding.text =
+          fmt::format("{}: ended {:.0f} days ago; clients refuse it", chain.string(), -left.count());
       finding.fix = "Renew it, then send SIGHUP to the server, which reads it again";
       return finding;
     }
@@ -86,9 +88,11 @@ Finding checkDirectory(const std::filesystem::path& directory, const char* optio
   while (!std::filesystem::exists(place, error) && place.has_relative_path()) place = place.parent_path();
   if (access(place.c_str(), W_OK | X_OK) != 0 || !std::filesystem::is_directory(place, error)) {
     finding.level = Level::problem;
-    finding.text = fmt::format("{}: nothing can be written in {}: {}", option, place.string(),
-                               std::filesystem::is_directory(place, error) ? std::strerror(errno) : "not a directory");
-    finding.fix = fmt::format("Give the server's account the right to write there, or choose another with {}", option);
+    finding.text =
+        fmt::format("{}: nothing can be written in {}: {}", option, place.string(),
+                    std::filesystem::is_directory(place, error) ? std::strerror(errno) : "not a directory");
+    finding.fix =
+        fmt::format("Give the server's account the right to write there, or choose another with {}", option);
     return finding;
   }
   const std::filesystem::space_info space = std::filesystem::space(place, error);
@@ -108,13 +112,15 @@ Finding checkClock() {
   timex request{};
   const int state = adjtimex(&request);
   const auto now = std::chrono::system_clock::now();
-  finding.text = fmt::format("{:%F %T} UTC, synchronised", fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
+  finding.text =
+      fmt::format("{:%F %T} UTC, synchronised", fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
   if (state == TIME_ERROR || (request.status & STA_UNSYNC) != 0) {
     finding.level = Level::advice;
     finding.text = fmt::format("{:%F %T} UTC; the kernel does not know whether this is right",
                                fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
-    finding.fix = "Install an NTP client, such as Debian's systemd-timesyncd or chrony: tokens and certificates "
-                  "need the right time";
+    finding.fix =
+        "Install an NTP client, such as Debian's systemd-timesyncd or chrony: tokens and certificates "
+        "need the right time";
   }
   return finding;
 }

@@ -28,8 +28,7 @@ doctor::Findings checkHost(const ProgramOptions& options) {
   if (options.metricsPort)
     findings.push_back(doctor::checkPort(options.metricsHost, *options.metricsPort, "--metrics-port"));
   if (!options.tlsCertificate.empty())
-    findings.push_back(
-        doctor::checkCertificate(options.tlsCertificate, options.tlsKey, options.publicNames));
+    findings.push_back(doctor::checkCertificate(options.tlsCertificate, options.tlsKey, options.publicNames));
   if (!options.stateDirectory.empty())
     findings.push_back(doctor::checkDirectory(options.stateDirectory, "--state-dir", options.keepFreeMb));
   if (!options.recordDirectory.empty())

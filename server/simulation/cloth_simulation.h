@@ -99,9 +99,10 @@ class ClothSimulation {
   // without contact are left out.
   std::vector<ContactStatus> contacts() const;
 
-  // For each collider: depth of the deepest free node that touches it, in this or another collider, at the end
-  // of the last recorded tick, once it is complete. Only nodes of cloths that nothing passes through count.
-  // Metres, in the order of TickInputs::colliders; 0 for a triangle mesh. Empty if the scene has no such cloth.
+  // For each collider: depth of the deepest free node that touches it, in this or another collider, at the
+  // end of the last recorded tick, once it is complete. Only nodes of cloths that nothing passes through
+  // count. Metres, in the order of TickInputs::colliders; 0 for a triangle mesh. Empty if the scene has no
+  // such cloth.
   std::vector<float> depths() const;
 
   // Status of the grabs of the last recorded tick, once it is complete.

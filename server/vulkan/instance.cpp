@@ -11,6 +11,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -119,6 +120,24 @@ std::string listText(const std::vector<Candidate>& candidates) {
 
 constexpr const char* kSoftwareThreads = "LP_NUM_THREADS";
 
+// Keeps the drivers loaded until the process ends. The loader otherwise unloads them with the last instance,
+// and a process that had opened an NVIDIA H200 about thirty times (driver 580.159.04) could not load its
+// driver again. The instance has no layers, and its devices are never enumerated, so that it costs little.
+void keepDriversLoaded() {
+  struct Kept {
+    vk::raii::Context context;
+    vk::raii::Instance instance;
+  };
+  static std::mutex mutex;
+  static const Kept* kept = nullptr;  // never deleted: drivers may not survive calls at the process's end
+  const std::lock_guard lock(mutex);
+  if (kept != nullptr) return;
+  const vk::ApplicationInfo application{.pApplicationName = "clothstream", .apiVersion = kApiVersion};
+  vk::raii::Context context;
+  vk::raii::Instance instance(context, vk::InstanceCreateInfo{.pApplicationInfo = &application});
+  kept = new Kept{std::move(context), std::move(instance)};
+}
+
 }  // namespace
 
 bool validationByEnvironment() {
@@ -178,7 +197,9 @@ vk::raii::Instance makeInstance(const vk::raii::Context& context, bool validate)
     info.ppEnabledExtensionNames = &extension;
   }
   try {
-    return vk::raii::Instance(context, info);
+    vk::raii::Instance instance(context, info);
+    keepDriversLoaded();
+    return instance;
   } catch (const vk::LayerNotPresentError&) {
     throw DeviceError(
         fmt::format("validation was asked for (option or CLOTHSTREAM_VALIDATION), but {} is not installed. "

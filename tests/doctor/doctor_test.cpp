@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The checks of `clothstream-server doctor`, each with a machine that is well and one that is not.
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -10,6 +8,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include "server/doctor/acceptance.h"
 #include "server/doctor/device.h"
@@ -83,8 +82,9 @@ TEST_F(Doctor, SeesWhetherADirectoryCanBeWrittenAndHasRoom) {
 }
 
 TEST_F(Doctor, PrintsLevelTopicTextAndFix) {
-  const doctor::Findings findings = {{.level = Level::good, .topic = "clock", .text = "right"},
-                                     {.level = Level::problem, .topic = "port", .text = "taken", .fix = "free it"}};
+  const doctor::Findings findings = {
+      {.level = Level::good, .topic = "clock", .text = "right"},
+      {.level = Level::problem, .topic = "port", .text = "taken", .fix = "free it"}};
   EXPECT_EQ(doctor::toText(findings),
             "ok       clock        right\nproblem  port         taken\n                      free it\n");
   EXPECT_EQ(doctor::toJson(findings).dump(),

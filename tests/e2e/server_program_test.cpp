@@ -280,7 +280,8 @@ TEST_F(ServerProgram, DoctorReadsTheOptionsOfTheServerAndReportsProblems) {
 
   ServerProcess server(options({}));
   const std::uint16_t port = server.portIn(server.lineWith("page"));
-  ServerProcess ill({"--port", std::to_string(port), "--grpc-port", "0", "doctor", "--seconds", "0", "--json"});
+  ServerProcess ill(
+      {"--port", std::to_string(port), "--grpc-port", "0", "doctor", "--seconds", "0", "--json"});
   EXPECT_EQ(ill.exitCode(), 1);
   EXPECT_THAT(ill.output(), HasSubstr("is already in use"));
 }

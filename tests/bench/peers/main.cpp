@@ -28,7 +28,8 @@ int main(int argc, char** argv) {
       "nothing_passes",
       "Stress scenes: balls, cloth that nothing passes through, and Bullet's deformable cloth");
   int ticks = 1000;
-  nothingPasses->add_option("--ticks", ticks, "Ticks of each scene (default: all)")->check(CLI::Range(1, 1000));
+  nothingPasses->add_option("--ticks", ticks, "Ticks of each scene (default: all)")
+      ->check(CLI::Range(1, 1000));
   CLI::App* codec =
       app.add_subcommand("codec", "Motions by raw floats, Draco, meshoptimizer, zstd, and ours");
   CLI::App* curves = app.add_subcommand("codec_curves", "Bits against errors of the same");
