@@ -265,8 +265,8 @@ def keep(device):
                 continue
             suite, _, _, cells = TABLES[base]
             rows = json.loads((folder / f"{suite}.json").read_text())
-            replace(name, f"`tests/bench/results/{device}/{suite}.json`; {run['machine']}; commit {run['commit']}; "
-                          f"{run['date']}\n\n" + header(name)
+            replace(name, f"`tests/bench/results/{device}/{suite}.json`; {run['machine']};\n"
+                          f"commit {run['commit']}; {run['date']}\n\n" + header(name)
                           + "".join("| " + " | ".join(map(str, row)) + " |\n" for row in cells(rows)))
 
 
