@@ -88,7 +88,10 @@ constexpr CounterRow kSceneCounters[] = {
      &Metrics::overloadStepsUp},
     {"rollbacks_total", "Returns to the last good state.", &Metrics::rollbacks},
     {"resets_total", "Returns to the initial state.", &Metrics::resets},
-    {"crowded_balls_total", "Full neighbour lists, and balls with too many contacts, in self-collision.",
+    {"crowded_balls_total",
+     "Full neighbour lists, balls with too many contacts, and substeps in which a bounded cloth stood still, "
+     "in "
+     "self-collision.",
      &Metrics::crowdedBalls},
     {"rejected_messages_total", "Messages answered by an error.", &Metrics::rejectedMessages},
     {"joins_total", "Joins, reconnections included.", &Metrics::joins},

@@ -121,13 +121,23 @@ void StretchedSystems::record(vulkan::Recorder& recorder, const SolveGroup& on, 
                                    .substepRate = static_cast<float>(1 / h),
                                    .collides = collides ? 1u : 0u,
                                    .reserved = 0};
-  constexpr std::size_t kBytes = sizeof(std::uint32_t);
   constexpr std::uint64_t kChunkNodes = CLOTHSTREAM_SOLVE_LANES * CLOTHSTREAM_SOLVE_WALK;
-  const std::uint64_t most = push.systems * on.smallChunks * kChunkNodes * on.iterations * push.rounds;
-  recorder.dispatchIndirect(group.solve[from], push, stretches_, push.stretchSize * kBytes, most);
+  const std::uint64_t chunks = std::max(on.smallChunks, on.endChunk - on.firstLargeChunk);
+  const std::uint64_t ofSystem = chunks * kChunkNodes * on.iterations * push.rounds;
+  // Indirect dispatches cannot be divided. Without one, workgroups find that nothing is marked.
+  const auto dispatch = [&](const Bindings& solve, std::uint32_t size) {
+    const std::uint32_t width = solve.kernel().workgroupSize();
+    const std::uint64_t threads = std::uint64_t{push.systems} * width,
+                        work = workPerInvocation(ofSystem, width);
+    if (recorder.divides(solve, threads, work))
+      recorder.dispatch(solve, push, threads, work);
+    else
+      recorder.dispatchIndirect(solve, push, stretches_, size * sizeof(std::uint32_t), threads * work);
+  };
+  dispatch(group.solve[from], push.stretchSize);
   if (group.next.empty()) return;
   recorder.barrier();
-  recorder.dispatchIndirect(group.next[from], push, stretches_, push.nextSize * kBytes, most);
+  dispatch(group.next[from], push.nextSize);
 }
 
 }  // namespace clothstream::simulation

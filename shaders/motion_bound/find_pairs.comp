@@ -58,7 +58,8 @@ Face fetchFace(uint number) {
 bool mayMeet(float apart, vec3 u, float reach) {
   precise float least = reach * reach * dotProduct(u, u);
   precise float squared = apart * apart;
-  return !(apart > 0.0 && squared > 1.001 * least);
+  precise float most = 1.001 * least;
+  return !(apart > 0.0 && squared > most);
 }
 
 bool nodeMayMeet(Moving node, Moving a, Moving b, Moving c) {

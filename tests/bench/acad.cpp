@@ -13,6 +13,7 @@
 
 #include "server/model/coarse_level.h"
 #include "server/model/springs.h"
+#include "server/model/strain_limit.h"
 #include "tests/bench/bytes_moved.h"
 #include "tests/bench/reference_check.h"
 #include "tests/bench/simulated.h"
@@ -62,7 +63,8 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   }
   // (N - i) nodes hang below row i of N in a column: k strain L = (N - i) m g.
   const double rows = 4 * experiment.active, length = 1.0 / (size - 1);
-  const double most = experiment.active == 0 ? 0.5 * double{kActivation} : double{kActivation} / (1 - rows);
+  const double held = double{model::heldStrain(cloth.solver)};
+  const double most = experiment.active == 0 ? 0.5 * held : held / (1 - rows);
   scene.environment.gravity = model::Vec3(
       0, -static_cast<float>(most * double{cloth.structural.stiffness} * length * size / double{kMass}), 0);
   scene.name = "acad";
@@ -70,9 +72,10 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
   return scene;
 }
 
-// Rows where they hang at rest. With ACAD those beyond the bound hang at the strain `held`.
-simulation::NodeState hanging(const model::Scene& scene, double held = double{kActivation}) {
+// Rows where they hang at rest. With ACAD those beyond the bound hang at `times` the strain that it holds.
+simulation::NodeState hanging(const model::Scene& scene, double times = 1) {
   const model::Cloth& cloth = scene.cloths.front();
+  const double held = times * double{model::heldStrain(cloth.solver)};
   const model::Grid& grid = cloth.grid;
   simulation::NodeState state = simulation::restState(scene.cloths);
   const double length = double{model::spacing(grid).row};
@@ -94,8 +97,7 @@ void check(vulkan::Device& device, const Case& experiment, std::uint32_t size,
            const simulation::SimulationOptions& options) {
   const model::Scene scene = sceneOf(experiment, size);
   checkWithReference(device, scene, options);
-  checkWithReference(device, scene, options, hanging(scene, 1.2 * double{kActivation}),
-                     {scene.environment, {}});
+  checkWithReference(device, scene, options, hanging(scene, 1.2), {scene.environment, {}});
 }
 
 struct Candidate {

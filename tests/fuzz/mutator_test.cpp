@@ -69,7 +69,7 @@ TEST(Mutator, DifferentSeedsGiveDifferentMessages) {
 TEST(Mutator, ReachesEveryFieldOfASession) {
   std::set<std::string> fields;
   Mutator mutator(1);
-  for (int run = 0; run < 1000; ++run) {
+  for (int run = 0; run < 2000; ++run) {
     SessionInput input;
     for (int i = 0; i < 20; ++i) mutator.mutate(input, 20'000);
     addFields(input, fields);

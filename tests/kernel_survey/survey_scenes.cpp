@@ -82,6 +82,16 @@ void addSolvers(std::vector<SurveyScene>& scenes) {
           return mesh ? model::asMesh(grid) : grid;
         };
         add(scenes, name, cloth, sizes);
+        // Too many iterations for one workgroup.
+        if (experiment.kind == acad && !mesh)
+          add(
+              scenes, name + "/long",
+              [&](std::uint32_t size) {
+                model::Cloth solved = cloth(size);
+                solved.solver.iterations = 1'000'000;
+                return solved;
+              },
+              sizes);
         if (experiment.kind == xpbd)
           add(
               scenes, name + "/sweeps",

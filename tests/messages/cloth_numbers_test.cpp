@@ -80,7 +80,10 @@ TEST(ParameterTable, ListsEveryFieldOfAChangeThatIsANumber) {
                                   ->FindFieldByNumber(static_cast<int>(parameter.group->field.inCloth))
                                   ->message_type();
     const auto isInGroup = [&](const ClothParameter& other) { return other.group == parameter.group; };
-    EXPECT_EQ(group->field_count(), std::ranges::count_if(kClothParameters, isInGroup)) << parameter.option;
+    int numbers = 0;
+    for (int i = 0; i < group->field_count(); ++i)
+      numbers += group->field(i)->cpp_type() == FieldDescriptor::CPPTYPE_FLOAT ? 1 : 0;
+    EXPECT_EQ(numbers, std::ranges::count_if(kClothParameters, isInGroup)) << parameter.option;
   }
 }
 

@@ -42,7 +42,7 @@ constexpr const char* kEveryField = R"json({
     "pinnedVertices": [3, 41],
     "pinnedRegions": [{"centre": {"x": 1, "y": 2, "z": 3}, "size": {"x": 0.5, "y": 0.25, "z": 1}},
                       {"centre": {"x": 1, "y": 0, "z": 0}, "radius": 2}],
-    "solver": {"massSpring": {}}, "selfCollision": {"radius": 0.125, "friction": 0.5}
+    "solver": {"massSpring": {}}, "selfCollision": {"radius": 0.125, "friction": 0.5, "nothingPasses": true}
   }, {
     "name": "mesh", "mesh": {"positions": [0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0], "triangles": [0, 1, 2, 1, 3, 2],
       "quads": [0], "uvs": [0, 0, 1, 0, 0, 1, 1, 1], "uvTriangles": [0, 1, 2, 1, 3, 2],
