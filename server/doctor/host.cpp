@@ -39,7 +39,7 @@ Finding checkPort(const std::string& host, std::uint16_t port, const char* optio
   } catch (const std::exception& error) {
     finding.level = Level::problem;
     finding.text = error.what();
-    finding.fix = fmt::format("ss -ltnp shows who has a port; {} chooses another", option);
+    finding.fix = fmt::format("`ss -ltnp` shows which program uses a port. {} chooses another port", option);
   }
   return finding;
 }

@@ -114,6 +114,27 @@ bool readJoints(const v1::SavedCheckpoint& message, const model::Scene& scene,
   return true;
 }
 
+bool isUsable(const scene::ColliderSet::Yield& yield) {
+  return isFinite(yield.accepted) && std::isfinite(yield.depth) && std::isfinite(yield.step) &&
+         yield.step >= scene::kLeastStep;
+}
+
+scene::ColliderSet::Yield toYield(const v1::SavedYield& message) {
+  return {.accepted = toPose(message.accepted()),
+          .depth = message.depth(),
+          .step = message.step(),
+          .refused = message.refused(),
+          .stands = message.stands()};
+}
+
+void write(const scene::ColliderSet::Yield& yield, v1::SavedYield& message) {
+  messages::write(yield.accepted, *message.mutable_accepted());
+  message.set_depth(yield.depth);
+  message.set_step(yield.step);
+  message.set_refused(yield.refused);
+  message.set_stands(yield.stands);
+}
+
 bool readColliders(const v1::SavedCheckpoint& message, const model::Scene& scene,
                    scene::ColliderSet::State& state) {
   if (static_cast<std::size_t>(message.scene_colliders_size()) != scene.colliders.size() ||
@@ -130,10 +151,12 @@ bool readColliders(const v1::SavedCheckpoint& message, const model::Scene& scene
                                toPose(from.before()),
                                toPose(from.before()),
                                {}});
+    if (from.has_yield()) state.colliders.back().yield = toYield(from.yield());
   }
   return std::ranges::all_of(state.scenePoses, isFinite) &&
          std::ranges::all_of(state.colliders, [](const scene::ColliderSet::Placed& placed) {
-           return isFinite(placed.before) && isFinite(placed.now.pose);
+           return isFinite(placed.before) && isFinite(placed.now.pose) &&
+                  (!placed.yield || isUsable(*placed.yield));
          });
 }
 
@@ -271,6 +294,7 @@ v1::SavedCheckpoint toMessage(const scene::Checkpoint& checkpoint) {
     messages::write(placed.before, *to.mutable_before());
     messages::write(placed.now.pose, *to.mutable_pose());
     messages::write(placed.now.shape, *to.mutable_shape());
+    if (placed.yield) write(*placed.yield, *to.mutable_yield());
   }
   for (std::size_t i = 0; i < checkpoint.grabs.moved.size(); ++i) {
     if (!checkpoint.grabs.moved[i]) continue;

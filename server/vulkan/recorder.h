@@ -135,7 +135,7 @@ class Recorder {
   void note(const Bindings& bindings, std::uint64_t invocations);
   void bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes);
   void mark();
-  // What a command is to a barrier. An indirect dispatch also reads its size.
+  // Commands as barriers distinguish them. An indirect dispatch is a kernel and also reads its size.
   enum Command : std::uint8_t { kernelCommand, copyCommand, sizeCommand, kCommands };
   // Records the barrier that a command of this type needs, if any.
   void waitBefore(Command command);

@@ -229,6 +229,25 @@ TEST_F(CheckpointTest, ContinuesWithTheWorkOfAnOverload) {
   EXPECT_EQ(run(restored, 6), run(whole, 6));
 }
 
+TEST_F(CheckpointTest, KeepsHowCollidersYield) {
+  const model::Scene scene = tests::busyScene(SolverKind::massSpring);
+  scene::Checkpoint checkpoint = checkpointAfter(5);
+  ASSERT_EQ(checkpoint.colliders.colliders.size(), 1u);
+  auto& yield = checkpoint.colliders.colliders[0].yield.emplace();
+  yield.accepted.position = {1, 2, 3};
+  yield.depth = 0.006f;
+  yield.step = 0.25f;
+  yield.refused = yield.stands = true;
+  const scene::Checkpoint read = throughBytes(checkpoint, scene);
+  const auto& kept = read.colliders.colliders.at(0).yield;
+  ASSERT_TRUE(kept.has_value());
+  EXPECT_EQ(kept->accepted.position, yield.accepted.position);
+  EXPECT_EQ(kept->depth, yield.depth);
+  EXPECT_EQ(kept->step, yield.step);
+  EXPECT_TRUE(kept->refused);
+  EXPECT_TRUE(kept->stands);
+}
+
 TEST_F(CheckpointTest, HasTheEventsThatWereAnnounced) {
   const scene::Checkpoint checkpoint = checkpointAfter(1);
   ASSERT_EQ(checkpoint.grabs.slots.size(), 1u);
@@ -277,6 +296,7 @@ TEST_F(CheckpointTest, RefusesWhatDoesNotFitTheScene) {
   refuses("pose", [](v1::SavedCheckpoint& m) { m.mutable_scene_colliders(0)->Clear(); });
   refuses("colliders", [](v1::SavedCheckpoint& m) { m.mutable_scene_colliders()->RemoveLast(); });
   refuses("shape", [](v1::SavedCheckpoint& m) { m.mutable_colliders(0)->clear_shape(); });
+  refuses("yield", [](v1::SavedCheckpoint& m) { m.mutable_colliders(0)->mutable_yield()->set_step(0); });
   refuses("cloths", [](v1::SavedCheckpoint& m) { m.clear_cloths(); });
   refuses("substeps", [](v1::SavedCheckpoint& m) { m.set_substeps(13); });
   refuses("parameters", [](v1::SavedCheckpoint& m) { m.mutable_parameters()->clear_cloths(); });

@@ -19,10 +19,9 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. The last stage of a substep: it finds all pairs of a node and a triangle
-// and of two edges that could meet on the way from the substep's start to its end, separates those that come
-// too near, and then shortens the motion of nodes so that no pair meets. docs/simulation.md explains why none
-// can.
+// Belongs to the device's thread. The last stage of a substep. It finds all pairs of a node and a triangle,
+// and of two edges, that could meet between the substep's start and its end. It separates those that come too
+// near, and then shortens the motion of nodes so that no pair meets (docs/simulation.md).
 class MotionBoundStage {
  public:
   // At least one cloth must have model::boundsMotion(). Throws std::runtime_error if the device has too
