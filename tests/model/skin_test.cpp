@@ -13,12 +13,15 @@ namespace {
 std::uint64_t allocations = 0;
 }
 
-// Counts the allocations of this program. Inlined, the compiler would see a mismatch of new and free.
-[[gnu::noinline]] void* operator new(std::size_t size) {
+// Counts the allocations of this program. Inlined, the compiler would see a mismatch of new and free. The form that does
+// not throw is replaced as well: a sanitizer would otherwise allocate with its own, and complain when free gets it.
+[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   ++allocations;
-  void* memory = std::malloc(size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
+  return std::malloc(size);
+}
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  if (void* memory = ::operator new(size, std::nothrow)) return memory;
+  throw std::bad_alloc();
 }
 [[gnu::noinline]] void operator delete(void* memory) noexcept {
   std::free(memory);
