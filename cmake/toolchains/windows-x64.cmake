@@ -12,5 +12,7 @@ set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE BOTH) # so that programs find an installed libclothstream in CMAKE_PREFIX_PATH
 include(${CMAKE_CURRENT_LIST_DIR}/header_only.cmake)
-# Debian has no zstd for Windows.
-set(CLOTHSTREAM_RECORDINGS OFF CACHE BOOL "libclothstream reads recordings")
+# Debian has no zstd for Windows: without its source, recordings are left out.
+if(NOT CLOTHSTREAM_ZSTD_SOURCE)
+  set(CLOTHSTREAM_RECORDINGS OFF CACHE BOOL "libclothstream reads recordings")
+endif()

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT
  * Test program in C for every platform: prints "frame TICK HASH" for the frames that it decodes, so that the
  * frames of two platforms can be compared. Usage: hashes ADDRESS FRAMES [ca|fingerprint|token TEXT]...
+ *                                                 hashes recording FILE
  * FRAMES: number of frames, then it leaves. Prints why and returns 1 if it cannot join or a frame is wrong.
  */
 #include <clothstream/clothstream.h>
+#include <clothstream/recording.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,7 +52,24 @@ static int follow(clothstream_stream* stream, unsigned long frames) {
   return 0;
 }
 
+static int read_recording(const char* path) {
+  cs_recording* recording = cs_recording_open(path);
+  cs_recorded message = {.version = CS_RECORDED_VERSION};
+  cs_recording_result result;
+  int wrong = 0;
+  while ((result = cs_recording_next(recording, CS_RECORDED_FRAME, &message)) == CS_RECORDING_NEXT) {
+    const cs_client* client = cs_recording_client(recording);
+    wrong |= cs_reconstruction_hash(client) != message.reconstruction_hash;
+    printf("frame %" PRIu64 " %016" PRIx64 "\n", message.tick, hash_of(client));
+  }
+  if (result == CS_RECORDING_ERROR) fprintf(stderr, "%s: %s\n", path, cs_recording_error_text(recording));
+  if (wrong) fprintf(stderr, "%s: a frame was decoded wrongly\n", path);
+  cs_recording_close(recording);
+  return result == CS_RECORDING_ERROR || wrong;
+}
+
 int main(int argc, char** argv) {
+  if (argc == 3 && strcmp(argv[1], "recording") == 0) return read_recording(argv[2]);
   if (argc < 3 || argc % 2 == 0) return 2;
   clothstream_options options;
   clothstream_default_options(&options);

@@ -8,7 +8,8 @@ need() { # command package
   command -v "$1" >/dev/null || skip "$1 is missing; install $2 (./dev test --long does)"
 }
 
-# needPlatform windows-x64|linux-arm64: sets `platform` and `compiler`; skips the test without what the platform needs.
+# needPlatform windows-x64|linux-arm64: sets `platform`, `compiler` and, if it must be compiled, `zstd`, its source. Skips
+# the test without what the platform needs.
 needPlatform() {
   platform=$1
   case "$platform" in
@@ -16,6 +17,8 @@ needPlatform() {
       need x86_64-w64-mingw32-g++-posix g++-mingw-w64-x86-64-posix
       wine=$(command -v wine64 || echo /usr/lib/wine/wine64)
       need "$wine" wine64
+      zstd=$sources/build/zstd
+      [ -d "$zstd" ] || skip "build/zstd, the source of zstd, is missing (./dev test --long loads it)"
       compiler=x86_64-w64-mingw32-gcc-posix
       ;;
     linux-arm64)
@@ -34,6 +37,7 @@ buildLibrary() {
   local build=$1 prefix=$2 log=$2.log
   "$cmake" -S "$sources" -B "$build" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$sources/cmake/toolchains/$platform.cmake" \
     -DCLOTHSTREAM_CLIENT_ONLY=ON -DCMAKE_BUILD_TYPE=Release -DCMAKE_UNITY_BUILD=ON -DCMAKE_CXX_FLAGS=-Werror \
+    ${zstd:+"-DCLOTHSTREAM_ZSTD_SOURCE=$zstd"} \
     >"$log" || fail "$(cat "$log")"
   "$cmake" --build "$build" --target clothstream_library -- -j2 >"$log" || fail "$(cat "$log")"
   "$cmake" --install "$build" --prefix "$prefix" >/dev/null

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Builds libclothstream for another platform, follows a scene there and here at the same time, and compares the bits of
-# each frame: without TLS, with TLS and a fingerprint, and with TLS and an authority. Refused servers are reported.
+# each frame: without TLS, with TLS and a fingerprint, and with TLS and an authority. Refused servers are reported. Frames of
+# a recording are compared as well.
 # Usage: platform_test.sh windows-x64|linux-arm64 CMAKE SOURCES BUILD SERVER HASHES
 # BUILD: folder of the build, which is used again. HASHES: hashes.c for this machine.
 set -euo pipefail
@@ -103,6 +104,15 @@ refuse() {
   [[ $said == *"$text"* ]] || fail "$what: '$text' is not in: $said"
   echo "$what: $said"
 }
+
+# Recordings that the server has made, in the chunks of a file: each frame has the bits of this machine.
+sample=$sources/examples/testing/cloth.mcap
+for side in here there; do
+  if [ "$side" = here ]; then "$here" recording "$sample"; else there "$folder/hashes.exe" recording "$sample"; fi >"$folder/$side"
+done
+frames=$(grep -cE '^frame [0-9]+ [0-9a-f]{16}$' "$folder/here")
+[ "$frames" -ge 20 ] && cmp "$folder/here" "$folder/there" || fail "the recording has other frames on $platform"
+echo "recording: $frames frames have the same bits"
 
 serve
 compare "without TLS" "ws://$address"
