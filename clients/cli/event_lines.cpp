@@ -2,6 +2,7 @@
 #include "clients/cli/event_lines.h"
 
 #include <cstddef>
+#include <cstdlib>
 #include <span>
 
 #include <fmt/format.h>
@@ -164,6 +165,7 @@ std::string EventLines::of(cs_client* client, std::uint32_t events) {
     lines += presenceLine(client, presence);
   }
   if (frames_ && happened(CS_EVENT_FRAME)) lines += frameLine(client);
+  if (happened(CS_EVENT_FRAME)) lines += yieldLines(client);
   if (happened(CS_EVENT_CONTACTS)) lines += contactLines(client);
   if (happened(CS_EVENT_GRABS)) lines += grabLines(client);
   if (happened(CS_EVENT_PLAYBACK)) lines += playbackLine(client);
@@ -175,6 +177,28 @@ std::string EventLines::of(cs_client* client, std::uint32_t events) {
   if (happened(CS_EVENT_NOTICE))
     lines += textLine(client, "notice", cs_notice_text(client), cs_notice_participant(client));
   if (happened(CS_EVENT_ERROR)) lines += textLine(client, "error", cs_error_text(client));
+  return lines;
+}
+
+// Lines for the colliders that have begun to yield since the last frame, and for those that no longer do.
+std::string EventLines::yieldLines(const cs_client* client) {
+  std::set<std::pair<std::uint64_t, std::string>> yielding;
+  cs_collider collider;
+  for (std::uint32_t i = 0; cs_get_collider(client, i, &collider) != 0; ++i)
+    if (collider.yields != 0) yielding.emplace(collider.participant_id, collider.name);
+  std::string lines;
+  const auto addMissing = [&](const char* name, const auto& from, const auto& to) {
+    for (const auto& key : from) {
+      if (to.contains(key)) continue;
+      Json object = event(client, name);
+      object["participant"] = key.first;
+      object["colliderId"] = std::strtoul(key.second.c_str(), nullptr, 10);
+      lines += lineOf(object);
+    }
+  };
+  addMissing("colliderYields", yielding, yielding_);
+  addMissing("colliderFollows", yielding_, yielding);
+  yielding_ = std::move(yielding);
   return lines;
 }
 

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "clients/core/core.h"
 
@@ -20,9 +22,13 @@ class EventLines {
   std::string of(cs_client* client, std::uint32_t events);
 
  private:
+  std::string yieldLines(const cs_client* client);
+
   const bool frames_;
   bool reconnecting_ = false;
   std::uint64_t joinedAs_ = 0;  // id in the last "joined" line
+  // Participants and names of the colliders that yield.
+  std::set<std::pair<std::uint64_t, std::string>> yielding_;
 };
 
 // Makes a line with the event "summary" of an object (Report::json).

@@ -323,7 +323,11 @@ typedef struct cs_collider {
   float position[3];
   float orientation[4];          /* quaternion x y z w */
   float radius, length, size[3]; /* 0 if the shape does not have them */
-  uint64_t participant_id;       /* 0 for a collider of the scene */
+  /* 1: the collider yields. It is not where its participant put it, because cloth that nothing passes through
+   * has no room there (docs/colliders.md). Else 0. The struct has the same size and offsets on 64 bits as
+   * without it. */
+  int32_t yields;
+  uint64_t participant_id; /* 0 for a collider of the scene */
 } cs_collider;
 
 /* Frames per second of the stream, and ticks per second of the simulation; 0 before the description. */

@@ -40,6 +40,7 @@ inline int writeCollider(const Collider* collider, cs_collider* out) {
   out->radius = collider->radius;
   out->length = collider->length;
   copy(collider->size, out->size);
+  out->yields = collider->yields ? 1 : 0;
   out->participant_id = collider->participantId;
   return 1;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Decoding of frames, acknowledgements, key-frame requests, hashes and statistics.
 #include <cmath>
+#include <cstddef>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -86,6 +87,25 @@ TEST(Frames, MoveColliders) {
   EXPECT_EQ(cs_get_collider(joined.client.get(), 5, &collider), 0);
 }
 
+TEST(Frames, SayWhichColliderYields) {
+  Joined joined;
+  cs_collider collider;
+  for (const bool yields : {true, false}) {
+    v1::Frame frame = joined.server.frameMessage(yields ? 1 : 2, codec::PacketKind::predicted);
+    frame.mutable_colliders(2)->set_yields(yields);
+    joined.client.receive(ScriptedServer::serialise(frame));
+    ASSERT_EQ(cs_get_collider(joined.client.get(), 2, &collider), 1);
+    EXPECT_EQ(collider.yields, yields ? 1 : 0);
+    ASSERT_EQ(cs_get_collider(joined.client.get(), 0, &collider), 1);
+    EXPECT_EQ(collider.yields, 0);
+  }
+  // Programs for an older library keep their memory for the struct, and its members their places.
+  if (sizeof(void*) == 8) {
+    EXPECT_EQ(sizeof(cs_collider), 72u);
+    EXPECT_EQ(offsetof(cs_collider, participant_id), 64u);
+  }
+}
+
 TEST(Frames, ReadCollidersOfEveryShape) {
   Joined joined;
   joined.client.receive(joined.server.frame(5));
@@ -98,6 +118,7 @@ TEST(Frames, ReadCollidersOfEveryShape) {
   EXPECT_EQ(colliders[2].shape, CS_SHAPE_CAPSULE);
   EXPECT_EQ(colliders[2].length, 0.03f);
   EXPECT_EQ(colliders[2].participant_id, 7u);
+  EXPECT_EQ(colliders[2].yields, 0);
   EXPECT_EQ(colliders[3].shape, CS_SHAPE_PLANE);
   EXPECT_EQ(colliders[4].shape, CS_SHAPE_BOX);
   EXPECT_EQ(colliders[4].size[1], 2);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `clothstream join --input` and `--events`, and `clothstream set` of colliders and attachments, against the
 // real clothstream-server.
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <fstream>
@@ -8,6 +9,7 @@
 #include <sstream>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -110,6 +112,33 @@ TEST_F(JoinLines, InputTouchesClothAndCausesEvents) {
   }
   EXPECT_GT(newestTick, 0u);
   EXPECT_TRUE(began && ended && taken && released) << client->output();
+}
+
+TEST_F(JoinLines, EventsSayThatAColliderYields) {
+  startServer({"--scene", "layers", "--scene-file", "tests/e2e/layers.json"});
+  if (IsSkipped()) return;
+  // A plate is put 2 cm into the ground, in steps, and lifted two seconds later.
+  const auto plateAt = [](double after, double lowerSide) {
+    return fmt::format(
+        R"({{"after": {}, "colliders": [{{"box": {{"size": [0.4, 0.1, 0.4]}}, "position": [0, {}, 0]}}]}})"
+        "\n",
+        after, lowerSide + 0.05);
+  };
+  std::string lines;
+  for (int step = 0; step < 20; ++step) lines += plateAt(0.05, 0.17 - 0.01 * step);
+  const auto input = write("input", lines + plateAt(2, 0.3));
+  const auto client = clothstream({"join", address_, "--events", "--input", input});
+  EXPECT_TRUE(client->waitForOutput("colliderFollows", kPatience)) << client->errors();
+  client->signal(SIGINT);
+  ASSERT_EQ(client->waitForEnd(kPatience), 0) << client->errors();
+  const std::vector<Json> events = linesOf(client->output());
+  const auto yields =
+      std::ranges::find(events, "colliderYields", [](const Json& line) { return line.at("event"); });
+  ASSERT_NE(yields, events.end()) << client->output();
+  EXPECT_EQ(yields->at("participant"), events.front().at("id"));
+  EXPECT_EQ(yields->at("colliderId"), 0);
+  EXPECT_GT(events.back().at("seconds").get<double>() - yields->at("seconds").get<double>(), 1.5)
+      << "the plate followed before it was lifted: " << client->output();
 }
 
 TEST_F(JoinLines, EventsReportJoinsChangesAndLeaves) {

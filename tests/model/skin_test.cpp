@@ -13,8 +13,9 @@ namespace {
 std::uint64_t allocations = 0;
 }
 
-// Counts the allocations of this program. Inlined, the compiler would see a mismatch of new and free. The form that does
-// not throw is replaced as well: a sanitizer would otherwise allocate with its own, and complain when free gets it.
+// Counts the allocations of this program. Inlined, the compiler would see a mismatch of new and free. The
+// form that does not throw is replaced as well: a sanitizer would otherwise allocate with its own, and
+// complain when free gets it.
 [[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   ++allocations;
   return std::malloc(size);

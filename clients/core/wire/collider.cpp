@@ -74,6 +74,7 @@ bool readCollider(Bytes message, Collider& collider) {
   collider.hull = collider.mesh = {};
   collider.joints.clear();
   collider.participantId = 0;
+  collider.yields = false;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
     switch (tag) {
       case F::kName.tag:
@@ -103,6 +104,8 @@ bool readCollider(Bytes message, Collider& collider) {
         return set(collider.shape, CS_SHAPE_HULL) && set(collider.mesh, reader.get_view());
       case F::kJoints.tag:
         return copyJoints(reader.get_view(), collider.joints);
+      case F::kYields.tag:
+        return set(collider.yields, reader.get_bool());
       default:
         return skip(reader);
     }

@@ -26,6 +26,7 @@ struct Collider {
   Bytes hull, mesh;
   std::vector<float> joints;  // of a mesh, in the frame of the collider: skin.h
   std::uint64_t participantId = 0;
+  bool yields = false;
 };
 
 // Convex hull or closed mesh in the collider's own frame.

@@ -199,6 +199,7 @@ class cs_collider(c.Structure):
         ("radius", c.c_float),
         ("length", c.c_float),
         ("size", c.c_float * 3),
+        ("yields", c.c_int32),
         ("participant_id", c.c_uint64),
     ]
 

@@ -82,6 +82,7 @@ class Collider:
     radius: float  # m
     length: float  # m
     size: Vec3  # m
+    yields: int  # 1: it is not where its participant put it, because the cloth there has no room to give way
     participant_id: int  # 0: the scene
 
 

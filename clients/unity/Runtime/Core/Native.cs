@@ -209,6 +209,7 @@ namespace ClothStream.Core
         [FieldOffset(40)] public float radius;
         [FieldOffset(44)] public float length;
         [FieldOffset(48)] public fixed float size[3];
+        [FieldOffset(60)] public int yields;
         [FieldOffset(64)] public ulong participantId;
     }
 

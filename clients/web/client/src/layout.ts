@@ -72,7 +72,7 @@ export const cs_submesh = {
   index_count: 8,
 } as const;
 export const cs_collider = {
-  sizeof: 64,
+  sizeof: 72,
   name: 0,
   shape: 4,
   position: 8,
@@ -80,7 +80,8 @@ export const cs_collider = {
   radius: 36,
   length: 40,
   size: 44,
-  participant_id: 56,
+  yields: 56,
+  participant_id: 64,
 } as const;
 export const cs_play_out_options = {
   sizeof: 40,

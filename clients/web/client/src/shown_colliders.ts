@@ -33,6 +33,7 @@ export function readCollider(handle: CoreHandle, view: DataView, at: number, ind
     participantId,
     idWords: [view.getUint32(at + cs_collider.participant_id, true), view.getUint32(at + cs_collider.participant_id + 4, true)],
     isHead: isHead(participantId, name),
+    yields: view.getInt32(at + cs_collider.yields, true) !== 0,
   };
 }
 
@@ -74,6 +75,7 @@ export class ShownColliders {
     readFloats(view, at + cs_collider.size, collider.size);
     this.updateId(collider, view, at + cs_collider.participant_id);
     collider.isHead = isHead(collider.participantId, collider.name);
+    collider.yields = view.getInt32(at + cs_collider.yields, true) !== 0;
   }
 
   // Each bigint that is read is a new object, so it is read only after a change.

@@ -113,6 +113,7 @@ export interface Collider {
   size: Vec3;
   participantId: bigint; // 0 for a collider of the scene
   isHead: boolean; // of its participant
+  yields: boolean; // it is not where its participant put it, because the cloth there has no room to give way
 }
 
 // Vertices (3 floats each) and triangles (3 indices each).

@@ -20,6 +20,7 @@ import { View } from "./view";
 import { chosenDetail, gathersNormals } from "./detail";
 
 const kFiguresPeriodMs = 250;
+const kYields = "The cloth has no room to give way there. What you hold against it is red, and waits.";
 const kLoadAgainMs = 3000;
 
 async function start(): Promise<void> {
@@ -172,6 +173,7 @@ async function start(): Promise<void> {
   document.addEventListener("visibilitychange", () => session.gaps.restart());
 
   let figuresAt = 0;
+  let yielded = false;
   function draw(now: number, frame?: XRFrame): void {
     const began = performance.now();
     const client = session.state.kind === "live" ? session.client : undefined;
@@ -191,6 +193,8 @@ async function start(): Promise<void> {
       const pauseMs = takePause(client);
       panel.refresh(client, now, pauseMs);
       headset.show();
+      if (view.ownYields && !yielded) notify(kYields);
+      yielded = view.ownYields;
     }
     view.draw(session.client, displayTime(now, frame));
     work.add(began, view, session);

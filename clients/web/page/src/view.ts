@@ -120,6 +120,11 @@ export class View {
     this.people.name(client.people.participants());
   }
 
+  // Whether a collider of this participant yielded in the last drawn frame.
+  get ownYields(): boolean {
+    return this.people.ownYields;
+  }
+
   // Draws the frame for a time of performance.now(). Reads the core's memory only during the call.
   draw(client: Client | undefined, now: number): void {
     const began = performance.now();

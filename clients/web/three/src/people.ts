@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Other participants as heads, hands and names, made of their colliders. Own colliders are drawn faintly.
+// Other participants as heads, hands and names, made of their colliders. Own colliders are drawn faintly. Colliders that
+// yield are red.
 
 import * as THREE from "three";
 import { Shape, type Collider, type Participant } from "@clothstream/client";
@@ -11,10 +12,13 @@ const kColours = [0x4f9bd9, 0xe08a4a, 0x6fb56a, 0xc779b8, 0xd9c04f, 0x5fc4bd, 0x
   (colour) => new THREE.Color(colour),
 );
 const kVisorColour = new THREE.Color(0x15171c);
+const kYieldColour = new THREE.Color(0xff3b1f);
 const kLabelHeight = 0.16; // m above the middle of the head, in addition to its radius
 
 export class People {
   readonly group = new THREE.Group();
+  // Whether a collider of this participant yields.
+  ownYields = false;
   private readonly others = new Figures(1);
   private readonly own = new Figures(kOwnOpacity);
   private readonly participants = new Map<bigint, Participant>();
@@ -40,15 +44,17 @@ export class People {
   place(colliders: readonly Collider[], eye: THREE.Vector3, showOwn: boolean): void {
     this.others.begin();
     this.own.begin();
+    this.ownYields = false;
     if (this.labels.size > 0) for (const label of this.labels.values()) label.sprite.visible = false;
     for (let index = 0; index < colliders.length; ++index) {
       const collider = colliders[index]!;
       const id = collider.participantId;
       if (id === 0n) continue;
       const self = this.participants.get(id)?.self === true;
+      this.ownYields ||= self && collider.yields;
       if (self && (collider.isHead || !showOwn)) continue;
       const figures = self ? this.own : this.others;
-      figures.add(collider, colourOf(id));
+      figures.add(collider, collider.yields ? kYieldColour : colourOf(id));
       if (collider.isHead) {
         if (turned(collider)) figures.addVisor(collider);
         this.placeLabel(id, collider, eye);
