@@ -42,6 +42,7 @@ inline constexpr Range kPosition{-1000, 1000};    // m
 inline constexpr Range kGridLength{0.001, 1000};  // m
 inline constexpr double kMinSpacing = 0.0001;     // m; also of a mesh's edges
 inline constexpr Range kScale{1e-6, 1e6};         // m per unit
+inline constexpr Range kDistanceCell{5e-4, 10};   // m
 inline constexpr Range kWeldDistance{0, 0.1};     // m
 inline constexpr Range kRegionLength{0, 1000};    // m
 inline constexpr Range kMass{1e-6, 1e6};          // kg

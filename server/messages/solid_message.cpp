@@ -2,6 +2,7 @@
 #include "server/messages/solid_message.h"
 
 #include <bit>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -11,6 +12,7 @@
 
 #include "server/messages/limits.h"
 #include "server/messages/skin_message.h"
+#include "server/model/distance_grid.h"
 
 namespace clothstream::messages {
 namespace {
@@ -113,6 +115,23 @@ std::optional<model::Skin> ofFile(Checks& checks, const Path& path, float scale,
   return skin;
 }
 
+float toDistanceCell(Checks& checks, const Path& path, float value, const model::ClosedMesh& mesh) {
+  const float cell = checks.number(path, value, limits::kDistanceCell);
+  if (checks.failed()) return 0;
+  const std::string shown = fmt::format("{}", cell);
+  if (mesh.skin) checks.fail(path, shown, "is for rigid meshes; remove it, or the joints");
+  const float most = model::thinnestSide(mesh) / 4;
+  if (cell > most)
+    checks.fail(path, shown,
+                fmt::format("is too coarse for this mesh; use at most {:.3g}, a quarter of its thinnest side", most));
+  const std::uint64_t points = model::distanceGridOf(mesh, cell).points();
+  if (points > model::kMaxDistancePoints)
+    checks.fail(path, shown,
+                fmt::format("needs {} points; must need at most {}, so use a larger one", points,
+                            model::kMaxDistancePoints));
+  return cell;
+}
+
 template <typename Element>
 std::string littleEndian(const std::vector<Element>& elements) {
   static_assert(std::endian::native == std::endian::little && sizeof(Element) == 12);
@@ -146,6 +165,8 @@ model::Solid toSolid(Checks& checks, const Path& path, const v1::ColliderMesh& m
     mesh.skin = toSkin(checks, path / "skin", message.skin(), vertexCount, mesh.sources);
   else if (surface.skin)
     mesh.skin = ofFile(checks, path / "file", scale, std::move(*surface.skin), mesh.sources);
+  if (message.has_distance_cell())
+    mesh.distanceCell = toDistanceCell(checks, path / "distanceCell", message.distance_cell(), mesh);
   if (checks.failed()) return nullptr;
   return std::make_shared<const model::ClosedMesh>(std::move(mesh));
 }
@@ -155,6 +176,7 @@ void write(const model::ClosedMesh& mesh, v1::ColliderMesh& message) {
   for (const model::Vec3& p : mesh.vertices) message.mutable_positions()->Add(p.data(), p.data() + 3);
   for (const model::TriangleCorners& t : mesh.triangles) message.mutable_triangles()->Add(t.begin(), t.end());
   if (mesh.skin) write(*mesh.skin, *message.mutable_skin());
+  if (mesh.distanceCell > 0) message.set_distance_cell(mesh.distanceCell);
 }
 
 void write(const model::ClosedMesh& mesh, v1::ColliderMeshDescription& message) {

@@ -33,6 +33,9 @@ struct ClosedMesh {
   std::vector<std::uint32_t> sources;
   float reach = 0;           // m, of a sphere around the origin that contains the mesh
   std::optional<Skin> skin;  // absent: the mesh is rigid
+  // Distance of the points at which signed distances are sampled, m; contact is with the distances between
+  // them (distance_grid.h). 0: contact is with the triangles. A mesh with a skin has none.
+  float distanceCell = 0;
 };
 
 struct ClosedMeshProblem {

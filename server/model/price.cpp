@@ -5,6 +5,7 @@
 #include <array>
 #include <cassert>
 
+#include "server/model/distance_grid.h"
 #include "server/model/mesh.h"
 #include "server/model/springs.h"
 
@@ -42,7 +43,8 @@ constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kMotionBoundBytes = 2000, kHingeBytes = 200, kSystemBytes = 64,
                  kPairBytes = 40;
-constexpr double kTriangleBytes = 400;  // of a solid
+constexpr double kTriangleBytes = 400;       // of a solid
+constexpr double kDistancePointBytes = 48;  // of a solid's grid, three times 16
 constexpr double kSkinVertexBytes = 500;
 constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
 
@@ -89,6 +91,12 @@ double skinBytes(const ClosedMesh& mesh) {
   return bytes;
 }
 
+// Samples of distances: on the host, for the upload, and on the device.
+double gridBytes(const ClosedMesh& mesh) {
+  if (mesh.distanceCell == 0) return 0;
+  return kDistancePointBytes * static_cast<double>(distanceGridOf(mesh, mesh.distanceCell).points());
+}
+
 bool isSystem(SolverKind kind) {
   return kind == SolverKind::constraint || kind == SolverKind::acad || kind == SolverKind::implicitEuler;
 }
@@ -96,7 +104,7 @@ bool isSystem(SolverKind kind) {
 }  // namespace
 
 double colliderWork(const Shape& shape) {
-  if (std::holds_alternative<Solid>(shape)) return kSolidWork;
+  if (const auto* solid = std::get_if<Solid>(&shape)) return (*solid)->distanceCell > 0 ? kGridWork : kSolidWork;
   const double planes =
       std::visit(ShapeVisitor{[](const Sphere&) { return 0.0; }, [](const Capsule&) { return 0.0; },
                               [](const Plane&) { return 1.0; }, [](const Box&) { return kBoxPlanes; },
@@ -228,7 +236,8 @@ double PriceModel::bytes(const Scene& scene) const {
   for (const Collider& collider : scene.colliders) {
     bytes += listBytes(collider.motion.keys);
     if (const auto* solid = std::get_if<Solid>(&collider.shape))
-      bytes += kTriangleBytes * static_cast<double>((*solid)->triangles.size()) + skinBytes(**solid);
+      bytes += kTriangleBytes * static_cast<double>((*solid)->triangles.size()) + skinBytes(**solid) +
+               gridBytes(**solid);
   }
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     const Cloth& cloth = scene.cloths[i];

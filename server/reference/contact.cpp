@@ -84,6 +84,11 @@ std::optional<Vec3> entry(const model::Shape& shape, double thickness, const Vec
 // Normals of a mesh whose product is above this are on one side.
 constexpr double kSameSide = 0.01;
 
+// On the triangles of a mesh, or in its grid of distances.
+NearestPoint nearestPoint(const model::ClosedMesh& mesh, const Vec3& p) {
+  return mesh.distanceCell > 0 ? nearestInGrid(mesh, p) : nearestOn(mesh, p);
+}
+
 // A mesh in a substep.
 struct MovingMesh {
   const model::ClosedMesh& before;
@@ -114,17 +119,17 @@ struct Entry {
 };
 
 std::optional<Entry> entryOf(const MovingMesh& mesh, const Vec3& from, const Vec3& to) {
-  if (!mesh.moves()) {
+  if (!mesh.moves() && mesh.before.distanceCell == 0) {
     const std::optional<Crossing> crossing = firstCrossing(mesh.before, from, to);
     if (!crossing) return std::nullopt;
     return Entry{from + crossing->part * (to - from), crossing->normal, Vec3::Zero()};
   }
   constexpr int kSamples = 64;
-  NearestPoint outside = nearestOn(mesh.before, from);
+  NearestPoint outside = nearestPoint(mesh.before, from);
   double part = 0;
   for (int i = 1; i <= kSamples; ++i) {
     const double next = static_cast<double>(i) / kSamples;
-    const NearestPoint here = nearestOn(between(mesh.before, mesh.after, next), from + next * (to - from));
+    const NearestPoint here = nearestPoint(between(mesh.before, mesh.after, next), from + next * (to - from));
     if (here.distance < 0)
       return Entry{outside.point + (1 - part) * mesh.moveAt(outside), outside.normal, mesh.moveAt(outside)};
     outside = here;
@@ -138,7 +143,7 @@ std::optional<Entry> entryOf(const MovingMesh& mesh, const Vec3& from, const Vec
 std::optional<Contact> contactWithSolid(const MovingMesh& mesh, double thickness, double seconds,
                                         const Vec3& from, const Vec3& to) {
   const double way = (to - from).norm() + mesh.farthest();
-  const NearestPoint begin = nearestOn(mesh.before, from), end = nearestOn(mesh.after, to);
+  const NearestPoint begin = nearestPoint(mesh.before, from), end = nearestPoint(mesh.after, to);
   const double bound = way + std::max(thickness, double{model::kSolidDepth});
   if (std::abs(begin.distance) >= bound || begin.distance - way >= thickness) return std::nullopt;
   const bool begunInside = begin.distance < 0;
@@ -183,7 +188,7 @@ std::optional<Contact> contactOf(const model::Shape& shape, double thickness, co
 
 double heightOver(const model::Shape& shape, const Pose& pose, const Vec3& point) {
   if (const auto* solid = std::get_if<model::Solid>(&shape))
-    return nearestOn(**solid, pose.orientation.conjugate() * (point - pose.position)).distance;
+    return nearestPoint(**solid, pose.orientation.conjugate() * (point - pose.position)).distance;
   return over(shape, 0, pose.orientation.conjugate() * (point - pose.position)).height;
 }
 

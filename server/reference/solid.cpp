@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "server/model/distance_grid.h"
+
 namespace clothstream::reference {
 namespace {
 
@@ -100,6 +102,46 @@ NearestPoint nearestOn(const model::ClosedMesh& mesh, const Vec3& p) {
   }
   nearest.normal.normalize();
   return nearest;
+}
+
+NearestPoint nearestInGrid(const model::ClosedMesh& mesh, const Vec3& p) {
+  const model::DistanceGrid grid = model::distanceGridOf(mesh, mesh.distanceCell);
+  const Vec3 origin = grid.origin.cast<double>();
+  const double cell = grid.cell;
+  Vec3 beyond;  // from the nearest point of the grid
+  std::array<double, 3> first{}, part{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    const double cells = grid.counts[k] - 1;
+    const double free = (p[axis] - origin[axis]) / cell, place = std::clamp(free, 0.0, cells);
+    first[k] = std::min(std::floor(place), cells - 1);
+    part[k] = place - first[k];
+    beyond[axis] = cell * (free - place);
+  }
+  double distance = 0;
+  Vec3 slope = Vec3::Zero();
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    Vec3 at;
+    std::array<double, 3> weight{}, sign{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<std::size_t>(axis);
+      const bool upper = (corner >> k & 1) != 0;
+      at[axis] = origin[axis] + cell * (first[k] + (upper ? 1 : 0));
+      weight[k] = upper ? part[k] : 1 - part[k];
+      sign[k] = upper ? 1 : -1;
+    }
+    const double sample = nearestOn(mesh, at).distance;
+    distance += weight[0] * weight[1] * weight[2] * sample;
+    slope += sample * Vec3(sign[0] * weight[1] * weight[2], weight[0] * sign[1] * weight[2],
+                           weight[0] * weight[1] * sign[2]);
+  }
+  Vec3 normal = slope.normalized();
+  if (beyond.norm() > 0) {
+    const Vec3 way = distance * normal + beyond;
+    distance = std::hypot(distance, beyond.norm());
+    normal = way / distance;
+  }
+  return {.distance = distance, .point = p - distance * normal, .normal = normal};
 }
 
 std::optional<Crossing> firstCrossing(const model::ClosedMesh& mesh, const Vec3& from, const Vec3& to) {

@@ -26,6 +26,11 @@ struct NearestPoint {
 // surface if the point is within 0.1 mm.
 NearestPoint nearestOn(const model::ClosedMesh& mesh, const Eigen::Vector3d& p);
 
+// The same by trilinear interpolation between the points of the mesh's grid, whose distances are nearestOn()
+// each time. Outside of the grid the distance is a lower bound. The triangle means nothing. A mesh without
+// `distanceCell` must not be given.
+NearestPoint nearestInGrid(const model::ClosedMesh& mesh, const Eigen::Vector3d& p);
+
 struct Crossing {
   double part = 0;  // share of the way
   Eigen::Vector3d normal;

@@ -529,7 +529,7 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
     on.report =
         std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
                                       on.meshes ? on.meshes->springs() : MeshSprings{},
-                                      on.solids ? &on.solids->solids() : nullptr, on.asked.workgroupSize);
+                                      on.solids.get(), on.asked.workgroupSize);
   recorder.beginStage("report");
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
                     on.collision.push(on.substeps - 1, on.substeps, on.tickRate), on.collision.solidCount());

@@ -73,14 +73,14 @@ std::vector<SpringStiffness> springStiffness(std::span<const model::Cloth> cloth
 }
 
 ReportStage::ReportStage(const vulkan::Device& device, std::span<const shared::ClothRecord> cloths,
-                         const StateBuffers& state, const MeshSprings& meshes, const Buffer* solids,
+                         const StateBuffers& state, const MeshSprings& meshes, const SolidStage* solids,
                          std::uint32_t workgroupSize)
     : ReportStage(
           device, blocksOf(cloths), state, meshes, solids,
           std::min(workgroupSize == 0 ? 64 : workgroupSize, device.limits().maxWorkgroupInvocations)) {}
 
 ReportStage::ReportStage(const vulkan::Device& device, ReportBlocks blocks, const StateBuffers& state,
-                         const MeshSprings& meshes, const Buffer* solids, std::uint32_t workgroupSize)
+                         const MeshSprings& meshes, const SolidStage* solids, std::uint32_t workgroupSize)
     : workgroupSize_(workgroupSize),
       of_(std::move(blocks)),
       blockUpload_(uploadOf(device, of_.records)),
@@ -122,9 +122,11 @@ ReportStage::ReportStage(const vulkan::Device& device, ReportBlocks blocks, cons
                                   .bindings = {kTexels, kTexels, kTexels, kStorage, kTexels, kTexels},
                                   .pushConstantBytes = sizeof(shared::PenetrationPush),
                                   .workgroupSize = workgroupSize,
-                                  .specialisation = {}},
-        Stage::Buffers{&state.cloths, &blocks_, state.positions[0], &counts_, solids, &state.colliders},
-        Stage::Buffers{&state.cloths, &blocks_, state.positions[1], &counts_, solids, &state.colliders});
+                                  .specialisation = {solids->specialisation().begin(), solids->specialisation().end()}},
+        Stage::Buffers{&state.cloths, &blocks_, state.positions[0], &counts_, &solids->solids(),
+                       &state.colliders},
+        Stage::Buffers{&state.cloths, &blocks_, state.positions[1], &counts_, &solids->solids(),
+                       &state.colliders});
 }
 
 Bindings ReportStage::measureIn(const vulkan::Device& device, const StateBuffers& state,

@@ -10,6 +10,7 @@
 
 #include "server/model/scene.h"
 #include "server/simulation/cloth_report.h"
+#include "server/simulation/collision/solid_stage.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
@@ -47,7 +48,7 @@ class ReportStage {
   // `cloths` have the nodes of each cloth. `solids` has the triangle meshes of colliders, or is null.
   // `workgroupSize` 0: the measured best for the device.
   ReportStage(const vulkan::Device& device, std::span<const shared::ClothRecord> cloths,
-              const StateBuffers& state, const MeshSprings& meshes, const vulkan::Buffer* solids,
+              const StateBuffers& state, const MeshSprings& meshes, const SolidStage* solids,
               std::uint32_t workgroupSize);
 
   // Measures the state in the buffers `present` against the colliders at the end of `collision`, and
@@ -59,7 +60,7 @@ class ReportStage {
 
  private:
   ReportStage(const vulkan::Device& device, ReportBlocks blocks, const StateBuffers& state,
-              const MeshSprings& meshes, const vulkan::Buffer* solids, std::uint32_t workgroupSize);
+              const MeshSprings& meshes, const SolidStage* solids, std::uint32_t workgroupSize);
   vulkan::Bindings measureIn(const vulkan::Device& device, const StateBuffers& state,
                              const MeshSprings& meshes, std::size_t present) const;
   vulkan::Bindings penetrationsIn(const vulkan::Device& device, const StateBuffers& state,

@@ -19,7 +19,17 @@ struct SolidRecord {
 
   float triangleCount;
   float vertexTexels;  // CLOTHSTREAM_VERTEX_TEXELS, or CLOTHSTREAM_MOVING_VERTEX_TEXELS if joints move them
-  float reserved0, reserved1;
+  float firstGrid;     // DistanceGridRecord; 0: contact is with the triangles
+  float reserved;
+};
+
+// Signed distances at the points of a grid. A texel for each point follows, x first.
+#define CLOTHSTREAM_DISTANCE_GRID_TEXELS 2
+struct DistanceGridRecord {
+  vec3 origin;  // m
+  float cell;   // m
+  vec3 counts;  // of points along x, y and z
+  float inverseCell;
 };
 
 // The corners of a triangle, and the triangles across its edges 0-1, 1-2 and 2-0.
@@ -95,6 +105,12 @@ struct RefitPush {
   uint32_t levels;
 };
 
+// Samples the distances of one mesh.
+struct SamplePush {
+  uint32_t solid;  // texel of the SolidRecord
+  uint32_t reserved0, reserved1, reserved2;
+};
+
 // Nodes deeper inside a mesh than this are found only if their way in the substep is as long, m.
 const float kSolidDepth = 0.03f;
 
@@ -119,6 +135,8 @@ static_assert(sizeof(TriangleRecord) == CLOTHSTREAM_TRIANGLE_TEXELS * sizeof(vec
 static_assert(sizeof(VertexRecord) == CLOTHSTREAM_VERTEX_TEXELS * sizeof(vec4));
 static_assert(sizeof(BoxRecord) == CLOTHSTREAM_BOX_TEXELS * sizeof(vec4));
 static_assert(sizeof(SkinVertexRecord) == CLOTHSTREAM_SKIN_VERTEX_TEXELS * sizeof(vec4));
+static_assert(sizeof(DistanceGridRecord) == CLOTHSTREAM_DISTANCE_GRID_TEXELS * sizeof(vec4));
+static_assert(sizeof(SamplePush) == 16);
 static_assert(sizeof(FanRecord) == 16 && sizeof(SkinPush) == 32 && sizeof(RefitPush) == 16);
 static_assert(sizeof(NodeTileRecord) == 16 && sizeof(SolidPush) == 48);
 }  // namespace clothstream::shared

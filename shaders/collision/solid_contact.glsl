@@ -8,7 +8,7 @@
 #define CLOTHSTREAM_SHADERS_COLLISION_SOLID_CONTACT_GLSL
 
 #include "shaders/collision/contact.glsl"
-#include "shaders/collision/solid_nearest.glsl"
+#include "shaders/collision/distance_grid.glsl"
 
 // A path is searched for its first crossing in at most this number of strides.
 const uint kStrides = 32u;
@@ -62,7 +62,7 @@ SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, flo
     float share = query == 1u ? 1.0 : part;
     precise vec3 between = from + share * path;
     precise float progress = begins + share * substep;
-    Nearest here = nearestOnSolid(solid, query == 1u ? ends : progress, query == 1u ? to : between, bound);
+    Nearest here = nearestPoint(solid, query == 1u ? ends : progress, query == 1u ? to : between, bound);
     if (query == 0u) {
       entry = here;
       precise float least = here.distance - way;

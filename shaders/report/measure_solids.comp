@@ -9,7 +9,7 @@ const int kColliderBinding = 5;        // the lists of near colliders are not us
 const int kContactImpulseBinding = 7;  // unused: this kernel changes no node
 
 #include "shaders/collision/collide.glsl"
-#include "shaders/collision/solid_nearest.glsl"
+#include "shaders/collision/distance_grid.glsl"
 #include "shaders/report/report.h"
 #include "shaders/shared/arithmetic.glsl"
 #include "shaders/shared/simulation.h"
@@ -41,7 +41,7 @@ float depthIn(uint number, vec3 position) {
   if (squaredFromBox(p, solid, 1u) > 0.0) {
     return 0.0;
   }
-  precise float depth = -nearestOnSolid(solid, push.collision.progressAfter, p, kFar).distance;
+  precise float depth = -nearestPoint(solid, push.collision.progressAfter, p, kFar).distance;
   return depth;
 }
 

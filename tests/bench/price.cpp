@@ -63,6 +63,11 @@ model::Shape ball(std::uint32_t rings, bool skinned) {
   return std::make_shared<const model::ClosedMesh>(std::move(mesh));
 }
 
+// The same with sampled distances, with cells of 2 cm.
+model::Shape sampledBall(std::uint32_t rings) {
+  return model::sampled(model::ballMesh(0.3f, rings), 0.02f);
+}
+
 // Solvers that may end early never do: the tolerance is 0.
 std::vector<Case> cases() {
   std::vector<Case> all = {
@@ -80,6 +85,8 @@ std::vector<Case> cases() {
       {.method = "8 hulls of 128 faces", .colliders = 8, .shape = prism(126)},
       {.method = "mesh of 1,848 triangles", .colliders = 1, .shape = ball(22, false)},
       {.method = "mesh of 19,320 triangles", .colliders = 1, .shape = ball(70, false)},
+      {.method = "sampled mesh of 1,848 triangles", .colliders = 1, .shape = sampledBall(22)},
+      {.method = "sampled mesh of 19,320 triangles", .colliders = 1, .shape = sampledBall(70)},
       {.method = "skin of 1,848 triangles", .colliders = 1, .shape = ball(22, true)},
       {.method = "skin of 19,320 triangles", .colliders = 1, .shape = ball(70, true)}};
   const auto solver = [&](const char* method, model::SolverKind kind, std::uint32_t iterations) {

@@ -103,6 +103,10 @@ constexpr const char* kEveryField = R"json({
     }, "pose": {"position": {"x": 1, "y": 0, "z": 0},
     "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
   }, {
+    "name": "sampled", "mesh": {"positions": [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1],
+      "triangles": [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3], "distanceCell": 0.0625},
+    "pose": {"position": {}, "orientation": {"w": 1}}, "friction": 1
+  }, {
     "name": "limb", "mesh": {
       "positions": [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1],
       "triangles": [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3],

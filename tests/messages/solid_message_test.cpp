@@ -2,6 +2,7 @@
 // Colliders that are meshes, and their joints, in messages.
 #include <filesystem>
 #include <fstream>
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -103,6 +104,34 @@ TEST(SolidMessage, RefusesWrongMeshesWithTheFieldAndTheReason) {
                 }
               }),
               StartsWith("colliders: have 9 meshes; must have at most 8"));
+}
+
+TEST(SolidMessage, KeepsTheCellOfSampledDistances) {
+  v1::Scene message = sceneWithMesh();
+  message.mutable_colliders(0)->mutable_mesh()->clear_skin();
+  message.mutable_colliders(0)->mutable_mesh()->set_distance_cell(0.05f);
+  const Result<model::Scene> scene = toScene(message);
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(meshOf(*scene).distanceCell, 0.05f);
+  EXPECT_EQ(meshOf(*toScene(toMessage(*scene))).distanceCell, 0.05f);
+}
+
+TEST(SolidMessage, RefusesSampledDistancesThatMeanNothingOrCostTooMuch) {
+  using S = v1::Scene;
+  using M = v1::ColliderMesh;
+  EXPECT_THAT(errorOf([](S&, M& m) { m.set_distance_cell(0.05f); }),
+              StartsWith("colliders[0].mesh.distanceCell = 0.05: is for rigid meshes"));
+  const auto rigid = [](float cell) {
+    return errorOf([&](S&, M& m) {
+      m.clear_skin();
+      m.set_distance_cell(cell);
+    });
+  };
+  EXPECT_THAT(rigid(0.3f), StartsWith("colliders[0].mesh.distanceCell = 0.3: is too coarse for this mesh; use at most 0.25"));
+  EXPECT_THAT(rigid(0.01f), AllOf(StartsWith("colliders[0].mesh.distanceCell = 0.01: needs "),
+                                  HasSubstr("must need at most 262144")));
+  EXPECT_THAT(rigid(0), StartsWith("colliders[0].mesh.distanceCell = 0:"));
+  EXPECT_THAT(rigid(std::nanf("")), StartsWith("colliders[0].mesh.distanceCell"));
 }
 
 TEST(SolidMessage, RefusesWrongJointsWithTheFieldAndTheReason) {

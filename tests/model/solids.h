@@ -80,6 +80,13 @@ inline Solid ballMesh(float radius, std::uint32_t rings) {
   return solidOf(std::move(vertices), std::move(triangles));
 }
 
+// The mesh with sampled distances instead of triangles (distance_grid.h).
+inline Solid sampled(const Solid& solid, float cell) {
+  ClosedMesh mesh = *solid;
+  mesh.distanceCell = cell;
+  return std::make_shared<const ClosedMesh>(std::move(mesh));
+}
+
 // Rod along X, centred on the origin: `along` times `around` quads, and two ends that are fans.
 inline Solid rodMesh(float radius, float length, std::uint32_t around, std::uint32_t along) {
   std::vector<Vec3> vertices{Vec3(-length / 2, 0, 0), Vec3(length / 2, 0, 0)};

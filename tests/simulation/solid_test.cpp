@@ -66,6 +66,104 @@ TEST_F(SolidCollision, NodesTouchMeshesAsInTheReference) {
   }
 }
 
+// Nodes around meshes with sampled distances, which turn and move, against the reference. Many begin outside of
+// the grids.
+TEST_F(SolidCollision, NodesTouchSampledDistancesAsInTheReference) {
+  const model::Shape shapes[] = {model::sampled(torus(0.12f, 0.04f, 16, 8), 0.01f),
+                                 model::sampled(ballMesh(0.12f, 6), 0.02f)};
+  for (const model::Shape& shape : shapes) {
+    model::Scene scene = solidScene(looseCloth(33, 33), {shape});
+    scene.substeps = 1;
+    scene.simulationRate = 720;
+    scene.environment.gravity = model::Vec3::Zero();
+    std::mt19937 random(17);
+    NodeState start = randomState(scene, random, 0, 3);
+    std::uniform_real_distribution<float> unit(-0.2f, 0.2f);
+    for (model::Vec3& position : start.positions)
+      position = model::Vec3(unit(random), unit(random), unit(random));
+    const model::Pose from{model::Vec3(0.01f, 0.02f, 0), turned(25, model::Vec3(1, 0.3f, 0.2f))};
+    const model::Pose to{model::Vec3(0.011f, 0.021f, 0.003f), turned(26, model::Vec3(1, 0.3f, 0.2f))};
+    const simulation::TickInputs inputs = inputsOf(scene, {{shape, from, to, 1}});
+    Running running(scene);
+    running.restore(start);
+    EXPECT_TRUE(running.tick(inputs).healthy);
+    reference::ReferenceSimulation reference(scene);
+    setState(reference, start);
+    reference.tick(referenceInputs(inputs));
+    // As with triangles. The slope of a cell has the rounding of its samples, 0.2 m at most, divided by the
+    // cell, and acts over a depth of 4 cm.
+    const double distance = 40 * kRounding * 0.5 + 0.04 * 8 * kRounding * 0.2 / 0.01;
+    EXPECT_LT(largestDistance(running.state(), reference), distance) << "shape " << shape.index();
+    std::size_t moved = 0;
+    for (std::size_t i = 0; i < start.positions.size(); ++i) {
+      const model::Vec3 free = start.positions[i] + start.velocities[i] / 720;
+      moved += (running.state().positions[i] - free).norm() > 1e-4f;
+    }
+    EXPECT_GT(moved, 50u);
+  }
+}
+
+// Nodes near a sampled ball end at the thickness from it, within what trilinear interpolation allows. Second
+// derivatives of the distance from a ball are 1/r along two axes at most, so that cell^2 / 8 times 2 / r
+// bounds the error of the distance.
+TEST_F(SolidCollision, SampledDistancesOfABallAreWithinTheErrorOfTheirInterpolation) {
+  constexpr float kRadius = 0.12f, kCell = 0.012f, kThickness = 0.004f, kBand = 0.004f;
+  constexpr std::uint32_t kRings = 48;
+  const model::Shape shape = model::sampled(ballMesh(kRadius, kRings), kCell);
+  model::Cloth cloth = looseCloth(33, 33);
+  cloth.thickness = kThickness;
+  model::Scene scene = solidScene(cloth, {shape});
+  scene.substeps = 1;
+  scene.environment.gravity = model::Vec3::Zero();
+  std::mt19937 random(3);
+  NodeState start = randomState(scene, random, 0, 0);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  for (model::Vec3& position : start.positions)
+    position = model::Vec3(unit(random), unit(random), unit(random)).normalized() *
+               (kRadius + kBand * unit(random));
+  Running running(scene);
+  running.restore(start);
+  running.tick(inputsOf(scene, {{shape, model::Pose{}, model::Pose{}, 1}}));
+  const double least = kRadius - kBand;
+  const double interpolation = kCell * kCell / 8 * 2 / least;
+  // A flat triangle is this much inside of the ball, its corners on it.
+  const double facet = kRadius * (1 - std::cos(std::acos(-1.0) / kRings));
+  // The normal differs from the ball's by the error of the slope, cell / 2 times 2 / r, over the depth.
+  const double slant = (kThickness + kBand) * std::pow(kCell / least, 2) / 2;
+  for (const model::Vec3& position : running.state().positions) {
+    const double distance = double{position.norm()} - kRadius;
+    ASSERT_GT(distance, kThickness - interpolation - facet - slant - 1e-6);
+    ASSERT_LT(distance, kThickness + interpolation + slant + 1e-6);
+  }
+}
+
+// Cloth with sampled distances below it hangs into the hole of a ring, and is outside by the reference's
+// distances after any tick. A report finds no node inside.
+TEST_F(SolidCollision, ClothOnASampledRingStaysOutside) {
+  const model::Solid ring = model::sampled(torus(0.12f, 0.03f, 16, 8), 0.01f);
+  model::Cloth cloth = calmCloth(21, 21);
+  cloth.grid.pose = {model::Vec3(0, 0.06f, -cloth.grid.height / 2), turned(-90, model::Vec3::UnitX())};
+  cloth.damping = 3;
+  cloth.thickness = 0.004f;
+  const model::Scene scene = solidScene(cloth, {ring});
+  Running running(scene);
+  double deepest = 0;
+  for (int tick = 0; tick < 72; ++tick) {
+    running.tick(inputsOf(scene, {{ring, model::Pose{}, model::Pose{}, 1}}));
+    if (tick % 24 != 23) continue;
+    for (const model::Vec3& position : running.state().positions)
+      deepest = std::max(deepest, 0.004 - reference::heightOver(ring, {}, position.cast<double>()));
+  }
+  // The way out is along the slope of the cell, whose error is at most half a cell times the second
+  // derivatives, 1 / 0.03 m along two axes. It is at most as long as the way of a node in a substep, which
+  // falls from 6 cm.
+  const double way = std::sqrt(2 * 9.81 * 0.06) * scene.substepSeconds();
+  EXPECT_LT(deepest, way * 0.01 / 2 * std::sqrt(2.0) / 0.03);
+  float lowest = 1;
+  for (const model::Vec3& position : running.state().positions) lowest = std::min(lowest, position.y());
+  EXPECT_LT(lowest, 0.02f);
+}
+
 // A thin ring that is thrown at 25 m/s carries the nodes that it hits and lets none through. Nodes inside the
 // ring stay where they are.
 TEST_F(SolidCollision, AFastThinRingTakesTheNodesInItsWayAndNoOthers) {

@@ -2,12 +2,21 @@
 #include "server/simulation/collision/solid_stage.h"
 
 #include "kernels/collide_solids.h"
+#include "kernels/sample_distances.h"
+#include "server/model/distance_grid.h"
 #include "server/model/price.h"
 
 namespace clothstream::simulation {
 
 using vulkan::kStorage;
 using vulkan::kTexels;
+
+namespace {
+
+// Work of a sample, in moves of a node by its springs: a search from far away visits many triangles.
+constexpr std::uint64_t kSampleWork = 50;
+
+}  // namespace
 
 SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
                        std::span<const model::Cloth> cloths, const StateBuffers& state,
@@ -22,15 +31,34 @@ SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
                 .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kTexels},
                 .pushConstantBytes = sizeof(shared::SolidPush),
                 .workgroupSize = workgroupSize,
-                .specialisation = {}},
+                .specialisation = tables.specialisation()},
                {&state.cloths, &tiles_.texels(), &solids_.texels(), state.positions[0], state.positions[1],
                 state.velocities[1], &state.contactImpulses, &state.colliders},
                {&state.cloths, &tiles_.texels(), &solids_.texels(), state.positions[1], state.positions[0],
-                state.velocities[0], &state.contactImpulses, &state.colliders}) {}
+                state.velocities[0], &state.contactImpulses, &state.colliders}) {
+  for (std::size_t i = 0; i < tables.solids.size(); ++i) {
+    const model::ClosedMesh& mesh = *tables.solids[i];
+    if (mesh.distanceCell == 0) continue;
+    sampled_.push_back({{.solid = tables.places[i], .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
+                        model::distanceGridOf(mesh, mesh.distanceCell).points()});
+  }
+  if (sampled_.empty()) return;
+  sample_.emplace(device, vulkan::KernelDescription{.name = "sample_distances",
+                                                    .spirv = kernels::sample_distances,
+                                                    .bindings = {kTexels, kStorage},
+                                                    .pushConstantBytes = sizeof(shared::SamplePush),
+                                                    .workgroupSize = workgroupSize,
+                                                    .specialisation = {}});
+  sampleIn_.emplace(device, *sample_, std::vector{&solids_.texels(), &solids_.texels()});
+}
 
 void SolidStage::recordTables(vulkan::Recorder& recorder) const {
   solids_.recordUpload(recorder);
   tiles_.recordUpload(recorder);
+  for (const Sampled& sampled : sampled_) {
+    recorder.barrier();
+    recorder.dispatch(*sampleIn_, sampled.push, sampled.points, kSampleWork);
+  }
 }
 
 void SolidStage::record(vulkan::Recorder& recorder, std::uint32_t present,

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "server/model/scene.h"
 #include "server/simulation/collision/solid_tables.h"
@@ -29,12 +31,22 @@ class SolidStage {
               std::uint32_t solidCount) const;
 
   const vulkan::Buffer& solids() const { return solids_.texels(); }
+  // Constants of the kernels that include distance_grid.glsl.
+  std::span<const std::uint32_t> specialisation() const { return collide_.kernel.specialisation(); }
 
  private:
   std::uint32_t workgroupSize_;
   std::uint32_t tileCount_;
   DeviceTable solids_, tiles_;
   Stage collide_;
+  // A mesh whose distances are sampled.
+  struct Sampled {
+    shared::SamplePush push;
+    std::uint64_t points = 0;
+  };
+  std::vector<Sampled> sampled_;
+  std::optional<vulkan::Kernel> sample_;  // absent if no mesh is
+  std::optional<vulkan::Bindings> sampleIn_;
 };
 
 }  // namespace clothstream::simulation

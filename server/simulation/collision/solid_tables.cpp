@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 
+#include "server/model/distance_grid.h"
 #include "server/simulation/collision/triangle_tree.h"
 #include "server/simulation/texel.h"
 
@@ -27,7 +28,9 @@ std::uint32_t append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
   const std::size_t firstBox = firstVertex + vertexTexels * mesh.vertices.size();
   texels.push_back({static_cast<float>(firstTriangle), static_cast<float>(firstVertex),
                     static_cast<float>(firstBox), static_cast<float>(tree.leafCount)});
-  texels.push_back({static_cast<float>(mesh.triangles.size()), static_cast<float>(vertexTexels), 0, 0});
+  const std::size_t firstGrid = firstBox + CLOTHSTREAM_BOX_TEXELS * tree.boxes.size();
+  texels.push_back({static_cast<float>(mesh.triangles.size()), static_cast<float>(vertexTexels),
+                    mesh.distanceCell > 0 ? static_cast<float>(firstGrid) : 0, 0});
 
   std::vector<std::uint32_t> rank(tree.order.size());
   for (std::uint32_t i = 0; i < rank.size(); ++i) rank[tree.order[i]] = i;
@@ -47,6 +50,14 @@ std::uint32_t append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
   for (const TriangleTree::Box& box : tree.boxes) {
     texels.push_back(texel(box.low, 0));
     texels.push_back(texel(box.high, 0));
+  }
+  assert(texels.size() == firstGrid);
+  if (mesh.distanceCell > 0) {
+    const model::DistanceGrid grid = model::distanceGridOf(mesh, mesh.distanceCell);
+    const auto count = [&](std::size_t axis) { return static_cast<float>(grid.counts[axis]); };
+    texels.push_back(texel(grid.origin, grid.cell));
+    texels.push_back({count(0), count(1), count(2), 1 / grid.cell});
+    texels.resize(texels.size() + grid.points());  // the device samples them
   }
   return tree.leafCount;
 }

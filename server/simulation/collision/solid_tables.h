@@ -2,6 +2,7 @@
 // Triangle meshes of colliders as the kernels read them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -22,6 +23,11 @@ struct SolidTables {
   std::vector<float> reaches, motions;
 
   bool empty() const { return solids.empty(); }
+  // Constants of the kernels that include distance_grid.glsl.
+  std::vector<std::uint32_t> specialisation() const {
+    const auto hasGrid = [](const model::Solid& solid) { return solid->distanceCell > 0; };
+    return {std::ranges::any_of(solids, hasGrid), !std::ranges::all_of(solids, hasGrid)};
+  }
   // Index of a mesh that the tables have.
   std::size_t indexOf(const model::Solid& solid) const;
   // Texel of the first vertex of a mesh.
