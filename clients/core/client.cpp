@@ -3,6 +3,7 @@
 #include "clients/core/client.h"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 #include "clients/core/stream/resume_token.h"
@@ -13,6 +14,22 @@ namespace clothstream::client {
 
 // Request ids of a mirror differ from those of the client that it follows.
 constexpr std::uint64_t kFirstMirrorId = std::uint64_t{1} << 31;
+
+namespace {
+
+// True if the named constraints are between vertices of their cloths.
+bool namesVertices(const SimulationReport& report, std::span<const codec::ClothLayout> cloths) {
+  for (std::size_t i = 0; i < report.cloths.size(); ++i) {
+    const std::vector<std::uint32_t>& ends = report.cloths[i].constraintEnds;
+    const std::uint32_t vertices = i < cloths.size() ? cloths[i].vertexCount : 0;
+    if (ends.size() % 2 != 0 ||
+        std::any_of(ends.begin(), ends.end(), [&](auto end) { return end >= vertices; }))
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
 
 Client::Client(Hello hello, Kind kind)
     : kind_(kind),
@@ -258,7 +275,8 @@ std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs, const cs_de
   }
   const std::uint32_t events = packetReceived(nowUs, decoded);
   if (!frame_.report || (events & CS_EVENT_FRAME) == 0) return events;
-  if (!readReport(*frame_.report, report_)) return failMalformed("SimulationReport");
+  if (!readReport(*frame_.report, report_) || !namesVertices(report_, description_.layout.cloths))
+    return failMalformed("SimulationReport");
   reportTick_ = newest_.tick();
   return events | CS_EVENT_REPORT;
 }

@@ -65,6 +65,7 @@ class Client {
   std::optional<cs_cloth_point> nearestPoint(const Vec3& point, float maxDistance) const;
   std::optional<cs_cloth_point> castRay(const Vec3& origin, const Vec3& direction, float maxDistance) const;
   void wantContacts(bool wants, std::uint64_t nowUs);
+  void wantConstraints(bool wants, std::uint64_t nowUs);
   void move(AttachmentPose attachment, std::uint64_t nowUs);
   void move(ColliderJoints joints, std::uint64_t nowUs);
   void change(const ParameterChange& change);

@@ -60,6 +60,11 @@ void Client::wantContacts(bool wants, std::uint64_t nowUs) {
   sendPoses(nowUs);
 }
 
+void Client::wantConstraints(bool wants, std::uint64_t nowUs) {
+  poses_.wantsConstraints = wants;
+  sendPoses(nowUs);
+}
+
 void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
   const auto known =
       std::find_if(poses_.attachments.begin(), poses_.attachments.end(),
@@ -92,9 +97,10 @@ void Client::sendPoses(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED || !isConnected()) return;
   const std::uint64_t serverUs = clock_.serverTimeUs(nowUs);
   if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs, serverUs);
-  // A viewer sends no poses, only whether it wants contact events.
+  // A viewer sends no poses, only whether it wants contact events and the names of constraints.
   Poses none;
   none.wantsContacts = poses_.wantsContacts;
+  none.wantsConstraints = poses_.wantsConstraints;
   writeColliderPoses(outbox_.poses(), none, nowUs, serverUs);
 }
 

@@ -891,6 +891,13 @@ double cs_stream_seconds(const cs_client* client) CS_NOEXCEPT;
 int cs_get_stage_statistics(const cs_client* client, cs_stage_statistics* out) CS_NOEXCEPT;
 /* Fails if the cloth index is out of range, `out->version` is unknown, or no report arrived yet. */
 int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report* out) CS_NOEXCEPT;
+/* Turns cs_constraint_ends on or off. Default: off. */
+void cs_want_constraints(cs_client* client, int wants, uint64_t now_us) CS_NOEXCEPT;
+/* Ends of the active constraints of a cloth with the solver ACAD in the newest report: two vertices for each
+ * constraint, numbered from the cloth's first vertex. Sets `*count` to the number of constraints; returns
+ * null if it is 0. A report names at most 16,384 constraints, while active_constraints counts all of them.
+ * Valid until the next call that receives. */
+const uint32_t* cs_constraint_ends(const cs_client* client, uint32_t index, uint32_t* count) CS_NOEXCEPT;
 
 /* NOLINTEND(modernize-use-using) */
 

@@ -105,6 +105,10 @@ void cs_want_contacts(cs_client* client, int wants, uint64_t now_us) noexcept {
   client->client.wantContacts(wants != 0, now_us);
 }
 
+void cs_want_constraints(cs_client* client, int wants, uint64_t now_us) noexcept {
+  client->client.wantConstraints(wants != 0, now_us);
+}
+
 uint32_t cs_contact_event_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.contactEvents().size());
 }

@@ -60,3 +60,9 @@ int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report
           .tick = client->client.reportTick()};
   return 1;
 }
+
+const uint32_t* cs_constraint_ends(const cs_client* client, uint32_t index, uint32_t* count) noexcept {
+  const ClothReport* cloth = at(client->client.report().cloths, index);
+  *count = cloth ? static_cast<std::uint32_t>(cloth->constraintEnds.size() / 2) : 0;
+  return *count > 0 ? cloth->constraintEnds.data() : nullptr;
+}

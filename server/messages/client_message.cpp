@@ -171,6 +171,7 @@ Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const 
   readAttachments(checks, path, message, scene, poses);
   readJoints(checks, path, message, scene, poses);
   poses.wantsContacts = message.contact_events();
+  poses.wantsConstraints = message.active_constraints();
   return std::move(checks).result(std::move(poses));
 }
 

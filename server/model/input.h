@@ -59,7 +59,8 @@ struct ParticipantPoses {
   std::vector<Grab> grabs = {};
   std::vector<AttachmentPose> attachments = {};
   std::vector<ColliderJoints> joints = {};
-  bool wantsContacts = false;  // subscribes to contact events
+  bool wantsContacts = false;     // subscribes to contact events
+  bool wantsConstraints = false;  // wants reports that name the active constraints
 };
 
 // Absent values leave the cloth as it is. A material sets its own numbers first, then `numbers` apply.

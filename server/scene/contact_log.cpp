@@ -7,13 +7,6 @@
 
 namespace clothstream::scene {
 
-void ContactLog::request(std::uint64_t participant, bool requests) {
-  if (requests)
-    requesting_.insert(participant);
-  else
-    requesting_.erase(participant);
-}
-
 void ContactLog::addEvents(std::uint64_t tick, const model::Scene& scene, const ColliderSet& colliders,
                            std::span<const simulation::ContactStatus> contacts, v1::TickEvents& events) {
   const auto add = [&](v1::ContactEventKind kind, const Pair& pair, double impulse, double seconds) {

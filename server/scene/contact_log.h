@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <map>
-#include <set>
 #include <span>
 #include <tuple>
 
@@ -21,11 +20,6 @@ class ContactLog {
   // Seconds without touch after which a contact has ended. Cloth that bounces on a collider therefore counts
   // as one contact.
   static constexpr double kApart = 0.05;
-
-  // Sets whether this participant asks for contact events.
-  void request(std::uint64_t participant, bool requests);
-  // Returns whether any participant asks for contact events.
-  bool requested() const { return !requesting_.empty(); }
 
   // Adds the contacts that began and ended in a complete tick. `colliders` is the set of that tick.
   void addEvents(std::uint64_t tick, const model::Scene& scene, const ColliderSet& colliders,
@@ -44,7 +38,6 @@ class ContactLog {
     double impulse;
   };
 
-  std::set<std::uint64_t> requesting_;
   std::map<Pair, Contact> contacts_;
 };
 

@@ -51,6 +51,7 @@ void PoseHistory::add(Poses&& poses) {
   track->attachments = std::move(poses.now.poses.attachments);
   track->joints = std::move(poses.now.poses.joints);
   track->wantsContacts = poses.now.poses.wantsContacts;
+  track->wantsConstraints = poses.now.poses.wantsConstraints;
   track->settled = false;
   for (TimedPoses& earlier : poses.earlier) add(*track, std::move(earlier));
   add(*track, std::move(poses.now));
@@ -126,6 +127,7 @@ void PoseHistory::place(
     placed_.joints = std::move(track.joints);
     track.joints.clear();
     placed_.wantsContacts = track.wantsContacts;
+    placed_.wantsConstraints = track.wantsConstraints;
     place(track.participant, placed_);
   }
   std::erase_if(tracks_, [](const Track& track) {

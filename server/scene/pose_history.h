@@ -19,8 +19,8 @@ namespace clothstream::scene {
 // more poses because nothing moves ends up exactly at its last pose.
 //
 // Poses without a time act at once and are not extrapolated. Poses with a time are ordered by the client's
-// own clock: late ones are dropped, and one of the same time replaces the older one. Attachments, joints
-// and wantsContacts are not part of the history: they act at once.
+// own clock: late ones are dropped, and one of the same time replaces the older one. Attachments, joints,
+// wantsContacts and wantsConstraints are not part of the history: they act at once.
 //
 // Belongs to the device's thread. Bounded: kMaxPoses for each participant.
 class PoseHistory {
@@ -54,7 +54,7 @@ class PoseHistory {
     std::vector<Entry> entries = {};  // never empty after add(); times ascend
     std::vector<model::AttachmentPose> attachments = {};
     std::vector<model::ColliderJoints> joints = {};
-    bool wantsContacts = false;
+    bool wantsContacts = false, wantsConstraints = false;
     bool settled = false;  // nothing changes until more poses arrive
   };
 

@@ -411,7 +411,10 @@ messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPo
   if (poses.colliders.size() != before)
     if (auto charged = charge(*entry, poses.colliders.size()); !charged) return charged;
   entry->posed = true;
-  entry->poses = {.colliders = poses.colliders, .grabs = poses.grabs, .wantsContacts = poses.wantsContacts};
+  entry->poses = {.colliders = poses.colliders,
+                  .grabs = poses.grabs,
+                  .wantsContacts = poses.wantsContacts,
+                  .wantsConstraints = poses.wantsConstraints};
   inbox_.postPoses(entry->participant.id, std::move(poses), arrival, poseTime(message, arrival));
   return {};
 }

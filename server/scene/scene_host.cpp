@@ -133,7 +133,8 @@ void SceneHost::begin(Clock::time_point now) {
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
   grabs_.advance(scene_, endSeconds, tickInputs_);
-  tickInputs_.reportsContacts = contacts_.requested();
+  tickInputs_.reportsContacts = contactRequests_.any();
+  tickInputs_.namesConstraints = constraintRequests_.any();
   tickInputs_.environment = model::environmentAt(scene_, tick_);
 
   SceneOnDevice& on = *onDevice_;
@@ -246,7 +247,8 @@ void SceneHost::applyInputs() {
     colliders_.place(participant, poses.colliders);
     colliders_.placeJoints(poses.joints);
     grabs_.place(participant, poses.grabs, poses.attachments);
-    contacts_.request(participant, poses.wantsContacts);
+    contactRequests_.set(participant, poses.wantsContacts);
+    constraintRequests_.set(participant, poses.wantsConstraints);
   });
 }
 
@@ -474,8 +476,12 @@ void SceneHost::writeReport(double deviceSeconds) {
   v1::SimulationReport& message = *frame_.fields->mutable_report();
   message.Clear();
   message.set_device_seconds(deviceSeconds);
-  for (const simulation::ClothReport& report : onDevice_->simulation.report()) {
+  const std::vector<simulation::ClothReport> reports = onDevice_->simulation.report();
+  const std::vector<std::vector<std::uint32_t>> ends = onDevice_->simulation.constraintEnds();
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    const simulation::ClothReport& report = reports[i];
     v1::ClothReport& cloth = *message.add_cloths();
+    cloth.mutable_constraint_ends()->Add(ends[i].begin(), ends[i].end());
     cloth.set_strain_max(report.strainMax);
     cloth.set_strain_p99(report.strainP99);
     cloth.set_strain_mean(report.strainMean);

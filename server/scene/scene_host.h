@@ -18,6 +18,7 @@
 #include "server/scene/grabs_and_attachments.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/pose_history.h"
+#include "server/scene/requests.h"
 #include "server/scene/scene_on_device.h"
 #include "server/schedule/token_bucket.h"
 #include "server/simulation/cloth_simulation.h"
@@ -155,6 +156,7 @@ class SceneHost {
   ColliderSet colliders_;
   GrabsAndAttachments grabs_;
   ContactLog contacts_;
+  Requests contactRequests_, constraintRequests_;
   Inputs inputs_;
   PoseHistory poses_;
   simulation::TickInputs tickInputs_;

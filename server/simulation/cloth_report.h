@@ -2,9 +2,13 @@
 // Measured values of a cloth at a tick's end, for every solver.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace clothstream::simulation {
+
+// Most springs that one report names.
+inline constexpr std::size_t kMostNamedConstraints = 16'384;
 
 struct ClothReport {
   // Stretch |d| / L - 1 of the structural springs: the largest; the value that 99 % of them do not exceed (at

@@ -196,11 +196,12 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<MassStage> massChange;              // created when a mass first changes
   SimulationOptions asked;
 
-  bool started = false;       // the start state is on the device
-  bool tabled = false;        // the tables of the solvers are on the device
-  bool weighed = true;        // the states on the device have the present masses
-  std::uint32_t present = 0;  // index of the state buffers with the present state
-  std::uint32_t slot = 0;     // index of the inputs and status of the last recorded tick
+  bool started = false;           // the start state is on the device
+  bool tabled = false;            // the tables of the solvers are on the device
+  bool weighed = true;            // the states on the device have the present masses
+  bool namesConstraints = false;  // the last recorded report does
+  std::uint32_t present = 0;      // index of the state buffers with the present state
+  std::uint32_t slot = 0;         // index of the inputs and status of the last recorded tick
 };
 
 ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene& scene,
@@ -526,13 +527,14 @@ void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
 void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs& inputs) {
   Pipeline& on = *pipeline_;
   if (!on.report)
-    on.report =
-        std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
-                                      on.meshes ? on.meshes->springs() : MeshSprings{},
-                                      on.solids.get(), on.asked.workgroupSize);
+    on.report = std::make_unique<ReportStage>(on.device, on.records, stateOf(on.buffers, on.collision),
+                                              on.meshes ? on.meshes->springs() : MeshSprings{},
+                                              on.solids.get(), on.asked.workgroupSize);
   recorder.beginStage("report");
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
                     on.collision.push(on.substeps - 1, on.substeps, on.tickRate), on.collision.solidCount());
+  on.namesConstraints = inputs.namesConstraints && on.solves.active();
+  if (on.namesConstraints) on.solves.recordActiveSprings(recorder);
 }
 
 std::vector<ContactStatus> ClothSimulation::contacts() const {
@@ -567,6 +569,12 @@ std::vector<ClothReport> ClothSimulation::report() const {
   if (pipeline_->solves.active()) take(pipeline_->solves);
   if (pipeline_->assembled) take(*pipeline_->assembled);
   return reports;
+}
+
+std::vector<std::vector<std::uint32_t>> ClothSimulation::constraintEnds() const {
+  std::vector<std::vector<std::uint32_t>> ends(pipeline_->records.size());
+  if (pipeline_->namesConstraints) pipeline_->solves.activeSprings(kMostNamedConstraints, ends);
+  return ends;
 }
 
 TickStatus ClothSimulation::status() const {

@@ -33,6 +33,7 @@ struct TickInputs {
   model::Environment environment;
   std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
   bool reportsContacts = false;           // true: contacts() reports this tick
+  bool namesConstraints = false;          // true: a report of this tick has constraintEnds()
   // Pose of each attachment at the tick's end, in the order of the scene's cloths. Empty: the poses at the
   // start.
   std::vector<model::Pose> attachments = {};
@@ -112,6 +113,10 @@ class ClothSimulation {
   // complete. Ticks without a report cost nothing. Stage "report".
   void recordReport(vulkan::Recorder& recorder, const TickInputs& inputs);
   std::vector<ClothReport> report() const;
+  // Of each cloth with ACAD: the ends of its active constraints in the last solve of the tick, two nodes of
+  // the cloth for each spring. At most kMostNamedConstraints springs, the first cloth's first. Empty if the
+  // recorded report should not name them.
+  std::vector<std::vector<std::uint32_t>> constraintEnds() const;
 
   // Keeps the present state on the device, or returns to the state that was kept last (initially the start).
   // Stage "checkpoint".

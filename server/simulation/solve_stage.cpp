@@ -15,6 +15,7 @@
 #include "kernels/prepare_springs.h"
 #include "kernels/solve_velocities.h"
 #include "kernels/update_corrections.h"
+#include "server/simulation/active_springs.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/stretched_systems.h"
 #include "server/simulation/workgroup_work.h"
@@ -242,6 +243,7 @@ struct SolveStage::Systems {
           device, kernels.stretched, tables, state,
           StretchedSystems::Buffers{systems.texels(), chunks.texels(), vectors, solves});
     onlyStretched = std::ranges::all_of(tables.groups, isStretched);
+    named = activeTables(tables);
     std::uint32_t size = 0;
     for (const SolveGroup& on : tables.groups) {
       groups.push_back(
@@ -333,6 +335,8 @@ struct SolveStage::Systems {
   Buffer along, across, rows, impulses, vectors, sums, actives, solves, solvesReadback;
   std::vector<Group> groups;
   std::unique_ptr<StretchedSystems> stretched;  // null if no group uses it
+  ActiveTables named;
+  std::unique_ptr<ActiveSprings> marked;  // created at the first request
   bool onlyStretched = false;
 };
 
@@ -551,6 +555,22 @@ void SolveStage::recordReport(vulkan::Recorder& recorder) const {
 
 std::span<const shared::SolveRecord> SolveStage::report() const {
   return systems_->solvesReadback.mapped<const shared::SolveRecord>();
+}
+
+void SolveStage::recordActiveSprings(vulkan::Recorder& recorder) {
+  Systems& all = *systems_;
+  if (!all.marked && all.named.groups.empty()) return;
+  if (!all.marked)
+    all.marked = std::make_unique<ActiveSprings>(
+        device_, std::move(all.named),
+        ActiveSprings::Buffers{state_.cloths, all.systems.texels(), all.chunks.texels(), all.solves,
+                               all.along, all.rows, all.vectors, all.stretched.get()},
+        all.cut.workgroup);
+  all.marked->record(recorder);
+}
+
+void SolveStage::activeSprings(std::size_t most, std::span<std::vector<std::uint32_t>> ofCloths) const {
+  if (systems_->marked) systems_->marked->collect(most, ofCloths);
 }
 
 std::span<const std::uint32_t> SolveStage::cloths() const {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "server/model/scene.h"
 #include "server/simulation/scene_tables.h"
@@ -48,6 +49,11 @@ class SolveStage {
   // recording is complete.
   void recordReport(vulkan::Recorder& recorder) const;
   std::span<const shared::SolveRecord> report() const;
+
+  // Marks the springs that ACAD held in the last recorded substep, if a cloth has it. Begins with a barrier.
+  void recordActiveSprings(vulkan::Recorder& recorder);
+  // Ends of these springs once the recording is complete: ActiveSprings::collect().
+  void activeSprings(std::size_t most, std::span<std::vector<std::uint32_t>> ofCloths) const;
 
   // Workgroups that look for stretched springs of the grids that follow these forces; 0 unless `follow` is a
   // mode of acad.

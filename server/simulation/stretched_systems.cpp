@@ -21,7 +21,7 @@ using vulkan::kTexels;
 
 namespace {
 
-// shaders/solve/stretched_nodes.glsl and solve_stretched.comp: numbers of a node and of a system in `lists`.
+// shaders/solve/stretched_tables.glsl: numbers of a node and of a system in `lists`.
 constexpr std::size_t kTables = 6, kHead = 8;
 // lavapipe allows an invocation 65,535 loop rounds. Some are left for the short loops. On other devices the
 // same number keeps a dispatch below some tens of milliseconds.

@@ -55,6 +55,10 @@ class StretchedSystems {
               double substepSeconds) const;
   void recordTables(vulkan::Recorder& recorder) const;
 
+  // What solves leave: shaders/solve/stretched_tables.glsl, and the springs of solve_stretched.comp.
+  const vulkan::Buffer& lists() const { return lists_; }
+  const vulkan::Buffer& springs() const { return springs_; }
+
  private:
   struct Group {
     std::uint32_t firstSystem = 0;

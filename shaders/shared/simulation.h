@@ -192,6 +192,20 @@ struct StretchedPush {
   uint32_t reserved;
 };
 
+// Springs that a node of a grid owns, by bit of its mark: to the right, below, right below, left below,
+// second to the right, second below.
+#define CLOTHSTREAM_GRID_SPRINGS 6
+// Springs of a mesh that a mark has.
+#define CLOTHSTREAM_MARKED_SPRINGS 32
+
+struct MarkPush {
+  uint32_t nodes;  // in the scene
+  uint32_t firstChunk;
+  uint32_t firstSpring;  // of meshes
+  uint32_t endSpring;
+  uint32_t firstMark;  // of these springs
+};
+
 struct ApplyPush {
   CollisionPush collision;
   uint32_t nodes;  // in the scene
@@ -248,7 +262,8 @@ static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, wind) == 16 &&
               offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);
 static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 48 && sizeof(SolvePush) == 24 &&
               sizeof(ApplyPush) == 64 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&
-              sizeof(FinishPush) == 48 && sizeof(StretchedPush) == 48 && sizeof(HashPush) == 4);
+              sizeof(FinishPush) == 48 && sizeof(StretchedPush) == 48 && sizeof(MarkPush) == 20 &&
+              sizeof(HashPush) == 4);
 static_assert(sizeof(StatusRecord) == 16 && offsetof(StatusRecord, unhealthy) == 8);
 }  // namespace clothstream::shared
 #else

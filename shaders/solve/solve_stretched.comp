@@ -28,11 +28,6 @@ layout(std430, binding = 13) coherent buffer Solves {
   SolveRecord solves[];
 };
 
-const uint kPlaces = 6;  // a vector: the position; w: texels of springs
-// A head in `lists`: walks and nodes listed, most texels of springs, stretched springs, round, 1 if a wide
-// workgroup continues.
-const uint kHead = 8;
-
 // The chunks of a batch are added up at the same time.
 const uint kBatchChunks = 16, kBatchWalks = kBatchChunks * kLanes;
 const uint kMostChunks = CLOTHSTREAM_STRETCHED_CHUNKS, kMostBatches = kMostChunks / kBatchChunks;
@@ -372,6 +367,7 @@ bool solveRound(uint round, bool resumed, inout uint spent) {
   }
   solveNodes(nodes);
   if (self() == 0) {
+    lists[head + 1] = nodes;
     solves[system.number] = solve;
   }
   moveNodes(nodes, round + 1 == push.rounds);

@@ -5,6 +5,7 @@
 #define CLOTHSTREAM_SHADERS_SOLVE_STRETCHED_NODES_GLSL
 
 #include "shaders/solve/linear_system.glsl"
+#include "shaders/solve/stretched_tables.glsl"
 
 // True: the workgroup is wide, and continues solves that the narrow one found too long for its device.
 layout(constant_id = 5) const bool kContinues = false;
@@ -30,12 +31,6 @@ layout(push_constant) uniform Push {
 
 #include "shaders/solve/spring_weight.glsl"
 
-// Tables in `lists`, each with a number for every node of the scene. A head of each system follows.
-// - kMasks, by walk: the nodes that are solved for (4 bits), and those of the round before (4 bits).
-// - kFirsts, by walk: the place of its first such node in kNodes.
-// - kFlags, by walk: 1 if it must be tested.
-// - kTested: the walks to test. kWalks: the walks with nodes to solve for. kNodes: these nodes.
-const uint kMasks = 0, kFirsts = 1, kFlags = 2, kTested = 3, kWalks = 4, kNodes = 5, kTables = 6;
 const uint kAllOfWalk = (1u << kWalk) - 1;
 
 System system;

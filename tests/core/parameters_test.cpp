@@ -469,6 +469,49 @@ TEST(Reports, AreAvailableWithTheirTick) {
   EXPECT_EQ(cs_get_cloth_report(client.get(), 0, &report), 0);
 }
 
+TEST(Reports, NameConstraintsOnRequest) {
+  JoinedClient joined;
+  ScriptedServer server;
+  ClientUnderTest& client = joined.client;
+  cs_want_constraints(client.get(), 1, 1);
+  EXPECT_TRUE(joined.sent().collider_poses().active_constraints());
+  v1::Frame frame = server.frameMessage(1, codec::PacketKind::key);
+  std::uint32_t count = 7;
+  v1::ClothReport& cloth = *frame.mutable_report()->add_cloths();
+  for (const std::uint32_t end : {0u, 1u, 1u, 3u}) cloth.add_constraint_ends(end);
+  client.receive(ScriptedServer::serialise(frame));
+  const std::uint32_t* ends = cs_constraint_ends(client.get(), 0, &count);
+  ASSERT_EQ(count, 2u);
+  EXPECT_THAT(std::vector(ends, ends + 4), ::testing::ElementsAre(0, 1, 1, 3));
+  // A report without names has none.
+  frame = server.frameMessage(2, codec::PacketKind::predicted);
+  frame.mutable_report()->add_cloths();
+  client.receive(ScriptedServer::serialise(frame));
+  EXPECT_EQ(cs_constraint_ends(client.get(), 0, &count), nullptr);
+  EXPECT_EQ(count, 0u);
+  count = 7;
+  EXPECT_EQ(cs_constraint_ends(client.get(), 1, &count), nullptr);
+  EXPECT_EQ(count, 0u);
+  client.outgoing();
+  cs_want_constraints(client.get(), 0, 1);
+  EXPECT_FALSE(joined.sent().collider_poses().active_constraints());
+}
+
+// Half a constraint, a vertex that the cloth does not have, and more constraints than a report names.
+TEST(Reports, WithConstraintsThatCannotBeEndTheClient) {
+  std::vector<std::vector<std::uint32_t>> wrong = {{0}, {0, 1'000'000}, {}};
+  wrong.back().resize(2 * 16'385);
+  for (const std::vector<std::uint32_t>& ends : wrong) {
+    ScriptedServer server;
+    ClientUnderTest client;
+    client.join(server);
+    v1::Frame frame = server.frameMessage(1, codec::PacketKind::key);
+    frame.mutable_report()->add_cloths()->mutable_constraint_ends()->Add(ends.begin(), ends.end());
+    client.receive(ScriptedServer::serialise(frame));
+    EXPECT_EQ(cs_get_state(client.get()), CS_STATE_FAILED) << ends.size();
+  }
+}
+
 TEST(Reports, WithInvalidNumbersEndTheClient) {
   ScriptedServer server;
   ClientUnderTest client;

@@ -2,6 +2,7 @@
 // The paper's ACAD on the device against a dense solve that was written from the paper alone.
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -155,14 +156,17 @@ TEST_F(PaperAcad, MovesAFallingSheetAsADenseSolve) {
     expectLikeThePaper(scene, paperGridSystem(scene), start, 25, {.solveWholeNodes = wholeNodes});
 }
 
-TEST_F(PaperAcad, MovesAMeshAsADenseSolve) {
+model::Scene paperDisc() {
   model::Cloth disc = discCloth(5);
   disc.structural = {20, 0.02f};
   disc.shear = {10, 0.01f};
   disc.bend = {4, 0.01f};
   disc.pinnedVertices = {0};
   disc.solver = paperSolver(false);
-  const model::Scene scene = steppedScene(std::move(disc));
+  return steppedScene(std::move(disc));
+}
+
+PaperSystem paperMeshSystem(const model::Scene& scene) {
   const model::Cloth& cloth = scene.cloths.front();
   std::vector<PaperSpring> springs;
   for (const model::SpringLink& link : model::springLinks(cloth)) {
@@ -173,8 +177,77 @@ TEST_F(PaperAcad, MovesAMeshAsADenseSolve) {
     spring.restLength = link.restLength;
     springs.push_back(spring);
   }
-  expectLikeThePaper(scene, paperSystemOf(scene, std::move(springs)), simulation::restState(scene.cloths),
-                     40);
+  return paperSystemOf(scene, std::move(springs));
+}
+
+TEST_F(PaperAcad, MovesAMeshAsADenseSolve) {
+  const model::Scene scene = paperDisc();
+  expectLikeThePaper(scene, paperMeshSystem(scene), simulation::restState(scene.cloths), 40);
+}
+
+using Ends = std::set<std::pair<std::uint32_t, std::uint32_t>>;
+
+Ends sortedEnds(const std::vector<std::uint32_t>& ends) {
+  Ends sorted;
+  for (std::size_t i = 0; i < ends.size(); i += 2)
+    EXPECT_TRUE(sorted.insert(std::minmax({ends[i], ends[i + 1]})).second) << ends[i] << ' ' << ends[i + 1];
+  return sorted;
+}
+
+// One substep from a scattered state: the constraints are the springs that are then too long.
+void expectNamed(const model::Scene& scene, const PaperSystem& system, std::uint32_t wholeNodes) {
+  std::mt19937 random(8);
+  Running running(scene, {.solveWholeNodes = wholeNodes});
+  for (int round = 0; round < 2; ++round) {
+    const NodeState start = randomState(scene, random, 0.002f, 0.2f);
+    running.restore(start);
+    std::vector<std::uint32_t> expected;
+    for (const std::size_t spring : paperConstraints(system, paperStateOf(start)))
+      expected.insert(expected.end(), {static_cast<std::uint32_t>(system.springs[spring].one),
+                                       static_cast<std::uint32_t>(system.springs[spring].two)});
+    EXPECT_GT(expected.size(), 2 * 5u);
+    EXPECT_LT(expected.size(), 2 * system.springs.size());
+    EXPECT_EQ(sortedEnds(running.tickAndName(inputsOf(scene)).front()), sortedEnds(expected));
+  }
+  // Nothing is too long in the next one.
+  running.restore(simulation::restState(scene.cloths));
+  EXPECT_TRUE(running.tickAndName(inputsOf(scene)).front().empty());
+}
+
+TEST_F(PaperAcad, NamesItsConstraints) {
+  for (const std::uint32_t wholeNodes : {0u, 4096u}) {
+    SCOPED_TRACE(wholeNodes);
+    for (const bool bend : {false, true}) {
+      const model::Scene scene = steppedScene(softCloth(9, 14, bend));
+      expectNamed(scene, paperGridSystem(scene), wholeNodes);
+    }
+    // Two columns: the springs to the left below and to the right are between neighbours in the table.
+    const model::Scene narrow = steppedScene(softCloth(24, 2, true));
+    expectNamed(narrow, paperGridSystem(narrow), wholeNodes);
+    const model::Scene mesh = paperDisc();
+    expectNamed(mesh, paperMeshSystem(mesh), wholeNodes);
+  }
+}
+
+// The first cloth's springs come first, as many as a report names.
+TEST_F(PaperAcad, NamesAtMostAsManyConstraintsAsAReportHasRoomFor) {
+  model::Cloth sheet = softCloth(70, 70, true);
+  sheet.solver.iterations = 1;
+  model::Cloth disc = paperDisc().cloths.front();
+  disc.name = "disc";
+  model::Scene both = steppedScene(sheet);
+  both.cloths = {disc, sheet};
+  // Twice the rest length in every direction: all springs are too long.
+  NodeState start = simulation::restState(both.cloths);
+  for (model::Vec3& position : start.positions) position *= 2;
+  Running running(both);
+  running.restore(start);
+  const std::vector<std::vector<std::uint32_t>> ends = running.tickAndName(inputsOf(both));
+  const std::size_t ofDisc = paperMeshSystem(paperDisc()).springs.size();
+  EXPECT_GT(ends[0].size() / 2, 10u);
+  EXPECT_LE(ends[0].size() / 2, ofDisc);
+  EXPECT_EQ((ends[0].size() + ends[1].size()) / 2, simulation::kMostNamedConstraints);
+  EXPECT_GT(running.solves().front().constraints, simulation::kMostNamedConstraints - ends[0].size() / 2);
 }
 
 // The reference in server/reference does the same, so that benchmarks may compare with it.
@@ -286,6 +359,37 @@ TEST_F(LimitAcad, EqualsMassSpringToTheBitWithoutStretch) {
   Running one(held), other(free);
   for (int tick = 0; tick < 30; ++tick)
     EXPECT_EQ(one.tick(inputsOf(held, {})).stateHash, other.tick(inputsOf(free, {})).stateHash);
+}
+
+// The names agree with the number of constraints, whether one workgroup solves or several.
+TEST_F(LimitAcad, NamesAsManyConstraintsAsItCounts) {
+  model::Cloth disc = discCloth(6);
+  disc.name = "disc";
+  disc.structural = {8, 0.01f};
+  disc.pinnedVertices = {0, 1};
+  model::Cloth sheet = softCloth(30, 41, false);
+  model::Scene scene = sceneOf({sheet, disc});
+  scene.substeps = 4;
+  for (const model::AcadMode mode : {model::AcadMode::hold, model::AcadMode::limit}) {
+    for (model::Cloth& cloth : scene.cloths) {
+      cloth.solver = limitSolver();
+      cloth.solver.acadMode = mode;
+    }
+    std::vector<std::vector<std::uint32_t>> first;
+    for (const std::uint32_t wholeNodes : {4096u, 0u}) {
+      SCOPED_TRACE(wholeNodes);
+      Running running(scene, {.solveWholeNodes = wholeNodes});
+      for (int tick = 0; tick < 5; ++tick) running.tick(passingBall(scene, tick));
+      const std::vector<std::vector<std::uint32_t>> ends = running.tickAndName(passingBall(scene, 5));
+      const std::vector<shared::SolveRecord> solves = running.solves();
+      for (std::size_t i = 0; i < ends.size(); ++i) {
+        EXPECT_GT(ends[i].size(), 20u);
+        EXPECT_EQ(sortedEnds(ends[i]).size(), solves[i].constraints);
+      }
+      if (first.empty()) first = ends;
+      EXPECT_EQ(ends, first);
+    }
+  }
 }
 
 TEST_F(LimitAcad, GivesTheSameBitsForEveryPartitionOfWork) {

@@ -186,6 +186,12 @@ std::vector<simulation::ClothReport> Running::tickAndReport(const simulation::Ti
   return simulation_.report();
 }
 
+std::vector<std::vector<std::uint32_t>> Running::tickAndName(simulation::TickInputs inputs) {
+  inputs.namesConstraints = true;
+  tickAndReport(inputs);
+  return simulation_.constraintEnds();
+}
+
 void Running::restore(const simulation::NodeState& state) {
   restore(simulation::pack(state, 0));
 }

@@ -80,6 +80,8 @@ class Running {
   std::uint64_t dispatches(const simulation::TickInputs& inputs);
   // Runs one tick with a report. Returns the reports of all cloths.
   std::vector<simulation::ClothReport> tickAndReport(const simulation::TickInputs& inputs);
+  // The same with the names of the active constraints: their ends, by cloth.
+  std::vector<std::vector<std::uint32_t>> tickAndName(simulation::TickInputs inputs);
   void setCloths(std::span<const model::Cloth> cloths) { simulation_.setCloths(cloths); }
   void setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths) {
     simulation_.setSubsteps(substeps, cloths);

@@ -179,6 +179,7 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
       }
     }
     if (poses.wantsContacts) message.add_bool(F::kContactEvents.number, true);
+    if (poses.wantsConstraints) message.add_bool(F::kActiveConstraints.number, true);
     if (serverTimeUs != 0) message.add_uint64(F::kServerTimeUs.number, serverTimeUs);
     addHand(message, CS_HAND_LEFT, poses.leftHand);
     addHand(message, CS_HAND_RIGHT, poses.rightHand);

@@ -63,7 +63,7 @@ struct Poses {
   std::vector<OwnGrab> grabs;
   std::vector<AttachmentPose> attachments;
   std::vector<ColliderJoints> joints;
-  bool wantsContacts = false;
+  bool wantsContacts = false, wantsConstraints = false;
 };
 // Both times are the same instant, on the client's and on the server's clock. serverTimeUs is 0 if unknown.
 void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clientTimeUs,

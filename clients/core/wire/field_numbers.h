@@ -248,6 +248,7 @@ struct ColliderMesh {
   static constexpr Field kTriangles{3, WireType::kBytes};
   static constexpr Field kScale{4, WireType::kFixed32};
   static constexpr Field kSkin{5, WireType::kBytes};
+  static constexpr Field kDistanceCell{6, WireType::kFixed32};
 };
 struct Skin {
   static constexpr Field kJoints{1, WireType::kBytes};
@@ -548,6 +549,7 @@ struct ClothReport {
   static constexpr Field kIterations{8, WireType::kVarint};
   static constexpr Field kResidual{9, WireType::kFixed32};
   static constexpr Field kPenetration{10, WireType::kFixed32};
+  static constexpr Field kConstraintEnds{71, WireType::kBytes};
 };
 struct ColliderState {
   static constexpr Field kName{1, WireType::kBytes};
@@ -590,6 +592,7 @@ struct ColliderPoses {
   static constexpr Field kServerTimeUs{60, WireType::kVarint};
   static constexpr Field kHands{61, WireType::kBytes};
   static constexpr Field kJoints{81, WireType::kBytes};
+  static constexpr Field kActiveConstraints{82, WireType::kVarint};
 };
 struct ColliderJoints {
   static constexpr Field kCollider{1, WireType::kBytes};

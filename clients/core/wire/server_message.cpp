@@ -53,6 +53,8 @@ bool readClothReport(Bytes message, ClothReport& report) {
         return setFinite(report.residual, reader);
       case F::kPenetration.tag:
         return setFinite(report.penetration, reader);
+      case F::kConstraintEnds.tag:
+        return readPackedVarints(reader.get_view(), kMaxConstraintEnds, report.constraintEnds);
       default:
         return skip(reader);
     }

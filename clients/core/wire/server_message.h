@@ -92,7 +92,10 @@ struct ClothReport {
   float kineticEnergy = 0, elasticEnergy = 0, gravityEnergy = 0;
   std::uint32_t activeConstraints = 0, iterations = 0;
   float residual = 0, penetration = 0;
+  std::vector<std::uint32_t> constraintEnds;  // two vertices of the cloth for each named constraint
 };
+
+inline constexpr std::size_t kMaxConstraintEnds = 2 * 16'384;  // of a cloth
 
 struct SimulationReport {
   std::vector<ClothReport> cloths;

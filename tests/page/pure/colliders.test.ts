@@ -10,7 +10,7 @@ const client = { frames: { hull: () => ({ vertices, triangles: Uint32Array.of(0,
 
 function collider(shape: Shape): Collider {
   const orientation = [0, 0, 0, 1] as const;
-  return { index: 0, name: "", shape, position: [9, 9, 9], orientation, radius: 0.5, length: 2, size: [2, 3, 6], participantId: 0n, isHead: false };
+  return { index: 0, name: "", shape, position: [9, 9, 9], orientation, radius: 0.5, length: 2, size: [2, 3, 6], participantId: 0n, isHead: false, yields: false };
 }
 
 test("the reach of a collider is its farthest point, and nothing for a plane", () => {

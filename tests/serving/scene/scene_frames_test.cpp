@@ -301,5 +301,31 @@ TEST_F(SceneFramesTest, SendsFourReportsPerSecond) {
   EXPECT_GE(report.device_seconds(), 0);
 }
 
+TEST_F(SceneFramesTest, ReportsNameConstraintsWhileAParticipantAsks) {
+  model::Scene scene = smallScene();
+  scene.cloths.front().solver.kind = model::SolverKind::acad;
+  scene.cloths.front().solver.activation = 0.001f;
+  HostedScene hosted(std::move(scene));
+  const auto ask = [&](std::uint64_t participant, bool asks) {
+    hosted.live.inbox.postPoses(participant, {.wantsConstraints = asks}, hosted.now);
+  };
+  const auto newest = [&]() -> const v1::ClothReport& { return hosted.frames.back().report().cloths(0); };
+  hosted.ticks(21);
+  EXPECT_GT(newest().active_constraints(), 0u);
+  EXPECT_EQ(newest().constraint_ends_size(), 0);
+  ask(7, true);
+  ask(8, true);
+  hosted.ticks(10);
+  EXPECT_GT(newest().constraint_ends_size(), 0);
+  EXPECT_EQ(newest().constraint_ends_size(), 2 * static_cast<int>(newest().active_constraints()));
+  ask(7, false);
+  hosted.ticks(10);
+  EXPECT_GT(newest().constraint_ends_size(), 0);
+  ask(8, false);
+  hosted.ticks(10);
+  EXPECT_GT(newest().active_constraints(), 0u);
+  EXPECT_EQ(newest().constraint_ends_size(), 0);
+}
+
 }  // namespace
 }  // namespace clothstream::scene

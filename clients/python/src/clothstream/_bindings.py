@@ -686,6 +686,8 @@ FUNCTIONS = {
     "cs_stream_seconds": (c.c_double, [c.c_void_p]),
     "cs_get_stage_statistics": (c.c_int, [c.c_void_p, c.POINTER(cs_stage_statistics)]),
     "cs_get_cloth_report": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_cloth_report)]),
+    "cs_want_constraints": (None, [c.c_void_p, c.c_int, c.c_uint64]),
+    "cs_constraint_ends": (c.POINTER(c.c_uint32), [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
     "cs_recording_open": (c.c_void_p, [c.c_char_p]),
     "cs_recording_open_bytes": (c.c_void_p, [c.POINTER(c.c_uint8), c.c_size_t]),
     "cs_recording_open_source": (c.c_void_p, [c.POINTER(cs_recording_source)]),

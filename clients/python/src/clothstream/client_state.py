@@ -187,6 +187,14 @@ class ClientState:
             found = versioned(b.cs_cloth_report, b.CS_CLOTH_REPORT_VERSION)
             return to(ClothReport, found) if lib.cs_get_cloth_report(client, cloth, c.byref(found)) else None
 
+    def constraint_ends(self, cloth: int = 0) -> list[tuple[int, int]]:
+        """Active constraints of a cloth with ACAD in the newest report: the two vertices of each, numbered from the
+        cloth's first vertex. At most 16,384. Empty without want_constraints()."""
+        with self._client() as client:
+            count = c.c_uint32()
+            ends = lib.cs_constraint_ends(client, cloth, c.byref(count))
+            return [(ends[2 * i], ends[2 * i + 1]) for i in range(count.value)]
+
     @property
     def statistics(self) -> Statistics:
         with self._client() as client:

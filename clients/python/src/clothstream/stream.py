@@ -236,6 +236,11 @@ class Stream(ClientState):
         with self._client() as client:
             lib.cs_want_contacts(client, int(wants), lib.clothstream_now_us())
 
+    def want_constraints(self, wants: bool = True) -> None:
+        """Turns constraint_ends() on or off."""
+        with self._client() as client:
+            lib.cs_want_constraints(client, int(wants), lib.clothstream_now_us())
+
     # Parameters. Event.PARAMETERS follows when a change took effect.
 
     def set_environment(self, gravity: Vec3 | None = None, wind: Vec3 | None = None, air_density: float | None = None) -> None:

@@ -109,6 +109,29 @@ namespace ClothStream.Core
             }
         }
 
+        /// <summary>Turns ConstraintEnds on or off. Default: off.</summary>
+        public void WantConstraints(bool wants)
+        {
+            lock (Gate) Native.cs_want_constraints(Handle, wants ? 1 : 0, NowUs);
+            Flush();
+        }
+
+        /// <summary>
+        /// Active constraints of a cloth with ACAD in the newest report: two vertices for each, numbered from the
+        /// cloth's first vertex. At most 16,384 constraints. Empty without WantConstraints.
+        /// </summary>
+        public uint[] ConstraintEnds(int cloth)
+        {
+            lock (Gate)
+            {
+                uint count;
+                uint* found = Native.cs_constraint_ends(Handle, (uint)cloth, &count);
+                var ends = new uint[2 * count];
+                for (int i = 0; i < ends.Length; ++i) ends[i] = found[i];
+                return ends;
+            }
+        }
+
         public Statistics Statistics
         {
             get

@@ -602,5 +602,7 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern double cs_stream_seconds(IntPtr client);
         [DllImport(Library)] public static extern int cs_get_stage_statistics(IntPtr client, StageStatistics* @out);
         [DllImport(Library)] public static extern int cs_get_cloth_report(IntPtr client, uint index, ClothReport* @out);
+        [DllImport(Library)] public static extern void cs_want_constraints(IntPtr client, int wants, ulong nowUs);
+        [DllImport(Library)] public static extern uint* cs_constraint_ends(IntPtr client, uint index, uint* count);
     }
 }

@@ -167,6 +167,10 @@ export class Client {
   get noticeText(): string {
     return this.core.text(this.core.exports.cs_notice_text(this.handle.pointer));
   }
+  // Name and version of the server's program; "" before Welcome.
+  get serverName(): string {
+    return this.core.text(this.core.exports.cs_server_name(this.handle.pointer));
+  }
   get deviceName(): string {
     return this.core.text(this.core.exports.cs_device_name(this.handle.pointer));
   }

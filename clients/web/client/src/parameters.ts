@@ -2,7 +2,7 @@
 // Environment, materials, solvers and reports of the cloths.
 
 import { CS_CLOTH_REPORT_VERSION, CS_CLOTH_SETTINGS_VERSION, cs_cloth_parameters, cs_cloth_report, cs_cloth_settings, cs_collider_change, cs_environment } from "./layout";
-import { spring, vec3, type CoreHandle } from "./handle";
+import { nowUs, spring, vec3, type CoreHandle } from "./handle";
 import type { ClothParameters, ClothReport, ColliderChange, Environment, Vec3 } from "./types";
 
 export class Parameters {
@@ -84,6 +84,19 @@ export class Parameters {
       deviceMs: real(cs_cloth_report.device_ms),
       tick: Number(view.getBigUint64(this.handle.scratch + cs_cloth_report.tick, true)),
     };
+  }
+
+  // Asks for reports that name the active constraints, or for such reports to end. Default: no names.
+  wantConstraints(wants: boolean): void {
+    this.handle.core.exports.cs_want_constraints(this.handle.pointer, wants ? 1 : 0, nowUs());
+  }
+
+  // Ends of the active constraints of a cloth with ACAD in the newest report: two vertices for each, numbered from the
+  // cloth's first vertex. At most 16,384 constraints. A view, valid until the next call.
+  constraintEnds(cloth: number): Uint32Array {
+    const { core, pointer, scratch } = this.handle;
+    const ends = core.exports.cs_constraint_ends(pointer, cloth, scratch);
+    return core.indices(ends, 2 * core.view().getUint32(scratch, true));
   }
 
   setEnvironment(change: { gravity?: Vec3; wind?: Vec3 }): void {

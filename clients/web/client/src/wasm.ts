@@ -49,6 +49,7 @@ export interface CoreExports {
   cs_error_text(client: Pointer): Pointer;
   cs_notice_text(client: Pointer): Pointer;
   cs_get_statistics(client: Pointer, nowUs: bigint, out: Pointer): void;
+  cs_server_name(client: Pointer): Pointer;
   cs_device_name(client: Pointer): Pointer;
   cs_scene_name(client: Pointer): Pointer;
   cs_stream_rate(client: Pointer): number;
@@ -77,6 +78,8 @@ export interface CoreExports {
   cs_get_cloth_parameters(client: Pointer, index: number, out: Pointer): number;
   cs_get_cloth_settings(client: Pointer, index: number, out: Pointer): number;
   cs_get_cloth_report(client: Pointer, index: number, out: Pointer): number;
+  cs_want_constraints(client: Pointer, wants: number, nowUs: bigint): void;
+  cs_constraint_ends(client: Pointer, index: number, count: Pointer): Pointer;
   cs_keep_cloth_settings(out: Pointer): void;
   cs_change_cloth(client: Pointer, cloth: Pointer, settings: Pointer): number;
   cs_participant_id(client: Pointer): bigint;

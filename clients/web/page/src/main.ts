@@ -196,6 +196,7 @@ async function start(): Promise<void> {
       if (view.ownYields && !yielded) notify(kYields);
       yielded = view.ownYields;
     }
+    view.drawsConstraints = panel.drawsConstraints;
     view.draw(session.client, displayTime(now, frame));
     work.add(began, view, session);
   }

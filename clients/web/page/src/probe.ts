@@ -32,6 +32,8 @@ export interface Probe {
   readonly drawnColliders: Vec3[];
   // Drawn vertices of the scene's colliders, in their frames.
   readonly drawnColliderVertices: Float32Array[];
+  // Drawn ends of active constraints, 3 floats each.
+  readonly constraintEnds: Float32Array;
   readonly participants: Participant[];
   // Defined if the scene is a recording.
   readonly playback: Playback | undefined;
@@ -134,6 +136,9 @@ export function expose(session: Session, view: View, { headset, panel, work, his
     },
     get drawnColliderVertices() {
       return view.colliders.map(({ geometry }) => new Float32Array(geometry.getAttribute("position").array));
+    },
+    get constraintEnds() {
+      return view.constraintEnds;
     },
     get participants() {
       return session.client.people.participants();

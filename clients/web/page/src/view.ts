@@ -4,7 +4,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Shape, type Client, type Vec3 } from "@clothstream/client";
-import { Cloths, ColliderMeshes, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
+import { Cloths, ColliderMeshes, ConstraintLines, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
 import { Fingers } from "./fingers";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
@@ -27,6 +27,8 @@ export class View {
   private readonly studio: Studio;
   private readonly colliderMeshes = new ColliderMeshes();
   private readonly people = new People();
+  private readonly constraints = new ConstraintLines();
+  drawsConstraints = false; // those that the newest report names
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private readonly cloths: Cloths;
   private readonly madeMs = performance.now();
@@ -56,7 +58,7 @@ export class View {
     this.renderer.toneMapping = THREE.AgXToneMapping;
     this.renderer.toneMappingExposure = 1.35;
     this.studio = new Studio(this.renderer, detail, (reflections) => this.colliderMeshes.reflect(reflections));
-    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group);
+    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group, this.constraints.lines);
     this.orbit = new OrbitControls(this.camera, canvas);
     const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
     const damp = () => (this.orbit.enableDamping = !calm.matches);
@@ -92,6 +94,11 @@ export class View {
     return this.people.shown;
   }
 
+  // Drawn ends of constraints, three numbers each.
+  get constraintEnds(): Float32Array {
+    return this.constraints.ends;
+  }
+
   get clothMeshes(): THREE.Mesh[] {
     return this.cloths.meshes;
   }
@@ -99,6 +106,7 @@ export class View {
   // Loads topology and rest state of a new description, and fits the camera to them.
   describe(client: Client): void {
     this.cloths.describe(client);
+    this.constraints.describe(client);
     this.bounds.copy(this.cloths.reach());
     this.colliderMeshes.describe();
     for (const collider of client.frames.colliders()) {
@@ -130,6 +138,8 @@ export class View {
     const began = performance.now();
     // The last frame of the previous client stays until the description of a joining one arrives.
     const shows = client !== undefined && this.cloths.show(client, now);
+    if (!this.drawsConstraints) this.constraints.clear();
+    else if (shows) this.constraints.show(client);
     if (shows) {
       const colliders = client.frames.shownColliders();
       this.colliderMeshes.place(client, colliders);

@@ -4,6 +4,7 @@
 export * from "./cloth_mesh";
 export { Cloths } from "./cloths";
 export * from "./collider_meshes";
+export { ConstraintLines } from "./constraint_lines";
 export { type Detail, tiled } from "./fabric_material";
 export { fabricNames, fabricOf, type Fabric } from "./fabrics";
 export * from "./people";

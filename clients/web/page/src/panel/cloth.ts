@@ -22,6 +22,7 @@ export class ClothPanel {
   private readonly material = element<HTMLSelectElement>("material");
   private readonly solver = element<HTMLSelectElement>("solver");
   private readonly deviceMs = element("device-ms");
+  private readonly constraints = element<HTMLInputElement>("draw-constraints");
   private readonly figures = new Map<Figure, HTMLElement>();
   private readonly rows = kClothParameters.map(
     (row) => new NumberRow(`number-${row.option}`, row.option.replaceAll("-", " "), row.help, row),
@@ -52,6 +53,10 @@ export class ClothPanel {
       const { value } = this.material;
       this.chosen.push((client) => client.parameters.setMaterial(this.name, value));
     });
+    this.constraints.addEventListener("change", () => {
+      const { checked } = this.constraints;
+      this.chosen.push((client) => client.parameters.wantConstraints(checked));
+    });
     this.solver.addEventListener("change", () => {
       const solver = Number(this.solver.value);
       this.chosen.push((client) => client.settings.change(this.name, { solver }));
@@ -67,7 +72,12 @@ export class ClothPanel {
     const none = new Option("no material", "");
     none.disabled = true;
     this.material.replaceChildren(none, ...client.parameters.materials().map((name) => new Option(name.replaceAll("_", " "), name)));
+    if (this.drawsConstraints) client.parameters.wantConstraints(true);
     this.show(client);
+  }
+
+  get drawsConstraints(): boolean {
+    return this.constraints.checked;
   }
 
   // Shows the current parameters of the chosen cloth.

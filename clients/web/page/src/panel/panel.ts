@@ -63,6 +63,7 @@ export class Panel {
     this.create.offer(client.parameters.materials());
     this.scenes.show(client);
     this.invite.value = this.linkTo(client.sceneName);
+    write(element("server"), client.serverName);
     write(element("device"), client.deviceName);
     write(element("figure-vertices"), client.frames.vertexCount.toLocaleString("en"));
   }
@@ -109,6 +110,10 @@ export class Panel {
     this.cloth.apply(client);
   }
 
+  get drawsConstraints(): boolean {
+    return this.cloth.drawsConstraints;
+  }
+
   // Whether the scene sends no frames, because it stands still.
   isPaused(client: Client): boolean {
     return this.scenes.isPaused || client.playback.state()?.paused === true;
@@ -126,7 +131,6 @@ export class Panel {
   refresh(client: Client | undefined, now: number, pauseMs: number): void {
     this.hud.sample(client, now, pauseMs);
     if (!client || !this.tabs.isOpen) return;
-    if (this.tabs.current === "air") this.controls.showRadius(client);
     if (this.tabs.current === "cloth") this.cloth.showReport(client);
     if (this.tabs.current === "air") this.controls.showRadius(client);
     if (this.tabs.current === "scene" && now - this.listedAt >= kListPeriodMs) this.wantList();

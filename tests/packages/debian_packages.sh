@@ -1,0 +1,92 @@
+#!/usr/bin/env bash
+# Builds the Debian packages, checks them with lintian, and installs them on a fresh Debian 12 from an APT repository. There
+# the server serves its page, a program is compiled with the library, and nothing is left after a purge.
+# Usage: debian_packages.sh BUILD SOURCE
+set -euo pipefail
+build=$1 source=$2
+readonly kSkipped=77 # CMake's SKIP_RETURN_CODE for this test
+
+for tool in lintian reprepro mmdebstrap help2man curl; do
+  command -v "$tool" >/dev/null || { echo "skipped: $tool is missing (apt install $tool)"; exit $kSkipped; }
+done
+[ "$(id -u)" -eq 0 ] || { echo "skipped: only root can install a Debian into a folder"; exit $kSkipped; }
+
+work=$(mktemp -d)
+server=
+finish() {
+  [ -z "$server" ] || kill "$server" 2>/dev/null || true
+  rm -rf "$work"
+}
+trap finish EXIT
+
+echo "Packing"
+"$source/deploy/debian/make_repository.sh" "$build" "$work/apt"
+chmod -R a+rX "$work"
+mapfile -t packages < <(find "$work/apt/pool" -name '*.deb')
+ls -l "${packages[@]}"
+[ ${#packages[@]} -eq 4 ] || { echo "there should be four packages"; exit 1; }
+
+echo "Checking with lintian"
+lintian --fail-on error,warning --allow-root --tag-display-limit 0 "${packages[@]}"
+
+echo "Installing a Debian 12"
+root=$work/root
+mmdebstrap --quiet --mode=root --variant=minbase --include=gcc,libc6-dev,pkg-config bookworm "$root" \
+  http://deb.debian.org/debian
+mkdir -p "$root/apt"
+cp -r "$work/apt/." "$root/apt/"
+echo 'deb [trusted=yes] file:///apt bookworm main' >"$root/etc/apt/sources.list.d/clothstream.list"
+# Nothing starts services here.
+printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d"
+chmod +x "$root/usr/sbin/policy-rc.d"
+inside() { chroot "$root" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"; }
+inside apt-get -qq update
+# Files that the packages of others leave are not ours.
+inside apt-get -qq -y --no-install-recommends install $(inside apt-cache depends --recurse --no-recommends --no-suggests --no-conflicts \
+  --no-breaks --no-replaces --no-enhances clothstream-server libclothstream-dev |
+  grep -E '^[a-z0-9]' | grep -v clothstream | sort -u | tr '\n' ' ') >/dev/null
+files() { (cd "$root" && find . -xdev \( -path ./var/cache -o -path ./var/lib/apt -o -path ./var/lib/dpkg -o -path ./var/log -o -path ./proc \
+  -o -path ./sys -o -path ./tmp \) -prune -o -print | sort); }
+files >"$work/before"
+inside apt-get -qq -y --no-install-recommends install clothstream-server libclothstream-dev >/dev/null
+
+echo "Using it"
+version=$(inside dpkg-query -W -f '${Version}' clothstream-server)
+inside clothstream-server --version | grep -qF "$version"
+inside clothstream --version | grep -qF "$version"
+[ -s "$root/lib/systemd/system/clothstream-server.service" ]
+grep -q 'ExecStart=/usr/bin/clothstream-server' "$root/lib/systemd/system/clothstream-server.service"
+zgrep -q 'clothstream-server' "$root/usr/share/man/man1/clothstream-server.1.gz"
+inside clothstream-server --config /etc/clothstream/server.toml --port 0 --grpc-port 0 >"$work/server.log" 2>&1 &
+server=$!
+for ((i = 0; i < 300; ++i)); do
+  page=$(grep -oE 'http://127\.0\.0\.1:[0-9]+' "$work/server.log" | head -1 || true)
+  [ -z "$page" ] || break
+  kill -0 "$server" 2>/dev/null || break
+  sleep 0.2
+done
+[ -n "${page:-}" ] || { echo "the server did not start:"; cat "$work/server.log"; exit 1; }
+curl -sS --fail "$page/" | grep -q '<title>ClothStream'
+curl -sS --fail -o /dev/null "$page/main.js"
+cat >"$root/program.c" <<'C'
+#include <clothstream/clothstream.h>
+#include <stdio.h>
+int main(void) {
+  puts(clothstream_version());
+  return 0;
+}
+C
+inside sh -c 'gcc /program.c -o /program $(pkg-config --cflags --libs clothstream) && /program' | grep -qF "$version"
+rm "$root/program.c" "$root/program"
+kill -TERM "$server"
+wait "$server" || { echo "the server ended with an error:"; cat "$work/server.log"; exit 1; }
+server=
+
+echo "Removing it"
+inside apt-get -qq -y purge clothstream-server clothstream-client 'libclothstream*' >/dev/null
+files >"$work/after"
+if ! diff "$work/before" "$work/after" >"$work/left"; then
+  echo "the packages left files:"
+  cat "$work/left"
+  exit 1
+fi
