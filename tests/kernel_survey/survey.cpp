@@ -61,6 +61,7 @@ class CompiledScene {
         encoder_(device, simulation_, encode::streamLayout(scene, 1)),
         recorder_(device) {
     simulation::TickInputs inputs{scene.environment, {}};
+    inputs.namesConstraints = true;
     recorder_.beginRehearsal();
     for (int tick = 0; tick < 2; ++tick) {
       simulation_.recordTick(recorder_, inputs);
@@ -68,6 +69,7 @@ class CompiledScene {
       if (scene.stream.normals == model::Normals::octahedral) simulation_.recordNormals(recorder_);
       encoder_.discard(encoder_.record(recorder_, static_cast<std::uint64_t>(tick + 1), false));
       inputs = simulation::inputsAt(scene, 1);
+      inputs.namesConstraints = true;
       inputs.colliders.emplace_back();
       inputs.grabs.push_back({.state = simulation::Grab::State::takes});
     }

@@ -8,6 +8,7 @@
 
 #include "server/messages/scene_file.h"
 #include "tests/model/meshes.h"
+#include "tests/model/solids.h"
 
 namespace clothstream::kernel_survey {
 namespace {
@@ -182,6 +183,13 @@ void addFeatures(std::vector<SurveyScene>& scenes) {
         return cloth;
       },
       kLarge);
+  for (const bool triangles : {false, true})
+    add(scenes, triangles ? "sampled_and_triangles" : "sampled", grid, kLarge,
+        [triangles](model::Scene& scene) {
+          const model::Solid ball = model::ballMesh(0.1f, 4);
+          scene.colliders.emplace_back().shape = model::sampled(ball, 0.02f);
+          if (triangles) scene.colliders.emplace_back().shape = ball;
+        });
   add(scenes, "normals", grid, kLarge,
       [](model::Scene& scene) { scene.stream.normals = model::Normals::octahedral; });
   add(
