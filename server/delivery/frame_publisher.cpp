@@ -122,6 +122,8 @@ void FramePublisher::publish(const CompleteFrame::Recorded& recorded, const enco
   // Counted before it is published, so that a subscriber that has the frame finds it counted.
   telemetry::SceneMetrics& metrics = *frame_.metrics;
   metrics.encode.record(schedule::seconds(complete - frame_.deviceDone));
+  metrics.trace.add({published.key ? "encode a key frame" : "encode a frame", telemetry::TraceTrack::packets,
+                     frame_.deviceDone, complete - frame_.deviceDone, published.tick});
   for (const Clock::time_point arrival : frame_.poseArrivals)
     metrics.inputToPacket.record(schedule::seconds(complete - arrival));
   frame_.poseArrivals.clear();  // the first published quality counts

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/monitoring/monitoring_endpoint.h"
 
+#include <charconv>
 #include <cstddef>
 #include <exception>
 #include <iterator>
@@ -9,8 +10,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
@@ -24,6 +27,7 @@
 #include "server/hosting/server_state.h"
 #include "server/monitoring/http_connection.h"
 #include "server/monitoring/metric_families.h"
+#include "server/monitoring/trace_events.h"
 
 namespace clothstream::monitoring {
 namespace {
@@ -34,10 +38,25 @@ using net::ip::tcp;
 using namespace std::chrono_literals;
 
 constexpr auto kAcceptPause = 100ms;
+constexpr int kTraceSeconds = 5, kMostTraceSeconds = 60;
 constexpr int kProbes = 5;  // of the device thread in MonitoringOptions::deviceSilence
 
 void append(Families& families, Families more) {
   families.insert(families.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+}
+
+// Of a request for /trace; empty for another target and for a wrong number.
+std::optional<int> traceSeconds(std::string_view target) {
+  constexpr std::string_view kPath = "/trace", kQuery = "?seconds=";
+  if (!target.starts_with(kPath)) return std::nullopt;
+  target.remove_prefix(kPath.size());
+  if (target.empty()) return kTraceSeconds;
+  if (!target.starts_with(kQuery)) return std::nullopt;
+  target.remove_prefix(kQuery.size());
+  int seconds = 0;
+  const auto [end, error] = std::from_chars(target.data(), target.data() + target.size(), seconds);
+  if (error != std::errc() || end != target.data() + target.size()) return std::nullopt;
+  return seconds >= 1 && seconds <= kMostTraceSeconds ? std::optional(seconds) : std::nullopt;
 }
 
 }  // namespace
@@ -131,7 +150,17 @@ struct MonitoringEndpoint::State {
     if (target == "/metrics") return metrics();
     if (target == "/healthz") return health();
     if (target == "/readyz") return readiness();
-    return {.status = http::status::not_found, .body = "There are /metrics, /healthz and /readyz.\n"};
+    if (const std::optional<int> seconds = traceSeconds(target)) return trace(*seconds);
+    return {.status = http::status::not_found,
+            .body = "There are /metrics, /healthz, /readyz, and /trace?seconds=N with N from 1 to 60.\n"};
+  }
+
+  Answer trace(int seconds) const {
+    const auto begin = schedule::Clock::now() - std::chrono::seconds(seconds);
+    return {.contentType = "application/json",
+            .body = traceEvents(server != nullptr ? server->state().scenesNow()
+                                                  : std::vector<std::shared_ptr<scene::LiveScene>>(),
+                                begin)};
   }
 
   Answer metrics() {

@@ -33,6 +33,7 @@ struct MonitoringOptions {
 //   /metrics  metrics in the text format of Prometheus
 //   /healthz  200, or 503 with the reason if the device thread does not answer. 200 without a server.
 //   /readyz   200 while the server accepts clients, else 503 with the reason
+//   /trace    spans of the scenes' newest seconds (traceEvents); /trace?seconds=N, 1 to 60, default 5
 //
 // Has one thread for all sockets. Create and destroy the endpoint on one thread.
 class MonitoringEndpoint {

@@ -438,6 +438,7 @@ void SceneHost::finish() {
     }
   }
   telemetry::SceneMetrics& metrics = live_.metrics;
+  traceTick(done);
   double total = 0, report = 0;
   for (const vulkan::StageTime& stage : on.recorder.stageTimes()) {
     metrics.device.record(stage.stage, stage.seconds);
@@ -470,6 +471,25 @@ void SceneHost::finish() {
   deviceSeconds_ = total > 0 ? std::optional(total) : std::nullopt;
   ownSeconds_ =
       total > 0 ? std::optional(total + schedule::seconds(beginTime_ + (Clock::now() - done))) : std::nullopt;
+}
+
+// The device tells how long its stages took, not when they began: they end together with the tick.
+void SceneHost::traceTick(Clock::time_point done) {
+  using telemetry::TraceTrack;
+  telemetry::Trace& trace = live_.metrics.trace;
+  trace.add({"record", TraceTrack::tick, tickStart_, beginTime_, tick_});
+  trace.add({"wait for the device", TraceTrack::tick, tickStart_ + beginTime_, done - tickStart_ - beginTime_,
+             tick_});
+  const auto length = [](const vulkan::StageTime& stage) {
+    return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(stage.seconds));
+  };
+  const std::span<const vulkan::StageTime> stages = onDevice_->recorder.stageTimes();
+  Clock::time_point start = done;
+  for (const vulkan::StageTime& stage : stages) start -= length(stage);
+  for (const vulkan::StageTime& stage : stages) {
+    trace.add({stage.stage, TraceTrack::device, start, length(stage), tick_});
+    start += length(stage);
+  }
 }
 
 void SceneHost::writeReport(double deviceSeconds) {

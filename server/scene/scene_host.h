@@ -141,6 +141,7 @@ class SceneHost {
   void describeFrame(Clock::time_point start);
   // Chooses the size of the slices of the next tick from those of this one.
   void adaptSlices();
+  void traceTick(Clock::time_point done);
   void writeReport(double deviceSeconds);
   void announceEvents();
   void recover();

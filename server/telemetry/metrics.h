@@ -10,6 +10,7 @@
 
 #include "server/telemetry/histogram.h"
 #include "server/telemetry/refusal.h"
+#include "server/telemetry/trace.h"
 
 namespace clothstream::telemetry {
 
@@ -33,6 +34,8 @@ struct SceneMetrics {
   Histogram encode;  // from the end of a tick on the device to its packet, with the wait for entropy coding
   Histogram send;    // from the packet to the moment an endpoint takes it
   Histogram inputToPacket;  // from the arrival of a pose to the packet that shows its effect
+
+  Trace trace;
 
   Counter ticks;
   Counter lateTicks;          // ticks that started more than a quarter of a period late

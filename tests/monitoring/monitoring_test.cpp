@@ -9,12 +9,14 @@
 #include <memory>
 #include <mutex>
 #include <regex>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 #include <prometheus/text_serializer.h>
 
 #include "server/endpoint/web/web_endpoint.h"
@@ -86,6 +88,43 @@ class MonitoringTest : public SmallServer {
   std::unique_ptr<endpoint::WebEndpoint> web_;
   std::unique_ptr<monitoring::MonitoringEndpoint> monitoring_;
 };
+
+// Spans of one track never overlap, those of the device have the names of the stages, and those of packets
+// the ticks of the frames that the client got.
+TEST_F(MonitoringTest, TraceShowsTicksStagesAndPackets) {
+  Joined joined(connect());
+  ASSERT_TRUE(joined.see(30));
+  const Response response = get("/trace?seconds=60");
+  EXPECT_EQ(response.result(), http::status::ok);
+  EXPECT_EQ(std::string(response[http::field::content_type]), "application/json");
+  const nlohmann::json trace = nlohmann::json::parse(response.body());
+  std::map<std::string, int> processes;
+  for (const nlohmann::json& event : trace["traceEvents"])
+    if (event["name"] == "process_name") processes[event["args"]["name"]] = event["pid"];
+  ASSERT_TRUE(processes.contains("small"));
+  std::map<int, double> ends;
+  std::map<int, std::set<std::string>> names;
+  std::set<std::uint64_t> packets;
+  for (const nlohmann::json& event : trace["traceEvents"]) {
+    if (event["ph"] != "X" || event["pid"] != processes["small"]) continue;
+    const int track = event["tid"];
+    const double start = event["ts"], length = event["dur"];
+    EXPECT_GE(length, 0);
+    // Times are doubles of microseconds since the machine started.
+    if (track == 0) EXPECT_GE(start, ends[track] - 1) << event;
+    ends[track] = start + length;
+    names[track].insert(event["name"]);
+    if (track == 2) packets.insert(event["args"]["tick"].get<std::uint64_t>());
+  }
+  EXPECT_THAT(names[0], testing::ElementsAre("record", "wait for the device"));
+  EXPECT_THAT(names[1], testing::Contains("advance"));
+  EXPECT_THAT(names[2], testing::Contains("encode a key frame"));
+  EXPECT_GE(packets.size(), 30u);
+  EXPECT_TRUE(packets.contains(joined.viewer.tick()));
+  for (const char* wrong :
+       {"/trace?seconds=0", "/trace?seconds=61", "/trace?seconds=", "/trace?seconds=1x", "/traces"})
+    EXPECT_EQ(get(wrong).result(), http::status::not_found) << wrong;
+}
 
 TEST_F(MonitoringTest, MetricsAgreeWithWhatTheClientReceived) {
   Joined joined(connect());

@@ -15,6 +15,7 @@ work=$(mktemp -d)
 server=
 finish() {
   [ -z "$server" ] || kill "$server" 2>/dev/null || true
+  ! mountpoint -q "$work/root/proc" || umount "$work/root/proc"
   rm -rf "$work"
 }
 trap finish EXIT
@@ -39,15 +40,9 @@ echo 'deb [trusted=yes] file:///apt bookworm main' >"$root/etc/apt/sources.list.
 # Nothing starts services here.
 printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d"
 chmod +x "$root/usr/sbin/policy-rc.d"
+mount -t proc proc "$root/proc"
 inside() { chroot "$root" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"; }
 inside apt-get -qq update
-# Files that the packages of others leave are not ours.
-inside apt-get -qq -y --no-install-recommends install $(inside apt-cache depends --recurse --no-recommends --no-suggests --no-conflicts \
-  --no-breaks --no-replaces --no-enhances clothstream-server libclothstream-dev |
-  grep -E '^[a-z0-9]' | grep -v clothstream | sort -u | tr '\n' ' ') >/dev/null
-files() { (cd "$root" && find . -xdev \( -path ./var/cache -o -path ./var/lib/apt -o -path ./var/lib/dpkg -o -path ./var/log -o -path ./proc \
-  -o -path ./sys -o -path ./tmp \) -prune -o -print | sort); }
-files >"$work/before"
 inside apt-get -qq -y --no-install-recommends install clothstream-server libclothstream-dev >/dev/null
 
 echo "Using it"
@@ -83,10 +78,12 @@ wait "$server" || { echo "the server ended with an error:"; cat "$work/server.lo
 server=
 
 echo "Removing it"
-inside apt-get -qq -y purge clothstream-server clothstream-client 'libclothstream*' >/dev/null
-files >"$work/after"
-if ! diff "$work/before" "$work/after" >"$work/left"; then
-  echo "the packages left files:"
-  cat "$work/left"
-  exit 1
-fi
+mapfile -t installed < <(inside dpkg-query -W -f '${Package}\n' | grep clothstream)
+[ ${#installed[@]} -eq 4 ] || { echo "${installed[*]} are installed, which should be four"; exit 1; }
+# Where systemd keeps the state of the unit.
+mkdir -p "$root/var/lib/private/clothstream/states"
+ln -s private/clothstream "$root/var/lib/clothstream"
+inside apt-get -qq -y purge "${installed[@]}" >/dev/null
+left=$(cd "$root" && find . -xdev -path ./apt -prune -o -path ./var/lib/apt -prune -o -path ./var/log -prune -o \
+  -name '*clothstream*' ! -path ./etc/apt/sources.list.d/clothstream.list -print)
+[ -z "$left" ] || { printf 'the packages left files:\n%s\n' "$left"; exit 1; }
