@@ -122,8 +122,9 @@ float toDistanceCell(Checks& checks, const Path& path, float value, const model:
   if (mesh.skin) checks.fail(path, shown, "is for rigid meshes; remove it, or the joints");
   const float most = model::thinnestSide(mesh) / 4;
   if (cell > most)
-    checks.fail(path, shown,
-                fmt::format("is too coarse for this mesh; use at most {:.3g}, a quarter of its thinnest side", most));
+    checks.fail(
+        path, shown,
+        fmt::format("is too coarse for this mesh; use at most {:.3g}, a quarter of its thinnest side", most));
   const std::uint64_t points = model::distanceGridOf(mesh, cell).points();
   if (points > model::kMaxDistancePoints)
     checks.fail(path, shown,

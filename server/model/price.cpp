@@ -43,7 +43,7 @@ constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kMotionBoundBytes = 2000, kHingeBytes = 200, kSystemBytes = 64,
                  kPairBytes = 40;
-constexpr double kTriangleBytes = 400;       // of a solid
+constexpr double kTriangleBytes = 400;      // of a solid
 constexpr double kDistancePointBytes = 48;  // of a solid's grid, three times 16
 constexpr double kSkinVertexBytes = 500;
 constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
@@ -104,7 +104,8 @@ bool isSystem(SolverKind kind) {
 }  // namespace
 
 double colliderWork(const Shape& shape) {
-  if (const auto* solid = std::get_if<Solid>(&shape)) return (*solid)->distanceCell > 0 ? kGridWork : kSolidWork;
+  if (const auto* solid = std::get_if<Solid>(&shape))
+    return (*solid)->distanceCell > 0 ? kGridWork : kSolidWork;
   const double planes =
       std::visit(ShapeVisitor{[](const Sphere&) { return 0.0; }, [](const Capsule&) { return 0.0; },
                               [](const Plane&) { return 1.0; }, [](const Box&) { return kBoxPlanes; },

@@ -57,8 +57,7 @@ Answer HttpConnection::answer() const {
                 "adds it.\n"};
   if (request.method() != http::verb::get && request.method() != http::verb::head)
     return {.status = http::status::method_not_allowed, .body = "Only GET and HEAD are allowed.\n"};
-  const std::string_view target = view(request.target());
-  return context_.answer(target.substr(0, target.find('?')));
+  return context_.answer(view(request.target()));
 }
 
 void HttpConnection::write(Answer&& answer) {

@@ -45,17 +45,15 @@ void append(Families& families, Families more) {
   families.insert(families.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
 }
 
-// Of a request for /trace; empty for another target and for a wrong number.
-std::optional<int> traceSeconds(std::string_view target) {
-  constexpr std::string_view kPath = "/trace", kQuery = "?seconds=";
-  if (!target.starts_with(kPath)) return std::nullopt;
-  target.remove_prefix(kPath.size());
-  if (target.empty()) return kTraceSeconds;
-  if (!target.starts_with(kQuery)) return std::nullopt;
-  target.remove_prefix(kQuery.size());
+// Seconds of a request for /trace; empty if the query asks for something else.
+std::optional<int> traceSeconds(std::string_view query) {
+  constexpr std::string_view kName = "?seconds=";
+  if (query.empty()) return kTraceSeconds;
+  if (!query.starts_with(kName)) return std::nullopt;
+  query.remove_prefix(kName.size());
   int seconds = 0;
-  const auto [end, error] = std::from_chars(target.data(), target.data() + target.size(), seconds);
-  if (error != std::errc() || end != target.data() + target.size()) return std::nullopt;
+  const auto [end, error] = std::from_chars(query.data(), query.data() + query.size(), seconds);
+  if (error != std::errc() || end != query.data() + query.size()) return std::nullopt;
   return seconds >= 1 && seconds <= kMostTraceSeconds ? std::optional(seconds) : std::nullopt;
 }
 
@@ -147,20 +145,23 @@ struct MonitoringEndpoint::State {
 
   Answer answer(std::string_view target) {
     const std::lock_guard lock(mutex);
-    if (target == "/metrics") return metrics();
-    if (target == "/healthz") return health();
-    if (target == "/readyz") return readiness();
-    if (const std::optional<int> seconds = traceSeconds(target)) return trace(*seconds);
-    return {.status = http::status::not_found,
-            .body = "There are /metrics, /healthz, /readyz, and /trace?seconds=N with N from 1 to 60.\n"};
+    const std::string_view path = target.substr(0, target.find('?'));
+    if (path == "/metrics") return metrics();
+    if (path == "/healthz") return health();
+    if (path == "/readyz") return readiness();
+    if (path == "/trace") return trace(traceSeconds(target.substr(path.size())));
+    return {.status = http::status::not_found, .body = "There are /metrics, /healthz, /readyz and /trace.\n"};
   }
 
-  Answer trace(int seconds) const {
-    const auto begin = schedule::Clock::now() - std::chrono::seconds(seconds);
+  Answer trace(std::optional<int> seconds) const {
+    if (!seconds)
+      return {
+          .status = http::status::bad_request,
+          .body = fmt::format("Use /trace or /trace?seconds=N with N from 1 to {}.\n", kMostTraceSeconds)};
+    std::vector<std::shared_ptr<scene::LiveScene>> scenes;
+    if (server != nullptr) scenes = server->state().scenesNow();
     return {.contentType = "application/json",
-            .body = traceEvents(server != nullptr ? server->state().scenesNow()
-                                                  : std::vector<std::shared_ptr<scene::LiveScene>>(),
-                                begin)};
+            .body = traceEvents(scenes, schedule::Clock::now() - std::chrono::seconds(*seconds))};
   }
 
   Answer metrics() {

@@ -117,12 +117,13 @@ ReportStage::ReportStage(const vulkan::Device& device, ReportBlocks blocks, cons
   if (solids != nullptr)
     solidDepths_ = std::make_unique<Stage>(
         device,
-        vulkan::KernelDescription{.name = "measure_solids",
-                                  .spirv = kernels::measure_solids,
-                                  .bindings = {kTexels, kTexels, kTexels, kStorage, kTexels, kTexels},
-                                  .pushConstantBytes = sizeof(shared::PenetrationPush),
-                                  .workgroupSize = workgroupSize,
-                                  .specialisation = {solids->specialisation().begin(), solids->specialisation().end()}},
+        vulkan::KernelDescription{
+            .name = "measure_solids",
+            .spirv = kernels::measure_solids,
+            .bindings = {kTexels, kTexels, kTexels, kStorage, kTexels, kTexels},
+            .pushConstantBytes = sizeof(shared::PenetrationPush),
+            .workgroupSize = workgroupSize,
+            .specialisation = {solids->specialisation().begin(), solids->specialisation().end()}},
         Stage::Buffers{&state.cloths, &blocks_, state.positions[0], &counts_, &solids->solids(),
                        &state.colliders},
         Stage::Buffers{&state.cloths, &blocks_, state.positions[1], &counts_, &solids->solids(),

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Colliders that are meshes, and their joints, in messages.
+#include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <cmath>
 #include <functional>
 #include <string>
 
@@ -127,7 +127,9 @@ TEST(SolidMessage, RefusesSampledDistancesThatMeanNothingOrCostTooMuch) {
       m.set_distance_cell(cell);
     });
   };
-  EXPECT_THAT(rigid(0.3f), StartsWith("colliders[0].mesh.distanceCell = 0.3: is too coarse for this mesh; use at most 0.25"));
+  EXPECT_THAT(
+      rigid(0.3f),
+      StartsWith("colliders[0].mesh.distanceCell = 0.3: is too coarse for this mesh; use at most 0.25"));
   EXPECT_THAT(rigid(0.01f), AllOf(StartsWith("colliders[0].mesh.distanceCell = 0.01: needs "),
                                   HasSubstr("must need at most 262144")));
   EXPECT_THAT(rigid(0), StartsWith("colliders[0].mesh.distanceCell = 0:"));

@@ -111,7 +111,9 @@ TEST_F(MonitoringTest, TraceShowsTicksStagesAndPackets) {
     const double start = event["ts"], length = event["dur"];
     EXPECT_GE(length, 0);
     // Times are doubles of microseconds since the machine started.
-    if (track == 0) EXPECT_GE(start, ends[track] - 1) << event;
+    if (track == 0) {
+      EXPECT_GE(start, ends[track] - 1) << event;
+    }
     ends[track] = start + length;
     names[track].insert(event["name"]);
     if (track == 2) packets.insert(event["args"]["tick"].get<std::uint64_t>());
@@ -121,9 +123,9 @@ TEST_F(MonitoringTest, TraceShowsTicksStagesAndPackets) {
   EXPECT_THAT(names[2], testing::Contains("encode a key frame"));
   EXPECT_GE(packets.size(), 30u);
   EXPECT_TRUE(packets.contains(joined.viewer.tick()));
-  for (const char* wrong :
-       {"/trace?seconds=0", "/trace?seconds=61", "/trace?seconds=", "/trace?seconds=1x", "/traces"})
-    EXPECT_EQ(get(wrong).result(), http::status::not_found) << wrong;
+  for (const char* wrong : {"/trace?seconds=0", "/trace?seconds=61", "/trace?seconds=", "/trace?seconds=1x"})
+    EXPECT_EQ(get(wrong).result(), http::status::bad_request) << wrong;
+  EXPECT_EQ(get("/traces").result(), http::status::not_found);
 }
 
 TEST_F(MonitoringTest, MetricsAgreeWithWhatTheClientReceived) {

@@ -66,8 +66,8 @@ TEST_F(SolidCollision, NodesTouchMeshesAsInTheReference) {
   }
 }
 
-// Nodes around meshes with sampled distances, which turn and move, against the reference. Many begin outside of
-// the grids.
+// Nodes around meshes with sampled distances, which turn and move, against the reference. Many begin outside
+// of the grids.
 TEST_F(SolidCollision, NodesTouchSampledDistancesAsInTheReference) {
   const model::Shape shapes[] = {model::sampled(torus(0.12f, 0.04f, 16, 8), 0.01f),
                                  model::sampled(ballMesh(0.12f, 6), 0.02f)};
@@ -119,8 +119,8 @@ TEST_F(SolidCollision, SampledDistancesOfABallAreWithinTheErrorOfTheirInterpolat
   NodeState start = randomState(scene, random, 0, 0);
   std::uniform_real_distribution<float> unit(-1, 1);
   for (model::Vec3& position : start.positions)
-    position = model::Vec3(unit(random), unit(random), unit(random)).normalized() *
-               (kRadius + kBand * unit(random));
+    position =
+        model::Vec3(unit(random), unit(random), unit(random)).normalized() * (kRadius + kBand * unit(random));
   Running running(scene);
   running.restore(start);
   running.tick(inputsOf(scene, {{shape, model::Pose{}, model::Pose{}, 1}}));
