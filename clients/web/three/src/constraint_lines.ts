@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The active constraints of cloths with ACAD as red lines over the cloths.
+// The active constraints of cloths with ACAD as lines over the cloths, in a colour that no fabric has.
 
 import * as THREE from "three";
 import type { Client } from "@clothstream/client";
@@ -10,7 +10,7 @@ const kRoom = 1024;
 export class ConstraintLines {
   readonly lines = new THREE.LineSegments(
     new THREE.BufferGeometry(),
-    new THREE.LineBasicMaterial({ color: 0xd62828, depthTest: false, transparent: true, opacity: 0.85 }),
+    new THREE.LineBasicMaterial({ color: 0x00d5ff, toneMapped: false, depthTest: false, transparent: true, opacity: 0.85 }),
   );
   private firstVertices: number[] = [];
   private places = new Float32Array(0);
