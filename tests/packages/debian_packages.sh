@@ -52,7 +52,8 @@ inside clothstream --version | grep -qF "$version"
 [ -s "$root/lib/systemd/system/clothstream-server.service" ]
 grep -q 'ExecStart=/usr/bin/clothstream-server' "$root/lib/systemd/system/clothstream-server.service"
 zgrep -q 'clothstream-server' "$root/usr/share/man/man1/clothstream-server.1.gz"
-inside clothstream-server --config /etc/clothstream/server.toml --port 0 --grpc-port 0 >"$work/server.log" 2>&1 &
+# Without a shell between, which would take the signal.
+chroot "$root" env CLOTHSTREAM_CACHE_DIR=/tmp/cache clothstream-server --config /etc/clothstream/server.toml --port 0 --grpc-port 0 >"$work/server.log" 2>&1 &
 server=$!
 for ((i = 0; i < 300; ++i)); do
   page=$(grep -oE 'http://127\.0\.0\.1:[0-9]+' "$work/server.log" | head -1 || true)
