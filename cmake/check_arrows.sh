@@ -30,6 +30,7 @@ server/saved_state | server/scene server/model server/messages server/telemetry 
 server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
 server/recording   | server/encode server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
+server/fleet       | server/hosting server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls
 server/discovery   | proto/discovery
@@ -39,7 +40,7 @@ server/endpoint/grpc | server/endpoint/listen server/tls server/session server/h
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | proto/recording server/hosting server/recording server/step server/scene server/model
-server/program     | proto/recording server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
+server/program     | server/fleet proto/recording server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
 server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
@@ -72,6 +73,7 @@ readonly OUTSIDE='
 <wincrypt.h        | clients/websocket/winhttp
 <qrencode          | server/tls
 <zip.h             | clients/files
+<nats/             | server/fleet
 <avahi-            | server/discovery clients/cli
 <Eigen/            | server/model server/reference
 <draco/            | server/meshes

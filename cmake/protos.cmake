@@ -2,7 +2,7 @@
 # clothstream_protos_health gRPC's health service. Generated sources are in <build>/proto_generated.
 find_package(Protobuf REQUIRED)
 set(protoOut ${PROJECT_BINARY_DIR}/proto_generated)
-set(protoNames recording saved_state scene session)
+set(protoNames fleet recording saved_state scene session)
 set(keepMessagesValid ${CMAKE_CURRENT_LIST_DIR}/keep_messages_valid.cmake)
 set(messageSources)
 foreach(name IN LISTS protoNames)

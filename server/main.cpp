@@ -21,6 +21,8 @@ int run(const ProgramOptions& options, const program::Signals& signals) {
       return program::serve(options, signals);
     case Command::play:
       return program::play(options, signals);
+    case Command::edge:
+      return program::edge(options, signals);
     case Command::resimulate:
       return program::resimulate(options, signals);
     case Command::step:

@@ -108,6 +108,19 @@ void Mailbox::deliver(const PublishedFrame& frame) {
   wake();
 }
 
+void Mailbox::deliver(std::span<const PublishedFrame> frames) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!streaming_ || closed_ || !needsKey_ || !endpointWaits_ || !hasRoom()) return;
+    if (shape_.qualities > 1 && frames.front().quality != chosenQuality()) return;
+    if (!hold(frames.front())) return;
+    sinceKey_ = 0;
+    for (const PublishedFrame& frame : frames.subspan(1)) hold(frame);
+    endpointWaits_ = false;
+  }
+  wake();
+}
+
 std::uint8_t Mailbox::chosenQuality() const {
   return shape_.qualities > 1 ? adaptation_.point().quality : quality_;
 }

@@ -22,6 +22,16 @@ std::size_t Subscribers::size() const {
   return subscribers_.size();
 }
 
+void Subscribers::setRelay(std::shared_ptr<Relay> relay) {
+  const std::lock_guard lock(mutex_);
+  relay_ = std::move(relay);
+}
+
+std::size_t Subscribers::receivers(Clock::time_point now) const {
+  const std::lock_guard lock(mutex_);
+  return subscribers_.size() + (relay_ && relay_->requested(now).qualities != 0 ? 1 : 0);
+}
+
 std::uint64_t Subscribers::participantOf(const Mailbox& mailbox) const {
   const std::lock_guard lock(mutex_);
   for (const Subscriber& subscriber : subscribers_)
@@ -40,9 +50,19 @@ void Subscribers::publish(const PublishedFrame& frame) {
   {
     const std::lock_guard lock(mutex_);
     receivers_.assign(subscribers_.begin(), subscribers_.end());
+    if (relay_) relay_->deliver(frame);
   }
   for (const Subscriber& receiver : receivers_) receiver.mailbox->deliver(frame);
   receivers_.clear();
+}
+
+void Subscribers::publishAgain(std::span<const PublishedFrame> frames) {
+  std::vector<Subscriber> receivers;
+  {
+    const std::lock_guard lock(mutex_);
+    receivers = subscribers_;
+  }
+  for (const Subscriber& receiver : receivers) receiver.mailbox->deliver(frames);
 }
 
 void Subscribers::announce(const SharedBytes& message) {
@@ -51,6 +71,7 @@ void Subscribers::announce(const SharedBytes& message) {
   {
     const std::lock_guard lock(mutex_);
     receivers = subscribers_;
+    if (relay_) relay_->announce(message);
   }
   SharedMerges merges;
   for (const Subscriber& receiver : receivers) receiver.mailbox->announce(message, merges);
@@ -74,6 +95,7 @@ RequestedFrames Subscribers::requested(Clock::time_point now) const {
   const std::lock_guard lock(mutex_);
   RequestedFrames requested;
   for (const Subscriber& subscriber : subscribers_) requested |= subscriber.mailbox->requested(now);
+  if (relay_) requested |= relay_->requested(now);
   return requested;
 }
 
@@ -81,6 +103,7 @@ std::uint8_t Subscribers::needsKeyFrame() const {
   const std::lock_guard lock(mutex_);
   std::uint8_t qualities = 0;
   for (const Subscriber& subscriber : subscribers_) qualities |= subscriber.mailbox->needsKeyFrame();
+  if (relay_) qualities |= relay_->requested(Clock::now()).keyFrames;
   return qualities;
 }
 

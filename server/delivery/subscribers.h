@@ -7,10 +7,12 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "server/delivery/mailbox.h"
+#include "server/delivery/relay.h"
 
 namespace clothstream::delivery {
 
@@ -27,12 +29,19 @@ class Subscribers {
   void remove(const Mailbox& mailbox);
   std::size_t size() const;
 
+  // The relay also gets everything from now on. Null: none.
+  void setRelay(std::shared_ptr<Relay> relay);
+  // Subscribers, and one more for a relay that needs frames.
+  std::size_t receivers(Clock::time_point now) const;
+
   // Participant of this mailbox; 0 if the mailbox is not in the list.
   std::uint64_t participantOf(const Mailbox& mailbox) const;
   // Mailbox of this participant; null if the participant is disconnected.
   std::shared_ptr<Mailbox> find(std::uint64_t participant) const;
 
   void publish(const PublishedFrame& frame);
+  // Sends frames that were published before to the subscribers that wait for a key frame (Mailbox::deliver).
+  void publishAgain(std::span<const PublishedFrame> frames);
   // Sends the message to every subscriber. A subscriber that does not read gets it merged with others.
   void announce(const SharedBytes& message);
   // Closes every mailbox with this last message, and removes them all.
@@ -57,6 +66,7 @@ class Subscribers {
   const std::function<void(const SharedBytes&)> tap_;
   mutable std::mutex mutex_;
   std::vector<Subscriber> subscribers_;
+  std::shared_ptr<Relay> relay_;
   // Used by publish() alone. It avoids waking mailboxes under the lock and allocating for every frame.
   std::vector<Subscriber> receivers_;
 };

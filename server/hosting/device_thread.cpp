@@ -338,7 +338,7 @@ void DeviceThread::quarantine(Run& run, const std::string& why) {
 
 DeviceThread::Run* DeviceThread::sceneToLoad() const {
   const auto urgency = [this](const Run& run) {
-    return std::pair(&run == runs_.front().get(), run.scene->subscribers.size());
+    return std::pair(&run == runs_.front().get(), run.scene->subscribers.receivers(Clock::now()));
   };
   Run* next = nullptr;
   for (const auto& run : runs_) {
@@ -359,7 +359,7 @@ void DeviceThread::startAndStopScenes() {
     run->guest = run->scene->isGuest();
     if (run->begun || run->quarantined) continue;
     const scene::LiveScene& scene = *run->scene;
-    const bool inUse = scene.subscribers.size() > 0;
+    const bool inUse = scene.subscribers.receivers(now) > 0;
     const bool ready = run->host && run->host->isReady();
     const bool stopped = scene.paused && !scene.resetRequested && !(ready && run->host->owesFrame());
     const bool wanted = ready && !stopped && (runAlways_ || inUse);

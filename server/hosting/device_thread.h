@@ -119,7 +119,7 @@ class DeviceThread {
 
     // Returns whether the scene is to be loaded.
     bool needsDevice() const {
-      const bool wanted = scene->subscribers.size() > 0 || host || whenAdded;
+      const bool wanted = scene->subscribers.receivers(Clock::now()) > 0 || host || whenAdded;
       return wanted && !begun && !quarantined && !(host && host->isReady());
     }
 

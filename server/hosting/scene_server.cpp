@@ -41,6 +41,27 @@ SceneServer::SceneServer(std::string name, std::shared_ptr<scene::FrameSource> s
   state_ = std::make_unique<State>(std::move(played), std::move(options));
 }
 
+SceneServer::SceneServer(ServerOptions options) {
+  messages::buildDescriptors();
+  state_ = std::make_unique<State>(std::vector<model::Scene>{}, std::move(options));
+  state_->participants = State::kFirstViewer;
+}
+
+std::shared_ptr<scene::LiveScene> SceneServer::add(std::string name,
+                                                   std::shared_ptr<scene::FrameSource> source) {
+  auto scene = std::make_shared<scene::LiveScene>(std::move(name), std::move(source),
+                                                  state_->options.maxConnections);
+  scene->source->begin(*scene);
+  state_->insert(scene);
+  return scene;
+}
+
+void SceneServer::remove(const std::shared_ptr<scene::LiveScene>& scene, const delivery::SharedBytes& last) {
+  state_->erase(*scene);
+  scene->source->end();
+  scene->roster.close(last);
+}
+
 SceneServer::~SceneServer() {
   stop();
 }

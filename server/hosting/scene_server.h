@@ -13,6 +13,7 @@
 
 #include <tl/expected.hpp>
 
+#include "server/delivery/envelope.h"
 #include "server/delivery/wire_types.h"
 #include "server/identity/identity.h"
 #include "server/messages/limits.h"
@@ -27,6 +28,7 @@
 namespace clothstream::scene {
 class FrameSource;
 class Journal;
+class LiveScene;
 class SceneStore;
 }  // namespace clothstream::scene
 
@@ -134,10 +136,19 @@ class SceneServer {
   // Server of one scene that is not simulated; it is the default scene. Needs no device and can create no
   // other scenes.
   SceneServer(std::string name, std::shared_ptr<scene::FrameSource> source, ServerOptions options);
+  // Server without scenes, of which add() makes some. Needs no device and can create no others. A peer that names
+  // no scene gets options.defaultScene or, if that is empty, the first one.
+  explicit SceneServer(ServerOptions options);
   // Stops. Every session must have ended.
   ~SceneServer();
   SceneServer(const SceneServer&) = delete;
   SceneServer& operator=(const SceneServer&) = delete;
+
+  // Adds a scene that is not simulated. While there is another one of this name, peers get that. It has room for as
+  // many participants as the server for connections.
+  std::shared_ptr<scene::LiveScene> add(std::string name, std::shared_ptr<scene::FrameSource> source);
+  // Ends such a scene, with this as the last message to its participants.
+  void remove(const std::shared_ptr<scene::LiveScene>& scene, const delivery::SharedBytes& last);
 
   // Unary calls of a peer that is not in a stream. By default the program itself calls.
   v1::ListScenesResponse listScenes(const Identity& by = identity::local()) const;

@@ -50,9 +50,6 @@ void raiseNewestParticipant(std::atomic<std::uint64_t>& newest, const scene::Sav
     include(slot.participant);
 }
 
-// Viewers of a recording have numbers above this one, so that they differ from the participants in it.
-constexpr std::uint64_t kFirstViewer = std::uint64_t{1} << 32;
-
 delivery::SharedBytes stoppingNotice(std::chrono::milliseconds drain) {
   const float seconds = std::chrono::duration<float>(drain).count();
   v1::ServerMessage message;
@@ -94,7 +91,8 @@ v1::SceneSummary summaryOf(const scene::LiveScene& scene) {
     summary.set_vertex_count(vertices);
     summary.set_cloth_count(static_cast<std::uint32_t>(played.cloths_size()));
     summary.set_description(played.definition().description());
-    *summary.mutable_playback() = scene.source->playback();
+    if (std::optional<v1::Playback> playback = scene.source->playback())
+      *summary.mutable_playback() = std::move(*playback);
   }
   summary.set_participants(static_cast<std::uint32_t>(scene.subscribers.size()));
   summary.set_max_participants(scene.maxParticipants);
@@ -216,8 +214,9 @@ void SceneServer::State::wake(const scene::LiveScene& scene) {
 }
 
 std::shared_ptr<scene::LiveScene> SceneServer::State::find(const std::string& name) const {
+  const std::string& wanted = name.empty() ? options.defaultScene : name;
   for (const auto& scene : scenesNow())
-    if (scene->name() == (name.empty() ? options.defaultScene : name)) return scene;
+    if (scene->name() == wanted || wanted.empty()) return scene;
   return nullptr;
 }
 

@@ -338,6 +338,29 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
   table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");
 }
 
+void addFleetOptions(OptionTable& table, ProgramOptions& options) {
+  table.group("Other servers");
+  CLI::Option* servers =
+      table.list("--nats", options.natsServers, "URL",
+                 "Offer the scenes of this server to edge servers through NATS, such as nats://10.0.0.5:4222; may "
+                 "be repeated, or a comma-separated list. Built-in scenes other than --scene are not offered");
+  servers->delimiter(',')->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  table.text("--nats-credentials", options.natsCredentials, "FILE",
+             "Credentials of this server for NATS (JWT and seed)");
+  table.text("--nats-ca", options.natsAuthority, "FILE",
+             "Require TLS for NATS, with a certificate of an authority in this PEM file");
+}
+
+CLI::App& addEdgeCommand(OptionTable& table) {
+  CLI::App& command =
+      table.command("edge", "Serve scenes of other servers to more viewers. Needs no device");
+  command.footer(
+      "Options of clothstream-server for participants, network and log apply too; --nats is required, and\n"
+      "--scene is the default scene: without it, clients that name none get the first one.");
+  command.fallthrough();
+  return command;
+}
+
 CLI::App& addPrintSceneCommand(OptionTable& table, ProgramOptions& options) {
   CLI::App& command = table.command(
       "print-scene", "Print a scene as JSON, with all defaults and the geometry of its meshes filled in");
@@ -570,6 +593,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   addIdentityOptions(table, parsed);
   addNetworkOptions(table, parsed);
   addTlsOptions(table, parsed);
+  addFleetOptions(table, options);
   table.group("Device");
   addDeviceOptions(table, parsed);
   table.action("--list-devices", parsed.listDevices, "List the Vulkan devices, and exit");
@@ -578,6 +602,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   const CLI::App& step = addStepCommand(table, parsed);
   const CLI::App& resimulate = addResimulateCommand(table, parsed);
   const CLI::App& play = addPlayCommand(table, options);
+  const CLI::App& edge = addEdgeCommand(table);
   const CLI::App& token = addTokenCommand(table, parsed);
   const CLI::App& doctor = addDoctorCommand(table, parsed);
   // For `resimulate`, 1 means a difference.
@@ -604,10 +629,13 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     options.token.role = parsed.tokenRole.value_or(options.token.role);
     options.playback.speed = playbackSpeed(options);
     options.token.valid = parseTime(parsed.tokenValid).value_or(std::chrono::hours(8));
-    const bool serves = app.get_subcommands().empty() || play.parsed();
+    const bool serves = app.get_subcommands().empty() || play.parsed() || edge.parsed();
     if (serves && !parsed.printConfig && !parsed.printMarkdown && !parsed.listDevices &&
         !parsed.listMaterials)
       checkIdentity(options);
+    if (edge.parsed() && options.natsServers.empty())
+      throw OptionError("edge: --nats URL is missing: the NATS servers that the other servers use");
+    if (edge.parsed() && app.get_option("--scene")->count() == 0) options.server.defaultScene.clear();
     if (token.parsed() && options.token.key.empty() && options.token.newKey.empty())
       throw OptionError("token: give --key FILE to print a token, or --new-key FILE to make a key");
   } catch (const CLI::ExtrasError&) {
@@ -630,6 +658,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   options.recordDirectory = options.recordsOnRequest ? parsed.recordings : parsed.record;
   options.command = step.parsed()          ? Command::step
                     : play.parsed()        ? Command::play
+                    : edge.parsed()        ? Command::edge
                     : resimulate.parsed()  ? Command::resimulate
                     : printScene.parsed()  ? Command::printScene
                     : token.parsed()       ? Command::token

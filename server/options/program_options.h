@@ -23,7 +23,7 @@ inline constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VER
 // Exit code after SIGINT or SIGTERM, as shells use it.
 inline constexpr int kInterrupted = 130;
 
-enum class Command { serve, play, resimulate, step, printScene, token, doctor, listDevices, listMaterials };
+enum class Command { serve, play, edge, resimulate, step, printScene, token, doctor, listDevices, listMaterials };
 
 // Options of the command `token`.
 struct TokenOptions {
@@ -76,6 +76,10 @@ struct ProgramOptions {
   // TLS for both endpoints: with a self-signed certificate, or with that in the files.
   bool tlsSelf = false;
   std::filesystem::path tlsCertificate, tlsKey, tlsClientCa;  // empty: none
+
+  // Other servers.
+  std::vector<std::string> natsServers;                 // empty: this server is alone
+  std::filesystem::path natsCredentials, natsAuthority;  // empty: none
 
   // Identity of peers.
   std::filesystem::path tokenKeys;  // directory; empty: none

@@ -12,6 +12,8 @@ namespace clothstream::program {
 int serve(const ProgramOptions& options, const Signals& signals);
 // Serves a recording.
 int play(const ProgramOptions& options, const Signals& signals);
+// Serves scenes of other servers.
+int edge(const ProgramOptions& options, const Signals& signals);
 // Simulates a recording again and compares the result.
 int resimulate(const ProgramOptions& options, const Signals& signals);
 // Writes ticks of a scene into a file.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `clothstream-server play`: a recording, served through both endpoints.
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -8,10 +9,12 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/fleet/origin.h"
 #include "server/hosting/scene_server.h"
 #include "server/program/authentication.h"
 #include "server/program/commands.h"
 #include "server/program/endpoints.h"
+#include "server/program/fleet.h"
 #include "server/program/guards.h"
 #include "server/program/monitoring.h"
 #include "server/recording/playback.h"
@@ -53,6 +56,8 @@ int play(const ProgramOptions& options, const Signals& signals) {
   serverOptions.authenticator = makeAuthenticator(options);
   hosting::SceneServer server(
       scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), serverOptions);
+  std::optional<fleet::Origin> origin;
+  if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options));
   guard = openEndpoints(server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
                         intro, [&] { return server.report(); });
   return 0;

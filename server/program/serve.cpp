@@ -10,12 +10,14 @@
 
 #include <fmt/format.h>
 
+#include "server/fleet/origin.h"
 #include "server/hosting/scene_server.h"
 #include "server/model/scene.h"
 #include "server/program/authentication.h"
 #include "server/program/commands.h"
 #include "server/program/devices.h"
 #include "server/program/endpoints.h"
+#include "server/program/fleet.h"
 #include "server/program/guards.h"
 #include "server/program/monitoring.h"
 #include "server/program/scenes.h"
@@ -72,6 +74,8 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   serverOptions.store = savedState;
   serverOptions.guestScenes = std::move(builtIn);
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
+  std::optional<fleet::Origin> origin;
+  if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   guard = openEndpoints(
       server, options, signals, start, authenticator.get(), monitoring.get(),

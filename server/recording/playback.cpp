@@ -126,7 +126,7 @@ messages::Result<void> Playback::control(const v1::ControlSceneRequest& request)
   return {};
 }
 
-v1::Playback Playback::playback() const {
+std::optional<v1::Playback> Playback::playback() const {
   const std::lock_guard lock(mutex_);
   v1::Playback playback;
   playback.set_length(recording_.length());
@@ -140,7 +140,7 @@ v1::Playback Playback::playback() const {
 std::optional<Playback::Clock::time_point> Playback::step(scene::LiveScene& scene, Clock::time_point now) {
   if (options_.lockstep && scene.subscribers.awaitAcknowledgement()) return now + kLookAgain;
   takeWanted(scene, now);
-  const bool here = scene.subscribers.size() > 0;
+  const bool here = scene.subscribers.receivers(now) > 0;
   // In lockstep the key frame before serves a subscriber that returns alone, whether or not the loss of its
   // former connection was noticed.
   if (!here || (options_.lockstep && scene.subscribers.allRestart())) asleep_ = true;
@@ -164,7 +164,7 @@ std::optional<Playback::Clock::time_point> Playback::step(scene::LiveScene& scen
 
 bool Playback::needsJump(const scene::LiveScene& scene, Clock::time_point now) const {
   if (!asleep_ && !paused_) return false;
-  const std::size_t subscribers = scene.subscribers.size();
+  const std::size_t subscribers = scene.subscribers.receivers(now);
   if (subscribers == 0 || (!begun_ && subscribers < options_.waitFor)) return false;
   if (scene.subscribers.requested(now).keyFrames == 0) return false;
   // In lockstep, a subscriber that lost the last frames to a fault does not get an earlier frame again.

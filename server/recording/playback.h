@@ -54,7 +54,8 @@ class Playback final : public scene::FrameSource {
   bool inLockstep() const override { return options_.lockstep; }
   void wake() override;
   messages::Result<void> control(const v1::ControlSceneRequest& request) override;
-  v1::Playback playback() const override;
+  std::string whyFixed() const override { return "is a recording that is played"; }
+  std::optional<v1::Playback> playback() const override;
   v1::ParameterChange parameters() const override;
 
   // Publishes everything due by `now`. Returns when to call it again; nullopt means after a wake(). Only the

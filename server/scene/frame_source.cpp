@@ -8,8 +8,10 @@
 namespace clothstream::scene {
 
 delivery::SharedBytes playbackMessage(const FrameSource& source) {
+  std::optional<v1::Playback> playback = source.playback();
+  if (!playback) return nullptr;
   v1::ServerMessage message;
-  *message.mutable_playback() = source.playback();
+  *message.mutable_playback() = std::move(*playback);
   return delivery::serialise(message);
 }
 

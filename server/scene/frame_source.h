@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Source of a scene's frames that is not a simulation, such as a recording that is played.
+// Source of a scene's frames that is not a simulation of this server: a recording that is played, or another server.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "server/delivery/envelope.h"
@@ -22,6 +23,11 @@ class FrameSource {
   // Name of the device that simulated the frames.
   virtual std::string deviceName() const = 0;
 
+  // Number of qualities of each frame. 1 means a single quality, which may have any number. Constant.
+  virtual std::uint8_t qualities() const { return 1; }
+  // Why participants cannot change parameters: the end of a sentence that begins with the scene. Constant.
+  virtual std::string whyFixed() const = 0;
+
   // Whether the next frame waits until all subscribers have acknowledged the last one. Constant.
   virtual bool inLockstep() const { return false; }
 
@@ -32,15 +38,15 @@ class FrameSource {
   // acknowledged what it was sent.
   virtual void wake() = 0;
 
-  // Applies seek, speed, loop and reset of the request: all of them, or none and an error.
+  // Checks the whole request, and applies its seek, speed, loop and reset: all of them, or none and an error.
   [[nodiscard]] virtual messages::Result<void> control(const v1::ControlSceneRequest& request) = 0;
-  // Present position and settings.
-  virtual v1::Playback playback() const = 0;
+  // Present position and settings of a recording; nothing for other sources.
+  virtual std::optional<v1::Playback> playback() const = 0;
   // Parameters in force at the present position; empty if none are known.
   virtual v1::ParameterChange parameters() const = 0;
 };
 
-// Message with the source's position and settings.
+// Message with the source's position and settings; null for a source without them.
 delivery::SharedBytes playbackMessage(const FrameSource& source);
 
 // Message with the parameters in force at the present position; null if none are known.

@@ -214,7 +214,7 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   if (source)
     return tl::unexpected(messages::FieldError{
         v1::ERROR_CODE_INVALID_ARGUMENT,
-        "parameterChange: '" + name() + "' is a recording that is played; its parameters cannot be changed"});
+        fmt::format("parameterChange: '{}' {}; its parameters cannot be changed", name(), source->whyFixed())});
   const std::lock_guard lock(mutex_);
   if (auto counted = countChangeLocked(participant, "parameterChange"); !counted) return counted;
   messages::Result<model::ParameterChange> change =
@@ -259,6 +259,7 @@ delivery::StreamShape LiveScene::shape() const {
   const std::uint32_t layers = source->description().temporal_layers();
   return {.rate = start_.streamRate,
           .layers = static_cast<std::uint8_t>(std::max(layers, 1u)),
+          .qualities = source->qualities(),
           .lockstep = source->inLockstep()};
 }
 

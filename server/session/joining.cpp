@@ -144,7 +144,8 @@ void Session::tellPresentState(scene::LiveScene& scene) {
   if (!scene.source && scene.work.load() != scene.allWork())
     mailbox_->announce(scene::workNotice(scene, scene.tick));
   if (scene.source) {
-    mailbox_->announce(scene::playbackMessage(*scene.source));
+    if (delivery::SharedBytes playback = scene::playbackMessage(*scene.source))
+      mailbox_->announce(std::move(playback));
     if (delivery::SharedBytes parameters = scene::parametersMessage(*scene.source, scene.tick))
       mailbox_->announce(std::move(parameters));
   }

@@ -66,6 +66,11 @@ std::string table(const ServerMetrics& m) {
                      {"rejected messages", m.rejectedMessages.value()},
                      {"device rebuilds", m.deviceRebuilds.value()},
                      {"scenes in quarantine", m.quarantines.value()}});
+  if (m.nats.published.value() + m.nats.received.value() > 0)
+    addCounters(text, {{"NATS messages sent", m.nats.published.value()},
+                       {"received", m.nats.received.value()},
+                       {"dropped", m.nats.dropped.value()},
+                       {"refused", m.nats.refused.value()}});
   for (std::size_t i = 0; i < kRefusalNames.size(); ++i)
     if (m.refusals[i].value() > 0)
       addCounters(text, {{fmt::format("refused: {}", kRefusalNames[i]), m.refusals[i].value()}});

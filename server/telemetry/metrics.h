@@ -58,6 +58,14 @@ struct SceneMetrics {
   Counter joins;
 };
 
+// Connection to NATS.
+struct NatsMetrics {
+  std::atomic<bool> connected{false};
+  Counter published, publishedBytes, received, receivedBytes;
+  Counter dropped;  // messages lost on this side: without connection, or because either side was too slow
+  Counter refused;  // messages that do not belong to their stream
+};
+
 struct ServerMetrics {
   void refuse(Refusal reason) { refusals[static_cast<std::size_t>(reason)].add(); }
 
@@ -69,6 +77,7 @@ struct ServerMetrics {
   Counter rejectedMessages;    // messages answered by an Error before the client joined
   Counter deviceRebuilds;
   Counter quarantines;  // scenes stopped because they harmed others
+  NatsMetrics nats;
 };
 
 // One line per histogram (count, p50, p90, p99 and maximum in milliseconds), then lines of counters.

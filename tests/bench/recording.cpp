@@ -133,7 +133,7 @@ void measure(const std::string& name, const std::string& path, std::uint32_t fra
     seeks.push_back(millisecondsSince(start));
     mostProcessorMs = std::max(mostProcessorMs, processorMs() - processorStart);
     if (!framed) throw std::runtime_error("a seek sent no key frame");
-    check(frame, playback->playback(), viewer.parameters.change(), sliders);
+    check(frame, *playback->playback(), viewer.parameters.change(), sliders);
   }
   std::ranges::sort(seeks);
   fmt::print("{:<32}{:>8.1f}{:>10.1f}{:>10.3f}{:>10.3f}{:>10.3f}{:>10.3f}\n", name,

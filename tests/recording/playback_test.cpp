@@ -155,7 +155,7 @@ TEST_F(PlaybackTest, SeekContinuesFromThePreviousKeyFrame) {
   play();
   join();
   pass(0.5);
-  for (const double to : {1.3, 0.0, 2.0, 0.41, playback->playback().length()}) {
+  for (const double to : {1.3, 0.0, 2.0, 0.41, playback->playback()->length()}) {
     const std::size_t before = viewer->frames.size();
     const std::uint64_t tick = viewer->frames.back().tick;
     seek(to);
@@ -165,7 +165,7 @@ TEST_F(PlaybackTest, SeekContinuesFromThePreviousKeyFrame) {
     EXPECT_EQ(frameOf(first), sought / kMaxKeyFrameDistance * kMaxKeyFrameDistance) << to;
     EXPECT_TRUE(first.key);
     EXPECT_EQ(first.tick, tick + 1);
-    EXPECT_NEAR(playback->playback().position(), static_cast<double>(frameOf(first)) / kSampleRate, 1e-6);
+    EXPECT_NEAR(playback->playback()->position(), static_cast<double>(frameOf(first)) / kSampleRate, 1e-6);
     pass(0.1);
     EXPECT_GT(viewer->frames.size(), before + 3);
   }
@@ -293,7 +293,7 @@ TEST_F(PlaybackTest, SeekGivesTheParametersOfPlayingThrough) {
     pause(true);
     std::mt19937 random(5);
     for (int i = 0; i < 100; ++i) {
-      seek(playback->playback().length() * static_cast<double>(random() % 1001) / 1000);
+      seek(playback->playback()->length() * static_cast<double>(random() % 1001) / 1000);
       const std::size_t frame = frameOf(viewer->frames.back());
       ASSERT_LT(frame, played.size());
       EXPECT_EQ(playback->parameters().SerializeAsString(), played[frame]) << frame;
@@ -371,7 +371,7 @@ TEST_F(PlaybackTest, StandsStillWithoutViewers) {
   pass(0.5);
   viewer.reset();
   pass(5);
-  const double position = playback->playback().position();
+  const double position = playback->playback()->position();
   EXPECT_NEAR(position, 0.5, 0.02);
   join();
   ASSERT_EQ(viewer->frames.size(), 1u);

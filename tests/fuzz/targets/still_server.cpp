@@ -39,7 +39,8 @@ class StillSource final : public scene::FrameSource {
   void end() override {}
   void wake() override {}
   messages::Result<void> control(const v1::ControlSceneRequest& /*request*/) override { return {}; }
-  v1::Playback playback() const override { return {}; }
+  std::string whyFixed() const override { return "stands still"; }
+  std::optional<v1::Playback> playback() const override { return v1::Playback(); }
   v1::ParameterChange parameters() const override { return {}; }
 
  private:

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+// `clothstream-server edge`: scenes of other servers, served through both endpoints.
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "server/fleet/edge.h"
+#include "server/hosting/scene_server.h"
+#include "server/program/authentication.h"
+#include "server/program/commands.h"
+#include "server/program/endpoints.h"
+#include "server/program/fleet.h"
+#include "server/program/guards.h"
+#include "server/program/monitoring.h"
+
+namespace clothstream::program {
+
+int edge(const ProgramOptions& options, const Signals& signals) {
+  StartGuard start(signals, options.server.drain);
+  const auto monitoring = openMonitoring(options);
+  std::unique_ptr<EndGuard> guard;  // outlives the server
+  hosting::ServerOptions serverOptions = options.server;
+  serverOptions.authenticator = makeAuthenticator(options);
+  hosting::SceneServer server(serverOptions);
+  const fleet::Edge shown(server, natsOptions(options), serverOptions.reconnectGrace.place);
+  guard = openEndpoints(server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
+                        fmt::format("shows   scenes of other servers, by {}\n", fmt::join(options.natsServers, ", ")),
+                        [&] { return server.report(); });
+  return 0;
+}
+
+}  // namespace clothstream::program

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+#include "tests/fleet/nats_server.h"
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include "tests/support/eventually.h"
+
+namespace clothstream::tests {
+
+std::unique_ptr<NatsServer> NatsServer::start() {
+  if (!std::filesystem::exists(CLOTHSTREAM_NATS_SERVER)) return nullptr;
+  return std::unique_ptr<NatsServer>(new NatsServer);
+}
+
+NatsServer::NatsServer() {
+  std::string name = std::filesystem::temp_directory_path() / "clothstream-nats-XXXXXX";
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory");
+  directory_ = name;
+  run("-1");  // a free one
+}
+
+NatsServer::~NatsServer() {
+  process_.reset();
+  std::filesystem::remove_all(directory_);
+}
+
+void NatsServer::run(const std::string& port) {
+  process_ = std::make_unique<e2e::Process>(std::vector<std::string>{
+      CLOTHSTREAM_NATS_SERVER, "--addr", "127.0.0.1", "--port", port, "--ports_file_dir", directory_.string()});
+  // It writes its address into a file: {"nats":["nats://127.0.0.1:39999"]}
+  const auto portInFile = [&] {
+    for (const auto& entry : std::filesystem::directory_iterator(directory_)) {
+      std::ifstream file(entry.path());
+      const std::string text{std::istreambuf_iterator<char>(file), {}};
+      const std::string before = "nats://127.0.0.1:";
+      const std::size_t found = text.find(before);
+      if (found == std::string::npos) continue;
+      port_ = text.substr(found + before.size());
+      port_ = port_.substr(0, port_.find('"'));
+      return true;
+    }
+    return false;
+  };
+  if (!eventually(portInFile)) throw std::runtime_error("nats-server does not start: " + process_->errors());
+}
+
+std::string NatsServer::url() const {
+  return "nats://127.0.0.1:" + port_;
+}
+
+void NatsServer::kill() {
+  process_->signal(SIGKILL);
+  process_->waitForEnd(std::chrono::seconds(10));
+  for (const auto& entry : std::filesystem::directory_iterator(directory_)) std::filesystem::remove(entry);
+}
+
+void NatsServer::restart() {
+  run(port_);
+}
+
+}  // namespace clothstream::tests

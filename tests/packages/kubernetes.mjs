@@ -1,0 +1,489 @@
+// SPDX-License-Identifier: MIT
+// Builds the manifests of deploy/kubernetes with kubectl, and checks the objects without a cluster: schemas, names that
+// refer to each other, options of the server, rights, and a cluster of three NATS servers with their configuration.
+
+import assert from "node:assert/strict";
+import { execFileSync, spawn, spawnSync } from "node:child_process";
+import { existsSync, readFileSync } from "node:fs";
+import { cp, mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
+import { createRequire } from "node:module";
+import { connect, createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { setTimeout as sleep } from "node:timers/promises";
+import { fileURLToPath } from "node:url";
+
+const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
+const source = fileURLToPath(new URL("../../", import.meta.url));
+const room = fileURLToPath(new URL(".", import.meta.url));
+const web = join(source, "clients/web");
+
+function skip(reason) {
+  console.log(`skipped: ${reason}`);
+  process.exit(kSkipped);
+}
+if (spawnSync("kubectl", ["version", "--client"]).status !== 0) skip("there is no kubectl (apt install kubernetes-client)");
+for (const name of [join(room, "node_modules/kubernetes-models"), join(room, "node_modules/yaml"), join(web, "node_modules/typescript")])
+  if (!existsSync(name)) skip(`${name} is missing; the build installs it (ninja test_kubernetes clothstream_npm)`);
+
+const { parseAllDocuments } = await import("yaml");
+const ts = createRequire(join(web, "package.json"))("typescript");
+const read = (path) => readFileSync(join(source, path), "utf8");
+const version = /^project\(clothstream VERSION (\S+)/m.exec(read("CMakeLists.txt"))[1];
+const documentation = /^## Kubernetes\n(.*?)\n## /ms.exec(read("docs/operations.md"))[1];
+const server = process.env.CLOTHSTREAM_SERVER;
+const help = execFileSync(server, ["--help"], { encoding: "utf8" });
+const kComponent = "app.kubernetes.io/component";
+
+// What deploy/image/build_image.sh puts into the image.
+const script = read("deploy/image/build_image.sh");
+const image = {
+  user: Number(/^readonly kUser=(\d+)/m.exec(script)[1]),
+  volumes: [...script.matchAll(/--volume (\S+)/g)].map((match) => match[1]),
+  environment: Object.fromEntries([...script.matchAll(/--env (\w+)=(\S+)/g)].map((match) => [match[1], match[2]])),
+};
+
+let folder;
+const builds = {}; // objects by name of the build
+before(async () => {
+  folder = await mkdtemp(join(tmpdir(), "clothstream-kubernetes-"));
+  const copy = join(folder, "clothstream/deploy/kubernetes");
+  await cp(join(source, "deploy/kubernetes"), copy, { recursive: true });
+  for (const name of ["base", "overlays/gpu", "overlays/fleet"]) builds[name] = kustomize(join(source, "deploy/kubernetes", name));
+
+  // An operator's own overlay, as documented.
+  await mkdir(join(folder, "own"));
+  await writeFile(join(folder, "own/kustomization.yaml"), /^```yaml\n(.*?)^```/ms.exec(documentation)[1]);
+  builds.own = kustomize(join(folder, "own"));
+
+  const fleet = join(copy, "overlays/fleet/kustomization.yaml");
+  const text = await readFile(fleet, "utf8");
+  assert.match(text, /^bases: \[\.\.\/gpu\]/m);
+  await writeFile(fleet, text.replace("../gpu", "../../base"));
+  builds["fleet without GPU"] = kustomize(join(copy, "overlays/fleet"));
+});
+after(() => rm(folder, { recursive: true, force: true }));
+
+function kustomize(directory) {
+  const output = execFileSync("kubectl", ["kustomize", directory], { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
+  const objects = parseAllDocuments(output).map((document) => {
+    assert.deepEqual([...document.errors, ...document.warnings], []);
+    return document.toJS();
+  });
+  const names = objects.map(nameOf);
+  assert.equal(new Set(names).size, names.length);
+  return objects;
+}
+
+const nameOf = (object) => `${object.kind} ${object.metadata.name}`;
+const ofKind = (objects, kind) => objects.filter((object) => object.kind === kind);
+const named = (objects, kind, name) => {
+  const found = objects.find((object) => object.kind === kind && object.metadata.name === name);
+  assert.ok(found, `there is no ${kind} ${name}`);
+  return found;
+};
+const workloads = (objects) => objects.filter((object) => object.spec?.template);
+const componentOf = (workload) => workload.spec.template.metadata.labels[kComponent];
+const podOf = (workload) => workload.spec.template.spec;
+const isOurs = (container) => container.image.includes("clothstream-server");
+
+function matches(selector, labels) {
+  assert.ok(Object.keys(selector.matchLabels ?? {}).length + (selector.matchExpressions ?? []).length > 0, "the selector is empty");
+  return (
+    Object.entries(selector.matchLabels ?? {}).every(([key, value]) => labels[key] === value) &&
+    (selector.matchExpressions ?? []).every(({ key, operator, values }) => {
+      assert.equal(operator, "In");
+      return values.includes(labels[key]);
+    })
+  );
+}
+
+// Workloads with pods that a selector finds. There must be one.
+function selected(objects, selector, what) {
+  const found = workloads(objects).filter((workload) => matches(selector, workload.spec.template.metadata.labels));
+  assert.ok(found.length > 0, `${what} selects no pod`);
+  return found;
+}
+
+const portsOf = (workload) => podOf(workload).containers.flatMap((container) => container.ports.map((port) => port.name));
+
+// Runs a check for each build.
+function testEach(title, check) {
+  test(title, async (t) => {
+    for (const [name, objects] of Object.entries(builds)) await t.test(name, (t) => check(objects, t, name));
+  });
+}
+
+testEach("objects have the schemas of Kubernetes", async (objects) => {
+  for (const object of objects) {
+    const models = await import(`kubernetes-models/${object.apiVersion}/${object.kind}`);
+    assert.doesNotThrow(() => new models[object.kind](object).validate(), nameOf(object));
+  }
+});
+
+// The schemas allow fields that they do not know, such as misspelt ones. TypeScript does not.
+test("objects have no unknown fields", () => {
+  const lines = Object.values(builds)
+    .flat()
+    .map((object) => `(${JSON.stringify(object)}) satisfies import("kubernetes-models/${object.apiVersion}/${object.kind}").I${object.kind};`);
+  const problems = compile(lines);
+  assert.deepEqual(problems, []);
+  assert.equal(compile(lines.map((line) => line.replace('"metadata":', '"metadatas":'))).length, lines.length);
+});
+
+function compile(lines) {
+  const options = { strict: true, noEmit: true, skipLibCheck: true, types: [], module: ts.ModuleKind.ESNext, moduleResolution: ts.ModuleResolutionKind.Bundler };
+  const file = join(room, "objects.ts"); // in memory
+  const host = ts.createCompilerHost(options);
+  const { getSourceFile, fileExists } = host;
+  host.fileExists = (name) => name === file || fileExists.call(host, name);
+  host.getSourceFile = (name, ...rest) =>
+    name === file ? ts.createSourceFile(name, lines.join("\n"), ts.ScriptTarget.ES2022) : getSourceFile.call(host, name, ...rest);
+  return ts.getPreEmitDiagnostics(ts.createProgram([file], options, host)).map((problem) => ts.flattenDiagnosticMessageText(problem.messageText, "\n"));
+}
+
+testEach("everything is in the namespace, which restricts pods", (objects) => {
+  const [namespace, ...others] = ofKind(objects, "Namespace");
+  assert.deepEqual(others, []);
+  assert.equal(namespace.metadata.labels["pod-security.kubernetes.io/enforce"], "restricted");
+  for (const object of objects) if (object !== namespace) assert.equal(object.metadata.namespace, namespace.metadata.name, nameOf(object));
+});
+
+testEach("images are those of this version, or NATS", (objects) => {
+  for (const { image } of workloads(objects).flatMap((workload) => podOf(workload).containers))
+    assert.match(image, new RegExp(`^(\\S+\\.example\\.\\w+/clothstream-server:${version.replaceAll(".", "\\.")}|docker\\.io/library/nats:\\d[\\w.-]*)$`));
+});
+
+testEach("pods have no rights that they do not need", (objects) => {
+  for (const workload of workloads(objects)) {
+    const pod = podOf(workload);
+    const account = named(objects, "ServiceAccount", pod.serviceAccountName);
+    assert.deepEqual([account.automountServiceAccountToken, pod.automountServiceAccountToken, pod.enableServiceLinks], [false, false, false]);
+    assert.deepEqual([pod.hostNetwork, pod.hostPID, pod.hostIPC], [undefined, undefined, undefined]);
+    assert.equal(pod.securityContext.runAsNonRoot, true);
+    assert.ok(pod.securityContext.runAsUser > 0);
+    assert.equal(pod.securityContext.fsGroup, pod.securityContext.runAsGroup);
+    assert.equal(pod.securityContext.seccompProfile.type, "RuntimeDefault");
+    assert.equal(pod.initContainers, undefined);
+    for (const container of pod.containers) {
+      if (isOurs(container)) assert.deepEqual([pod.securityContext.runAsUser, pod.securityContext.runAsGroup], [image.user, image.user]);
+      assert.deepEqual(container.securityContext, { allowPrivilegeEscalation: false, readOnlyRootFilesystem: true, capabilities: { drop: ["ALL"] } });
+    }
+    for (const volume of pod.volumes) assert.match(Object.keys(volume).find((key) => key !== "name"), /^(configMap|emptyDir|projected|secret)$/);
+  }
+});
+
+testEach("probes ask the port for operators", (objects) => {
+  for (const workload of workloads(objects)) {
+    for (const container of podOf(workload).containers) {
+      const [ready, alive] = [container.readinessProbe.httpGet, container.livenessProbe.httpGet];
+      const port = container.ports.find(({ name }) => name === ready.port);
+      assert.ok(port, `${nameOf(workload)} has no port ${ready.port}`);
+      assert.equal(alive.port, ready.port);
+      assert.equal(alive.path, "/healthz");
+      if (!isOurs(container)) continue;
+      assert.equal(ready.path, "/readyz");
+      const config = effective(objects, container);
+      assert.deepEqual(Object.fromEntries(container.ports.map(({ name, containerPort }) => [name, containerPort])), {
+        web: config.port,
+        grpc: config["grpc-port"],
+        metrics: config["metrics-port"],
+      });
+      assert.equal(port.name, "metrics");
+      assert.deepEqual([config.host, config["metrics-host"]], ["0.0.0.0", "0.0.0.0"]); // kubelet does not use the loopback address
+    }
+  }
+});
+
+testEach("requests and limits are set", (objects) => {
+  const kUnits = { m: 1e-3, Mi: 2 ** 20, Gi: 2 ** 30 };
+  const amount = (text) => {
+    const [, number, unit] = /^(\d+)(m|Mi|Gi)?$/.exec(text);
+    return Number(number) * (kUnits[unit] ?? 1);
+  };
+  for (const workload of workloads(objects)) {
+    for (const { resources } of podOf(workload).containers) {
+      assert.ok(amount(resources.requests.cpu) >= 0.1);
+      assert.ok(amount(resources.requests.memory) >= 64 * kUnits.Mi);
+      assert.ok(amount(resources.limits.memory) >= amount(resources.requests.memory));
+    }
+    for (const volume of podOf(workload).volumes) if (volume.emptyDir) assert.ok(amount(volume.emptyDir.sizeLimit) > 0);
+  }
+  const [claim] = named(objects, "StatefulSet", "clothstream-server").spec.volumeClaimTemplates;
+  const config = effective(objects, podOf(named(objects, "StatefulSet", "clothstream-server")).containers[0]);
+  assert.ok(amount(claim.spec.resources.requests.storage) >= (2 * config["state-limit"] + config["keep-free"]) * 1e6);
+});
+
+testEach("pods have the time to drain", (objects) => {
+  for (const workload of workloads(objects)) {
+    for (const container of podOf(workload).containers.filter(isOurs)) {
+      const pause = Number(container.lifecycle?.preStop.exec.command[1] ?? 0);
+      assert.ok(podOf(workload).terminationGracePeriodSeconds > effective(objects, container).drain + pause + 1, nameOf(workload));
+    }
+  }
+});
+
+testEach("selectors find pods with these ports", (objects) => {
+  for (const workload of workloads(objects)) {
+    assert.deepEqual(selected(objects, workload.spec.selector, nameOf(workload)), [workload]);
+    for (const constraint of podOf(workload).topologySpreadConstraints ?? [])
+      assert.deepEqual(selected(objects, constraint.labelSelector, nameOf(workload)), [workload]);
+    if (workload.kind !== "StatefulSet") continue;
+    const governing = named(objects, "Service", workload.spec.serviceName);
+    assert.equal(governing.spec.clusterIP, "None");
+    assert.deepEqual(selected(objects, { matchLabels: governing.spec.selector }, nameOf(governing)), [workload]);
+  }
+  for (const service of ofKind(objects, "Service")) {
+    const [workload, ...others] = selected(objects, { matchLabels: service.spec.selector }, nameOf(service));
+    assert.deepEqual(others, []);
+    for (const { targetPort } of service.spec.ports) assert.ok(portsOf(workload).includes(targetPort), `${nameOf(service)}: ${targetPort}`);
+    if (service.spec.type === "LoadBalancer") assert.deepEqual(service.spec.ports.map(({ targetPort }) => targetPort), ["web"]);
+  }
+  const budgets = ofKind(objects, "PodDisruptionBudget").map((budget) => {
+    const [workload, ...others] = selected(objects, budget.spec.selector, nameOf(budget));
+    assert.deepEqual(others, []);
+    return workload;
+  });
+  assert.deepEqual(new Set(budgets), new Set(workloads(objects)));
+});
+
+// Names of the components that may reach a port of a workload; "everyone" for a rule without senders.
+function senders(objects, workload, port) {
+  const found = new Set();
+  for (const policy of ofKind(objects, "NetworkPolicy")) {
+    if (!selected(objects, policy.spec.podSelector, nameOf(policy)).includes(workload)) continue;
+    for (const rule of policy.spec.ingress ?? []) {
+      assert.ok(rule.ports?.length > 0, `${nameOf(policy)} opens all ports`);
+      if (!rule.ports.some((entry) => entry.port === port)) continue;
+      if (!rule.from) found.add("everyone");
+      for (const peer of rule.from ?? [])
+        if (peer.namespaceSelector) found.add(`namespace ${peer.namespaceSelector.matchLabels["kubernetes.io/metadata.name"]}`);
+        else for (const from of selected(objects, peer.podSelector, nameOf(policy))) found.add(componentOf(from));
+    }
+  }
+  return [...found].sort();
+}
+
+testEach("network policies let in and out what is needed", (objects) => {
+  const policies = ofKind(objects, "NetworkPolicy");
+  for (const policy of policies) {
+    const targets = selected(objects, policy.spec.podSelector, nameOf(policy));
+    for (const { port } of (policy.spec.ingress ?? []).flatMap((rule) => rule.ports))
+      for (const target of targets) assert.ok(portsOf(target).includes(port), `${nameOf(policy)}: ${port}`);
+    for (const rule of policy.spec.egress ?? [])
+      for (const peer of rule.to ?? [])
+        for (const { port } of rule.ports)
+          for (const to of selected(objects, peer.podSelector, nameOf(policy))) assert.ok(portsOf(to).includes(port), `${nameOf(policy)}: ${port}`);
+  }
+  const kAllowed = {
+    server: { web: ["everyone"], grpc: [], metrics: ["namespace monitoring"] },
+    edge: { web: ["everyone"], grpc: [], metrics: ["namespace monitoring"] },
+    nats: { nats: ["edge", "server"], routes: ["nats"], monitor: [] },
+  };
+  for (const workload of workloads(objects)) {
+    const own = policies.filter((policy) => matches(policy.spec.podSelector, workload.spec.template.metadata.labels));
+    for (const direction of ["Ingress", "Egress"]) assert.ok(own.some((policy) => policy.spec.policyTypes.includes(direction)), `${nameOf(workload)} has no policy for ${direction}`);
+    for (const port of portsOf(workload)) assert.deepEqual(senders(objects, workload, port), kAllowed[componentOf(workload)][port], `${nameOf(workload)}: ${port}`);
+    const receivers = own
+      .flatMap((policy) => policy.spec.egress ?? [])
+      .flatMap((rule) => (rule.to ? rule.to.flatMap((peer) => selected(objects, peer.podSelector, nameOf(workload)).map(componentOf)) : rule.ports.map(({ port }) => port)));
+    assert.deepEqual(receivers, workloads(objects).length > 1 ? ["nats", 53, 53] : []);
+  }
+});
+
+// Variables of a container, those of the image included.
+function environmentOf(objects, container) {
+  const variables = { ...image.environment };
+  for (const { configMapRef } of container.envFrom ?? []) Object.assign(variables, named(objects, "ConfigMap", configMapRef.name).data);
+  for (const { name, value } of container.env ?? []) variables[name] = value;
+  return variables;
+}
+
+const listed = (option) => new RegExp(`^ +(-\\w,)?${option}\\b`, "m").test(help);
+const isComing = (option) => (option.startsWith("--nats") && !listed("--nats")) || (option === "edge" && !listed("edge"));
+const optionOf = (variable) => `--${variable.replace("CLOTHSTREAM_", "").toLowerCase().replaceAll("_", "-")}`;
+
+// Options that the server has with the variables and arguments of a container.
+function effective(objects, container) {
+  const known = Object.entries(environmentOf(objects, container)).filter(([name]) => name.startsWith("CLOTHSTREAM_") && !isComing(optionOf(name)));
+  const args = (container.args ?? []).filter((arg) => arg.startsWith("-") && !isComing(arg.split("=")[0]));
+  const { status, stdout, stderr } = spawnSync(server, [...args, "--print-config"], { encoding: "utf8", env: Object.fromEntries(known) });
+  assert.deepEqual([status, stderr], [0, ""]);
+  return Object.fromEntries([...stdout.matchAll(/^([\w-]+) = (.*)$/gm)].map(([, name, value]) => [name, JSON.parse(value)]));
+}
+
+testEach("the server has every option", (objects, t) => {
+  for (const container of workloads(objects).flatMap((workload) => podOf(workload).containers).filter(isOurs)) {
+    const options = Object.keys(environmentOf(objects, container)).filter((name) => name.startsWith("CLOTHSTREAM_")).map(optionOf);
+    options.push(...(container.args ?? []).map((arg) => arg.split("=")[0]));
+    assert.ok(options.length > 5);
+    for (const option of options) {
+      if (isComing(option)) t.diagnostic(`skipped: this server does not have ${option} yet`);
+      else assert.ok(listed(option), `there is no option ${option}`);
+    }
+    effective(objects, container);
+  }
+});
+
+// Secrets and their files that operators make, from the table of the documentation.
+const secrets = new Map(
+  [...documentation.matchAll(/^\| `(clothstream-[\w-]+)` \| (.*?) \|/gm)].map(([, name, files]) => [name, [...files.matchAll(/`([\w.]+)`/g)].map((match) => match[1])]),
+);
+
+// Fails unless a path is in a volume of the pod, and is a file that its secret or ConfigMap has.
+function checkPath(objects, workload, container, path) {
+  const mount = container.volumeMounts.find(({ mountPath }) => path === mountPath || path.startsWith(`${mountPath}/`));
+  assert.ok(mount, `${nameOf(workload)}: ${path} is in no volume`);
+  if (path === mount.mountPath) return mount;
+  const volume = podOf(workload).volumes.find(({ name }) => name === mount.name);
+  const files = [];
+  if (volume.secret) files.push(...secrets.get(volume.secret.secretName));
+  if (volume.configMap) files.push(...Object.keys(named(objects, "ConfigMap", volume.configMap.name).data));
+  for (const { secret } of volume.projected?.sources ?? []) files.push(...secret.items.map((item) => item.path));
+  assert.ok(files.includes(path.slice(mount.mountPath.length + 1)), `${nameOf(workload)}: ${path} is not in its volume`);
+  return mount;
+}
+
+testEach("volumes, secrets and files exist", (objects) => {
+  for (const workload of workloads(objects)) {
+    const pod = podOf(workload);
+    const claims = (workload.spec.volumeClaimTemplates ?? []).map((claim) => claim.metadata.name);
+    const volumes = [...pod.volumes.map((volume) => volume.name), ...claims].sort();
+    for (const container of pod.containers) {
+      assert.deepEqual(container.volumeMounts.map(({ name }) => name).sort(), volumes, nameOf(workload));
+      const values = [...Object.values(environmentOf(objects, container)), ...(container.args ?? [])].filter((value) => value?.startsWith("/"));
+      if (isOurs(container)) {
+        for (const path of [...image.volumes, ...values, "/tmp"]) checkPath(objects, workload, container, path);
+        if (componentOf(workload) === "server") assert.ok(claims.includes(checkPath(objects, workload, container, image.environment.CLOTHSTREAM_STATE_DIR).name));
+        continue;
+      }
+      const config = container.args.at(-1);
+      checkPath(objects, workload, container, config);
+      const text = natsConfiguration(objects);
+      for (const [path] of text.matchAll(/\/etc\/\S+/g)) checkPath(objects, workload, container, path);
+      for (const [, path] of text.matchAll(/^include (\S+)/gm)) checkPath(objects, workload, container, join(config, "..", path));
+    }
+    for (const volume of pod.volumes) {
+      const used = volume.secret ? [{ name: volume.secret.secretName }] : (volume.projected?.sources ?? []).map(({ secret }) => secret);
+      for (const { name, items } of used) {
+        assert.ok(secrets.has(name), `docs/operations.md does not have the Secret ${name}`);
+        for (const { key } of items ?? []) assert.ok(secrets.get(name).includes(key), `${name} has no ${key}`);
+      }
+    }
+  }
+});
+
+testEach("only containers with a GPU see one", (objects, _, name) => {
+  let count = 0;
+  for (const workload of workloads(objects)) {
+    for (const container of podOf(workload).containers.filter(isOurs)) {
+      const visible = environmentOf(objects, container).NVIDIA_VISIBLE_DEVICES;
+      const gpus = container.resources.limits["nvidia.com/gpu"];
+      if (gpus === undefined) {
+        assert.equal(visible, "void");
+        continue;
+      }
+      count += gpus;
+      assert.equal(visible, image.environment.NVIDIA_VISIBLE_DEVICES); // the device plugin replaces it
+      assert.match(image.environment.NVIDIA_DRIVER_CAPABILITIES, /\bgraphics\b/);
+      assert.ok(podOf(workload).tolerations.some(({ key, operator }) => key === "nvidia.com/gpu" && operator === "Exists"));
+      assert.equal(componentOf(workload), "server");
+    }
+  }
+  assert.equal(count, ["base", "fleet without GPU"].includes(name) ? 0 : 1);
+});
+
+testEach("the autoscaler has a target", (objects) => {
+  for (const scaler of ofKind(objects, "HorizontalPodAutoscaler")) {
+    assert.equal(scaler.apiVersion, "autoscaling/v2");
+    const target = named(objects, scaler.spec.scaleTargetRef.kind, scaler.spec.scaleTargetRef.name);
+    assert.equal(target.apiVersion, scaler.spec.scaleTargetRef.apiVersion);
+    assert.equal(target.spec.replicas, undefined); // each `kubectl apply` would reset it
+    assert.ok(scaler.spec.minReplicas >= 2 && scaler.spec.maxReplicas > scaler.spec.minReplicas);
+    assert.deepEqual(scaler.spec.metrics.map(({ resource }) => resource.name), ["cpu"]);
+  }
+  assert.equal(ofKind(objects, "HorizontalPodAutoscaler").length, ofKind(objects, "Deployment").length);
+});
+
+function natsConfiguration(objects) {
+  const volume = podOf(named(objects, "StatefulSet", "clothstream-nats")).volumes.find(({ configMap }) => configMap);
+  return named(objects, "ConfigMap", volume.configMap.name).data["nats.conf"];
+}
+
+testEach("servers and edges know NATS, and its servers each other", (objects) => {
+  const nats = objects.find((object) => nameOf(object) === "StatefulSet clothstream-nats");
+  if (!nats) return;
+  for (const workload of workloads(objects)) {
+    const [container] = podOf(workload).containers;
+    if (!isOurs(container)) continue;
+    const { protocol, hostname, port } = new URL(environmentOf(objects, container).CLOTHSTREAM_NATS);
+    assert.equal(protocol, "tls:");
+    const service = named(objects, "Service", hostname);
+    assert.deepEqual(selected(objects, { matchLabels: service.spec.selector }, nameOf(service)), [nats]);
+    assert.deepEqual(service.spec.ports.map((entry) => entry.port), [Number(port)]);
+  }
+  const text = natsConfiguration(objects);
+  const ports = Object.fromEntries(podOf(nats).containers[0].ports.map(({ name, containerPort }) => [name, containerPort]));
+  const routes = [...text.matchAll(/^ +(tls:\S+)$/gm)].map((match) => match[1]);
+  assert.deepEqual(routes, Array.from({ length: nats.spec.replicas }, (_, i) => `tls://${nats.metadata.name}-${i}.${nats.spec.serviceName}:${ports.routes}`));
+  const [client, cluster] = [...text.matchAll(/^ *port: (\d+)/gm)].map((match) => Number(match[1]));
+  assert.deepEqual([client, cluster, Number(/^http_port: (\d+)/m.exec(text)[1])], [ports.nats, ports.routes, ports.monitor]);
+});
+
+async function freePorts(count) {
+  const listeners = [];
+  for (let i = 0; i < count; ++i) listeners.push(await new Promise((resolve) => { const listener = createServer().listen(0, "127.0.0.1", () => resolve(listener)); }));
+  const ports = listeners.map((listener) => listener.address().port);
+  for (const listener of listeners) await new Promise((resolve) => listener.close(resolve));
+  return ports;
+}
+
+const hasNats = spawnSync("nats-server", ["--version"]).status === 0;
+test("three NATS servers form a cluster with the configuration", { skip: hasNats ? false : "there is no nats-server", timeout: 60_000 }, async () => {
+  const text = natsConfiguration(builds["overlays/fleet"]);
+  const room = join(folder, "nats");
+  for (const name of ["tls", "accounts"]) await mkdir(join(room, name), { recursive: true });
+  const at = (name) => join(room, "tls", name);
+  execFileSync("openssl", ["req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", "/CN=nats", "-addext", "subjectAltName=DNS:localhost", "-keyout", at("tls.key"), "-out", at("tls.crt")], { stdio: "ignore" });
+  await cp(at("tls.crt"), at("ca.crt"));
+  await writeFile(join(room, "accounts/accounts.conf"), "authorization { user: tester, password: tester }\n");
+
+  const routes = await freePorts(3);
+  const processes = [];
+  const monitors = await freePorts(3);
+  const clients = await freePorts(3);
+  try {
+    for (let i = 0; i < 3; ++i) {
+      let own = text.replaceAll("/etc/nats/", `${room}/`).replace("port: 4222", `host: 127.0.0.1\nport: ${clients[i]}`);
+      own = own.replace("http_port: 8222", `http: 127.0.0.1:${monitors[i]}`).replace("port: 6222", `host: 127.0.0.1\n  port: ${routes[i]}`);
+      for (let j = 0; j < 3; ++j) own = own.replace(/tls:\/\/clothstream-nats-\d\.\S+/, `tls://localhost:${routes[j]}`);
+      await mkdir(join(room, `config${i}`));
+      await writeFile(join(room, `config${i}/nats.conf`), own);
+      const child = spawn("nats-server", ["--config", join(room, `config${i}/nats.conf`)], { env: { ...process.env, POD_NAME: `nats-${i}` }, stdio: ["ignore", "ignore", "pipe"] });
+      child.log = "";
+      child.stderr.on("data", (data) => (child.log += data));
+      processes.push(child);
+    }
+    const get = async (i, path) => (await fetch(`http://127.0.0.1:${monitors[i]}${path}`)).json();
+    const names = async (i) => (await get(i, "/routez")).routes.map((route) => route.remote_name).sort();
+    for (let i = 0; i < 3; ++i) {
+      const others = [0, 1, 2].filter((j) => j !== i).map((j) => `nats-${j}`);
+      let found;
+      do {
+        assert.equal(processes[i].exitCode, null, processes[i].log);
+        await sleep(50);
+        found = await names(i).catch(() => []);
+      } while (new Set(found).size < 2);
+      assert.deepEqual([...new Set(found)], others);
+      assert.equal((await get(i, "/healthz")).status, "ok");
+    }
+    const socket = connect(clients[0], "127.0.0.1");
+    const greeting = JSON.parse(String(await new Promise((resolve) => socket.once("data", resolve))).slice("INFO ".length));
+    socket.destroy();
+    assert.deepEqual([greeting.tls_required, greeting.auth_required, greeting.connect_urls], [true, true, undefined]);
+    assert.ok(greeting.max_payload >= 1e6);
+  } finally {
+    for (const child of processes) child.kill("SIGKILL");
+  }
+});
