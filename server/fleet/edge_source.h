@@ -32,6 +32,7 @@ class EdgeSource final : public scene::FrameSource {
   const v1::StreamDescription& description() const override { return description_; }
   std::string deviceName() const override { return deviceName_; }
   std::uint8_t qualities() const override { return qualities_; }
+  bool onlyViewed() const override { return true; }
   std::string whyFixed() const override { return "is simulated by another server, and is only shown here"; }
   void begin(scene::LiveScene& scene) override;
   void end() override;

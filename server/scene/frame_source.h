@@ -25,6 +25,8 @@ class FrameSource {
 
   // Number of qualities of each frame. 1 means a single quality, which may have any number. Constant.
   virtual std::uint8_t qualities() const { return 1; }
+  // Whether everyone in the scene is a viewer. Constant.
+  virtual bool onlyViewed() const { return false; }
   // Why participants cannot change parameters: the end of a sentence that begins with the scene. Constant.
   virtual std::string whyFixed() const = 0;
 

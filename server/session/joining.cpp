@@ -64,7 +64,8 @@ void Session::authenticate(const v1::AuthenticateRequest& request) {
 
 scene::Rights Session::rightsIn(const scene::LiveScene& scene) const {
   using scene::Ownership;
-  if (identity_->role == scene::Role::viewer) return {.ownership = Ownership::never, .onlyViews = true};
+  if (identity_->role == scene::Role::viewer || (scene.source && scene.source->onlyViewed()))
+    return {.ownership = Ownership::never, .onlyViews = true};
   if (hosting::SceneServer::State::isOfOtherTenant(*identity_, scene)) return {.ownership = Ownership::never};
   if (identity_->isVerifiedOwner()) return {.ownership = Ownership::always};
   const bool mayOwn = identity_->role == scene::Role::owner || server_.options.participantsMay.own;

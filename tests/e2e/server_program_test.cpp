@@ -457,6 +457,9 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--overload=keep",
                                        "--state-limit=500",
                                        "--tls-client-ca=ca.pem",
+                                       "--nats=nats://10.0.0.5:4222,nats://10.0.0.6:4222",
+                                       "--nats-credentials=server.creds",
+                                       "--nats-ca=nats.pem",
                                        "--state-dir=state",
                                        "--metrics-port=0",
                                        "--metrics-host=::1",
@@ -476,7 +479,8 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
     for (const char* line :
          {"\nmax-error = 0.0005\n", "\nrecord-limit = 1000000000\n", "\nhold = 1e-06\n", "\nreports = 0.25\n",
           "\nseconds = 1000000000\n", "\nscene-file = [\"one.json\", \"two, three.json\"]\n",
-          "\nparticipants-change = [\"cloths\", \"colliders\"]\n", "\ndevice = \"1\"\n"})
+          "\nparticipants-change = [\"cloths\", \"colliders\"]\n",
+          "\nnats = [\"nats://10.0.0.5:4222\", \"nats://10.0.0.6:4222\"]\n", "\ndevice = \"1\"\n"})
       EXPECT_THAT(first.output, HasSubstr(line));
     std::istringstream lines(defaults.output);
     for (std::string line; std::getline(lines, line);) {

@@ -101,6 +101,7 @@ TEST_F(EdgeTest, ViewersGetTheFramesOfTheOriginAsTheyAre) {
   TestPeer direct(server()), viewer(edge->server);
   direct.join("small");
   viewer.join("small");
+  EXPECT_EQ(viewer.welcome().role(), v1::ROLE_VIEWER);
   EXPECT_EQ(viewer.welcome().device_name(), direct.welcome().device_name());
   EXPECT_EQ(viewer.description().cloths(0).rest_positions(), direct.description().cloths(0).rest_positions());
   for (int i = 0; i < 10; ++i) {

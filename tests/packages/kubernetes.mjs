@@ -36,7 +36,7 @@ const server = process.env.CLOTHSTREAM_SERVER;
 const help = execFileSync(server, ["--help"], { encoding: "utf8" });
 const kComponent = "app.kubernetes.io/component";
 
-// What deploy/image/build_image.sh puts into the image.
+// User, volumes and variables of the image, from deploy/image/build_image.sh.
 const script = read("deploy/image/build_image.sh");
 const image = {
   user: Number(/^readonly kUser=(\d+)/m.exec(script)[1]),
@@ -440,7 +440,7 @@ async function freePorts(count) {
 }
 
 const hasNats = spawnSync("nats-server", ["--version"]).status === 0;
-test("three NATS servers form a cluster with the configuration", { skip: hasNats ? false : "there is no nats-server", timeout: 60_000 }, async () => {
+test("three NATS servers form a cluster with the configuration", { skip: hasNats ? false : "there is no nats-server" }, async () => {
   const text = natsConfiguration(builds["overlays/fleet"]);
   const room = join(folder, "nats");
   for (const name of ["tls", "accounts"]) await mkdir(join(room, name), { recursive: true });
@@ -466,16 +466,19 @@ test("three NATS servers form a cluster with the configuration", { skip: hasNats
       processes.push(child);
     }
     const get = async (i, path) => (await fetch(`http://127.0.0.1:${monitors[i]}${path}`)).json();
-    const names = async (i) => (await get(i, "/routez")).routes.map((route) => route.remote_name).sort();
+    const until = async (what, check) => {
+      for (const end = Date.now() + 30_000; !(await check().catch(() => false)); await sleep(50))
+        assert.ok(Date.now() < end, `${what} within 30 s\n${processes.map(({ log }) => log).join("\n")}`);
+    };
+    const ids = [];
+    for (let i = 0; i < 3; ++i) await until(`nats-${i} answers`, async () => (ids[i] = (await get(i, "/varz")).server_id) !== undefined);
     for (let i = 0; i < 3; ++i) {
-      const others = [0, 1, 2].filter((j) => j !== i).map((j) => `nats-${j}`);
-      let found;
-      do {
-        assert.equal(processes[i].exitCode, null, processes[i].log);
-        await sleep(50);
-        found = await names(i).catch(() => []);
-      } while (new Set(found).size < 2);
-      assert.deepEqual([...new Set(found)], others);
+      const others = ids.filter((id) => id !== ids[i]);
+      await until(`nats-${i} has two routes`, async () => {
+        const found = (await get(i, "/routez")).routes.map((route) => route.remote_id);
+        return others.every((id) => found.includes(id));
+      });
+      assert.equal((await get(i, "/varz")).server_name, `nats-${i}`);
       assert.equal((await get(i, "/healthz")).status, "ok");
     }
     const socket = connect(clients[0], "127.0.0.1");

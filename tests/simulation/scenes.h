@@ -106,8 +106,10 @@ simulation::TickInputs passingBall(const model::Scene& scene, int tick);
 // Expects the same bits after `ticks` ticks with each of these partitions of the work.
 void expectSameBits(const model::Scene& scene, InputsAt inputs, int ticks,
                     std::span<const simulation::SimulationOptions> ways);
-// Expects the same hashes in two runs of a thousand ticks, and in a hundred ticks with the options `other`.
-void expectSameThousandTicks(const model::Scene& scene, InputsAt inputs,
+// Ticks of a long run: 250, or 1,000 in the test `thousand_ticks`, which is labelled `long`.
+int longRunTicks();
+// Expects the same hashes in two long runs, and in a hundred ticks with the options `other`.
+void expectSameLongRuns(const model::Scene& scene, InputsAt inputs,
                              const simulation::SimulationOptions& other);
 // Expects the same reports of ten ticks with both options, and returns them for further checks.
 using Reports = std::vector<std::vector<simulation::ClothReport>>;

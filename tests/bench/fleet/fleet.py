@@ -1,0 +1,237 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Measures edge servers on this machine: `./dev bench fleet`.
+
+Starts nats-server, two origins that play a recording of 10 frames/s each, and three edges. Then it measures
+
+- the CPU time of an origin with 1, 60 and 600 viewers at the edges;
+- the age of frames (packet complete at the origin to arrival) of four viewers at an origin and at an edge;
+- how long viewers are without frames when nats-server, an edge and an origin are killed and started again.
+
+One viewer in twenty decodes every frame and compares its hash. Exits with 1 if any frame was wrong or a viewer was lost.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+EDGES = 3
+NATS_PORT = 24222
+CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
+
+SCENE = {
+    "simulationRate": 60,
+    "streamRate": 10,
+    "substeps": 4,
+    "cloths": [
+        {
+            "name": "sheet",
+            "grid": {"rows": 64, "columns": 64, "width": 1, "height": 1, "pose": {"position": {"y": 2}}},
+            "mass": 0.2,
+            "structural": {"stiffness": 20, "damping": 0.01},
+            "shear": {"stiffness": 5, "damping": 0.002},
+            "damping": 0.5,
+            "drag": 0.5,
+            "pins": [{"firstRow": 0, "firstColumn": 0, "lastColumn": 63, "columnStep": 63}],
+        }
+    ],
+    "environment": {"wind": {"z": 3}},
+}
+
+
+class Program:
+    """A child process, whose output goes to a file."""
+
+    def __init__(self, command, log):
+        self.command = [str(part) for part in command]
+        self.log = log
+        self.start()
+
+    def start(self):
+        self.process = subprocess.Popen(self.command, stdout=open(self.log, "ab"), stderr=subprocess.STDOUT)
+
+    def wait_for(self, text):
+        end = time.monotonic() + 60
+        while time.monotonic() < end:
+            if text in self.log.read_text(errors="replace"):
+                return
+            if self.process.poll() is not None:
+                break
+            time.sleep(0.05)
+        sys.exit(f"{' '.join(self.command)}: '{text}' did not come:\n{self.log.read_text(errors='replace')}")
+
+    def cpu_seconds(self):
+        fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / CLOCK_TICKS
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+
+    def stop(self):
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait()
+
+
+class Fleet:
+    def __init__(self, programs, folder):
+        self.programs = programs
+        self.folder = folder
+        self.started = []
+        nats = ["nats-server", "--addr", "127.0.0.1", "--port", NATS_PORT]
+        self.nats = self.run(nats, "nats", "Server is ready")
+        self.options = ["--nats", f"nats://127.0.0.1:{NATS_PORT}"]
+        self.origins = []
+        for i, name in enumerate(("first", "second")):
+            self.origins.append(self.serve(name, 25000 + 10 * i, ["play", "--loop", self.record(name)]))
+        self.edges = [self.serve(f"edge{i}", 25100 + 10 * i, ["edge"]) for i in range(EDGES)]
+        for edge in self.edges:
+            for name in ("first", "second"):
+                edge.wait_for(f"{name}: serves this scene")
+
+    def run(self, command, name, ready):
+        program = Program(command, self.folder / f"{name}.log")
+        self.started.append(program)
+        program.wait_for(ready)
+        return program
+
+    def serve(self, name, port, more):
+        limits = ["--max-connections", 2000, "--connections-per-second", 5000]
+        command = [self.programs / "clothstream-server", "--port", port, "--grpc-port", port + 1, *limits, *self.options, *more]
+        program = self.run(command, name, "gRPC ")
+        program.address = f"127.0.0.1:{port + 1}"
+        return program
+
+    def record(self, name):
+        """Records 20 seconds of the scene, and returns the file."""
+        scene = self.folder / f"{name}.json"
+        scene.write_text(json.dumps({"name": name, **SCENE}))
+        recordings = self.folder / f"{name}-recordings"
+        recordings.mkdir()
+        command = [self.programs / "clothstream-server", "--port", 0, "--grpc-port", 0, "--scene-file", scene, "--scene", name]
+        command += ["--always-run", "--record", recordings, "--seconds", 20]
+        subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        return next(recordings.glob("*.mcap"))
+
+    def load(self, address, scene, viewers, seconds, decoders=None):
+        command = [self.programs / "clothstream", "load", address, "--scene", scene, "--participants", viewers, "--viewers", viewers]
+        command += ["--seconds", seconds, "--joins", 200, "--json", "--decoders", decoders or max(1, viewers // 20)]
+        return subprocess.Popen([str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def stop(self):
+        for program in reversed(self.started):
+            if program.process.poll() is None:
+                program.stop()
+
+
+def result_of(load):
+    out, errors = load.communicate()
+    if load.returncode != 0:
+        sys.exit(f"the load test failed with {load.returncode}: {errors}{out}")
+    result = json.loads(out)
+    wrong = result["hashMismatches"] + result["decodeErrors"]
+    if wrong or result["lost"]:
+        sys.exit(f"{wrong} frames were wrong, {result['lost']} viewers lost")
+    return result
+
+
+def crowd(fleet, viewers, seconds):
+    """Viewers at the edges, divided among edges and scenes. Returns CPU time per second and frames per second."""
+    groups = []
+    share = [(edge, scene) for edge in fleet.edges for scene in ("first", "second")]
+    for i, (edge, scene) in enumerate(share):
+        mine = viewers // len(share) + (1 if i < viewers % len(share) else 0)
+        if mine:
+            groups.append(fleet.load(edge.address, scene, mine, seconds))
+    time.sleep(3 + viewers / 400)  # all have joined
+    before = [origin.cpu_seconds() for origin in fleet.origins]
+    start = time.monotonic()
+    time.sleep(max(1, seconds - 4))
+    took = time.monotonic() - start
+    cpu = [(origin.cpu_seconds() - then) / took for origin, then in zip(fleet.origins, before)]
+    results = [result_of(group) for group in groups]
+    joined = sum(result["joined"] for result in results)
+    if joined != viewers:
+        sys.exit(f"{joined} of {viewers} viewers joined")
+    frames = min(result["framesPerSecond"] for result in results)
+    return {"viewers": viewers, "originCpu": cpu[0], "framesPerSecond": frames}
+
+
+def gap(fleet, lost, lose, come_back):
+    """Longest time between two frames of a viewer at the first edge, while `lost` is away for a second."""
+    edge = fleet.edges[0]
+    command = [fleet.programs / "clothstream", "join", edge.address, "--scene", "first", "--seconds", 15]
+    command += ["--events", "--frames"]
+    viewer = subprocess.Popen([str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    start = time.monotonic()
+    times, state = [], 0
+    for line in viewer.stdout:
+        now = time.monotonic()
+        if '"frame"' in line:
+            times.append(now)
+        if state == 0 and now - start > 3:
+            threading.Thread(target=lambda: (lose(), time.sleep(1), come_back())).start()
+            state = 1
+    viewer.wait()
+    gaps = [later - earlier for earlier, later in zip(times, times[1:])]
+    if not gaps or time.monotonic() - times[-1] > 2:
+        sys.exit(f"no frames came back after {lost} was lost (exit code {viewer.returncode})")
+    return {"lost": lost, "longestGapSeconds": max(gaps)}
+
+
+def restart(program, ready):
+    program.log.write_text("")
+    program.start()
+    program.wait_for(ready)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--programs", type=pathlib.Path, required=True, help="folder of clothstream and clothstream-server")
+    parser.add_argument("--seconds", type=float, default=20, help="time of each measurement (default: %(default)s)")
+    parser.add_argument("--json", type=pathlib.Path, help="file for the figures")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="clothstream-fleet-") as folder:
+        fleet = Fleet(arguments.programs, pathlib.Path(folder))
+        try:
+            figures = measure(fleet, arguments.seconds)
+        finally:
+            fleet.stop()
+    if arguments.json:
+        arguments.json.write_text(json.dumps(figures, indent=2) + "\n")
+
+
+def measure(fleet, seconds):
+    origin, edge = fleet.origins[0], fleet.edges[0]
+    print("| viewers at 3 edges | CPU of an origin | slowest frames/s |\n|---|---|---|")
+    crowds = []
+    for viewers in (1, 60, 600):
+        crowds.append(crowd(fleet, viewers, seconds))
+        row = crowds[-1]
+        print(f"| {viewers} | {100 * row['originCpu']:.2f} % | {row['framesPerSecond']:.2f} |", flush=True)
+
+    print("\n| four viewers at | age of frames p50, ms | p99, ms |\n|---|---|---|")
+    ages = {}
+    for name, server in (("the origin", origin), ("an edge", edge)):
+        result = result_of(fleet.load(server.address, "first", 4, seconds, 4))
+        ages[name] = (result["frameAgeMsP50"], result["frameAgeMsP99"])
+        print(f"| {name} | {ages[name][0]:.2f} | {ages[name][1]:.2f} |", flush=True)
+
+    print("\n| killed for a second | longest time without a frame, s |\n|---|---|")
+    gaps = []
+    for lost, program, ready in (("nats-server", fleet.nats, "Server is ready"), ("the edge", edge, "gRPC "),
+                                 ("the origin", origin, "gRPC ")):
+        gaps.append(gap(fleet, lost, program.kill, lambda program=program, ready=ready: restart(program, ready)))
+        print(f"| {lost} | {gaps[-1]['longestGapSeconds']:.2f} |", flush=True)
+    return {"crowds": crowds, "frameAgeMs": ages, "gaps": gaps}
+
+
+if __name__ == "__main__":
+    main()
