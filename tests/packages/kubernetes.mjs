@@ -127,9 +127,10 @@ test("objects have no unknown fields", () => {
   const lines = Object.values(builds)
     .flat()
     .map((object) => `(${JSON.stringify(object)}) satisfies import("kubernetes-models/${object.apiVersion}/${object.kind}").I${object.kind};`);
-  const problems = compile(lines);
-  assert.deepEqual(problems, []);
-  assert.equal(compile(lines.map((line) => line.replace('"metadata":', '"metadatas":'))).length, lines.length);
+  const misspelt = lines.find((line) => line.includes('"readinessProbe":')).replace('"readinessProbe":', '"readynessProbe":');
+  const problems = compile([...new Set(lines), misspelt]);
+  assert.deepEqual(problems.filter((problem) => !problem.includes("readynessProbe")), []);
+  assert.equal(problems.length, 1);
 });
 
 function compile(lines) {
@@ -305,12 +306,17 @@ const isComing = (option) => (option.startsWith("--nats") && !listed("--nats")) 
 const optionOf = (variable) => `--${variable.replace("CLOTHSTREAM_", "").toLowerCase().replaceAll("_", "-")}`;
 
 // Options that the server has with the variables and arguments of a container.
+const printed = new Map();
 function effective(objects, container) {
   const known = Object.entries(environmentOf(objects, container)).filter(([name]) => name.startsWith("CLOTHSTREAM_") && !isComing(optionOf(name)));
   const args = (container.args ?? []).filter((arg) => arg.startsWith("-") && !isComing(arg.split("=")[0]));
-  const { status, stdout, stderr } = spawnSync(server, [...args, "--print-config"], { encoding: "utf8", env: Object.fromEntries(known) });
-  assert.deepEqual([status, stderr], [0, ""]);
-  return Object.fromEntries([...stdout.matchAll(/^([\w-]+) = (.*)$/gm)].map(([, name, value]) => [name, JSON.parse(value)]));
+  const key = JSON.stringify([known, args]);
+  if (!printed.has(key)) {
+    const { status, stdout, stderr } = spawnSync(server, [...args, "--print-config"], { encoding: "utf8", env: Object.fromEntries(known) });
+    assert.deepEqual([status, stderr], [0, ""]);
+    printed.set(key, Object.fromEntries([...stdout.matchAll(/^([\w-]+) = (.*)$/gm)].map(([, name, value]) => [name, JSON.parse(value)])));
+  }
+  return printed.get(key);
 }
 
 testEach("the server has every option", (objects, t) => {

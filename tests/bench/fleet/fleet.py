@@ -143,7 +143,7 @@ def result_of(load):
 
 
 def crowd(fleet, viewers, seconds):
-    """Viewers at the edges, divided among edges and scenes. Returns CPU time per second and frames per second."""
+    """Viewers at the edges, divided among edges and scenes. CPU times are seconds per second."""
     groups = []
     share = [(edge, scene) for edge in fleet.edges for scene in ("first", "second")]
     for i, (edge, scene) in enumerate(share):
@@ -151,17 +151,18 @@ def crowd(fleet, viewers, seconds):
         if mine:
             groups.append(fleet.load(edge.address, scene, mine, seconds))
     time.sleep(3 + viewers / 400)  # all have joined
-    before = [origin.cpu_seconds() for origin in fleet.origins]
+    programs = [fleet.origins[0], fleet.nats, fleet.edges[0]]
+    before = [program.cpu_seconds() for program in programs]
     start = time.monotonic()
     time.sleep(max(1, seconds - 4))
     took = time.monotonic() - start
-    cpu = [(origin.cpu_seconds() - then) / took for origin, then in zip(fleet.origins, before)]
+    cpu = [(program.cpu_seconds() - then) / took for program, then in zip(programs, before)]
     results = [result_of(group) for group in groups]
     joined = sum(result["joined"] for result in results)
     if joined != viewers:
         sys.exit(f"{joined} of {viewers} viewers joined")
     frames = min(result["framesPerSecond"] for result in results)
-    return {"viewers": viewers, "originCpu": cpu[0], "framesPerSecond": frames}
+    return {"viewers": viewers, "originCpu": cpu[0], "natsCpu": cpu[1], "edgeCpu": cpu[2], "framesPerSecond": frames}
 
 
 def gap(fleet, lost, lose, come_back):
@@ -210,12 +211,13 @@ def main():
 
 def measure(fleet, seconds):
     origin, edge = fleet.origins[0], fleet.edges[0]
-    print("| viewers at 3 edges | CPU of an origin | slowest frames/s |\n|---|---|---|")
+    print("| viewers at 3 edges | CPU of an origin | of nats-server | of an edge | slowest frames/s |\n|---|---|---|---|---|")
     crowds = []
     for viewers in (1, 60, 600):
         crowds.append(crowd(fleet, viewers, seconds))
         row = crowds[-1]
-        print(f"| {viewers} | {100 * row['originCpu']:.2f} % | {row['framesPerSecond']:.2f} |", flush=True)
+        cpu = " | ".join(f"{100 * row[name]:.2f} %" for name in ("originCpu", "natsCpu", "edgeCpu"))
+        print(f"| {viewers} | {cpu} | {row['framesPerSecond']:.2f} |", flush=True)
 
     print("\n| four viewers at | age of frames p50, ms | p99, ms |\n|---|---|---|")
     ages = {}
