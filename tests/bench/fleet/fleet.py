@@ -29,7 +29,7 @@ CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 SCENE = {
     "simulationRate": 60,
     "streamRate": 10,
-    "substeps": 4,
+    "substeps": 32,
     "cloths": [
         {
             "name": "sheet",
@@ -85,6 +85,8 @@ class Fleet:
         self.programs = programs
         self.folder = folder
         self.started = []
+
+    def start(self):
         nats = ["nats-server", "--addr", "127.0.0.1", "--port", NATS_PORT]
         self.nats = self.run(nats, "nats", "Server is ready")
         self.options = ["--nats", f"nats://127.0.0.1:{NATS_PORT}"]
@@ -117,7 +119,9 @@ class Fleet:
         recordings.mkdir()
         command = [self.programs / "clothstream-server", "--port", 0, "--grpc-port", 0, "--scene-file", scene, "--scene", name]
         command += ["--always-run", "--record", recordings, "--seconds", 20]
-        subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        made = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+        if made.returncode != 0:
+            sys.exit(f"the recording failed: {made.stderr}")
         return next(recordings.glob("*.mcap"))
 
     def load(self, address, scene, viewers, seconds, decoders=None):
@@ -202,6 +206,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="clothstream-fleet-") as folder:
         fleet = Fleet(arguments.programs, pathlib.Path(folder))
         try:
+            fleet.start()
             figures = measure(fleet, arguments.seconds)
         finally:
             fleet.stop()
