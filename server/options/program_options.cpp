@@ -349,6 +349,21 @@ void addFleetOptions(OptionTable& table, ProgramOptions& options) {
              "Credentials of this server for NATS (JWT and seed)");
   table.text("--nats-ca", options.natsAuthority, "FILE",
              "Require TLS for NATS, with a certificate of an authority in this PEM file");
+  table.flag("--agones", options.isGameServer,
+             "Be a game server of Agones in Kubernetes: tell its sidecar, at the port AGONES_SDK_HTTP_PORT (9358), that "
+             "the server is ready, healthy or in use, and what it carries");
+}
+
+// Port of the sidecar. Throws OptionError.
+std::uint16_t agonesPort() {
+  const char* const text = std::getenv("AGONES_SDK_HTTP_PORT");
+  if (text == nullptr || *text == '\0') return ProgramOptions().agonesPort;
+  std::uint16_t port = 0;
+  const std::string_view whole(text);
+  const auto [rest, error] = std::from_chars(whole.data(), whole.data() + whole.size(), port);
+  if (error != std::errc() || rest != whole.data() + whole.size() || port == 0)
+    throw OptionError(fmt::format("AGONES_SDK_HTTP_PORT: '{}' is not a port; Agones sets it to 1 to 65535", whole));
+  return port;
 }
 
 CLI::App& addEdgeCommand(OptionTable& table) {
@@ -633,6 +648,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     if (serves && !parsed.printConfig && !parsed.printMarkdown && !parsed.listDevices &&
         !parsed.listMaterials)
       checkIdentity(options);
+    if (options.isGameServer) options.agonesPort = agonesPort();
     if (edge.parsed() && options.natsServers.empty())
       throw OptionError("edge: --nats URL is missing: the NATS servers that the other servers use");
     if (edge.parsed() && app.get_option("--scene")->count() == 0) options.server.defaultScene.clear();

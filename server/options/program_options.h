@@ -81,6 +81,9 @@ struct ProgramOptions {
   std::vector<std::string> natsServers;                 // empty: this server is alone
   std::filesystem::path natsCredentials, natsAuthority;  // empty: none
 
+  bool isGameServer = false;        // of Agones
+  std::uint16_t agonesPort = 9358;  // of the sidecar's REST interface
+
   // Identity of peers.
   std::filesystem::path tokenKeys;  // directory; empty: none
   std::string tokenAudience = "clothstream";

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/agones/agones.h"
 #include "server/discovery/announcement.h"
 #include "server/endpoint/grpc/grpc_endpoint.h"
 #include "server/endpoint/web/web_endpoint.h"
@@ -116,6 +117,8 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Prog
                                      .encrypted = tls != nullptr,
                                      .fingerprint = options.tlsSelf ? tls->fingerprint() : "",
                                      .version = kServerName});
+    std::optional<agones::Agones> gameServer;
+    if (options.isGameServer) gameServer.emplace(server, options.agonesPort);
     const std::optional<SteadyTime> stopAt = start.finish();
     if (!stopAt) waitForStop(signals, options, tls.get(), authenticator, report);
     spdlog::info("stopping");

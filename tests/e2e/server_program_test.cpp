@@ -460,6 +460,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--nats=nats://10.0.0.5:4222,nats://10.0.0.6:4222",
                                        "--nats-credentials=server.creds",
                                        "--nats-ca=nats.pem",
+                                       "--agones",
                                        "--state-dir=state",
                                        "--metrics-port=0",
                                        "--metrics-host=::1",
