@@ -3,16 +3,15 @@
 // refer to each other, options of the server, rights, and a cluster of three NATS servers with their configuration.
 
 import assert from "node:assert/strict";
-import { execFileSync, spawn, spawnSync } from "node:child_process";
+import { execFileSync, spawnSync } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
 import { cp, mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { createRequire } from "node:module";
-import { connect, createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { setTimeout as sleep } from "node:timers/promises";
 import { fileURLToPath } from "node:url";
+import { clusterGreeting } from "./nats_cluster.mjs";
 
 const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
 const source = fileURLToPath(new URL("../../", import.meta.url));
@@ -25,7 +24,7 @@ function skip(reason) {
 }
 if (spawnSync("kubectl", ["version", "--client"]).status !== 0) skip("there is no kubectl (apt install kubernetes-client)");
 for (const name of [join(room, "node_modules/kubernetes-models"), join(room, "node_modules/yaml"), join(web, "node_modules/typescript")])
-  if (!existsSync(name)) skip(`${name} is missing; the build installs it (ninja test_kubernetes clothstream_npm)`);
+  if (!existsSync(name)) skip(`${name} is missing; the build installs it (ninja test_kubernetes)`);
 
 const { parseAllDocuments } = await import("yaml");
 const ts = createRequire(join(web, "package.json"))("typescript");
@@ -111,7 +110,7 @@ const portsOf = (workload) => podOf(workload).containers.flatMap((container) => 
 // Runs a check for each build.
 function testEach(title, check) {
   test(title, async (t) => {
-    for (const [name, objects] of Object.entries(builds)) await t.test(name, (t) => check(objects, t, name));
+    for (const [name, objects] of Object.entries(builds)) await t.test(name, () => check(objects, name));
   });
 }
 
@@ -129,19 +128,31 @@ test("objects have no unknown fields", () => {
     .map((object) => `(${JSON.stringify(object)}) satisfies import("kubernetes-models/${object.apiVersion}/${object.kind}").I${object.kind};`);
   const misspelt = lines.find((line) => line.includes('"readinessProbe":')).replace('"readinessProbe":', '"readynessProbe":');
   const problems = compile([...new Set(lines), misspelt]);
-  assert.deepEqual(problems.filter((problem) => !problem.includes("readynessProbe")), []);
+  assert.deepEqual(
+    problems.filter((problem) => !problem.includes("readynessProbe")),
+    [],
+  );
   assert.equal(problems.length, 1);
 });
 
 function compile(lines) {
-  const options = { strict: true, noEmit: true, skipLibCheck: true, types: [], module: ts.ModuleKind.ESNext, moduleResolution: ts.ModuleResolutionKind.Bundler };
+  const options = {
+    strict: true,
+    noEmit: true,
+    skipLibCheck: true,
+    types: [],
+    module: ts.ModuleKind.ESNext,
+    moduleResolution: ts.ModuleResolutionKind.Bundler,
+  };
   const file = join(room, "objects.ts"); // in memory
   const host = ts.createCompilerHost(options);
   const { getSourceFile, fileExists } = host;
   host.fileExists = (name) => name === file || fileExists.call(host, name);
   host.getSourceFile = (name, ...rest) =>
     name === file ? ts.createSourceFile(name, lines.join("\n"), ts.ScriptTarget.ES2022) : getSourceFile.call(host, name, ...rest);
-  return ts.getPreEmitDiagnostics(ts.createProgram([file], options, host)).map((problem) => ts.flattenDiagnosticMessageText(problem.messageText, "\n"));
+  return ts
+    .getPreEmitDiagnostics(ts.createProgram([file], options, host))
+    .map((problem) => ts.flattenDiagnosticMessageText(problem.messageText, "\n"));
 }
 
 testEach("everything is in the namespace, which restricts pods", (objects) => {
@@ -153,7 +164,10 @@ testEach("everything is in the namespace, which restricts pods", (objects) => {
 
 testEach("images are those of this version, or NATS", (objects) => {
   for (const { image } of workloads(objects).flatMap((workload) => podOf(workload).containers))
-    assert.match(image, new RegExp(`^(\\S+\\.example\\.\\w+/clothstream-server:${version.replaceAll(".", "\\.")}|docker\\.io/library/nats:\\d[\\w.-]*)$`));
+    assert.match(
+      image,
+      new RegExp(`^([\\w.-]+\\.example\\.\\w+/clothstream-server:${version.replaceAll(".", "\\.")}|docker\\.io/library/nats:\\d[\\w.-]*)$`),
+    );
 });
 
 testEach("pods have no rights that they do not need", (objects) => {
@@ -171,7 +185,11 @@ testEach("pods have no rights that they do not need", (objects) => {
       if (isOurs(container)) assert.deepEqual([pod.securityContext.runAsUser, pod.securityContext.runAsGroup], [image.user, image.user]);
       assert.deepEqual(container.securityContext, { allowPrivilegeEscalation: false, readOnlyRootFilesystem: true, capabilities: { drop: ["ALL"] } });
     }
-    for (const volume of pod.volumes) assert.match(Object.keys(volume).find((key) => key !== "name"), /^(configMap|emptyDir|projected|secret)$/);
+    for (const volume of pod.volumes)
+      assert.match(
+        Object.keys(volume).find((key) => key !== "name"),
+        /^(configMap|emptyDir|projected|secret)$/,
+      );
   }
 });
 
@@ -239,7 +257,11 @@ testEach("selectors find pods with these ports", (objects) => {
     const [workload, ...others] = selected(objects, { matchLabels: service.spec.selector }, nameOf(service));
     assert.deepEqual(others, []);
     for (const { targetPort } of service.spec.ports) assert.ok(portsOf(workload).includes(targetPort), `${nameOf(service)}: ${targetPort}`);
-    if (service.spec.type === "LoadBalancer") assert.deepEqual(service.spec.ports.map(({ targetPort }) => targetPort), ["web"]);
+    if (service.spec.type === "LoadBalancer")
+      assert.deepEqual(
+        service.spec.ports.map(({ targetPort }) => targetPort),
+        ["web"],
+      );
   }
   const budgets = ofKind(objects, "PodDisruptionBudget").map((budget) => {
     const [workload, ...others] = selected(objects, budget.spec.selector, nameOf(budget));
@@ -284,11 +306,20 @@ testEach("network policies let in and out what is needed", (objects) => {
   };
   for (const workload of workloads(objects)) {
     const own = policies.filter((policy) => matches(policy.spec.podSelector, workload.spec.template.metadata.labels));
-    for (const direction of ["Ingress", "Egress"]) assert.ok(own.some((policy) => policy.spec.policyTypes.includes(direction)), `${nameOf(workload)} has no policy for ${direction}`);
-    for (const port of portsOf(workload)) assert.deepEqual(senders(objects, workload, port), kAllowed[componentOf(workload)][port], `${nameOf(workload)}: ${port}`);
+    for (const direction of ["Ingress", "Egress"])
+      assert.ok(
+        own.some((policy) => policy.spec.policyTypes.includes(direction)),
+        `${nameOf(workload)} has no policy for ${direction}`,
+      );
+    for (const port of portsOf(workload))
+      assert.deepEqual(senders(objects, workload, port), kAllowed[componentOf(workload)][port], `${nameOf(workload)}: ${port}`);
     const receivers = own
       .flatMap((policy) => policy.spec.egress ?? [])
-      .flatMap((rule) => (rule.to ? rule.to.flatMap((peer) => selected(objects, peer.podSelector, nameOf(workload)).map(componentOf)) : rule.ports.map(({ port }) => port)));
+      .flatMap((rule) =>
+        rule.to
+          ? rule.to.flatMap((peer) => selected(objects, peer.podSelector, nameOf(workload)).map(componentOf))
+          : rule.ports.map(({ port }) => port),
+      );
     assert.deepEqual(receivers, workloads(objects).length > 1 ? ["nats", 53, 53] : []);
   }
 });
@@ -302,14 +333,13 @@ function environmentOf(objects, container) {
 }
 
 const listed = (option) => new RegExp(`^ +(-\\w,)?${option}\\b`, "m").test(help);
-const isComing = (option) => (option.startsWith("--nats") && !listed("--nats")) || (option === "edge" && !listed("edge"));
 const optionOf = (variable) => `--${variable.replace("CLOTHSTREAM_", "").toLowerCase().replaceAll("_", "-")}`;
 
 // Options that the server has with the variables and arguments of a container.
 const printed = new Map();
 function effective(objects, container) {
-  const known = Object.entries(environmentOf(objects, container)).filter(([name]) => name.startsWith("CLOTHSTREAM_") && !isComing(optionOf(name)));
-  const args = (container.args ?? []).filter((arg) => arg.startsWith("-") && !isComing(arg.split("=")[0]));
+  const known = Object.entries(environmentOf(objects, container)).filter(([name]) => name.startsWith("CLOTHSTREAM_"));
+  const args = container.args ?? [];
   const key = JSON.stringify([known, args]);
   if (!printed.has(key)) {
     const { status, stdout, stderr } = spawnSync(server, [...args, "--print-config"], { encoding: "utf8", env: Object.fromEntries(known) });
@@ -319,22 +349,26 @@ function effective(objects, container) {
   return printed.get(key);
 }
 
-testEach("the server has every option", (objects, t) => {
-  for (const container of workloads(objects).flatMap((workload) => podOf(workload).containers).filter(isOurs)) {
-    const options = Object.keys(environmentOf(objects, container)).filter((name) => name.startsWith("CLOTHSTREAM_")).map(optionOf);
+testEach("the server has every option", (objects) => {
+  for (const container of workloads(objects)
+    .flatMap((workload) => podOf(workload).containers)
+    .filter(isOurs)) {
+    const options = Object.keys(environmentOf(objects, container))
+      .filter((name) => name.startsWith("CLOTHSTREAM_"))
+      .map(optionOf);
     options.push(...(container.args ?? []).map((arg) => arg.split("=")[0]));
     assert.ok(options.length > 5);
-    for (const option of options) {
-      if (isComing(option)) t.diagnostic(`skipped: this server does not have ${option} yet`);
-      else assert.ok(listed(option), `there is no option ${option}`);
-    }
+    for (const option of options) assert.ok(listed(option), `there is no option ${option}`);
     effective(objects, container);
   }
 });
 
 // Secrets and their files that operators make, from the table of the documentation.
 const secrets = new Map(
-  [...documentation.matchAll(/^\| `(clothstream-[\w-]+)` \| (.*?) \|/gm)].map(([, name, files]) => [name, [...files.matchAll(/`([\w.]+)`/g)].map((match) => match[1])]),
+  [...documentation.matchAll(/^\| `(clothstream-[\w-]+)` \| (.*?) \|/gm)].map(([, name, files]) => [
+    name,
+    [...files.matchAll(/`([\w.]+)`/g)].map((match) => match[1]),
+  ]),
 );
 
 // Fails unless a path is in a volume of the pod, and is a file that its secret or ConfigMap has.
@@ -361,7 +395,8 @@ testEach("volumes, secrets and files exist", (objects) => {
       const values = [...Object.values(environmentOf(objects, container)), ...(container.args ?? [])].filter((value) => value?.startsWith("/"));
       if (isOurs(container)) {
         for (const path of [...image.volumes, ...values, "/tmp"]) checkPath(objects, workload, container, path);
-        if (componentOf(workload) === "server") assert.ok(claims.includes(checkPath(objects, workload, container, image.environment.CLOTHSTREAM_STATE_DIR).name));
+        if (componentOf(workload) === "server")
+          assert.ok(claims.includes(checkPath(objects, workload, container, image.environment.CLOTHSTREAM_STATE_DIR).name));
         continue;
       }
       const config = container.args.at(-1);
@@ -380,7 +415,7 @@ testEach("volumes, secrets and files exist", (objects) => {
   }
 });
 
-testEach("only containers with a GPU see one", (objects, _, name) => {
+testEach("only containers with a GPU see one", (objects, name) => {
   let count = 0;
   for (const workload of workloads(objects)) {
     for (const container of podOf(workload).containers.filter(isOurs)) {
@@ -407,7 +442,10 @@ testEach("the autoscaler has a target", (objects) => {
     assert.equal(target.apiVersion, scaler.spec.scaleTargetRef.apiVersion);
     assert.equal(target.spec.replicas, undefined); // each `kubectl apply` would reset it
     assert.ok(scaler.spec.minReplicas >= 2 && scaler.spec.maxReplicas > scaler.spec.minReplicas);
-    assert.deepEqual(scaler.spec.metrics.map(({ resource }) => resource.name), ["cpu"]);
+    assert.deepEqual(
+      scaler.spec.metrics.map(({ resource }) => resource.name),
+      ["cpu"],
+    );
   }
   assert.equal(ofKind(objects, "HorizontalPodAutoscaler").length, ofKind(objects, "Deployment").length);
 });
@@ -427,72 +465,25 @@ testEach("servers and edges know NATS, and its servers each other", (objects) =>
     assert.equal(protocol, "tls:");
     const service = named(objects, "Service", hostname);
     assert.deepEqual(selected(objects, { matchLabels: service.spec.selector }, nameOf(service)), [nats]);
-    assert.deepEqual(service.spec.ports.map((entry) => entry.port), [Number(port)]);
+    assert.deepEqual(
+      service.spec.ports.map((entry) => entry.port),
+      [Number(port)],
+    );
   }
   const text = natsConfiguration(objects);
   const ports = Object.fromEntries(podOf(nats).containers[0].ports.map(({ name, containerPort }) => [name, containerPort]));
   const routes = [...text.matchAll(/^ +(tls:\S+)$/gm)].map((match) => match[1]);
-  assert.deepEqual(routes, Array.from({ length: nats.spec.replicas }, (_, i) => `tls://${nats.metadata.name}-${i}.${nats.spec.serviceName}:${ports.routes}`));
+  assert.deepEqual(
+    routes,
+    Array.from({ length: nats.spec.replicas }, (_, i) => `tls://${nats.metadata.name}-${i}.${nats.spec.serviceName}:${ports.routes}`),
+  );
   const [client, cluster] = [...text.matchAll(/^ *port: (\d+)/gm)].map((match) => Number(match[1]));
   assert.deepEqual([client, cluster, Number(/^http_port: (\d+)/m.exec(text)[1])], [ports.nats, ports.routes, ports.monitor]);
 });
 
-async function freePorts(count) {
-  const listeners = [];
-  for (let i = 0; i < count; ++i) listeners.push(await new Promise((resolve) => { const listener = createServer().listen(0, "127.0.0.1", () => resolve(listener)); }));
-  const ports = listeners.map((listener) => listener.address().port);
-  for (const listener of listeners) await new Promise((resolve) => listener.close(resolve));
-  return ports;
-}
-
 const hasNats = spawnSync("nats-server", ["--version"]).status === 0;
 test("three NATS servers form a cluster with the configuration", { skip: hasNats ? false : "there is no nats-server" }, async () => {
-  const text = natsConfiguration(builds["overlays/fleet"]);
-  const room = join(folder, "nats");
-  for (const name of ["tls", "accounts"]) await mkdir(join(room, name), { recursive: true });
-  const at = (name) => join(room, "tls", name);
-  execFileSync("openssl", ["req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", "/CN=nats", "-addext", "subjectAltName=DNS:localhost", "-keyout", at("tls.key"), "-out", at("tls.crt")], { stdio: "ignore" });
-  await cp(at("tls.crt"), at("ca.crt"));
-  await writeFile(join(room, "accounts/accounts.conf"), "authorization { user: tester, password: tester }\n");
-
-  const routes = await freePorts(3);
-  const processes = [];
-  const monitors = await freePorts(3);
-  const clients = await freePorts(3);
-  try {
-    for (let i = 0; i < 3; ++i) {
-      let own = text.replaceAll("/etc/nats/", `${room}/`).replace("port: 4222", `host: 127.0.0.1\nport: ${clients[i]}`);
-      own = own.replace("http_port: 8222", `http: 127.0.0.1:${monitors[i]}`).replace("port: 6222", `host: 127.0.0.1\n  port: ${routes[i]}`);
-      for (let j = 0; j < 3; ++j) own = own.replace(/tls:\/\/clothstream-nats-\d\.\S+/, `tls://localhost:${routes[j]}`);
-      await mkdir(join(room, `config${i}`));
-      await writeFile(join(room, `config${i}/nats.conf`), own);
-      const child = spawn("nats-server", ["--config", join(room, `config${i}/nats.conf`)], { env: { ...process.env, POD_NAME: `nats-${i}` }, stdio: ["ignore", "ignore", "pipe"] });
-      child.log = "";
-      child.stderr.on("data", (data) => (child.log += data));
-      processes.push(child);
-    }
-    const get = async (i, path) => (await fetch(`http://127.0.0.1:${monitors[i]}${path}`)).json();
-    const until = async (what, check) => {
-      for (const end = Date.now() + 30_000; !(await check().catch(() => false)); await sleep(50))
-        assert.ok(Date.now() < end, `${what} within 30 s\n${processes.map(({ log }) => log).join("\n")}`);
-    };
-    const ids = [];
-    for (let i = 0; i < 3; ++i) await until(`nats-${i} answers`, async () => (ids[i] = (await get(i, "/varz")).server_id) !== undefined);
-    for (let i = 0; i < 3; ++i) {
-      const others = ids.filter((id) => id !== ids[i]);
-      await until(`nats-${i} has two routes`, async () => {
-        const found = (await get(i, "/routez")).routes.map((route) => route.remote_id);
-        return others.every((id) => found.includes(id));
-      });
-      assert.equal((await get(i, "/varz")).server_name, `nats-${i}`);
-      assert.equal((await get(i, "/healthz")).status, "ok");
-    }
-    const socket = connect(clients[0], "127.0.0.1");
-    const greeting = JSON.parse(String(await new Promise((resolve) => socket.once("data", resolve))).slice("INFO ".length));
-    socket.destroy();
-    assert.deepEqual([greeting.tls_required, greeting.auth_required, greeting.connect_urls], [true, true, undefined]);
-    assert.ok(greeting.max_payload >= 1e6);
-  } finally {
-    for (const child of processes) child.kill("SIGKILL");
-  }
+  const greeting = await clusterGreeting(natsConfiguration(builds["overlays/fleet"]), join(folder, "nats"));
+  assert.deepEqual([greeting.tls_required, greeting.auth_required, greeting.connect_urls], [true, true, undefined]);
+  assert.ok(greeting.max_payload >= 1e6);
 });

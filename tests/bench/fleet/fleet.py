@@ -169,6 +169,24 @@ def crowd(fleet, viewers, seconds):
     return {"viewers": viewers, "originCpu": cpu[0], "natsCpu": cpu[1], "edgeCpu": cpu[2], "framesPerSecond": frames}
 
 
+def message_cost(fleet, seconds):
+    """Processor time of nats-server for one frame that it sends, from two speeds of the recordings."""
+    spent = []
+    for speed in (1, 8):
+        for origin, name in zip(fleet.origins, ("first", "second")):
+            command = [fleet.programs / "clothstream", "speed", "--server", origin.address, name, speed]
+            subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)
+        viewers = [fleet.load(edge.address, name, 1, seconds, 1) for edge in fleet.edges for name in ("first", "second")]
+        time.sleep(4)
+        before, start = fleet.nats.cpu_seconds(), time.monotonic()
+        time.sleep(max(1, seconds - 6))
+        spent.append((fleet.nats.cpu_seconds() - before) / (time.monotonic() - start))
+        for viewer in viewers:
+            result_of(viewer)
+    messages = [len(fleet.edges) * 2 * SCENE["streamRate"] * speed for speed in (1, 8)]
+    return (spent[1] - spent[0]) / (messages[1] - messages[0])
+
+
 def gap(fleet, lost, lose, come_back):
     """Longest time between two frames of a viewer at the first edge, while `lost` is away for a second."""
     edge = fleet.edges[0]
@@ -237,7 +255,9 @@ def measure(fleet, seconds):
                                  ("the origin", origin, "gRPC ")):
         gaps.append(gap(fleet, lost, program.kill, lambda program=program, ready=ready: restart(program, ready)))
         print(f"| {lost} | {gaps[-1]['longestGapSeconds']:.2f} |", flush=True)
-    return {"crowds": crowds, "frameAgeMs": ages, "gaps": gaps}
+    cost = message_cost(fleet, seconds)
+    print(f"\nnats-server takes {1e6 * cost:.1f} us of processor time for one frame that it sends to one edge.", flush=True)
+    return {"crowds": crowds, "frameAgeMs": ages, "natsSecondsOfFrame": cost, "gaps": gaps}
 
 
 if __name__ == "__main__":
