@@ -99,7 +99,8 @@ void Agones::tellScenes(const std::set<std::string>& names) {
     told = gone ? scenesTold_.erase(told) : std::next(told);
   }
   for (const std::string& name : names)
-    if (!scenesTold_.contains(name) && done("list", sidecar_.addToList(kScenes, name))) scenesTold_.insert(name);
+    if (!scenesTold_.contains(name) && done("list", sidecar_.addToList(kScenes, name)))
+      scenesTold_.insert(name);
 }
 
 bool Agones::isUnknown(const std::string& name, Answer answer) {

@@ -17,23 +17,25 @@
 
 namespace clothstream::agones {
 
-// Names of counters and of the list in the GameServer's specification. Those that it does not have are left out.
+// Names of counters and of the list in the GameServer's specification. Those that it does not have are left
+// out.
 inline constexpr const char* kParticipants = "participants";  // connected ones; capacity: room in all scenes
 inline constexpr const char* kCreatedScenes = "created-scenes";
-inline constexpr const char* kLoad = "load";  // price of what clients added, ms of the device's time per second
+inline constexpr const char* kLoad =
+    "load";  // price of what clients added, ms of the device's time per second
 inline constexpr const char* kScenes = "scenes";  // list of the names of all scenes
 
-// Tells the sidecar that the server is ready, every two seconds that it is healthy, and once per second what has
-// changed of counters and list. While the server has participants or scenes that clients created, it is allocated, so
-// that Agones does not end it; 30 seconds after the last of them it is ready again.
+// Tells the sidecar that the server is ready, every two seconds that it is healthy, and once per second what
+// has changed of counters and list. While the server has participants or scenes that clients created, it is
+// allocated, so that Agones does not end it; 30 seconds after the last of them it is ready again.
 //
 // Calls are made on a thread of its own. A sidecar that does not answer is asked again.
 class Agones {
  public:
   static constexpr std::chrono::seconds kPeriod{1}, kHealthPeriod{2}, kStaysAllocated{30};
 
-  // The server must outlive it. `deviceSilence`: the server counts as healthy if its device thread has answered
-  // within this time.
+  // The server must outlive it. `deviceSilence`: the server counts as healthy if its device thread has
+  // answered within this time.
   Agones(hosting::SceneServer& server, std::uint16_t port,
          schedule::Clock::duration deviceSilence = std::chrono::seconds(5));
   // Asks Agones to end the pod.

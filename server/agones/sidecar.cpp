@@ -45,13 +45,15 @@ Sidecar::Answer Sidecar::call(const char* method, const std::string& path, const
     if (error) failure = error;
     return !error;
   };
-  stream.async_connect(tcp::endpoint(asio::ip::address_v4::loopback(), port_), [&](beast::error_code connected) {
-    if (!onError(connected)) return;
-    http::async_write(stream, request, [&](beast::error_code written, std::size_t) {
-      if (!onError(written)) return;
-      http::async_read(stream, buffer, parser, [&](beast::error_code read, std::size_t) { onError(read); });
-    });
-  });
+  stream.async_connect(tcp::endpoint(asio::ip::address_v4::loopback(), port_),
+                       [&](beast::error_code connected) {
+                         if (!onError(connected)) return;
+                         http::async_write(stream, request, [&](beast::error_code written, std::size_t) {
+                           if (!onError(written)) return;
+                           http::async_read(stream, buffer, parser,
+                                            [&](beast::error_code read, std::size_t) { onError(read); });
+                         });
+                       });
   context.run();
   if (failure) {
     problem_ = failure.message();

@@ -76,8 +76,8 @@ class Mailbox {
   void subscribe(std::shared_ptr<const DescriptionChunks> description, const StreamShape& shape,
                  telemetry::SceneMetrics& metrics, OperatingPoint wanted = {0, codec::kMaxTemporalLayers});
   void deliver(const PublishedFrame& frame);
-  // If the subscriber needs a key frame and has room for it: gives it `frames`, which were published before: a
-  // key frame in its quality and those that follow, at most kMaxHeld in all.
+  // If the subscriber needs a key frame and has room for it: gives it `frames`, which were published before:
+  // a key frame in its quality and those that follow, at most kMaxHeld in all.
   void deliver(std::span<const PublishedFrame> frames);
   // Returns what the subscriber asks of the next frame. Call it whenever a frame is made, because it also
   // measures the time in which the subscriber gets no frames.

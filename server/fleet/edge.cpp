@@ -75,12 +75,16 @@ SharedBytes standsStill(const scene::LiveScene& scene, const char* why) {
 class Edge::Stream {
  public:
   Stream(Edge& edge, std::uint64_t origin, const v1::OfferedScene& offered)
-      : origin_(origin), edge_(edge), offered_(offered), name_(offered.summary().name()),
-        subject_(streamSubject(name_, offered.stream())), inbox_(Nats::inbox()) {
-    events_ = edge.nats_.subscribe(eventsSubject(subject_), [this](const auto&, const auto&, auto data) { event(data); });
-    chunks_ = edge.nats_.subscribe(inbox_, [&edge, stream = id()](const auto&, const auto&, auto data) {
-      edge.arrive(stream, data);
-    });
+      : origin_(origin),
+        edge_(edge),
+        offered_(offered),
+        name_(offered.summary().name()),
+        subject_(streamSubject(name_, offered.stream())),
+        inbox_(Nats::inbox()) {
+    events_ = edge.nats_.subscribe(eventsSubject(subject_),
+                                   [this](const auto&, const auto&, auto data) { event(data); });
+    chunks_ = edge.nats_.subscribe(
+        inbox_, [&edge, stream = id()](const auto&, const auto&, auto data) { edge.arrive(stream, data); });
     sendInterest(Clock::now());
     ask(Clock::now());
   }
@@ -100,7 +104,8 @@ class Edge::Stream {
       received_ = 0;
     }
     if (chunk.content_id() != content_ || chunk.index() != received_ ||
-        chunk.total_bytes() > kMaxDescriptionBytes || description_.size() + chunk.data().size() > chunk.total_bytes())
+        chunk.total_bytes() > kMaxDescriptionBytes ||
+        description_.size() + chunk.data().size() > chunk.total_bytes())
       return false;
     description_ += chunk.data();
     ++received_;
@@ -117,10 +122,12 @@ class Edge::Stream {
     description_ = {};
     chunks_.reset();
     if (!problem.empty()) {
-      telemetry::log({name_}, spdlog::level::warn, "the scene that another server offers is not shown: {}", problem);
+      telemetry::log({name_}, spdlog::level::warn, "the scene that another server offers is not shown: {}",
+                     problem);
       return false;
     }
-    auto source = std::make_shared<EdgeSource>(offered_, std::move(description), [&edge = edge_] { edge.wake(); });
+    auto source =
+        std::make_shared<EdgeSource>(offered_, std::move(description), [&edge = edge_] { edge.wake(); });
     scene_ = edge_.server_.add(name_, source);
     scene_->paused = offered_.summary().paused();
     const std::lock_guard lock(mutex_);
@@ -149,7 +156,8 @@ class Edge::Stream {
     const delivery::RequestedFrames needed = source_->needs(now);
     receiveFrames(needed.qualities, now);
     const bool more = needed.qualities != sent_.qualities || (needed.keyFrames & ~sent_.keyFrames) != 0;
-    const auto period = needed.keyFrames != 0 ? Clock::duration(kKeyFramePeriod) : Clock::duration(kInterestPeriod);
+    const auto period =
+        needed.keyFrames != 0 ? Clock::duration(kKeyFramePeriod) : Clock::duration(kInterestPeriod);
     if (!more && now - interestSent_ < period) {
       sent_.keyFrames &= needed.keyFrames;
       return;
@@ -184,11 +192,12 @@ class Edge::Stream {
       const bool needed = (qualities >> quality & 1) != 0;
       if (needed) frames.neededAt = now;
       if (needed && !frames.subscription)
-        frames.subscription = edge_.nats_.subscribe(
-            framesPattern(subject_, single ? std::nullopt : std::optional(quality)),
-            [this](const auto&, const auto&, auto data) {
-              if (!source_->receiveFrame(data)) edge_.server_.state().metrics.nats.refused.add();
-            });
+        frames.subscription =
+            edge_.nats_.subscribe(framesPattern(subject_, single ? std::nullopt : std::optional(quality)),
+                                  [this](const auto&, const auto&, auto data) {
+                                    if (!source_->receiveFrame(data))
+                                      edge_.server_.state().metrics.nats.refused.add();
+                                  });
       if (frames.subscription && now - frames.neededAt > kQualityTime) {
         frames.subscription.reset();
         source_->forgetFrames();
@@ -205,7 +214,7 @@ class Edge::Stream {
   }
 
   void receive(std::span<const std::byte> data) {
-  if (!source_->receiveEvent(data)) edge_.server_.state().metrics.nats.refused.add();
+    if (!source_->receiveEvent(data)) edge_.server_.state().metrics.nats.refused.add();
   }
 
   struct Frames {
@@ -299,7 +308,8 @@ void Edge::run() {
           continue;
         }
         for (auto& [name, known] : scenes_)
-          if (known->next && known->next->id() == arrival.stream && known->next->receiveChunk(*arrival.bytes, now))
+          if (known->next && known->next->id() == arrival.stream &&
+              known->next->receiveChunk(*arrival.bytes, now))
             serve(*known);
       }
       look(now);
@@ -351,8 +361,8 @@ void Edge::handle(std::uint64_t origin, const v1::OfferedScene& offered, Clock::
 void Edge::serve(Known& known) {
   if (!known.next->serve()) return;
   if (known.served)
-    known.served->end(delivery::error(v1::ERROR_CODE_CUT_OFF,
-                                      "the scene began again at the server that simulates it: join again", true));
+    known.served->end(delivery::error(
+        v1::ERROR_CODE_CUT_OFF, "the scene began again at the server that simulates it: join again", true));
   known.served = std::move(known.next);
   known.lost = false;
   telemetry::log({known.served->scene()->name()}, spdlog::level::info, "serves this scene of another server");

@@ -25,12 +25,13 @@ class OfferedScene;
 
 namespace clothstream::fleet {
 
-// Adds the scenes that origins offer to a server without scenes of its own, and asks the origins for the frames that
-// the viewers need. If two origins offer scenes of the same name, the first one counts as long as it is offered.
+// Adds the scenes that origins offer to a server without scenes of its own, and asks the origins for the
+// frames that the viewers need. If two origins offer scenes of the same name, the first one counts as long as
+// it is offered.
 //
-// Without NATS or without the origin of a scene, its viewers stay and read why the picture stands still. They go on
-// with a key frame when both are back. An origin that has started again has another stream: viewers are then
-// disconnected once and join again. A scene whose origin does not come back is removed after `keep`.
+// Without NATS or without the origin of a scene, its viewers stay and read why the picture stands still. They
+// go on with a key frame when both are back. An origin that has started again has another stream: viewers are
+// then disconnected once and join again. A scene whose origin does not come back is removed after `keep`.
 class Edge {
  public:
   static constexpr std::size_t kMaxScenes = 4096;

@@ -49,9 +49,10 @@ void EdgeSource::wake() {
 }
 
 messages::Result<void> EdgeSource::control(const v1::ControlSceneRequest& request) {
-  return tl::unexpected(messages::FieldError{
-      v1::ERROR_CODE_INVALID_ARGUMENT,
-      fmt::format("controlScene: '{}' {}; send this to the server that simulates it", request.name(), whyFixed())});
+  return tl::unexpected(
+      messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
+                           fmt::format("controlScene: '{}' {}; send this to the server that simulates it",
+                                       request.name(), whyFixed())});
 }
 
 std::optional<v1::Playback> EdgeSource::playback() const {
@@ -102,7 +103,8 @@ void EdgeSource::keep(const delivery::PublishedFrame& frame) {
     kept = {frame};
     return;
   }
-  const bool follows = std::ranges::find(kept, frame.referenceTick, &delivery::PublishedFrame::tick) != kept.end();
+  const bool follows =
+      std::ranges::find(kept, frame.referenceTick, &delivery::PublishedFrame::tick) != kept.end();
   if (follows && kept.size() < delivery::Mailbox::kMaxHeld)
     kept.push_back(frame);
   else

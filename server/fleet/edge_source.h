@@ -66,7 +66,7 @@ class EdgeSource final : public scene::FrameSource {
   scene::LiveScene* scene_ = nullptr;
   std::optional<v1::Playback> playback_;
   recording::ParametersInForce parameters_;
-  std::array<std::optional<std::uint64_t>, codec::kMaxQualities> newest_;              // tick
+  std::array<std::optional<std::uint64_t>, codec::kMaxQualities> newest_;             // tick
   std::array<std::vector<delivery::PublishedFrame>, codec::kMaxQualities> sinceKey_;  // empty: not kept
   Clock::time_point newestTime_{};
 };

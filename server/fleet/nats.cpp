@@ -14,8 +14,8 @@ namespace clothstream::fleet {
 namespace {
 
 // Milliseconds.
-constexpr std::int64_t kReconnectWait = 250, kReconnectJitter = 100, kPingInterval = 2000, kWriteDeadline = 2000,
-                       kConnectTimeout = 2000;
+constexpr std::int64_t kReconnectWait = 250, kReconnectJitter = 100, kPingInterval = 2000,
+                       kWriteDeadline = 2000, kConnectTimeout = 2000;
 constexpr int kMaxPingsOut = 2;
 constexpr std::chrono::milliseconds kLookAgain{1};
 constexpr std::size_t kCostOfMessage = 256;  // bytes counted besides its data
@@ -222,7 +222,8 @@ std::unique_ptr<Nats::Subscription> Nats::subscribe(const std::string& subject, 
           fmt::format("NATS: {}", subject));
   made->handle_ = subscription;
   require(natsSubscription_SetPendingLimits(subscription, kMaxPending, kMaxPendingBytes), "NATS");
-  require(natsSubscription_SetOnCompleteCB(subscription, &Subscription::Receiver::complete, closure.get()), "NATS");
+  require(natsSubscription_SetOnCompleteCB(subscription, &Subscription::Receiver::complete, closure.get()),
+          "NATS");
   closure.release();
   return made;
 }

@@ -25,19 +25,20 @@ namespace clothstream::fleet {
 struct NatsOptions {
   std::vector<std::string> servers;   // such as nats://127.0.0.1:4222, or tls://...
   std::filesystem::path credentials;  // file with JWT and seed of a NATS user; empty: none
-  std::filesystem::path authority;    // PEM file of the authorities of the servers' certificates; empty: the system's
-  std::string name;                   // of this program, for the servers' lists of connections
+  std::filesystem::path
+      authority;     // PEM file of the authorities of the servers' certificates; empty: the system's
+  std::string name;  // of this program, for the servers' lists of connections
 };
 
 // Thread-safe. Connects again as often as it takes; servers that cannot be reached are not an error.
 class Nats {
  public:
   // `reply` is empty, or the subject for an answer.
-  using Handler =
-      std::function<void(const std::string& subject, const std::string& reply, std::span<const std::byte> data)>;
+  using Handler = std::function<void(const std::string& subject, const std::string& reply,
+                                     std::span<const std::byte> data)>;
 
-  // Ends with its destructor, which waits for a running handler. Must not be destroyed by its own handler, nor
-  // after the connection.
+  // Ends with its destructor, which waits for a running handler. Must not be destroyed by its own handler,
+  // nor after the connection.
   class Subscription {
    public:
     ~Subscription();
@@ -58,8 +59,8 @@ class Nats {
   static constexpr int kMaxPending = 1024;
   static constexpr int kMaxPendingBytes = 64 << 20;
 
-  // Counts into `metrics`, which must outlive the connection. Throws std::runtime_error for options that cannot be
-  // used, such as a file that cannot be read.
+  // Counts into `metrics`, which must outlive the connection. Throws std::runtime_error for options that
+  // cannot be used, such as a file that cannot be read.
   Nats(const NatsOptions& options, telemetry::NatsMetrics& metrics);
   ~Nats();
   Nats(const Nats&) = delete;
@@ -68,8 +69,8 @@ class Nats {
   bool connected() const;
   // Queues a message and returns at once. Without connection, or beyond kMaxWaiting, the message is dropped.
   void publish(std::string subject, delivery::SharedBytes data, std::string reply = {});
-  // All handlers of the process run on one thread. While there is no connection, nothing arrives; the subscription
-  // continues with the next connection. `subject` may have the wildcards of NATS.
+  // All handlers of the process run on one thread. While there is no connection, nothing arrives; the
+  // subscription continues with the next connection. `subject` may have the wildcards of NATS.
   std::unique_ptr<Subscription> subscribe(const std::string& subject, Handler handler);
   // Subject for answers to one request.
   static std::string inbox();

@@ -42,7 +42,8 @@ class SceneRelay final : public delivery::Relay {
       const auto bit = static_cast<std::uint8_t>(qualities_ > 1 ? 1u << frame.quality : ~0u);
       if ((neededLocked(Clock::now()).qualities & bit) == 0) return;
       if (frame.key)
-        for (auto& [edge, interest] : interests_) interest.frames.keyFrames &= static_cast<std::uint8_t>(~bit);
+        for (auto& [edge, interest] : interests_)
+          interest.frames.keyFrames &= static_cast<std::uint8_t>(~bit);
     }
     nats_.publish(framesSubject(stream_, frame.quality, frame.layer), frame.message);
   }
@@ -113,8 +114,8 @@ struct Origin::Stream {
       if (!parse(data, message)) return;
       if (relay->hear(message, Clock::now())) server.state().wake(*scene);
     });
-    description =
-        nats.subscribe(descriptionSubject(subject), [this, &nats](const auto&, const std::string& reply, auto data) {
+    description = nats.subscribe(
+        descriptionSubject(subject), [this, &nats](const auto&, const std::string& reply, auto data) {
           v1::ChunkRequest request;
           if (reply.empty() || !parse(data, request)) return;
           const std::shared_ptr<const delivery::DescriptionChunks> chunks = scene->description();
@@ -135,7 +136,10 @@ struct Origin::Stream {
 };
 
 Origin::Origin(hosting::SceneServer& server, const NatsOptions& options)
-    : server_(server), id_(randomId()), nats_(options, server.state().metrics.nats), thread_([this] { run(); }) {}
+    : server_(server),
+      id_(randomId()),
+      nats_(options, server.state().metrics.nats),
+      thread_([this] { run(); }) {}
 
 Origin::~Origin() {
   {

@@ -15,10 +15,11 @@
 
 namespace clothstream::fleet {
 
-// Each frame and event of a scene is sent once, whatever the number of edges, and only while an edge needs it.
+// Each frame and event of a scene is sent once, whatever the number of edges, and only while an edge needs
+// it.
 //
-// Offered are the default scene, scenes from files, created scenes and a recording that is played, but neither the
-// other built-in scenes, which every server has, nor recordings in lockstep.
+// Offered are the default scene, scenes from files, created scenes and a recording that is played, but
+// neither the other built-in scenes, which every server has, nor recordings in lockstep.
 class Origin {
  public:
   // The server must outlive it.

@@ -49,8 +49,8 @@ SceneServer::SceneServer(ServerOptions options) {
 
 std::shared_ptr<scene::LiveScene> SceneServer::add(std::string name,
                                                    std::shared_ptr<scene::FrameSource> source) {
-  auto scene = std::make_shared<scene::LiveScene>(std::move(name), std::move(source),
-                                                  state_->options.maxConnections);
+  auto scene =
+      std::make_shared<scene::LiveScene>(std::move(name), std::move(source), state_->options.maxConnections);
   scene->source->begin(*scene);
   state_->insert(scene);
   return scene;

@@ -136,16 +136,16 @@ class SceneServer {
   // Server of one scene that is not simulated; it is the default scene. Needs no device and can create no
   // other scenes.
   SceneServer(std::string name, std::shared_ptr<scene::FrameSource> source, ServerOptions options);
-  // Server without scenes, of which add() makes some. Needs no device and can create no others. A peer that names
-  // no scene gets options.defaultScene or, if that is empty, the first one.
+  // Server without scenes, of which add() makes some. Needs no device and can create no others. A peer that
+  // names no scene gets options.defaultScene or, if that is empty, the first one.
   explicit SceneServer(ServerOptions options);
   // Stops. Every session must have ended.
   ~SceneServer();
   SceneServer(const SceneServer&) = delete;
   SceneServer& operator=(const SceneServer&) = delete;
 
-  // Adds a scene that is not simulated. While there is another one of this name, peers get that. It has room for as
-  // many participants as the server for connections.
+  // Adds a scene that is not simulated. While there is another one of this name, peers get that. It has room
+  // for as many participants as the server for connections.
   std::shared_ptr<scene::LiveScene> add(std::string name, std::shared_ptr<scene::FrameSource> source);
   // Ends such a scene, with this as the last message to its participants.
   void remove(const std::shared_ptr<scene::LiveScene>& scene, const delivery::SharedBytes& last);

@@ -94,8 +94,8 @@ struct SceneServer::State {
   void flushStore(const scene::LiveScene& scene) const;
   void stop();
 
-  // Viewers of a scene that is not simulated have numbers above this one, so that they differ from the participants
-  // in its frames.
+  // Viewers of a scene that is not simulated have numbers above this one, so that they differ from the
+  // participants in its frames.
   static constexpr std::uint64_t kFirstViewer = std::uint64_t{1} << 32;
 
   const ServerOptions options;

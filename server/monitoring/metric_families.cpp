@@ -218,17 +218,17 @@ Families serverFamilies(hosting::SceneServer& server) {
   };
   gauge("clothstream_nats_connected", "1 while there is a connection to NATS, else 0.",
         metrics.nats.connected ? 1 : 0);
-  MetricFamily& natsMessages =
-      add(families, MetricType::Counter, "clothstream_nats_messages_total",
-          "Messages through NATS: sent, received, dropped on this side, or refused because they do not belong to "
-          "their stream.");
+  MetricFamily& natsMessages = add(
+      families, MetricType::Counter, "clothstream_nats_messages_total",
+      "Messages through NATS: sent, received, dropped on this side, or refused because they do not belong to "
+      "their stream.");
   for (const auto& [kind, counted] : {std::pair{"sent", &metrics.nats.published},
                                       {"received", &metrics.nats.received},
                                       {"dropped", &metrics.nats.dropped},
                                       {"refused", &metrics.nats.refused}})
     addSample(natsMessages, static_cast<double>(counted->value()), {{"kind", kind}});
-  MetricFamily& natsBytes =
-      add(families, MetricType::Counter, "clothstream_nats_bytes_total", "Bytes of the messages through NATS.");
+  MetricFamily& natsBytes = add(families, MetricType::Counter, "clothstream_nats_bytes_total",
+                                "Bytes of the messages through NATS.");
   addSample(natsBytes, static_cast<double>(metrics.nats.publishedBytes.value()), {{"kind", "sent"}});
   addSample(natsBytes, static_cast<double>(metrics.nats.receivedBytes.value()), {{"kind", "received"}});
   total("clothstream_state_writes_total", "Writes to the database of kept scenes.", store.writes);

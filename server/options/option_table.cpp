@@ -310,20 +310,23 @@ void OptionTable::describe(std::string& page, const Row& row) const {
 
 std::string OptionTable::toMarkdown() const {
   std::string page, group;
-  const CLI::App* app = nullptr;
   for (const Row& row : rows_) {
-    if (row.app != app || row.option->get_group() != group) {
+    if (row.app != &program_) continue;
+    if (row.option->get_group() != group) {
       group = row.option->get_group();
-      if (row.app != &program_ && row.app != app) {
-        page += fmt::format("\n## Command `{}`\n\n", row.app->get_name());
-        appendWrapped(page, "", row.app->get_description() + ".");
-      } else if (row.app == &program_) {
-        page += fmt::format("\n## {}\n", group);
-      }
-      page += '\n';
-      app = row.app;
+      page += fmt::format("\n## {}\n\n", group);
     }
     describe(page, row);
+  }
+  for (const CLI::App* command : program_.get_subcommands({})) {
+    page += fmt::format("\n## Command `{}`\n\n", command->get_name());
+    appendWrapped(page, "", command->get_description() + ".");
+    bool first = true;
+    for (const Row& row : rows_) {
+      if (row.app != command) continue;
+      if (std::exchange(first, false)) page += '\n';
+      describe(page, row);
+    }
   }
   return page;
 }

@@ -340,17 +340,18 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
 
 void addFleetOptions(OptionTable& table, ProgramOptions& options) {
   table.group("Other servers");
-  CLI::Option* servers =
-      table.list("--nats", options.natsServers, "URL",
-                 "Offer the scenes of this server to edge servers through NATS, such as nats://10.0.0.5:4222; may "
-                 "be repeated, or a comma-separated list. Built-in scenes other than --scene are not offered");
+  CLI::Option* servers = table.list(
+      "--nats", options.natsServers, "URL",
+      "Offer the scenes of this server to edge servers through NATS, such as nats://10.0.0.5:4222; may "
+      "be repeated, or a comma-separated list. Built-in scenes other than --scene are not offered");
   servers->delimiter(',')->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   table.text("--nats-credentials", options.natsCredentials, "FILE",
              "Credentials of this server for NATS (JWT and seed)");
   table.text("--nats-ca", options.natsAuthority, "FILE",
              "Require TLS for NATS, with a certificate of an authority in this PEM file");
   table.flag("--agones", options.isGameServer,
-             "Be a game server of Agones in Kubernetes: tell its sidecar, at the port AGONES_SDK_HTTP_PORT (9358), that "
+             "Be a game server of Agones in Kubernetes: tell its sidecar, at the port AGONES_SDK_HTTP_PORT "
+             "(9358), that "
              "the server is ready, healthy or in use, and what it carries");
 }
 
@@ -362,13 +363,13 @@ std::uint16_t agonesPort() {
   const std::string_view whole(text);
   const auto [rest, error] = std::from_chars(whole.data(), whole.data() + whole.size(), port);
   if (error != std::errc() || rest != whole.data() + whole.size() || port == 0)
-    throw OptionError(fmt::format("AGONES_SDK_HTTP_PORT: '{}' is not a port; Agones sets it to 1 to 65535", whole));
+    throw OptionError(
+        fmt::format("AGONES_SDK_HTTP_PORT: '{}' is not a port; Agones sets it to 1 to 65535", whole));
   return port;
 }
 
 CLI::App& addEdgeCommand(OptionTable& table) {
-  CLI::App& command =
-      table.command("edge", "Serve scenes of other servers to more viewers. Needs no device");
+  CLI::App& command = table.command("edge", "Serve scenes of other servers to more viewers. Needs no device");
   command.footer(
       "Options of clothstream-server for participants, network and log apply too; --nats is required, and\n"
       "--scene is the default scene: without it, clients that name none get the first one.");

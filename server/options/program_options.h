@@ -23,7 +23,18 @@ inline constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VER
 // Exit code after SIGINT or SIGTERM, as shells use it.
 inline constexpr int kInterrupted = 130;
 
-enum class Command { serve, play, edge, resimulate, step, printScene, token, doctor, listDevices, listMaterials };
+enum class Command {
+  serve,
+  play,
+  edge,
+  resimulate,
+  step,
+  printScene,
+  token,
+  doctor,
+  listDevices,
+  listMaterials
+};
 
 // Options of the command `token`.
 struct TokenOptions {
@@ -78,7 +89,7 @@ struct ProgramOptions {
   std::filesystem::path tlsCertificate, tlsKey, tlsClientCa;  // empty: none
 
   // Other servers.
-  std::vector<std::string> natsServers;                 // empty: this server is alone
+  std::vector<std::string> natsServers;                  // empty: this server is alone
   std::filesystem::path natsCredentials, natsAuthority;  // empty: none
 
   bool isGameServer = false;        // of Agones

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // `clothstream-server edge`: scenes of other servers, served through both endpoints.
+#include "server/fleet/edge.h"
+
 #include <memory>
 #include <string>
 
 #include <fmt/format.h>
 
-#include "server/fleet/edge.h"
 #include "server/hosting/scene_server.h"
 #include "server/program/authentication.h"
 #include "server/program/commands.h"
@@ -24,9 +25,10 @@ int edge(const ProgramOptions& options, const Signals& signals) {
   serverOptions.authenticator = makeAuthenticator(options);
   hosting::SceneServer server(serverOptions);
   const fleet::Edge shown(server, natsOptions(options), serverOptions.reconnectGrace.place);
-  guard = openEndpoints(server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
-                        fmt::format("shows   scenes of other servers, by {}\n", fmt::join(options.natsServers, ", ")),
-                        [&] { return server.report(); });
+  guard = openEndpoints(
+      server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
+      fmt::format("shows   scenes of other servers, by {}\n", fmt::join(options.natsServers, ", ")),
+      [&] { return server.report(); });
   return 0;
 }
 

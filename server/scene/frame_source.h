@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Source of a scene's frames that is not a simulation of this server: a recording that is played, or another server.
+// Source of a scene's frames that is not a simulation of this server: a recording that is played, or another
+// server.
 #pragma once
 
 #include <cstdint>

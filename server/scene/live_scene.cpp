@@ -212,9 +212,10 @@ messages::Result<void> LiveScene::countChangeLocked(std::uint64_t participant, c
 
 messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
   if (source)
-    return tl::unexpected(messages::FieldError{
-        v1::ERROR_CODE_INVALID_ARGUMENT,
-        fmt::format("parameterChange: '{}' {}; its parameters cannot be changed", name(), source->whyFixed())});
+    return tl::unexpected(
+        messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
+                             fmt::format("parameterChange: '{}' {}; its parameters cannot be changed", name(),
+                                         source->whyFixed())});
   const std::lock_guard lock(mutex_);
   if (auto counted = countChangeLocked(participant, "parameterChange"); !counted) return counted;
   messages::Result<model::ParameterChange> change =

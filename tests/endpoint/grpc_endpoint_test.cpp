@@ -329,6 +329,7 @@ std::unique_ptr<RpcStream> getMeshWithoutReading(std::uint16_t port) {
   request.set_name("mesh");
   call->send(request.SerializeAsString());
   call->sendDone();
+  call->awaitAnswer();
   return call;
 }
 

@@ -82,6 +82,11 @@ StreamEnd RpcStream::end() {
   return {status.error_code(), status.error_message()};
 }
 
+void RpcStream::awaitAnswer() {
+  call_->ReadInitialMetadata(this);
+  if (!await("an answer")) throw std::runtime_error("the call ended without an answer");
+}
+
 void RpcStream::sendDone() {
   call_->WritesDone(this);
   await("end of sending");

@@ -49,6 +49,8 @@ class RpcStream final : public Client {
 
   // Closes the client's half of the stream.
   void sendDone();
+  // Waits until the server has begun to answer. Call it before receive().
+  void awaitAnswer();
   // Status with which the server ended the stream.
   grpc::Status finish();
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Frames that an edge keeps for viewers that join, and messages that it refuses.
+#include "server/fleet/edge_source.h"
+
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,7 +10,6 @@
 
 #include "clothstream/v1/fleet.pb.h"
 #include "proto/codec/packet_header.h"
-#include "server/fleet/edge_source.h"
 #include "server/fleet/message_bytes.h"
 #include "server/scene/live_scene.h"
 
@@ -30,13 +31,14 @@ v1::StreamDescription description() {
 class EdgeSourceTest : public ::testing::Test {
  protected:
   EdgeSourceTest()
-      : source_(std::make_shared<EdgeSource>(v1::OfferedScene{}, description(), [] {})), scene_("small", source_) {
+      : source_(std::make_shared<EdgeSource>(v1::OfferedScene{}, description(), [] {})),
+        scene_("small", source_) {
     source_->begin(scene_);
   }
 
   // A frame with only a header. `reference` 0: a key frame.
-  static delivery::SharedBytes frame(std::uint64_t tick, std::uint64_t reference = 0, std::uint8_t quality = 0,
-                                     std::uint32_t epoch = 1) {
+  static delivery::SharedBytes frame(std::uint64_t tick, std::uint64_t reference = 0,
+                                     std::uint8_t quality = 0, std::uint32_t epoch = 1) {
     codec::PacketHeader header;
     header.epoch = epoch;
     header.tick = tick;
@@ -80,7 +82,8 @@ class EdgeSourceTest : public ::testing::Test {
 };
 
 TEST_F(EdgeSourceTest, AViewerGetsTheKeyFrameAndTheFramesSince) {
-  for (const auto& message : {frame(10), frame(11, 10), frame(12, 11)}) EXPECT_TRUE(source_->receiveFrame(*message));
+  for (const auto& message : {frame(10), frame(11, 10), frame(12, 11)})
+    EXPECT_TRUE(source_->receiveFrame(*message));
   const auto viewer = join();
   EXPECT_EQ(source_->needs(Clock::now()).keyFrames, 0);
   EXPECT_EQ(ticksIn(*viewer), (std::vector<std::uint64_t>{10, 11, 12}));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Viewers on an edge: what they see of a scene that another server simulates, and what they see when a part of the
-// fleet is lost.
+// Viewers on an edge: what they see of a scene that another server simulates, and what they see when a part
+// of the fleet is lost.
+#include "server/fleet/edge.h"
+
 #include <algorithm>
 #include <chrono>
 #include <map>
@@ -14,7 +16,6 @@
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/fleet.pb.h"
-#include "server/fleet/edge.h"
 #include "server/fleet/message_bytes.h"
 #include "server/fleet/origin.h"
 #include "server/fleet/subjects.h"
@@ -38,7 +39,9 @@ class EdgeTest : public tests::ServerTest {
     if (!nats_) GTEST_SKIP() << "there is no nats-server (apt install nats-server)";
   }
 
-  NatsOptions natsOptions() const { return {.servers = {nats_->url()}, .credentials = {}, .authority = {}, .name = "test"}; }
+  NatsOptions natsOptions() const {
+    return {.servers = {nats_->url()}, .credentials = {}, .authority = {}, .name = "test"};
+  }
 
   void startOrigin(hosting::ServerOptions options = {}) {
     options.guestScenes = {"other"};
@@ -166,7 +169,7 @@ TEST_F(EdgeTest, ParametersAreThoseOfTheOrigin) {
   viewer.change(change);
   const auto refused = viewer.readUntil(v1::ServerMessage::kError);
   EXPECT_FALSE(refused.error().fatal());
-  EXPECT_THAT(refused.error().text(), HasSubstr("simulated by another server"));
+  EXPECT_THAT(refused.error().text(), HasSubstr("yours is viewer"));
 }
 
 TEST_F(EdgeTest, AnOriginSleepsWhenNobodyWatches) {

@@ -255,7 +255,7 @@ int longRunTicks() {
 }
 
 void expectSameLongRuns(const model::Scene& scene, InputsAt inputs,
-                             const simulation::SimulationOptions& other) {
+                        const simulation::SimulationOptions& other) {
   Running one(scene), again(scene), differently(scene, other);
   for (int tick = 0; tick < longRunTicks(); ++tick) {
     const simulation::TickInputs now = inputs(scene, tick);

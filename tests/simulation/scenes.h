@@ -110,7 +110,7 @@ void expectSameBits(const model::Scene& scene, InputsAt inputs, int ticks,
 int longRunTicks();
 // Expects the same hashes in two long runs, and in a hundred ticks with the options `other`.
 void expectSameLongRuns(const model::Scene& scene, InputsAt inputs,
-                             const simulation::SimulationOptions& other);
+                        const simulation::SimulationOptions& other);
 // Expects the same reports of ten ticks with both options, and returns them for further checks.
 using Reports = std::vector<std::vector<simulation::ClothReport>>;
 Reports expectSameReports(const model::Scene& scene, InputsAt inputs,
