@@ -107,11 +107,12 @@ TEST_F(EdgeTest, ViewersGetTheFramesOfTheOriginAsTheyAre) {
   EXPECT_EQ(viewer.welcome().role(), v1::ROLE_VIEWER);
   EXPECT_EQ(viewer.welcome().device_name(), direct.welcome().device_name());
   EXPECT_EQ(viewer.description().cloths(0).rest_positions(), direct.description().cloths(0).rest_positions());
-  for (int i = 0; i < 10; ++i) {
+  // A slow machine leaves out frames, and not the same ones for both.
+  for (int i = 0; i < 100 && sameFrames(direct, viewer) < 20; ++i) {
     viewer.readFrames(4);
     direct.readFrames(4);
   }
-  EXPECT_GT(sameFrames(direct, viewer), 20u);
+  EXPECT_GE(sameFrames(direct, viewer), 20u);
 }
 
 TEST_F(EdgeTest, OneStreamServesAllViewers) {
