@@ -39,6 +39,8 @@ constexpr auto kKeyFramePeriod = 100ms;
 constexpr auto kAskAgain = 2s;
 // An origin that has offered nothing for this long counts as lost.
 constexpr auto kOfferTime = 3s;
+// Every origin has offered its scenes after this time.
+constexpr auto kFirstOffers = 1500ms;
 // Frames of a quality that no viewer needs any more are received for this long.
 constexpr auto kQualityTime = 5s;
 // Messages that wait for the thread, and events that wait for a description. Further ones are dropped.
@@ -269,6 +271,13 @@ Edge::~Edge() {
   for (auto& [name, known] : scenes_)
     for (auto* stream : {&known->served, &known->next})
       if (*stream) (*stream)->end(nullptr);
+}
+
+void Edge::waitForOffers() const {
+  const Clock::time_point start = Clock::now();
+  const auto waited = [&] { return Clock::now() - start; };
+  while (waited() < kPatience && (waited() < kFirstOffers || server_.state().scenesNow().empty()))
+    std::this_thread::sleep_for(kLookPeriod);
 }
 
 void Edge::arrive(std::uint64_t stream, std::span<const std::byte> bytes) {

@@ -2,6 +2,7 @@
 // Scenes of other servers, which this server shows to its viewers.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -34,12 +35,15 @@ namespace clothstream::fleet {
 // then disconnected once and join again. A scene whose origin does not come back is removed after `keep`.
 class Edge {
  public:
+  static constexpr std::chrono::seconds kPatience{3};
   static constexpr std::size_t kMaxScenes = 4096;
   static constexpr std::size_t kMaxDescriptionBytes = std::size_t{256} << 20;
 
   // The server must outlive it.
   Edge(hosting::SceneServer& server, const NatsOptions& options, schedule::Clock::duration keep);
   ~Edge();
+  // Returns when all origins have had time to offer their scenes, or after kPatience without any.
+  void waitForOffers() const;
   Edge(const Edge&) = delete;
   Edge& operator=(const Edge&) = delete;
 

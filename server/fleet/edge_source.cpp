@@ -147,11 +147,14 @@ void EdgeSource::forgetFrames() {
 delivery::RequestedFrames EdgeSource::needs(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (scene_ == nullptr || scene_->subscribers.size() == 0) return {};
-  if (now - newestTime_ > kStillTime) scene_->running = false;
+  const bool still = now - newestTime_ > kStillTime;
+  if (still) scene_->running = false;
   if (scene_->subscribers.needsKeyFrame() != 0)
     for (const auto& kept : sinceKey_)
       if (!kept.empty()) scene_->subscribers.publishAgain(kept);
   delivery::RequestedFrames needed = scene_->subscribers.requested(now);
+  // A recording that its origin stopped for a lack of viewers continues when a viewer needs a key frame.
+  if (still && !scene_->paused) needed.keyFrames |= needed.qualities;
   if (qualities_ == 1) {
     needed.qualities = needed.qualities != 0 ? 1 : 0;
     needed.keyFrames = needed.keyFrames != 0 ? 1 : 0;

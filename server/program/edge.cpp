@@ -25,6 +25,7 @@ int edge(const ProgramOptions& options, const Signals& signals) {
   serverOptions.authenticator = makeAuthenticator(options);
   hosting::SceneServer server(serverOptions);
   const fleet::Edge shown(server, natsOptions(options), serverOptions.reconnectGrace.place);
+  shown.waitForOffers();  // clients that come back to an edge that starts again find their scenes
   guard = openEndpoints(
       server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
       fmt::format("shows   scenes of other servers, by {}\n", fmt::join(options.natsServers, ", ")),
