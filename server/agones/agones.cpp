@@ -106,7 +106,7 @@ void Agones::tellScenes(const std::set<std::string>& names) {
 bool Agones::isUnknown(const std::string& name, Answer answer) {
   if (answer != Answer::unknown) return false;
   unknown_.insert(name);
-  spdlog::info("Agones: the GameServer has no counter or list '{}', so it is not told", name);
+  spdlog::info("Agones: the GameServer has no counter or list '{}'; it is left out", name);
   return true;
 }
 

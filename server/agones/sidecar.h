@@ -34,7 +34,7 @@ class Sidecar {
   // Values in the list. Empty if the answer is not `ok`.
   Answer list(const std::string& name, std::vector<std::string>& values);
 
-  // Of the newest call that was refused or had no answer.
+  // Explains the newest call that was refused or had no answer.
   const std::string& problem() const { return problem_; }
 
  private:

@@ -7,7 +7,7 @@
 
 namespace clothstream::delivery {
 
-// Such as the link to edge servers. Thread-safe; calls must not block.
+// The link to edge servers is one. Thread-safe; calls must not block.
 class Relay {
  public:
   virtual ~Relay() = default;

@@ -30,7 +30,7 @@ constexpr auto kInterestTime = 3s;
 // Edges that one scene remembers. Further ones are not heard.
 constexpr std::size_t kMaxEdges = 1024;
 
-// What the edges need of one scene, and the way of its frames to them.
+// Collects what the edges need of one scene, and sends its frames to them.
 class SceneRelay final : public delivery::Relay {
  public:
   SceneRelay(Nats& nats, std::string stream, std::uint8_t qualities)
