@@ -32,6 +32,7 @@ server/session     | server/hosting server/identity server/scene server/delivery
 server/recording   | server/encode server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
 server/fleet       | server/hosting server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
 server/agones      | server/hosting server/scene server/schedule
+server/events      | proto/text server/scene server/schedule
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls
 server/discovery   | proto/discovery
@@ -40,8 +41,8 @@ server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
-server/options     | proto/recording server/hosting server/recording server/step server/scene server/model
-server/program     | server/agones server/fleet proto/recording server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
+server/options     | proto/recording server/events server/hosting server/recording server/step server/scene server/model
+server/program     | server/agones server/events server/fleet proto/recording server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
 server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
@@ -63,12 +64,12 @@ clients/cli        | proto/text proto/discovery clients/core clients/recording c
 readonly OUTSIDE='
 <vulkan/           | server/vulkan server/simulation server/encode
 <grpcpp/           | server/endpoint/grpc clients/grpc clients/load
-<boost/beast       | server/agones server/endpoint/web server/monitoring clients/websocket
+<boost/beast       | server/agones server/events server/endpoint/web server/monitoring clients/websocket
 <prometheus/       | server/monitoring
-<openssl/          | proto/tls server/tls server/identity server/scene
+<openssl/          | proto/tls server/tls server/identity server/events server/scene
 <jwt.h>            | server/identity
 <sqlite3           | server/saved_state
-<boost/asio/ssl    | server/tls server/endpoint/web clients/websocket
+<boost/asio/ssl    | server/tls server/events server/endpoint/web clients/websocket
 <windows.h         | clients/websocket/winhttp
 <winhttp.h         | clients/websocket/winhttp
 <wincrypt.h        | clients/websocket/winhttp

@@ -17,6 +17,7 @@
 #include "clients/cli/discover.h"
 #include "clients/cli/error.h"
 #include "clients/cli/exit_code.h"
+#include "clients/cli/fleet.h"
 #include "clients/cli/identity_commands.h"
 #include "clients/cli/join.h"
 #include "clients/cli/list.h"
@@ -254,6 +255,8 @@ int run(int argc, char** argv) {
   listCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
       ->capture_default_str();
   listCommand.add_flag("--json", listOptions.json, "Print a JSON array");
+  FleetCommands fleetCommands;
+  fleetCommands.add(app, listCommand);
 
   DiscoverCommand discoverCommand;
   discoverCommand.add(app);
@@ -304,6 +307,7 @@ int run(int argc, char** argv) {
   }
   blockEndingSignals();
   if (discoverCommand.parsed()) return discoverCommand.run();
+  if (fleetCommands.parsed()) return fleetCommands.run(listOptions.json);
   if (motionCommands.parsed()) return motionCommands.run();
   if (comparisonCommands.parsed()) return comparisonCommands.run(CLOTHSTREAM_VERSION);
   if (!recordingCommands.parsed() || recordingCommands.connects()) {

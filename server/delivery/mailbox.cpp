@@ -283,6 +283,8 @@ bool Mailbox::closed() const {
 std::optional<SharedBytes> Mailbox::next(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   std::optional<SharedBytes> message = take(now);
+  // After the end of the session the metrics may no longer exist.
+  if (message && metrics_ != nullptr && !closed_) metrics_->sentBytes.add((*message)->size());
   endpointWaits_ = !message;
   return message;
 }

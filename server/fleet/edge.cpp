@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <optional>
 #include <span>
 #include <utility>
@@ -15,6 +17,7 @@
 #include "clothstream/v1/fleet.pb.h"
 #include "proto/codec/packet_header.h"
 #include "server/fleet/edge_source.h"
+#include "server/fleet/edge_tunnel.h"
 #include "server/fleet/message_bytes.h"
 #include "server/fleet/random_id.h"
 #include "server/fleet/subjects.h"
@@ -82,15 +85,73 @@ class Edge::Stream {
         offered_(offered),
         name_(offered.summary().name()),
         subject_(streamSubject(name_, offered.stream())),
-        inbox_(Nats::inbox()) {
-    events_ = edge.nats_.subscribe(eventsSubject(subject_),
-                                   [this](const auto&, const auto&, auto data) { event(data); });
+        inbox_(Nats::inbox()),
+        tunnels_(std::make_shared<EdgeTunnels>(edge.nats_, edge.id_, subject_)) {
+    listen();
     chunks_ = edge.nats_.subscribe(
         inbox_, [&edge, stream = id()](const auto&, const auto&, auto data) { edge.arrive(stream, data); });
     sendInterest(Clock::now());
     ask(Clock::now());
   }
 
+  // A stream that continues another one, because the scene moves to its origin. Viewers get whatever comes
+  // first of both.
+  Stream(Edge& edge, std::uint64_t origin, const v1::OfferedScene& offered, const Stream& former)
+      : origin_(origin),
+        edge_(edge),
+        offered_(offered),
+        name_(offered.summary().name()),
+        subject_(streamSubject(name_, offered.stream())),
+        continues_(true),
+        scene_(former.scene_),
+        source_(former.source_),
+        tunnels_(former.tunnels_) {
+    listen();
+    look(Clock::now());
+  }
+
+  // Whether it continues another stream and has not replaced it yet.
+  bool isSuccessor() const { return continues_ && !replaced_; }
+  bool arrived() const { return arrived_; }
+  // Replaces the stream that it continues.
+  void replace() {
+    replaced_ = true;
+    source_->forgetFrames();
+    tunnels_->moveTo(subject_);
+  }
+  // Another stream has replaced it.
+  void retire() {
+    frames_ = {};
+    events_.reset();
+    down_.reset();
+  }
+  // Takes what a later offer says.
+  void learn(const v1::OfferedScene& offered) {
+    const v1::SceneSummary& summary = offered.summary();
+    tunnels_->setRoom(!summary.has_playback() && summary.participants() < summary.max_participants());
+    if (!scene_) return;
+    std::vector<scene::Ban> bans;
+    for (const v1::SavedBan& ban : offered.bans())
+      bans.push_back({{.tenant = ban.tenant(), .name = ban.subject()}, ban.display_name()});
+    scene_->roster.setBans(std::move(bans));
+  }
+  // What everyone reads who does not see the picture move.
+  void tell(const char* why) {
+    const SharedBytes notice = standsStill(*scene_, why);
+    scene_->subscribers.announce(notice);
+    tunnels_->tell(notice);
+  }
+
+ private:
+  void listen() {
+    events_ = edge_.nats_.subscribe(eventsSubject(subject_),
+                                    [this](const auto&, const auto&, auto data) { event(data); });
+    down_ = edge_.nats_.subscribe(
+        downPattern(subject_, edge_.id_),
+        [this](const std::string& subject, const auto&, auto data) { tunnels_->receive(subject_, subject, data); });
+  }
+
+ public:
   std::uint64_t id() const { return offered_.stream(); }
   std::uint64_t origin() const { return origin_; }
   const std::shared_ptr<scene::LiveScene>& scene() const { return scene_; }
@@ -128,10 +189,14 @@ class Edge::Stream {
                      problem);
       return false;
     }
-    auto source =
-        std::make_shared<EdgeSource>(offered_, std::move(description), [&edge = edge_] { edge.wake(); });
+    auto source = std::make_shared<EdgeSource>(
+        offered_, std::move(description), [&edge = edge_] { edge.wake(); },
+        [tunnels = tunnels_](const scene::RemotePeer& peer, std::function<void()> wake) {
+          return tunnels->connect(peer, std::move(wake));
+        });
     scene_ = edge_.server_.add(name_, source);
     scene_->paused = offered_.summary().paused();
+    learn(offered_);
     const std::lock_guard lock(mutex_);
     source_ = std::move(source);
     for (const SharedBytes& event : early_) receive(*event);
@@ -140,8 +205,8 @@ class Edge::Stream {
   }
 
   void end(const SharedBytes& last) {
-    frames_ = {};
-    events_.reset();
+    retire();
+    tunnels_->close(last);
     if (scene_) edge_.server_.remove(scene_, last);
   }
 
@@ -150,16 +215,19 @@ class Edge::Stream {
   }
 
   void look(Clock::time_point now) {
+    if (!isSuccessor()) tunnels_->poll();
     if (!scene_) {
       if (now - asked_ > kAskAgain && chunks_) ask(now);
       if (now - interestSent_ > kInterestPeriod) sendInterest(now);
       return;
     }
-    const delivery::RequestedFrames needed = source_->needs(now);
+    delivery::RequestedFrames needed = source_->needs(now);
+    // Its first frames must not refer to those of the other stream.
+    if (isSuccessor()) needed.keyFrames = needed.qualities;
     receiveFrames(needed.qualities, now);
     const bool more = needed.qualities != sent_.qualities || (needed.keyFrames & ~sent_.keyFrames) != 0;
     const auto period =
-        needed.keyFrames != 0 ? Clock::duration(kKeyFramePeriod) : Clock::duration(kInterestPeriod);
+        needed.keyFrames != 0 && !isSuccessor() ? Clock::duration(kKeyFramePeriod) : Clock::duration(kInterestPeriod);
     if (!more && now - interestSent_ < period) {
       sent_.keyFrames &= needed.keyFrames;
       return;
@@ -196,15 +264,17 @@ class Edge::Stream {
       if (needed && !frames.subscription)
         frames.subscription =
             edge_.nats_.subscribe(framesPattern(subject_, single ? std::nullopt : std::optional(quality)),
-                                  [this](const auto&, const auto&, auto data) {
-                                    if (!source_->receiveFrame(data))
-                                      edge_.server_.state().metrics.nats.refused.add();
-                                  });
+                                  [this](const auto&, const auto&, auto data) { receiveFrame(data); });
       if (frames.subscription && now - frames.neededAt > kQualityTime) {
         frames.subscription.reset();
         source_->forgetFrames();
       }
     }
+  }
+
+  void receiveFrame(std::span<const std::byte> data) {
+    if (!source_->receiveFrame(data)) return edge_.server_.state().metrics.nats.refused.add();
+    if (!arrived_.exchange(true) && isSuccessor()) edge_.wake();
   }
 
   void event(std::span<const std::byte> data) {
@@ -228,6 +298,7 @@ class Edge::Stream {
   Edge& edge_;
   const v1::OfferedScene offered_;
   const std::string name_, subject_, inbox_;
+  const bool continues_ = false;
 
   std::uint64_t content_ = 0;
   std::uint32_t received_ = 0;  // chunks
@@ -240,7 +311,10 @@ class Edge::Stream {
   std::shared_ptr<EdgeSource> source_;
   std::deque<SharedBytes> early_;
 
-  std::unique_ptr<Nats::Subscription> events_, chunks_;
+  const std::shared_ptr<EdgeTunnels> tunnels_;
+  std::atomic<bool> arrived_{false}, replaced_{false};
+
+  std::unique_ptr<Nats::Subscription> events_, down_, chunks_;
   std::array<Frames, codec::kMaxQualities> frames_;
 };
 
@@ -333,10 +407,17 @@ void Edge::handle(const v1::Offer& offer, Clock::time_point now) {
   for (const v1::OfferedScene& offered : offer.scenes()) handle(offer.origin(), offered, now);
   // The origin has ended scenes that it offers no longer.
   for (auto& [name, known] : scenes_) {
-    const bool isOffered = std::ranges::any_of(offer.scenes(), [&](const v1::OfferedScene& offered) {
-      return offered.stream() == known->newest().id();
-    });
-    if (known->newest().origin() == offer.origin() && !isOffered) known->offered = now - kOfferTime;
+    const auto offers = [&](const Stream& stream) {
+      return stream.origin() != offer.origin() ||
+             std::ranges::any_of(offer.scenes(), [&](const v1::OfferedScene& offered) {
+               return offered.stream() == stream.id();
+             });
+    };
+    if (known->next && known->next->isSuccessor()) {
+      if (!offers(*known->next)) known->next.reset();  // the scene stays where it is
+      continue;
+    }
+    if (!offers(known->newest())) known->offered = now - kOfferTime;
   }
 }
 
@@ -344,7 +425,7 @@ void Edge::handle(std::uint64_t origin, const v1::OfferedScene& offered, Clock::
   const std::string& name = offered.summary().name();
   if (!isName(name) || offered.stream() == 0) return;
   if (!scenes_.contains(name)) {
-    if (scenes_.size() >= kMaxScenes) return;
+    if (scenes_.size() >= kMaxScenes || offered.prepared()) return;
     auto known = std::make_unique<Known>();
     known->next = std::make_unique<Stream>(*this, origin, offered);
     known->offered = now;
@@ -352,11 +433,20 @@ void Edge::handle(std::uint64_t origin, const v1::OfferedScene& offered, Clock::
     return;
   }
   Known& known = *scenes_.at(name);
-  if (known.newest().id() == offered.stream()) {
+  const bool isServed = known.served && known.served->id() == offered.stream();
+  if (isServed || known.newest().id() == offered.stream()) {
     known.offered = now;
     known.lost = false;
+    if (isServed) known.served->learn(offered);
+    if (!isServed && known.next->isSuccessor() && !offered.prepared()) replace(known);
     return;
   }
+  if (known.served && known.served->id() == offered.continues()) {
+    known.next = std::make_unique<Stream>(*this, origin, offered, *known.served);
+    if (!offered.prepared()) replace(known);
+    return;
+  }
+  if (offered.prepared()) return;
   if (known.newest().origin() != origin && now - known.offered < kOfferTime) {
     if (!std::exchange(known.clashes, true))
       telemetry::log({name}, spdlog::level::warn,
@@ -365,6 +455,14 @@ void Edge::handle(std::uint64_t origin, const v1::OfferedScene& offered, Clock::
   }
   known.next = std::make_unique<Stream>(*this, origin, offered);
   known.offered = now;
+}
+
+void Edge::replace(Known& known) {
+  known.next->replace();
+  known.served->retire();
+  known.served = std::move(known.next);
+  known.lost = false;
+  telemetry::log({known.served->scene()->name()}, spdlog::level::info, "follows this scene to another server");
 }
 
 void Edge::serve(Known& known) {
@@ -387,9 +485,7 @@ void Edge::look(Clock::time_point now) {
   if (!connected && connectedSince_) {
     connectedSince_.reset();
     for (auto& [name, known] : scenes_)
-      if (known->served)
-        known->served->scene()->subscribers.announce(
-            standsStill(*known->served->scene(), "this server has lost its connection to the others (NATS)"));
+      if (known->served) known->served->tell("this server has lost its connection to the others (NATS)");
   }
   std::erase_if(scenes_, [&](auto& entry) { return lookAt(entry.first, *entry.second, now); });
 }
@@ -397,14 +493,14 @@ void Edge::look(Clock::time_point now) {
 bool Edge::lookAt(const std::string& name, Known& known, Clock::time_point now) {
   if (known.next) known.next->look(now);
   if (known.served) known.served->look(now);
+  if (known.next && known.next->isSuccessor() && known.next->arrived()) replace(known);
   // Offers that cannot arrive are not missing.
   if (!connectedSince_) return false;
   const Clock::duration silent = now - std::max(known.offered, *connectedSince_);
   if (silent < kOfferTime) return false;
   if (!std::exchange(known.lost, true) && known.served) {
     telemetry::log({name}, spdlog::level::warn, "the server that simulates this scene is lost");
-    known.served->scene()->subscribers.announce(
-        standsStill(*known.served->scene(), "the server that simulates the scene does not answer"));
+    known.served->tell("the server that simulates the scene does not answer");
   }
   if (silent < kOfferTime + keep_) return false;
   telemetry::log({name}, spdlog::level::warn, "the server that simulates this scene has not come back");

@@ -61,6 +61,8 @@ class Edge {
   void wake();
   void handle(const v1::Offer& offer, Clock::time_point now);
   void handle(std::uint64_t origin, const v1::OfferedScene& offered, Clock::time_point now);
+  // Serves the stream of the server that a scene has moved to. Its viewers notice nothing.
+  void replace(Known& known);
   // Serves a stream whose description is complete, instead of the former one.
   void serve(Known& known);
   // Asks origins for what is needed, and looks for lost ones.

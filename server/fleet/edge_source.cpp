@@ -24,13 +24,19 @@ delivery::SharedBytes copyOf(std::span<const std::byte> bytes) {
 }  // namespace
 
 EdgeSource::EdgeSource(const v1::OfferedScene& offered, v1::StreamDescription description,
-                       std::function<void()> wake)
+                       std::function<void()> wake, Connect connect)
     : description_(std::move(description)),
       deviceName_(offered.device_name()),
       qualities_(static_cast<std::uint8_t>(std::max(description_.qualities(), 1u))),
       wake_(std::move(wake)),
+      connect_(std::move(connect)),
       parameters_(description_) {
   if (offered.summary().has_playback()) playback_ = offered.summary().playback();
+}
+
+std::shared_ptr<scene::RemoteSession> EdgeSource::connect(const scene::RemotePeer& peer,
+                                                          std::function<void()> wake) {
+  return connect_ ? connect_(peer, std::move(wake)) : nullptr;
 }
 
 void EdgeSource::begin(scene::LiveScene& scene) {
@@ -137,6 +143,13 @@ bool EdgeSource::receiveEvent(std::span<const std::byte> bytes) {
   }
   scene_->subscribers.announce(copyOf(bytes));
   return true;
+}
+
+std::optional<std::uint64_t> EdgeSource::newest() const {
+  const std::lock_guard lock(mutex_);
+  std::optional<std::uint64_t> newest;
+  for (const auto& tick : newest_) newest = std::max(newest, tick);
+  return newest;
 }
 
 void EdgeSource::forgetFrames() {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -26,14 +27,22 @@ namespace clothstream::fleet {
 // Mailbox::kMaxHeld: a viewer that joins gets them, and the origin encodes no other key frame for it.
 class EdgeSource final : public scene::FrameSource {
  public:
+  // Opens a session with the origin, or returns null if it has no room.
+  using Connect = std::function<std::shared_ptr<scene::RemoteSession>(const scene::RemotePeer& peer,
+                                                                      std::function<void()> wake)>;
+
   // `wake` is called when the viewers may need something else, until the return of end(). It must not block.
-  EdgeSource(const v1::OfferedScene& offered, v1::StreamDescription description, std::function<void()> wake);
+  // `connect` may be called for as long as the source exists.
+  EdgeSource(const v1::OfferedScene& offered, v1::StreamDescription description, std::function<void()> wake,
+             Connect connect = {});
 
   const v1::StreamDescription& description() const override { return description_; }
   std::string deviceName() const override { return deviceName_; }
   std::uint8_t qualities() const override { return qualities_; }
   bool onlyViewed() const override { return true; }
   std::string whyFixed() const override { return "is simulated by another server, and is only shown here"; }
+  std::shared_ptr<scene::RemoteSession> connect(const scene::RemotePeer& peer,
+                                                std::function<void()> wake) override;
   void begin(scene::LiveScene& scene) override;
   void end() override;
   void wake() override;
@@ -44,6 +53,8 @@ class EdgeSource final : public scene::FrameSource {
   // Passes a serialised ServerMessage on to the viewers. Returns false if it is not one that belongs here.
   bool receiveFrame(std::span<const std::byte> message);
   bool receiveEvent(std::span<const std::byte> message);
+  // Newest tick of all qualities; nothing before the first frame.
+  std::optional<std::uint64_t> newest() const;
   // Frames may be missing from now on, so that none of the kept ones may be given to a viewer.
   void forgetFrames();
   // Gives kept frames to viewers that wait for them. Returns what the viewers need from the origin.
@@ -61,6 +72,7 @@ class EdgeSource final : public scene::FrameSource {
   const std::string deviceName_;
   const std::uint8_t qualities_;
   const std::function<void()> wake_;
+  const Connect connect_;
 
   mutable std::mutex mutex_;  // protects all below; held while frames are published
   scene::LiveScene* scene_ = nullptr;

@@ -22,6 +22,8 @@
 
 namespace clothstream::fleet {
 
+class Bucket;
+
 struct NatsOptions {
   std::vector<std::string> servers;   // such as nats://127.0.0.1:4222, or tls://...
   std::filesystem::path credentials;  // file with JWT and seed of a NATS user; empty: none
@@ -76,6 +78,7 @@ class Nats {
   static std::string inbox();
 
  private:
+  friend class Bucket;
   struct Waiting {
     std::string subject, reply;
     delivery::SharedBytes data;

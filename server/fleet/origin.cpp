@@ -2,159 +2,161 @@
 #include "server/fleet/origin.h"
 
 #include <algorithm>
-#include <chrono>
+#include <cstddef>
 #include <exception>
+#include <future>
+#include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "clothstream/v1/fleet.pb.h"
-#include "server/delivery/description_chunks.h"
-#include "server/delivery/relay.h"
+#include "server/fleet/conversation.h"
 #include "server/fleet/message_bytes.h"
 #include "server/fleet/random_id.h"
 #include "server/fleet/subjects.h"
 #include "server/hosting/server_state.h"
+#include "server/saved_state/contents.h"
 #include "server/scene/live_scene.h"
+#include "server/schedule/clock.h"
+#include "server/telemetry/log.h"
 
 namespace clothstream::fleet {
 namespace {
 
-using delivery::SharedBytes;
-using schedule::Clock;
 using namespace std::chrono_literals;
 
 constexpr auto kOfferPeriod = 1s;
-// An edge that has been silent for this long needs nothing.
-constexpr auto kInterestTime = 3s;
-// Edges that one scene remembers. Further ones are not heard.
-constexpr std::size_t kMaxEdges = 1024;
+// Another server answers within this time, loads a scene within this one, and continues it within this one.
+constexpr auto kAnswerTime = 5s;
+constexpr auto kLoadTime = 120s;
+constexpr auto kStartTime = 10s;
+// Edges learn about a prepared scene within this time.
+constexpr auto kEdgeTime = 150ms;
+// Interval of attempts to learn which of two servers has a scene.
+constexpr auto kDecidePeriod = 500ms;
+constexpr auto kFlushTime = 2s;
 
-// Collects what the edges need of one scene, and sends its frames to them.
-class SceneRelay final : public delivery::Relay {
- public:
-  SceneRelay(Nats& nats, std::string stream, std::uint8_t qualities)
-      : nats_(nats), stream_(std::move(stream)), qualities_(qualities) {}
+v1::ServerEntry entryOf(std::uint64_t id, const OriginOptions& options, const std::string& name) {
+  v1::ServerEntry entry;
+  entry.set_origin(id);
+  entry.set_server_name(name);
+  entry.set_version(options.version);
+  entry.set_public_name(options.publicName);
+  return entry;
+}
 
-  void deliver(const delivery::PublishedFrame& frame) override {
-    {
-      const std::lock_guard lock(mutex_);
-      const auto bit = static_cast<std::uint8_t>(qualities_ > 1 ? 1u << frame.quality : ~0u);
-      if ((neededLocked(Clock::now()).qualities & bit) == 0) return;
-      if (frame.key)
-        for (auto& [edge, interest] : interests_)
-          interest.frames.keyFrames &= static_cast<std::uint8_t>(~bit);
-    }
-    nats_.publish(framesSubject(stream_, frame.quality, frame.layer), frame.message);
-  }
-
-  void announce(const SharedBytes& message) override {
-    {
-      const std::lock_guard lock(mutex_);
-      forgetSilentEdges(Clock::now());
-      if (interests_.empty()) return;
-    }
-    nats_.publish(eventsSubject(stream_), message);
-  }
-
-  delivery::RequestedFrames requested(Clock::time_point now) override {
-    const std::lock_guard lock(mutex_);
-    return neededLocked(now);
-  }
-
-  // Returns whether the scene must be woken.
-  bool hear(const v1::Interest& interest, Clock::time_point now) {
-    const std::lock_guard lock(mutex_);
-    forgetSilentEdges(now);
-    if (interests_.size() >= kMaxEdges && !interests_.contains(interest.edge())) return false;
-    const auto all = static_cast<std::uint8_t>((1u << qualities_) - 1);
-    const auto qualities = static_cast<std::uint8_t>(interest.qualities() & all);
-    const auto keyFrames = static_cast<std::uint8_t>(interest.key_frames() & qualities);
-    Interest& known = interests_[interest.edge()];
-    const bool wakes = keyFrames != 0 || (qualities & ~known.frames.qualities) != 0 ||
-                       (qualities == 0 && known.frames.qualities != 0);
-    known = {.frames = {.qualities = qualities, .keyFrames = keyFrames}, .until = now + kInterestTime};
-    return wakes;
-  }
-
- private:
-  struct Interest {
-    delivery::RequestedFrames frames;
-    Clock::time_point until{};
-  };
-
-  delivery::RequestedFrames neededLocked(Clock::time_point now) {
-    forgetSilentEdges(now);
-    delivery::RequestedFrames needed;
-    for (const auto& [edge, interest] : interests_) needed |= interest.frames;
-    return needed;
-  }
-
-  void forgetSilentEdges(Clock::time_point now) {
-    std::erase_if(interests_, [&](const auto& known) { return known.second.until < now; });
-  }
-
-  Nats& nats_;
-  const std::string stream_;
-  const std::uint8_t qualities_;
-  std::mutex mutex_;
-  std::map<std::uint64_t, Interest> interests_;  // by edge
-};
+v1::MoveResponse refused(std::string why) {
+  v1::MoveResponse response;
+  response.set_error(std::move(why));
+  return response;
+}
 
 }  // namespace
 
-struct Origin::Stream {
-  Stream(hosting::SceneServer& server, Nats& nats, const std::shared_ptr<scene::LiveScene>& live)
-      : scene(live),
-        id(randomId()),
-        subject(streamSubject(live->name(), id)),
-        relay(std::make_shared<SceneRelay>(nats, subject, live->shape().qualities)) {
-    interest = nats.subscribe(interestSubject(subject), [this, &server](const auto&, const auto&, auto data) {
-      v1::Interest message;
-      if (!parse(data, message)) return;
-      if (relay->hear(message, Clock::now())) server.state().wake(*scene);
-    });
-    description = nats.subscribe(
-        descriptionSubject(subject), [this, &nats](const auto&, const std::string& reply, auto data) {
-          v1::ChunkRequest request;
-          if (reply.empty() || !parse(data, request)) return;
-          const std::shared_ptr<const delivery::DescriptionChunks> chunks = scene->description();
-          const bool same = request.content_id() == chunks->contentId() && request.index() < chunks->count();
-          nats.publish(reply, chunks->chunk(same ? request.index() : 0));
-        });
-    scene->subscribers.setRelay(relay);
-  }
-  ~Stream() { scene->subscribers.setRelay(nullptr); }
-  Stream(const Stream&) = delete;
-  Stream& operator=(const Stream&) = delete;
+// Does one task at a time, on a thread of its own.
+class Origin::Worker {
+ public:
+  static constexpr std::size_t kMaxWaiting = 64;
 
-  const std::shared_ptr<scene::LiveScene> scene;
-  const std::uint64_t id;
-  const std::string subject;
-  const std::shared_ptr<SceneRelay> relay;
-  std::unique_ptr<Nats::Subscription> interest, description;
+  Worker() : thread_([this] { run(); }) {}
+  // Drops the tasks that wait.
+  ~Worker() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  // Returns false if too many wait.
+  bool post(std::function<void()> task) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopping_ || tasks_.size() >= kMaxWaiting) return false;
+      tasks_.push_back(std::move(task));
+    }
+    changed_.notify_all();
+    return true;
+  }
+
+ private:
+  void run() {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      changed_.wait(lock, [this] { return stopping_ || !tasks_.empty(); });
+      if (stopping_) return;
+      const std::function<void()> task = std::move(tasks_.front());
+      tasks_.pop_front();
+      lock.unlock();
+      try {
+        task();
+      } catch (const std::exception& failure) {
+        spdlog::error("moving a scene failed: {}", failure.what());
+      }
+      lock.lock();
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::function<void()>> tasks_;
+  bool stopping_ = false;
+  std::thread thread_;
 };
 
-Origin::Origin(hosting::SceneServer& server, const NatsOptions& options)
+Origin::Origin(hosting::SceneServer& server, const NatsOptions& nats, OriginOptions options)
     : server_(server),
       id_(randomId()),
-      nats_(options, server.state().metrics.nats),
+      options_(std::move(options)),
+      nats_(nats, server.state().metrics.nats),
+      tunnels_(server, nats_),
+      departures_(std::make_unique<Worker>()),
+      arrivals_(std::make_unique<Worker>()),
+      directory_(std::make_unique<Directory>(
+          nats_, server, entryOf(id_, options_, server.state().options.serverName),
+          [this](v1::SavedParts parts, const std::function<bool()>& claim) {
+            return adopt(std::move(parts), claim);
+          })),
+      requests_(nats_.subscribe(
+          serverSubject(id_),
+          [this](const auto&, const std::string& reply, auto data) { hear(data, reply); })),
       thread_([this] { run(); }) {}
 
-Origin::~Origin() {
+void Origin::simulateLoss() {
+  directory_->simulateLoss();
+  endOffers();
+  const std::lock_guard lock(mutex_);
+  streams_.clear();
+}
+
+void Origin::endOffers() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
+}
+
+Origin::~Origin() {
+  requests_.reset();
+  endOffers();
+  departures_.reset();
+  arrivals_.reset();
+  directory_.reset();
   streams_.clear();
+  prepared_.clear();
   offer();
 }
 
 void Origin::run() {
   std::unique_lock lock(mutex_);
-  while (!stopping_) {
+  while (!stopping_.load()) {
     lock.unlock();
     try {
       lookForScenes();
@@ -163,35 +165,327 @@ void Origin::run() {
       spdlog::error("offering scenes to edges failed: {}; trying again", failure.what());
     }
     lock.lock();
-    changed_.wait_for(lock, kOfferPeriod, [this] { return stopping_; });
+    changed_.wait_for(lock, kOfferPeriod, [this] { return stopping_.load(); });
   }
 }
 
 void Origin::lookForScenes() {
   const auto scenes = server_.state().scenesNow();
-  std::erase_if(streams_, [&](const auto& known) {
-    return std::ranges::find(scenes, known.second->scene) == scenes.end();
-  });
-  for (const auto& scene : scenes) {
-    const bool isOffered = !scene->sharesAsGuest && !scene->shape().lockstep && scene->quarantined().empty();
-    if (!isOffered)
-      streams_.erase(scene->name());
-    else if (!streams_.contains(scene->name()))
-      streams_.emplace(scene->name(), std::make_unique<Stream>(server_, nats_, scene));
+  std::vector<SharedStream> ended;
+  std::vector<Directory::OwnScene> own;
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto known = streams_.begin(); known != streams_.end();) {
+      if (std::ranges::find(scenes, known->second->scene()) != scenes.end()) {
+        ++known;
+        continue;
+      }
+      ended.push_back(std::move(known->second));
+      known = streams_.erase(known);
+    }
+    for (const auto& scene : scenes) {
+      const bool isOffered = !scene->sharesAsGuest && !scene->shape().lockstep &&
+                             scene->quarantined().empty() && !directory_->isTaken(scene->name());
+      const auto known = streams_.find(scene->name());
+      if (!isOffered && known != streams_.end()) {
+        ended.push_back(std::move(known->second));
+        streams_.erase(known);
+      } else if (isOffered && known == streams_.end()) {
+        streams_.emplace(scene->name(), std::make_shared<OriginStream>(server_, nats_, tunnels_, scene));
+      }
+    }
+    for (const auto& [name, stream] : streams_) own.push_back({stream->scene(), stream->id()});
   }
+  directory_->setScenes(std::move(own));
 }
 
 void Origin::offer() {
   v1::Offer offer;
   offer.set_origin(id_);
   offer.set_server_name(server_.state().options.serverName);
-  for (const auto& [name, stream] : streams_) {
-    v1::OfferedScene& offered = *offer.add_scenes();
-    offered.set_stream(stream->id);
-    *offered.mutable_summary() = hosting::summaryOf(*stream->scene);
-    offered.set_device_name(server_.state().deviceNameOf(*stream->scene));
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto* streams : {&streams_, &prepared_})
+      for (const auto& [name, stream] : *streams) *offer.add_scenes() = stream->offer();
   }
   nats_.publish(kOffers, toBytes(offer));
+}
+
+Origin::SharedStream Origin::streamOf(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = streams_.find(name);
+  return found == streams_.end() ? nullptr : found->second;
+}
+
+void Origin::hear(std::span<const std::byte> request, const std::string& reply) {
+  v1::MoveRequest move;
+  if (!parse(request, move)) return server_.state().metrics.nats.refused.add();
+  const bool queued =
+      move.move() != 0
+          ? arrivals_->post([this, id = move.move()] { receiveScene(id); })
+          : departures_->post([this, move, reply] {
+              const v1::MoveResponse response = moveNow(move.scene(), move.to());
+              if (!reply.empty()) nats_.publish(reply, toBytes(response));
+            });
+  if (!queued && move.move() == 0 && !reply.empty())
+    nats_.publish(reply, toBytes(refused("too many scenes wait to be moved; try again later")));
+}
+
+v1::MoveResponse Origin::move(const std::string& scene, std::uint64_t to) {
+  auto result = std::make_shared<std::promise<v1::MoveResponse>>();
+  std::future<v1::MoveResponse> moved = result->get_future();
+  if (!departures_->post([this, scene, to, result] { result->set_value(moveNow(scene, to)); }))
+    return refused("too many scenes wait to be moved; try again later");
+  try {
+    return moved.get();
+  } catch (const std::future_error&) {
+    return refused("the server stops");
+  }
+}
+
+std::size_t Origin::moveAll(Clock::time_point until) {
+  directory_->setStopping();
+  std::vector<std::string> names;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [name, stream] : streams_)
+      if (stream->scene()->created) names.push_back(name);
+  }
+  std::size_t stay = 0;
+  for (const std::string& name : names) {
+    const v1::MoveResponse moved = Clock::now() < until ? move(name) : refused("there was no time");
+    if (moved.error().empty()) continue;
+    ++stay;
+    telemetry::log({name}, spdlog::level::warn, "not moved to another server: {}", moved.error());
+  }
+  return stay;
+}
+
+std::uint64_t Origin::target(const scene::LiveScene& scene) const {
+  const double price = scene.price();
+  std::uint64_t best = 0;
+  double mostRoom = 0;
+  for (const v1::ServerEntry& server : directory_->others()) {
+    const double room = server.max_load() - server.load() - price;
+    const bool fits = !server.stopping() && server.version() >= options_.version && room >= 0 &&
+                      server.created_scenes() < server.max_created_scenes();
+    if (!fits || (best != 0 && room <= mostRoom)) continue;
+    best = server.origin();
+    mostRoom = room;
+  }
+  return best;
+}
+
+v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
+  const SharedStream stream = streamOf(name);
+  if (!stream) return refused(fmt::format("this server has no scene '{:.64}' that edges see", name));
+  const std::shared_ptr<scene::LiveScene>& scene = stream->scene();
+  if (!scene->created) return refused("the server started with this scene; only created ones move");
+  if (to == 0) to = target(*scene);
+  if (to == 0) return refused("no other server has room for it");
+  if (to == id_) return refused("this server has it already");
+  const auto others = directory_->others();
+  const auto known = std::ranges::find(others, to, &v1::ServerEntry::origin);
+  if (known == others.end()) return refused("there is no such server in the directory");
+  if (known->version() < options_.version)
+    return refused(fmt::format("{} is older than this server, and scenes move only to the same or a later "
+                               "version",
+                               known->server_name()));
+
+  const std::uint64_t move = randomId();
+  Conversation talk(nats_, moveUpSubject(move), moveDownSubject(move), stopping_);
+  v1::MoveRequest request;
+  request.set_scene(name);
+  request.set_move(move);
+  nats_.publish(serverSubject(to), toBytes(request));
+  v1::MoveMessage message;
+  *message.mutable_prepare()->mutable_scene() = saved_state::definitionOf(*scene);
+  message.mutable_prepare()->set_stream(stream->id());
+  message.mutable_prepare()->set_origin(id_);
+  talk.send(message);
+  const auto prepared = talk.receive(kLoadTime);
+  if (!prepared) return refused("the other server does not answer");
+  if (!prepared->has_prepared()) return refused(fmt::format("the other server says: {}", prepared->refused()));
+
+  Clock::time_point stopped{};
+  if (const std::string why = handOver(talk, *stream, to, stopped); !why.empty()) return refused(why);
+  v1::MoveResponse response;
+  response.set_to(to);
+  response.set_gap(schedule::seconds(Clock::now() - stopped));
+  // Those who are connected to this server must join again; those at edges follow, and must not hear of it.
+  tunnels_.end(stream->subject());
+  server_.state().removeCreated(
+      scene, delivery::error(v1::ERROR_CODE_CUT_OFF,
+                             known->public_name().empty()
+                                 ? std::string("the scene has moved to another server: join again there")
+                                 : fmt::format("the scene has moved to {}: join again there",
+                                               known->public_name()),
+                             true));
+  dropStream(stream);
+  telemetry::log({name}, spdlog::level::info, "moved to another server at tick {}", scene->tick.load());
+  return response;
+}
+
+std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std::uint64_t to,
+                             Clock::time_point& stopped) {
+  const std::shared_ptr<scene::LiveScene>& scene = stream.scene();
+  const std::string& name = scene->name();
+  const std::optional<std::uint64_t> revision = directory_->beginMove(name);
+  if (!revision) return "it is not in the directory of the fleet (nats-server needs --jetstream)";
+  const auto stay = [&](std::string why) {
+    tunnels_.thaw(stream.subject());
+    server_.state().device.unhold(scene);
+    directory_->endMove(name);
+    return why;
+  };
+  // Inputs that were used before are in the state, and later ones go to the other server.
+  const std::vector<v1::MovedTunnel> tunnels = tunnels_.freeze(stream.subject());
+  v1::MoveMessage message;
+  try {
+    const std::optional<scene::Checkpoint> state = server_.state().device.hold(scene).get();
+    stopped = Clock::now();
+    *message.mutable_state()->mutable_scene() = saved_state::stateOf(*scene, state);
+  } catch (const std::exception& failure) {
+    return stay(fmt::format("its state cannot be read: {}", failure.what()));
+  }
+  message.mutable_state()->set_revision(*revision);
+  for (const v1::MovedTunnel& tunnel : tunnels) *message.mutable_state()->add_tunnels() = tunnel;
+  talk.send(message);
+  const auto answer = talk.receive(kStartTime);
+  if (answer && answer->has_done()) {
+    directory_->endMove(name);
+    return {};
+  }
+  const std::string why = answer ? fmt::format("the other server says: {}", answer->refused())
+                                 : "the other server does not answer";
+  // The directory decides which of the two has the scene.
+  v1::SceneEntry entry;
+  entry.set_origin(id_);
+  entry.set_stream(stream.id());
+  entry.set_created(true);
+  *entry.mutable_checkpoint() = directory_->checkpointOf(name);
+  for (;;) {
+    try {
+      if (Directory::transfer(nats_, name, entry, *revision)) return stay(why);
+      const auto owner = Directory::ownerOf(nats_, name);
+      if (owner != to) return stay(why);
+      directory_->endMove(name);
+      return {};
+    } catch (const std::exception& failure) {
+      telemetry::log({name}, spdlog::level::warn,
+                     "stands still until NATS says which server has it after a move: {}", failure.what());
+    }
+    if (stopping_) return stay(why);
+    std::this_thread::sleep_for(kDecidePeriod);
+  }
+}
+
+void Origin::receiveScene(std::uint64_t move) {
+  Conversation talk(nats_, moveDownSubject(move), moveUpSubject(move), stopping_);
+  const auto refuse = [&](std::string why) {
+    v1::MoveMessage message;
+    message.set_refused(std::move(why));
+    talk.send(message);
+    talk.flush(kFlushTime);
+  };
+  auto asked = talk.receive(kAnswerTime);
+  if (!asked || !asked->has_prepare()) return;
+  auto saved = saved_state::toSaved(std::move(*asked->mutable_prepare()->mutable_scene()));
+  if (!saved) return refuse(saved.error());
+  const std::string name = saved->start.name;
+  auto arriving = server_.state().prepareArrival(std::move(*saved));
+  if (!arriving) return refuse(arriving.error());
+  const std::shared_ptr<scene::LiveScene> scene = *arriving;
+  const SharedStream stream = prepareStream(scene, asked->prepare().stream());
+  const auto giveUp = [&](const std::string& why) {
+    dropStream(stream);
+    server_.state().abandonArrival(scene);
+    directory_->expectNoMore(name);
+    refuse(why);
+  };
+  offer();
+  std::this_thread::sleep_for(kEdgeTime);
+  v1::MoveMessage message;
+  message.mutable_prepared()->set_stream(stream->id());
+  talk.send(message);
+
+  auto state = talk.receive(kLoadTime);
+  if (!state || !state->has_state()) return giveUp("no state came");
+  auto continued = saved_state::toSaved(std::move(*state->mutable_state()->mutable_scene()), scene->start());
+  if (!continued) return giveUp(continued.error());
+  tunnels_.expect(stream->subject(), {state->state().tunnels().begin(), state->state().tunnels().end()});
+  v1::SceneEntry entry;
+  entry.set_origin(id_);
+  entry.set_stream(stream->id());
+  entry.set_created(true);
+  *entry.mutable_checkpoint() = directory_->checkpointOf(name);
+  directory_->expect(name);
+  try {
+    if (!Directory::transfer(nats_, name, entry, state->state().revision()))
+      return giveUp("the directory has another server for it");
+    server_.state().startArrived(scene, std::move(*continued));
+  } catch (const std::exception& failure) {
+    entry.set_origin(asked->prepare().origin());
+    entry.set_stream(asked->prepare().stream());
+    try {
+      if (Directory::ownerOf(nats_, name) == id_) Directory::give(nats_, name, entry);
+    } catch (const std::exception& again) {
+      spdlog::error("{}: {}", name, again.what());
+    }
+    return giveUp(failure.what());
+  }
+  runStream(stream);
+  message.Clear();
+  message.mutable_done();
+  talk.send(message);
+  talk.flush(kFlushTime);
+}
+
+Origin::SharedStream Origin::prepareStream(const std::shared_ptr<scene::LiveScene>& scene,
+                                           std::uint64_t continues) {
+  auto stream = std::make_shared<OriginStream>(server_, nats_, tunnels_, scene, continues);
+  const std::lock_guard lock(mutex_);
+  prepared_[scene->name()] = stream;
+  return stream;
+}
+
+void Origin::runStream(const SharedStream& stream) {
+  stream->run();
+  {
+    const std::lock_guard lock(mutex_);
+    prepared_.erase(stream->scene()->name());
+    streams_[stream->scene()->name()] = stream;
+  }
+  offer();
+  server_.state().wake(*stream->scene());
+  lookForScenes();
+}
+
+void Origin::dropStream(const SharedStream& stream) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto* streams : {&streams_, &prepared_})
+      std::erase_if(*streams, [&](const auto& known) { return known.second == stream; });
+  }
+  tunnels_.end(stream->subject());
+  offer();
+}
+
+std::string Origin::adopt(v1::SavedParts parts, const std::function<bool()>& claim) {
+  auto saved = saved_state::toSaved(std::move(parts));
+  if (!saved) return saved.error();
+  auto arriving = server_.state().prepareArrival(*saved);
+  if (!arriving) return arriving.error();
+  try {
+    if (!claim()) throw std::runtime_error("another server was faster");
+    server_.state().startArrived(*arriving, std::move(*saved));
+  } catch (const std::exception& failure) {
+    server_.state().abandonArrival(*arriving);
+    return failure.what();
+  }
+  lookForScenes();
+  offer();
+  return {};
 }
 
 }  // namespace clothstream::fleet

@@ -113,6 +113,103 @@ std::future<void> DeviceThread::add(std::shared_ptr<scene::LiveScene> scene) {
   return whenAdded;
 }
 
+std::future<void> DeviceThread::prepare(std::shared_ptr<scene::LiveScene> scene) {
+  const auto prepared = std::make_shared<std::promise<void>>();
+  std::future<void> whenPrepared = prepared->get_future();
+  post(std::packaged_task<void()>([this, scene = std::move(scene), prepared]() mutable {
+    try {
+      if (!device_) throw std::runtime_error("there is no device");
+      runs_.push_back(std::make_unique<Run>(std::move(scene)));
+      runs_.back()->waits = true;
+      runs_.back()->whenAdded = std::move(*prepared);
+    } catch (...) {
+      prepared->set_exception(std::current_exception());
+    }
+  }));
+  return whenPrepared;
+}
+
+std::future<void> DeviceThread::start(std::shared_ptr<scene::LiveScene> scene) {
+  const auto started = std::make_shared<std::promise<void>>();
+  std::future<void> whenStarted = started->get_future();
+  post(std::packaged_task<void()>([this, scene = std::move(scene), started] {
+    Run* const run = runOf(*scene);
+    if (run == nullptr || !run->waits)
+      return started->set_exception(
+          std::make_exception_ptr(std::runtime_error("the scene is not prepared any more")));
+    run->waits = false;
+    run->whenAdded = std::move(*started);
+  }));
+  return whenStarted;
+}
+
+std::future<std::optional<scene::Checkpoint>> DeviceThread::hold(std::shared_ptr<scene::LiveScene> scene) {
+  return read(std::move(scene), true);
+}
+
+std::future<std::optional<scene::Checkpoint>> DeviceThread::read(std::shared_ptr<scene::LiveScene> scene) {
+  return read(std::move(scene), false);
+}
+
+std::future<std::optional<scene::Checkpoint>> DeviceThread::read(std::shared_ptr<scene::LiveScene> scene,
+                                                                 bool holds) {
+  const auto state = std::make_shared<std::promise<std::optional<scene::Checkpoint>>>();
+  std::future<std::optional<scene::Checkpoint>> whenRead = state->get_future();
+  post(std::packaged_task<void()>([this, scene = std::move(scene), holds, state] {
+    Run* const run = runOf(*scene);
+    if (run == nullptr || run->waits || run->whenRead || run->held)
+      return state->set_exception(std::make_exception_ptr(std::runtime_error("it does not run here now")));
+    run->holds = holds;
+    // A tick that has begun took its inputs before.
+    run->readAt = holds && run->host ? run->host->tick() + (run->begun ? 2 : 1) : 0;
+    run->whenRead = std::move(*state);
+  }));
+  return whenRead;
+}
+
+void DeviceThread::unhold(std::shared_ptr<scene::LiveScene> scene) {
+  post(std::packaged_task<void()>([this, scene = std::move(scene)] {
+    if (Run* const run = runOf(*scene)) run->held = false;
+  }));
+}
+
+DeviceThread::Run* DeviceThread::runOf(const scene::LiveScene& scene) const {
+  for (const auto& run : runs_)
+    if (run->scene.get() == &scene) return run.get();
+  return nullptr;
+}
+
+void DeviceThread::readStates() {
+  for (const auto& run : runs_) {
+    const bool isDue = run->whenRead && !run->begun && !run->loading.valid() &&
+                       (!run->host || !run->running || run->host->tick() >= run->readAt);
+    if (!isDue) continue;
+    std::promise<std::optional<scene::Checkpoint>> state = std::move(*run->whenRead);
+    run->whenRead.reset();
+    try {
+      if (run->quarantined || (run->host && !run->host->isReady()))
+        throw std::runtime_error("it does not run now; try again later");
+      std::optional<scene::Checkpoint> read;
+      if (run->host)
+        read = run->host->stateNow();
+      else if (const auto restored = run->scene->restored())
+        read = restored->checkpoint;
+      if (run->holds) {
+        run->held = true;
+        run->running = run->paused = false;
+        run->scene->running = false;
+      }
+      state.set_value(std::move(read));
+    } catch (const vulkan::DeviceLost&) {
+      state.set_exception(std::make_exception_ptr(std::runtime_error("the device was lost")));
+      countLoss(*run);
+      throw;
+    } catch (...) {
+      state.set_exception(std::current_exception());
+    }
+  }
+}
+
 void DeviceThread::adopt(std::shared_ptr<scene::LiveScene> scene) {
   post(std::packaged_task<void()>([this, scene = std::move(scene)] {
     schedule::retryUntilDone(
@@ -169,6 +266,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       encodePausedFrames();
       runDueTicks();
       runSlice();
+      readStates();
     } catch (const std::exception& failure) {
       // A lack of memory may also end the attempt.
       schedule::retryUntilDone(
@@ -229,27 +327,25 @@ void DeviceThread::abandonLoading() {
   for (const auto& run : runs_) {
     run->stopLoading.request_stop();
     run->loading = {};
+    run->prepared.reset();
   }
   loader_.wait();
 }
 
 void DeviceThread::takeLoadedScenes() {
-  for (const auto& run : runs_)
-    if (run->loading.valid() && run->loading.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
-      take(*run);
+  for (const auto& run : runs_) {
+    const bool isLoaded =
+        run->loading.valid() && run->loading.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    if (isLoaded || (run->prepared && !run->waits)) take(*run);
+  }
   std::erase_if(runs_, [](const auto& run) { return run->refused; });
 }
 
 void DeviceThread::take(Run& run) {
   try {
     checkSimulatedLoss(run);
-    if (run.host) {
-      run.host->rebuild(run.loading.get(), run.rebuiltAfter);
-    } else {
-      run.host = std::make_unique<scene::SceneHost>(run.loading.get(), *run.scene, publisher_, reportRate_);
-      continueOverload(run);
-    }
-    run.host->setWork(run.overload.level());
+    if (!run.prepared) run.prepared = run.loading.get();
+    if (!run.waits) begin(run, std::move(run.prepared));
     if (run.whenAdded) run.whenAdded->set_value();
     run.whenAdded.reset();
   } catch (const vulkan::DeviceLost&) {
@@ -265,6 +361,16 @@ void DeviceThread::take(Run& run) {
     else
       dismiss(run, failure.what());
   }
+}
+
+void DeviceThread::begin(Run& run, std::unique_ptr<scene::SceneOnDevice> loaded) {
+  if (run.host) {
+    run.host->rebuild(std::move(loaded), run.rebuiltAfter);
+  } else {
+    run.host = std::make_unique<scene::SceneHost>(std::move(loaded), *run.scene, publisher_, reportRate_);
+    continueOverload(run);
+  }
+  run.host->setWork(run.overload.level());
 }
 
 void DeviceThread::continueOverload(Run& run) {
@@ -357,7 +463,7 @@ void DeviceThread::startAndStopScenes() {
   };
   for (const auto& run : runs_) {
     run->guest = run->scene->isGuest();
-    if (run->begun || run->quarantined) continue;
+    if (run->begun || run->quarantined || run->held) continue;
     const scene::LiveScene& scene = *run->scene;
     const bool inUse = scene.subscribers.receivers(now) > 0;
     const bool ready = run->host && run->host->isReady();

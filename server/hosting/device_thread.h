@@ -22,6 +22,7 @@
 #include "server/scene/live_scene.h"
 #include "server/scene/scene_host.h"
 #include "server/scene/scene_loader.h"
+#include "server/scene/scene_on_device.h"
 #include "server/schedule/overload_policy.h"
 #include "server/schedule/price_watch.h"
 #include "server/schedule/slow_watch.h"
@@ -82,6 +83,19 @@ class DeviceThread {
   // Loads a scene and adds it. The future is ready when the scene is. It throws what the device or the scene
   // throws, or std::future_error if the thread ends first; then nothing has changed.
   std::future<void> add(std::shared_ptr<scene::LiveScene> scene);
+  // Loads a scene that another server has, and waits for start(). The future is as for add().
+  std::future<void> prepare(std::shared_ptr<scene::LiveScene> scene);
+  // Begins to run a prepared scene, from the state that was given to LiveScene::restore() meanwhile. The
+  // future is as for add().
+  std::future<void> start(std::shared_ptr<scene::LiveScene> scene);
+  // Ends the ticks of a scene that moves to another server. If it runs, one more tick takes the inputs that
+  // were posted before. The future has the state after the newest tick, or nothing if there was none. It
+  // throws if the scene cannot be held now, and then the scene goes on.
+  std::future<std::optional<scene::Checkpoint>> hold(std::shared_ptr<scene::LiveScene> scene);
+  // The same state, of a scene that goes on.
+  std::future<std::optional<scene::Checkpoint>> read(std::shared_ptr<scene::LiveScene> scene);
+  // Lets a held scene go on.
+  void unhold(std::shared_ptr<scene::LiveScene> scene);
   // Adds a scene that is loaded when it is first joined.
   void adopt(std::shared_ptr<scene::LiveScene> scene);
   // The future is ready when the scene is no longer used.
@@ -119,8 +133,8 @@ class DeviceThread {
 
     // Returns whether the scene is to be loaded.
     bool needsDevice() const {
-      const bool wanted = scene->subscribers.receivers(Clock::now()) > 0 || host || whenAdded;
-      return wanted && !begun && !quarantined && !(host && host->isReady());
+      const bool wanted = scene->subscribers.receivers(Clock::now()) > 0 || host || whenAdded || waits;
+      return wanted && !prepared && !begun && !quarantined && !(host && host->isReady());
     }
 
     // Time at which the scene next needs the thread.
@@ -135,6 +149,12 @@ class DeviceThread {
     std::stop_source stopLoading;                 // of `loading`
     std::unique_ptr<scene::SceneHost> host;       // once it is loaded
     std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
+    bool waits = false;                           // for start()
+    std::unique_ptr<scene::SceneOnDevice> prepared;  // loaded, while it waits
+    std::optional<std::promise<std::optional<scene::Checkpoint>>> whenRead;  // set by hold() and read()
+    std::uint64_t readAt = 0;                                                // tick of this state
+    bool holds = false;                                                      // for hold()
+    bool held = false;                                                       // it runs no ticks
     bool quarantined = false;
     bool refused = false;                         // added, but cannot run
     Clock::duration used{};                       // time of the current tick on the device
@@ -172,6 +192,9 @@ class DeviceThread {
   void takeLoadedScenes();
   // Throws vulkan::DeviceLost, and counts that as the scene's.
   void take(Run& run);
+  std::future<std::optional<scene::Checkpoint>> read(std::shared_ptr<scene::LiveScene> scene, bool holds);
+  // Fulfils the promises of hold() and read().
+  void readStates();
   // Gives the states of all scenes to their keepers, because the thread ends. Ends short ticks first.
   void saveLast();
   // Gives the speed of a new device to the budget.
@@ -182,6 +205,8 @@ class DeviceThread {
   void checkPrice(Run& run);
   // Stops a scene that harms others; a scene of the server is only given up the first time.
   void quarantine(Run& run, const std::string& why);
+  // Makes the host of a scene that is loaded, or gives it the new device.
+  void begin(Run& run, std::unique_ptr<scene::SceneOnDevice> loaded);
   // Lets a new host that continues from a checkpoint keep the checkpoint's work.
   void continueOverload(Run& run);
   // Gives the scene up and dismisses its participants.
@@ -206,6 +231,8 @@ class DeviceThread {
   void countLoss(const Run& noticed);
   void rebuildScene(Run& run, const std::string& reason);
   void begin(Run& run, Clock::time_point now);
+  // The run of this scene; null if there is none.
+  Run* runOf(const scene::LiveScene& scene) const;
   void rebuildDevice(const std::string& reason);
   bool tryRebuildDevice();
   // Prepares all scenes that were on the former device for being loaded again.

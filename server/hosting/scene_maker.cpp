@@ -299,27 +299,7 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
     return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
                    fmt::format("createScene.maxParticipants = {}: must be at most {}, the server's maximum",
                                request.max_participants(), most));
-  const std::vector<std::shared_ptr<scene::LiveScene>> scenes = server_.scenesNow();
-  const auto created = static_cast<std::uint32_t>(
-      std::ranges::count_if(scenes, [](const auto& scene) { return scene->created; }));
-  if (created >= server_.options.maxCreatedScenes) {
-    server_.metrics.refuse(telemetry::Refusal::createdScenes);
-    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                   fmt::format("the server has {} created scenes, its maximum: delete one first", created));
-  }
-  const auto ofTenant = static_cast<std::uint32_t>(std::ranges::count_if(
-      scenes, [&](const auto& scene) { return scene->created && scene->tenant == tenant; }));
-  if (ofTenant >= server_.scenesPerTenant()) {
-    server_.metrics.refuse(telemetry::Refusal::scenesOfTenant);
-    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                   fmt::format("your tenant has {} created scenes, its maximum (--max-scenes-per-tenant): "
-                               "delete one first",
-                               ofTenant));
-  }
-  if (std::ranges::any_of(scenes, [&](const auto& scene) { return scene->name() == definition->name; }))
-    return refused(
-        v1::ERROR_CODE_INVALID_ARGUMENT,
-        fmt::format("createScene: a scene '{}' exists already; choose another name", definition->name));
+  if (auto room = server_.roomFor(definition->name, tenant); !room) return tl::unexpected(room.error());
   std::shared_ptr<scene::Journal> journal =
       server_.options.journals ? server_.options.journals(*definition) : nullptr;
   const auto scene = std::make_shared<scene::LiveScene>(
@@ -380,17 +360,8 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(const v1:
   const delivery::SharedBytes last =
       delivery::notice(v1::NOTICE_KIND_SCENE_DELETED, fmt::format("the scene '{}' {}", scene->name(), why),
                        scene->tick.load());
-  server_.erase(*scene);
-  const auto finish = [&] {
-    scene->roster.close(last);
-    server_.device.remove(scene).wait();
-    scene->discharge();
-    server_.forget(*scene);
-  };
   // No later request finds the scene, so its deletion must be completed here.
-  schedule::retryUntilDone(finish, [&](const std::exception& failure) {
-    spdlog::error("{}: not deleted: {}; trying again", scene->name(), failure.what());
-  });
+  server_.removeCreated(scene, last);
   server_.flushStore(*scene);
   telemetry::log({scene->name()}, spdlog::level::info, "deleted");
   return v1::DeleteSceneResponse();

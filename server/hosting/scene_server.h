@@ -29,6 +29,7 @@ namespace clothstream::scene {
 class FrameSource;
 class Journal;
 class LiveScene;
+class Observer;
 class SceneStore;
 }  // namespace clothstream::scene
 
@@ -96,6 +97,8 @@ struct ServerOptions {
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};
   // Keeps scenes beyond the end of the server; null: nothing is kept.
   std::shared_ptr<scene::SceneStore> store{};
+  // Learns who joins and leaves the scenes, and what they use. May be null.
+  std::shared_ptr<scene::Observer> observer{};
   // Time after stop() within which the program ends. Sent to peers.
   std::chrono::milliseconds drain{10'000};
   // A peer that sends nothing for this long is disconnected.

@@ -13,6 +13,7 @@
 #include "proto/text/printable.h"
 #include "server/messages/description.h"
 #include "server/messages/scene_message.h"
+#include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
 #include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
@@ -38,17 +39,6 @@ std::vector<std::shared_ptr<scene::LiveScene>> liveScenes(std::vector<model::Sce
 
 // Longest wait for the disk before an answer, which is then given without it.
 constexpr std::chrono::seconds kStorePatience{2};
-
-// No later participant gets a number of a saved one. A checkpoint may have participants who left after it.
-void raiseNewestParticipant(std::atomic<std::uint64_t>& newest, const scene::SavedScene& saved) {
-  const auto include = [&](std::uint64_t id) { newest = std::max(newest.load(), id); };
-  for (const scene::SavedParticipant& known : saved.roster.participants) include(known.participant.id);
-  if (!saved.checkpoint) return;
-  for (const scene::ColliderSet::Placed& placed : saved.checkpoint->colliders.colliders)
-    include(placed.participant);
-  for (const scene::GrabsAndAttachments::Slot& slot : saved.checkpoint->grabs.slots)
-    include(slot.participant);
-}
 
 delivery::SharedBytes stoppingNotice(std::chrono::milliseconds drain) {
   const float seconds = std::chrono::duration<float>(drain).count();
@@ -120,6 +110,8 @@ SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions o
       device(options.device, restored(), publisher, metrics, *budget, options.runAlways, options.reportRate,
              options.adaptsToLoad),
       maker(*this) {
+  if (options.observer)
+    for (const auto& scene : scenes) scene->observe(options.observer->observe(*scene));
   restoreCreated();
   // Participants of an earlier run cannot come back before this time, however long the start took.
   for (const auto& scene : scenesNow()) scene->roster.restartGrace(options.reconnectGrace, Clock::now());
@@ -133,11 +125,22 @@ SceneServer::State::State(std::shared_ptr<scene::LiveScene> played, ServerOption
   insert(std::move(played));
 }
 
+// A checkpoint may have participants who left after it.
+void SceneServer::State::raiseNewestParticipant(const scene::SavedScene& saved) {
+  const auto include = [&](std::uint64_t id) { participants = std::max(participants.load(), id); };
+  for (const scene::SavedParticipant& known : saved.roster.participants) include(known.participant.id);
+  if (!saved.checkpoint) return;
+  for (const scene::ColliderSet::Placed& placed : saved.checkpoint->colliders.colliders)
+    include(placed.participant);
+  for (const scene::GrabsAndAttachments::Slot& slot : saved.checkpoint->grabs.slots)
+    include(slot.participant);
+}
+
 const std::vector<std::shared_ptr<scene::LiveScene>>& SceneServer::State::restored() {
   if (!options.store) return scenes;
   for (const auto& scene : scenes) {
     if (auto saved = options.store->take(scene->start())) {
-      raiseNewestParticipant(participants, *saved);
+      raiseNewestParticipant(*saved);
       scene->restore(std::move(*saved), options.reconnectGrace, Clock::now());
     }
     scene->keeper = options.store->keep(scene);
@@ -156,7 +159,7 @@ void SceneServer::State::restoreCreated() {
                      "name is not saved; rename the server's scene, or start the server without it");
       continue;
     }
-    raiseNewestParticipant(participants, saved);
+    raiseNewestParticipant(saved);
     auto scene = std::make_shared<scene::LiveScene>(
         saved.start, true, options.journals ? options.journals(saved.start) : nullptr,
         std::min(saved.maxParticipants, options.maxParticipants), budget);
@@ -226,6 +229,7 @@ std::vector<std::shared_ptr<scene::LiveScene>> SceneServer::State::scenesNow() c
 }
 
 void SceneServer::State::insert(std::shared_ptr<scene::LiveScene> scene) {
+  if (options.observer) scene->observe(options.observer->observe(*scene));
   const std::lock_guard lock(mutex);
   scenes.push_back(std::move(scene));
 }

@@ -13,6 +13,8 @@
 #include <string_view>
 #include <vector>
 
+#include <tl/expected.hpp>
+
 #include "server/delivery/frame_publisher.h"
 #include "server/hosting/device_thread.h"
 #include "server/hosting/peer.h"
@@ -92,6 +94,20 @@ struct SceneServer::State {
   void keep(const std::shared_ptr<scene::LiveScene>& scene) const;
   void forget(const scene::LiveScene& scene) const;
   void flushStore(const scene::LiveScene& scene) const;
+  // No later participant gets a number of a saved one.
+  void raiseNewestParticipant(const scene::SavedScene& saved);
+  // Returns why no scene of this name can be added for a client of this tenant.
+  tl::expected<void, v1::Error> roomFor(const std::string& name, const std::string& tenant);
+  // Loads a scene that a client created on another server, and that still runs there. Until
+  // startArrived() nobody can join it. Returns why it cannot run here.
+  tl::expected<std::shared_ptr<scene::LiveScene>, std::string> prepareArrival(scene::SavedScene saved);
+  // Continues it here with this session and state; its definition is not used. Throws std::runtime_error if
+  // that fails; then call abandonArrival().
+  void startArrived(const std::shared_ptr<scene::LiveScene>& scene, scene::SavedScene saved);
+  void abandonArrival(const std::shared_ptr<scene::LiveScene>& scene);
+  // Removes a created scene, because a peer deleted it or another server has it now. `last` is the last
+  // message to its participants.
+  void removeCreated(const std::shared_ptr<scene::LiveScene>& scene, const delivery::SharedBytes& last);
   void stop();
 
   // Viewers of a scene that is not simulated have numbers above this one, so that they differ from the

@@ -8,6 +8,7 @@
 
 #include "server/hosting/server_state.h"
 #include "server/monitoring/process_usage.h"
+#include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
 #include "server/telemetry/histogram.h"
 #include "server/telemetry/log.h"
@@ -80,6 +81,8 @@ constexpr CounterRow kSceneCounters[] = {
      &Metrics::framesDropped},
     {"thinned_frames_total", "Frames of temporal layers that the subscriber skips, per subscriber.",
      &Metrics::framesThinned},
+    {"sent_bytes_total", "Bytes of all messages that endpoints have taken, per subscriber.",
+     &Metrics::sentBytes},
     {"steps_down_total", "Subscribers moved to fewer layers or a coarser quality.", &Metrics::stepsDown},
     {"steps_up_total", "Subscribers moved to more layers or a finer quality.", &Metrics::stepsUp},
     {"overload_steps_down_total", "Reductions of frames or substeps because the device was overloaded.",
@@ -231,6 +234,14 @@ Families serverFamilies(hosting::SceneServer& server) {
                                 "Bytes of the messages through NATS.");
   addSample(natsBytes, static_cast<double>(metrics.nats.publishedBytes.value()), {{"kind", "sent"}});
   addSample(natsBytes, static_cast<double>(metrics.nats.receivedBytes.value()), {{"kind", "received"}});
+  const scene::ObserverStatus told =
+      state.options.observer ? state.options.observer->status() : scene::ObserverStatus();
+  MetricFamily& events =
+      add(families, MetricType::Counter, "clothstream_events_total",
+          "Events for a backend: delivered, dropped, and attempts that failed and are retried.");
+  for (const auto& [result, counted] :
+       {std::pair{"delivered", told.delivered}, {"retried", told.retried}, {"dropped", told.dropped}})
+    addSample(events, static_cast<double>(counted), {{"result", result}});
   total("clothstream_state_writes_total", "Writes to the database of kept scenes.", store.writes);
   total("clothstream_state_failed_writes_total", "Writes to it that failed.", store.failedWrites);
   return families;

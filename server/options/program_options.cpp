@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "proto/recording/verdict.h"
+#include "server/events/url.h"
 #include "server/hosting/scene_server.h"
 #include "server/options/option_table.h"
 #include "server/scene/roles.h"
@@ -353,6 +354,23 @@ void addFleetOptions(OptionTable& table, ProgramOptions& options) {
              "Be a game server of Agones in Kubernetes: tell its sidecar, at the port AGONES_SDK_HTTP_PORT "
              "(9358), that "
              "the server is ready, healthy or in use, and what it carries");
+  table.text("--events-url", options.eventsUrl, "URL",
+             "Report who joins and leaves scenes, and what scenes use, to this webhook of a backend, such as "
+             "https://backend.example.org/cloth. With http:// everyone on the way can read the events",
+             [](const std::string& text) {
+               const auto url = events::parseUrl(text);
+               return url || text.empty() ? std::string() : url.error();
+             });
+  table.text("--events-secret-file", options.eventsSecret, "FILE",
+             "Secret that signs the events: whsec_ and the base64 of 24 to 64 random bytes");
+}
+
+// Checks the options together.
+void checkEvents(const ProgramOptions& options) {
+  if (!options.eventsUrl.empty() && options.eventsSecret.empty())
+    throw OptionError("--events-url needs a secret that signs the events: add --events-secret-file FILE");
+  if (options.eventsUrl.empty() && !options.eventsSecret.empty())
+    throw OptionError("--events-secret-file has no effect without --events-url URL: give both");
 }
 
 // Port of the sidecar. Throws OptionError.
@@ -634,6 +652,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
                                                               : vulkan::KernelSettings::automatic;
     options.keepsScenes = parsed.stateDirectory->count() > 0 && !options.stateDirectory.empty();
     checkTls(options);
+    checkEvents(options);
     options.announces = parsed.announce == "on" ||
                         (parsed.announce == "auto" && options.tlsSelf && !isLoopback(options.host));
     options.server.maxUploadBytes = static_cast<std::size_t>(options.maxUploadMb * 1e6);

@@ -19,6 +19,8 @@
 namespace clothstream {
 
 inline constexpr const char* kServerName = "clothstream-server " CLOTHSTREAM_VERSION;
+// The version as one number that grows.
+inline constexpr std::uint32_t kServerVersion = CLOTHSTREAM_VERSION_NUMBER;
 
 // Exit code after SIGINT or SIGTERM, as shells use it.
 inline constexpr int kInterrupted = 130;
@@ -94,6 +96,10 @@ struct ProgramOptions {
 
   bool isGameServer = false;        // of Agones
   std::uint16_t agonesPort = 9358;  // of the sidecar's REST interface
+
+  // Webhook that gets events. Both are set, or none.
+  std::string eventsUrl;
+  std::filesystem::path eventsSecret;
 
   // Identity of peers.
   std::filesystem::path tokenKeys;  // directory; empty: none

@@ -11,6 +11,7 @@
 #include "server/program/authentication.h"
 #include "server/program/commands.h"
 #include "server/program/endpoints.h"
+#include "server/program/events.h"
 #include "server/program/fleet.h"
 #include "server/program/guards.h"
 #include "server/program/monitoring.h"
@@ -23,6 +24,7 @@ int edge(const ProgramOptions& options, const Signals& signals) {
   std::unique_ptr<EndGuard> guard;  // outlives the server
   hosting::ServerOptions serverOptions = options.server;
   serverOptions.authenticator = makeAuthenticator(options);
+  serverOptions.observer = openEvents(options);
   hosting::SceneServer server(serverOptions);
   const fleet::Edge shown(server, natsOptions(options), serverOptions.reconnectGrace.place);
   shown.waitForOffers();  // clients that come back to an edge that starts again find their scenes

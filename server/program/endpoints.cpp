@@ -25,6 +25,9 @@
 namespace clothstream::program {
 namespace {
 
+// Quarters of --drain in which scenes may leave; the rest is for the end of the server.
+constexpr int kLeaveShare = 3;
+
 // Directory of the page in a build or an installation, relative to the program. Empty if it does not exist.
 std::filesystem::path pageNextToProgram() {
   const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
@@ -74,7 +77,8 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Prog
                                         const Signals& signals, StartGuard& start,
                                         identity::Authenticator* authenticator,
                                         monitoring::MonitoringEndpoint* monitoring, const std::string& intro,
-                                        const std::function<std::string()>& report) {
+                                        const std::function<std::string()>& report,
+                                        const std::function<void(SteadyTime)>& leave) {
   std::unique_ptr<EndGuard> guard;
   const std::shared_ptr<tls::ServerTls> tls = openTls(options);
   {
@@ -126,6 +130,7 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Prog
         signals, stopAt.value_or(std::chrono::steady_clock::now() + options.server.drain));
     announcement.reset();
     monitored.stopping();
+    if (leave) leave(std::chrono::steady_clock::now() + kLeaveShare * options.server.drain / 4);
     server.stop();
   }
   fmt::print("{}", report());

@@ -2,6 +2,7 @@
 // Both endpoints of the program, from their opening until the server stops.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -16,11 +17,13 @@
 namespace clothstream::program {
 
 // Serves through both endpoints until a signal or --seconds ends it. `intro` is printed before the addresses.
-// `report` is printed after SIGUSR1 and at the end. `authenticator` and `monitoring` may be null. Returns
-// what limits the time until the process ends.
+// `report` is printed after SIGUSR1 and at the end. `authenticator` and `monitoring` may be null. `leave` is
+// called before the peers are disconnected, and should return before the time that it is given. Returns what
+// limits the time until the process ends.
 [[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(
     hosting::SceneServer& server, const ProgramOptions& options, const Signals& signals, StartGuard& start,
     identity::Authenticator* authenticator, monitoring::MonitoringEndpoint* monitoring,
-    const std::string& intro, const std::function<std::string()>& report);
+    const std::string& intro, const std::function<std::string()>& report,
+    const std::function<void(std::chrono::steady_clock::time_point)>& leave = {});
 
 }  // namespace clothstream::program

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "server/fleet/nats.h"
+#include "server/fleet/origin.h"
 #include "server/options/program_options.h"
 
 namespace clothstream::program {
@@ -12,6 +13,11 @@ inline fleet::NatsOptions natsOptions(const ProgramOptions& options) {
           .credentials = options.natsCredentials,
           .authority = options.natsAuthority,
           .name = kServerName};
+}
+
+inline fleet::OriginOptions originOptions(const ProgramOptions& options) {
+  return {.publicName = options.publicNames.empty() ? "" : options.publicNames.front(),
+          .version = kServerVersion};
 }
 
 }  // namespace clothstream::program

@@ -14,6 +14,7 @@
 #include "server/program/authentication.h"
 #include "server/program/commands.h"
 #include "server/program/endpoints.h"
+#include "server/program/events.h"
 #include "server/program/fleet.h"
 #include "server/program/guards.h"
 #include "server/program/monitoring.h"
@@ -54,10 +55,11 @@ int play(const ProgramOptions& options, const Signals& signals) {
   std::unique_ptr<EndGuard> guard;  // outlives the server
   hosting::ServerOptions serverOptions = options.server;
   serverOptions.authenticator = makeAuthenticator(options);
+  serverOptions.observer = openEvents(options);
   hosting::SceneServer server(
       scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), serverOptions);
   std::optional<fleet::Origin> origin;
-  if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options));
+  if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options), originOptions(options));
   guard = openEndpoints(server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
                         intro, [&] { return server.report(); });
   return 0;

@@ -17,6 +17,7 @@
 #include "server/program/commands.h"
 #include "server/program/devices.h"
 #include "server/program/endpoints.h"
+#include "server/program/events.h"
 #include "server/program/fleet.h"
 #include "server/program/guards.h"
 #include "server/program/monitoring.h"
@@ -72,14 +73,18 @@ int serve(const ProgramOptions& options, const Signals& signals) {
     return recordings ? recordings->add(scene.name) : nullptr;
   };
   serverOptions.store = savedState;
+  serverOptions.observer = openEvents(options);
   serverOptions.guestScenes = std::move(builtIn);
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   std::optional<fleet::Origin> origin;
-  if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options));
+  if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options), originOptions(options));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   guard = openEndpoints(
       server, options, signals, start, authenticator.get(), monitoring.get(),
-      fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.deviceInfo()), sceneList), report);
+      fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.deviceInfo()), sceneList), report,
+      [&](schedule::Clock::time_point until) {
+        if (origin) origin->moveAll(until);
+      });
   return 0;
 }
 

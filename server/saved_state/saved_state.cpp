@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/messages/scene_message.h"
+#include "server/saved_state/contents.h"
 #include "server/saved_state/state_message.h"
 #include "server/telemetry/log.h"
 
@@ -26,65 +27,6 @@ void warnOfDamage(const std::string& name, const std::filesystem::path& file, co
                  "not restored: {} (in {}); its row stays until a scene of this name "
                  "is kept or deleted",
                  problem, file.string());
-}
-
-// Logs what is damaged, and leaves it out.
-v1::SavedSession parseSession(const std::string& name, const SceneContents& contents) {
-  v1::SavedSession session;
-  if (contents.session && !session.ParseFromString(*contents.session)) {
-    telemetry::log({name}, spdlog::level::err,
-                   "its participants and bans are not restored: their row is damaged");
-    session.Clear();
-  }
-  return session;
-}
-
-Read<scene::Checkpoint> readCheckpoint(const v1::SavedCheckpoint& message, bool isParsed,
-                                       const model::Scene& start) {
-  if (!isParsed) return tl::unexpected(std::string("it is damaged"));
-  return toCheckpoint(message, start);
-}
-
-// Adds session and checkpoint. A part that cannot be used is left out, and logged.
-void addSessionAndCheckpoint(const SceneContents& contents, scene::SavedScene& saved) {
-  const std::string& name = saved.start.name;
-  const v1::SavedSession session = parseSession(name, contents);
-  saved.roster = toRoster(session);
-  saved.paused = session.paused();
-  saved.resetRequested = session.reset_requested();
-  v1::Scene then = messages::toMessageWithoutMeshes(saved.start);
-  if (contents.checkpoint) {
-    v1::SavedCheckpoint message;
-    const bool isParsed = message.ParseFromString(*contents.checkpoint);
-    if (auto checkpoint = readCheckpoint(message, isParsed, saved.start)) {
-      saved.checkpoint = std::move(*checkpoint);
-      then = message.parameters();
-    } else {
-      telemetry::log({name}, spdlog::level::err,
-                     "its state is not restored: {}; it starts from the beginning, with its participants "
-                     "and bans",
-                     checkpoint.error());
-    }
-  }
-  if (!session.has_parameters() || session.parameters().SerializeAsString() == then.SerializeAsString())
-    return;
-  if (auto accepted = withParameters(session.parameters(), saved.start))
-    saved.accepted = std::move(*accepted);
-  else
-    telemetry::log({name}, spdlog::level::err, "changes of its parameters are not restored: {}",
-                   accepted.error());
-}
-
-Read<scene::SavedScene> toCreated(const SceneContents& contents) {
-  v1::SavedScene message;
-  if (!contents.scene || !message.ParseFromString(*contents.scene))
-    return tl::unexpected(std::string("its definition is damaged"));
-  Read<model::Scene> start = toScene(message.definition());
-  if (!start) return tl::unexpected(std::move(start).error());
-  scene::SavedScene saved{
-      .start = std::move(*start), .maxParticipants = message.max_participants(), .tenant = message.tenant()};
-  addSessionAndCheckpoint(contents, saved);
-  return saved;
 }
 
 }  // namespace
@@ -344,10 +286,7 @@ void SavedState::readSession(KeptScene& kept) {
   const scene::SavedRoster roster = live->roster.saved();
   kept.hasSession = !roster.participants.empty() || !roster.bans.empty() ||
                     !roster.refusedTokenHashes.empty() || live->paused;
-  v1::SavedSession message = toMessage(roster, kept.parameters);
-  message.set_paused(live->paused);
-  message.set_reset_requested(live->resetRequested);
-  std::string session = message.SerializeAsString();
+  std::string session = sessionOf(*live, roster, kept.parameters).SerializeAsString();
   if (session != kept.session)
     kept.waitingSession = std::move(session);
   else

@@ -7,6 +7,12 @@
 
 namespace clothstream::scene {
 
+std::shared_ptr<RemoteSession> FrameSource::connect(const RemotePeer& /*peer*/,
+                                                    std::function<void()> /*wake*/) {
+  return nullptr;
+}
+
+
 delivery::SharedBytes playbackMessage(const FrameSource& source) {
   std::optional<v1::Playback> playback = source.playback();
   if (!playback) return nullptr;

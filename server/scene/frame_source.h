@@ -4,11 +4,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "server/delivery/envelope.h"
 #include "server/messages/field_error.h"
+#include "server/scene/remote_session.h"
 
 namespace clothstream::scene {
 
@@ -26,8 +29,12 @@ class FrameSource {
 
   // Number of qualities of each frame. 1 means a single quality, which may have any number. Constant.
   virtual std::uint8_t qualities() const { return 1; }
-  // Whether everyone in the scene is a viewer. Constant.
+  // Whether everyone in the scene who has no session with another server is a viewer. Constant.
   virtual bool onlyViewed() const { return false; }
+  // Opens a session with the server that simulates the scene, for a peer that wants to take part. Null: there
+  // is none, or it has no room. `wake` is called, from any thread, when the session has something for the
+  // peer or has ended; it must not block.
+  virtual std::shared_ptr<RemoteSession> connect(const RemotePeer& peer, std::function<void()> wake);
   // Why participants cannot change parameters: the end of a sentence that begins with the scene. Constant.
   virtual std::string whyFixed() const = 0;
 

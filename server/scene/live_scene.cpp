@@ -96,6 +96,14 @@ LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::u
 
 LiveScene::~LiveScene() {
   if (source) source->end();
+  // Participants of a kept scene may come back in the next run of the server.
+  roster.endObservation(keeper == nullptr);
+  observer_.reset();
+}
+
+void LiveScene::observe(std::unique_ptr<SceneObserver> observer) {
+  observer_ = std::move(observer);
+  roster.observe(*observer_);
 }
 
 model::Scene LiveScene::definition() const {

@@ -24,6 +24,7 @@
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/roster.h"
+#include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
 #include "server/schedule/overload_policy.h"
 #include "server/schedule/token_bucket.h"
@@ -71,6 +72,10 @@ class LiveScene {
   std::shared_ptr<const Restored> restored() const;
   // A host continues from it, so that a later host does not.
   void forgetRestored();
+
+  // The observer is told what happens in the scene from now on. It must be called at most once, before peers
+  // can join.
+  void observe(std::unique_ptr<SceneObserver> observer);
 
   // Number of changes of definition(). Differs from that of an earlier definition.
   std::uint64_t version() const;
@@ -189,6 +194,8 @@ class LiveScene {
   std::optional<Clock::time_point> emptySince_;                     // of the newest call of hasBeenEmptyFor()
   std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
   std::uint64_t contents_ = 0;                                      // newest content id
+
+  std::unique_ptr<SceneObserver> observer_;
 };
 
 // Notice that a scene is paused; `participant` as for delivery::notice().

@@ -123,7 +123,7 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
       // would ever remove it.
       constexpr ReconnectGrace kGrace{};
       subscribers_.remove(*mailbox);
-      known->participant.away = true;
+      setAway(*known, now);
       known->posesExpire = std::max(known->posesExpire, now + kGrace.poses);
       known->placeExpires = std::max(known->placeExpires, now + kGrace.place);
       throw;
@@ -142,6 +142,7 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
   entry.subject = request.subject;
   entry.rights = request.rights;
   entry.attempt = request.attempt;
+  entry.connectedSince = now;
   entry.participant = {.id = ++ids,
                        .displayName = request.displayName,
                        .clientName = request.clientName,
@@ -154,6 +155,7 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
     const Participant& joined = entries_.back().participant;
     Admission admission = admissionOf(entries_.back(), std::move(token), false);
     if (journal_) journal_->joined(joined.id, request.clientName, request.displayName);
+    if (observer_) observer_->joined(joined, request.subject);
     // Announced before the new participant subscribes, because its Welcome already contains itself.
     announce(Presence::joined, joined);
     subscribers_.add(mailbox, joined.id);
@@ -174,6 +176,7 @@ Roster::Admission Roster::resume(Entry& entry, const JoinRequest& request,
     former->close(last);
   }
   const bool wasAway = std::exchange(entry.participant.away, false);
+  if (wasAway) entry.connectedSince = now;
   if (wasAway) announce(Presence::returned, entry.participant);
   // Announced before the participant subscribes, because its Welcome already contains its role.
   limitRole(entry, request.rights, now);
@@ -233,7 +236,7 @@ void Roster::disconnect(const Mailbox& mailbox, const ReconnectGrace& grace, Clo
     return;
   }
   subscribers_.remove(mailbox);
-  entry->participant.away = true;
+  setAway(*entry, now);
   entry->posesExpire = now + std::min(grace.poses, grace.place);
   entry->placeExpires = now + grace.place;
   announce(Presence::disconnected, entry->participant);
@@ -249,6 +252,18 @@ void Roster::expire(Clock::time_point now) {
     else
       ++entry;
   }
+}
+
+void Roster::setAway(Entry& entry, Clock::time_point now) {
+  if (!entry.participant.away) entry.connected += now - entry.connectedSince;
+  entry.participant.away = true;
+}
+
+void Roster::reportLeft(const Entry& entry, Clock::time_point now) {
+  if (observer_ == nullptr) return;
+  const Clock::duration newest =
+      entry.participant.away ? Clock::duration::zero() : now - entry.connectedSince;
+  observer_->left(entry.participant, entry.subject, entry.connected + newest);
 }
 
 void Roster::removePoses(Entry& entry, Clock::time_point now) {
@@ -281,10 +296,11 @@ Roster::Entries::iterator Roster::erase(Entries::iterator entry, LeaveReason rea
   removePoses(*entry, now);
   if (const std::shared_ptr<Mailbox> mailbox = subscribers_.find(entry->participant.id))
     subscribers_.remove(*mailbox);
-  const Participant participant = std::move(entry->participant);
+  const Entry gone = std::move(*entry);
   const auto next = entries_.erase(entry);
-  if (journal_) journal_->left(participant.id);
-  announceLeft(participant, reason, by);
+  if (journal_) journal_->left(gone.participant.id);
+  reportLeft(gone, now);
+  announceLeft(gone.participant, reason, by);
   ensureOwner(now);
   return next;
 }
@@ -314,6 +330,7 @@ void Roster::changeRole(Entry& entry, Role role, std::uint64_t by, Clock::time_p
 void Roster::clear() {
   if (journal_)
     for (const Entry& entry : entries_) journal_->left(entry.participant.id);
+  for (const Entry& entry : entries_) reportLeft(entry, Clock::now());
   entries_.clear();
   inbox_.dropPoses();
   if (charge_) std::ignore = charge_(0);
@@ -330,6 +347,27 @@ void Roster::close(const SharedBytes& last) {
   closed_ = true;
   subscribers_.closeAll(last);
   clear();
+}
+
+void Roster::observe(SceneObserver& observer) {
+  const std::lock_guard lock(mutex_);
+  observer_ = &observer;
+}
+
+void Roster::endObservation(bool everyoneLeaves) {
+  const std::lock_guard lock(mutex_);
+  if (everyoneLeaves)
+    for (const Entry& entry : entries_) reportLeft(entry, Clock::now());
+  observer_ = nullptr;
+}
+
+bool Roster::knows(const std::string& token) const {
+  if (token.size() != kTokenBytes) return false;
+  const std::string hash = hashOfToken(token);
+  const std::lock_guard lock(mutex_);
+  bool known = false;
+  for (const Entry& entry : entries_) known |= isSame(entry.tokenHash, hash);
+  return known;
 }
 
 SavedRoster Roster::saved() const {

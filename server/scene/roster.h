@@ -22,6 +22,7 @@
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/roles.h"
+#include "server/scene/scene_observer.h"
 #include "server/scene/subject.h"
 #include "server/schedule/clock.h"
 
@@ -153,6 +154,15 @@ class Roster {
   // Same as dismiss(), and refuses every later join().
   void close(const delivery::SharedBytes& last);
 
+  // The observer is told who joins and leaves from now on. It must outlive the roster, or the observation.
+  void observe(SceneObserver& observer);
+  // The observer is not called any more after the return. `everyoneLeaves`: it is first told that all
+  // participants left; otherwise they continue somewhere else, or in a later run of the server.
+  void endObservation(bool everyoneLeaves);
+
+  // Whether a participant has this resume token.
+  bool knows(const std::string& token) const;
+
   SavedRoster saved() const;
   // Adds participants of an earlier run as if they were disconnected now, bans and refused tokens. The roster
   // must be empty.
@@ -205,6 +215,8 @@ class Roster {
     model::ParticipantPoses poses;                    // the newest, without attachments
     bool posed = false;                               // the scene may have colliders or grabs of it
     Clock::time_point posesExpire{}, placeExpires{};  // while it is away
+    Clock::time_point connectedSince{};               // while it is not away
+    Clock::duration connected{};                      // before
   };
   using Entries = std::vector<Entry>;
   enum class Presence : std::uint8_t { joined, roleChanged, disconnected, returned };
@@ -233,6 +245,10 @@ class Roster {
   // Returns the next entry. `by` is the participant that caused it, or 0.
   Entries::iterator erase(Entries::iterator entry, LeaveReason reason, std::uint64_t by,
                           Clock::time_point now);
+  // The participant counts as disconnected.
+  static void setAway(Entry& entry, Clock::time_point now);
+  // Tells the observer that the participant left.
+  void reportLeft(const Entry& entry, Clock::time_point now);
   void removePoses(Entry& entry, Clock::time_point now);
   // Charges the colliders of all participants, with `count` for this one.
   messages::Result<void> charge(const Entry& entry, std::size_t count);
@@ -255,6 +271,7 @@ class Roster {
   std::deque<std::string> refusedTokens_;  // hashes of those of removed participants, newest last
   std::deque<Subject> demoted_;            // made viewers by an owner, newest last
   bool closed_ = false;
+  SceneObserver* observer_ = nullptr;
 };
 
 }  // namespace clothstream::scene

@@ -103,14 +103,25 @@ Checkpoint SceneHost::checkpoint() const {
 void SceneHost::saveLast() {
   // A state that a rollback or a reset will replace is not worth keeping; neither is the start.
   if (!live_.keeper || recovery_ != Recovery::none || tick_ == 0) return;
-  if (newestState_.tick != tick_) {
-    SceneOnDevice& on = *onDevice_;
-    on.recorder.begin();
-    on.simulation.recordSaveState(on.recorder);
-    on.device.wait(on.device.submit(on.recorder));
-    newestState_ = on.simulation.collectState(tick_);
-  }
+  readState();
   live_.keeper->save(checkpoint());
+}
+
+std::optional<Checkpoint> SceneHost::stateNow() {
+  if (recovery_ != Recovery::none)
+    throw std::runtime_error("its newest state is not valid; try again later");
+  if (tick_ == 0) return std::nullopt;
+  readState();
+  return checkpoint();
+}
+
+void SceneHost::readState() {
+  if (newestState_.tick == tick_) return;
+  SceneOnDevice& on = *onDevice_;
+  on.recorder.begin();
+  on.simulation.recordSaveState(on.recorder);
+  on.device.wait(on.device.submit(on.recorder));
+  newestState_ = on.simulation.collectState(tick_);
 }
 
 SceneHost::~SceneHost() {

@@ -101,6 +101,9 @@ class SceneHost {
   // Gives the state after the newest complete tick to the keeper, because the server ends. No tick may have
   // begun. Throws vulkan::DeviceLost.
   void saveLast();
+  // The same state, for a scene that moves to another server; nothing before the first tick. Throws
+  // std::runtime_error if the newest state will be replaced by an earlier one.
+  std::optional<Checkpoint> stateNow();
 
   // Newest complete tick, and its status.
   std::uint64_t tick() const { return tick_; }
@@ -113,6 +116,8 @@ class SceneHost {
  private:
   // Continues a restored scene.
   void continueFrom(const LiveScene::Restored& restored);
+  // Reads the state after the newest complete tick into `newestState_`.
+  void readState();
   // The state after the newest complete tick, which `newestState_` holds.
   Checkpoint checkpoint() const;
   // The next tick starts from the scene's start.

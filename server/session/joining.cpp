@@ -2,6 +2,8 @@
 // Identity of a peer, and its way into a scene.
 #include <algorithm>
 #include <chrono>
+#include <span>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +13,7 @@
 #include "server/delivery/mailbox.h"
 #include "server/hosting/server_state.h"
 #include "server/messages/client_message.h"
+#include "server/scene/remote_session.h"
 #include "server/session/session.h"
 #include "server/telemetry/log.h"
 
@@ -20,6 +23,7 @@ void Session::identify(const std::string& token) {
   const std::lock_guard lock(mutex_);
   if (mailbox_->closed()) return;
   now_ = Clock::now();
+  token_ = token;
   messages::Result<identity::Identity> identity = server_.identify(token, address_.empty());
   if (identity)
     become(std::move(*identity));
@@ -58,6 +62,7 @@ void Session::authenticate(const v1::AuthenticateRequest& request) {
                    "authenticate: a stream in a scene accepts only tokens of the same subject and tenant "
                    "that are valid for this scene"});
   if (!become(std::move(*identity))) return;
+  token_ = reply.authenticate().token().empty() ? request.token() : reply.authenticate().token();
   if (scene_ != nullptr) scene_->roster.renew(*mailbox_, rightsIn(*scene_), now_);
   answer(reply);
 }
@@ -153,6 +158,28 @@ void Session::tellPresentState(scene::LiveScene& scene) {
   if (scene.journal && scene.journal->active()) mailbox_->announce(scene::recordingNotice(scene.tick));
 }
 
+bool Session::joinRemotely(const v1::Hello& message, const messages::Joining& joining,
+                           const std::shared_ptr<scene::LiveScene>& scene) {
+  const bool onlyViews = identity_->role == scene::Role::viewer || joining.role == v1::ROLE_VIEWER;
+  if (!scene->source || onlyViews || scene->roster.knows(message.resume_token())) return false;
+  // Messages of the other server come before the last one of this mailbox.
+  std::shared_ptr<scene::RemoteSession> remote = scene->source->connect(
+      {.name = peer_, .address = address_, .token = token_}, [mailbox = mailbox_] { mailbox->wake(); });
+  if (!remote) return false;
+  v1::ClientMessage first;
+  first.set_request_id(requestId_);
+  *first.mutable_hello() = message;
+  first.mutable_hello()->set_scene(scene->name());
+  const std::string bytes = first.SerializeAsString();
+  if (!remote->send(std::as_bytes(std::span(bytes)))) return false;
+  {
+    const std::lock_guard lock(remoteMutex_);
+    remote_ = std::move(remote);
+  }
+  telemetry::log({scene->name()}, spdlog::level::info, "{} takes part through this server", peer_);
+  return true;
+}
+
 void Session::hello(const v1::Hello& message) {
   if (scene_ != nullptr)
     return fail(v1::ERROR_CODE_OUT_OF_ORDER,
@@ -163,7 +190,7 @@ void Session::hello(const v1::Hello& message) {
   if (!joining) return fail(joining.error().code, joining.error().text);
   if (joining->scene.empty()) joining->scene = identity_->scene;
   const std::shared_ptr<scene::LiveScene> scene = sceneOf(message, *joining);
-  if (!scene) return;
+  if (!scene || joinRemotely(request, *joining, scene)) return;
   auto admission = scene->roster.join({.clientName = joining->clientName,
                                        .displayName = joining->displayName,
                                        .role = scene::fromMessage(joining->role),
@@ -176,9 +203,12 @@ void Session::hello(const v1::Hello& message) {
   scene_ = scene;
   participant_ = admission->id;
   scene->metrics.joins.add();
+  if (continues_ && !admission->resumed)
+    return fail(v1::ERROR_CODE_CUT_OFF, "the scene has moved to another server: join again");
   const std::shared_ptr<const delivery::DescriptionChunks> description = scene->description();
-  const bool known = admission->resumed && message.description_content_id() == description->contentId();
-  welcome(*admission, *joining, description->contentId());
+  const bool known = continues_ || (admission->resumed &&
+                                    message.description_content_id() == description->contentId());
+  if (!continues_) welcome(*admission, *joining, description->contentId());
   mailbox_->subscribe(known ? nullptr : description, scene->shape(), scene->metrics,
                       {joining->quality, joining->temporalLayers});
   tellPresentState(*scene);

@@ -14,6 +14,7 @@
 #include "server/hosting/server_state.h"
 #include "server/identity/authenticator.h"
 #include "server/messages/client_message.h"
+#include "server/scene/remote_session.h"
 #include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
@@ -32,6 +33,7 @@ Session::Session(hosting::SceneServer::State& server, Arrival arrival, std::func
     : server_(server),
       peer_(std::move(arrival.peer)),
       address_(std::move(arrival.address)),
+      continues_(arrival.continues),
       mailbox_(std::make_shared<Mailbox>(std::move(wake))),
       opened_(Clock::now()),
       lastHeard_(opened_),
@@ -55,7 +57,16 @@ std::shared_ptr<Session> Session::open(hosting::SceneServer& server, Arrival arr
 }
 
 std::optional<SharedBytes> Session::next() {
+  if (const std::shared_ptr<scene::RemoteSession> remote = this->remote()) {
+    if (std::optional<SharedBytes> message = remote->next()) return message;
+    if (remote->ended()) mailbox_->close(nullptr);
+  }
   return mailbox_->next(Clock::now());
+}
+
+std::shared_ptr<scene::RemoteSession> Session::remote() const {
+  const std::lock_guard lock(remoteMutex_);
+  return remote_;
 }
 
 bool Session::finished() const {
@@ -71,6 +82,12 @@ void Session::receive(std::span<const std::byte> bytes) {
   requestId_ = 0;
   readPause_ = readRate_.pay(now, static_cast<double>(bytes.size()));
   try {
+    if (const std::shared_ptr<scene::RemoteSession> remote = this->remote()) {
+      if (!remote->send(bytes))
+        cutOff(telemetry::Refusal::unreadAnswers,
+               "the server that simulates the scene does not answer: join again");
+      return;
+    }
     if (!allowed(messageRate_, "messages")) return;
     const messages::Result<v1::ClientMessage> message = messages::parseClientMessage(bytes);
     if (!message) return refuse(message.error(), kMalformedCost);
@@ -160,6 +177,8 @@ void Session::checkSilence(Clock::time_point now) {
     now_ = now;
     return disconnect(DisconnectReason::lost);
   }
+  // The server that simulates the scene decides about all the rest.
+  if (remote()) return;
   // A stream in a scene has some time to send a new token.
   const auto grace = scene_ ? identity::Authenticator::kExpiryGrace : std::chrono::seconds(0);
   if (const char* const why =
@@ -211,6 +230,11 @@ void Session::end() {
 }
 
 void Session::disconnect(DisconnectReason reason) {
+  using End = scene::RemoteSession::End;
+  if (const std::shared_ptr<scene::RemoteSession> remote = this->remote())
+    remote->end(reason == DisconnectReason::left         ? End::left
+                : reason == DisconnectReason::pageClosed ? End::pageClosed
+                                                         : End::lost);
   if (scene_ == nullptr) return;
   const bool mayReturn = reason == DisconnectReason::lost || reason == DisconnectReason::pageClosed;
   scene::ReconnectGrace grace = server_.options.reconnectGrace;

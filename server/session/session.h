@@ -34,7 +34,8 @@ struct Joining;
 }
 namespace clothstream::scene {
 class LiveScene;
-}
+class RemoteSession;
+}  // namespace clothstream::scene
 
 namespace clothstream::session {
 
@@ -49,6 +50,9 @@ struct Arrival {
   std::string peer;     // name for logs
   std::string address;  // groups the peers of one machine; empty for programs of this machine
   std::string token;    // sent with the connection; empty: none
+  // The peer had a session with another server, which had the scene before. Its Hello must name a participant
+  // of the scene. It gets no Welcome and no description, because it has both.
+  bool continues = false;
 };
 
 // Thread-safe. An endpoint opens one for each peer, feeds it what arrives, and writes what next() returns,
@@ -96,6 +100,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
  private:
   Session(hosting::SceneServer::State& server, Arrival arrival, std::function<void()> wake);
   void end();
+  std::shared_ptr<scene::RemoteSession> remote() const;
   // Decides on the identity of a peer that has sent none in a message.
   void identify(const std::string& token);
 
@@ -111,6 +116,9 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Rights that the identity has in this scene.
   scene::Rights rightsIn(const scene::LiveScene& scene) const;
   void hello(const v1::Hello& message);
+  // Opens a session with the server that simulates the scene, if there is one and the peer wants to take part.
+  bool joinRemotely(const v1::Hello& message, const messages::Joining& joining,
+                    const std::shared_ptr<scene::LiveScene>& scene);
   // The scene that the peer asks for. Null, and the session has ended, if the peer may not join it.
   std::shared_ptr<scene::LiveScene> sceneOf(const v1::Hello& message, const messages::Joining& joining);
   void failToJoin(scene::Roster::Refusal refusal, const scene::LiveScene& scene);
@@ -145,13 +153,19 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
 
   hosting::SceneServer::State& server_;
   const std::string peer_, address_;
+  const bool continues_;
   const std::shared_ptr<delivery::Mailbox> mailbox_;
   const Clock::time_point opened_;
   std::atomic<Clock::time_point> lastHeard_;
   std::atomic<Clock::duration> readPause_{};
 
+  mutable std::mutex remoteMutex_;  // protects `remote_`
+  // Session with the server that simulates the scene, which gets all messages of this peer. Set once.
+  std::shared_ptr<scene::RemoteSession> remote_;
+
   std::mutex mutex_;  // protects all below
   std::shared_ptr<scene::LiveScene> scene_;
+  std::string token_;  // newest one that the peer has sent
   std::uint64_t participant_ = 0;
   std::optional<identity::Identity> identity_;  // none until the peer has proved what the server requires
   std::string whyUnknown_;                      // error for a peer without identity

@@ -461,6 +461,8 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--nats-credentials=server.creds",
                                        "--nats-ca=nats.pem",
                                        "--agones",
+                                       "--events-url=http://127.0.0.1:9000/events",
+                                       "--events-secret-file=events.secret",
                                        "--state-dir=state",
                                        "--metrics-port=0",
                                        "--metrics-host=::1",

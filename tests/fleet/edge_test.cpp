@@ -32,6 +32,10 @@ using tests::eventually;
 using tests::SeenFrame;
 using tests::TestPeer;
 
+struct Viewer : TestPeer {
+  explicit Viewer(hosting::SceneServer& server) : TestPeer(server) { role = v1::ROLE_VIEWER; }
+};
+
 class EdgeTest : public tests::ServerTest {
  protected:
   void SetUp() override {
@@ -101,7 +105,8 @@ TEST_F(EdgeTest, ViewersGetTheFramesOfTheOriginAsTheyAre) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
-  TestPeer direct(server()), viewer(edge->server);
+  TestPeer direct(server());
+  Viewer viewer(edge->server);
   direct.join("small");
   viewer.join("small");
   EXPECT_EQ(viewer.welcome().role(), v1::ROLE_VIEWER);
@@ -119,7 +124,7 @@ TEST_F(EdgeTest, OneStreamServesAllViewers) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
-  TestPeer first(edge->server), second(edge->server), third(edge->server);
+  Viewer first(edge->server), second(edge->server), third(edge->server);
   for (TestPeer* peer : {&first, &second, &third}) peer->join();
   third.readFrames(10);
   EXPECT_EQ(metrics().framesTaken.value(), 0u);  // by nobody at the origin
@@ -130,20 +135,20 @@ TEST_F(EdgeTest, AViewerGetsAKeptKeyFrameOfAPausedScene) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
-  TestPeer first(edge->server);
+  Viewer first(edge->server);
   first.join();
   v1::ControlSceneRequest pause;
   pause.set_paused(true);
   ASSERT_TRUE(server().controlScene(pause));
   noticeWith(first, "paused");
   // The first viewer that joins now needs a key frame of the origin, the second one gets the same.
-  TestPeer second(edge->server);
+  Viewer second(edge->server);
   second.join();
   EXPECT_TRUE(second.frames().back().key);
   // A request that was sent twice because the first answer took long is answered by now.
   std::this_thread::sleep_for(500ms);
   const std::uint64_t keyFrames = metrics().keyFrames.value();
-  TestPeer third(edge->server);
+  Viewer third(edge->server);
   third.hello();
   noticeWith(third, "paused");
   third.readFrames(1);
@@ -155,7 +160,8 @@ TEST_F(EdgeTest, ParametersAreThoseOfTheOrigin) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
-  TestPeer direct(server()), viewer(edge->server);
+  TestPeer direct(server());
+  Viewer viewer(edge->server);
   direct.join();
   viewer.join();
   v1::ParameterChange change;
@@ -165,7 +171,7 @@ TEST_F(EdgeTest, ParametersAreThoseOfTheOrigin) {
     return message.parameter_changed().change().wind().value().x();
   };
   viewer.readUntil([&](const v1::ServerMessage& message) { return windOf(message) == 3; });
-  TestPeer later(edge->server);
+  Viewer later(edge->server);
   later.hello("small");
   EXPECT_EQ(windOf(later.readUntil(v1::ServerMessage::kParameterChanged)), 3);
   // A viewer cannot change them.
@@ -181,13 +187,13 @@ TEST_F(EdgeTest, AnOriginSleepsWhenNobodyWatches) {
   const auto scene = server().state().find("small");
   auto edge = startEdge();
   {
-    TestPeer viewer(edge->server);
+    Viewer viewer(edge->server);
     viewer.join();
     EXPECT_TRUE(eventually([&] { return scene->running.load(); }));
   }
   EXPECT_TRUE(eventually([&] { return !scene->running; }));
   {
-    TestPeer viewer(edge->server);
+    Viewer viewer(edge->server);
     viewer.join();
     viewer.readFrames(10);  // more than the edge keeps
     EXPECT_TRUE(scene->running);
@@ -201,7 +207,8 @@ TEST_F(EdgeTest, ViewersWaitForNatsAndGoOn) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
-  TestPeer direct(server()), viewer(edge->server);
+  TestPeer direct(server());
+  Viewer viewer(edge->server);
   direct.join();
   viewer.join();
   nats_->kill();
@@ -217,7 +224,7 @@ TEST_F(EdgeTest, AnOriginThatStartsAgainIsFollowed) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
-  TestPeer viewer(edge->server);
+  Viewer viewer(edge->server);
   viewer.join();
   stopOrigin();
   noticeWith(viewer, "does not answer");
@@ -225,7 +232,7 @@ TEST_F(EdgeTest, AnOriginThatStartsAgainIsFollowed) {
   const auto last = viewer.readToTheEnd();
   EXPECT_EQ(last.error().code(), v1::ERROR_CODE_CUT_OFF);
   EXPECT_THAT(last.error().text(), HasSubstr("join again"));
-  TestPeer again(edge->server);
+  Viewer again(edge->server);
   again.join("small");
   again.readFrames(5);
 }
@@ -234,7 +241,7 @@ TEST_F(EdgeTest, ASceneWithoutOriginIsRemoved) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge(500ms);
-  TestPeer viewer(edge->server);
+  Viewer viewer(edge->server);
   viewer.join();
   stopOrigin();
   const auto last = viewer.readToTheEnd();
@@ -248,7 +255,7 @@ TEST_F(EdgeTest, BuiltInScenesThatEveryServerHasAreNotOffered) {
   if (IsSkipped()) return;
   const auto edge = startEdge();
   EXPECT_FALSE(edge->shows("other"));
-  TestPeer viewer(edge->server);
+  Viewer viewer(edge->server);
   viewer.hello("other");
   EXPECT_EQ(viewer.readToTheEnd().error().code(), v1::ERROR_CODE_NOT_FOUND);
 }
@@ -267,7 +274,7 @@ TEST_F(EdgeTest, ScenesCreatedLaterAreShownAndDeletedOnesEnd) {
   });
   ASSERT_TRUE(eventually([&] { return done.load(); }));
   ASSERT_TRUE(eventually([&] { return edge->shows("copy"); }));
-  TestPeer viewer(edge->server);
+  Viewer viewer(edge->server);
   viewer.join("copy");
   v1::DeleteSceneRequest remove;
   remove.set_name("copy");
@@ -279,7 +286,7 @@ TEST_F(EdgeTest, AServerOfTheSameSceneNameDoesNotReplaceTheFirst) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
-  TestPeer viewer(edge->server);
+  Viewer viewer(edge->server);
   viewer.join();
   telemetry::NatsMetrics metrics;
   Nats other(natsOptions(), metrics);
@@ -298,7 +305,7 @@ TEST_F(EdgeTest, MessagesThatDoNotBelongToAStreamAreDropped) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
-  TestPeer viewer(edge->server);
+  Viewer viewer(edge->server);
   viewer.join();
   // Another program of the network that knows the stream.
   telemetry::NatsMetrics metrics;

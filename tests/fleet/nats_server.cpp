@@ -30,12 +30,14 @@ NatsServer::~NatsServer() {
 }
 
 void NatsServer::run(const std::string& port) {
+  std::filesystem::create_directories(directory_ / "ports");
   process_ = std::make_unique<e2e::Process>(
       std::vector<std::string>{CLOTHSTREAM_NATS_SERVER, "--addr", "127.0.0.1", "--port", port,
-                               "--ports_file_dir", directory_.string()});
+                               "--ports_file_dir", (directory_ / "ports").string(), "--jetstream",
+                               "--store_dir", (directory_ / "store").string()});
   // It writes its address into a file: {"nats":["nats://127.0.0.1:39999"]}
   const auto portInFile = [&] {
-    for (const auto& entry : std::filesystem::directory_iterator(directory_)) {
+    for (const auto& entry : std::filesystem::directory_iterator(directory_ / "ports")) {
       std::ifstream file(entry.path());
       const std::string text{std::istreambuf_iterator<char>(file), {}};
       const std::string before = "nats://127.0.0.1:";
@@ -57,7 +59,7 @@ std::string NatsServer::url() const {
 void NatsServer::kill() {
   process_->signal(SIGKILL);
   process_->waitForEnd(std::chrono::seconds(10));
-  for (const auto& entry : std::filesystem::directory_iterator(directory_)) std::filesystem::remove(entry);
+  std::filesystem::remove_all(directory_ / "ports");
 }
 
 void NatsServer::restart() {

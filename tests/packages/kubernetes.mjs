@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Builds the manifests of deploy/kubernetes with kubectl, and checks the objects without a cluster: schemas, names that
 // refer to each other, options of the server, rights, and a cluster of three NATS servers with their configuration.
+// No package has the schemas of Agones, so the test itself says which fields its objects have; the schemas of Kubernetes
+// hold for the template of its pods.
 
 import assert from "node:assert/strict";
 import { execFileSync, spawnSync } from "node:child_process";
@@ -31,6 +33,7 @@ const ts = createRequire(join(web, "package.json"))("typescript");
 const read = (path) => readFileSync(join(source, path), "utf8");
 const version = /^project\(clothstream VERSION (\S+)/m.exec(read("CMakeLists.txt"))[1];
 const documentation = /^## Kubernetes\n(.*?)\n## /ms.exec(read("docs/operations.md"))[1];
+const aboutAgones = /^## Many scenes: Agones\n(.*?)\n## /ms.exec(read("docs/fleet.md"))[1];
 const server = process.env.CLOTHSTREAM_SERVER;
 const help = execFileSync(server, ["--help"], { encoding: "utf8" });
 const kComponent = "app.kubernetes.io/component";
@@ -49,16 +52,16 @@ before(async () => {
   folder = await mkdtemp(join(tmpdir(), "clothstream-kubernetes-"));
   const copy = join(folder, "clothstream/deploy/kubernetes");
   await cp(join(source, "deploy/kubernetes"), copy, { recursive: true });
-  for (const name of ["base", "overlays/gpu", "overlays/fleet"]) builds[name] = kustomize(join(source, "deploy/kubernetes", name));
+  for (const name of ["base", "overlays/gpu", "overlays/fleet", "overlays/agones"]) builds[name] = kustomize(join(source, "deploy/kubernetes", name));
 
   // An operator's own overlay, as documented.
-  await mkdir(join(folder, "own"));
-  await writeFile(join(folder, "own/kustomization.yaml"), /^```yaml\n(.*?)^```/ms.exec(documentation)[1]);
-  builds.own = kustomize(join(folder, "own"));
+  const [own, nodes] = [...documentation.matchAll(/^```yaml\n(.*?)^```/gms)].map((match) => match[1]);
+  builds.own = await kustomizeText("own", own);
+  builds["own with Agones"] = await kustomizeText("own-agones", own.replace("overlays/fleet", "overlays/agones") + nodes);
 
   const fleet = join(copy, "overlays/fleet/kustomization.yaml");
   const text = await readFile(fleet, "utf8");
-  assert.match(text, /^bases: \[\.\.\/gpu\]/m);
+  assert.match(text, /^bases: \[\.\.\/gpu, /m);
   await writeFile(fleet, text.replace("../gpu", "../../base"));
   builds["fleet without GPU"] = kustomize(join(copy, "overlays/fleet"));
 });
@@ -75,6 +78,12 @@ function kustomize(directory) {
   return objects;
 }
 
+async function kustomizeText(name, text) {
+  await mkdir(join(folder, name));
+  await writeFile(join(folder, name, "kustomization.yaml"), text);
+  return kustomize(join(folder, name));
+}
+
 const nameOf = (object) => `${object.kind} ${object.metadata.name}`;
 const ofKind = (objects, kind) => objects.filter((object) => object.kind === kind);
 const named = (objects, kind, name) => {
@@ -83,8 +92,13 @@ const named = (objects, kind, name) => {
   return found;
 };
 const workloads = (objects) => objects.filter((object) => object.spec?.template);
-const componentOf = (workload) => workload.spec.template.metadata.labels[kComponent];
-const podOf = (workload) => workload.spec.template.spec;
+const isAgones = (object) => /^(autoscaling\.)?agones\.dev\//.test(object.apiVersion);
+const isFleet = (object) => object.kind === "Fleet";
+// The template of a Fleet is a GameServer, which has the template of a pod.
+const templateOf = (workload) => (isFleet(workload) ? workload.spec.template.spec.template : workload.spec.template);
+const labelsOf = (workload) => templateOf(workload).metadata.labels;
+const componentOf = (workload) => labelsOf(workload)[kComponent];
+const podOf = (workload) => templateOf(workload).spec;
 const isOurs = (container) => container.image.includes("clothstream-server");
 
 function matches(selector, labels) {
@@ -100,7 +114,7 @@ function matches(selector, labels) {
 
 // Workloads with pods that a selector finds. There must be one.
 function selected(objects, selector, what) {
-  const found = workloads(objects).filter((workload) => matches(selector, workload.spec.template.metadata.labels));
+  const found = workloads(objects).filter((workload) => matches(selector, labelsOf(workload)));
   assert.ok(found.length > 0, `${what} selects no pod`);
   return found;
 }
@@ -114,8 +128,14 @@ function testEach(title, check) {
   });
 }
 
+// Objects of Kubernetes: for a Fleet the template of its pods.
+const ofKubernetes = (objects) => [
+  ...objects.filter((object) => !isAgones(object)),
+  ...ofKind(objects, "Fleet").map((fleet) => ({ apiVersion: "v1", kind: "PodTemplate", metadata: fleet.metadata, template: templateOf(fleet) })),
+];
+
 testEach("objects have the schemas of Kubernetes", async (objects) => {
-  for (const object of objects) {
+  for (const object of ofKubernetes(objects)) {
     const models = await import(`kubernetes-models/${object.apiVersion}/${object.kind}`);
     assert.doesNotThrow(() => new models[object.kind](object).validate(), nameOf(object));
   }
@@ -124,7 +144,7 @@ testEach("objects have the schemas of Kubernetes", async (objects) => {
 // The schemas allow fields that they do not know, such as misspelt ones. TypeScript does not.
 test("objects have no unknown fields", () => {
   const lines = Object.values(builds)
-    .flat()
+    .flatMap(ofKubernetes)
     .map((object) => `(${JSON.stringify(object)}) satisfies import("kubernetes-models/${object.apiVersion}/${object.kind}").I${object.kind};`);
   const misspelt = lines.find((line) => line.includes('"readinessProbe":')).replace('"readinessProbe":', '"readynessProbe":');
   const problems = compile([...new Set(lines), misspelt]);
@@ -155,10 +175,12 @@ function compile(lines) {
     .map((problem) => ts.flattenDiagnosticMessageText(problem.messageText, "\n"));
 }
 
-testEach("everything is in the namespace, which restricts pods", (objects) => {
+testEach("everything is in the namespace, which restricts pods, except with Agones", (objects) => {
   const [namespace, ...others] = ofKind(objects, "Namespace");
   assert.deepEqual(others, []);
-  assert.equal(namespace.metadata.labels["pod-security.kubernetes.io/enforce"], "restricted");
+  // Ports of nodes, which Agones gives to pods, need the other profile.
+  const profile = objects.some(isAgones) ? "privileged" : "restricted";
+  assert.equal(namespace.metadata.labels["pod-security.kubernetes.io/enforce"], profile);
   for (const object of objects) if (object !== namespace) assert.equal(object.metadata.namespace, namespace.metadata.name, nameOf(object));
 });
 
@@ -166,15 +188,21 @@ testEach("images are those of this version, or NATS", (objects) => {
   for (const { image } of workloads(objects).flatMap((workload) => podOf(workload).containers))
     assert.match(
       image,
-      new RegExp(`^([\\w.-]+\\.example\\.\\w+/clothstream-server:${version.replaceAll(".", "\\.")}|docker\\.io/library/nats:\\d[\\w.-]*)$`),
+      new RegExp(`^([\\w.-]+\\.example\\.\\w+/clothstream-(server|backend):${version.replaceAll(".", "\\.")}|docker\\.io/library/nats:\\d[\\w.-]*)$`),
     );
 });
 
 testEach("pods have no rights that they do not need", (objects) => {
   for (const workload of workloads(objects)) {
     const pod = podOf(workload);
-    const account = named(objects, "ServiceAccount", pod.serviceAccountName);
-    assert.deepEqual([account.automountServiceAccountToken, pod.automountServiceAccountToken, pod.enableServiceLinks], [false, false, false]);
+    assert.equal(pod.enableServiceLinks, false);
+    if (isFleet(workload))
+      // Agones sets the account of its sidecar, and hides the token of it from the server.
+      assert.deepEqual([pod.serviceAccountName, pod.automountServiceAccountToken], [undefined, undefined]);
+    else {
+      const account = named(objects, "ServiceAccount", pod.serviceAccountName);
+      assert.deepEqual([account.automountServiceAccountToken, pod.automountServiceAccountToken], [false, false]);
+    }
     assert.deepEqual([pod.hostNetwork, pod.hostPID, pod.hostIPC], [undefined, undefined, undefined]);
     assert.equal(pod.securityContext.runAsNonRoot, true);
     assert.ok(pod.securityContext.runAsUser > 0);
@@ -196,11 +224,10 @@ testEach("pods have no rights that they do not need", (objects) => {
 testEach("probes ask the port for operators", (objects) => {
   for (const workload of workloads(objects)) {
     for (const container of podOf(workload).containers) {
-      const [ready, alive] = [container.readinessProbe.httpGet, container.livenessProbe.httpGet];
+      const [ready, alive] = [container.readinessProbe.httpGet, container.livenessProbe?.httpGet];
       const port = container.ports.find(({ name }) => name === ready.port);
       assert.ok(port, `${nameOf(workload)} has no port ${ready.port}`);
-      assert.equal(alive.port, ready.port);
-      assert.equal(alive.path, "/healthz");
+      assert.deepEqual(alive, isFleet(workload) ? undefined : { path: "/healthz", port: ready.port });
       if (!isOurs(container)) continue;
       assert.equal(ready.path, "/readyz");
       const config = effective(objects, container);
@@ -229,8 +256,14 @@ testEach("requests and limits are set", (objects) => {
     }
     for (const volume of podOf(workload).volumes) if (volume.emptyDir) assert.ok(amount(volume.emptyDir.sizeLimit) > 0);
   }
-  const [claim] = named(objects, "StatefulSet", "clothstream-server").spec.volumeClaimTemplates;
-  const config = effective(objects, podOf(named(objects, "StatefulSet", "clothstream-server")).containers[0]);
+  const origin = workloads(objects).find((workload) => componentOf(workload) === "server");
+  const config = effective(objects, podOf(origin).containers[0]);
+  if (isFleet(origin)) {
+    // Its volume ends with the pod, so it keeps no states.
+    assert.equal(environmentOf(objects, podOf(origin).containers[0]).CLOTHSTREAM_STATE_DIR, "");
+    return;
+  }
+  const [claim] = origin.spec.volumeClaimTemplates;
   assert.ok(amount(claim.spec.resources.requests.storage) >= (2 * config["state-limit"] + config["keep-free"]) * 1e6);
 });
 
@@ -245,7 +278,7 @@ testEach("pods have the time to drain", (objects) => {
 
 testEach("selectors find pods with these ports", (objects) => {
   for (const workload of workloads(objects)) {
-    assert.deepEqual(selected(objects, workload.spec.selector, nameOf(workload)), [workload]);
+    if (!isFleet(workload)) assert.deepEqual(selected(objects, workload.spec.selector, nameOf(workload)), [workload]);
     for (const constraint of podOf(workload).topologySpreadConstraints ?? [])
       assert.deepEqual(selected(objects, constraint.labelSelector, nameOf(workload)), [workload]);
     if (workload.kind !== "StatefulSet") continue;
@@ -268,7 +301,7 @@ testEach("selectors find pods with these ports", (objects) => {
     assert.deepEqual(others, []);
     return workload;
   });
-  assert.deepEqual(new Set(budgets), new Set(workloads(objects)));
+  assert.deepEqual(new Set(budgets), new Set(workloads(objects).filter((workload) => !isFleet(workload)))); // Agones has one for its pods
 });
 
 // Names of the components that may reach a port of a workload; "everyone" for a rule without senders.
@@ -303,9 +336,19 @@ testEach("network policies let in and out what is needed", (objects) => {
     server: { web: ["everyone"], grpc: [], metrics: ["namespace monitoring"] },
     edge: { web: ["everyone"], grpc: [], metrics: ["namespace monitoring"] },
     nats: { nats: ["edge", "server"], routes: ["nats"], monitor: [] },
+    backend: { http: ["namespace application", "server"] },
+  };
+  const kNames = [53, 53]; // UDP and TCP
+  const kApi = [443, 6443];
+  const [hasNats, hasAgones] = [workloads(objects).length > 1, objects.some(isAgones)];
+  const kMayReach = {
+    server: [...(hasNats ? ["nats", ...kNames] : []), ...(hasAgones ? ["backend", ...kApi] : [])], // the sidecar uses the API
+    edge: ["nats", ...kNames],
+    nats: ["nats", ...kNames],
+    backend: [...kApi, ...kNames],
   };
   for (const workload of workloads(objects)) {
-    const own = policies.filter((policy) => matches(policy.spec.podSelector, workload.spec.template.metadata.labels));
+    const own = policies.filter((policy) => matches(policy.spec.podSelector, labelsOf(workload)));
     for (const direction of ["Ingress", "Egress"])
       assert.ok(
         own.some((policy) => policy.spec.policyTypes.includes(direction)),
@@ -320,15 +363,31 @@ testEach("network policies let in and out what is needed", (objects) => {
           ? rule.to.flatMap((peer) => selected(objects, peer.podSelector, nameOf(workload)).map(componentOf))
           : rule.ports.map(({ port }) => port),
       );
-    assert.deepEqual(receivers, workloads(objects).length > 1 ? ["nats", 53, 53] : []);
+    assert.deepEqual(receivers.sort(), kMayReach[componentOf(workload)].sort());
   }
 });
 
+// Values for fields that a pod refers to.
+const kFields = { "metadata.name": "pod-0", "metadata.namespace": "clothstream", "spec.nodeName": "node-1" };
+
+function expand(text, variables) {
+  return text.replace(/\$\((\w+)\)/g, (_, name) => {
+    assert.ok(name in variables, `${text}: there is no ${name}`);
+    return variables[name];
+  });
+}
+
 // Variables of a container, those of the image included.
 function environmentOf(objects, container) {
-  const variables = { ...image.environment };
+  const variables = isOurs(container) ? { ...image.environment } : {};
   for (const { configMapRef } of container.envFrom ?? []) Object.assign(variables, named(objects, "ConfigMap", configMapRef.name).data);
-  for (const { name, value } of container.env ?? []) variables[name] = value;
+  for (const { name, value, valueFrom } of container.env ?? []) {
+    const { fieldRef, configMapKeyRef: entry } = valueFrom ?? {};
+    if (fieldRef) variables[name] = kFields[fieldRef.fieldPath];
+    else if (entry) variables[name] = named(objects, "ConfigMap", entry.name).data[entry.key];
+    else variables[name] = expand(value, variables);
+    assert.equal(typeof variables[name], "string", `${name} has no value`);
+  }
   return variables;
 }
 
@@ -367,7 +426,7 @@ testEach("the server has every option", (objects) => {
 const secrets = new Map(
   [...documentation.matchAll(/^\| `(clothstream-[\w-]+)` \| (.*?) \|/gm)].map(([, name, files]) => [
     name,
-    [...files.matchAll(/`([\w.]+)`/g)].map((match) => match[1]),
+    [...files.matchAll(/`([\w.-]+)`/g)].map((match) => match[1]),
   ]),
 );
 
@@ -380,7 +439,7 @@ function checkPath(objects, workload, container, path) {
   const files = [];
   if (volume.secret) files.push(...secrets.get(volume.secret.secretName));
   if (volume.configMap) files.push(...Object.keys(named(objects, "ConfigMap", volume.configMap.name).data));
-  for (const { secret } of volume.projected?.sources ?? []) files.push(...secret.items.map((item) => item.path));
+  for (const { secret } of volume.projected?.sources ?? []) files.push(...(secret?.items ?? []).map((item) => item.path));
   assert.ok(files.includes(path.slice(mount.mountPath.length + 1)), `${nameOf(workload)}: ${path} is not in its volume`);
   return mount;
 }
@@ -392,11 +451,17 @@ testEach("volumes, secrets and files exist", (objects) => {
     const volumes = [...pod.volumes.map((volume) => volume.name), ...claims].sort();
     for (const container of pod.containers) {
       assert.deepEqual(container.volumeMounts.map(({ name }) => name).sort(), volumes, nameOf(workload));
-      const values = [...Object.values(environmentOf(objects, container)), ...(container.args ?? [])].filter((value) => value?.startsWith("/"));
+      const args = (container.args ?? []).map((arg) => arg.replace(/^--[\w-]+=/, ""));
+      const values = [...Object.values(environmentOf(objects, container)), ...args].filter((value) => value.startsWith("/"));
       if (isOurs(container)) {
         for (const path of [...image.volumes, ...values, "/tmp"]) checkPath(objects, workload, container, path);
-        if (componentOf(workload) === "server")
-          assert.ok(claims.includes(checkPath(objects, workload, container, image.environment.CLOTHSTREAM_STATE_DIR).name));
+        const state = checkPath(objects, workload, container, image.environment.CLOTHSTREAM_STATE_DIR).name;
+        assert.equal(claims.includes(state), workload.kind === "StatefulSet");
+        continue;
+      }
+      if (componentOf(workload) === "backend") {
+        for (const path of values) checkPath(objects, workload, container, path);
+        assert.ok(values.length >= 3);
         continue;
       }
       const config = container.args.at(-1);
@@ -406,7 +471,7 @@ testEach("volumes, secrets and files exist", (objects) => {
       for (const [, path] of text.matchAll(/^include (\S+)/gm)) checkPath(objects, workload, container, join(config, "..", path));
     }
     for (const volume of pod.volumes) {
-      const used = volume.secret ? [{ name: volume.secret.secretName }] : (volume.projected?.sources ?? []).map(({ secret }) => secret);
+      const used = volume.secret ? [{ name: volume.secret.secretName }] : (volume.projected?.sources ?? []).flatMap(({ secret }) => secret ?? []);
       for (const { name, items } of used) {
         assert.ok(secrets.has(name), `docs/operations.md does not have the Secret ${name}`);
         for (const { key } of items ?? []) assert.ok(secrets.get(name).includes(key), `${name} has no ${key}`);
@@ -425,7 +490,8 @@ testEach("only containers with a GPU see one", (objects, name) => {
         assert.equal(visible, "void");
         continue;
       }
-      count += gpus;
+      assert.equal(typeof gpus, isFleet(workload) ? "string" : "number");
+      count += Number(gpus);
       assert.equal(visible, image.environment.NVIDIA_VISIBLE_DEVICES); // the device plugin replaces it
       assert.match(image.environment.NVIDIA_DRIVER_CAPABILITIES, /\bgraphics\b/);
       assert.ok(podOf(workload).tolerations.some(({ key, operator }) => key === "nvidia.com/gpu" && operator === "Exists"));
@@ -447,7 +513,94 @@ testEach("the autoscaler has a target", (objects) => {
       ["cpu"],
     );
   }
-  assert.equal(ofKind(objects, "HorizontalPodAutoscaler").length, ofKind(objects, "Deployment").length);
+  assert.equal(ofKind(objects, "HorizontalPodAutoscaler").length, workloads(objects).filter((workload) => componentOf(workload) === "edge").length);
+});
+
+// Runs a check for each build with Agones.
+function testAgones(title, check) {
+  testEach(title, (objects) => {
+    for (const fleet of ofKind(objects, "Fleet")) check(fleet, objects);
+  });
+}
+
+// Counters and the list, from the table of the documentation with three columns.
+const rows = [...aboutAgones.matchAll(/^\| `([\w-]+)`( \(list\))? \|[^|]*\|[^|]*\|$/gm)];
+const counters = rows.map(([, name, isList]) => ({ name, isList: isList !== undefined }));
+
+testAgones("the fleet has the counters and the list of the documentation", (fleet, objects) => {
+  const { counters: counts, lists } = fleet.spec.template.spec;
+  const names = (isList) => counters.filter((entry) => entry.isList === isList).map(({ name }) => name);
+  assert.deepEqual(Object.keys(counts).sort(), names(false).sort());
+  assert.deepEqual(Object.keys(lists), names(true));
+  assert.deepEqual(names(false).length + names(true).length, 4);
+  for (const [name, counter] of Object.entries(counts)) {
+    assert.deepEqual(Object.keys(counter).sort(), ["capacity", "count"], name);
+    assert.equal(counter.count, 0);
+  }
+  const config = effective(objects, podOf(fleet).containers[0]);
+  assert.equal(counts["created-scenes"].capacity, config["max-created-scenes"]);
+  assert.equal(counts.load.capacity, 1000 * config["max-load"]);
+  assert.equal(counts.participants.capacity, config["max-participants"]);
+  for (const list of Object.values(lists)) assert.deepEqual(list, { capacity: 1000, values: [] }); // 1000 is the most that Agones allows
+});
+
+testAgones("the fleet runs game servers", (fleet, objects) => {
+  const kGameServer = ["counters", "eviction", "health", "lists", "ports", "template"];
+  assert.equal(fleet.apiVersion, "agones.dev/v1");
+  assert.deepEqual(Object.keys(fleet.spec).sort(), ["scheduling", "template"]); // no `replicas`: each `kubectl apply` would reset it
+  assert.deepEqual(Object.keys(fleet.spec.template).sort(), ["metadata", "spec"]);
+  assert.deepEqual(fleet.spec.template.metadata.labels, labelsOf(fleet));
+  const { spec } = fleet.spec.template;
+  assert.deepEqual(Object.keys(spec).sort(), kGameServer);
+  const [container, ...others] = podOf(fleet).containers;
+  assert.deepEqual(others, []);
+  const config = effective(objects, container);
+  assert.equal(config.agones, true);
+  assert.deepEqual(spec.ports, [{ name: "web", portPolicy: "Dynamic", containerPort: config.port, protocol: "TCP" }]);
+  const kSidecar = [8080, 9357, 9358]; // its ports for probes, gRPC and REST
+  for (const { containerPort } of container.ports) assert.ok(!kSidecar.includes(containerPort), `the sidecar has port ${containerPort}`);
+  assert.deepEqual(spec.eviction, { safe: "Never" });
+  const { initialDelaySeconds, periodSeconds, failureThreshold, ...rest } = spec.health;
+  assert.deepEqual(rest, {});
+  assert.ok(initialDelaySeconds >= 30 && periodSeconds > 2 && failureThreshold > 1); // the server reports every two seconds
+  assert.equal(environmentOf(objects, container).CLOTHSTREAM_PUBLIC_NAME, `node-1.${environmentOf(objects, container).NODE_DOMAIN}`);
+});
+
+testAgones("the autoscaler of the fleet counts created scenes", (fleet, objects) => {
+  const [scaler, ...others] = ofKind(objects, "FleetAutoscaler");
+  assert.deepEqual(others, []);
+  assert.equal(scaler.apiVersion, "autoscaling.agones.dev/v1");
+  const { key, bufferSize, minCapacity, maxCapacity, ...rest } = scaler.spec.policy.counter;
+  assert.deepEqual(scaler.spec, {
+    fleetName: fleet.metadata.name,
+    policy: { type: "Counter", counter: scaler.spec.policy.counter },
+    sync: { type: "FixedInterval", fixedInterval: { seconds: 30 } },
+  });
+  assert.deepEqual([key, rest], ["created-scenes", {}]);
+  const { capacity } = fleet.spec.template.spec.counters[key];
+  assert.ok(bufferSize > 0 && bufferSize <= minCapacity && minCapacity < maxCapacity); // Agones requires this
+  for (const number of [bufferSize, minCapacity, maxCapacity]) assert.equal(number % capacity, 0); // whole servers
+});
+
+testAgones("the backend may only allocate servers of the fleet", (fleet, objects) => {
+  const backend = named(objects, "Deployment", "clothstream-backend");
+  const binding = named(objects, "RoleBinding", "clothstream-backend");
+  const { namespace } = backend.metadata;
+  assert.deepEqual(named(objects, binding.roleRef.kind, binding.roleRef.name).rules, [
+    { apiGroups: ["allocation.agones.dev"], resources: ["gameserverallocations"], verbs: ["create"] },
+  ]);
+  assert.deepEqual(binding.subjects, [{ kind: "ServiceAccount", name: podOf(backend).serviceAccountName, namespace }]);
+  assert.deepEqual(ofKind(objects, "Role").length + ofKind(objects, "ClusterRole").length, 1);
+  assert.deepEqual(backend.spec.replicas, 1);
+  const [container] = podOf(backend).containers;
+  const args = container.args.map((arg) => expand(arg, environmentOf(objects, container)));
+  const option = (name) => args.find((arg) => arg.startsWith(`--${name}=`))?.slice(name.length + 3);
+  assert.deepEqual([option("fleet"), option("namespace")], [fleet.metadata.name, namespace]);
+  const domain = environmentOf(objects, podOf(fleet).containers[0]).NODE_DOMAIN;
+  assert.equal(option("address"), `https://{node}.${domain}:{port}`);
+  assert.equal(podOf(backend).securityContext.runAsUser, Number(/^USER (\d+)/m.exec(read("deploy/backend/Containerfile"))[1]));
+  const known = /const kDefaults = \{.*?^\};/ms.exec(read("deploy/backend/backend.mjs"))[0];
+  for (const arg of args) assert.match(known, new RegExp(`[ "]${/^--([\w-]+)=/.exec(arg)[1]}"?: "`));
 });
 
 function natsConfiguration(objects) {

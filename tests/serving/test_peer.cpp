@@ -31,6 +31,7 @@ void TestPeer::sendBytes(const std::string& bytes) {
 void TestPeer::hello(const std::string& scene) {
   v1::Hello hello;
   hello.set_scene(scene);
+  hello.set_role(role);
   this->hello(hello);
 }
 

@@ -84,6 +84,7 @@ class TestPeer {
   const codec::Decoder& decoder() const { return *decoder_; }
 
   bool acknowledges = true;
+  v1::Role role = v1::ROLE_UNSPECIFIED;  // asked for by hello(scene) and join()
 
  private:
   std::optional<v1::ServerMessage> read();

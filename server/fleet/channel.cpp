@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#include "server/fleet/channel.h"
+
+#include <algorithm>
+#include <memory>
+
+namespace clothstream::fleet {
+
+void Channel::push(const delivery::SharedBytes& message) {
+  const auto* const bytes = reinterpret_cast<const char*>(message->data());
+  std::size_t at = 0;
+  do {
+    const std::size_t size = std::min(message->size() - at, kMaxSegmentBytes);
+    v1::Segment segment;
+    segment.set_data(bytes + at, size);
+    at += size;
+    segment.set_more(at < message->size());
+    queue(std::move(segment));
+  } while (at < message->size());
+}
+
+void Channel::pushEnd(v1::TunnelEnd end) {
+  v1::Segment segment;
+  segment.set_end(end);
+  queue(std::move(segment));
+}
+
+void Channel::queue(v1::Segment segment) {
+  segment.set_sequence(next_++);
+  waitingBytes_ += segment.data().size();
+  waiting_.push_back(std::move(segment));
+}
+
+void Channel::transmit(v1::Segment& segment, Clock::time_point now, const Send& send) {
+  segment.set_acknowledged(whole_);
+  segment.set_consumed(usedUpTo_);
+  lastSent_ = now;
+  answerAt_.reset();
+  unansweredBytes_ = 0;
+  send(segment);
+}
+
+void Channel::poll(Clock::time_point now, const Send& send) {
+  if (!sent_.empty() && now - progress_ >= repeat_) {
+    for (v1::Segment& segment : sent_) transmit(segment, now, send);
+    progress_ = now;
+    repeat_ = std::min<Clock::duration>(2 * repeat_, kLongestRepeat);
+  }
+  while (!waiting_.empty() && windowBytes_ < kWindow) {
+    if (sent_.empty()) progress_ = now;
+    sent_.push_back(std::move(waiting_.front()));
+    waiting_.pop_front();
+    v1::Segment& segment = sent_.back();
+    waitingBytes_ -= segment.data().size();
+    windowBytes_ += segment.data().size();
+    unused_.emplace_back(segment.sequence(), segment.data().size());
+    transmit(segment, now, send);
+  }
+  if ((answerAt_ && now >= *answerAt_) || now - lastSent_ >= kKeepAlive) {
+    v1::Segment answer;
+    transmit(answer, now, send);
+  }
+}
+
+std::vector<Channel::Received> Channel::receive(const v1::Segment& segment, Clock::time_point now) {
+  heard_ = true;
+  while (!sent_.empty() && sent_.front().sequence() <= segment.acknowledged()) {
+    sent_.pop_front();
+    progress_ = now;
+    repeat_ = kFirstRepeat;
+  }
+  while (!unused_.empty() && unused_.front().first <= segment.consumed()) {
+    windowBytes_ -= unused_.front().second;
+    unused_.pop_front();
+  }
+  if (segment.sequence() == 0) return {};
+  // Also a segment that is here already, because its sender has not heard of that.
+  if (!answerAt_) answerAt_ = now + kAnswerTime;
+  if (segment.sequence() != received_ + 1) return {};
+  ++received_;
+  unansweredBytes_ += segment.data().size();
+  if (segment.end() != v1::TUNNEL_END_UNSPECIFIED) {
+    whole_ = received_;
+    return {{.message = nullptr, .end = segment.end(), .sequence = received_}};
+  }
+  if (partial_.size() + segment.data().size() <= kMaxMessageBytes) partial_ += segment.data();
+  if (segment.more()) {
+    use(usedUpTo_);
+    return {};
+  }
+  whole_ = received_;
+  const auto* const bytes = reinterpret_cast<const std::byte*>(partial_.data());
+  Received complete{.message = std::make_shared<std::vector<std::byte>>(bytes, bytes + partial_.size()),
+                    .sequence = received_};
+  partial_.clear();
+  return {std::move(complete)};
+}
+
+void Channel::use(std::uint64_t sequence) {
+  usedUpTo_ = std::max(usedUpTo_, sequence);
+  // A message that is longer than the window must not wait for its own end.
+  if (usedUpTo_ >= whole_) usedUpTo_ = received_;
+  if (unansweredBytes_ >= kWindow / 4) answerAt_ = Clock::time_point{};
+}
+
+void Channel::restart() {
+  received_ = usedUpTo_ = whole_ = 0;
+  partial_.clear();
+  heard_ = false;
+  progress_ = {};
+}
+
+}  // namespace clothstream::fleet

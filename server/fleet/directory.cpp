@@ -1,0 +1,451 @@
+// SPDX-License-Identifier: MIT
+#include "server/fleet/directory.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <exception>
+#include <future>
+#include <tuple>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <zlib.h>
+
+#include "server/hosting/server_state.h"
+#include "server/saved_state/contents.h"
+#include "server/scene/live_scene.h"
+#include "server/telemetry/log.h"
+
+namespace clothstream::fleet {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kPeriod = 500ms;
+constexpr auto kRetry = 2s;
+// Entries of servers are deleted by NATS after this time without a renewal.
+constexpr auto kServerLifetime = 30s;
+constexpr auto kStateTime = 2s;  // that reading a state may take
+constexpr std::size_t kPartBytes = 512 * 1024;
+constexpr std::uint64_t kMaxCheckpointBytes = std::uint64_t{256} << 20;
+constexpr int kMaxParts = static_cast<int>(kMaxCheckpointBytes / kPartBytes) + 1;
+// Servers try to adopt a scene at different times.
+constexpr int kMaxDelay = 500;  // ms
+
+std::uint32_t crcOf(const std::string& bytes) {
+  return static_cast<std::uint32_t>(
+      ::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+std::string keyOf(std::uint64_t origin) {
+  return fmt::format("{:016x}", origin);
+}
+
+std::string partKey(const std::string& scene, std::uint32_t slot, std::uint32_t part) {
+  return fmt::format("{}.{}.{}", scene, slot, part);
+}
+
+}  // namespace
+
+struct Directory::Buckets {
+  explicit Buckets(Nats& nats)
+      : servers(nats, {.name = kServers, .lifetime = kServerLifetime}),
+        scenes(nats, {.name = kScenes}),
+        checkpoints(nats, {.name = kCheckpoints}) {}
+  Bucket servers, scenes, checkpoints;
+  bool serversRead = false, scenesRead = false;
+};
+
+Directory::Directory(Nats& nats, hosting::SceneServer& server, v1::ServerEntry self, Adopt adopt)
+    : nats_(nats), server_(server), self_(std::move(self)), adopt_(std::move(adopt)) {
+  thread_ = std::thread([this] { run(); });
+}
+
+Directory::~Directory() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void Directory::setScenes(std::vector<OwnScene> scenes) {
+  {
+    const std::lock_guard lock(mutex_);
+    scenes_ = std::move(scenes);
+    for (const OwnScene& own : scenes_) arriving_.erase(own.scene->name());
+  }
+  changed_.notify_all();
+}
+
+std::vector<Directory::OwnScene> Directory::scenesNow() const {
+  const std::lock_guard lock(mutex_);
+  return scenes_;
+}
+
+bool Directory::isAlive(std::uint64_t origin, Clock::time_point now) const {
+  const auto found = servers_.find(origin);
+  return found != servers_.end() && now - found->second.second < kLease;
+}
+
+bool Directory::isTaken(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = known_.find(name);
+  return found != known_.end() && found->second.entry.origin() != self_.origin() &&
+         isAlive(found->second.entry.origin(), Clock::now());
+}
+
+bool Directory::owns(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  return revisionOf(name).has_value();
+}
+
+void Directory::simulateLoss() {
+  {
+    const std::lock_guard lock(mutex_);
+    lost_ = true;
+  }
+  changed_.notify_all();
+}
+
+std::vector<v1::ServerEntry> Directory::others() const {
+  const std::lock_guard lock(mutex_);
+  const Clock::time_point now = Clock::now();
+  std::vector<v1::ServerEntry> others;
+  for (const auto& [origin, server] : servers_)
+    if (origin != self_.origin() && now - server.second < kLease) others.push_back(server.first);
+  return others;
+}
+
+void Directory::setStopping() {
+  {
+    const std::lock_guard lock(mutex_);
+    leaves_ = true;
+  }
+  changed_.notify_all();
+}
+
+std::optional<std::uint64_t> Directory::revisionOf(const std::string& name) const {
+  const auto found = known_.find(name);
+  if (found == known_.end() || found->second.entry.origin() != self_.origin()) return std::nullopt;
+  return found->second.revision;
+}
+
+std::optional<std::uint64_t> Directory::beginMove(const std::string& name) {
+  std::unique_lock lock(mutex_);
+  leaving_.insert(name);
+  changed_.wait(lock, [&] { return saving_ != name; });
+  const std::optional<std::uint64_t> revision = revisionOf(name);
+  if (!revision) leaving_.erase(name);
+  return revision;
+}
+
+void Directory::endMove(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  leaving_.erase(name);
+}
+
+void Directory::expect(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  arriving_.insert(name);
+}
+
+void Directory::expectNoMore(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  arriving_.erase(name);
+}
+
+v1::StoredCheckpoint Directory::checkpointOf(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = known_.find(name);
+  return found == known_.end() ? v1::StoredCheckpoint() : found->second.entry.checkpoint();
+}
+
+bool Directory::transfer(Nats& nats, const std::string& name, const v1::SceneEntry& entry,
+                         std::uint64_t revision) {
+  return Bucket(nats, {.name = kScenes}).update(name, entry.SerializeAsString(), revision).has_value();
+}
+
+std::uint64_t Directory::ownerOf(Nats& nats, const std::string& name) {
+  const auto entry = Bucket(nats, {.name = kScenes}).get(name);
+  v1::SceneEntry scene;
+  return entry && scene.ParseFromString(entry->value) ? scene.origin() : 0;
+}
+
+void Directory::give(Nats& nats, const std::string& name, const v1::SceneEntry& entry) {
+  Bucket(nats, {.name = kScenes}).put(name, entry.SerializeAsString());
+}
+
+v1::ServerEntry Directory::selfNow() const {
+  v1::ServerEntry now = self_;
+  const hosting::SceneServer::State& state = server_.state();
+  for (const auto& scene : state.scenesNow()) {
+    now.set_participants(now.participants() + static_cast<std::uint32_t>(scene->subscribers.size()));
+    now.set_created_scenes(now.created_scenes() + (scene->created ? 1 : 0));
+  }
+  const scene::Budget::Usage usage = state.budget->usage();
+  now.set_load(usage.load);
+  now.set_max_load(usage.load + usage.freeLoad);
+  now.set_max_created_scenes(state.options.maxCreatedScenes);
+  const std::lock_guard lock(mutex_);
+  now.set_stopping(leaves_);
+  return now;
+}
+
+void Directory::run() {
+  std::unique_ptr<Buckets> buckets;
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    const bool last = stopping_;
+    if (lost_) return;
+    lock.unlock();
+    Clock::duration wait = kPeriod;
+    try {
+      if (!buckets && nats_.connected() && !last) {
+        buckets = std::make_unique<Buckets>(nats_);
+        readAt_ = {};
+      }
+      if (buckets) pass(*buckets);
+      if (buckets && last) {
+        saveScenes(*buckets, scenesNow(), true);
+        buckets->servers.remove(keyOf(self_.origin()));
+      }
+      if (buckets) logged_ = false;
+    } catch (const std::exception& failure) {
+      if (!std::exchange(logged_, true))
+        spdlog::warn(
+            "the directory of the fleet cannot be used: {}; trying again (nats-server needs --jetstream)",
+            failure.what());
+      buckets.reset();
+      wait = kRetry;
+    }
+    lock.lock();
+    if (last) return;
+    changed_.wait_for(lock, wait, [this] { return stopping_ || lost_; });
+  }
+}
+
+void Directory::pass(Buckets& buckets) {
+  buckets.servers.put(keyOf(self_.origin()), selfNow().SerializeAsString());
+  readChanges(buckets);
+  if (!buckets.serversRead || !buckets.scenesRead) return;
+  const std::vector<OwnScene> scenes = scenesNow();
+  claimScenes(buckets, scenes);
+  saveScenes(buckets, scenes, false);
+  adoptScenes(buckets);
+}
+
+void Directory::readChanges(Buckets& buckets) {
+  while (const auto change = buckets.servers.next(1ms)) {
+    if (change->key.empty()) {
+      buckets.serversRead = true;
+      continue;
+    }
+    v1::ServerEntry entry;
+    if (!change->deleted && !entry.ParseFromString(change->value)) continue;
+    const std::lock_guard lock(mutex_);
+    if (change->deleted)
+      std::erase_if(servers_, [&](const auto& known) { return keyOf(known.first) == change->key; });
+    else
+      servers_[entry.origin()] = {entry, Clock::now()};
+  }
+  while (const auto change = buckets.scenes.next(1ms)) {
+    if (change->key.empty()) {
+      buckets.scenesRead = true;
+      readAt_ = Clock::now();
+      continue;
+    }
+    v1::SceneEntry entry;
+    if (!change->deleted && !entry.ParseFromString(change->value)) continue;
+    const std::lock_guard lock(mutex_);
+    if (change->deleted)
+      known_.erase(change->key);
+    else
+      known_[change->key] = {entry, change->revision};
+  }
+}
+
+void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scenes) {
+  std::vector<std::pair<std::string, Known>> given;
+  for (const OwnScene& own : scenes) {
+    const std::string& name = own.scene->name();
+    std::optional<Known> known;
+    {
+      const std::lock_guard lock(mutex_);
+      if (leaving_.contains(name)) continue;
+      if (const auto found = known_.find(name); found != known_.end()) known = found->second;
+      if (known && known->entry.origin() != self_.origin() &&
+          (isAlive(known->entry.origin(), Clock::now()) || Clock::now() - readAt_ < kLease))
+        continue;
+    }
+    if (known && known->entry.origin() == self_.origin() && known->entry.stream() == own.stream) continue;
+    v1::SceneEntry entry;
+    entry.set_origin(self_.origin());
+    entry.set_stream(own.stream);
+    entry.set_created(own.scene->created);
+    // A scene that was continued here, or came here, keeps its checkpoint until it has another one.
+    if (known && known->entry.origin() == self_.origin())
+      *entry.mutable_checkpoint() = known->entry.checkpoint();
+    const auto revision = known ? buckets.scenes.update(name, entry.SerializeAsString(), known->revision)
+                                : buckets.scenes.create(name, entry.SerializeAsString());
+    if (!revision) continue;
+    const std::lock_guard lock(mutex_);
+    known_[name] = {entry, *revision};
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [name, known] : known_)
+      if (known.entry.origin() == self_.origin() && !arriving_.contains(name) && !leaving_.contains(name) &&
+          std::ranges::none_of(scenes, [&](const OwnScene& own) { return own.scene->name() == name; }))
+        given.emplace_back(name, known);
+  }
+  for (const auto& [name, known] : given) {
+    // Another server may have it by now.
+    const auto present = buckets.scenes.get(name);
+    if (!present || present->revision != known.revision) continue;
+    buckets.scenes.remove(name);
+    for (std::uint32_t slot = 0; slot < 2; ++slot)
+      for (std::uint32_t part = 0; part < known.entry.checkpoint().parts(); ++part)
+        buckets.checkpoints.purge(partKey(name, slot, part));
+    saved_.erase(name);
+  }
+}
+
+void Directory::saveScenes(Buckets& buckets, const std::vector<OwnScene>& scenes, bool all) {
+  for (const OwnScene& own : scenes) {
+    if (!own.scene->created) continue;
+    Stored& stored = saved_[own.scene->name()];
+    if (!all && Clock::now() - stored.at < kCheckpointPeriod) continue;
+    const std::uint64_t tick = own.scene->tick.load();
+    if (stored.at != Clock::time_point{} && stored.tick == tick) continue;
+    stored.at = Clock::now();
+    {
+      const std::lock_guard lock(mutex_);
+      if (leaving_.contains(own.scene->name())) continue;
+      saving_ = own.scene->name();
+    }
+    bool isSaved = false;
+    std::exception_ptr failure;
+    try {
+      isSaved = save(buckets, own);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      saving_.clear();
+    }
+    changed_.notify_all();
+    if (failure) std::rethrow_exception(failure);
+    if (isSaved) stored.tick = tick;
+  }
+}
+
+bool Directory::save(Buckets& buckets, const OwnScene& own) {
+  const std::string& name = own.scene->name();
+  std::optional<std::uint64_t> revision;
+  {
+    const std::lock_guard lock(mutex_);
+    revision = revisionOf(name);
+  }
+  if (!revision) return false;
+  std::future<std::optional<scene::Checkpoint>> state = server_.state().device.read(own.scene);
+  if (state.wait_for(kStateTime) != std::future_status::ready) return false;
+  std::string bytes;
+  v1::SceneEntry entry;
+  try {
+    const std::optional<scene::Checkpoint> checkpoint = state.get();
+    v1::SavedParts parts = saved_state::definitionOf(*own.scene);
+    v1::SavedParts rest = saved_state::stateOf(*own.scene, checkpoint);
+    parts.MergeFrom(rest);
+    bytes = parts.SerializeAsString();
+    entry.mutable_checkpoint()->set_tick(checkpoint ? checkpoint->state.tick : 0);
+  } catch (const std::exception& failure) {
+    spdlog::debug("{}: no checkpoint for other servers: {}", name, failure.what());
+    return false;
+  }
+  if (bytes.size() > kMaxCheckpointBytes) return false;
+  {
+    const std::lock_guard lock(mutex_);
+    const v1::StoredCheckpoint& former = known_[name].entry.checkpoint();
+    entry.mutable_checkpoint()->set_slot(former.parts() > 0 ? 1 - former.slot() : 0);
+  }
+  entry.set_origin(self_.origin());
+  entry.set_stream(own.stream);
+  entry.set_created(true);
+  v1::StoredCheckpoint& stored = *entry.mutable_checkpoint();
+  stored.set_bytes(bytes.size());
+  stored.set_crc(crcOf(bytes));
+  for (std::size_t at = 0; at < bytes.size(); at += kPartBytes) {
+    buckets.checkpoints.put(partKey(name, stored.slot(), stored.parts()), bytes.substr(at, kPartBytes));
+    stored.set_parts(stored.parts() + 1);
+  }
+  const auto written = buckets.scenes.update(name, entry.SerializeAsString(), *revision);
+  if (!written) return false;
+  const std::lock_guard lock(mutex_);
+  known_[name] = {entry, *written};
+  return true;
+}
+
+std::optional<v1::SavedParts> Directory::load(Buckets& buckets, const std::string& name,
+                                              const v1::StoredCheckpoint& stored) {
+  if (stored.bytes() > kMaxCheckpointBytes || stored.parts() > kMaxParts || stored.slot() > 1)
+    return std::nullopt;
+  std::string bytes;
+  for (std::uint32_t part = 0; part < stored.parts(); ++part) {
+    const auto entry = buckets.checkpoints.get(partKey(name, stored.slot(), part));
+    if (!entry || bytes.size() + entry->value.size() > stored.bytes()) return std::nullopt;
+    bytes += entry->value;
+  }
+  v1::SavedParts parts;
+  if (crcOf(bytes) != stored.crc() || !parts.ParseFromString(bytes)) return std::nullopt;
+  return parts;
+}
+
+void Directory::adoptScenes(Buckets& buckets) {
+  const Clock::time_point now = Clock::now();
+  std::optional<std::pair<std::string, Known>> next;
+  {
+    const std::lock_guard lock(mutex_);
+    if (leaves_ || stopping_ || now - readAt_ < kLease) return;
+    std::erase_if(adoptAt_, [&](const auto& waiting) { return !known_.contains(waiting.first); });
+    for (const auto& [name, known] : known_) {
+      const v1::SceneEntry& entry = known.entry;
+      if (!entry.created() || !entry.has_checkpoint() || entry.origin() == self_.origin() ||
+          isAlive(entry.origin(), now)) {
+        adoptAt_.erase(name);
+        continue;
+      }
+      const auto [waiting, isNew] = adoptAt_.try_emplace(name, now);
+      if (isNew) waiting->second += std::chrono::milliseconds(random_() % kMaxDelay);
+      if (now >= waiting->second && !next) next.emplace(name, known);
+    }
+  }
+  if (!next) return;
+  auto& [name, known] = *next;
+  std::string problem = "its checkpoint is damaged";
+  std::optional<std::uint64_t> claimed;
+  if (auto parts = load(buckets, name, known.entry.checkpoint())) {
+    expect(name);
+    problem = adopt_(std::move(*parts), [&] {
+      v1::SceneEntry entry = known.entry;
+      entry.set_origin(self_.origin());
+      entry.set_stream(0);
+      claimed = buckets.scenes.update(name, entry.SerializeAsString(), known.revision);
+      if (!claimed) return false;
+      const std::lock_guard lock(mutex_);
+      known_[name] = {entry, *claimed};
+      return true;
+    });
+  }
+  if (problem.empty()) return;
+  telemetry::log({name}, spdlog::level::warn, "the scene of a server that is gone is not continued here: {}",
+                 problem);
+  adoptAt_[name] = Clock::now() + 10 * kRetry;
+  // Another server may try.
+  if (claimed) std::ignore = buckets.scenes.update(name, known.entry.SerializeAsString(), *claimed);
+  expectNoMore(name);
+}
+
+}  // namespace clothstream::fleet

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+// Which server of a fleet has which scene, in NATS' key-value store.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "clothstream/v1/fleet.pb.h"
+#include "server/fleet/bucket.h"
+#include "server/hosting/scene_server.h"
+#include "server/schedule/clock.h"
+
+namespace clothstream::scene {
+class LiveScene;
+}
+
+namespace clothstream::fleet {
+
+// A server has a lease, which it renews every second. A scene belongs to the server in its entry as long as
+// that server's lease lasts; then another server takes its name over or, for a scene that a client created,
+// continues it from its newest checkpoint. Thread-safe; one thread waits for NATS.
+//
+// Without JetStream there is no directory, and edges choose between scenes of the same name.
+class Directory {
+ public:
+  static constexpr std::chrono::seconds kLease{5};
+  // Interval of the checkpoints of created scenes.
+  static constexpr std::chrono::seconds kCheckpointPeriod{3};
+  static constexpr const char *kServers = "clothstream-servers", *kScenes = "clothstream-scenes",
+                              *kCheckpoints = "clothstream-checkpoints";
+
+  // A scene of this server.
+  struct OwnScene {
+    std::shared_ptr<scene::LiveScene> scene;
+    std::uint64_t stream = 0;
+  };
+  // Continues a scene of a server that is gone. `claim` makes it this server's, at once before it runs.
+  // Returns why not; empty if it runs.
+  using Adopt = std::function<std::string(v1::SavedParts parts, const std::function<bool()>& claim)>;
+
+  // `self`: the entry of this server, whose numbers are read from the server. References must outlive it.
+  Directory(Nats& nats, hosting::SceneServer& server, v1::ServerEntry self, Adopt adopt);
+  // Writes the last checkpoints, and ends the lease.
+  ~Directory();
+  Directory(const Directory&) = delete;
+  Directory& operator=(const Directory&) = delete;
+
+  // Scenes that this server has and offers now. Those that are not in the list any more are given up.
+  void setScenes(std::vector<OwnScene> scenes);
+  // Whether another server has a scene of this name, so that this one must not offer its own.
+  bool isTaken(const std::string& name) const;
+  // Whether the entry of this scene names this server.
+  bool owns(const std::string& name) const;
+  // Other servers with a lease.
+  std::vector<v1::ServerEntry> others() const;
+  // This server takes no scenes any more.
+  void setStopping();
+  // Begins a move of a scene that this server has: its entry does not change until endMove(). Returns the
+  // revision of the entry, or nothing if it has none.
+  std::optional<std::uint64_t> beginMove(const std::string& name);
+  void endMove(const std::string& name);
+  // A scene of this name comes to this server. Its entry may be this server's before setScenes() has it.
+  void expect(const std::string& name);
+  void expectNoMore(const std::string& name);
+  // Newest checkpoint of a scene of any server.
+  v1::StoredCheckpoint checkpointOf(const std::string& name) const;
+  // Makes a scene the server's that has `entry.origin`, unless its revision is another one. For a thread
+  // with its own connection to the store. Throws what Bucket throws.
+  static bool transfer(Nats& nats, const std::string& name, const v1::SceneEntry& entry,
+                       std::uint64_t revision);
+  // Server that has a scene, 0 if none; and the same as transfer() whatever the revision is.
+  static std::uint64_t ownerOf(Nats& nats, const std::string& name);
+  static void give(Nats& nats, const std::string& name, const v1::SceneEntry& entry);
+
+  // Ends all work at once, as if the server were killed. For tests.
+  void simulateLoss();
+
+ private:
+  using Clock = schedule::Clock;
+  struct Buckets;
+  struct Known {
+    v1::SceneEntry entry;
+    std::uint64_t revision = 0;
+  };
+  struct Stored {
+    Clock::time_point at{};
+    std::uint64_t tick = 0;
+  };
+
+  void run();
+  v1::ServerEntry selfNow() const;
+  // One round: reads changes, renews the lease, claims and gives up scenes, saves and adopts.
+  void pass(Buckets& buckets);
+  void readChanges(Buckets& buckets);
+  void claimScenes(Buckets& buckets, const std::vector<OwnScene>& scenes);
+  void saveScenes(Buckets& buckets, const std::vector<OwnScene>& scenes, bool all);
+  bool save(Buckets& buckets, const OwnScene& own);
+  void adoptScenes(Buckets& buckets);
+  std::optional<v1::SavedParts> load(Buckets& buckets, const std::string& name,
+                                     const v1::StoredCheckpoint& stored);
+  std::optional<std::uint64_t> revisionOf(const std::string& name) const;
+  bool isAlive(std::uint64_t origin, Clock::time_point now) const;
+  std::vector<OwnScene> scenesNow() const;
+
+  Nats& nats_;
+  hosting::SceneServer& server_;
+  const v1::ServerEntry self_;
+  const Adopt adopt_;
+
+  mutable std::mutex mutex_;  // protects the following
+  std::condition_variable changed_;
+  std::vector<OwnScene> scenes_;
+  std::map<std::uint64_t, std::pair<v1::ServerEntry, Clock::time_point>> servers_;  // with their renewal
+  std::map<std::string, Known> known_;
+  std::set<std::string> leaving_, arriving_;
+  std::string saving_;  // scene whose entry the thread is about to change
+  bool leaves_ = false, stopping_ = false, lost_ = false;
+
+  // Used by the thread.
+  Clock::time_point readAt_{};  // all present entries are known since
+  std::map<std::string, Stored> saved_;
+  std::map<std::string, Clock::time_point> adoptAt_;
+  std::minstd_rand random_{std::random_device{}()};
+  bool logged_ = false;  // that there is no directory
+
+  std::thread thread_;
+};
+
+}  // namespace clothstream::fleet

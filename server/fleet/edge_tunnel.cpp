@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+#include "server/fleet/edge_tunnel.h"
+
+#include <utility>
+#include <vector>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/fleet/message_bytes.h"
+#include "server/fleet/random_id.h"
+
+namespace clothstream::fleet {
+
+using delivery::SharedBytes;
+using schedule::Clock;
+
+EdgeTunnel::EdgeTunnel(Nats& nats, std::string stream, const TunnelId& id, const scene::RemotePeer& peer,
+                       std::function<void()> wake)
+    : nats_(nats), id_(id), wake_(std::move(wake)), stream_(std::move(stream)) {
+  open_.set_peer(peer.name);
+  open_.set_address(peer.address);
+  open_.set_token(peer.token);
+}
+
+EdgeTunnel::~EdgeTunnel() = default;
+
+bool EdgeTunnel::send(std::span<const std::byte> message) {
+  const std::lock_guard lock(mutex_);
+  if (closed_ || left_) return true;  // the peer learns why
+  if (channel_.bytes() + message.size() > kMaxWaiting) return false;
+  if (v1::ClientMessage first; !hello_.protocol_version() && parse(message, first) && first.has_hello())
+    hello_ = first.hello();
+  channel_.push(std::make_shared<std::vector<std::byte>>(message.begin(), message.end()));
+  pollLocked();
+  return true;
+}
+
+std::optional<SharedBytes> EdgeTunnel::next() {
+  const std::lock_guard lock(mutex_);
+  if (messages_.empty()) return std::nullopt;
+  Waiting next = std::move(messages_.front());
+  messages_.pop_front();
+  if (next.sequence > 0) channel_.use(next.sequence);
+  pollLocked();
+  return std::move(next.message);
+}
+
+bool EdgeTunnel::ended() const {
+  const std::lock_guard lock(mutex_);
+  return closed_ && messages_.empty();
+}
+
+void EdgeTunnel::end(End how) {
+  const std::lock_guard lock(mutex_);
+  if (std::exchange(left_, true) || closed_) return;
+  channel_.pushEnd(how == End::left         ? v1::TUNNEL_END_LEFT
+                   : how == End::pageClosed ? v1::TUNNEL_END_PAGE_CLOSED
+                                            : v1::TUNNEL_END_LOST);
+  messages_.clear();
+  pollLocked();
+}
+
+void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || stream != stream_) return;
+    if (segment.unknown()) {
+      closed_ = true;
+      if (!left_)
+        messages_.push_back({delivery::error(
+            v1::ERROR_CODE_CUT_OFF, "the server that simulates the scene has lost this participant: join again",
+            true)});
+    }
+    for (Channel::Received& received : channel_.receive(segment, Clock::now())) {
+      if (!received.message || left_) {
+        closed_ = closed_ || !received.message;
+        channel_.use(received.sequence);
+        continue;
+      }
+      if (!welcomed_) readWelcome(received.message);
+      messages_.push_back({std::move(received.message), received.sequence});
+    }
+    pollLocked();
+    if (left_) return;
+  }
+  wake_();
+}
+
+void EdgeTunnel::readWelcome(const SharedBytes& message) {
+  v1::ServerMessage parsed;
+  if (!parse(*message, parsed) || !parsed.has_welcome()) return;
+  welcomed_ = true;
+  hello_.set_resume_token(parsed.welcome().resume_token());
+  hello_.set_description_content_id(parsed.welcome().description_content_id());
+}
+
+bool EdgeTunnel::poll() {
+  const std::lock_guard lock(mutex_);
+  pollLocked();
+  return !(left_ && (closed_ || channel_.delivered()));
+}
+
+void EdgeTunnel::pollLocked() {
+  if (!nats_.connected()) return;
+  const bool opens = !channel_.heard();
+  channel_.poll(Clock::now(), [&](const v1::Segment& segment) {
+    if (!opens) return nats_.publish(upSubject(stream_, id_), toBytes(segment));
+    v1::Segment opening = segment;
+    *opening.mutable_open() = open_;
+    nats_.publish(upSubject(stream_, id_), toBytes(opening));
+  });
+}
+
+void EdgeTunnel::moveTo(std::string stream) {
+  const std::lock_guard lock(mutex_);
+  if (closed_ || stream == stream_) return;
+  if (!welcomed_) {
+    closed_ = true;
+    messages_.push_back(
+        {delivery::error(v1::ERROR_CODE_CUT_OFF, "the scene has moved to another server: join again", true)});
+    wake_();
+    return;
+  }
+  stream_ = std::move(stream);
+  channel_.restart();
+  for (Waiting& waiting : messages_) waiting.sequence = 0;  // of the former server
+  *open_.mutable_continues() = hello_;
+  pollLocked();
+}
+
+void EdgeTunnel::close(const SharedBytes& last) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_) return;
+    closed_ = true;
+    if (last && !left_) messages_.push_back({last});
+  }
+  wake_();
+}
+
+void EdgeTunnel::tell(SharedBytes message) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || left_) return;
+    messages_.push_back({std::move(message)});
+  }
+  wake_();
+}
+
+std::shared_ptr<scene::RemoteSession> EdgeTunnels::connect(const scene::RemotePeer& peer,
+                                                           std::function<void()> wake) {
+  if (!hasRoom_) return nullptr;
+  const std::lock_guard lock(mutex_);
+  const TunnelId id{edge_, randomId()};
+  auto tunnel = std::make_shared<EdgeTunnel>(nats_, stream_, id, peer, std::move(wake));
+  tunnels_.emplace(id.peer, tunnel);
+  return tunnel;
+}
+
+std::vector<std::shared_ptr<EdgeTunnel>> EdgeTunnels::all() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<EdgeTunnel>> now;
+  for (const auto& [peer, tunnel] : tunnels_) now.push_back(tunnel);
+  return now;
+}
+
+void EdgeTunnels::receive(const std::string& stream, const std::string& subject,
+                          std::span<const std::byte> bytes) {
+  const std::optional<TunnelId> id = tunnelOf(subject);
+  v1::Segment segment;
+  if (!id || !parse(bytes, segment)) return;
+  std::shared_ptr<EdgeTunnel> tunnel;
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = tunnels_.find(id->peer); found != tunnels_.end()) tunnel = found->second;
+  }
+  if (tunnel) tunnel->receive(stream, segment);
+}
+
+void EdgeTunnels::poll() {
+  for (const auto& tunnel : all()) {
+    if (tunnel->poll()) continue;
+    const std::lock_guard lock(mutex_);
+    tunnels_.erase(tunnel->id().peer);
+  }
+}
+
+void EdgeTunnels::moveTo(const std::string& stream) {
+  {
+    const std::lock_guard lock(mutex_);
+    stream_ = stream;
+  }
+  for (const auto& tunnel : all()) tunnel->moveTo(stream);
+}
+
+void EdgeTunnels::close(const SharedBytes& last) {
+  hasRoom_ = false;
+  for (const auto& tunnel : all()) tunnel->close(last);
+}
+
+void EdgeTunnels::tell(const SharedBytes& message) {
+  for (const auto& tunnel : all()) tunnel->tell(message);
+}
+
+}  // namespace clothstream::fleet

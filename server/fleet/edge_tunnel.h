@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+// Session of a participant on an edge with the origin of the scene.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/fleet/channel.h"
+#include "server/fleet/nats.h"
+#include "server/fleet/subjects.h"
+#include "server/scene/remote_session.h"
+
+namespace clothstream::fleet {
+
+// All bytes of the peer go through NATS, both ways, as they are. Thread-safe.
+//
+// When the scene moves to another server, the tunnel continues there: what the former server has not used is
+// sent to the new one, and the peer notices nothing.
+class EdgeTunnel final : public scene::RemoteSession {
+ public:
+  // Bytes of messages of the peer that wait for the origin.
+  static constexpr std::size_t kMaxWaiting = std::size_t{4} << 20;
+
+  EdgeTunnel(Nats& nats, std::string stream, const TunnelId& id, const scene::RemotePeer& peer,
+             std::function<void()> wake);
+  ~EdgeTunnel() override;
+
+  [[nodiscard]] bool send(std::span<const std::byte> message) override;
+  std::optional<delivery::SharedBytes> next() override;
+  bool ended() const override;
+  void end(End how) override;
+
+  const TunnelId& id() const { return id_; }
+  // From the origin. `stream` is the one that it comes from.
+  void receive(const std::string& stream, const v1::Segment& segment);
+  // Sends what is due. Call it every 20 ms or so. Returns false once there is nothing more to do.
+  bool poll();
+  // Continues at this stream.
+  void moveTo(std::string stream);
+  // Ends it with this last message to the peer, or without one.
+  void close(const delivery::SharedBytes& last);
+  // Gives the peer a message.
+  void tell(delivery::SharedBytes message);
+
+ private:
+  struct Waiting {
+    delivery::SharedBytes message;
+    std::uint64_t sequence = 0;  // 0: not of the channel
+  };
+
+  void pollLocked();
+  // Remembers what another server needs to know the participant.
+  void readWelcome(const delivery::SharedBytes& message);
+
+  Nats& nats_;
+  const TunnelId id_;
+  const std::function<void()> wake_;
+
+  mutable std::mutex mutex_;  // protects all below
+  std::string stream_;
+  v1::OpenTunnel open_;
+  v1::Hello hello_;
+  bool welcomed_ = false;
+  Channel channel_;
+  std::deque<Waiting> messages_;
+  bool closed_ = false;  // no message will follow
+  bool left_ = false;    // the peer is gone
+};
+
+// Tunnels of one scene on an edge. Thread-safe.
+class EdgeTunnels {
+ public:
+  EdgeTunnels(Nats& nats, std::uint64_t edge, std::string stream)
+      : nats_(nats), edge_(edge), stream_(std::move(stream)) {}
+
+  // Null if the scene has no room for another participant.
+  std::shared_ptr<scene::RemoteSession> connect(const scene::RemotePeer& peer, std::function<void()> wake);
+  // Whether the scene has room for participants, as its origin says.
+  void setRoom(bool hasRoom) { hasRoom_ = hasRoom; }
+  void receive(const std::string& stream, const std::string& subject, std::span<const std::byte> bytes);
+  void poll();
+  // As for one tunnel.
+  void moveTo(const std::string& stream);
+  void close(const delivery::SharedBytes& last);
+  void tell(const delivery::SharedBytes& message);
+
+ private:
+  std::vector<std::shared_ptr<EdgeTunnel>> all() const;
+
+  Nats& nats_;
+  const std::uint64_t edge_;
+  std::atomic<bool> hasRoom_{false};
+
+  mutable std::mutex mutex_;  // protects the next two
+  std::string stream_;
+  std::map<std::uint64_t, std::shared_ptr<EdgeTunnel>> tunnels_;  // by peer
+};
+
+}  // namespace clothstream::fleet

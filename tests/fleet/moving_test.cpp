@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+// Scenes that move between servers, and scenes of a server that is gone.
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/fleet/fleet_test.h"
+
+namespace clothstream::fleet {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using tests::eventually;
+using tests::SeenFrame;
+using tests::TestPeer;
+
+class MovingTest : public tests::FleetTest {
+ protected:
+  // Starts two servers, a scene "moves" on the first one, and an edge.
+  void startTwo() {
+    first_ = startOrigin();
+    second_ = startOrigin();
+    ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
+    ASSERT_TRUE(eventually([&] {
+      return first_->owns("moves") && !first_->origin->directory().others().empty();
+    }));
+    edge_ = startEdge("moves");
+  }
+  static std::map<std::uint64_t, std::uint64_t> hashesOf(const TestPeer& peer) {
+    std::map<std::uint64_t, std::uint64_t> hashes;
+    for (const SeenFrame& frame : peer.frames()) hashes[frame.tick] = frame.stateHash;
+    return hashes;
+  }
+
+  std::unique_ptr<OriginServer> first_, second_;
+  std::unique_ptr<EdgeServer> edge_;
+};
+
+TEST_F(MovingTest, NobodyAtAnEdgeNoticesAndTheStateIsThatOfASceneThatNeverMoved) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  TestPeer viewer(edge_->server), peer(edge_->server);
+  viewer.role = v1::ROLE_VIEWER;
+  viewer.join("moves");
+  peer.join("moves");
+  viewer.readFrames(20);
+  peer.readFrames(20);
+  const auto moved = first_->origin->move("moves");
+  ASSERT_THAT(moved.error(), IsEmpty());
+  EXPECT_EQ(moved.to(), second_->origin->id());
+  RecordProperty("gap_ms", static_cast<int>(moved.gap() * 1000));
+  EXPECT_EQ(first_->find("moves"), nullptr);
+  const auto scene = second_->find("moves");
+  ASSERT_NE(scene, nullptr);
+  const std::uint64_t tick = scene->tick;
+  while (viewer.frames().back().tick < tick + 60) viewer.readFrames(5);
+  while (peer.frames().back().tick < tick + 60) peer.readFrames(5);
+  EXPECT_EQ(scene->roster.size(), 1u);
+  EXPECT_EQ(scene->roster.away(), 0u);
+
+  // The same scene on a server that is alone.
+  hosting::SceneServer alone({tests::smallScene("small"), tests::smallScene("other")}, options());
+  TestPeer still(alone);
+  still.join("other");
+  while (still.frames().back().tick < tick + 60) still.readFrames(20);
+  const auto expected = hashesOf(still);
+  std::size_t compared = 0;
+  for (const TestPeer* seen : {&viewer, &peer})
+    for (const auto& [at, hash] : hashesOf(*seen)) {
+      const auto found = expected.find(at);
+      if (found == expected.end()) continue;
+      EXPECT_EQ(hash, found->second) << "tick " << at;
+      compared += at > tick ? 1 : 0;
+    }
+  EXPECT_GT(compared, 10u);
+  alone.stop();
+}
+
+TEST_F(MovingTest, NamesRolesCollidersAndInputsStay) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  TestPeer peer(edge_->server);
+  peer.join("moves");
+  peer.poses({{0, 0.25F}});
+  const std::uint64_t id = peer.welcome().participant_id();
+  const auto hasCollider = [&](const v1::ServerMessage& message) {
+    return std::ranges::any_of(message.frame().colliders(), [&](const v1::ColliderState& collider) {
+      return collider.participant_id() == id;
+    });
+  };
+  peer.readUntil(hasCollider);
+  std::atomic<bool> moved = false;
+  std::thread mover([&] {
+    EXPECT_THAT(first_->origin->move("moves").error(), IsEmpty());
+    moved = true;
+  });
+  // Changes go on while the scene moves. Each is confirmed once, in order.
+  v1::ParameterChange change;
+  std::vector<float> winds;
+  float sent = 0;
+  const auto read = [&](const v1::ServerMessage& message) {
+    EXPECT_FALSE(message.has_error()) << message.error().text();
+    if (message.has_frame()) {
+      EXPECT_TRUE(hasCollider(message));
+    }
+    if (!message.has_parameter_changed() || !message.parameter_changed().change().has_wind()) return false;
+    winds.push_back(message.parameter_changed().change().wind().value().x());
+    return winds.back() == sent;
+  };
+  do {
+    change.mutable_wind()->mutable_value()->set_x(sent += 0.1F);
+    peer.change(change);
+    peer.readUntil(read);
+  } while (!moved);
+  mover.join();
+  for (int i = 0; i < 5; ++i) {
+    change.mutable_wind()->mutable_value()->set_x(sent += 0.1F);
+    peer.change(change);
+    peer.readUntil(read);
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(winds));
+  EXPECT_EQ(std::ranges::adjacent_find(winds), winds.end());
+  const auto scene = second_->find("moves");
+  ASSERT_NE(scene, nullptr);
+  const scene::SavedRoster roster = scene->roster.saved();
+  ASSERT_EQ(roster.participants.size(), 1u);
+  EXPECT_EQ(roster.participants[0].participant.id, id);
+  EXPECT_EQ(roster.participants[0].participant.role, scene::Role::owner);
+  EXPECT_EQ(roster.participants[0].participant.clientName, "test");
+}
+
+TEST_F(MovingTest, WhoIsConnectedToTheServerIsToldToJoinAgain) {
+  first_ = startOrigin();
+  second_ = startOrigin({.publicName = "second.example.com"});
+  ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
+  ASSERT_TRUE(eventually([&] {
+    return first_->owns("moves") && !first_->origin->directory().others().empty();
+  }));
+  TestPeer direct(first_->server);
+  direct.join("moves");
+  ASSERT_THAT(first_->origin->move("moves").error(), IsEmpty());
+  const auto last = direct.readToTheEnd();
+  EXPECT_EQ(last.error().code(), v1::ERROR_CODE_CUT_OFF);
+  EXPECT_THAT(last.error().text(), HasSubstr("second.example.com"));
+  // Its place is kept at the other server.
+  v1::Hello hello;
+  hello.set_scene("moves");
+  hello.set_resume_token(direct.welcome().resume_token());
+  TestPeer again(second_->server);
+  again.hello(hello);
+  again.readUntil(v1::ServerMessage::kWelcome);
+  EXPECT_TRUE(again.welcome().resumed());
+}
+
+TEST_F(MovingTest, ASceneStaysWhereItIsIfItCannotMove) {
+  first_ = startOrigin();
+  EXPECT_THAT(first_->origin->move("none").error(), HasSubstr("no scene 'none'"));
+  ASSERT_TRUE(eventually([&] { return first_->owns("small"); }));
+  EXPECT_THAT(first_->origin->move("small").error(), HasSubstr("only created ones move"));
+  ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
+  ASSERT_TRUE(eventually([&] { return first_->owns("moves"); }));
+  EXPECT_THAT(first_->origin->move("moves").error(), HasSubstr("no other server"));
+  EXPECT_THAT(first_->origin->move("moves", 7).error(), HasSubstr("no such server"));
+  EXPECT_THAT(first_->origin->move("moves", first_->origin->id()).error(), HasSubstr("has it already"));
+
+  // A server without room, and one of an earlier version.
+  hosting::ServerOptions full = options();
+  full.maxCreatedScenes = 0;
+  OriginServer second(natsOptions(), full);
+  ASSERT_TRUE(eventually([&] { return first_->origin->directory().others().size() == 1; }));
+  EXPECT_THAT(first_->origin->move("moves").error(), HasSubstr("no other server"));
+  EXPECT_THAT(first_->origin->move("moves", second.origin->id()).error(), HasSubstr("its maximum"));
+  TestPeer direct(first_->server);
+  direct.join("moves");
+  direct.readFrames(5);
+}
+
+TEST_F(MovingTest, ScenesMoveOnlyToTheSameOrALaterVersion) {
+  first_ = startOrigin({.version = 2000});
+  second_ = startOrigin({.version = 1999});
+  ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
+  ASSERT_TRUE(eventually([&] {
+    return first_->owns("moves") && !first_->origin->directory().others().empty();
+  }));
+  EXPECT_THAT(first_->origin->move("moves").error(), HasSubstr("no other server"));
+  EXPECT_THAT(first_->origin->move("moves", second_->origin->id()).error(), HasSubstr("older"));
+}
+
+TEST_F(MovingTest, AServerThatStopsMovesItsScenes) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  TestPeer peer(edge_->server);
+  peer.join("moves");
+  EXPECT_EQ(first_->origin->moveAll(schedule::Clock::now() + 30s), 0u);
+  first_.reset();
+  peer.readFrames(20);
+  EXPECT_FALSE(peer.finished());
+  EXPECT_NE(second_->find("moves"), nullptr);
+}
+
+TEST_F(MovingTest, AnotherServerContinuesTheScenesOfOneThatIsGone) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  v1::Hello hello;
+  hello.set_scene("moves");
+  TestPeer peer(edge_->server);
+  peer.join("moves");
+  hello.set_resume_token(peer.welcome().resume_token());
+  ASSERT_TRUE(eventually([&] {
+    peer.readFrames(1);
+    return first_->origin->directory().checkpointOf("moves").tick() > 0;
+  }));
+  // Like a server that was killed: it saves and says nothing more.
+  const std::uint64_t tick = first_->find("moves")->tick;
+  first_->origin->simulateLoss();
+  peer.readToTheEnd();
+  ASSERT_TRUE(eventually([&] { return second_->find("moves") != nullptr; }));
+  const auto scene = second_->find("moves");
+  const double rate = scene->start().simulationRate;
+  EXPECT_GT(static_cast<double>(scene->tick) + 5 * rate, static_cast<double>(tick));
+  ASSERT_TRUE(eventually([&] {
+    TestPeer again(edge_->server);
+    again.hello(hello);
+    return again.readUntil([](const auto&) { return true; }).welcome().resumed();
+  }));
+}
+
+}  // namespace
+}  // namespace clothstream::fleet

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+// Participants on an edge: their inputs reach the server that simulates the scene, in order and once.
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/fleet/fleet_test.h"
+
+namespace clothstream::fleet {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using tests::eventually;
+using tests::TestPeer;
+
+class ParticipantsTest : public tests::FleetTest {
+ protected:
+  static v1::ParameterChange windOf(float x) {
+    v1::ParameterChange change;
+    change.mutable_wind()->mutable_value()->set_x(x);
+    return change;
+  }
+  // Winds that the peer is told about, until this one.
+  static std::vector<float> windsUntil(TestPeer& peer, float last) {
+    std::vector<float> winds;
+    peer.readUntil([&](const v1::ServerMessage& message) {
+      if (!message.has_parameter_changed() || !message.parameter_changed().change().has_wind()) return false;
+      winds.push_back(message.parameter_changed().change().wind().value().x());
+      return winds.back() == last;
+    });
+    return winds;
+  }
+};
+
+TEST_F(ParticipantsTest, TakePartAsAtTheOrigin) {
+  const auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  TestPeer direct(origin->server), peer(edge->server);
+  direct.join("small");
+  peer.join("small");
+  EXPECT_EQ(direct.welcome().role(), v1::ROLE_OWNER);
+  EXPECT_EQ(peer.welcome().role(), v1::ROLE_PARTICIPANT);
+  EXPECT_EQ(peer.welcome().participants_size(), 2);
+  EXPECT_EQ(origin->find("small")->roster.size(), 2u);
+  EXPECT_EQ(edge->server.state().find("small")->roster.size(), 0u);
+
+  peer.poses({{0, 0.25F}});
+  direct.readUntil([&](const v1::ServerMessage& message) {
+    const auto& colliders = message.frame().colliders();
+    return std::ranges::any_of(colliders, [&](const v1::ColliderState& collider) {
+      return collider.participant_id() == peer.welcome().participant_id();
+    });
+  });
+  direct.change(windOf(2));
+  EXPECT_EQ(windsUntil(peer, 2), std::vector<float>{2});
+  peer.readFrames(5);  // each one is decoded and compared with the origin's hash
+
+  peer.leave();
+  const auto left = direct.readUntil([](const v1::ServerMessage& message) {
+    return message.has_presence() && message.presence().kind() == v1::PRESENCE_KIND_LEFT;
+  });
+  EXPECT_EQ(left.presence().reason(), v1::LEAVE_REASON_LEFT);
+}
+
+TEST_F(ParticipantsTest, ErrorsAreThoseOfTheOrigin) {
+  const auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  TestPeer owner(origin->server), peer(edge->server);
+  owner.join("small");
+  peer.join("small");
+  v1::ClientMessage remove;
+  remove.mutable_remove_participant()->set_participant_id(owner.welcome().participant_id());
+  peer.send(remove);
+  EXPECT_THAT(peer.readUntil(v1::ServerMessage::kError).error().text(), HasSubstr("yours is participant"));
+  remove.mutable_remove_participant()->set_participant_id(peer.welcome().participant_id());
+  owner.send(remove);
+  const auto last = peer.readToTheEnd();
+  EXPECT_EQ(last.error().code(), v1::ERROR_CODE_REMOVED);
+}
+
+TEST_F(ParticipantsTest, AFullSceneIsWatched) {
+  hosting::ServerOptions few = options();
+  few.maxParticipants = 1;
+  OriginServer origin(natsOptions(), few);
+  TestPeer owner(origin.server);
+  owner.join("small");
+  const auto edge = startEdge("small");
+  // The edge learns how many there are from the next offer.
+  ASSERT_TRUE(eventually([&] {
+    TestPeer peer(edge->server);
+    peer.hello("small");
+    return peer.readUntil([](const auto&) { return true; }).welcome().role() == v1::ROLE_VIEWER;
+  }));
+}
+
+// Every change arrives once, in order, although NATS loses its connections in between.
+TEST_F(ParticipantsTest, InputsArriveInOrderAndOnceAfterNatsWasLost) {
+  const auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  TestPeer direct(origin->server), peer(edge->server);
+  peer.join("small");
+  direct.join("small");
+  std::vector<float> sent;
+  for (int i = 1; i <= 60; ++i) {
+    sent.push_back(static_cast<float>(i) / 10);
+    peer.change(windOf(sent.back()));
+    if (i == 20) nats_->kill();
+    if (i == 40) nats_->restart();
+    std::this_thread::sleep_for(30ms);
+  }
+  std::vector<float> winds = windsUntil(direct, sent.back());
+  // Changes of one tick are one change, so some are not seen, but none twice and none late.
+  EXPECT_TRUE(std::ranges::is_sorted(winds));
+  EXPECT_EQ(std::ranges::adjacent_find(winds), winds.end());
+  EXPECT_FALSE(peer.finished());
+  peer.readFrames(5);
+}
+
+TEST_F(ParticipantsTest, ALostEdgeKeepsThePlaceOfItsParticipants) {
+  const auto origin = startOrigin();
+  auto edge = startEdge("small");
+  v1::Hello hello;
+  hello.set_scene("small");
+  {
+    TestPeer peer(edge->server);
+    peer.join("small");
+    hello.set_resume_token(peer.welcome().resume_token());
+  }
+  edge.reset();
+  edge = startEdge("small");
+  TestPeer again(edge->server);
+  again.hello(hello);
+  again.readUntil(v1::ServerMessage::kWelcome);
+  EXPECT_TRUE(again.welcome().resumed());
+}
+
+TEST_F(ParticipantsTest, AnOriginThatIsLostCutsThemOff) {
+  auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  TestPeer peer(edge->server);
+  peer.join("small");
+  origin.reset();
+  EXPECT_THAT(peer.readToTheEnd().notice().text(), HasSubstr("stopping"));
+}
+
+}  // namespace
+}  // namespace clothstream::fleet
