@@ -5,6 +5,12 @@
 #include <memory>
 
 namespace clothstream::fleet {
+namespace {
+
+// Used segments of which the other end learns at once, so that a full window does not wait.
+constexpr std::uint64_t kUsedAtOnce = 4;
+
+}  // namespace
 
 void Channel::push(const delivery::SharedBytes& message) {
   const auto* const bytes = reinterpret_cast<const char*>(message->data());
@@ -36,7 +42,7 @@ void Channel::transmit(v1::Segment& segment, Clock::time_point now, const Send& 
   segment.set_consumed(usedUpTo_);
   lastSent_ = now;
   answerAt_.reset();
-  unansweredBytes_ = 0;
+  announced_ = usedUpTo_;
   send(segment);
 }
 
@@ -56,7 +62,9 @@ void Channel::poll(Clock::time_point now, const Send& send) {
     unused_.emplace_back(segment.sequence(), segment.data().size());
     transmit(segment, now, send);
   }
-  if ((answerAt_ && now >= *answerAt_) || now - lastSent_ >= kKeepAlive) {
+  const bool isUseDue = usedUpTo_ - announced_ >= kUsedAtOnce ||
+                        (usedUpTo_ > announced_ && now - lastSent_ >= kAnswerTime);
+  if ((answerAt_ && now >= *answerAt_) || isUseDue || now - lastSent_ >= kKeepAlive) {
     v1::Segment answer;
     transmit(answer, now, send);
   }
@@ -78,7 +86,6 @@ std::vector<Channel::Received> Channel::receive(const v1::Segment& segment, Cloc
   if (!answerAt_) answerAt_ = now + kAnswerTime;
   if (segment.sequence() != received_ + 1) return {};
   ++received_;
-  unansweredBytes_ += segment.data().size();
   if (segment.end() != v1::TUNNEL_END_UNSPECIFIED) {
     whole_ = received_;
     return {{.message = nullptr, .end = segment.end(), .sequence = received_}};
@@ -100,11 +107,10 @@ void Channel::use(std::uint64_t sequence) {
   usedUpTo_ = std::max(usedUpTo_, sequence);
   // A message that is longer than the window must not wait for its own end.
   if (usedUpTo_ >= whole_) usedUpTo_ = received_;
-  if (unansweredBytes_ >= kWindow / 4) answerAt_ = Clock::time_point{};
 }
 
 void Channel::restart() {
-  received_ = usedUpTo_ = whole_ = 0;
+  received_ = usedUpTo_ = whole_ = announced_ = 0;
   partial_.clear();
   heard_ = false;
   progress_ = {};

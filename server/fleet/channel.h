@@ -41,7 +41,7 @@ class Channel {
 
   // `received`: newest segment that this end has used already, in a former life.
   explicit Channel(std::uint64_t received = 0)
-      : received_(received), usedUpTo_(received), whole_(received) {}
+      : received_(received), usedUpTo_(received), whole_(received), announced_(received) {}
 
   // Whether another message would be sent at once.
   bool hasRoom() const { return waiting_.empty() && windowBytes_ < kWindow; }
@@ -81,9 +81,9 @@ class Channel {
   Clock::duration repeat_ = kFirstRepeat;
 
   std::uint64_t received_, usedUpTo_, whole_;
+  std::uint64_t announced_ = 0;  // usedUpTo_ that the other end knows
   std::string partial_;
   std::optional<Clock::time_point> answerAt_;
-  std::size_t unansweredBytes_ = 0;
   bool heard_ = false;
 };
 

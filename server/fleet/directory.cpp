@@ -162,19 +162,27 @@ v1::StoredCheckpoint Directory::checkpointOf(const std::string& name) const {
   return found == known_.end() ? v1::StoredCheckpoint() : found->second.entry.checkpoint();
 }
 
-bool Directory::transfer(Nats& nats, const std::string& name, const v1::SceneEntry& entry,
-                         std::uint64_t revision) {
-  return Bucket(nats, {.name = kScenes}).update(name, entry.SerializeAsString(), revision).has_value();
+bool Directory::transfer(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision) {
+  const auto written =
+      Bucket(nats_, {.name = kScenes}).update(name, entry.SerializeAsString(), revision);
+  if (written) know(name, entry, *written);
+  return written.has_value();
 }
 
-std::uint64_t Directory::ownerOf(Nats& nats, const std::string& name) {
-  const auto entry = Bucket(nats, {.name = kScenes}).get(name);
-  v1::SceneEntry scene;
-  return entry && scene.ParseFromString(entry->value) ? scene.origin() : 0;
+std::uint64_t Directory::ownerOf(const std::string& name) {
+  const auto present = Bucket(nats_, {.name = kScenes}).get(name);
+  v1::SceneEntry entry;
+  return present && entry.ParseFromString(present->value) ? entry.origin() : 0;
 }
 
-void Directory::give(Nats& nats, const std::string& name, const v1::SceneEntry& entry) {
-  Bucket(nats, {.name = kScenes}).put(name, entry.SerializeAsString());
+void Directory::give(const std::string& name, const v1::SceneEntry& entry) {
+  know(name, entry, Bucket(nats_, {.name = kScenes}).put(name, entry.SerializeAsString()));
+}
+
+void Directory::know(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision) {
+  const std::lock_guard lock(mutex_);
+  Known& known = known_[name];
+  if (revision >= known.revision) known = {entry, revision};
 }
 
 v1::ServerEntry Directory::selfNow() const {
@@ -258,11 +266,12 @@ void Directory::readChanges(Buckets& buckets) {
     }
     v1::SceneEntry entry;
     if (!change->deleted && !entry.ParseFromString(change->value)) continue;
+    if (!change->deleted) {
+      know(change->key, entry, change->revision);
+      continue;
+    }
     const std::lock_guard lock(mutex_);
-    if (change->deleted)
-      known_.erase(change->key);
-    else
-      known_[change->key] = {entry, change->revision};
+    if (known_[change->key].revision <= change->revision) known_.erase(change->key);
   }
 }
 
@@ -289,9 +298,7 @@ void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scene
       *entry.mutable_checkpoint() = known->entry.checkpoint();
     const auto revision = known ? buckets.scenes.update(name, entry.SerializeAsString(), known->revision)
                                 : buckets.scenes.create(name, entry.SerializeAsString());
-    if (!revision) continue;
-    const std::lock_guard lock(mutex_);
-    known_[name] = {entry, *revision};
+    if (revision) know(name, entry, *revision);
   }
   {
     const std::lock_guard lock(mutex_);
@@ -382,10 +389,8 @@ bool Directory::save(Buckets& buckets, const OwnScene& own) {
     stored.set_parts(stored.parts() + 1);
   }
   const auto written = buckets.scenes.update(name, entry.SerializeAsString(), *revision);
-  if (!written) return false;
-  const std::lock_guard lock(mutex_);
-  known_[name] = {entry, *written};
-  return true;
+  if (written) know(name, entry, *written);
+  return written.has_value();
 }
 
 std::optional<v1::SavedParts> Directory::load(Buckets& buckets, const std::string& name,
@@ -433,10 +438,8 @@ void Directory::adoptScenes(Buckets& buckets) {
       entry.set_origin(self_.origin());
       entry.set_stream(0);
       claimed = buckets.scenes.update(name, entry.SerializeAsString(), known.revision);
-      if (!claimed) return false;
-      const std::lock_guard lock(mutex_);
-      known_[name] = {entry, *claimed};
-      return true;
+      if (claimed) know(name, entry, *claimed);
+      return claimed.has_value();
     });
   }
   if (problem.empty()) return;

@@ -76,14 +76,12 @@ class Directory {
   void expectNoMore(const std::string& name);
   // Newest checkpoint of a scene of any server.
   v1::StoredCheckpoint checkpointOf(const std::string& name) const;
-  // Makes a scene the server's that has `entry.origin`, unless its revision is another one. For a thread
-  // with its own connection to the store. Throws what Bucket throws.
-  static bool transfer(Nats& nats, const std::string& name, const v1::SceneEntry& entry,
-                       std::uint64_t revision);
-  // Server that has a scene, 0 if none; and the same as transfer() whatever the revision is.
-  static std::uint64_t ownerOf(Nats& nats, const std::string& name);
-  static void give(Nats& nats, const std::string& name, const v1::SceneEntry& entry);
-
+  // Writes the entry of a scene, unless its revision is another one. Returns whether it is written. The
+  // following three may be called on any thread, and throw what Bucket throws.
+  bool transfer(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision);
+  // Server that has a scene, 0 if none; and transfer() whatever the revision is.
+  std::uint64_t ownerOf(const std::string& name);
+  void give(const std::string& name, const v1::SceneEntry& entry);
   // Ends all work at once, as if the server were killed. For tests.
   void simulateLoss();
 
@@ -111,6 +109,8 @@ class Directory {
   std::optional<v1::SavedParts> load(Buckets& buckets, const std::string& name,
                                      const v1::StoredCheckpoint& stored);
   std::optional<std::uint64_t> revisionOf(const std::string& name) const;
+  // Remembers an entry, unless a newer one is known.
+  void know(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision);
   bool isAlive(std::uint64_t origin, Clock::time_point now) const;
   std::vector<OwnScene> scenesNow() const;
 

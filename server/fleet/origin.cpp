@@ -366,8 +366,8 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
   *entry.mutable_checkpoint() = directory_->checkpointOf(name);
   for (;;) {
     try {
-      if (Directory::transfer(nats_, name, entry, *revision)) return stay(why);
-      const auto owner = Directory::ownerOf(nats_, name);
+      if (directory_->transfer(name, entry, *revision)) return stay(why);
+      const auto owner = directory_->ownerOf(name);
       if (owner != to) return stay(why);
       directory_->endMove(name);
       return {};
@@ -421,14 +421,14 @@ void Origin::receiveScene(std::uint64_t move) {
   *entry.mutable_checkpoint() = directory_->checkpointOf(name);
   directory_->expect(name);
   try {
-    if (!Directory::transfer(nats_, name, entry, state->state().revision()))
+    if (!directory_->transfer(name, entry, state->state().revision()))
       return giveUp("the directory has another server for it");
     server_.state().startArrived(scene, std::move(*continued));
   } catch (const std::exception& failure) {
     entry.set_origin(asked->prepare().origin());
     entry.set_stream(asked->prepare().stream());
     try {
-      if (Directory::ownerOf(nats_, name) == id_) Directory::give(nats_, name, entry);
+      if (directory_->ownerOf(name) == id_) directory_->give(name, entry);
     } catch (const std::exception& again) {
       spdlog::error("{}: {}", name, again.what());
     }

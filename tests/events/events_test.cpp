@@ -144,7 +144,7 @@ TEST_F(EventsTest, SendsSignedEventsInTheirOrder) {
 
 TEST_F(EventsTest, RepeatsTheSameEventUntilItIsAccepted) {
   const std::vector<int> answers{500, Receiver::kClose, 408, 429, 302, 204};
-  receive([&](std::size_t number) { return number < answers.size() ? answers[number] : 200; });
+  receive([answers](std::size_t number) { return number < answers.size() ? answers[number] : 200; });
   start();
   const auto scene = makeScene();
   join(*scene);
