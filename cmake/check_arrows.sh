@@ -30,7 +30,7 @@ server/saved_state | server/scene server/model server/messages server/telemetry 
 server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
 server/recording   | server/encode server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
-server/fleet       | server/hosting server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
+server/fleet       | server/session server/hosting server/saved_state server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
 server/agones      | server/hosting server/scene server/schedule
 server/events      | proto/text server/scene server/schedule
 server/step        | server/model server/vulkan server/simulation server/messages
@@ -75,7 +75,7 @@ readonly OUTSIDE='
 <wincrypt.h        | clients/websocket/winhttp
 <qrencode          | server/tls
 <zip.h             | clients/files
-<nats/             | server/fleet
+<nats/             | server/fleet clients/cli
 <avahi-            | server/discovery clients/cli
 <Eigen/            | server/model server/reference
 <draco/            | server/meshes

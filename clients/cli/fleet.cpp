@@ -23,7 +23,7 @@
 namespace clothstream::cli {
 namespace {
 
-constexpr std::int64_t kWait = 3000;          // milliseconds
+constexpr std::int64_t kWait = 3000;         // milliseconds
 constexpr std::int64_t kMoveWait = 180'000;  // a large scene is loaded first
 constexpr std::size_t kMaxEntries = 100'000;
 
@@ -60,12 +60,13 @@ Connection connect(const std::vector<std::string>& servers, const std::string& c
     require(natsOptions_SetUserCredentialsFromFiles(options.get(), credentials.c_str(), nullptr),
             "--nats-credentials " + credentials);
   if (!authority.empty()) {
-    require(natsOptions_LoadCATrustedCertificates(options.get(), authority.c_str()), "--nats-ca " + authority);
+    require(natsOptions_LoadCATrustedCertificates(options.get(), authority.c_str()),
+            "--nats-ca " + authority);
     require(natsOptions_SetSecure(options.get(), true), "--nats-ca");
   }
-  return made<Connection>(fmt::format("NATS at {}", fmt::join(servers, ", ")), [&](natsConnection** connection) {
-    return natsConnection_Connect(connection, options.get());
-  });
+  return made<Connection>(
+      fmt::format("NATS at {}", fmt::join(servers, ", ")),
+      [&](natsConnection** connection) { return natsConnection_Connect(connection, options.get()); });
 }
 
 struct Directory {
@@ -101,7 +102,8 @@ void readBucket(jsCtx* context, const char* bucket, const auto& take) {
     if (next == nullptr) return;  // these were all
     const Owned<kvEntry, &kvEntry_Destroy> entry(next);
     Message message;
-    if (kvEntry_Operation(next) == kvOp_Put && message.ParseFromArray(kvEntry_Value(next), kvEntry_ValueLen(next)))
+    if (kvEntry_Operation(next) == kvOp_Put &&
+        message.ParseFromArray(kvEntry_Value(next), kvEntry_ValueLen(next)))
       take(kvEntry_Key(next), message);
   }
 }
@@ -113,12 +115,13 @@ Directory read(natsConnection* connection) {
   const auto context = made<Owned<jsCtx, &jsCtx_Destroy>>(
       "NATS", [&](jsCtx** made) { return natsConnection_JetStream(made, connection, &options); });
   Directory directory;
-  readBucket<v1::ServerEntry>(context.get(), "clothstream-servers", [&](const char*, const v1::ServerEntry& server) {
-    directory.servers.emplace(server.origin(), server);
-  });
-  readBucket<v1::SceneEntry>(context.get(), "clothstream-scenes", [&](const char* name, const v1::SceneEntry& scene) {
-    directory.scenes.emplace(name, scene);
-  });
+  readBucket<v1::ServerEntry>(context.get(), "clothstream-servers",
+                              [&](const char*, const v1::ServerEntry& server) {
+                                directory.servers.emplace(server.origin(), server);
+                              });
+  readBucket<v1::SceneEntry>(
+      context.get(), "clothstream-scenes",
+      [&](const char* name, const v1::SceneEntry& scene) { directory.scenes.emplace(name, scene); });
   return directory;
 }
 
@@ -148,8 +151,8 @@ std::string json(const Directory& directory) {
 }
 
 void print(const Directory& directory) {
-  fmt::print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}\n", "SERVER", "VERSION", "NAME", "PARTICIPANTS", "CREATED",
-             "LOAD");
+  fmt::print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}\n", "SERVER", "VERSION", "NAME", "PARTICIPANTS",
+             "CREATED", "LOAD");
   for (const auto& [origin, server] : directory.servers)
     fmt::print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}{}\n", idOf(origin), printable(server.server_name()),
                server.public_name().empty() ? "-" : printable(server.public_name()), server.participants(),
@@ -168,23 +171,28 @@ void FleetCommands::add(CLI::App& app, CLI::App& list) {
   list_ = &list;
   move_ = app.add_subcommand("move", "Move a scene that a client created to another server of a fleet");
   move_->add_option("SCENE", scene_, "Name of the scene")->required();
-  move_->add_option("--to", to_, "Server that shall have it: its number or name in \"clothstream list --nats\". "
-                                 "Default: the one with the most room")
+  move_
+      ->add_option("--to", to_,
+                   "Server that shall have it: its number or name in \"clothstream list --nats\". "
+                   "Default: the one with the most room")
       ->type_name("SERVER");
   for (CLI::App* command : {list_, move_}) {
     CLI::Option* const nats =
         command
             ->add_option("--nats", servers_,
-                         command == list_ ? "List the servers and scenes of a fleet: URL of its NATS server, such as "
-                                            "nats://10.0.0.5:4222; may be repeated"
-                                          : "URL of a NATS server of the fleet; may be repeated")
+                         command == list_
+                             ? "List the servers and scenes of a fleet: URL of its NATS server, such as "
+                               "nats://10.0.0.5:4222; may be repeated"
+                             : "URL of a NATS server of the fleet; may be repeated")
             ->type_name("URL")
             ->delimiter(',');
     if (command == move_) nats->required();
     command->add_option("--nats-credentials", credentials_, "File with the credentials of a NATS user")
         ->type_name("FILE")
         ->needs(nats);
-    command->add_option("--nats-ca", authority_, "Require TLS, with a certificate of an authority in this PEM file")
+    command
+        ->add_option("--nats-ca", authority_,
+                     "Require TLS, with a certificate of an authority in this PEM file")
         ->type_name("FILE")
         ->needs(nats);
   }
@@ -213,7 +221,8 @@ ExitCode FleetCommands::move() const {
   const Directory directory = read(connection.get());
   const auto scene = directory.scenes.find(scene_);
   if (scene == directory.scenes.end())
-    return printError(kRefused, fmt::format("the directory has no scene '{}'; see clothstream list --nats", scene_));
+    return printError(kRefused,
+                      fmt::format("the directory has no scene '{}'; see clothstream list --nats", scene_));
   v1::MoveRequest request;
   request.set_scene(scene_);
   if (!to_.empty()) {

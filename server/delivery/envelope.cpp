@@ -76,12 +76,14 @@ SharedBytes parametersChanged(v1::ParameterChange change, std::uint64_t tick, st
   return serialise(message);
 }
 
-SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_t requestId) {
+SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_t requestId,
+                  std::string server) {
   v1::ServerMessage message;
   message.set_request_id(requestId);
   message.mutable_error()->set_code(code);
   message.mutable_error()->set_text(std::move(text));
   message.mutable_error()->set_fatal(fatal);
+  message.mutable_error()->set_server(std::move(server));
   return serialise(message);
 }
 

@@ -29,8 +29,9 @@ SharedBytes notice(v1::NoticeKind kind, std::string text, std::uint64_t tick, st
 // `participant` as for notice().
 SharedBytes parametersChanged(v1::ParameterChange change, std::uint64_t tick, std::uint64_t participant = 0);
 
-// `requestId` is that of the message being answered.
-SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_t requestId = 0);
+// `requestId` is that of the message being answered, `server` the one that has the scene, if it is known.
+SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_t requestId = 0,
+                  std::string server = {});
 
 // Last message to a peer that does not read its messages. The peer may reconnect.
 SharedBytes tooSlow();

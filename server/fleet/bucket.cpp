@@ -86,8 +86,8 @@ std::optional<Bucket::Entry> Bucket::get(const std::string& key) {
 
 std::uint64_t Bucket::put(const std::string& key, const std::string& value) {
   std::uint64_t revision = 0;
-  const natsStatus status = kvStore_Put(&revision, storeOf(store_), key.c_str(), value.data(),
-                                        static_cast<int>(value.size()));
+  const natsStatus status =
+      kvStore_Put(&revision, storeOf(store_), key.c_str(), value.data(), static_cast<int>(value.size()));
   if (status != NATS_OK) fail(status, name_);
   return revision;
 }
@@ -102,8 +102,8 @@ std::optional<std::uint64_t> Bucket::written(int status, std::uint64_t revision,
 
 std::optional<std::uint64_t> Bucket::create(const std::string& key, const std::string& value) {
   std::uint64_t revision = 0;
-  const natsStatus status = kvStore_Create(&revision, storeOf(store_), key.c_str(), value.data(),
-                                           static_cast<int>(value.size()));
+  const natsStatus status =
+      kvStore_Create(&revision, storeOf(store_), key.c_str(), value.data(), static_cast<int>(value.size()));
   return written(status, revision, key);
 }
 

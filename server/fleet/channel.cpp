@@ -62,8 +62,8 @@ void Channel::poll(Clock::time_point now, const Send& send) {
     unused_.emplace_back(segment.sequence(), segment.data().size());
     transmit(segment, now, send);
   }
-  const bool isUseDue = usedUpTo_ - announced_ >= kUsedAtOnce ||
-                        (usedUpTo_ > announced_ && now - lastSent_ >= kAnswerTime);
+  const bool isUseDue =
+      usedUpTo_ - announced_ >= kUsedAtOnce || (usedUpTo_ > announced_ && now - lastSent_ >= kAnswerTime);
   if ((answerAt_ && now >= *answerAt_) || isUseDue || now - lastSent_ >= kKeepAlive) {
     v1::Segment answer;
     transmit(answer, now, send);

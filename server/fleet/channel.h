@@ -18,8 +18,8 @@
 
 namespace clothstream::fleet {
 
-// One end. Long messages are divided into segments. Segments stay until the other end has their whole message,
-// and are sent again if no answer comes. Not thread-safe.
+// One end. Long messages are divided into segments. Segments stay until the other end has their whole
+// message, and are sent again if no answer comes. Not thread-safe.
 class Channel {
  public:
   using Clock = schedule::Clock;
@@ -72,9 +72,9 @@ class Channel {
   void queue(v1::Segment segment);
   void transmit(v1::Segment& segment, Clock::time_point now, const Send& send);
 
-  std::uint64_t next_ = 1;            // number of the next new segment
-  std::deque<v1::Segment> waiting_;   // not sent yet
-  std::deque<v1::Segment> sent_;      // not acknowledged
+  std::uint64_t next_ = 1;                                    // number of the next new segment
+  std::deque<v1::Segment> waiting_;                           // not sent yet
+  std::deque<v1::Segment> sent_;                              // not acknowledged
   std::deque<std::pair<std::uint64_t, std::size_t>> unused_;  // sent segments that are not used, with sizes
   std::size_t waitingBytes_ = 0, windowBytes_ = 0;
   Clock::time_point progress_{}, lastSent_{};

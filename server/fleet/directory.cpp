@@ -33,8 +33,7 @@ constexpr int kMaxParts = static_cast<int>(kMaxCheckpointBytes / kPartBytes) + 1
 constexpr int kMaxDelay = 500;  // ms
 
 std::uint32_t crcOf(const std::string& bytes) {
-  return static_cast<std::uint32_t>(
-      ::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+  return static_cast<std::uint32_t>(::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
 std::string keyOf(std::uint64_t origin) {
@@ -101,6 +100,15 @@ bool Directory::owns(const std::string& name) const {
   return revisionOf(name).has_value();
 }
 
+std::string Directory::publicNameOf(const std::string& scene) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = known_.find(scene);
+  if (found == known_.end() || found->second.entry.origin() == self_.origin() ||
+      !isAlive(found->second.entry.origin(), Clock::now()))
+    return {};
+  return servers_.at(found->second.entry.origin()).first.public_name();
+}
+
 void Directory::simulateLoss() {
   {
     const std::lock_guard lock(mutex_);
@@ -163,8 +171,7 @@ v1::StoredCheckpoint Directory::checkpointOf(const std::string& name) const {
 }
 
 bool Directory::transfer(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision) {
-  const auto written =
-      Bucket(nats_, {.name = kScenes}).update(name, entry.SerializeAsString(), revision);
+  const auto written = Bucket(nats_, {.name = kScenes}).update(name, entry.SerializeAsString(), revision);
   if (written) know(name, entry, *written);
   return written.has_value();
 }

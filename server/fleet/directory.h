@@ -63,6 +63,8 @@ class Directory {
   bool isTaken(const std::string& name) const;
   // Whether the entry of this scene names this server.
   bool owns(const std::string& name) const;
+  // Name under which clients reach the server that has a scene, if that is another one; else empty.
+  std::string publicNameOf(const std::string& scene) const;
   // Other servers with a lease.
   std::vector<v1::ServerEntry> others() const;
   // This server takes no scenes any more.

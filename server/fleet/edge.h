@@ -15,6 +15,7 @@
 #include <string>
 #include <thread>
 
+#include "server/fleet/edge_stream.h"
 #include "server/fleet/nats.h"
 #include "server/hosting/scene_server.h"
 #include "server/schedule/clock.h"
@@ -37,7 +38,6 @@ class Edge {
  public:
   static constexpr std::chrono::seconds kPatience{3};
   static constexpr std::size_t kMaxScenes = 4096;
-  static constexpr std::size_t kMaxDescriptionBytes = std::size_t{256} << 20;
 
   // The server must outlive it.
   Edge(hosting::SceneServer& server, const NatsOptions& options, schedule::Clock::duration keep);
@@ -49,7 +49,6 @@ class Edge {
 
  private:
   using Clock = schedule::Clock;
-  class Stream;
   struct Known;
   struct Arrival {
     std::uint64_t stream = 0;  // 0: an offer
@@ -57,6 +56,7 @@ class Edge {
   };
 
   void run();
+  EdgeContext context();
   void arrive(std::uint64_t stream, std::span<const std::byte> bytes);
   void wake();
   void handle(const v1::Offer& offer, Clock::time_point now);

@@ -67,8 +67,8 @@ void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) 
       closed_ = true;
       if (!left_)
         messages_.push_back({delivery::error(
-            v1::ERROR_CODE_CUT_OFF, "the server that simulates the scene has lost this participant: join again",
-            true)});
+            v1::ERROR_CODE_CUT_OFF,
+            "the server that simulates the scene has lost this participant: join again", true)});
     }
     for (Channel::Received& received : channel_.receive(segment, Clock::now())) {
       if (!received.message || left_) {

@@ -122,10 +122,12 @@ Origin::Origin(hosting::SceneServer& server, const NatsOptions& nats, OriginOpti
           [this](v1::SavedParts parts, const std::function<bool()>& claim) {
             return adopt(std::move(parts), claim);
           })),
-      requests_(nats_.subscribe(
-          serverSubject(id_),
-          [this](const auto&, const std::string& reply, auto data) { hear(data, reply); })),
-      thread_([this] { run(); }) {}
+      requests_(nats_.subscribe(serverSubject(id_), [this](const auto&, const std::string& reply,
+                                                           auto data) { hear(data, reply); })),
+      thread_([this] { run(); }) {
+  server_.state().setOtherServers(
+      [this](const std::string& scene) { return directory_->publicNameOf(scene); });
+}
 
 void Origin::simulateLoss() {
   directory_->simulateLoss();
@@ -144,6 +146,7 @@ void Origin::endOffers() {
 }
 
 Origin::~Origin() {
+  server_.state().setOtherServers(nullptr);
   requests_.reset();
   endOffers();
   departures_.reset();
@@ -220,13 +223,11 @@ Origin::SharedStream Origin::streamOf(const std::string& name) const {
 void Origin::hear(std::span<const std::byte> request, const std::string& reply) {
   v1::MoveRequest move;
   if (!parse(request, move)) return server_.state().metrics.nats.refused.add();
-  const bool queued =
-      move.move() != 0
-          ? arrivals_->post([this, id = move.move()] { receiveScene(id); })
-          : departures_->post([this, move, reply] {
-              const v1::MoveResponse response = moveNow(move.scene(), move.to());
-              if (!reply.empty()) nats_.publish(reply, toBytes(response));
-            });
+  const bool queued = move.move() != 0 ? arrivals_->post([this, id = move.move()] { receiveScene(id); })
+                                       : departures_->post([this, move, reply] {
+                                           const v1::MoveResponse response = moveNow(move.scene(), move.to());
+                                           if (!reply.empty()) nats_.publish(reply, toBytes(response));
+                                         });
   if (!queued && move.move() == 0 && !reply.empty())
     nats_.publish(reply, toBytes(refused("too many scenes wait to be moved; try again later")));
 }
@@ -288,9 +289,10 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
   const auto known = std::ranges::find(others, to, &v1::ServerEntry::origin);
   if (known == others.end()) return refused("there is no such server in the directory");
   if (known->version() < options_.version)
-    return refused(fmt::format("{} is older than this server, and scenes move only to the same or a later "
-                               "version",
-                               known->server_name()));
+    return refused(
+        fmt::format("{} is older than this server, and scenes move only to the same or a later "
+                    "version",
+                    known->server_name()));
 
   const std::uint64_t move = randomId();
   Conversation talk(nats_, moveUpSubject(move), moveDownSubject(move), stopping_);
@@ -305,7 +307,8 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
   talk.send(message);
   const auto prepared = talk.receive(kLoadTime);
   if (!prepared) return refused("the other server does not answer");
-  if (!prepared->has_prepared()) return refused(fmt::format("the other server says: {}", prepared->refused()));
+  if (!prepared->has_prepared())
+    return refused(fmt::format("the other server says: {}", prepared->refused()));
 
   Clock::time_point stopped{};
   if (const std::string why = handOver(talk, *stream, to, stopped); !why.empty()) return refused(why);
@@ -315,12 +318,12 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
   // Those who are connected to this server must join again; those at edges follow, and must not hear of it.
   tunnels_.end(stream->subject());
   server_.state().removeCreated(
-      scene, delivery::error(v1::ERROR_CODE_CUT_OFF,
-                             known->public_name().empty()
-                                 ? std::string("the scene has moved to another server: join again there")
-                                 : fmt::format("the scene has moved to {}: join again there",
-                                               known->public_name()),
-                             true));
+      scene,
+      delivery::error(v1::ERROR_CODE_CUT_OFF,
+                      known->public_name().empty()
+                          ? std::string("the scene has moved to another server: join again there")
+                          : fmt::format("the scene has moved to {}: join again there", known->public_name()),
+                      true, 0, known->public_name()));
   dropStream(stream);
   telemetry::log({name}, spdlog::level::info, "moved to another server at tick {}", scene->tick.load());
   return response;

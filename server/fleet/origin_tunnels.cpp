@@ -91,13 +91,13 @@ std::shared_ptr<OriginTunnels::Tunnel> OriginTunnels::open(const Key& key, const
     }
   }
   auto tunnel = std::make_shared<Tunnel>(key, used);
-  tunnel->session = session::Session::open(
-      server_,
-      {.peer = fmt::format("{} at an edge", request.peer()),
-       .address = request.address().empty() ? kEdgeAddress : request.address(),
-       .token = request.token(),
-       .continues = request.has_continues()},
-      [this, key] { wake(key); });
+  tunnel->session =
+      session::Session::open(server_,
+                             {.peer = fmt::format("{} at an edge", request.peer()),
+                              .address = request.address().empty() ? kEdgeAddress : request.address(),
+                              .token = request.token(),
+                              .continues = request.has_continues()},
+                             [this, key] { wake(key); });
   if (request.has_continues()) {
     v1::ClientMessage hello;
     *hello.mutable_hello() = request.continues();

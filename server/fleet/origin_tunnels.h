@@ -21,7 +21,8 @@
 
 namespace clothstream::fleet {
 
-// Each participant has a session like one that is connected to this server, with the same limits. Thread-safe.
+// Each participant has a session like one that is connected to this server, with the same limits.
+// Thread-safe.
 class OriginTunnels {
  public:
   OriginTunnels(hosting::SceneServer& server, Nats& nats);
@@ -35,8 +36,8 @@ class OriginTunnels {
   // The stream ends, or its scene has left this server: its sessions end without a further message.
   void end(const std::string& stream);
 
-  // For a scene that moves. After freeze() the sessions of the stream use no message any more; the result says
-  // which ones they have used. thaw() ends that.
+  // For a scene that moves. After freeze() the sessions of the stream use no message any more; the result
+  // says which ones they have used. thaw() ends that.
   std::vector<v1::MovedTunnel> freeze(const std::string& stream);
   void thaw(const std::string& stream);
   // Tunnels of the former server that will continue at this stream.

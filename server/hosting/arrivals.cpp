@@ -32,27 +32,26 @@ tl::expected<void, v1::Error> SceneServer::State::roomFor(const std::string& nam
   if (created >= options.maxCreatedScenes) {
     metrics.refuse(telemetry::Refusal::createdScenes);
     return cannotAdd(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                   fmt::format("the server has {} created scenes, its maximum: delete one first", created));
+                     fmt::format("the server has {} created scenes, its maximum: delete one first", created));
   }
   const auto ofTenant = static_cast<std::uint32_t>(std::ranges::count_if(
       present, [&](const auto& scene) { return scene->created && scene->tenant == tenant; }));
   if (ofTenant >= scenesPerTenant()) {
     metrics.refuse(telemetry::Refusal::scenesOfTenant);
     return cannotAdd(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                   fmt::format("your tenant has {} created scenes, its maximum (--max-scenes-per-tenant): "
-                               "delete one first",
-                               ofTenant));
+                     fmt::format("your tenant has {} created scenes, its maximum (--max-scenes-per-tenant): "
+                                 "delete one first",
+                                 ofTenant));
   }
   if (std::ranges::any_of(present, [&](const auto& scene) { return scene->name() == name; }))
     return cannotAdd(v1::ERROR_CODE_INVALID_ARGUMENT,
-                   fmt::format("createScene: a scene '{}' exists already; choose another name", name));
+                     fmt::format("createScene: a scene '{}' exists already; choose another name", name));
   return {};
 }
 
 tl::expected<std::shared_ptr<scene::LiveScene>, std::string> SceneServer::State::prepareArrival(
     scene::SavedScene saved) {
-  if (auto room = roomFor(saved.start.name, saved.tenant); !room)
-    return tl::unexpected(room.error().text());
+  if (auto room = roomFor(saved.start.name, saved.tenant); !room) return tl::unexpected(room.error().text());
   const auto scene = std::make_shared<scene::LiveScene>(
       saved.start, true, options.journals ? options.journals(saved.start) : nullptr,
       std::min(saved.maxParticipants, options.maxParticipants), budget);
@@ -87,7 +86,7 @@ void SceneServer::State::abandonArrival(const std::shared_ptr<scene::LiveScene>&
 }
 
 void SceneServer::State::removeCreated(const std::shared_ptr<scene::LiveScene>& scene,
-                                        const delivery::SharedBytes& last) {
+                                       const delivery::SharedBytes& last) {
   erase(*scene);
   const auto finish = [&] {
     scene->roster.close(last);

@@ -255,6 +255,16 @@ v1::Error SceneServer::State::noSuchScene(const std::string& name) {
   return error;
 }
 
+std::string SceneServer::State::otherServerOf(const std::string& scene) const {
+  const std::lock_guard lock(mutex);
+  return otherServers ? otherServers(scene) : std::string();
+}
+
+void SceneServer::State::setOtherServers(std::function<std::string(const std::string&)> find) {
+  const std::lock_guard lock(mutex);
+  otherServers = std::move(find);
+}
+
 delivery::SharedBytes SceneServer::State::admit(const std::shared_ptr<Peer>& peer) {
   const std::lock_guard lock(mutex);
   if (stopping) {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -45,6 +46,11 @@ struct SceneServer::State {
   v1::Error noSuchScene(const std::string& name, const Identity& by) const;
   // The same without the list, for a scene that was deleted after the peer's rights were checked.
   static v1::Error noSuchScene(const std::string& name);
+
+  // DNS name of another server that has a scene of this name; empty if none is known.
+  std::string otherServerOf(const std::string& scene) const;
+  // `find` answers otherServerOf() from now on; null: there are no other servers. It must not call this.
+  void setOtherServers(std::function<std::string(const std::string& scene)> find);
 
   // Admits a peer. Returns null, or the last message to the peer if it is refused, because there are too many
   // peers or the server stops.
@@ -122,7 +128,8 @@ struct SceneServer::State {
   // Set when peers can join; before, no reconnect grace ends.
   std::atomic<bool> started{false};
 
-  mutable std::mutex mutex;  // protects the next four
+  mutable std::mutex mutex;  // protects the next five
+  std::function<std::string(const std::string&)> otherServers;
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;
   std::vector<std::weak_ptr<Peer>> peers;
   bool stopping = false;

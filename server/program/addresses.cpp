@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "server/program/addresses.h"
 
+#include <arpa/inet.h>
+
 #include <fmt/format.h>
 
 #include "server/tls/certificate.h"
@@ -12,6 +14,12 @@ std::string localAddress(const std::string& host, std::uint16_t port) {
   if (host == "::") return fmt::format("[::1]:{}", port);
   return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port)
                                              : fmt::format("[{}]:{}", host, port);
+}
+
+bool isAddress(const std::string& text) {
+  in_addr v4{};
+  in6_addr v6{};
+  return ::inet_pton(AF_INET, text.c_str(), &v4) == 1 || ::inet_pton(AF_INET6, text.c_str(), &v6) == 1;
 }
 
 std::string addressInNetwork(const ProgramOptions& options) {

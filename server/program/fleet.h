@@ -2,9 +2,11 @@
 // Connection of the program to other servers.
 #pragma once
 
+#include <algorithm>
 #include "server/fleet/nats.h"
 #include "server/fleet/origin.h"
 #include "server/options/program_options.h"
+#include "server/program/addresses.h"
 
 namespace clothstream::program {
 
@@ -15,9 +17,10 @@ inline fleet::NatsOptions natsOptions(const ProgramOptions& options) {
           .name = kServerName};
 }
 
+// Clients of other servers are sent to the first public name; an address is none.
 inline fleet::OriginOptions originOptions(const ProgramOptions& options) {
-  return {.publicName = options.publicNames.empty() ? "" : options.publicNames.front(),
-          .version = kServerVersion};
+  const auto name = std::ranges::find_if_not(options.publicNames, &isAddress);
+  return {.publicName = name == options.publicNames.end() ? "" : *name, .version = kServerVersion};
 }
 
 }  // namespace clothstream::program

@@ -92,9 +92,8 @@ v1::SavedParts definitionOf(const scene::LiveScene& live) {
 
 v1::SavedParts stateOf(const scene::LiveScene& live, const std::optional<scene::Checkpoint>& checkpoint) {
   v1::SavedParts parts;
-  parts.set_session(
-      sessionOf(live, live.roster.saved(), messages::toMessageWithoutMeshes(live.definition()))
-          .SerializeAsString());
+  parts.set_session(sessionOf(live, live.roster.saved(), messages::toMessageWithoutMeshes(live.definition()))
+                        .SerializeAsString());
   if (checkpoint) parts.set_checkpoint(toMessage(*checkpoint).SerializeAsString());
   return parts;
 }

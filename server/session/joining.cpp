@@ -79,8 +79,11 @@ scene::Rights Session::rightsIn(const scene::LiveScene& scene) const {
 
 std::shared_ptr<scene::LiveScene> Session::sceneOf(const v1::Hello& message,
                                                    const messages::Joining& joining) {
-  const auto refused = [this](v1::ErrorCode code, std::string text) {
-    fail(code, std::move(text));
+  const auto refused = [&](v1::ErrorCode code, std::string text) {
+    fail(code, std::move(text),
+         code == v1::ERROR_CODE_NOT_FOUND && identity_->reaches(joining.scene)
+             ? server_.otherServerOf(joining.scene)
+             : std::string());
     return nullptr;
   };
   if (const auto may = server_.mayUse(*identity_, joining.scene); !may)

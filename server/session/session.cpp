@@ -130,9 +130,10 @@ void Session::refuse(const messages::FieldError& reason, double cost) {
   answer(message);
 }
 
-void Session::fail(v1::ErrorCode code, std::string text) {
+void Session::fail(v1::ErrorCode code, std::string text, std::string server) {
   spdlog::info("{}: closed: {}", peer_, text);
-  closeLocked(delivery::error(code, std::move(text), true, requestId_), DisconnectReason::removed);
+  closeLocked(delivery::error(code, std::move(text), true, requestId_, std::move(server)),
+              DisconnectReason::removed);
 }
 
 bool Session::allowed(schedule::TokenBucket& bucket, const char* what) {

@@ -139,7 +139,8 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void refuseUnless(const messages::Result<void>& done);
   // For a request whose answer is made by answering().
   void refuseUnlessQueued(const tl::expected<void, v1::Error>& queued);
-  void fail(v1::ErrorCode code, std::string text);
+  // `server`: another one that has the scene.
+  void fail(v1::ErrorCode code, std::string text, std::string server = {});
   // Takes a token, or refuses the message.
   bool allowed(TokenBucket& bucket, const char* what);
   // Checks whether this peer may do this to the scene of this name. Returns its participant number there, 0

@@ -85,8 +85,13 @@ TEST_F(ChannelTest, CarriesMessagesBothWaysAtOnce) {
 
 TEST_F(ChannelTest, EmptyAndLongMessagesArriveWhole) {
   const std::string large(3 * Channel::kWindow + 7, 'x');
-  std::vector<std::string> sent{"", "a", std::string(Channel::kMaxSegmentBytes, 'b'),
-                                std::string(Channel::kMaxSegmentBytes + 1, 'c'), large, "", "end"};
+  std::vector<std::string> sent{"",
+                                "a",
+                                std::string(Channel::kMaxSegmentBytes, 'b'),
+                                std::string(Channel::kMaxSegmentBytes + 1, 'c'),
+                                large,
+                                "",
+                                "end"};
   for (const std::string& text : sent) one_.channel.push(bytesOf(text));
   settle();
   EXPECT_EQ(other_.messages, sent);

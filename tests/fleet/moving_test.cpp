@@ -29,9 +29,8 @@ class MovingTest : public tests::FleetTest {
     first_ = startOrigin();
     second_ = startOrigin();
     ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
-    ASSERT_TRUE(eventually([&] {
-      return first_->owns("moves") && !first_->origin->directory().others().empty();
-    }));
+    ASSERT_TRUE(
+        eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
     edge_ = startEdge("moves");
   }
   static std::map<std::uint64_t, std::uint64_t> hashesOf(const TestPeer& peer) {
@@ -139,9 +138,8 @@ TEST_F(MovingTest, WhoIsConnectedToTheServerIsToldToJoinAgain) {
   first_ = startOrigin();
   second_ = startOrigin({.publicName = "second.example.com"});
   ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
-  ASSERT_TRUE(eventually([&] {
-    return first_->owns("moves") && !first_->origin->directory().others().empty();
-  }));
+  ASSERT_TRUE(
+      eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
   TestPeer direct(first_->server);
   direct.join("moves");
   ASSERT_THAT(first_->origin->move("moves").error(), IsEmpty());
@@ -185,9 +183,8 @@ TEST_F(MovingTest, ScenesMoveOnlyToTheSameOrALaterVersion) {
   first_ = startOrigin({.version = 2000});
   second_ = startOrigin({.version = 1999});
   ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
-  ASSERT_TRUE(eventually([&] {
-    return first_->owns("moves") && !first_->origin->directory().others().empty();
-  }));
+  ASSERT_TRUE(
+      eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
   EXPECT_THAT(first_->origin->move("moves").error(), HasSubstr("no other server"));
   EXPECT_THAT(first_->origin->move("moves", second_->origin->id()).error(), HasSubstr("older"));
 }

@@ -31,10 +31,9 @@ NatsServer::~NatsServer() {
 
 void NatsServer::run(const std::string& port) {
   std::filesystem::create_directories(directory_ / "ports");
-  process_ = std::make_unique<e2e::Process>(
-      std::vector<std::string>{CLOTHSTREAM_NATS_SERVER, "--addr", "127.0.0.1", "--port", port,
-                               "--ports_file_dir", (directory_ / "ports").string(), "--jetstream",
-                               "--store_dir", (directory_ / "store").string()});
+  process_ = std::make_unique<e2e::Process>(std::vector<std::string>{
+      CLOTHSTREAM_NATS_SERVER, "--addr", "127.0.0.1", "--port", port, "--ports_file_dir",
+      (directory_ / "ports").string(), "--jetstream", "--store_dir", (directory_ / "store").string()});
   // It writes its address into a file: {"nats":["nats://127.0.0.1:39999"]}
   const auto portInFile = [&] {
     for (const auto& entry : std::filesystem::directory_iterator(directory_ / "ports")) {

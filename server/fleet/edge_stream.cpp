@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: MIT
+#include "server/fleet/edge_stream.h"
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/fleet/message_bytes.h"
+#include "server/fleet/subjects.h"
+#include "server/hosting/server_state.h"
+#include "server/scene/live_scene.h"
+#include "server/telemetry/log.h"
+
+namespace clothstream::fleet {
+namespace {
+
+using delivery::SharedBytes;
+using schedule::Clock;
+using namespace std::chrono_literals;
+
+// An interest is repeated after this time, and a request for a key frame earlier.
+constexpr auto kInterestPeriod = 1s;
+constexpr auto kKeyFramePeriod = 100ms;
+// A piece of a description is asked for again after this time.
+constexpr auto kAskAgain = 2s;
+// Frames of a quality that no viewer needs any more are received for this long.
+constexpr auto kQualityTime = 5s;
+// Events that wait for a description. Further ones are dropped.
+constexpr std::size_t kMaxEarlyEvents = 1024;
+
+// Empty if the stream can be shown.
+std::string problemOf(const v1::StreamDescription& description) {
+  if (std::ranges::find(codec::kCodecs, description.codec()) == std::end(codec::kCodecs))
+    return fmt::format("its codec {} is not known here: update this server", description.codec());
+  const auto isRate = [](std::uint32_t rate) { return rate >= 1 && rate <= 100'000; };
+  if (!isRate(description.simulation_rate()) || !isRate(description.stream_rate()) ||
+      description.qualities() > codec::kMaxQualities ||
+      description.temporal_layers() > codec::kMaxTemporalLayers)
+    return "its description is not valid";
+  return {};
+}
+
+// Why a picture stands still, for its viewers.
+SharedBytes standsStill(const scene::LiveScene& scene, const char* why) {
+  return delivery::notice(v1::NOTICE_KIND_RUNNING_SLOW, fmt::format("the picture stands still: {}", why),
+                          scene.tick.load());
+}
+
+}  // namespace
+
+EdgeStream::EdgeStream(EdgeContext context, std::uint64_t origin, const v1::OfferedScene& offered)
+    : origin_(origin),
+      edge_(std::move(context)),
+      offered_(offered),
+      name_(offered.summary().name()),
+      subject_(streamSubject(name_, offered.stream())),
+      inbox_(Nats::inbox()),
+      tunnels_(std::make_shared<EdgeTunnels>(edge_.nats, edge_.edge, subject_)) {
+  listen();
+  chunks_ =
+      edge_.nats.subscribe(inbox_, [this](const auto&, const auto&, auto data) { edge_.arrive(id(), data); });
+  sendInterest(Clock::now());
+  ask(Clock::now());
+}
+
+EdgeStream::EdgeStream(EdgeContext context, std::uint64_t origin, const v1::OfferedScene& offered,
+                       const EdgeStream& former)
+    : origin_(origin),
+      edge_(std::move(context)),
+      offered_(offered),
+      name_(offered.summary().name()),
+      subject_(streamSubject(name_, offered.stream())),
+      continues_(true),
+      scene_(former.scene_),
+      source_(former.source_),
+      tunnels_(former.tunnels_) {
+  listen();
+  look(Clock::now());
+}
+
+void EdgeStream::listen() {
+  events_ = edge_.nats.subscribe(eventsSubject(subject_),
+                                 [this](const auto&, const auto&, auto data) { event(data); });
+  down_ = edge_.nats.subscribe(downPattern(subject_, edge_.edge),
+                               [this](const std::string& subject, const auto&, auto data) {
+                                 tunnels_->receive(subject_, subject, data);
+                               });
+}
+
+bool EdgeStream::receiveChunk(std::span<const std::byte> bytes, Clock::time_point now) {
+  v1::ServerMessage message;
+  if (scene_ || !parse(bytes, message) || !message.has_chunk()) return false;
+  const v1::Chunk& chunk = message.chunk();
+  if (chunk.index() == 0) {
+    content_ = chunk.content_id();
+    description_.clear();
+    received_ = 0;
+  }
+  if (chunk.content_id() != content_ || chunk.index() != received_ ||
+      chunk.total_bytes() > kMaxDescriptionBytes ||
+      description_.size() + chunk.data().size() > chunk.total_bytes())
+    return false;
+  description_ += chunk.data();
+  ++received_;
+  if (received_ == chunk.count()) return true;
+  ask(now);
+  return false;
+}
+
+bool EdgeStream::serve() {
+  v1::StreamDescription description;
+  std::string problem = "its description is not valid";
+  if (description.ParseFromString(description_)) problem = problemOf(description);
+  description_ = {};
+  chunks_.reset();
+  if (!problem.empty()) {
+    telemetry::log({name_}, spdlog::level::warn, "the scene that another server offers is not shown: {}",
+                   problem);
+    return false;
+  }
+  auto source = std::make_shared<EdgeSource>(
+      offered_, std::move(description), edge_.wake,
+      [tunnels = tunnels_](const scene::RemotePeer& peer, std::function<void()> wake) {
+        return tunnels->connect(peer, std::move(wake));
+      });
+  scene_ = edge_.server.add(name_, source);
+  scene_->paused = offered_.summary().paused();
+  learn(offered_);
+  const std::lock_guard lock(mutex_);
+  source_ = std::move(source);
+  for (const SharedBytes& event : early_) receive(*event);
+  early_.clear();
+  return true;
+}
+
+void EdgeStream::end(const SharedBytes& last) {
+  retire();
+  tunnels_->close(last);
+  if (scene_) edge_.server.remove(scene_, last);
+}
+
+void EdgeStream::look(Clock::time_point now) {
+  if (!isSuccessor()) tunnels_->poll();
+  if (!scene_) {
+    if (now - asked_ > kAskAgain && chunks_) ask(now);
+    if (now - interestSent_ > kInterestPeriod) sendInterest(now);
+    return;
+  }
+  delivery::RequestedFrames needed = source_->needs(now);
+  // Its first frames must not refer to those of the other stream.
+  if (isSuccessor()) needed.keyFrames = needed.qualities;
+  receiveFrames(needed.qualities, now);
+  const bool more = needed.qualities != sent_.qualities || (needed.keyFrames & ~sent_.keyFrames) != 0;
+  const bool asksOften = needed.keyFrames != 0 && !isSuccessor();
+  if (!more && now - interestSent_ < (asksOften ? Clock::duration(kKeyFramePeriod) : kInterestPeriod)) {
+    sent_.keyFrames &= needed.keyFrames;
+    return;
+  }
+  sent_ = needed;
+  sendInterest(now);
+}
+
+void EdgeStream::learn(const v1::OfferedScene& offered) {
+  const v1::SceneSummary& summary = offered.summary();
+  tunnels_->setRoom(!summary.has_playback() && summary.participants() < summary.max_participants());
+  if (!scene_) return;
+  std::vector<scene::Ban> bans;
+  for (const v1::SavedBan& ban : offered.bans())
+    bans.push_back({{.tenant = ban.tenant(), .name = ban.subject()}, ban.display_name()});
+  scene_->roster.setBans(std::move(bans));
+}
+
+void EdgeStream::forgetFrames() {
+  if (source_) source_->forgetFrames();
+}
+
+void EdgeStream::tell(const char* why) {
+  const SharedBytes notice = standsStill(*scene_, why);
+  scene_->subscribers.announce(notice);
+  tunnels_->tell(notice);
+}
+
+void EdgeStream::replace() {
+  replaced_ = true;
+  source_->forgetFrames();
+  tunnels_->moveTo(subject_);
+}
+
+void EdgeStream::retire() {
+  frames_ = {};
+  events_.reset();
+  down_.reset();
+}
+
+ask(Clock::now());
+}
+
+sendInterest(Clock::now());
+ask(Clock::now());
+}
+
+receiveFrames(needed.qualities, now);
+const bool more = needed.qualities != sent_.qualities || (needed.keyFrames & ~sent_.keyFrames) != 0;
+const auto period = needed.keyFrames != 0 && !isSuccessor() ? Clock::duration(kKeyFramePeriod)
+                                                            : Clock::duration(kInterestPeriod);
+if (!more && now - interestSent_ < period) {
+  sent_.keyFrames &= needed.keyFrames;
+  return;
+}
+sent_ = needed;
+sendInterest(now);
+}
+
+void EdgeStream::receiveFrame(std::span<const std::byte> data) {
+  if (!source_->receiveFrame(data)) return edge_.server.state().metrics.nats.refused.add();
+  if (!arrived_.exchange(true) && isSuccessor()) edge_.wake();
+}
+
+void EdgeStream::event(std::span<const std::byte> data) {
+  const std::lock_guard lock(mutex_);
+  if (source_)
+    receive(data);
+  else if (early_.size() < kMaxEarlyEvents)
+    early_.push_back(std::make_shared<std::vector<std::byte>>(data.begin(), data.end()));
+}
+
+receive(data);
+else if (early_.size() < kMaxEarlyEvents)
+    early_.push_back(std::make_shared<std::vector<std::byte>>(data.begin(), data.end()));
+}
+
+}  // namespace clothstream::fleet
