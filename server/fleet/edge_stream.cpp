@@ -198,23 +198,39 @@ void EdgeStream::retire() {
   down_.reset();
 }
 
-ask(Clock::now());
+void EdgeStream::ask(Clock::time_point now) {
+  v1::ChunkRequest request;
+  request.set_content_id(received_ > 0 ? content_ : 0);
+  request.set_index(received_);
+  asked_ = now;
+  edge_.nats.publish(descriptionSubject(subject_), toBytes(request), inbox_);
 }
 
-sendInterest(Clock::now());
-ask(Clock::now());
+void EdgeStream::sendInterest(Clock::time_point now) {
+  v1::Interest interest;
+  interest.set_edge(edge_.edge);
+  interest.set_qualities(sent_.qualities);
+  interest.set_key_frames(sent_.keyFrames);
+  interest.set_viewers(scene_ ? static_cast<std::uint32_t>(scene_->subscribers.size()) : 0);
+  interestSent_ = now;
+  edge_.nats.publish(interestSubject(subject_), toBytes(interest));
 }
 
-receiveFrames(needed.qualities, now);
-const bool more = needed.qualities != sent_.qualities || (needed.keyFrames & ~sent_.keyFrames) != 0;
-const auto period = needed.keyFrames != 0 && !isSuccessor() ? Clock::duration(kKeyFramePeriod)
-                                                            : Clock::duration(kInterestPeriod);
-if (!more && now - interestSent_ < period) {
-  sent_.keyFrames &= needed.keyFrames;
-  return;
-}
-sent_ = needed;
-sendInterest(now);
+void EdgeStream::receiveFrames(std::uint8_t qualities, Clock::time_point now) {
+  const bool single = source_->qualities() == 1;
+  for (std::uint8_t quality = 0; quality < source_->qualities(); ++quality) {
+    Frames& frames = frames_[quality];
+    const bool needed = (qualities >> quality & 1) != 0;
+    if (needed) frames.neededAt = now;
+    if (needed && !frames.subscription)
+      frames.subscription =
+          edge_.nats.subscribe(framesPattern(subject_, single ? std::nullopt : std::optional(quality)),
+                               [this](const auto&, const auto&, auto data) { receiveFrame(data); });
+    if (frames.subscription && now - frames.neededAt > kQualityTime) {
+      frames.subscription.reset();
+      source_->forgetFrames();
+    }
+  }
 }
 
 void EdgeStream::receiveFrame(std::span<const std::byte> data) {
@@ -230,9 +246,8 @@ void EdgeStream::event(std::span<const std::byte> data) {
     early_.push_back(std::make_shared<std::vector<std::byte>>(data.begin(), data.end()));
 }
 
-receive(data);
-else if (early_.size() < kMaxEarlyEvents)
-    early_.push_back(std::make_shared<std::vector<std::byte>>(data.begin(), data.end()));
+void EdgeStream::receive(std::span<const std::byte> data) {
+  if (!source_->receiveEvent(data)) edge_.server.state().metrics.nats.refused.add();
 }
 
 }  // namespace clothstream::fleet
