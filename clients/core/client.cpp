@@ -86,6 +86,7 @@ void Client::connecting(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
   renewing_ = {};
   if (welcomed_) disconnected(nowUs);
+  redirection_.attempting();
   outbox_.clear();
   forgetRequests();
   assembly_ = {};
@@ -99,6 +100,7 @@ void Client::disconnected(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
   if (!welcome_.token.empty()) state_ = CS_STATE_RECONNECTING;
   welcomed_ = false;
+  redirection_.ended();
   unseenTick_.reset();
   outbox_.clear();
   forgetRequests();
@@ -131,7 +133,7 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
     case Body::parameterChanged:
       return parametersReceived(message->body);
     case Body::error:
-      return errorReceived(message->body, message->requestId);
+      return errorReceived(message->body, message->requestId, nowUs);
     case Body::tickEvents:
       return eventsReceived(message->body);
     case Body::presence:
@@ -203,6 +205,7 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   hello_.scene = welcome_.scene;
   hello_.contentId = known ? welcome_.contentId : 0;
   reconnection_.joined(nowUs);
+  redirection_.welcomed();
   point_ = formerPoint_ = {};
   frameDivisor_ = 1;
   acknowledgement_ = {};
@@ -212,6 +215,7 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   const std::uint32_t events = participants_.empty() ? 0 : CS_EVENT_PARTICIPANTS;
   if (!known) return events;
   state_ = CS_STATE_JOINED;
+  redirection_.joined();
   return events | CS_EVENT_RETURNED;
 }
 
@@ -263,6 +267,7 @@ std::uint32_t Client::described(Bytes content) {
   hello_.contentId = welcome_.contentId;
   const bool returned = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
+  redirection_.joined();
   return returned ? CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED : CS_EVENT_DESCRIPTION;
 }
 
@@ -408,7 +413,7 @@ std::uint32_t Client::parametersReceived(Bytes body) {
   return CS_EVENT_PARAMETERS;
 }
 
-std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId) {
+std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::uint64_t nowUs) {
   std::optional<ServerError> error = readError(body);
   if (!error) return failMalformed("Error");
   if (!error->fatal) {
@@ -429,14 +434,27 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId) {
       return CS_EVENT_ANSWER;
     }
   }
-  // The client may try again if only the connection was cut off, or if a reconnect found the server full.
-  const bool temporary =
-      error->code == field::ErrorCode::kCutOff ||
-      (error->code == field::ErrorCode::kResourceExhausted && state_ == CS_STATE_RECONNECTING && !welcomed_);
-  if (error->fatal && !temporary) return fail(std::move(error->text), error->code);
+  if (!error->fatal ||
+      (error->code != field::ErrorCode::kNotFound && error->code != field::ErrorCode::kCutOff))
+    error->server.clear();
+  // A server that cuts off and names itself wants the client to come back.
+  const bool names = follows_ && !error->server.empty() &&
+                     (error->code == field::ErrorCode::kNotFound || error->server != connectServer());
+  const bool isRedirect = names && redirection_.follow(error->server, nowUs);
+  if (error->fatal && !isRedirect && (names || !isTemporary(*error))) fail({});
   errorCode_ = error->code;
   errorText_ = std::move(error->text);
-  return CS_EVENT_ERROR;
+  errorServer_ = std::move(error->server);
+  return isRedirect ? 0 : CS_EVENT_ERROR;
+}
+
+bool Client::isTemporary(const ServerError& error) const {
+  using Code = field::ErrorCode;
+  const bool reconnects = state_ == CS_STATE_RECONNECTING && !welcomed_;
+  // The client may try again if only the connection was cut off, if a reconnect found the server full, or if
+  // another server than the one that has the scene was asked again.
+  return error.code == Code::kCutOff || (reconnects && error.code == Code::kResourceExhausted) ||
+         (reconnects && error.code == Code::kNotFound && redirection_.isReturn());
 }
 
 std::uint32_t Client::scenesReceived(Bytes body) {
@@ -554,6 +572,7 @@ std::uint32_t Client::fail(std::string text, std::uint32_t code) {
   state_ = CS_STATE_FAILED;
   errorCode_ = code;
   errorText_ = std::move(text);
+  errorServer_.clear();
   outbox_.clear();
   forgetRequests();
   return CS_EVENT_ERROR;

@@ -19,6 +19,7 @@
 #include "clients/core/stream/pending_requests.h"
 #include "clients/core/stream/play_out.h"
 #include "clients/core/stream/reconnection.h"
+#include "clients/core/stream/redirection.h"
 #include "clients/core/stream/server_clock.h"
 #include "clients/core/stream/upload.h"
 #include "clients/core/touch/contact.h"
@@ -42,6 +43,8 @@ class Client {
   void connecting(std::uint64_t nowUs);
   void disconnected(std::uint64_t nowUs);
   std::uint64_t connectAtUs() const;
+  // DNS name for the next connection. Empty: the address that the program was given.
+  const std::string& connectServer() const { return redirection_.server(); }
   const std::string* nextOutgoing();
 
   // Used from the next connection on; also for the current one while its Hello waits. A token replaces a
@@ -51,6 +54,8 @@ class Client {
   bool renew(std::string_view token);
   // Returns false if the text is neither empty nor one of resumeToken().
   bool resume(std::string_view text);
+  // Whether the program opens connections at connectServer().
+  void followRedirects(bool on) { follows_ = on; }
   // Has no effect on the current connection if its Hello is sent already.
   void want(const OperatingPoint& atMost);
 
@@ -102,6 +107,7 @@ class Client {
   cs_state state() const { return state_; }
   const std::string& errorText() const { return errorText_; }
   std::uint32_t errorCode() const { return errorCode_; }
+  const std::string& errorServer() const { return errorServer_; }
   const Notice& notice() const { return notice_; }
   // Token given, or received after pairing.
   const std::string& token() const { return proof_.token; }
@@ -172,7 +178,9 @@ class Client {
   std::uint32_t eventsReceived(Bytes body);
   std::uint32_t noticeReceived(Bytes body);
   std::uint32_t parametersReceived(Bytes body);
-  std::uint32_t errorReceived(Bytes body, std::uint64_t requestId);
+  std::uint32_t errorReceived(Bytes body, std::uint64_t requestId, std::uint64_t nowUs);
+  // Whether the error only ends the connection, so that the client may try again.
+  bool isTemporary(const ServerError& error) const;
   std::uint32_t scenesReceived(Bytes body);
   std::uint32_t tokenReceived(Bytes body);
   std::uint32_t pairingCodeReceived(Bytes body);
@@ -197,8 +205,9 @@ class Client {
   cs_state state_ = CS_STATE_JOINING;
   bool welcomed_ = false;  // whether Welcome has arrived on the current connection
   bool resumed_ = false;
+  bool follows_ = false;  // the program can connect to another server
   std::uint32_t errorCode_ = 0;
-  std::string errorText_;
+  std::string errorText_, errorServer_;
   Notice notice_;
   Proof proof_;
   Proof renewing_;           // sent by renew(), not yet accepted; empty without one
@@ -208,6 +217,7 @@ class Client {
   std::vector<Participant> participants_;
   Presence presence_;
   Reconnection reconnection_;
+  Redirection redirection_;
   std::uint64_t connectAtUs_ = Reconnection::kNever;  // used while not welcomed
   std::uint64_t lastHeardUs_ = 0, updatedUs_ = 0;
   Limits limits_;

@@ -171,6 +171,21 @@ void cs_disconnected(cs_client* client, uint64_t now_us) CS_NOEXCEPT;
 /* Returns when the transport must close its connection, if any, and open a new one: after a loss, after a
  * failed attempt, or after a long silence of the server. UINT64_MAX if no reconnect is scheduled. */
 uint64_t cs_connect_at(const cs_client* client) CS_NOEXCEPT;
+/* Tells whether the program opens connections at cs_connect_server. 0 is the default: a fatal NOT_FOUND then
+ * leads to CS_STATE_FAILED although it names a server, and after CUT_OFF the client returns to the same
+ * address. Call it also on a mirror. */
+void cs_follow_redirects(cs_client* client, int on) CS_NOEXCEPT;
+/* Returns the DNS name of the server at which to open the next connection, with the scheme, port and path of
+ * the program's address. Check its certificate against this name. "" means the host of that address. Call it
+ * each time before cs_connecting.
+ *
+ * With cs_follow_redirects(client, 1), a fatal NOT_FOUND or CUT_OFF with a cs_error_server is a redirect: the
+ * scene is there. It is neither CS_EVENT_ERROR nor CS_STATE_FAILED. The server ends the connection, and
+ * cs_connect_at schedules the next one as after a loss. Later connections go there too, except for each
+ * fourth attempt while that server does not answer. Three redirects within a minute are followed without a
+ * joined stream in between. The next one, and a NOT_FOUND that names the present server, lead to
+ * CS_STATE_FAILED. */
+const char* cs_connect_server(const cs_client* client) CS_NOEXCEPT;
 /* Returns 1 if the last Welcome resumed the participant of this client, or of the one before it
  * (cs_set_resume_token), else 0. */
 int cs_resumed(const cs_client* client) CS_NOEXCEPT;
@@ -181,6 +196,9 @@ const char* cs_error_text(const cs_client* client) CS_NOEXCEPT;
 /* Returns the server's ErrorCode (session.proto) of the last error; 0 if the client itself found the
  * error. */
 uint32_t cs_error_code(const cs_client* client) CS_NOEXCEPT;
+/* Returns the DNS name of the server that has the scene, of the last error; "" if the error named none. It
+ * has at most 253 bytes out of [A-Za-z0-9.-] and is no address. */
+const char* cs_error_server(const cs_client* client) CS_NOEXCEPT;
 /* Returns the text of the last CS_EVENT_NOTICE; "" if there was none. */
 const char* cs_notice_text(const cs_client* client) CS_NOEXCEPT;
 /* Returns the participant who caused the notice; 0 for the server or a person outside the scene. */

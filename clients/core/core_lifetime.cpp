@@ -125,6 +125,14 @@ uint64_t cs_connect_at(const cs_client* client) noexcept {
   return client->client.connectAtUs();
 }
 
+void cs_follow_redirects(cs_client* client, int on) noexcept {
+  client->client.followRedirects(on != 0);
+}
+
+const char* cs_connect_server(const cs_client* client) noexcept {
+  return client->client.connectServer().c_str();
+}
+
 int cs_resumed(const cs_client* client) noexcept {
   return client->client.resumed() ? 1 : 0;
 }
@@ -139,6 +147,10 @@ const char* cs_error_text(const cs_client* client) noexcept {
 
 uint32_t cs_error_code(const cs_client* client) noexcept {
   return client->client.errorCode();
+}
+
+const char* cs_error_server(const cs_client* client) noexcept {
+  return client->client.errorServer().c_str();
 }
 
 const char* cs_notice_text(const cs_client* client) noexcept {

@@ -29,7 +29,7 @@ void* tagOf(Operation operation) {
 
 class GrpcTransport final : public Transport {
  public:
-  explicit GrpcTransport(ServerAddress address) : address_(std::move(address)) {}
+  explicit GrpcTransport(ServerAddress address) : address_(std::move(address)), current_(address_) {}
   ~GrpcTransport() override {
     if (call_) call_->context.TryCancel();
     alarm_.Cancel();
@@ -40,8 +40,9 @@ class GrpcTransport final : public Transport {
     }
   }
 
-  void connect() override {
-    call_.emplace(address_);
+  void connect(const std::string& server) override {
+    current_ = address_.at(server);
+    call_.emplace(current_);
     call_->stream = call_->stub.PrepareCall(&call_->context, kJoinMethod, &queue_);
     ++call_->underway;
     call_->stream->StartCall(tagOf(kStarted));
@@ -90,8 +91,8 @@ class GrpcTransport final : public Transport {
   }
 
   bool endedByServer() const override { return call_->status.ok(); }
-  Failure notJoined() const override { return clothstream::notJoined(address_, call_->status); }
-  Failure lost() const override { return clothstream::lost(address_, call_->status); }
+  Failure notJoined() const override { return clothstream::notJoined(current_, call_->status); }
+  Failure lost() const override { return clothstream::lost(current_, call_->status); }
 
  private:
   // State of one connection.
@@ -145,6 +146,7 @@ class GrpcTransport final : public Transport {
   }
 
   const ServerAddress address_;
+  ServerAddress current_;  // of the newest connection
   grpc::CompletionQueue queue_;
   grpc::Alarm alarm_;
   std::atomic<bool> wakeUnderway_{false};

@@ -83,6 +83,14 @@ std::string ServerAddress::port() const {
   return text.substr(text.rfind(':') + 1);
 }
 
+ServerAddress ServerAddress::at(std::string_view name) const {
+  ServerAddress other = *this;
+  if (name.empty()) return other;
+  other.address = isEncrypted() ? kTls : "";
+  other.address.append(name).append(":").append(port());
+  return other;
+}
+
 tl::expected<std::string, std::string> completeAddress(std::string_view text, Endpoint endpoint) {
   const bool encrypted = takeScheme(text, endpoint);
   std::string_view host = text, port = endpoint == Endpoint::grpc ? "50051" : "8080";

@@ -39,6 +39,8 @@ struct ServerAddress {
   // Without brackets.
   std::string host() const;
   std::string port() const;
+  // The same with this host, which is a DNS name or empty. Empty: unchanged.
+  ServerAddress at(std::string_view name) const;
 
   std::string address;
   // With TLS, the server must have a certificate of an authority in this PEM file; empty means the

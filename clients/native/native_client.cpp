@@ -41,6 +41,7 @@ class NativeClient::Stream {
   Stream(ServerAddress address, std::unique_ptr<Transport> transport, const NativeClientOptions& options,
          OnEvents onEvents)
       : address_(std::move(address)),
+        current_(address_),
         options_(options),
         onEvents_(std::move(onEvents)),
         log_(options.onLog, address_.address),
@@ -151,23 +152,35 @@ class NativeClient::Stream {
   }
 
   void connect() {
+    const std::string server = cs_connect_server(core_.get());
+    current_ = address_.at(server);
+    cs_follow_redirects(core_.get(), mayFollow() ? 1 : 0);
     cs_connecting(core_.get(), NativeClient::nowUs());
     ++attempts_;
     opened_ = silent_ = swallowed_ = false;
     begun_ = lastHeard_ = SteadyClock::now();
-    transport_->connect();
+    transport_->connect(server);
   }
+
+  // A token goes to other machines only with TLS.
+  bool mayFollow() const { return address_.isEncrypted() || *cs_token(core_.get()) == '\0'; }
 
   // Waits after the end of a connection until the next attempt is due. Returns false if no attempt follows.
   bool waitForNextAttempt() {
     if (!disconnectedAt_) disconnectedAt_ = SteadyClock::now();
-    const auto giveUpAt = *disconnectedAt_ + options_.reconnectFor;
-    const bool tries = wasJoined_ && options_.reconnectFor.count() > 0;
+    const ServerAddress next = address_.at(cs_connect_server(core_.get()));
+    const bool redirected = next.address != current_.address;
+    // A join ends after options_.joinTimeout, by leaving_.
+    const auto giveUpAt = wasJoined_ ? *disconnectedAt_ + options_.reconnectFor : SteadyClock::time_point::max();
+    const bool tries = wasJoined_ ? options_.reconnectFor.count() > 0 : redirected;
     if (!tries || leaving_ || cs_get_state(core_.get()) == CS_STATE_FAILED) return false;
-    reconnects_ = true;
-    log_.lost(transport_->lost());
+    reconnects_ = wasJoined_;
+    if (redirected)
+      log_.redirected(next.address);
+    else
+      log_.lost(transport_->lost());
     cs_disconnected(core_.get(), NativeClient::nowUs());
-    announce(0);
+    if (wasJoined_) announce(0);
     if (const std::uint64_t now = NativeClient::nowUs(), due = cs_connect_at(core_.get());
         due > now && due != UINT64_MAX)
       log_.nextAttempt(std::chrono::microseconds(due - now));
@@ -243,12 +256,12 @@ class NativeClient::Stream {
       const bool saidByServer = code != 0;
       const std::string text = cs_error_text(core_.get());
       return {Failure::Kind::refused,
-              saidByServer ? "The server at " + address_.address + " refuses: " + text : text,
+              saidByServer ? "The server at " + current_.address + " refuses: " + text : text,
               code == CS_ERROR_UNAUTHENTICATED};
     }
     if (leaving_) return {Failure::Kind::lost, "The client left the stream."};
     if (silent_ && !transport_->endedByServer() && !reconnects_)
-      return {Failure::Kind::lost, "The server at " + address_.address + " has sent nothing for " +
+      return {Failure::Kind::lost, "The server at " + current_.address + " has sent nothing for " +
                                        seconds(options_.silenceTimeout) + " s: the stream is lost."};
     if (!wasJoined_) return transport_->notJoined();
     Failure failure = transport_->lost();
@@ -265,6 +278,7 @@ class NativeClient::Stream {
   }
 
   const ServerAddress address_;
+  ServerAddress current_;  // of the newest connection; used by the thread only
   const NativeClientOptions options_;
   const OnEvents onEvents_;
   StreamLog log_;  // used by the thread only

@@ -51,7 +51,7 @@ Answer pairOver(Transport& transport, const ServerAddress& address, const std::s
   const auto end = Clock::now() + timeout;
   std::optional<Answer> answer;
   bool sent = false;
-  transport.connect();
+  transport.connect("");
   while (!answer && transport.active() && Clock::now() < end) {
     if (transport.canWrite() && !sent) {
       sent = true;

@@ -32,6 +32,11 @@ void StreamLog::lost(const Failure& why) {
   say(LogLevel::warning, why.text);
 }
 
+void StreamLog::redirected(const std::string& address) {
+  address_ = address;
+  say(LogLevel::info, "the scene is at another server: connecting to ", address);
+}
+
 void StreamLog::nextAttempt(std::chrono::microseconds in) {
   say(LogLevel::info, "reconnecting in ",
       std::to_string(std::chrono::ceil<std::chrono::milliseconds>(in).count()), " ms");

@@ -26,6 +26,8 @@ class StreamLog {
   void received(cs_client* client, std::uint32_t events);
   // The connection is lost, or an attempt to reconnect has failed.
   void lost(const Failure& why);
+  // The server has named another one, at this address.
+  void redirected(const std::string& address);
   void nextAttempt(std::chrono::microseconds in);
   void ended(const Failure& why, bool left);
 

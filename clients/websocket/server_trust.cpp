@@ -12,7 +12,8 @@ namespace clothstream {
 
 namespace ssl = boost::asio::ssl;
 
-ServerTrust::ServerTrust(const ServerAddress& server) : context_(ssl::context::tls_client) {
+ServerTrust::ServerTrust(const ServerAddress& server)
+    : fingerprint_(server.fingerprint), context_(ssl::context::tls_client) {
   context_.set_options(ssl::context::no_tlsv1 | ssl::context::no_tlsv1_1);
   context_.set_verify_mode(ssl::verify_peer);
   if (server.fingerprint.empty() && server.caFile.empty()) context_.set_default_verify_paths();
@@ -23,13 +24,16 @@ ServerTrust::ServerTrust(const ServerAddress& server) : context_(ssl::context::t
       throw std::invalid_argument("cannot read the certificates in " + server.caFile + ": " +
                                   error.message());
   }
-  const ssl::host_name_verification isSigned(server.host());
-  context_.set_verify_callback(
-      [this, isSigned, wanted = server.fingerprint](bool verified, ssl::verify_context& chain) {
-        const X509* const certificate = X509_STORE_CTX_get0_cert(chain.native_handle());
-        shown_ = certificate ? fingerprintOf(*certificate).value_or("") : "";
-        return wanted.empty() ? isSigned(verified, chain) : shown_ == wanted;
-      });
+  expect(server.host());
+}
+
+void ServerTrust::expect(const std::string& host) {
+  const ssl::host_name_verification isSigned(host);
+  context_.set_verify_callback([this, isSigned](bool verified, ssl::verify_context& chain) {
+    const X509* const certificate = X509_STORE_CTX_get0_cert(chain.native_handle());
+    shown_ = certificate ? fingerprintOf(*certificate).value_or("") : "";
+    return fingerprint_.empty() ? isSigned(verified, chain) : shown_ == fingerprint_;
+  });
 }
 
 }  // namespace clothstream

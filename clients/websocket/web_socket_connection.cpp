@@ -37,13 +37,19 @@ using Stage = WebSocketEnd::Stage;
 
 struct WebSocketConnector::Shared {
   Shared(net::io_context& context, const ServerAddress& address)
-      : io(context), server(address), lookup(io, server.host(), server.port()) {
+      : io(context), server(address), lookup(std::in_place, io, server.host(), server.port()) {
     if (server.isEncrypted()) trust.emplace(server);
+  }
+  void goTo(const ServerAddress& address) {
+    if (address.address == server.address) return;
+    server = address;
+    lookup.emplace(io, server.host(), server.port());
+    if (trust) trust->expect(server.host());
   }
 
   net::io_context& io;
-  const ServerAddress server;
-  HostLookup lookup;
+  ServerAddress server;
+  std::optional<HostLookup> lookup;
   std::optional<ServerTrust> trust;  // with TLS
 };
 
@@ -72,7 +78,7 @@ class Connection final : public WebSocketConnection {
  public:
   Connection(Shared& shared, WebSocketListener& listener)
       : shared_(shared), listener_(listener), stream_(makeLayer(shared)) {
-    shared_.lookup.find([this, alive = std::weak_ptr<bool>(alive_)](error_code error, const auto& found) {
+    shared_.lookup->find([this, alive = std::weak_ptr<bool>(alive_)](error_code error, const auto& found) {
       if (alive.expired() || ended_) return;
       if (error) return end(error);
       connect(found);
@@ -220,7 +226,9 @@ WebSocketConnector::WebSocketConnector(net::io_context& io, const ServerAddress&
 
 WebSocketConnector::~WebSocketConnector() = default;
 
-std::unique_ptr<WebSocketConnection> WebSocketConnector::open(WebSocketListener& listener) {
+std::unique_ptr<WebSocketConnection> WebSocketConnector::open(const ServerAddress& server,
+                                                              WebSocketListener& listener) {
+  shared_->goTo(server);
   if (shared_->trust) return std::make_unique<Connection<Encrypted, Shared>>(*shared_, listener);
   return std::make_unique<Connection<Plain, Shared>>(*shared_, listener);
 }

@@ -25,13 +25,15 @@ std::string inBrackets(const std::string& text) {
 class WebSocketTransport final : public Transport, private WebSocketListener {
  public:
   explicit WebSocketTransport(const ServerAddress& address)
-      : address_(address), work_(net::make_work_guard(io_)), connector_(io_, address) {}
+      : address_(address), current_(address), work_(net::make_work_guard(io_)), connector_(io_, address) {}
 
-  void connect() override {
+  void connect(const std::string& server) override {
     end_.reset();
     message_.reset();
     open_ = opened_ = writing_ = leaving_ = false;
-    connection_ = connector_.open(*this);
+    current_ = address_.at(server);
+    connection_.reset();
+    connection_ = connector_.open(current_, *this);
   }
   bool active() const override { return connection_ && (!end_ || message_); }
   bool hasOpened() const override { return opened_; }
@@ -97,6 +99,7 @@ class WebSocketTransport final : public Transport, private WebSocketListener {
   Failure notUpgraded() const;
 
   const ServerAddress address_;
+  ServerAddress current_;  // of the newest connection
   net::io_context io_;
   net::executor_work_guard<net::io_context::executor_type> work_;
   std::atomic<bool> woken_{false};
@@ -108,8 +111,8 @@ class WebSocketTransport final : public Transport, private WebSocketListener {
 };
 
 Failure WebSocketTransport::notTrusted() const {
-  const std::string text = "The server at " + address_.address + " is not the one expected: ";
-  if (!address_.fingerprint.empty())
+  const std::string text = "The server at " + current_.address + " is not the one expected: ";
+  if (!current_.fingerprint.empty())
     return {Failure::Kind::refused, text + "it has the fingerprint " + end_->shownKey +
                                         ". If this is right, use it; otherwise another server answers."};
   return {Failure::Kind::refused, text + "no known authority has signed its certificate for this name" +
@@ -123,27 +126,27 @@ Failure WebSocketTransport::notUpgraded() const {
   const std::string status = std::to_string(end_->httpStatus);
   if (end_->httpStatus != 0 && end_->isOurs)
     return {Failure::Kind::refused,
-            "The server at " + address_.address + " refuses: " + end_->why + " (HTTP status " + status + ")"};
+            "The server at " + current_.address + " refuses: " + end_->why + " (HTTP status " + status + ")"};
   const std::string answer =
       end_->httpStatus != 0 ? "HTTP status " + status + inBrackets(end_->why) : end_->why;
   return {Failure::Kind::refused,
-          "No clothstream-server of this release answers at " + address_.address + ", but something else: " +
+          "No clothstream-server of this release answers at " + current_.address + ", but something else: " +
               answer + ". Use the port of the server's page (--port, default 8080), and " +
-              (address_.isEncrypted() ? "ws:// if it has no TLS." : "wss:// if it has TLS.")};
+              (current_.isEncrypted() ? "ws:// if it has no TLS." : "wss:// if it has TLS.")};
 }
 
 Failure WebSocketTransport::notJoined() const {
   using Kind = Failure::Kind;
   switch (end_->stage) {
     case Stage::lookup:
-      return {Kind::unreachable, "The name in the address " + address_.address + " is not known" +
+      return {Kind::unreachable, "The name in the address " + current_.address + " is not known" +
                                      inBrackets(end_->why) + ": check it, and the network."};
     case Stage::connect:
-      return {Kind::unreachable, "No server answers at " + address_.address +
+      return {Kind::unreachable, "No server answers at " + current_.address +
                                      ": is clothstream-server running there?" + inBrackets(end_->why)};
     case Stage::tls:
       if (end_->untrusted) return notTrusted();
-      return {Kind::refused, "The server at " + address_.address + " does not answer with TLS" +
+      return {Kind::refused, "The server at " + current_.address + " does not answer with TLS" +
                                  inBrackets(end_->why) + ". Use ws:// if it has no TLS."};
     case Stage::upgrade:
       return notUpgraded();
@@ -151,17 +154,17 @@ Failure WebSocketTransport::notJoined() const {
       break;
   }
   if (end_->byServer && !end_->why.empty())
-    return {Kind::refused, "The server at " + address_.address + " refuses: " + end_->why};
-  return {Kind::unreachable, "The server at " + address_.address +
+    return {Kind::refused, "The server at " + current_.address + " refuses: " + end_->why};
+  return {Kind::unreachable, "The server at " + current_.address +
                                  " ended the stream before the scene was described" +
                                  inBrackets(end_->byServer ? "" : end_->why) + "."};
 }
 
 Failure WebSocketTransport::lost() const {
   if (end_->byServer && end_->why.empty())
-    return {Failure::Kind::lost, "The server at " + address_.address + " ended the stream."};
+    return {Failure::Kind::lost, "The server at " + current_.address + " ended the stream."};
   return {Failure::Kind::lost,
-          "The stream from " + address_.address + " is lost" + inBrackets(end_->why) + "."};
+          "The stream from " + current_.address + " is lost" + inBrackets(end_->why) + "."};
 }
 
 }  // namespace

@@ -51,9 +51,8 @@ void add(Json& data, const Usage& usage) {
 }  // namespace
 
 std::string toJson(const Event& event, const std::string& server) {
-  Json data{{"server", server}, {"scene", event.scene}};
+  Json data{{"server", server}, {"scene", event.scene}, {"tenant", event.tenant}};
   std::visit([&](const auto& what) { add(data, what); }, event.what);
-  data["tenant"] = event.tenant;
   const char* const type = std::visit([](const auto& what) { return typeOf(what); }, event.what);
   const Json body{{"type", type}, {"timestamp", toText(event.time)}, {"data", std::move(data)}};
   // Invalid UTF-8 is replaced.

@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::int64_t kWait = 2000;  // milliseconds
 constexpr std::int64_t kNanoseconds = 1'000'000'000;
+constexpr int kCopies = 3;  // of a bucket, on servers of a cluster
 
 using OwnEntry = std::unique_ptr<kvEntry, decltype(&kvEntry_Destroy)>;
 
@@ -60,7 +61,12 @@ Bucket::Bucket(Nats& nats, const BucketOptions& options) : name_(options.name) {
     config.Bucket = name_.c_str();
     config.History = 1;
     config.TTL = options.lifetime.count() * kNanoseconds;
-    status = js_CreateKeyValue(&store, context, &config);
+    // A NATS server that is alone keeps one copy.
+    for (const int copies : {kCopies, 1}) {
+      config.Replicas = copies;
+      status = js_CreateKeyValue(&store, context, &config);
+      if (status == NATS_OK) break;
+    }
   }
   if (status != NATS_OK) {
     jsCtx_Destroy(context);

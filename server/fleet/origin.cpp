@@ -316,6 +316,8 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
   response.set_to(to);
   response.set_gap(schedule::seconds(Clock::now() - stopped));
   // Those who are connected to this server must join again; those at edges follow, and must not hear of it.
+  // The scene goes on, so nobody has left it.
+  scene->roster.endObservation(false);
   tunnels_.end(stream->subject());
   server_.state().removeCreated(
       scene,

@@ -181,11 +181,13 @@ std::string ScriptedServer::pong(std::uint64_t clientTimeUs, std::uint64_t serve
   return serialised(message);
 }
 
-std::string ScriptedServer::error(v1::ErrorCode code, const std::string& text, bool fatal) {
+std::string ScriptedServer::error(v1::ErrorCode code, const std::string& text, bool fatal,
+                                  const std::string& server) {
   v1::ServerMessage message;
   message.mutable_error()->set_code(code);
   message.mutable_error()->set_text(text);
   message.mutable_error()->set_fatal(fatal);
+  message.mutable_error()->set_server(server);
   return serialised(message);
 }
 

@@ -53,7 +53,8 @@ class ScriptedServer {
   static std::string serialise(const v1::Frame& frame);
   static std::string operatingPoint(std::uint32_t quality, std::uint32_t temporalLayers);
   static std::string pong(std::uint64_t clientTimeUs, std::uint64_t serverTimeUs);
-  static std::string error(v1::ErrorCode code, const std::string& text, bool fatal);
+  static std::string error(v1::ErrorCode code, const std::string& text, bool fatal,
+                           const std::string& server = {});
 
  private:
   void pose(std::uint64_t tick);

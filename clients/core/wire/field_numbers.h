@@ -712,6 +712,7 @@ struct Error {
   static constexpr Field kCode{1, WireType::kVarint};
   static constexpr Field kText{2, WireType::kBytes};
   static constexpr Field kFatal{3, WireType::kVarint};
+  static constexpr Field kServer{4, WireType::kBytes};
 };
 struct ListScenesResponse {
   static constexpr Field kScenes{1, WireType::kBytes};

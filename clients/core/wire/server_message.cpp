@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 
 #include "clients/core/wire/collider.h"
 
@@ -311,6 +312,49 @@ std::optional<PairingCode> readPairingCode(Bytes message) {
   });
 }
 
+namespace {
+
+constexpr std::size_t kMaxDnsNameBytes = 253, kMaxDnsLabelBytes = 63;
+
+bool isDigit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+bool isHexDigit(char c) {
+  return isDigit(c) || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+}
+
+bool isDnsLabel(std::string_view label) {
+  const auto isAllowed = [](char c) {
+    return isDigit(c) || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-';
+  };
+  return !label.empty() && label.size() <= kMaxDnsLabelBytes && label.front() != '-' && label.back() != '-' &&
+         std::all_of(label.begin(), label.end(), isAllowed);
+}
+
+// Whether browsers and the C library read a name as an IPv4 address if this is its last label: a decimal,
+// octal or hexadecimal number.
+bool isPartOfAddress(std::string_view label) {
+  if (label.starts_with("0x") || label.starts_with("0X"))
+    return std::all_of(label.begin() + 2, label.end(), isHexDigit);
+  return std::all_of(label.begin(), label.end(), isDigit);
+}
+
+// The text if it is a DNS name, without a dot at its end; else empty.
+std::string dnsName(Bytes text) {
+  const std::string_view name(text.data(), text.size());
+  if (name.size() > kMaxDnsNameBytes) return {};
+  std::string_view rest = name, label;
+  do {
+    label = rest.substr(0, rest.find('.'));
+    if (!isDnsLabel(label)) return {};
+    rest.remove_prefix(std::min(label.size() + 1, rest.size()));
+  } while (!rest.empty());
+  return isPartOfAddress(label) || name.ends_with('.') ? std::string() : std::string(name);
+}
+
+}  // namespace
+
 std::optional<ServerError> readError(Bytes message) {
   using F = field::Error;
   return readMessage<ServerError>(message, [](ServerError& error, std::uint32_t tag, Reader& reader) {
@@ -321,6 +365,9 @@ std::optional<ServerError> readError(Bytes message) {
         return setText(error.text, reader);
       case F::kFatal.tag:
         return set(error.fatal, reader.get_bool());
+      case F::kServer.tag:
+        error.server = dnsName(reader.get_view());
+        return true;
       default:
         return skip(reader);
     }

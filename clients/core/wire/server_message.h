@@ -128,6 +128,7 @@ struct ServerError {
   std::uint32_t code = 0;
   std::string text;
   bool fatal = false;
+  std::string server;  // DNS name of the server that has the scene; empty if none, or if it is not a DNS name
 };
 
 struct PairingCode {

@@ -26,7 +26,7 @@ struct LocalFreed {
 };
 
 void closeStore(HCERTSTORE store) {
-  CertCloseStore(store, 0);
+  if (store) CertCloseStore(store, 0);
 }
 
 void closeEngine(HCERTCHAINENGINE engine) {
@@ -107,13 +107,11 @@ std::string addressBytes(const std::string& host) {
 CertificateCheck::CertificateCheck(const ServerAddress& server)
     : fingerprint_(server.fingerprint),
       host_(utf16(server.host())),
-      address_(addressBytes(server.host())),
-      authorities_(nullptr, &closeStore),
-      engine_(nullptr, &closeEngine) {
+      address_(addressBytes(server.host())) {
   if (!fingerprint_.empty() || server.caFile.empty()) return;
   std::ifstream file(std::filesystem::path(utf16(server.caFile)), std::ios::binary);
   const std::string pem{std::istreambuf_iterator<char>(file), {}};
-  authorities_.reset(CertOpenStore(CERT_STORE_PROV_MEMORY, 0, 0, 0, nullptr));
+  authorities_.reset(CertOpenStore(CERT_STORE_PROV_MEMORY, 0, 0, 0, nullptr), &closeStore);
   if (!authorities_ || addCertificates(pem, authorities_.get()) == 0)
     throw std::invalid_argument("cannot read the certificates in " + server.caFile +
                                 ": it must be a PEM file with at least one certificate");
@@ -125,7 +123,14 @@ CertificateCheck::CertificateCheck(const ServerAddress& server)
   if (!CertCreateCertificateChainEngine(&config, &engine))
     throw std::invalid_argument("cannot use the certificates in " + server.caFile + ": " +
                                 windowsErrorText(GetLastError()));
-  engine_.reset(engine);
+  engine_.reset(engine, &closeEngine);
+}
+
+CertificateCheck CertificateCheck::at(const std::string& host) const {
+  CertificateCheck other = *this;
+  other.host_ = utf16(host);
+  other.address_ = addressBytes(host);
+  return other;
 }
 
 CertificateCheck::Result CertificateCheck::check(const CERT_CONTEXT& certificate) const {

@@ -19,6 +19,8 @@ class CertificateCheck {
  public:
   // Throws std::invalid_argument if the file of authorities cannot be read.
   explicit CertificateCheck(const ServerAddress& server);
+  // The same check for a server of another name.
+  CertificateCheck at(const std::string& host) const;
 
   struct Result {
     bool trusted = false;
@@ -32,14 +34,11 @@ class CertificateCheck {
   // Error of the chain or of the name; ERROR_SUCCESS for a trusted certificate.
   DWORD chainError(const CERT_CONTEXT& certificate) const;
 
-  using Store = std::unique_ptr<void, void (*)(HCERTSTORE)>;
-  using Engine = std::unique_ptr<void, void (*)(HCERTCHAINENGINE)>;
-
   std::string fingerprint_;
   std::wstring host_;
   std::string address_;  // bytes of the IP address if the host is one
-  Store authorities_;    // of the file; empty: those of the system
-  Engine engine_;        // for these authorities
+  // Store with the authorities of the file, and the engine for them; empty: those of the system.
+  std::shared_ptr<void> authorities_, engine_;
 };
 
 }  // namespace clothstream

@@ -76,15 +76,25 @@ struct WebSocketConnector::Shared {
     if (WinHttpSetStatusCallback(session.get(), &WinHttpLink::called, WINHTTP_CALLBACK_FLAG_ALL_NOTIFICATIONS,
                                  0) == WINHTTP_INVALID_STATUS_CALLBACK)
       throwLastError("WinHttpSetStatusCallback");
+    openHost();
+    if (!connect) throwLastError("WinHttpConnect");
+  }
+  // Without a handle, the next request fails.
+  void goTo(const ServerAddress& address) {
+    if (address.address == server.address) return;
+    server = address;
+    if (check) check = std::make_shared<const CertificateCheck>(check->at(server.host()));
+    openHost();
+  }
+  void openHost() {
     // A v6 address has brackets, so that the Host field has them.
     const std::string host = server.hostAndPort();
     connect.reset(WinHttpConnect(session.get(), utf16(host.substr(0, host.rfind(':'))).c_str(),
                                  static_cast<INTERNET_PORT>(std::stoul(server.port())), 0));
-    if (!connect) throwLastError("WinHttpConnect");
   }
 
   net::io_context& io;
-  const ServerAddress server;
+  ServerAddress server;
   std::shared_ptr<const CertificateCheck> check;  // with TLS
   WinHttpHandle session, connect;
 };
@@ -299,7 +309,9 @@ WebSocketConnector::WebSocketConnector(net::io_context& io, const ServerAddress&
 
 WebSocketConnector::~WebSocketConnector() = default;
 
-std::unique_ptr<WebSocketConnection> WebSocketConnector::open(WebSocketListener& listener) {
+std::unique_ptr<WebSocketConnection> WebSocketConnector::open(const ServerAddress& server,
+                                                              WebSocketListener& listener) {
+  shared_->goTo(server);
   return std::make_unique<Connection<Shared>>(*shared_, listener);
 }
 

@@ -6,7 +6,8 @@ Starts nats-server, two origins that play a recording of 10 frames/s each, and t
 
 - the CPU time of an origin with 1, 60 and 600 viewers at the edges;
 - the age of frames (packet complete at the origin to arrival) of four viewers at an origin and at an edge;
-- how long viewers are without frames when nats-server, an edge and an origin are killed and started again.
+- how long viewers are without frames when nats-server, an edge and an origin are killed and started again;
+- how long a scene of 10,000 vertices stands still when it moves between two servers that simulate it.
 
 One viewer in twenty decodes every frame and compares its hash. Exits with 1 if any frame was wrong or a viewer was lost.
 """
@@ -44,6 +45,17 @@ SCENE = {
     ],
     "environment": {"wind": {"z": 3}},
 }
+
+
+MOVING = {
+    **SCENE,
+    "name": "moving",
+    "simulationRate": 30,
+    "streamRate": 30,
+    "substeps": 10,
+    "cloths": [{**SCENE["cloths"][0], "grid": {**SCENE["cloths"][0]["grid"], "rows": 100, "columns": 100}}],
+}
+MOVES = 6
 
 
 class Program:
@@ -87,7 +99,7 @@ class Fleet:
         self.started = []
 
     def start(self):
-        nats = ["nats-server", "--addr", "127.0.0.1", "--port", NATS_PORT]
+        nats = ["nats-server", "--addr", "127.0.0.1", "--port", NATS_PORT, "--jetstream", "--store_dir", self.folder / "nats"]
         self.nats = self.run(nats, "nats", "Server is ready")
         self.options = ["--nats", f"nats://127.0.0.1:{NATS_PORT}"]
         self.origins = []
@@ -203,10 +215,45 @@ def gap(fleet, lost, lose, come_back):
             threading.Thread(target=lambda: (lose(), time.sleep(1), come_back())).start()
             state = 1
     viewer.wait()
-    gaps = [later - earlier for earlier, later in zip(times, times[1:])]
+    gaps = longest_gaps(times)
     if not gaps or time.monotonic() - times[-1] > 2:
         sys.exit(f"no frames came back after {lost} was lost (exit code {viewer.returncode})")
-    return {"lost": lost, "longestGapSeconds": max(gaps)}
+    return {"lost": lost, "longestGapSeconds": gaps[0]}
+
+
+def longest_gaps(times):
+    return sorted((later - earlier for earlier, later in zip(times, times[1:])), reverse=True)
+
+
+def moves(fleet):
+    """Moves a scene between two servers while a participant watches at an edge. Times are seconds."""
+    servers = [fleet.serve(name, port, ["--scene", "sphere_drop"]) for name, port in (("a", 25200), ("b", 25210))]
+    file = fleet.folder / "moving.json"
+    file.write_text(json.dumps(MOVING))
+    clothstream = fleet.programs / "clothstream"
+    subprocess.run([clothstream, "create", file, "--server", servers[0].address], check=True, stdout=subprocess.DEVNULL)
+    fleet.edges[0].wait_for("moving: serves this scene")
+    time.sleep(3)  # it is in the directory
+    viewer = subprocess.Popen([clothstream, "join", fleet.edges[0].address, "--scene", "moving", "--seconds", str(4 + 3 * MOVES),
+                               "--events", "--frames"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    times, still = [], []
+    reader = threading.Thread(target=lambda: times.extend(time.monotonic() for line in viewer.stdout if '"frame"' in line))
+    reader.start()
+    time.sleep(3)
+    for _ in range(MOVES):
+        began = time.monotonic()
+        moved = subprocess.run([clothstream, "move", "moving", *[str(option) for option in fleet.options]],
+                               capture_output=True, text=True)
+        if moved.returncode != 0:
+            sys.exit(f"the scene did not move: {moved.stderr}")
+        still.append(float(moved.stdout.rsplit(" ", 2)[1]) / 1000)
+        time.sleep(max(0, 3 - (time.monotonic() - began)))
+    viewer.wait()
+    reader.join()
+    if viewer.returncode != 0 or not times or time.monotonic() - times[-1] > 2:
+        sys.exit(f"the participant lost the scene that moved (exit code {viewer.returncode})")
+    usual = longest_gaps(times)[len(times) // 2]
+    return {"stillSeconds": still, "longestFrameGapsSeconds": longest_gaps(times)[:MOVES], "usualFrameGapSeconds": usual}
 
 
 def restart(program, ready):
@@ -255,9 +302,13 @@ def measure(fleet, seconds):
                                  ("the origin", origin, "gRPC ")):
         gaps.append(gap(fleet, lost, program.kill, lambda program=program, ready=ready: restart(program, ready)))
         print(f"| {lost} | {gaps[-1]['longestGapSeconds']:.2f} |", flush=True)
+    moved = moves(fleet)
+    print("\n| a scene of 10,000 vertices moves | time without simulation, ms | longest time without a frame, ms |\n|---|---|---|")
+    for i, (still, frame) in enumerate(zip(sorted(moved["stillSeconds"], reverse=True), moved["longestFrameGapsSeconds"])):
+        print(f"| {i + 1} | {1000 * still:.0f} | {1000 * frame:.0f} |", flush=True)
     cost = message_cost(fleet, seconds)
     print(f"\nnats-server takes {1e6 * cost:.1f} us of processor time for one frame that it sends to one edge.", flush=True)
-    return {"crowds": crowds, "frameAgeMs": ages, "natsSecondsOfFrame": cost, "gaps": gaps}
+    return {"crowds": crowds, "frameAgeMs": ages, "natsSecondsOfFrame": cost, "gaps": gaps, "moves": moved}
 
 
 if __name__ == "__main__":

@@ -149,7 +149,7 @@ void Program::call(const CoreInput::Call& call) {
       return cs_disconnected(client(), now_);
     case 2:
       static_cast<void>(cs_connect_at(client()));
-      return;
+      return cs_follow_redirects(client(), index % 2 == 1 ? 1 : 0);
     case 3:
       return cs_want(client(), index, static_cast<std::uint32_t>(call.numbers_size()));
     case 4:
@@ -497,6 +497,8 @@ void Program::readNumbers() {
   require(cs_get_contact_event(client(), cs_contact_event_count(client()), &contact) == 0,
           "there are no more events than their number");
   static_cast<void>(cs_error_code(client()));
+  expectText(cs_error_server(client()));
+  expectText(cs_connect_server(client()));
   static_cast<void>(cs_notice_participant(client()));
   static_cast<void>(cs_parameters_participant(client()));
   static_cast<void>(cs_participant_id(client()));

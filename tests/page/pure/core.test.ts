@@ -100,14 +100,15 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
-async function connect(resumeToken = ""): Promise<Connection> {
+async function connect(resumeToken = "", follows = true): Promise<Connection> {
   connection = await Connection.start(
     { postMessage: (message) => typeof message !== "number" && posted.push(message) },
     {
       kind: "start",
       session: 7,
       module,
-      url: "ws://server/stream",
+      url: "wss://server:8443/stream",
+      follows,
       scene: "flag",
       program: "test",
       identity: kIdentity,
@@ -187,4 +188,35 @@ test("messages of the server are passed on to the page", async () => {
   socket().onmessage?.({ data: bytes });
   const message = posted.at(-1)!;
   assert.isTrue(message.kind === "message" && message.message === bytes && message.frame === undefined);
+});
+
+// A fatal Error (session.proto) of a server that does not have the scene.
+function notFound(server: string): ArrayBuffer {
+  const field = (number: number, bytes: number[]) => [(number << 3) | 2, bytes.length, ...bytes];
+  const text = (value: string) => [...new TextEncoder().encode(value)];
+  const error = [0x08, 3, ...field(2, text("elsewhere")), 0x18, 1, ...field(4, text(server))];
+  return Uint8Array.from(field(8, error)).buffer;
+}
+
+test("a scene at another server is joined there, with the scheme, port and path of the URL", async () => {
+  await connect();
+  socket().opens();
+  socket().onmessage?.({ data: notFound("b.example") });
+  assert.isFalse(socket().closed, "the server closes the connection");
+  socket().onclose?.({ reason: "", wasClean: true });
+  assert.equal(socket().url, "wss://b.example:8443/stream");
+  socket().opens();
+  assert.include(textOf(socket().sent[0] as Uint8Array), "flag");
+  assert.isFalse(socket().closed);
+});
+
+test("a name is not followed if it is no DNS name, or if a secret would go without TLS", async () => {
+  for (const [server, follows] of [["192.0.2.1", true], ["b.example:80", true], ["b.example", false]] as const) {
+    await connect("", follows);
+    const { length } = FakeSocket.made;
+    socket().opens();
+    socket().onmessage?.({ data: notFound(server) });
+    assert.isTrue(socket().closed, `${server}: the client has failed`);
+    assert.lengthOf(FakeSocket.made, length);
+  }
 });

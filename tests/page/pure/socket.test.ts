@@ -23,7 +23,7 @@ afterEach(() => vi.unstubAllGlobals());
 
 test("messages are sent only while the socket is open", () => {
   socket.send(Uint8Array.of(1));
-  socket.open();
+  socket.open("");
   assert.isTrue(socket.inUse);
   assert.isFalse(socket.isOpen);
   socket.send(Uint8Array.of(2));
@@ -33,8 +33,20 @@ test("messages are sent only while the socket is open", () => {
   assert.deepEqual([last().url, last().binaryType], ["ws://server/stream", "arraybuffer"]);
 });
 
+test("a named server replaces the host of the URL for one connection", () => {
+  const urlAt = (url: string, server: string) => {
+    const one = new StreamSocket(url, { opened: () => undefined, message: () => undefined, lost: () => undefined });
+    one.open(server);
+    return last().url;
+  };
+  assert.equal(urlAt("wss://a.example:8443/path/stream?x=1", "b.example"), "wss://b.example:8443/path/stream?x=1");
+  assert.equal(urlAt("ws://[::1]:8080/stream", "b.example"), "ws://b.example:8080/stream");
+  assert.equal(urlAt("wss://a.example/stream", "b.example"), "wss://b.example/stream");
+  assert.equal(urlAt("wss://a.example/stream", ""), "wss://a.example/stream");
+});
+
 test("text of a server is ignored, bytes are passed on", () => {
-  socket.open();
+  socket.open("");
   last().opens();
   last().onmessage?.({ data: "text" });
   last().onmessage?.({ data: new ArrayBuffer(3) });
@@ -49,7 +61,7 @@ test("the reason of a lost connection says what happened", () => {
     [true, { reason: "", wasClean: false }, "The connection was lost."],
   ];
   for (const [opens, closed, reason] of cases) {
-    socket.open();
+    socket.open("");
     if (opens) last().opens();
     last().onclose?.(closed);
     assert.equal(events.at(-1), reason);
@@ -58,9 +70,9 @@ test("the reason of a lost connection says what happened", () => {
 });
 
 test("a socket that is closed or replaced reports nothing more", async () => {
-  socket.open();
+  socket.open("");
   const first = last();
-  socket.open();
+  socket.open("");
   assert.isTrue(first.closed);
   const closing = socket.close();
   assert.isTrue(last().closed);

@@ -24,9 +24,11 @@ namespace ClothStream.Core
 
         readonly ServerAddress address;
         readonly string fingerprint;
+        readonly bool hasCode;
         readonly IntPtr core;
         readonly Thread thread;
         readonly AutoResetEvent woken = new AutoResetEvent(false);
+        ServerAddress current; // of the newest connection
         StreamSocket socket;
         Events events;
         string failure = "", problem = "";
@@ -38,7 +40,8 @@ namespace ClothStream.Core
             if (IntPtr.Size != 8) throw new PlatformNotSupportedException("ClothStream needs a 64-bit device; build for ARM64.");
             address = new ServerAddress(options.Address);
             fingerprint = string.IsNullOrEmpty(options.Fingerprint) ? "" : KeyFingerprint.Normal(options.Fingerprint);
-            bool hasSecret = !string.IsNullOrEmpty(options.Token) || !string.IsNullOrEmpty(options.PairingCode);
+            hasCode = !string.IsNullOrEmpty(options.PairingCode);
+            bool hasSecret = !string.IsNullOrEmpty(options.Token) || hasCode;
             if (hasSecret && !address.IsEncrypted && !address.IsLoopback)
                 throw new ArgumentException("A token or pairing code is sent to another machine only with TLS; use wss://" + address + ".");
             if (fingerprint != "" && !address.IsEncrypted)
@@ -133,8 +136,8 @@ namespace ClothStream.Core
             {
                 while (!leaving && !HasFailed)
                 {
-                    lock (Gate) Native.cs_connecting(Handle, NowUs);
-                    using (socket = new StreamSocket(address, fingerprint, woken)) Serve();
+                    lock (Gate) StartConnection();
+                    using (socket = new StreamSocket(current, fingerprint, woken)) Serve();
                     WaitForNextAttempt();
                 }
             }
@@ -142,6 +145,15 @@ namespace ClothStream.Core
             {
                 Fail(error.Message);
             }
+        }
+
+        // The scene may be at another server than that of the address. Secrets go to other machines only with TLS.
+        void StartConnection()
+        {
+            current = address.At(Utf8.Text(Native.cs_connect_server(Handle)));
+            bool mayFollow = address.IsEncrypted || (!hasCode && Utf8.Text(Native.cs_token(Handle)) == "");
+            Native.cs_follow_redirects(Handle, mayFollow ? 1 : 0);
+            Native.cs_connecting(Handle, NowUs);
         }
 
         bool HasFailed { get { return State == State.Failed; } }
@@ -167,7 +179,7 @@ namespace ClothStream.Core
                 }
                 else if (NowUs >= ConnectAt)
                 {
-                    lock (Gate) problem = "The server at " + address + " does not answer.";
+                    lock (Gate) problem = "The server at " + current + " does not answer.";
                     return;
                 }
                 if (bytes == 0) woken.WaitOne(UpdateIntervalMs);
@@ -199,8 +211,8 @@ namespace ClothStream.Core
             lock (Gate)
             {
                 if (!socket.IsTrusted) Fail(NotTrusted());
-                else if (socket.Why == "") problem = "The server at " + address + " has closed the connection.";
-                else problem = "No connection to the server at " + address + ": " + Printable(socket.Why).TrimEnd('.') + ".";
+                else if (socket.Why == "") problem = "The server at " + current + " has closed the connection.";
+                else problem = "No connection to the server at " + current + ": " + Printable(socket.Why).TrimEnd('.') + ".";
             }
         }
 
@@ -212,7 +224,7 @@ namespace ClothStream.Core
 
         string NotTrusted()
         {
-            string text = "The server at " + address + " is not the one expected: ";
+            string text = "The server at " + current + " is not the one expected: ";
             if (fingerprint != "")
                 return text + "it has the fingerprint " + socket.ShownFingerprint + ". If this is right, use it; otherwise another server answers.";
             return text + "no known authority has signed its certificate for this name. Use the fingerprint of the server's key. This server shows the fingerprint " +

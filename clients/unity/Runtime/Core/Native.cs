@@ -490,10 +490,13 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern void cs_connecting(IntPtr client, ulong nowUs);
         [DllImport(Library)] public static extern void cs_disconnected(IntPtr client, ulong nowUs);
         [DllImport(Library)] public static extern ulong cs_connect_at(IntPtr client);
+        [DllImport(Library)] public static extern void cs_follow_redirects(IntPtr client, int on);
+        [DllImport(Library)] public static extern byte* cs_connect_server(IntPtr client);
         [DllImport(Library)] public static extern int cs_resumed(IntPtr client);
         [DllImport(Library)] public static extern State cs_get_state(IntPtr client);
         [DllImport(Library)] public static extern byte* cs_error_text(IntPtr client);
         [DllImport(Library)] public static extern uint cs_error_code(IntPtr client);
+        [DllImport(Library)] public static extern byte* cs_error_server(IntPtr client);
         [DllImport(Library)] public static extern byte* cs_notice_text(IntPtr client);
         [DllImport(Library)] public static extern ulong cs_notice_participant(IntPtr client);
         [DllImport(Library)] public static extern byte* cs_server_name(IntPtr client);

@@ -45,6 +45,19 @@ namespace ClothStream.Core
                 throw new ArgumentException("The address \"" + text + "\" has no host; use HOST or HOST:PORT.");
         }
 
+        ServerAddress(string host, int port, bool isEncrypted)
+        {
+            Host = host;
+            Port = port;
+            IsEncrypted = isEncrypted;
+        }
+
+        /// <summary>The address with a DNS name in place of the host; "" means unchanged.</summary>
+        public ServerAddress At(string name)
+        {
+            return name == "" ? this : new ServerAddress(name, Port, IsEncrypted);
+        }
+
         /// <summary>Whether the server runs on this machine: localhost or a loopback address.</summary>
         public bool IsLoopback
         {

@@ -142,6 +142,15 @@ export class Client {
     return Number(BigInt.asUintN(64, this.core.exports.cs_connect_at(this.handle.pointer))) / 1000;
   }
 
+  // Whether the program opens connections at connectServer. Call it on a client and on its mirror, before connecting.
+  followRedirects(on: boolean): void {
+    this.core.exports.cs_follow_redirects(this.handle.pointer, on ? 1 : 0);
+  }
+  // DNS name of the server for the next connection; "" means the host of the program's URL.
+  get connectServer(): string {
+    return this.core.text(this.core.exports.cs_connect_server(this.handle.pointer));
+  }
+
   // Sends pings and runs timers. Call at least ten times per second.
   update(atUs: bigint = nowUs()): void {
     this.core.exports.cs_update(this.handle.pointer, atUs);

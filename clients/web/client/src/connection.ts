@@ -44,6 +44,7 @@ export class Connection {
     if ("code" in options.proof) this.client.setPairingCode(options.proof.code);
     else this.client.setToken(options.proof.token);
     this.client.setResumeToken(options.resumeToken);
+    this.client.followRedirects(options.follows);
     this.socket = new StreamSocket(options.url, {
       opened: () => this.flush(),
       message: (bytes) => this.receive(bytes),
@@ -87,10 +88,11 @@ export class Connection {
 
   private connect(): void {
     const atMs = this.now();
+    const server = this.client.connectServer;
     this.waiting = [];
     this.client.connecting(microseconds(atMs));
     this.post({ kind: "connecting", connection: ++this.number, atMs });
-    this.socket.open();
+    this.socket.open(server);
   }
 
   private lose(reason: string): void {

@@ -174,6 +174,9 @@ export class Session {
     const client = new Client(this.core, "mirror", scene, program, identity);
     if ("token" in proof) client.setToken(proof.token);
     client.setResumeToken(resumeToken);
+    // Secrets go to other machines only with TLS.
+    const follows = url.startsWith("wss:") || ("token" in proof && proof.token === "");
+    client.followRedirects(follows);
     client.frames.playOut();
     client.frames.keepClothInFrontOfHands(true);
     this.post({
@@ -181,6 +184,7 @@ export class Session {
       session: ++this.number,
       module: this.module,
       url,
+      follows,
       scene,
       program,
       identity,

@@ -25,10 +25,11 @@ export class StreamSocket {
     return this.socket?.readyState === WebSocket.OPEN;
   }
 
-  // Closes the current socket, if any, and opens a new one.
-  open(): void {
+  // Closes the current socket, if any, and opens a new one. `server`: DNS name in place of the host of the URL; "" means
+  // the URL as it is.
+  open(server: string): void {
     void this.close();
-    const socket = new WebSocket(this.url);
+    const socket = new WebSocket(at(this.url, server));
     let wasOpen = false;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
@@ -60,6 +61,14 @@ export class StreamSocket {
   send(message: Uint8Array<ArrayBuffer>): void {
     if (this.isOpen) this.socket?.send(message);
   }
+}
+
+// The URL with this host, and with the same scheme, port and path.
+function at(url: string, server: string): string {
+  if (server === "") return url;
+  const other = new URL(url);
+  other.hostname = server;
+  return other.href;
 }
 
 function explain(event: CloseEvent, wasOpen: boolean): string {

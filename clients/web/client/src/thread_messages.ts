@@ -13,6 +13,7 @@ export interface Start {
   session: number; // repeated by all answers; a new start ends the session before it
   module: WebAssembly.Module;
   url: string;
+  follows: boolean; // to another server, if the one of the URL names it
   scene: string;
   program: string;
   identity: Identity;
