@@ -171,7 +171,8 @@ class NativeClient::Stream {
     const ServerAddress next = address_.at(cs_connect_server(core_.get()));
     const bool redirected = next.address != current_.address;
     // A join ends after options_.joinTimeout, by leaving_.
-    const auto giveUpAt = wasJoined_ ? *disconnectedAt_ + options_.reconnectFor : SteadyClock::time_point::max();
+    const auto giveUpAt =
+        wasJoined_ ? *disconnectedAt_ + options_.reconnectFor : SteadyClock::time_point::max();
     const bool tries = wasJoined_ ? options_.reconnectFor.count() > 0 : redirected;
     if (!tries || leaving_ || cs_get_state(core_.get()) == CS_STATE_FAILED) return false;
     reconnects_ = wasJoined_;

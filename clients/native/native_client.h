@@ -60,8 +60,8 @@ class NativeClient {
 
   // `transport` must lead to `address`, which must come from completeAddress(). Returns when the description
   // is complete. If the server names another one that has the scene, the client connects there, with the same
-  // scheme and port (cs_connect_server in core.h): while it joins, and later unless reconnectFor is 0. It does
-  // not if it has a token and the address has no TLS.
+  // scheme and port (cs_connect_server in core.h): while it joins, and later unless reconnectFor is 0. It
+  // does not if it has a token and the address has no TLS.
   [[nodiscard]] static tl::expected<std::unique_ptr<NativeClient>, Failure> join(
       const ServerAddress& address, std::unique_ptr<Transport> transport, const NativeClientOptions& options,
       OnEvents onEvents);

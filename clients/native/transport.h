@@ -23,9 +23,9 @@ class Transport {
  public:
   virtual ~Transport() = default;
 
-  // Starts to open a connection to the address of the transport. Only while none is active. `server`: DNS name
-  // in place of the host of that address; empty: the address as it is. With TLS, the certificate is checked
-  // against this name.
+  // Starts to open a connection to the address of the transport. Only while none is active. `server`: DNS
+  // name in place of the host of that address; empty: the address as it is. With TLS, the certificate is
+  // checked against this name.
   virtual void connect(const std::string& server) = 0;
   // Whether the connection is opening, open or closing. False before the first connect().
   virtual bool active() const = 0;

@@ -226,9 +226,11 @@ WebSocketConnector::WebSocketConnector(net::io_context& io, const ServerAddress&
 
 WebSocketConnector::~WebSocketConnector() = default;
 
-std::unique_ptr<WebSocketConnection> WebSocketConnector::open(const ServerAddress& server,
-                                                              WebSocketListener& listener) {
+void WebSocketConnector::goTo(const ServerAddress& server) {
   shared_->goTo(server);
+}
+
+std::unique_ptr<WebSocketConnection> WebSocketConnector::open(WebSocketListener& listener) {
   if (shared_->trust) return std::make_unique<Connection<Encrypted, Shared>>(*shared_, listener);
   return std::make_unique<Connection<Plain, Shared>>(*shared_, listener);
 }

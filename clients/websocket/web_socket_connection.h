@@ -57,8 +57,7 @@ class WebSocketConnection {
   virtual void cancel() = 0;
 };
 
-// Shared by the connections of one client, which exist one after the other: the address of the server, whom to
-// trust, the lookup of its name.
+// Shared by the connections to one server: its address, whom to trust, the lookup of its name.
 class WebSocketConnector {
  public:
   // `io` must outlive the connector. Throws std::invalid_argument if the file of authorities cannot be read.
@@ -67,9 +66,11 @@ class WebSocketConnector {
   WebSocketConnector(const WebSocketConnector&) = delete;
   WebSocketConnector& operator=(const WebSocketConnector&) = delete;
 
-  // Starts to open a connection to this address, which differs from that of the connector only in its host. The
-  // connector must outlive it. Call on the thread of the io_context, when the connection before is destroyed.
-  std::unique_ptr<WebSocketConnection> open(const ServerAddress& server, WebSocketListener& listener);
+  // Sets the address of the next connections. It may differ from the one before only in its host. Call on the
+  // thread of the io_context, while no connection exists.
+  void goTo(const ServerAddress& server);
+  // Starts to open a connection. The connector must outlive it. Call on the thread of the io_context.
+  std::unique_ptr<WebSocketConnection> open(WebSocketListener& listener);
 
  private:
   struct Shared;

@@ -33,7 +33,8 @@ class WebSocketTransport final : public Transport, private WebSocketListener {
     open_ = opened_ = writing_ = leaving_ = false;
     current_ = address_.at(server);
     connection_.reset();
-    connection_ = connector_.open(current_, *this);
+    connector_.goTo(current_);
+    connection_ = connector_.open(*this);
   }
   bool active() const override { return connection_ && (!end_ || message_); }
   bool hasOpened() const override { return opened_; }

@@ -92,6 +92,7 @@ bool Directory::isTaken(const std::string& name) const {
   const std::lock_guard lock(mutex_);
   const auto found = known_.find(name);
   return found != known_.end() && found->second.entry.origin() != self_.origin() &&
+         !leaving_.contains(name) && !arriving_.contains(name) &&
          isAlive(found->second.entry.origin(), Clock::now());
 }
 
@@ -100,12 +101,12 @@ bool Directory::owns(const std::string& name) const {
   return revisionOf(name).has_value();
 }
 
-std::string Directory::publicNameOf(const std::string& scene) const {
+std::optional<std::string> Directory::publicNameOf(const std::string& scene) const {
   const std::lock_guard lock(mutex_);
   const auto found = known_.find(scene);
   if (found == known_.end() || found->second.entry.origin() == self_.origin() ||
       !isAlive(found->second.entry.origin(), Clock::now()))
-    return {};
+    return std::nullopt;
   return servers_.at(found->second.entry.origin()).first.public_name();
 }
 

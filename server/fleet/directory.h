@@ -59,12 +59,14 @@ class Directory {
 
   // Scenes that this server has and offers now. Those that are not in the list any more are given up.
   void setScenes(std::vector<OwnScene> scenes);
-  // Whether another server has a scene of this name, so that this one must not offer its own.
+  // Whether another server has a scene of this name, so that this one must not offer its own. While a scene
+  // moves it is not.
   bool isTaken(const std::string& name) const;
   // Whether the entry of this scene names this server.
   bool owns(const std::string& name) const;
-  // Name under which clients reach the server that has a scene, if that is another one; else empty.
-  std::string publicNameOf(const std::string& scene) const;
+  // Name under which clients reach the other server that has a scene; may be empty. Nothing if this one has
+  // it, or none.
+  std::optional<std::string> publicNameOf(const std::string& scene) const;
   // Other servers with a lease.
   std::vector<v1::ServerEntry> others() const;
   // This server takes no scenes any more.

@@ -176,6 +176,7 @@ void Origin::lookForScenes() {
   const auto scenes = server_.state().scenesNow();
   std::vector<SharedStream> ended;
   std::vector<Directory::OwnScene> own;
+  std::vector<std::shared_ptr<scene::LiveScene>> old;
   {
     const std::lock_guard lock(mutex_);
     for (auto known = streams_.begin(); known != streams_.end();) {
@@ -187,8 +188,10 @@ void Origin::lookForScenes() {
       known = streams_.erase(known);
     }
     for (const auto& scene : scenes) {
-      const bool isOffered = !scene->sharesAsGuest && !scene->shape().lockstep &&
-                             scene->quarantined().empty() && !directory_->isTaken(scene->name());
+      const bool isTaken = directory_->isTaken(scene->name());
+      if (isTaken && scene->created) old.push_back(scene);
+      const bool isOffered =
+          !scene->sharesAsGuest && !scene->shape().lockstep && scene->quarantined().empty() && !isTaken;
       const auto known = streams_.find(scene->name());
       if (!isOffered && known != streams_.end()) {
         ended.push_back(std::move(known->second));
@@ -200,6 +203,23 @@ void Origin::lookForScenes() {
     for (const auto& [name, stream] : streams_) own.push_back({stream->scene(), stream->id()});
   }
   directory_->setScenes(std::move(own));
+  ended.clear();
+  // Another server has continued it while this one was away.
+  for (const auto& scene : old) {
+    telemetry::log({scene->name()}, spdlog::level::warn,
+                   "removed here, because another server continues it since this one was gone");
+    remove(scene, directory_->publicNameOf(scene->name()).value_or(""));
+  }
+}
+
+void Origin::remove(const std::shared_ptr<scene::LiveScene>& scene, const std::string& server) {
+  // The scene goes on, so nobody has left it.
+  scene->roster.endObservation(false);
+  const std::string where = server.empty() ? "another server" : server;
+  server_.state().removeCreated(
+      scene,
+      delivery::error(v1::ERROR_CODE_CUT_OFF,
+                      fmt::format("the scene has moved to {}: join again there", where), true, 0, server));
 }
 
 void Origin::offer() {
@@ -311,22 +331,18 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
     return refused(fmt::format("the other server says: {}", prepared->refused()));
 
   Clock::time_point stopped{};
-  if (const std::string why = handOver(talk, *stream, to, stopped); !why.empty()) return refused(why);
+  if (const std::string why = handOver(talk, *stream, to, stopped); !why.empty()) {
+    directory_->endMove(name);
+    return refused(why);
+  }
   v1::MoveResponse response;
   response.set_to(to);
   response.set_gap(schedule::seconds(Clock::now() - stopped));
   // Those who are connected to this server must join again; those at edges follow, and must not hear of it.
-  // The scene goes on, so nobody has left it.
-  scene->roster.endObservation(false);
   tunnels_.end(stream->subject());
-  server_.state().removeCreated(
-      scene,
-      delivery::error(v1::ERROR_CODE_CUT_OFF,
-                      known->public_name().empty()
-                          ? std::string("the scene has moved to another server: join again there")
-                          : fmt::format("the scene has moved to {}: join again there", known->public_name()),
-                      true, 0, known->public_name()));
+  remove(scene, known->public_name());
   dropStream(stream);
+  directory_->endMove(name);
   telemetry::log({name}, spdlog::level::info, "moved to another server at tick {}", scene->tick.load());
   return response;
 }
@@ -340,7 +356,6 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
   const auto stay = [&](std::string why) {
     tunnels_.thaw(stream.subject());
     server_.state().device.unhold(scene);
-    directory_->endMove(name);
     return why;
   };
   // Inputs that were used before are in the state, and later ones go to the other server.
@@ -357,10 +372,7 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
   for (const v1::MovedTunnel& tunnel : tunnels) *message.mutable_state()->add_tunnels() = tunnel;
   talk.send(message);
   const auto answer = talk.receive(kStartTime);
-  if (answer && answer->has_done()) {
-    directory_->endMove(name);
-    return {};
-  }
+  if (answer && answer->has_done()) return {};
   const std::string why = answer ? fmt::format("the other server says: {}", answer->refused())
                                  : "the other server does not answer";
   // The directory decides which of the two has the scene.
@@ -373,9 +385,7 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
     try {
       if (directory_->transfer(name, entry, *revision)) return stay(why);
       const auto owner = directory_->ownerOf(name);
-      if (owner != to) return stay(why);
-      directory_->endMove(name);
-      return {};
+      return owner == to ? std::string() : stay(why);
     } catch (const std::exception& failure) {
       telemetry::log({name}, spdlog::level::warn,
                      "stands still until NATS says which server has it after a move: {}", failure.what());

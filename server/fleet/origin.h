@@ -69,6 +69,8 @@ class Origin {
   // Begins and ends streams, as scenes are created and deleted.
   void lookForScenes();
   void offer();
+  // Removes a scene that another server has. `server` is its public name, or empty.
+  void remove(const std::shared_ptr<scene::LiveScene>& scene, const std::string& server);
   void hear(std::span<const std::byte> request, const std::string& reply);
   // The other server with the most room for this scene; 0 if there is none.
   std::uint64_t target(const scene::LiveScene& scene) const;

@@ -24,8 +24,8 @@ tl::unexpected<v1::Error> cannotAdd(v1::ErrorCode code, std::string text) {
 
 }  // namespace
 
-tl::expected<void, v1::Error> SceneServer::State::roomFor(const std::string& name,
-                                                          const std::string& tenant) {
+tl::expected<void, v1::Error> SceneServer::State::roomFor(const std::string& name, const std::string& tenant,
+                                                          bool isNew) {
   const std::vector<std::shared_ptr<scene::LiveScene>> present = scenesNow();
   const auto created = static_cast<std::uint32_t>(
       std::ranges::count_if(present, [](const auto& scene) { return scene->created; }));
@@ -46,12 +46,17 @@ tl::expected<void, v1::Error> SceneServer::State::roomFor(const std::string& nam
   if (std::ranges::any_of(present, [&](const auto& scene) { return scene->name() == name; }))
     return cannotAdd(v1::ERROR_CODE_INVALID_ARGUMENT,
                      fmt::format("createScene: a scene '{}' exists already; choose another name", name));
+  if (isNew && otherServerOf(name))
+    return cannotAdd(
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format("createScene: another server of the fleet has a scene '{}'; choose another name", name));
   return {};
 }
 
 tl::expected<std::shared_ptr<scene::LiveScene>, std::string> SceneServer::State::prepareArrival(
     scene::SavedScene saved) {
-  if (auto room = roomFor(saved.start.name, saved.tenant); !room) return tl::unexpected(room.error().text());
+  if (auto room = roomFor(saved.start.name, saved.tenant, false); !room)
+    return tl::unexpected(room.error().text());
   const auto scene = std::make_shared<scene::LiveScene>(
       saved.start, true, options.journals ? options.journals(saved.start) : nullptr,
       std::min(saved.maxParticipants, options.maxParticipants), budget);

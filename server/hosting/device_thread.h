@@ -145,11 +145,11 @@ class DeviceThread {
     }
 
     std::shared_ptr<scene::LiveScene> scene;
-    scene::SceneLoader::Future loading;           // valid while it is loaded
-    std::stop_source stopLoading;                 // of `loading`
-    std::unique_ptr<scene::SceneHost> host;       // once it is loaded
-    std::optional<std::promise<void>> whenAdded;  // set by add(), until the scene is ready
-    bool waits = false;                           // for start()
+    scene::SceneLoader::Future loading;              // valid while it is loaded
+    std::stop_source stopLoading;                    // of `loading`
+    std::unique_ptr<scene::SceneHost> host;          // once it is loaded
+    std::optional<std::promise<void>> whenAdded;     // set by add(), until the scene is ready
+    bool waits = false;                              // for start()
     std::unique_ptr<scene::SceneOnDevice> prepared;  // loaded, while it waits
     std::optional<std::promise<std::optional<scene::Checkpoint>>> whenRead;  // set by hold() and read()
     std::uint64_t readAt = 0;                                                // tick of this state

@@ -255,12 +255,12 @@ v1::Error SceneServer::State::noSuchScene(const std::string& name) {
   return error;
 }
 
-std::string SceneServer::State::otherServerOf(const std::string& scene) const {
+std::optional<std::string> SceneServer::State::otherServerOf(const std::string& scene) const {
   const std::lock_guard lock(mutex);
-  return otherServers ? otherServers(scene) : std::string();
+  return otherServers ? otherServers(scene) : std::nullopt;
 }
 
-void SceneServer::State::setOtherServers(std::function<std::string(const std::string&)> find) {
+void SceneServer::State::setOtherServers(FindServer find) {
   const std::lock_guard lock(mutex);
   otherServers = std::move(find);
 }

@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -47,10 +48,11 @@ struct SceneServer::State {
   // The same without the list, for a scene that was deleted after the peer's rights were checked.
   static v1::Error noSuchScene(const std::string& name);
 
-  // DNS name of another server that has a scene of this name; empty if none is known.
-  std::string otherServerOf(const std::string& scene) const;
+  // DNS name of the other server that has a scene of this name, which may be empty; nothing if none has it.
+  std::optional<std::string> otherServerOf(const std::string& scene) const;
   // `find` answers otherServerOf() from now on; null: there are no other servers. It must not call this.
-  void setOtherServers(std::function<std::string(const std::string& scene)> find);
+  using FindServer = std::function<std::optional<std::string>(const std::string& scene)>;
+  void setOtherServers(FindServer find);
 
   // Admits a peer. Returns null, or the last message to the peer if it is refused, because there are too many
   // peers or the server stops.
@@ -102,8 +104,9 @@ struct SceneServer::State {
   void flushStore(const scene::LiveScene& scene) const;
   // No later participant gets a number of a saved one.
   void raiseNewestParticipant(const scene::SavedScene& saved);
-  // Returns why no scene of this name can be added for a client of this tenant.
-  tl::expected<void, v1::Error> roomFor(const std::string& name, const std::string& tenant);
+  // Returns why no scene of this name can be added for a client of this tenant. `isNew`: it does not come
+  // from another server.
+  tl::expected<void, v1::Error> roomFor(const std::string& name, const std::string& tenant, bool isNew);
   // Loads a scene that a client created on another server, and that still runs there. Until
   // startArrived() nobody can join it. Returns why it cannot run here.
   tl::expected<std::shared_ptr<scene::LiveScene>, std::string> prepareArrival(scene::SavedScene saved);
@@ -129,7 +132,7 @@ struct SceneServer::State {
   std::atomic<bool> started{false};
 
   mutable std::mutex mutex;  // protects the next five
-  std::function<std::string(const std::string&)> otherServers;
+  FindServer otherServers;
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;
   std::vector<std::weak_ptr<Peer>> peers;
   bool stopping = false;

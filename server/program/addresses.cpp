@@ -2,7 +2,6 @@
 #include "server/program/addresses.h"
 
 #include <arpa/inet.h>
-
 #include <fmt/format.h>
 
 #include "server/tls/certificate.h"

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+
 #include "server/fleet/nats.h"
 #include "server/fleet/origin.h"
 #include "server/options/program_options.h"

@@ -79,12 +79,12 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   std::optional<fleet::Origin> origin;
   if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options), originOptions(options));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  guard = openEndpoints(
-      server, options, signals, start, authenticator.get(), monitoring.get(),
-      fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.deviceInfo()), sceneList), report,
-      [&](schedule::Clock::time_point until) {
-        if (origin) origin->moveAll(until);
-      });
+  guard =
+      openEndpoints(server, options, signals, start, authenticator.get(), monitoring.get(),
+                    fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.deviceInfo()), sceneList),
+                    report, [&](schedule::Clock::time_point until) {
+                      if (origin) origin->moveAll(until);
+                    });
   return 0;
 }
 

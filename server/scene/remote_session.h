@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Session of a peer with the server that makes the frames, which is another one than the peer is connected to.
+// Session of a peer with the server that makes the frames, which is another one than the peer is connected
+// to.
 #pragma once
 
 #include <cstddef>

@@ -80,10 +80,9 @@ scene::Rights Session::rightsIn(const scene::LiveScene& scene) const {
 std::shared_ptr<scene::LiveScene> Session::sceneOf(const v1::Hello& message,
                                                    const messages::Joining& joining) {
   const auto refused = [&](v1::ErrorCode code, std::string text) {
+    const bool mayBeElsewhere = code == v1::ERROR_CODE_NOT_FOUND && identity_->reaches(joining.scene);
     fail(code, std::move(text),
-         code == v1::ERROR_CODE_NOT_FOUND && identity_->reaches(joining.scene)
-             ? server_.otherServerOf(joining.scene)
-             : std::string());
+         mayBeElsewhere ? server_.otherServerOf(joining.scene).value_or("") : std::string());
     return nullptr;
   };
   if (const auto may = server_.mayUse(*identity_, joining.scene); !may)
@@ -209,8 +208,8 @@ void Session::hello(const v1::Hello& message) {
   if (continues_ && !admission->resumed)
     return fail(v1::ERROR_CODE_CUT_OFF, "the scene has moved to another server: join again");
   const std::shared_ptr<const delivery::DescriptionChunks> description = scene->description();
-  const bool known = continues_ || (admission->resumed &&
-                                    message.description_content_id() == description->contentId());
+  const bool known =
+      continues_ || (admission->resumed && message.description_content_id() == description->contentId());
   if (!continues_) welcome(*admission, *joining, description->contentId());
   mailbox_->subscribe(known ? nullptr : description, scene->shape(), scene->metrics,
                       {joining->quality, joining->temporalLayers});

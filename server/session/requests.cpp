@@ -162,8 +162,9 @@ void Session::acknowledge(std::uint64_t tick, Clock::time_point now) {
   const bool awaited = mailbox_->awaitsAcknowledgement();
   // A peer that continues here may acknowledge frames of the server that had the scene before.
   if (!mailbox_->acknowledge(tick, now))
-    return continues_ ? void() : refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
-                   fmt::format("frame_ack.tick = {}: must be of a frame that was sent", tick)});
+    return continues_ ? void()
+                      : refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
+                                fmt::format("frame_ack.tick = {}: must be of a frame that was sent", tick)});
   if (!inLockstep() || !awaited || mailbox_->awaitsAcknowledgement()) return;
   // Each frame permits one such acknowledgement, so they need no other limit.
   messageRate_.giveBack();

@@ -55,17 +55,19 @@ class FleetTest : public ::testing::Test {
     ~OriginServer() { server.stop(); }
 
     std::shared_ptr<scene::LiveScene> find(const std::string& scene) { return server.state().find(scene); }
-    // Creates a copy of "other".
-    void create(const std::string& name) {
+    // Creates a copy of "other". Returns why not; empty if it worked.
+    std::string create(const std::string& name) {
       v1::CreateSceneRequest request;
       request.set_named("other");
       request.set_name(name);
+      std::string problem = "no answer";
       std::atomic<bool> done = false;
       server.createScene(request, [&](const auto& created) {
-        EXPECT_TRUE(created) << created.error().text();
+        problem = created ? "" : created.error().text();
         done = true;
       });
-      ASSERT_TRUE(eventually([&] { return done.load(); }));
+      EXPECT_TRUE(eventually([&] { return done.load(); }));
+      return problem;
     }
     // Whether the directory says that this server has the scene, and can be asked to move it.
     bool owns(const std::string& scene) { return origin->directory().owns(scene); }

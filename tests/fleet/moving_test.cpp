@@ -28,7 +28,7 @@ class MovingTest : public tests::FleetTest {
   void startTwo() {
     first_ = startOrigin();
     second_ = startOrigin();
-    ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
+    ASSERT_THAT(first_->create("moves"), IsEmpty());
     ASSERT_TRUE(
         eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
     edge_ = startEdge("moves");
@@ -137,7 +137,7 @@ TEST_F(MovingTest, NamesRolesCollidersAndInputsStay) {
 TEST_F(MovingTest, WhoIsConnectedToTheServerIsToldToJoinAgain) {
   first_ = startOrigin();
   second_ = startOrigin({.publicName = "second.example.com"});
-  ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
+  ASSERT_THAT(first_->create("moves"), IsEmpty());
   ASSERT_TRUE(
       eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
   TestPeer direct(first_->server);
@@ -161,7 +161,7 @@ TEST_F(MovingTest, ASceneStaysWhereItIsIfItCannotMove) {
   EXPECT_THAT(first_->origin->move("none").error(), HasSubstr("no scene 'none'"));
   ASSERT_TRUE(eventually([&] { return first_->owns("small"); }));
   EXPECT_THAT(first_->origin->move("small").error(), HasSubstr("only created ones move"));
-  ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
+  ASSERT_THAT(first_->create("moves"), IsEmpty());
   ASSERT_TRUE(eventually([&] { return first_->owns("moves"); }));
   EXPECT_THAT(first_->origin->move("moves").error(), HasSubstr("no other server"));
   EXPECT_THAT(first_->origin->move("moves", 7).error(), HasSubstr("no such server"));
@@ -182,7 +182,7 @@ TEST_F(MovingTest, ASceneStaysWhereItIsIfItCannotMove) {
 TEST_F(MovingTest, ScenesMoveOnlyToTheSameOrALaterVersion) {
   first_ = startOrigin({.version = 2000});
   second_ = startOrigin({.version = 1999});
-  ASSERT_NO_FATAL_FAILURE(first_->create("moves"));
+  ASSERT_THAT(first_->create("moves"), IsEmpty());
   ASSERT_TRUE(
       eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
   EXPECT_THAT(first_->origin->move("moves").error(), HasSubstr("no other server"));
@@ -224,6 +224,31 @@ TEST_F(MovingTest, AnotherServerContinuesTheScenesOfOneThatIsGone) {
     again.hello(hello);
     return again.readUntil([](const auto&) { return true; }).welcome().resumed();
   }));
+}
+
+TEST_F(MovingTest, ANameIsGivenOnceInAFleet) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  ASSERT_TRUE(eventually([&] { return second_->origin->directory().isTaken("moves"); }));
+  EXPECT_THAT(second_->create("moves"), HasSubstr("another server of the fleet"));
+  EXPECT_THAT(second_->create("other-name"), IsEmpty());
+}
+
+TEST_F(MovingTest, AServerThatWasGoneGivesUpWhatAnotherOneContinues) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  TestPeer direct(first_->server);
+  direct.join("moves");
+  ASSERT_TRUE(eventually([&] {
+    direct.readFrames(1);
+    return first_->origin->directory().checkpointOf("moves").tick() > 0;
+  }));
+  first_->origin->simulateLoss();
+  ASSERT_TRUE(eventually([&] { return second_->find("moves") != nullptr; }));
+  direct.readFrames(5);  // who is connected to it notices nothing so far
+  first_->origin.reset();
+  first_->origin = std::make_unique<Origin>(first_->server, natsOptions());
+  EXPECT_EQ(direct.readToTheEnd().error().code(), v1::ERROR_CODE_CUT_OFF);
+  EXPECT_TRUE(eventually([&] { return first_->find("moves") == nullptr; }));
+  EXPECT_NE(second_->find("moves"), nullptr);
 }
 
 }  // namespace

@@ -99,6 +99,19 @@ TEST_F(ParticipantsTest, AFullSceneIsWatched) {
   }));
 }
 
+// A ban at the origin holds for viewers of an edge, too.
+TEST_F(ParticipantsTest, BansOfTheOriginHoldOnEdges) {
+  const auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  const scene::Subject subject{.tenant = "theatre", .name = "anna"};
+  const auto shown = edge->server.state().find("small");
+  EXPECT_FALSE(shown->roster.isBanned(subject));
+  origin->find("small")->roster.setBans({{.subject = subject, .displayName = "Anna"}});
+  EXPECT_TRUE(eventually([&] { return shown->roster.isBanned(subject); }));
+  origin->find("small")->roster.setBans({});
+  EXPECT_TRUE(eventually([&] { return !shown->roster.isBanned(subject); }));
+}
+
 // Every change arrives once, in order, although NATS loses its connections in between.
 TEST_F(ParticipantsTest, InputsArriveInOrderAndOnceAfterNatsWasLost) {
   const auto origin = startOrigin();

@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: MIT
 // Builds the manifests of deploy/kubernetes with kubectl, and checks the objects without a cluster: schemas, names that
-// refer to each other, options of the server, rights, and a cluster of three NATS servers with their configuration.
+// refer to each other, options of the server, rights, and a cluster of three NATS servers with their configuration, which
+// servers, an edge and an operator use with the documented permissions.
 // No package has the schemas of Agones, so the test itself says which fields its objects have; the schemas of Kubernetes
 // hold for the template of its pods.
 
 import assert from "node:assert/strict";
-import { execFileSync, spawnSync } from "node:child_process";
+import { execFile, execFileSync, spawnSync } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
 import { cp, mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { clusterGreeting } from "./nats_cluster.mjs";
+import { promisify } from "node:util";
+import { makeAccounts } from "./nats_accounts.mjs";
+import { startProcess, until, withCluster } from "./nats_cluster.mjs";
 
 const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
 const source = fileURLToPath(new URL("../../", import.meta.url));
@@ -227,7 +230,12 @@ testEach("probes ask the port for operators", (objects) => {
       const [ready, alive] = [container.readinessProbe.httpGet, container.livenessProbe?.httpGet];
       const port = container.ports.find(({ name }) => name === ready.port);
       assert.ok(port, `${nameOf(workload)} has no port ${ready.port}`);
-      assert.deepEqual(alive, isFleet(workload) ? undefined : { path: "/healthz", port: ready.port });
+      // Without a majority of its servers, NATS still carries frames.
+      const path = componentOf(workload) === "nats" ? "/healthz?js-enabled-only=true" : "/healthz";
+      assert.deepEqual(alive, isFleet(workload) ? undefined : { path, port: ready.port });
+      const started = componentOf(workload) === "nats" ? { path: "/healthz", port: ready.port } : undefined;
+      assert.deepEqual(container.startupProbe?.httpGet, started);
+      if (componentOf(workload) === "nats") assert.equal(ready.path, path);
       if (!isOurs(container)) continue;
       assert.equal(ready.path, "/readyz");
       const config = effective(objects, container);
@@ -243,11 +251,20 @@ testEach("probes ask the port for operators", (objects) => {
 });
 
 testEach("requests and limits are set", (objects) => {
-  const kUnits = { m: 1e-3, Mi: 2 ** 20, Gi: 2 ** 30 };
+  const kUnits = { m: 1e-3, Mi: 2 ** 20, Gi: 2 ** 30, MiB: 2 ** 20, GB: 2 ** 30 }; // NATS' GB is Gi
   const amount = (text) => {
-    const [, number, unit] = /^(\d+)(m|Mi|Gi)?$/.exec(text);
+    const [, number, unit] = /^(\d+)(m|Mi|Gi|MiB|GB)?$/.exec(text);
     return Number(number) * (kUnits[unit] ?? 1);
   };
+  const nats = workloads(objects).find((workload) => componentOf(workload) === "nats");
+  if (nats) {
+    const [memory, files] = ["memory", "file"].map((name) => amount(new RegExp(`^ +max_${name}_store: (\\w+)`, "m").exec(natsConfiguration(objects))[1]));
+    const [claim] = nats.spec.volumeClaimTemplates;
+    assert.equal(memory, 0);
+    assert.ok(files > 0 && files <= 0.8 * amount(claim.spec.resources.requests.storage)); // deleted entries need room, too
+    const [container] = podOf(nats).containers;
+    assert.ok(amount(environmentOf(objects, container).GOMEMLIMIT) <= 0.9 * amount(container.resources.limits.memory));
+  }
   for (const workload of workloads(objects)) {
     for (const { resources } of podOf(workload).containers) {
       assert.ok(amount(resources.requests.cpu) >= 0.1);
@@ -467,6 +484,8 @@ testEach("volumes, secrets and files exist", (objects) => {
       const config = container.args.at(-1);
       checkPath(objects, workload, container, config);
       const text = natsConfiguration(objects);
+      const store = /^ +store_dir: (\S+)$/m.exec(text)[1];
+      assert.deepEqual(claims, [checkPath(objects, workload, container, store).name]);
       for (const [path] of text.matchAll(/\/etc\/\S+/g)) checkPath(objects, workload, container, path);
       for (const [, path] of text.matchAll(/^include (\S+)/gm)) checkPath(objects, workload, container, join(config, "..", path));
     }
@@ -634,9 +653,104 @@ testEach("servers and edges know NATS, and its servers each other", (objects) =>
   assert.deepEqual([client, cluster, Number(/^http_port: (\d+)/m.exec(text)[1])], [ports.nats, ports.routes, ports.monitor]);
 });
 
+// Subjects that each user of NATS may use, from the table of the documentation.
+function documentedUsers() {
+  const users = /^\| subject \| (.*) \|$/m.exec(documentation)[1].split(" | ");
+  const buckets = [.../^`BUCKET` is each of (.*?)\.$/ms.exec(documentation)[1].matchAll(/`([\w-]+)`/g)].map((match) => match[1]);
+  assert.deepEqual([users, buckets.length], [["server", "edge", "operator"], 3]);
+  const found = Object.fromEntries(users.map((user) => [user, { publish: [], subscribe: [] }]));
+  for (const [, subject, cells] of documentation.matchAll(/^\| `((?:clothstream\.|_INBOX\.|\$)\S+)` \|(.*)\|$/gm))
+    cells.split("|").forEach((cell, i) => {
+      const own = users[i] === "server" ? buckets : buckets.slice(0, 2);
+      const subjects = subject.includes("BUCKET") ? own.map((bucket) => subject.replaceAll("BUCKET", bucket)) : [subject];
+      for (const right of cell.trim().split(", ").filter(Boolean)) found[users[i]][right].push(...subjects);
+    });
+  return found;
+}
+
+test("the example of nsc has the permissions of the table", () => {
+  const [, example] = /^nsc add user --account clothstream --name edge (.*?)^nsc/ms.exec(documentation);
+  const listed = (right) => [...example.matchAll(new RegExp(`--allow-${right} '(.*?)'`, "g"))].flatMap((match) => match[1].split(","));
+  const { publish, subscribe } = documentedUsers().edge;
+  assert.deepEqual([listed("pub").sort(), listed("sub").sort()], [publish.sort(), subscribe.sort()]);
+});
+
+// Runs `clothstream`, and returns what it printed.
+async function clothstream(...args) {
+  const { stdout } = await promisify(execFile)(join(dirname(server), "clothstream"), args, { encoding: "utf8", env: { HOME: folder } });
+  return stdout;
+}
+
 const hasNats = spawnSync("nats-server", ["--version"]).status === 0;
-test("three NATS servers form a cluster with the configuration", { skip: hasNats ? false : "there is no nats-server" }, async () => {
-  const greeting = await clusterGreeting(natsConfiguration(builds["overlays/fleet"]), join(folder, "nats"));
-  assert.deepEqual([greeting.tls_required, greeting.auth_required, greeting.connect_urls], [true, true, undefined]);
-  assert.ok(greeting.max_payload >= 1e6);
+test("servers, edge and operator use three NATS servers with the configuration and the permissions", { skip: hasNats ? false : "there is no nats-server" }, async (t) => {
+  const [, options] = /^nsc edit account --name clothstream (.*)$/m.exec(documentation);
+  const limits = [...options.matchAll(/--js-([\w-]+) (-?\d+)/g)].map(([, name, value]) => [name.replaceAll("-", "_"), Number(value)]);
+  assert.deepEqual(limits.map(([name]) => name).sort(), ["consumer", "disk_storage", "mem_storage", "streams"]);
+  const { configuration, credentials } = makeAccounts(Object.fromEntries(limits), documentedUsers());
+  const files = {};
+  for (const [user, text] of Object.entries(credentials)) {
+    files[user] = join(folder, `${user}.creds`);
+    await writeFile(files[user], text, { mode: 0o600 });
+  }
+  await withCluster(natsConfiguration(builds["overlays/fleet"]), configuration, join(folder, "nats"), async (cluster) => {
+    const { greeting, urls, authority, get, log } = cluster;
+    assert.deepEqual([greeting.tls_required, greeting.auth_required, greeting.connect_urls, greeting.jetstream], [true, true, undefined, true]);
+    assert.ok(greeting.max_payload >= 1e6);
+    if (!existsSync(join(dirname(server), "clothstream"))) return t.diagnostic("there is no program clothstream");
+
+    const as = (user) => ["--nats", urls.join(","), "--nats-credentials", files[user], "--nats-ca", authority];
+    const processes = [];
+    const start = async (user, ...args) => {
+      const ports = ["--port=0", "--grpc-port=0"];
+      const child = startProcess(server, [...args, ...ports, "--state-dir", "", "--announce=off", ...as(user)], { HOME: folder });
+      processes.push(child);
+      const endpoint = () => /^gRPC +(\S+)$/m.exec(child.log)?.[1];
+      await until(`the ${user} starts`, async () => endpoint() !== undefined, () => child.log);
+      return { child, endpoint: endpoint() };
+    };
+    const logs = () => [log(), ...processes.map((child) => child.log)].join("\n");
+    const directory = async () => JSON.parse(await clothstream("list", "--json", ...as("operator")));
+    const entryOf = async (name) => (await directory()).scenes.find(({ scene }) => scene === name);
+    const ownerOf = async (name) => (await entryOf(name)).server;
+    try {
+      const origin = await start("server", "--scene=flag");
+      await start("server", "--scene=swing");
+      const edge = await start("edge", "edge");
+      await clothstream("create", "--named", "swing", "--name", "mine", "--server", origin.endpoint);
+      await until("the directory has servers and scenes", async () => {
+        const { servers, scenes } = await directory();
+        return servers.length === 2 && scenes.map(({ scene }) => scene).sort().join() === "flag,mine,swing";
+      }, logs);
+      // A participant and a viewer on the edge stay while the scene moves.
+      const visits = ["participant", "viewer"].map((role) =>
+        clothstream("join", edge.endpoint, "--scene", "mine", "--role", role, "--seconds", "5", "--no-reconnect", "--hash", "--json"),
+      );
+      await until("the participant is in the directory", async () => (await directory()).servers.some(({ participants }) => participants === 1), logs);
+      const first = await ownerOf("mine");
+      await clothstream("move", "mine", ...as("operator"));
+      const second = await ownerOf("mine");
+      assert.notEqual(first, second);
+      for (const { frames, hashMismatches } of (await Promise.all(visits)).map((text) => JSON.parse(text))) {
+        assert.ok(frames > 0);
+        assert.equal(hashMismatches, 0);
+      }
+      await until("the scene has a checkpoint", async () => (await entryOf("mine")).checkpointTick > 0, logs);
+      // When its server is lost, the other one continues the scene.
+      processes[first === (await ownerOf("flag")) ? 1 : 0].kill("SIGKILL");
+      await until("the other server has the scene", async () => (await ownerOf("mine")) === first, logs);
+
+      const { account_details: accounts } = await get(0, "/jsz?streams=true&config=true");
+      const streams = accounts.flatMap(({ stream_detail: details }) => details ?? []);
+      assert.deepEqual(
+        streams.map(({ name, config }) => [name, config.num_replicas, config.storage]).sort(),
+        ["checkpoints", "scenes", "servers"].map((name) => [`KV_clothstream-${name}`, 3, "file"]),
+      );
+      assert.deepEqual(logs().match(/^.*violation.*$/gim), null);
+      // An edge has no rights in the directory.
+      await assert.rejects(clothstream("list", "--json", ...as("edge")));
+      assert.match(log(), /Publish Violation.*\$JS\.API/);
+    } finally {
+      for (const child of processes) child.kill("SIGKILL");
+    }
+  });
 });

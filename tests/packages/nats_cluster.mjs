@@ -19,26 +19,42 @@ async function freePorts() {
   return ports;
 }
 
-// Writes a certificate for localhost, and accounts with one user, where pods have their Secrets.
-async function writeSecrets(folder) {
+// Waits until a check returns true; until then it may also fail.
+export async function until(what, check, details = () => "") {
+  for (const end = Date.now() + kTimeoutMs; !(await check().catch(() => false)); await sleep(50))
+    assert.ok(Date.now() < end, `not within ${kTimeoutMs} ms: ${what}\n${details()}`);
+}
+
+// Starts a program that ends with the test. Its output is in `log`.
+export function startProcess(program, args, environment = process.env) {
+  const child = spawn(program, args, { env: environment, stdio: ["ignore", "pipe", "pipe"] });
+  process.once("exit", () => child.kill("SIGKILL")); // whatever ends the test
+  child.log = "";
+  for (const output of [child.stdout, child.stderr]) output.on("data", (data) => (child.log += data));
+  return child;
+}
+
+// Writes a certificate for localhost, and accounts.conf, where pods have their Secrets.
+async function writeSecrets(folder, accounts) {
   for (const name of ["tls", "accounts"]) await mkdir(join(folder, name), { recursive: true });
   const at = (name) => join(folder, "tls", name);
   const key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout", at("tls.key")];
   const names = ["-subj", "/CN=nats", "-addext", "subjectAltName=DNS:localhost"];
   execFileSync("openssl", ["req", "-x509", "-days", "2", ...key, ...names, "-out", at("tls.crt")], { stdio: "ignore" });
   await cp(at("tls.crt"), at("ca.crt"));
-  await writeFile(join(folder, "accounts/accounts.conf"), "authorization { user: tester, password: tester }\n");
+  await writeFile(join(folder, "accounts/accounts.conf"), accounts);
 }
 
 // Starts the servers with this text of nats.conf, in which only addresses and paths change. Fails unless each gets routes to
-// both others. Returns the INFO that the first one sends to its clients. Nothing runs afterwards.
-export async function clusterGreeting(configuration, folder) {
-  await writeSecrets(folder);
+// both others, and is healthy. Then calls `use` with the URLs for clients, the file of the authority, the INFO that the first
+// server sends to its clients, a function that asks a monitoring port, and one that returns the logs. Ends the servers.
+export async function withCluster(configuration, accounts, folder, use) {
+  await writeSecrets(folder, accounts);
   const [clients, monitors, routes] = [await freePorts(), await freePorts(), await freePorts()];
-  const processes = [];
   const start = async (i) => {
     let text = configuration
       .replaceAll("/etc/nats/", `${folder}/`)
+      .replace(/^( *store_dir:) \S+$/m, `$1 ${folder}/store${i}`)
       .replace("port: 4222", `host: 127.0.0.1\nport: ${clients[i]}`)
       .replace("http_port: 8222", `http: 127.0.0.1:${monitors[i]}`)
       .replace("port: 6222", `host: 127.0.0.1\n  port: ${routes[i]}`);
@@ -46,35 +62,35 @@ export async function clusterGreeting(configuration, folder) {
     const file = join(folder, `config${i}`, "nats.conf");
     await mkdir(join(file, ".."));
     await writeFile(file, text);
-    const environment = { ...process.env, POD_NAME: `nats-${i}` };
-    const child = spawn("nats-server", ["--config", file], { env: environment, stdio: ["ignore", "ignore", "pipe"] });
-    process.once("exit", () => child.kill("SIGKILL")); // whatever ends the test
-    child.log = "";
-    child.stderr.on("data", (data) => (child.log += data));
-    processes.push(child);
+    return startProcess("nats-server", ["--config", file], { ...process.env, POD_NAME: `nats-${i}` });
   };
   const get = async (i, path) => (await fetch(`http://127.0.0.1:${monitors[i]}${path}`)).json();
-  const until = async (what, check) => {
-    for (const end = Date.now() + kTimeoutMs; !(await check().catch(() => false)); await sleep(50))
-      assert.ok(Date.now() < end, `not within ${kTimeoutMs} ms: ${what}\n${processes.map(({ log }) => log).join("\n")}`);
-  };
 
+  const processes = [];
+  const log = () => processes.map((child) => child.log).join("\n");
   try {
-    for (const i of kServers) await start(i);
+    for (const i of kServers) processes.push(await start(i));
     const ids = [];
-    for (const i of kServers) await until(`nats-${i} answers`, async () => (ids[i] = (await get(i, "/varz")).server_id) !== undefined);
+    for (const i of kServers) await until(`nats-${i} answers`, async () => (ids[i] = (await get(i, "/varz")).server_id) !== undefined, log);
     for (const i of kServers) {
-      await until(`nats-${i} has routes to both others`, async () => {
+      const hasRoutes = async () => {
         const found = (await get(i, "/routez")).routes.map((route) => route.remote_id);
         return ids.every((id, other) => other === i || found.includes(id));
-      });
+      };
+      await until(`nats-${i} has routes to both others`, hasRoutes, log);
       assert.equal((await get(i, "/varz")).server_name, `nats-${i}`);
-      assert.equal((await get(i, "/healthz")).status, "ok");
+      await until(`nats-${i} is healthy`, async () => (await get(i, "/healthz")).status === "ok", log);
     }
     const socket = connect(clients[0], "127.0.0.1");
     const [greeting] = await new Promise((resolve) => socket.once("data", (...data) => resolve(data)));
     socket.destroy();
-    return JSON.parse(String(greeting).slice("INFO ".length));
+    await use({
+      greeting: JSON.parse(String(greeting).slice("INFO ".length)),
+      urls: clients.map((port) => `tls://localhost:${port}`),
+      authority: join(folder, "tls/ca.crt"),
+      get,
+      log,
+    });
   } finally {
     for (const child of processes) child.kill("SIGKILL");
   }

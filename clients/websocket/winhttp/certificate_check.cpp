@@ -105,9 +105,7 @@ std::string addressBytes(const std::string& host) {
 }  // namespace
 
 CertificateCheck::CertificateCheck(const ServerAddress& server)
-    : fingerprint_(server.fingerprint),
-      host_(utf16(server.host())),
-      address_(addressBytes(server.host())) {
+    : fingerprint_(server.fingerprint), host_(utf16(server.host())), address_(addressBytes(server.host())) {
   if (!fingerprint_.empty() || server.caFile.empty()) return;
   std::ifstream file(std::filesystem::path(utf16(server.caFile)), std::ios::binary);
   const std::string pem{std::istreambuf_iterator<char>(file), {}};

@@ -309,9 +309,11 @@ WebSocketConnector::WebSocketConnector(net::io_context& io, const ServerAddress&
 
 WebSocketConnector::~WebSocketConnector() = default;
 
-std::unique_ptr<WebSocketConnection> WebSocketConnector::open(const ServerAddress& server,
-                                                              WebSocketListener& listener) {
+void WebSocketConnector::goTo(const ServerAddress& server) {
   shared_->goTo(server);
+}
+
+std::unique_ptr<WebSocketConnection> WebSocketConnector::open(WebSocketListener& listener) {
   return std::make_unique<Connection<Shared>>(*shared_, listener);
 }
 

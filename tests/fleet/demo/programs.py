@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Child processes of the demo. All end with it, even if it is killed."""
+
+import ctypes
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import time
+
+PR_SET_PDEATHSIG = 1
+LIBC = ctypes.CDLL(None, use_errno=True)
+START_SECONDS = 60
+
+
+class MissingProgram(Exception):
+    """Something that the demo needs is not installed. The text says how to install it."""
+
+
+class ProgramFailed(Exception):
+    """A program ended or did not say what it should. The text has the end of its log."""
+
+
+def find_program(name, package, path=None):
+    """Path of a program. Debian's package name is for the error."""
+    found = path if path and pathlib.Path(path).exists() else shutil.which(name) or shutil.which(f"/usr/sbin/{name}")
+    if not found:
+        raise MissingProgram(f"{name} was not found; install it: sudo apt install {package}")
+    return found
+
+
+def end_with_parent():
+    """Runs in a new process. It gets SIGKILL when the demo ends, and no SIGINT from the terminal."""
+    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+class Program:
+    """A process whose output goes to a log file. `pipes`: its input and output are pipes instead."""
+
+    def __init__(self, name, command, log, environment=None, pipes=False):
+        self.name = name
+        self.command = [str(part) for part in command]
+        self.log = log
+        self.environment = environment
+        self.pipes = pipes
+        self.start()
+
+    def start(self):
+        """Starts it, also again after kill()."""
+        self.log_start = self.log.stat().st_size if self.log.exists() else 0
+        channels = {"stdin": subprocess.DEVNULL}
+        with open(self.log, "ab") as log:
+            if self.pipes:
+                channels = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": log, "text": True, "bufsize": 1}
+            else:
+                channels |= {"stdout": log, "stderr": subprocess.STDOUT}
+            self.process = subprocess.Popen(
+                self.command, env=self.environment, start_new_session=True, preexec_fn=end_with_parent, **channels
+            )
+
+    @property
+    def runs(self):
+        return self.process.poll() is None
+
+    def said(self):
+        """Text of the log since the last start."""
+        if not self.log.exists():
+            return ""
+        return self.log.read_bytes()[self.log_start :].decode(errors="replace")
+
+    def wait_for(self, pattern, seconds=START_SECONDS):
+        """Waits for a line of the log that matches, and returns the match."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            ended = not self.runs
+            if found := re.search(pattern, self.said(), re.MULTILINE):
+                return found
+            if ended:
+                raise ProgramFailed(f"{self.name} ended with {self.process.returncode}; its log, {self.log}, ends:\n{self.tail()}")
+            time.sleep(0.02)
+        raise ProgramFailed(f"{self.name}: no line matches '{pattern}' after {seconds} s; its log, {self.log}, ends:\n{self.tail()}")
+
+    def tail(self):
+        return "\n".join(self.said().splitlines()[-15:])
+
+    def kill(self):
+        """SIGKILL, as if the machine had lost its power."""
+        self.process.kill()
+        self.process.wait()
+
+    def ask_to_stop(self):
+        if self.runs:
+            self.process.send_signal(signal.SIGTERM)
+
+    def stop(self, seconds=10):
+        """SIGTERM, and SIGKILL if it has not ended after this time."""
+        self.ask_to_stop()
+        try:
+            self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            self.kill()

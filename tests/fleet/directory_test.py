@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""Real servers of one fleet, and `clothstream list --nats` and `clothstream move`, with Debian's nats-server."""
+import contextlib
+import json
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+import unittest
+
+SERVER, PROGRAM = os.environ["CLOTHSTREAM_SERVER"], os.environ["CLOTHSTREAM_PROGRAM"]
+NATS_SERVER = shutil.which("nats-server", path=os.environ["PATH"] + ":/usr/sbin")
+SCENE = {
+    "name": "moves", "simulationRate": 20, "streamRate": 10, "substeps": 16,
+    "cloths": [{"name": "sheet", "mass": 0.2, "structural": {"stiffness": 20, "damping": 0.01},
+                "grid": {"rows": 16, "columns": 16, "width": 1, "height": 1, "pose": {"position": {"y": 2}}},
+                "pins": [{"firstRow": 0, "firstColumn": 0, "lastColumn": 15, "columnStep": 15}]}],
+}
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def eventually(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not (result := condition()) and time.monotonic() < end:
+        time.sleep(0.1)
+    return result
+
+
+@unittest.skipUnless(NATS_SERVER, "there is no nats-server (apt install nats-server)")
+class Directory(unittest.TestCase):
+    def setUp(self):
+        self.stack = contextlib.ExitStack()
+        self.addCleanup(self.stack.close)
+        self.folder = pathlib.Path(self.stack.enter_context(tempfile.TemporaryDirectory()))
+        self.nats_port = free_port()
+        self.url = f"nats://127.0.0.1:{self.nats_port}"
+
+    def start(self, command, ready, name):
+        log = self.folder / f"{name}.log"
+        with log.open("wb") as output:
+            process = subprocess.Popen([str(part) for part in command], stdout=output, stderr=subprocess.STDOUT)
+
+        def end():
+            if process.poll() is None:
+                process.terminate()
+            process.wait()
+
+        self.stack.callback(end)
+        text = eventually(lambda: (text := log.read_text(errors="replace")) and ready in text and text)
+        self.assertTrue(text, f"{name} does not start: {log.read_text(errors='replace')}")
+        return process, text
+
+    def start_nats(self, *more):
+        self.start([NATS_SERVER, "--addr", "127.0.0.1", "--port", self.nats_port, *more], "Server is ready", "nats")
+
+    def start_server(self, name, *more):
+        scene = self.folder / "first.json"
+        scene.write_text(json.dumps({**SCENE, "name": "first"}))
+        process, text = self.start([SERVER, "--port", 0, "--grpc-port", 0, "--scene-file", scene, "--scene", "first",
+                                    "--nats", self.url, "--public-name", f"{name}.example.com",
+                                    "--insecure", "--state-dir", "", *more], "gRPC ", name)
+        process.address = text.split("gRPC ")[1].split()[0]
+        return process
+
+    def run_program(self, *arguments):
+        return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+
+    def directory(self):
+        listed = self.run_program("list", "--nats", self.url, "--json")
+        self.assertEqual(listed.returncode, 0, listed.stderr)
+        return json.loads(listed.stdout)
+
+    def server_of(self, scene):
+        directory = self.directory()
+        names = {server["server"]: server["publicName"] for server in directory["servers"]}
+        return next((names.get(entry["server"]) for entry in directory["scenes"] if entry["scene"] == scene), None)
+
+    def create(self, server):
+        scene = self.folder / "moves.json"
+        scene.write_text(json.dumps(SCENE))
+        created = self.run_program("create", scene, "--server", server.address)
+        self.assertEqual(created.returncode, 0, created.stderr)
+
+    def test_lists_and_moves_scenes(self):
+        self.start_nats("--jetstream", "--store_dir", self.folder / "store")
+        first, second = self.start_server("one"), self.start_server("two")
+        self.create(first)
+        self.assertTrue(eventually(lambda: self.server_of("moves") == "one.example.com"))
+        self.assertTrue(eventually(lambda: len(self.directory()["servers"]) == 2))
+        table = self.run_program("list", "--nats", self.url).stdout
+        for text in ("one.example.com", "two.example.com", "moves", "first", "clothstream-server"):
+            self.assertIn(text, table)
+
+        refused = self.run_program("move", "none", "--nats", self.url)
+        self.assertEqual((refused.returncode, "no scene 'none'" in refused.stderr), (4, True), refused.stderr)
+        refused = self.run_program("move", "moves", "--to", "three.example.com", "--nats", self.url)
+        self.assertEqual((refused.returncode, "0 servers" in refused.stderr), (4, True), refused.stderr)
+        refused = self.run_program("move", "first", "--nats", self.url)
+        self.assertEqual((refused.returncode, "only created ones move" in refused.stderr), (4, True), refused.stderr)
+
+        moved = self.run_program("move", "moves", "--to", "two.example.com", "--nats", self.url)
+        self.assertEqual(moved.returncode, 0, moved.stderr)
+        self.assertRegex(moved.stdout, r"moves is at server [0-9a-f]{16} now; it stood still for \d+ ms")
+        self.assertTrue(eventually(lambda: self.server_of("moves") == "two.example.com"))
+
+        # A server that stops moves its scenes, and one that is killed leaves a checkpoint.
+        joined = self.run_program("join", second.address, "--scene", "moves", "--seconds", 4)
+        self.assertEqual(joined.returncode, 0, joined.stderr)
+        second.terminate()
+        self.assertEqual(second.wait(), 0)
+        self.assertEqual(self.server_of("moves"), "one.example.com")
+        third = self.start_server("three")
+        time.sleep(4)  # a checkpoint of the scene, and the lease of the third server
+        first.send_signal(signal.SIGKILL)
+        self.assertTrue(eventually(lambda: self.server_of("moves") == "three.example.com"))
+        joined = self.run_program("join", third.address, "--scene", "moves", "--seconds", 2, "--hash")
+        self.assertEqual(joined.returncode, 0, joined.stderr)
+
+        deleted = self.run_program("delete", "moves", "--server", third.address)
+        self.assertEqual(deleted.returncode, 0, deleted.stderr)
+        self.assertTrue(eventually(lambda: self.server_of("moves") is None))
+
+    def test_says_what_is_missing(self):
+        refused = self.run_program("list", "--nats", self.url)
+        self.assertEqual((refused.returncode, f"NATS at {self.url}" in refused.stderr), (3, True), refused.stderr)
+        self.start_nats()
+        refused = self.run_program("list", "--nats", self.url)
+        self.assertEqual((refused.returncode, "--jetstream" in refused.stderr), (3, True), refused.stderr)
+        refused = self.run_program("move", "moves")
+        self.assertEqual((refused.returncode, "--nats" in refused.stderr), (2, True), refused.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
