@@ -6,7 +6,7 @@
  * that thread waits, and the caller may use the cs_client: its data does not change, so positions, normals
  * and triangles can be read without a copy. All functions of core.h are allowed, except those for programs
  * with their own connection: cs_create, cs_create_as, cs_want, cs_destroy, cs_set_clock, cs_receive,
- * cs_update, cs_next_outgoing, cs_connecting, cs_disconnected.
+ * cs_update, cs_next_outgoing, cs_connecting, cs_disconnected, cs_follow_redirects.
  *
  * Threads: all functions may be called from any thread. On one stream, clothstream_close must be the last
  * call, and the thread that acquired must release. Acquire only as long as copying or drawing takes: no

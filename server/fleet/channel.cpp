@@ -12,7 +12,7 @@ constexpr std::uint64_t kUsedAtOnce = 4;
 
 }  // namespace
 
-void Channel::push(const delivery::SharedBytes& message) {
+void Channel::push(const delivery::SharedBytes& message, Clock::time_point now) {
   const auto* const bytes = reinterpret_cast<const char*>(message->data());
   std::size_t at = 0;
   do {
@@ -21,6 +21,7 @@ void Channel::push(const delivery::SharedBytes& message) {
     segment.set_data(bytes + at, size);
     at += size;
     segment.set_more(at < message->size());
+    segment.set_time_us(schedule::microseconds(now));
     queue(std::move(segment));
   } while (at < message->size());
 }
@@ -98,7 +99,8 @@ std::vector<Channel::Received> Channel::receive(const v1::Segment& segment, Cloc
   whole_ = received_;
   const auto* const bytes = reinterpret_cast<const std::byte*>(partial_.data());
   Received complete{.message = std::make_shared<std::vector<std::byte>>(bytes, bytes + partial_.size()),
-                    .sequence = received_};
+                    .sequence = received_,
+                    .timeUs = segment.time_us()};
   partial_.clear();
   return {std::move(complete)};
 }

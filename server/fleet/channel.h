@@ -37,6 +37,7 @@ class Channel {
     delivery::SharedBytes message;  // null: the end
     v1::TunnelEnd end = v1::TUNNEL_END_UNSPECIFIED;
     std::uint64_t sequence = 0;  // for use()
+    std::uint64_t timeUs = 0;    // at which it was sent first, by the clock of the other end
   };
 
   // `received`: newest segment that this end has used already, in a former life.
@@ -50,7 +51,7 @@ class Channel {
   // Whether the other end has received everything.
   bool delivered() const { return waiting_.empty() && sent_.empty(); }
 
-  void push(const delivery::SharedBytes& message);
+  void push(const delivery::SharedBytes& message, Clock::time_point now);
   void pushEnd(v1::TunnelEnd end);
   // Sends what is new, what must be repeated, and answers.
   void poll(Clock::time_point now, const Send& send);

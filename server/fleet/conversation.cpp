@@ -30,7 +30,7 @@ Conversation::Conversation(Nats& nats, std::string out, const std::string& in,
       })) {}
 
 void Conversation::send(const v1::MoveMessage& message) {
-  channel_.push(toBytes(message));
+  channel_.push(toBytes(message), Clock::now());
   channel_.poll(Clock::now(), [this](const v1::Segment& segment) { nats_.publish(out_, toBytes(segment)); });
 }
 

@@ -29,7 +29,7 @@ bool EdgeTunnel::send(std::span<const std::byte> message) {
   if (channel_.bytes() + message.size() > kMaxWaiting) return false;
   if (v1::ClientMessage first; !hello_.protocol_version() && parse(message, first) && first.has_hello())
     hello_ = first.hello();
-  channel_.push(std::make_shared<std::vector<std::byte>>(message.begin(), message.end()));
+  channel_.push(std::make_shared<std::vector<std::byte>>(message.begin(), message.end()), Clock::now());
   pollLocked();
   return true;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/fleet/origin_tunnels.h"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <optional>
@@ -42,7 +43,17 @@ struct OriginTunnels::Tunnel {
   std::mutex mutex;  // protects the following
   Channel channel;
   std::shared_ptr<session::Session> session;
-  bool closed = false;  // the session has ended
+  // Time of this server at which a message was sent, by the time of the edge. The first one counts as sent
+  // now.
+  Clock::time_point sentAt(std::uint64_t timeUs) {
+    const Clock::time_point now = Clock::now();
+    const auto time = std::chrono::duration_cast<Clock::duration>(std::chrono::microseconds(timeUs));
+    if (!edgeClock) edgeClock = now - time;
+    return std::min(now, *edgeClock + time);
+  }
+
+  std::optional<Clock::time_point> edgeClock;  // its zero; used while `receiving` is held
+  bool closed = false;                         // the session has ended
   std::optional<Clock::time_point> removeAt;
 };
 
@@ -134,7 +145,7 @@ void OriginTunnels::receive(const std::string& stream, const std::string& subjec
     session = tunnel->session;
   }
   for (const Channel::Received& received : messages) {
-    if (session && received.message) session->receive(*received.message);
+    if (session && received.message) session->receive(*received.message, tunnel->sentAt(received.timeUs));
     if (session && received.end == v1::TUNNEL_END_LEFT) session->leave();
     if (session && received.end == v1::TUNNEL_END_PAGE_CLOSED) session->closePage();
     const std::lock_guard lock(tunnel->mutex);
@@ -159,7 +170,7 @@ bool OriginTunnels::pump(Tunnel& tunnel) {
   const std::lock_guard lock(tunnel.mutex);
   while (tunnel.session && !tunnel.closed && tunnel.channel.hasRoom()) {
     if (const std::optional<delivery::SharedBytes> message = tunnel.session->next()) {
-      tunnel.channel.push(*message);
+      tunnel.channel.push(*message, now);
     } else {
       if (!tunnel.session->finished()) break;
       tunnel.channel.pushEnd(v1::TUNNEL_END_CLOSED);

@@ -73,12 +73,13 @@ bool Session::finished() const {
   return mailbox_->closed();
 }
 
-void Session::receive(std::span<const std::byte> bytes) {
+void Session::receive(std::span<const std::byte> bytes, Clock::time_point sent) {
   const Clock::time_point now = Clock::now();
   lastHeard_ = now;
   const std::lock_guard lock(mutex_);
   if (mailbox_->closed()) return;
   now_ = now;
+  sent_ = std::max(sent_, sent);
   requestId_ = 0;
   readPause_ = readRate_.pay(now, static_cast<double>(bytes.size()));
   try {
@@ -137,7 +138,7 @@ void Session::fail(v1::ErrorCode code, std::string text, std::string server) {
 }
 
 bool Session::allowed(schedule::TokenBucket& bucket, const char* what) {
-  if (bucket.take(now_)) return true;
+  if (bucket.take(sent_)) return true;
   refuse({v1::ERROR_CODE_RATE_LIMITED, fmt::format("too many {}: this one was ignored", what),
           telemetry::Refusal::messageRate});
   return false;

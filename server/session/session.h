@@ -73,8 +73,9 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   static std::shared_ptr<Session> open(hosting::SceneServer& server, Arrival arrival,
                                        std::function<void()> wake);
 
-  // Handles one serialised ClientMessage.
-  void receive(std::span<const std::byte> message);
+  // Handles one serialised ClientMessage. `sent`: time at which the peer sent it, if that is known. Limits of
+  // messages per second count it, so that messages that were held up are not refused for coming together.
+  void receive(std::span<const std::byte> message, Clock::time_point sent = Clock::now());
   // Time that the endpoint must wait before it reads the next message, because this peer sends more bytes a
   // second than ServerOptions::maxReadRate. Usually 0.
   Clock::duration readPause() const { return readPause_.load(); }
@@ -116,7 +117,8 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Rights that the identity has in this scene.
   scene::Rights rightsIn(const scene::LiveScene& scene) const;
   void hello(const v1::Hello& message);
-  // Opens a session with the server that simulates the scene, if there is one and the peer wants to take part.
+  // Opens a session with the server that simulates the scene, if there is one and the peer wants to take
+  // part.
   bool joinRemotely(const v1::Hello& message, const messages::Joining& joining,
                     const std::shared_ptr<scene::LiveScene>& scene);
   // The scene that the peer asks for. Null, and the session has ended, if the peer may not join it.
@@ -177,6 +179,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Request id and arrival of the current message.
   std::uint64_t requestId_ = 0;
   Clock::time_point now_{};
+  Clock::time_point sent_{};  // of the newest message; only grows
 
   TokenBucket poseRate_{480, 120};
   TokenBucket changeRate_{60, 30};

@@ -13,8 +13,6 @@ namespace {
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-constexpr std::uint64_t kSecond = 1'000'000;
-
 class Redirect : public ::testing::Test {
  protected:
   void SetUp() override { cs_follow_redirects(client.get(), 1); }
@@ -44,6 +42,7 @@ class Redirect : public ::testing::Test {
   std::string named() const { return cs_error_server(client.get()); }
   cs_state state() const { return cs_get_state(client.get()); }
 
+  static constexpr std::uint64_t kSecond = 1'000'000;
   std::uint64_t now = 100 * kSecond;
   ScriptedServer server;
   ClientUnderTest client;

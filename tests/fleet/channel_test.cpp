@@ -76,8 +76,8 @@ class ChannelTest : public ::testing::Test {
 };
 
 TEST_F(ChannelTest, CarriesMessagesBothWaysAtOnce) {
-  one_.channel.push(bytesOf("to the other"));
-  other_.channel.push(bytesOf("to the one"));
+  one_.channel.push(bytesOf("to the other"), now_);
+  other_.channel.push(bytesOf("to the one"), now_);
   step();
   EXPECT_EQ(other_.messages, std::vector<std::string>{"to the other"});
   EXPECT_EQ(one_.messages, std::vector<std::string>{"to the one"});
@@ -92,7 +92,7 @@ TEST_F(ChannelTest, EmptyAndLongMessagesArriveWhole) {
                                 large,
                                 "",
                                 "end"};
-  for (const std::string& text : sent) one_.channel.push(bytesOf(text));
+  for (const std::string& text : sent) one_.channel.push(bytesOf(text), now_);
   settle();
   EXPECT_EQ(other_.messages, sent);
 }
@@ -102,8 +102,8 @@ TEST_F(ChannelTest, NothingIsLostRepeatedOrOutOfOrderOverABadWay) {
   std::vector<std::string> sent;
   for (int i = 0; i < 300; ++i) {
     sent.push_back(std::to_string(i) + std::string(static_cast<std::size_t>(i % 7) * 30'000, '.'));
-    one_.channel.push(bytesOf(sent.back()));
-    other_.channel.push(bytesOf(sent.back()));
+    one_.channel.push(bytesOf(sent.back()), now_);
+    other_.channel.push(bytesOf(sent.back()), now_);
     if (i % 3 == 0) step();
   }
   settle();
@@ -114,7 +114,7 @@ TEST_F(ChannelTest, NothingIsLostRepeatedOrOutOfOrderOverABadWay) {
 TEST_F(ChannelTest, WithoutLossNothingIsSentTwice) {
   std::size_t sent = 0;
   for (int i = 0; i < 200; ++i) {
-    one_.channel.push(bytesOf(std::string(10'000, 'x')));
+    one_.channel.push(bytesOf(std::string(10'000, 'x')), now_);
     sent += 10'000;
     step();
   }
@@ -126,7 +126,7 @@ TEST_F(ChannelTest, AReaderThatDoesNotReadStopsTheSender) {
   other_.uses = false;
   std::size_t pushed = 0;
   for (; one_.channel.hasRoom() && pushed < 100; ++pushed) {
-    one_.channel.push(bytesOf(std::string(10'000, 'x')));
+    one_.channel.push(bytesOf(std::string(10'000, 'x')), now_);
     step();
   }
   EXPECT_EQ(pushed, Channel::kWindow / 10'000 + 1);
@@ -139,7 +139,7 @@ TEST_F(ChannelTest, AReaderThatDoesNotReadStopsTheSender) {
 
 TEST_F(ChannelTest, TheEndComesAfterAllMessages) {
   loss_ = 0.3;
-  one_.channel.push(bytesOf("last"));
+  one_.channel.push(bytesOf("last"), now_);
   one_.channel.pushEnd(v1::TUNNEL_END_LEFT);
   settle();
   EXPECT_EQ(other_.messages, std::vector<std::string>{"last"});
@@ -151,7 +151,7 @@ TEST_F(ChannelTest, ANewOtherEndContinuesWhereTheFormerOneStopped) {
   std::vector<std::string> sent;
   for (int i = 0; i < 40; ++i) {
     sent.push_back(std::to_string(i) + std::string(20'000, '.'));
-    one_.channel.push(bytesOf(sent.back()));
+    one_.channel.push(bytesOf(sent.back()), now_);
   }
   loss_ = 0.3;
   for (int i = 0; i < 30; ++i) step();
@@ -162,7 +162,7 @@ TEST_F(ChannelTest, ANewOtherEndContinuesWhereTheFormerOneStopped) {
   other_ = {.channel = Channel(other_.channel.received())};
   one_.channel.restart();
   one_.arriving.clear();
-  other_.channel.push(bytesOf("from the new one"));
+  other_.channel.push(bytesOf("from the new one"), now_);
   settle();
   got.insert(got.end(), other_.messages.begin(), other_.messages.end());
   EXPECT_EQ(got, sent);

@@ -258,10 +258,10 @@ testEach("requests and limits are set", (objects) => {
   };
   const nats = workloads(objects).find((workload) => componentOf(workload) === "nats");
   if (nats) {
-    const [memory, files] = ["memory", "file"].map((name) => amount(new RegExp(`^ +max_${name}_store: (\\w+)`, "m").exec(natsConfiguration(objects))[1]));
+    const limit = (name) => amount(new RegExp(`^ +max_${name}_store: (\\w+)`, "m").exec(natsConfiguration(objects))[1]);
     const [claim] = nats.spec.volumeClaimTemplates;
-    assert.equal(memory, 0);
-    assert.ok(files > 0 && files <= 0.8 * amount(claim.spec.resources.requests.storage)); // deleted entries need room, too
+    assert.equal(limit("memory"), 0);
+    assert.ok(limit("file") > 0 && limit("file") <= 0.8 * amount(claim.spec.resources.requests.storage)); // deleted entries need room, too
     const [container] = podOf(nats).containers;
     assert.ok(amount(environmentOf(objects, container).GOMEMLIMIT) <= 0.9 * amount(container.resources.limits.memory));
   }
@@ -675,14 +675,18 @@ test("the example of nsc has the permissions of the table", () => {
   assert.deepEqual([listed("pub").sort(), listed("sub").sort()], [publish.sort(), subscribe.sort()]);
 });
 
+// Variables for programs of this build, without options and without the user's files.
+const programEnvironment = () => ({ ...Object.fromEntries(Object.entries(process.env).filter(([name]) => !name.startsWith("CLOTHSTREAM_"))), HOME: folder });
+
+const client = join(dirname(server), "clothstream");
 // Runs `clothstream`, and returns what it printed.
 async function clothstream(...args) {
-  const { stdout } = await promisify(execFile)(join(dirname(server), "clothstream"), args, { encoding: "utf8", env: { HOME: folder } });
+  const { stdout } = await promisify(execFile)(client, args, { encoding: "utf8", env: programEnvironment() });
   return stdout;
 }
 
-const hasNats = spawnSync("nats-server", ["--version"]).status === 0;
-test("servers, edge and operator use three NATS servers with the configuration and the permissions", { skip: hasNats ? false : "there is no nats-server" }, async (t) => {
+const noNats = spawnSync("nats-server", ["--version"]).status === 0 ? false : "there is no nats-server";
+test("servers, edge and operator use NATS with its configuration and the permissions", { skip: noNats }, async (t) => {
   const [, options] = /^nsc edit account --name clothstream (.*)$/m.exec(documentation);
   const limits = [...options.matchAll(/--js-([\w-]+) (-?\d+)/g)].map(([, name, value]) => [name.replaceAll("-", "_"), Number(value)]);
   assert.deepEqual(limits.map(([name]) => name).sort(), ["consumer", "disk_storage", "mem_storage", "streams"]);
@@ -696,17 +700,17 @@ test("servers, edge and operator use three NATS servers with the configuration a
     const { greeting, urls, authority, get, log } = cluster;
     assert.deepEqual([greeting.tls_required, greeting.auth_required, greeting.connect_urls, greeting.jetstream], [true, true, undefined, true]);
     assert.ok(greeting.max_payload >= 1e6);
-    if (!existsSync(join(dirname(server), "clothstream"))) return t.diagnostic("there is no program clothstream");
+    if (!existsSync(client)) return t.diagnostic("there is no program clothstream");
 
     const as = (user) => ["--nats", urls.join(","), "--nats-credentials", files[user], "--nats-ca", authority];
     const processes = [];
     const start = async (user, ...args) => {
       const ports = ["--port=0", "--grpc-port=0"];
-      const child = startProcess(server, [...args, ...ports, "--state-dir", "", "--announce=off", ...as(user)], { HOME: folder });
+      const child = startProcess(server, [...args, ...ports, "--state-dir", "", "--announce=off", ...as(user)], programEnvironment());
       processes.push(child);
       const endpoint = () => /^gRPC +(\S+)$/m.exec(child.log)?.[1];
       await until(`the ${user} starts`, async () => endpoint() !== undefined, () => child.log);
-      return { child, endpoint: endpoint() };
+      return endpoint();
     };
     const logs = () => [log(), ...processes.map((child) => child.log)].join("\n");
     const directory = async () => JSON.parse(await clothstream("list", "--json", ...as("operator")));
@@ -716,14 +720,14 @@ test("servers, edge and operator use three NATS servers with the configuration a
       const origin = await start("server", "--scene=flag");
       await start("server", "--scene=swing");
       const edge = await start("edge", "edge");
-      await clothstream("create", "--named", "swing", "--name", "mine", "--server", origin.endpoint);
+      await clothstream("create", "--named", "swing", "--name", "mine", "--server", origin);
       await until("the directory has servers and scenes", async () => {
         const { servers, scenes } = await directory();
         return servers.length === 2 && scenes.map(({ scene }) => scene).sort().join() === "flag,mine,swing";
       }, logs);
       // A participant and a viewer on the edge stay while the scene moves.
       const visits = ["participant", "viewer"].map((role) =>
-        clothstream("join", edge.endpoint, "--scene", "mine", "--role", role, "--seconds", "5", "--no-reconnect", "--hash", "--json"),
+        clothstream("join", edge, "--scene", "mine", "--role", role, "--seconds", "8", "--no-reconnect", "--hash", "--json"),
       );
       await until("the participant is in the directory", async () => (await directory()).servers.some(({ participants }) => participants === 1), logs);
       const first = await ownerOf("mine");
@@ -745,6 +749,10 @@ test("servers, edge and operator use three NATS servers with the configuration a
         streams.map(({ name, config }) => [name, config.num_replicas, config.storage]).sort(),
         ["checkpoints", "scenes", "servers"].map((name) => [`KV_clothstream-${name}`, 3, "file"]),
       );
+      for (const child of processes.filter(({ signalCode }) => signalCode === null)) {
+        child.kill();
+        await until("the program ends", async () => child.exitCode !== null, logs);
+      }
       assert.deepEqual(logs().match(/^.*violation.*$/gim), null);
       // An edge has no rights in the directory.
       await assert.rejects(clothstream("list", "--json", ...as("edge")));

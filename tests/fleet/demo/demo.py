@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: MIT
 """Runs a whole fleet on this machine, and shows that it works: `./dev fleet`.
 
-Starts nats-server, two origins on software Vulkan, two edges, and a stand-in for the sidecar of Agones next to the first
+Starts nats-server, two origins on software Vulkan, two edges, and a stand-in for the sidecar of Agones next to the second
 origin. A scene is created at the first origin. A page in a browser joins it at the first edge, a load of viewers at the
-second edge. Then the scene moves to the second origin, and nats-server, the first edge and the second origin are killed
-(SIGKILL). nats-server and the edge are started again 3 s later. The second origin is not: the first origin continues the
-scene from its checkpoint.
+second edge. Then the scene moves to the second origin and back, and nats-server, the first edge and the first origin are
+killed (SIGKILL). nats-server and the edge are started again. The origin is not: the second one continues the scene from
+its checkpoint.
 
 Every step says what page and viewers saw, and writes screenshots and logs.
 """
@@ -28,7 +28,6 @@ from watching import Load, Page, Viewer
 FOLDER = pathlib.Path(__file__).resolve().parent
 ROOT = FOLDER.parents[2]
 SCENE = "fleet-demo"
-AWAY_SECONDS = 3  # for which a killed program is away
 BOUND_SECONDS = 20  # within which the page must have new frames after a kill
 FRAMES_AFTER = 10  # new frames that the page must have
 CHROMIUM = "/usr/bin/chromium"  # as in tests/page/browser.mjs
@@ -60,19 +59,22 @@ class Story:
 
 def stand_in_of_agones(server, program):
     """The sidecar that the test of --agones uses."""
-    os.environ.setdefault("CLOTHSTREAM_SERVER", str(server))
-    os.environ.setdefault("CLOTHSTREAM_PROGRAM", str(program))
+    for name, path in (("CLOTHSTREAM_SERVER", server), ("CLOTHSTREAM_PROGRAM", program)):
+        os.environ.setdefault(name, str(path))
     sys.path.insert(0, str(FOLDER.parent))
     from agones_test import Sidecar
 
+    for name in ("CLOTHSTREAM_SERVER", "CLOTHSTREAM_PROGRAM"):
+        del os.environ[name]  # servers would read them as options
     return Sidecar(["participants", "created-scenes", "load"], ["scenes"])
 
 
 def flag_scene():
-    """The flag of server/scenes with 30 ticks per second, so that two cores can also draw the page."""
+    """The flag of server/scenes with fewer vertices and 30 ticks per second, so that two cores can also draw the page."""
     scene = json.loads((ROOT / "server/scenes/flag.json").read_text())
-    scene["substeps"] = round(scene["substeps"] * scene["simulationRate"] / 30)
-    return {**scene, "name": SCENE, "simulationRate": 30, "streamRate": 30}
+    scene["cloths"][0]["grid"] |= {"rows": 24, "columns": 36}
+    scene["cloths"][0]["pins"] = [{"firstRow": 0, "lastRow": 23, "firstColumn": 0}]
+    return {**scene, "name": SCENE, "simulationRate": 30, "streamRate": 30, "substeps": 16}
 
 
 class Fleet:
@@ -99,10 +101,10 @@ class Fleet:
         say(f"nats-server with JetStream: {self.nats_url}")
         self.sidecar = stand_in_of_agones(self.server, self.client)
         origin = ["--device", self.arguments.device, "--insecure", "--drain", 3, "--max-load", 1000, "--max-scene-load", 1000]
-        agones = ["--public-name", "origin-1.example", "--agones"]
+        agones = ["--public-name", "origin-2.example", "--agones"]
         environment = {**os.environ, "AGONES_SDK_HTTP_PORT": str(self.sidecar.port)}
-        self.origins = [self.serve("origin-1", [*origin, *agones], environment)]
-        self.origins.append(self.serve("origin-2", [*origin, "--public-name", "origin-2.example"]))
+        self.origins = [self.serve("origin-1", [*origin, "--public-name", "origin-1.example"])]
+        self.origins.append(self.serve("origin-2", [*origin, *agones], environment))
         self.edges = []
 
     def start_edges(self):
@@ -172,7 +174,7 @@ class Fleet:
         counters = self.sidecar.counters
         created, participants = counters["created-scenes"], counters["participants"]
         return (
-            f"Agones' stand-in: origin-1 is {self.sidecar.state}, {participants['count']} participants, "
+            f"Agones' stand-in: origin-2 is {self.sidecar.state}, {participants['count']} participants, "
             f"{created['count']} of {created['capacity']} created scenes"
         )
 
@@ -209,25 +211,30 @@ class Demo:
         say(f"{self.viewers} viewers join at edge-2")
         fleet.wait_for_directory(lambda origin, tick: tick > 0, 20, f"{SCENE} has no checkpoint")
         self.story.detail(fleet.listed() + fleet.agones_line())
-        self.move()
+        self.move("origin-2", "move-during")
+        self.move("origin-1")
+        self.picture("move-after")
         self.kill("nats-server", fleet.nats, "nats-lost")
         self.kill("edge-1", fleet.edges[0], "edge-lost")
-        self.kill("origin-2", fleet.origins[1], "origin-lost", back=False)
-        self.story.detail(fleet.agones_line())
+        self.kill("origin-1", fleet.origins[0], "origin-lost", back=False)
         if fleet.page.wrong_frames:
             self.problems.append(f"the page has decoded {fleet.page.wrong_frames} wrong frames")
         self.problems += [f"the page: {error}" for error in fleet.page.errors]
 
     def open_page(self):
         fleet = self.fleet
-        url = f"{fleet.edges[0].url}?scene={SCENE}&name=Visitor"
+        url = f"{fleet.edges[0].url}?scene={SCENE}&name=Visitor&detail=reduced"
         fleet.page = Page(fleet.node, url, fleet.out, fleet.logs / "browser.log")
         if not fleet.page.wait_for_frames(60, 0):
             raise ProgramFailed(f"the page at {url} has no frames; its state is {fleet.page.state}")
         self.story.say(f"the page is open: {url}")
 
     def picture(self, name):
-        shown = self.fleet.page.take_picture(name)
+        self.fleet.page.ask_for_picture(name)
+        self.picture_taken(name)
+
+    def picture_taken(self, name):
+        shown = self.fleet.page.wait_for_picture(name)
         self.story.say(f"screenshot {self.fleet.out / name}.png: {100 * shown['cloth']:.0f} % of {shown['vertices']} vertices show cloth")
         if shown["cloth"] < 0.5:
             self.problems.append(f"{name}.png shows no cloth")
@@ -242,25 +249,29 @@ class Demo:
             raise ProgramFailed("the page has no frames")
         return load
 
-    def move(self):
+    def move(self, to, picture=""):
+        """Moves the scene. A picture that is taken meanwhile keeps the page from showing frames."""
         fleet, page, say = self.fleet, self.fleet.page, self.story.say
-        self.story.title("The scene moves to origin-2")
+        self.story.title(f"The scene moves to {to}" + (f", while {picture}.png is taken" if picture else ""))
         load = self.begin()
-        self.picture("move-before")
+        if picture:
+            self.picture("move-before")
         begun = time.time()
-        page.ask_for_picture("move-during")
-        said = fleet.ask("move", SCENE, "--to", "origin-2.example", "--nats", fleet.nats_url)
+        if picture:
+            page.ask_for_picture(picture)
+        said = fleet.ask("move", SCENE, "--to", f"{to}.example", "--nats", fleet.nats_url)
         moved = time.time()
         say(said.strip())
         returned = page.wait_for_frames(60, moved, BOUND_SECONDS)
-        page.wait_until(lambda: "move-during" in page.pictures, BOUND_SECONDS)
-        self.note("move", "the scene", begun, time.time(), returned, load)
-        self.picture("move-after")
-        if "origin-2" != fleet.directory()[0]:
-            self.problems.append("the directory does not say that origin-2 has the scene")
+        until = time.time()
+        if picture:
+            self.picture_taken(picture)
+        self.note(f"move to {to}", begun, until, returned, load)
+        if to != fleet.directory()[0]:
+            self.problems.append(f"the directory does not say that {to} has the scene")
         if page.states_since(begun):
             self.problems.append(f"the page was disconnected by the move: {', '.join(page.states_since(begun))}")
-        self.story.detail(fleet.listed())
+        self.story.detail(fleet.listed() + fleet.agones_line())
 
     def kill(self, name, program, picture, back=True):
         fleet, page, say = self.fleet, self.fleet.page, self.story.say
@@ -273,24 +284,27 @@ class Demo:
         killed = time.time()
         say(f"{name} is killed")
         self.pause_until(killed + 1)
-        self.picture(picture)
+        page.ask_for_picture(picture)
         after = killed + 1  # no frame that comes later was sent before
         if back:
-            self.pause_until(killed + AWAY_SECONDS)
+            self.pause_until(killed + fleet.arguments.away)
             fleet.start_again(program)
             after = time.time() if program is fleet.nats else after
             say(f"{name} runs again")
         returned = page.wait_for_frames(FRAMES_AFTER, after, killed + BOUND_SECONDS - time.time())
-        self.note("kill", name, killed, time.time(), returned, load)
+        until = time.time()
+        self.picture_taken(picture)
+        self.note(f"kill {name}", killed, until, returned, load)
         self.picture(f"{picture}-after")
         if not back:
-            fleet.wait_for_directory(lambda origin, tick: origin == "origin-1", 10, "the directory does not say that origin-1 has the scene")
-            self.story.detail(fleet.listed())
+            fleet.wait_for_directory(lambda origin, tick: origin == "origin-2", 10, "the directory does not say that origin-2 has the scene")
+            self.story.detail(fleet.listed() + fleet.agones_line())
+            self.story.detail("The directory still lists origin-1: entries of servers are deleted 30 s after their last renewal.")
 
     def pause_until(self, at):
         self.fleet.page.wait_until(lambda: time.time() >= at, 60)
 
-    def note(self, what, name, since, until, returned, load):
+    def note(self, step, since, until, returned, load):
         """Prints and keeps what the page and the viewers saw."""
         fleet, page, say = self.fleet, self.fleet.page, self.story.say
         # Viewers at the other edge may come back later than the page.
@@ -301,7 +315,7 @@ class Demo:
         time.sleep(1)  # viewers of the load join again at random times
         figures = load.end()
         row = {
-            "step": f"{what} {name}",
+            "step": step,
             "connected": page.state == "live",
             "pageGap": page.gap(since, until),
             "pageAway": page.seconds_away(since),
@@ -349,7 +363,7 @@ class Demo:
 
 def keep_running(fleet, story):
     story.title("The fleet keeps running until Ctrl-C")
-    fleet.start_again(fleet.origins[1])
+    fleet.start_again(fleet.origins[0])
     for program in (*fleet.edges, *fleet.origins):
         print(f"{program.name:10} page {program.url}?scene={SCENE}   gRPC {program.address}")
     print(f"clothstream list --nats {fleet.nats_url}", flush=True)
@@ -369,12 +383,15 @@ def read_arguments():
     )
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "build/fleet-demo", metavar="DIR", help="folder for screenshots and logs; its former ones are replaced (default: build/fleet-demo)")
     parser.add_argument("--keep", action="store_true", help="leave everything running at the end, and print the addresses, until Ctrl-C")
+    parser.add_argument("--away", type=float, default=3, metavar="SECONDS", help="time after which nats-server and the edge are started again, 1.5 to 15 (default: %(default)s)")
     parser.add_argument("--viewers", type=int, default=20, metavar="N", help="viewers at the second edge, 1 to 1000 (default: %(default)s)")
     parser.add_argument("--device", default="llvmpipe", metavar="NAME", help="Vulkan device of the origins: a part of its name (default: %(default)s, in software)")
     parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build/release/bin", metavar="DIR", help="folder of clothstream and clothstream-server (default: build/release/bin)")
     arguments = parser.parse_args()
     if not 1 <= arguments.viewers <= 1000:
         parser.error(f"--viewers: {arguments.viewers} is not allowed; use 1 to 1000")
+    if not 1.5 <= arguments.away <= 15:
+        parser.error(f"--away: {arguments.away} is not allowed; use 1.5 to 15")
     return arguments
 
 
@@ -392,7 +409,7 @@ def main():
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, interrupt)
     fleet = None
-    code = 1
+    code = None
     with tempfile.TemporaryDirectory(prefix="clothstream-fleet-") as folder:
         try:
             arguments.out = arguments.out.resolve()
@@ -405,12 +422,13 @@ def main():
             if arguments.keep:
                 keep_running(fleet, story)
         except Interrupted:
-            code = code if arguments.keep and code == 0 else INTERRUPTED
+            code = INTERRUPTED if code is None else code
         except MissingProgram as problem:
             print(f"fleet: {problem}", file=sys.stderr)
             code = MISSING
         except (ProgramFailed, OSError) as problem:
             print(f"fleet: {problem}", file=sys.stderr)
+            code = 1
         finally:
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, signal.SIG_IGN)

@@ -6,12 +6,16 @@ import { createInterface } from "node:readline";
 import { launchBrowser, kPicture, openPage, takePixels } from "../../page/browser.mjs";
 
 const kReadMs = 50;
+// Milliseconds between drawn frames, in addition to those of openPage(). The servers need the processors.
+const kDrawPauseMs = 150;
 
 const say = (object) => console.log(JSON.stringify(object));
 
 // Runs in the page: notes what changes. Times are seconds since 1970.
-function watch() {
+function watch(pauseMs) {
   const kLookMs = 10;
+  const draw = window.requestAnimationFrame;
+  window.requestAnimationFrame = (callback) => setTimeout(() => draw(callback), pauseMs);
   const seen = (window.demoSeen = []);
   const last = {};
   const note = (what, value, at) => {
@@ -59,7 +63,10 @@ function isCloth([red, green]) {
 
 const browser = await launchBrowser();
 try {
-  const page = await openPage(browser, process.argv[2], { prepare: watch, viewport: kPicture });
+  const page = await openPage(browser, process.argv[2], { prepare: `(${watch})(${kDrawPauseMs})`, viewport: kPicture });
+  await page.click("#panel-close");
+  // Software drawing makes frames late. The card about it would cover the cloth.
+  await page.addStyleTag({ content: '#failure[data-kind="late"] { display: none !important; }' });
   page.on("crash", () => say({ error: "the page crashed" }));
   let pictures = Promise.resolve();
   let open = true;

@@ -112,15 +112,14 @@ class Page(Watcher):
         """Waits for this number of frames of a connected page."""
         return self.wait_until(lambda: self.state == "live" and self.frames_since(since) >= count, seconds)
 
-    def take_picture(self, name):
-        """Writes NAME.png. Returns what the page shows there, as page.mjs says."""
+    def ask_for_picture(self, name):
         self.program.process.stdin.write(f"picture {name}\n")
+
+    def wait_for_picture(self, name):
+        """Waits for NAME.png. Returns what the page shows there, as page.mjs says."""
         if not self.wait_until(lambda: name in self.pictures, PICTURE_SECONDS):
             raise ProgramFailed(f"the page made no picture within {PICTURE_SECONDS} s")
         return self.pictures[name]
-
-    def ask_for_picture(self, name):
-        self.program.process.stdin.write(f"picture {name}\n")
 
     def stop(self):
         try:

@@ -138,12 +138,14 @@ test("messages of the page wait for the connection, and come after Hello", async
 
 test("a resume token is sent with Hello, and other text is ignored", async () => {
   const sent = async (token: string) => {
-    await connect(token);
+    const started = await connect(token);
     socket().opens();
+    void started.leave();
     return textOf(socket().sent[0] as Uint8Array);
   };
   assert.include(await sent("50697a7a61-3"), "Pizza");
   assert.notInclude(await sent("Pizza"), "Pizza");
+  connection = undefined;
 });
 
 test("leaving ends when the socket is closed, and its code says whether the page may return", async () => {
@@ -212,11 +214,13 @@ test("a scene at another server is joined there, with the scheme, port and path 
 
 test("a name is not followed if it is no DNS name, or if a secret would go without TLS", async () => {
   for (const [server, follows] of [["192.0.2.1", true], ["b.example:80", true], ["b.example", false]] as const) {
-    await connect("", follows);
+    const started = await connect("", follows);
     const { length } = FakeSocket.made;
     socket().opens();
     socket().onmessage?.({ data: notFound(server) });
     assert.isTrue(socket().closed, `${server}: the client has failed`);
     assert.lengthOf(FakeSocket.made, length);
+    void started.leave();
   }
+  connection = undefined;
 });
