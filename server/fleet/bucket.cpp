@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <stdexcept>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <nats/nats.h>
@@ -61,11 +62,14 @@ Bucket::Bucket(Nats& nats, const BucketOptions& options) : name_(options.name) {
     config.Bucket = name_.c_str();
     config.History = 1;
     config.TTL = options.lifetime.count() * kNanoseconds;
-    // A NATS server that is alone keeps one copy.
-    for (const int copies : {kCopies, 1}) {
-      config.Replicas = copies;
+    config.Replicas = kCopies;
+    status = js_CreateKeyValue(&store, context, &config);
+    // A NATS server that is alone keeps one copy. The library tells this apart only in its text.
+    const char* const why = nats_GetLastError(nullptr);
+    if (status != NATS_OK && why != nullptr &&
+        std::string_view(why).find("non-clustered") != std::string_view::npos) {
+      config.Replicas = 1;
       status = js_CreateKeyValue(&store, context, &config);
-      if (status == NATS_OK) break;
     }
   }
   if (status != NATS_OK) {

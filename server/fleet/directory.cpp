@@ -341,18 +341,17 @@ void Directory::saveScenes(Buckets& buckets, const std::vector<OwnScene>& scenes
       saving_ = own.scene->name();
     }
     bool isSaved = false;
-    std::exception_ptr failure;
     try {
       isSaved = save(buckets, own);
-    } catch (...) {
-      failure = std::current_exception();
+    } catch (const std::exception& failure) {  // such as a full store
+      telemetry::log({own.scene->name()}, spdlog::level::warn,
+                     "no checkpoint for other servers: {}; trying again", failure.what());
     }
     {
       const std::lock_guard lock(mutex_);
       saving_.clear();
     }
     changed_.notify_all();
-    if (failure) std::rethrow_exception(failure);
     if (isSaved) stored.tick = tick;
   }
 }

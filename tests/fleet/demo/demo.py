@@ -280,8 +280,8 @@ class Demo:
         if not back:
             ticks = fleet.directory()[1]
             fleet.wait_for_directory(lambda origin, tick: tick > ticks, 20, f"{SCENE} has no new checkpoint")
-        program.kill()
         killed = time.time()
+        program.kill()
         say(f"{name} is killed")
         self.pause_until(killed + 1)
         page.ask_for_picture(picture)
