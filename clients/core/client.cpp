@@ -451,8 +451,8 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::ui
 bool Client::isTemporary(const ServerError& error) const {
   using Code = field::ErrorCode;
   const bool reconnects = state_ == CS_STATE_RECONNECTING && !welcomed_;
-  // The client may try again if only the connection was cut off, if a reconnect found the server full, or if
-  // another server than the one that has the scene was asked again.
+  // The client may try again if only the connection was cut off, or if a reconnect found the server full. It
+  // also may if it has returned to its first server, and another one was named.
   return error.code == Code::kCutOff || (reconnects && error.code == Code::kResourceExhausted) ||
          (reconnects && error.code == Code::kNotFound && redirection_.isReturn());
 }

@@ -136,7 +136,7 @@ TEST_F(Redirect, ReturnsWithTheResumeTokenAfterCutOff) {
   EXPECT_EQ(state(), CS_STATE_JOINED);
 }
 
-TEST_F(Redirect, WithoutConsentNotFoundIsFinalAndCutOffReturnsToTheSameServer) {
+TEST_F(Redirect, IsIgnoredByDefault) {
   cs_follow_redirects(client.get(), 0);
   join();
   EXPECT_EQ(refuse("b.example", v1::ERROR_CODE_CUT_OFF), std::uint32_t{CS_EVENT_ERROR});

@@ -143,7 +143,7 @@ TEST_P(Redirects, FirstJoinGoesToTheServerThatHasTheScene) {
   EXPECT_THAT(log_, HasSubstr("at " + addressOf(kSecond) + " as participant"));
 }
 
-TEST_P(Redirects, SceneThatNoServerHasIsReportedWithTheServerThatSaidSo) {
+TEST_P(Redirects, ReportsTheServerThatRefuses) {
   listen();
   EXPECT_THAT(refusal(first(), "none"),
               AllOf(HasSubstr("The server at " + addressOf(kSecond) + " refuses"), HasSubstr("none")));

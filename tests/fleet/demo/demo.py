@@ -94,7 +94,8 @@ class Fleet:
 
     def start(self):
         say = self.story.say
-        self.nats = self.run("nats-server", [self.nats_server, "--addr", "127.0.0.1", "--port", -1, "--jetstream", "--store_dir", self.folder / "nats"])
+        nats = [self.nats_server, "--addr", "127.0.0.1", "--port", -1, "--jetstream", "--store_dir", self.folder / "nats"]
+        self.nats = self.run("nats-server", nats)
         self.nats_url = f"nats://127.0.0.1:{self.nats.wait_for(r'Listening for client connections on .*:([0-9]+)')[1]}"
         self.nats.command[self.nats.command.index("-1")] = self.nats_url.rpartition(":")[2]
         self.nats.wait_for("Server is ready")
@@ -127,14 +128,15 @@ class Fleet:
         self.story.say(f"{name}: page {program.url}, gRPC {program.address}")
         return program
 
-    @staticmethod
-    def wait_for_addresses(program):
+    def wait_for_addresses(self, program):
         try:
             program.url = program.wait_for(r"^page +(\S+)")[1]
             program.address = program.wait_for(r"^gRPC +(\S+)")[1]
         except ProgramFailed:
             if "Vulkan" in program.said():
-                raise MissingProgram(f"a software Vulkan device was not found; install it: sudo apt install mesa-vulkan-drivers\n{program.tail()}") from None
+                problem = f"Vulkan device '{self.arguments.device}' was not found; install the one in software: "
+                problem += "sudo apt install mesa-vulkan-drivers"
+                raise MissingProgram(f"{problem}\n{program.tail()}") from None
             raise
 
     def start_again(self, program):
@@ -185,7 +187,7 @@ class Fleet:
         for program in reversed(self.started):
             program.ask_to_stop()
         for program in reversed(self.started):
-            program.stop(5)
+            program.wait_or_kill(5)
         if self.sidecar:
             self.sidecar.shutdown()
 
@@ -297,7 +299,8 @@ class Demo:
         self.note(f"kill {name}", killed, until, returned, load)
         self.picture(f"{picture}-after")
         if not back:
-            fleet.wait_for_directory(lambda origin, tick: origin == "origin-2", 10, "the directory does not say that origin-2 has the scene")
+            problem = "the directory does not say that origin-2 has the scene"
+            fleet.wait_for_directory(lambda origin, tick: origin == "origin-2", 10, problem)
             self.story.detail(fleet.listed() + fleet.agones_line())
             self.story.detail("The directory still lists origin-1: entries of servers are deleted 30 s after their last renewal.")
 
@@ -308,7 +311,7 @@ class Demo:
         """Prints and keeps what the page and the viewers saw."""
         fleet, page, say = self.fleet, self.fleet.page, self.story.say
         # Viewers at the other edge may come back later than the page.
-        end = time.monotonic() + max(0, since + BOUND_SECONDS - time.time())
+        end = time.monotonic() + max(1, since + BOUND_SECONDS - time.time())
         while time.monotonic() < end and not self.viewer.frames_since(until):
             time.sleep(0.02)
         viewer_returned = self.viewer.frames_since(until) > 0
@@ -318,7 +321,7 @@ class Demo:
             "step": step,
             "connected": page.state == "live",
             "pageGap": page.gap(since, until),
-            "pageAway": page.seconds_away(since),
+            "pageAway": page.seconds_away(since, until),
             "viewerGap": self.viewer.gap(since, until),
             "load": figures,
         }
@@ -381,12 +384,17 @@ def read_arguments():
         epilog=f"Exit codes: 0 success; 1 a check failed, such as no new frame {BOUND_SECONDS} s after a kill; "
         f"{WRONG_ARGUMENTS} wrong arguments; {MISSING} a program is missing; {INTERRUPTED} interrupted.",
     )
-    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "build/fleet-demo", metavar="DIR", help="folder for screenshots and logs; its former ones are replaced (default: build/fleet-demo)")
-    parser.add_argument("--keep", action="store_true", help="leave everything running at the end, and print the addresses, until Ctrl-C")
-    parser.add_argument("--away", type=float, default=3, metavar="SECONDS", help="time after which nats-server and the edge are started again, 1.5 to 15 (default: %(default)s)")
-    parser.add_argument("--viewers", type=int, default=20, metavar="N", help="viewers at the second edge, 1 to 1000 (default: %(default)s)")
-    parser.add_argument("--device", default="llvmpipe", metavar="NAME", help="Vulkan device of the origins: a part of its name (default: %(default)s, in software)")
-    parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build/release/bin", metavar="DIR", help="folder of clothstream and clothstream-server (default: build/release/bin)")
+    add = parser.add_argument
+    add("--out", type=pathlib.Path, default=ROOT / "build/fleet-demo", metavar="DIR",
+        help="folder for screenshots and logs; its former ones are replaced (default: build/fleet-demo)")
+    add("--keep", action="store_true", help="leave everything running at the end, and print the addresses, until Ctrl-C")
+    add("--away", type=float, default=3, metavar="SECONDS",
+        help="time after which nats-server and the edge are started again, 1.5 to 15 (default: %(default)s)")
+    add("--viewers", type=int, default=20, metavar="N", help="viewers at the second edge, 1 to 1000 (default: %(default)s)")
+    add("--device", default="llvmpipe", metavar="NAME",
+        help="Vulkan device of the origins: a part of its name (default: %(default)s, in software)")
+    add("--programs", type=pathlib.Path, default=ROOT / "build/release/bin", metavar="DIR",
+        help="folder of clothstream and clothstream-server (default: build/release/bin)")
     arguments = parser.parse_args()
     if not 1 <= arguments.viewers <= 1000:
         parser.error(f"--viewers: {arguments.viewers} is not allowed; use 1 to 1000")

@@ -96,6 +96,9 @@ class Program:
     def stop(self, seconds=10):
         """SIGTERM, and SIGKILL if it has not ended after this time."""
         self.ask_to_stop()
+        self.wait_or_kill(seconds)
+
+    def wait_or_kill(self, seconds):
         try:
             self.process.wait(seconds)
         except subprocess.TimeoutExpired:

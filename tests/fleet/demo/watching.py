@@ -56,7 +56,8 @@ class Page(Watcher):
         self.errors = []
         self.pictures = {}
         self.wrong_frames = 0
-        self.program = Program("the browser", [node, FOLDER / "page.mjs", url], log, {**os.environ, "CLOTHSTREAM_SCREENSHOTS": str(out)}, pipes=True)
+        environment = {**os.environ, "CLOTHSTREAM_SCREENSHOTS": str(out)}
+        self.program = Program("the browser", [node, FOLDER / "page.mjs", url], log, environment, pipes=True)
         threading.Thread(target=self.read, daemon=True).start()
 
     def read(self):
@@ -88,15 +89,16 @@ class Page(Watcher):
         with self.lock:
             return list(dict.fromkeys(text for at, text in self.said if at >= since))
 
-    def seconds_away(self, since):
+    def seconds_away(self, since, until):
         """Time without a connection to the scene."""
         with self.lock:
-            states = [(at, state) for at, state in self.states if at >= since] + [(time.time(), "")]
+            states = [(at, state) for at, state in self.states if since <= at <= until] + [(until, "")]
             return sum(later[0] - earlier[0] for earlier, later in zip(states, states[1:]) if earlier[1] != "live")
 
     def check(self):
         if not self.program.runs:
-            raise ProgramFailed(f"the browser ended with {self.program.process.returncode}; its log, {self.program.log}, ends:\n{self.program.tail()}")
+            code = self.program.process.returncode
+            raise ProgramFailed(f"the browser ended with {code}; its log, {self.program.log}, ends:\n{self.program.tail()}")
 
     def wait_until(self, holds, seconds):
         """Returns whether it holds before the time is over."""
