@@ -26,6 +26,7 @@ namespace {
 constexpr std::int64_t kWait = 3000;         // milliseconds
 constexpr std::int64_t kMoveWait = 180'000;  // a large scene is loaded first
 constexpr std::size_t kMaxEntries = 100'000;
+constexpr std::int64_t kLease = 5'000'000'000;  // ns, as in the servers
 
 void require(natsStatus status, const std::string& what) {
   if (status != NATS_OK) throw std::runtime_error(fmt::format("{}: {}", what, natsStatus_GetText(status)));
@@ -72,6 +73,15 @@ Connection connect(const std::vector<std::string>& servers, const std::string& c
 struct Directory {
   std::map<std::string, v1::SceneEntry> scenes;  // by name
   std::map<std::uint64_t, v1::ServerEntry> servers;
+  std::map<std::uint64_t, std::int64_t> renewed;  // by the clock of NATS, ns
+
+  // Whether the server has renewed its entry at most five seconds before the newest one of all.
+  bool isAlive(std::uint64_t origin) const {
+    std::int64_t newest = 0;
+    for (const auto& [other, time] : renewed) newest = std::max(newest, time);
+    const auto found = renewed.find(origin);
+    return found != renewed.end() && newest - found->second < kLease;
+  }
 
   // Servers that match an id or a public name.
   std::vector<std::uint64_t> matching(const std::string& text) const {
@@ -104,7 +114,7 @@ void readBucket(jsCtx* context, const char* bucket, const auto& take) {
     Message message;
     if (kvEntry_Operation(next) == kvOp_Put &&
         message.ParseFromArray(kvEntry_Value(next), kvEntry_ValueLen(next)))
-      take(kvEntry_Key(next), message);
+      take(kvEntry_Key(next), message, kvEntry_Created(next));
   }
 }
 
@@ -116,12 +126,14 @@ Directory read(natsConnection* connection) {
       "NATS", [&](jsCtx** made) { return natsConnection_JetStream(made, connection, &options); });
   Directory directory;
   readBucket<v1::ServerEntry>(context.get(), "clothstream-servers",
-                              [&](const char*, const v1::ServerEntry& server) {
+                              [&](const char*, const v1::ServerEntry& server, std::int64_t time) {
                                 directory.servers.emplace(server.origin(), server);
+                                directory.renewed.emplace(server.origin(), time);
                               });
-  readBucket<v1::SceneEntry>(
-      context.get(), "clothstream-scenes",
-      [&](const char* name, const v1::SceneEntry& scene) { directory.scenes.emplace(name, scene); });
+  readBucket<v1::SceneEntry>(context.get(), "clothstream-scenes",
+                             [&](const char* name, const v1::SceneEntry& scene, std::int64_t) {
+                               directory.scenes.emplace(name, scene);
+                             });
   return directory;
 }
 
@@ -140,7 +152,8 @@ std::string json(const Directory& directory) {
                        {"maxCreatedScenes", server.max_created_scenes()},
                        {"load", server.load()},
                        {"maxLoad", server.max_load()},
-                       {"stopping", server.stopping()}});
+                       {"stopping", server.stopping()},
+                       {"gone", !directory.isAlive(origin)}});
   for (const auto& [name, scene] : directory.scenes)
     scenes.push_back({{"scene", name},
                       {"server", idOf(scene.origin())},
@@ -158,11 +171,13 @@ void print(const Directory& directory) {
                server.public_name().empty() ? "-" : printable(server.public_name()), server.participants(),
                fmt::format("{} of {}", server.created_scenes(), server.max_created_scenes()),
                fmt::format("{:.2f} of {:.0f}", server.load(), server.max_load()),
-               server.stopping() ? "  stopping" : "");
+               !directory.isAlive(origin) ? "  gone"
+               : server.stopping()        ? "  stopping"
+                                          : "");
   fmt::print("\n{:<32} {:<17} {}\n", "SCENE", "SERVER", "CREATED");
   for (const auto& [name, scene] : directory.scenes)
     fmt::print("{:<32} {:<17} {}{}\n", printable(name), idOf(scene.origin()), scene.created() ? "yes" : "no",
-               directory.servers.contains(scene.origin()) ? "" : "  (its server is gone)");
+               directory.isAlive(scene.origin()) ? "" : "  (its server is gone)");
 }
 
 }  // namespace

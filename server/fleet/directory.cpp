@@ -85,7 +85,8 @@ std::vector<Directory::OwnScene> Directory::scenesNow() const {
 
 bool Directory::isAlive(std::uint64_t origin, Clock::time_point now) const {
   const auto found = servers_.find(origin);
-  return found != servers_.end() && now - found->second.second < kLease;
+  const bool hears = reads_ && now - readAt_ >= kLease;
+  return found != servers_.end() && (now - found->second.second < kLease || !hears);
 }
 
 bool Directory::isTaken(const std::string& name) const {
@@ -220,6 +221,7 @@ void Directory::run() {
     try {
       if (!buckets && nats_.connected() && !last) {
         buckets = std::make_unique<Buckets>(nats_);
+        const std::lock_guard reading(mutex_);
         readAt_ = {};
       }
       if (buckets) pass(*buckets);
@@ -237,6 +239,7 @@ void Directory::run() {
       wait = kRetry;
     }
     lock.lock();
+    reads_ = buckets && buckets->serversRead && buckets->scenesRead;
     if (last) return;
     changed_.wait_for(lock, wait, [this] { return stopping_ || lost_; });
   }
@@ -269,6 +272,7 @@ void Directory::readChanges(Buckets& buckets) {
   while (const auto change = buckets.scenes.next(1ms)) {
     if (change->key.empty()) {
       buckets.scenesRead = true;
+      const std::lock_guard lock(mutex_);
       readAt_ = Clock::now();
       continue;
     }

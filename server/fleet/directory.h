@@ -115,6 +115,7 @@ class Directory {
   std::optional<std::uint64_t> revisionOf(const std::string& name) const;
   // Remembers an entry, unless a newer one is known.
   void know(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision);
+  // Whether the server has a lease. While this one cannot hear of renewals, every known server has one.
   bool isAlive(std::uint64_t origin, Clock::time_point now) const;
   std::vector<OwnScene> scenesNow() const;
 
@@ -132,8 +133,10 @@ class Directory {
   std::string saving_;  // scene whose entry the thread is about to change
   bool leaves_ = false, stopping_ = false, lost_ = false;
 
-  // Used by the thread.
+  bool reads_ = false;          // the newest round has worked
   Clock::time_point readAt_{};  // all present entries are known since
+
+  // Used by the thread.
   std::map<std::string, Stored> saved_;
   std::map<std::string, Clock::time_point> adoptAt_;
   std::minstd_rand random_{std::random_device{}()};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/fleet/edge_tunnel.h"
 
+#include <chrono>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,15 @@ namespace clothstream::fleet {
 
 using delivery::SharedBytes;
 using schedule::Clock;
+
+namespace {
+
+// Each end of a channel sends something once per second.
+constexpr std::chrono::milliseconds kSilence{1500};
+// Pings and Pongs are not longer.
+constexpr std::size_t kMaxPingBytes = 64;
+
+}  // namespace
 
 EdgeTunnel::EdgeTunnel(Nats& nats, std::string stream, const TunnelId& id, const scene::RemotePeer& peer,
                        std::function<void()> wake)
@@ -26,11 +36,27 @@ EdgeTunnel::~EdgeTunnel() = default;
 bool EdgeTunnel::send(std::span<const std::byte> message) {
   const std::lock_guard lock(mutex_);
   if (closed_ || left_) return true;  // the peer learns why
+  if (answerPing(message, Clock::now())) return true;
   if (channel_.bytes() + message.size() > kMaxWaiting) return false;
   if (v1::ClientMessage first; !hello_.protocol_version() && parse(message, first) && first.has_hello())
     hello_ = first.hello();
   channel_.push(std::make_shared<std::vector<std::byte>>(message.begin(), message.end()), Clock::now());
   pollLocked();
+  return true;
+}
+
+bool EdgeTunnel::answerPing(std::span<const std::byte> message, Clock::time_point now) {
+  v1::ClientMessage ping;
+  if (!serverAheadUs_ || now - heardAt_ < kSilence || message.size() > kMaxPingBytes ||
+      !parse(message, ping) || !ping.has_ping())
+    return false;
+  v1::ServerMessage answer;
+  answer.set_request_id(ping.request_id());
+  answer.mutable_pong()->set_client_time_us(ping.ping().client_time_us());
+  answer.mutable_pong()->set_server_time_us(schedule::microseconds(now) +
+                                            static_cast<std::uint64_t>(*serverAheadUs_));
+  messages_.push_back({delivery::serialise(answer)});
+  wake_();
   return true;
 }
 
@@ -70,13 +96,19 @@ void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) 
             v1::ERROR_CODE_CUT_OFF,
             "the server that simulates the scene has lost this participant: join again", true)});
     }
-    for (Channel::Received& received : channel_.receive(segment, Clock::now())) {
+    const Clock::time_point now = Clock::now();
+    heardAt_ = now;
+    for (Channel::Received& received : channel_.receive(segment, now)) {
       if (!received.message || left_) {
         closed_ = closed_ || !received.message;
         channel_.use(received.sequence);
         continue;
       }
       if (!welcomed_) readWelcome(received.message);
+      if (v1::ServerMessage pong;
+          received.message->size() <= kMaxPingBytes && parse(*received.message, pong) && pong.has_pong())
+        serverAheadUs_ =
+            static_cast<std::int64_t>(pong.pong().server_time_us() - schedule::microseconds(now));
       messages_.push_back({std::move(received.message), received.sequence});
     }
     pollLocked();

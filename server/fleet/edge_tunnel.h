@@ -25,6 +25,9 @@ namespace clothstream::fleet {
 
 // All bytes of the peer go through NATS, both ways, as they are. Thread-safe.
 //
+// While nothing comes from the origin, pings are answered here, with its clock as it was last seen. A client
+// that waits for NATS thus stays connected.
+//
 // When the scene moves to another server, the tunnel continues there: what the former server has not used is
 // sent to the new one, and the peer notices nothing.
 class EdgeTunnel final : public scene::RemoteSession {
@@ -60,6 +63,8 @@ class EdgeTunnel final : public scene::RemoteSession {
   };
 
   void pollLocked();
+  // Answers a ping if the origin cannot. Returns false for other messages.
+  bool answerPing(std::span<const std::byte> message, schedule::Clock::time_point now);
   // Remembers what another server needs to know the participant.
   void readWelcome(const delivery::SharedBytes& message);
 
@@ -74,8 +79,10 @@ class EdgeTunnel final : public scene::RemoteSession {
   bool welcomed_ = false;
   Channel channel_;
   std::deque<Waiting> messages_;
-  bool closed_ = false;  // no message will follow
-  bool left_ = false;    // the peer is gone
+  schedule::Clock::time_point heardAt_{};      // newest segment
+  std::optional<std::int64_t> serverAheadUs_;  // clock of the origin, in its newest Pong
+  bool closed_ = false;                        // no message will follow
+  bool left_ = false;                          // the peer is gone
 };
 
 // Tunnels of one scene on an edge. Thread-safe.

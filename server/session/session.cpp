@@ -26,6 +26,8 @@ using delivery::SharedBytes;
 
 constexpr double kMalformedCost = 60;
 constexpr double kMegabyte = 1e6, kKilobyte = 1e3;
+// A request for the list of scenes is not longer.
+constexpr std::size_t kMaxListBytes = 64;
 
 }  // namespace
 
@@ -84,6 +86,13 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point sent) 
   readPause_ = readRate_.pay(now, static_cast<double>(bytes.size()));
   try {
     if (const std::shared_ptr<scene::RemoteSession> remote = this->remote()) {
+      // The scenes that this peer can join are those of this server.
+      if (v1::ClientMessage list; bytes.size() <= kMaxListBytes && identity_ &&
+                                  list.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
+                                  list.has_list_scenes()) {
+        requestId_ = list.request_id();
+        return dispatch(list, now);
+      }
       if (!remote->send(bytes))
         cutOff(telemetry::Refusal::unreadAnswers,
                "the server that simulates the scene does not answer: join again");

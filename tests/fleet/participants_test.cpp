@@ -135,6 +135,46 @@ TEST_F(ParticipantsTest, InputsArriveInOrderAndOnceAfterNatsWasLost) {
   peer.readFrames(5);
 }
 
+// Clients leave a server that does not answer pings.
+TEST_F(ParticipantsTest, StayConnectedWhileNatsIsLost) {
+  const auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  TestPeer peer(edge->server);
+  peer.join("small");
+  const auto ping = [&] {
+    v1::ClientMessage message;
+    message.mutable_ping()->set_client_time_us(7);
+    peer.send(message);
+    return peer.readUntil(v1::ServerMessage::kPong).pong();
+  };
+  const std::uint64_t before = ping().server_time_us();
+  nats_->kill();
+  std::this_thread::sleep_for(2s);
+  const v1::Pong pong = ping();
+  EXPECT_EQ(pong.client_time_us(), 7u);
+  // Both servers have the clock of this machine.
+  EXPECT_GT(pong.server_time_us(), before + 1'500'000);
+  EXPECT_LT(pong.server_time_us(), before + 60'000'000);
+  nats_->restart();
+  peer.readFrames(5);
+  EXPECT_GT(ping().server_time_us(), pong.server_time_us());
+}
+
+TEST_F(ParticipantsTest, SeeTheScenesOfTheEdge) {
+  const auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  TestPeer peer(edge->server);
+  peer.join("small");
+  v1::ClientMessage list;
+  list.set_request_id(9);
+  list.mutable_list_scenes();
+  peer.send(list);
+  const auto answer = peer.readUntil(v1::ServerMessage::kListScenes);
+  EXPECT_EQ(answer.request_id(), 9u);
+  ASSERT_EQ(answer.list_scenes().scenes_size(), 1);  // not "other", which the origin has, too
+  EXPECT_EQ(answer.list_scenes().scenes(0).name(), "small");
+}
+
 TEST_F(ParticipantsTest, ALostEdgeKeepsThePlaceOfItsParticipants) {
   const auto origin = startOrigin();
   auto edge = startEdge("small");
