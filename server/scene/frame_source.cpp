@@ -12,7 +12,6 @@ std::shared_ptr<RemoteSession> FrameSource::connect(const RemotePeer& /*peer*/,
   return nullptr;
 }
 
-
 delivery::SharedBytes playbackMessage(const FrameSource& source) {
   std::optional<v1::Playback> playback = source.playback();
   if (!playback) return nullptr;

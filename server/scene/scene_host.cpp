@@ -108,8 +108,7 @@ void SceneHost::saveLast() {
 }
 
 std::optional<Checkpoint> SceneHost::stateNow() {
-  if (recovery_ != Recovery::none)
-    throw std::runtime_error("its newest state is not valid; try again later");
+  if (recovery_ != Recovery::none) throw std::runtime_error("its newest state is not valid; try again later");
   if (tick_ == 0) return std::nullopt;
   readState();
   return checkpoint();

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using tests::eventually;
 using tests::TestPeer;
 
-class ParticipantsTest : public tests::FleetTest {
+class EdgeParticipantsTest : public tests::FleetTest {
  protected:
   static v1::ParameterChange windOf(float x) {
     v1::ParameterChange change;
@@ -38,7 +38,7 @@ class ParticipantsTest : public tests::FleetTest {
   }
 };
 
-TEST_F(ParticipantsTest, TakePartAsAtTheOrigin) {
+TEST_F(EdgeParticipantsTest, TakePartAsAtTheOrigin) {
   const auto origin = startOrigin();
   const auto edge = startEdge("small");
   TestPeer direct(origin->server), peer(edge->server);
@@ -68,7 +68,7 @@ TEST_F(ParticipantsTest, TakePartAsAtTheOrigin) {
   EXPECT_EQ(left.presence().reason(), v1::LEAVE_REASON_LEFT);
 }
 
-TEST_F(ParticipantsTest, ErrorsAreThoseOfTheOrigin) {
+TEST_F(EdgeParticipantsTest, ErrorsAreThoseOfTheOrigin) {
   const auto origin = startOrigin();
   const auto edge = startEdge("small");
   TestPeer owner(origin->server), peer(edge->server);
@@ -84,7 +84,7 @@ TEST_F(ParticipantsTest, ErrorsAreThoseOfTheOrigin) {
   EXPECT_EQ(last.error().code(), v1::ERROR_CODE_REMOVED);
 }
 
-TEST_F(ParticipantsTest, AFullSceneIsWatched) {
+TEST_F(EdgeParticipantsTest, AFullSceneIsWatched) {
   hosting::ServerOptions few = options();
   few.maxParticipants = 1;
   OriginServer origin(natsOptions(), few);
@@ -100,7 +100,7 @@ TEST_F(ParticipantsTest, AFullSceneIsWatched) {
 }
 
 // A ban at the origin holds for viewers of an edge, too.
-TEST_F(ParticipantsTest, BansOfTheOriginHoldOnEdges) {
+TEST_F(EdgeParticipantsTest, BansOfTheOriginHoldOnEdges) {
   const auto origin = startOrigin();
   const auto edge = startEdge("small");
   const scene::Subject subject{.tenant = "theatre", .name = "anna"};
@@ -113,7 +113,7 @@ TEST_F(ParticipantsTest, BansOfTheOriginHoldOnEdges) {
 }
 
 // Every change arrives once, in order, although NATS loses its connections in between.
-TEST_F(ParticipantsTest, InputsArriveInOrderAndOnceAfterNatsWasLost) {
+TEST_F(EdgeParticipantsTest, InputsArriveInOrderAndOnceAfterNatsWasLost) {
   const auto origin = startOrigin();
   const auto edge = startEdge("small");
   TestPeer direct(origin->server), peer(edge->server);
@@ -136,7 +136,7 @@ TEST_F(ParticipantsTest, InputsArriveInOrderAndOnceAfterNatsWasLost) {
 }
 
 // Clients leave a server that does not answer pings.
-TEST_F(ParticipantsTest, StayConnectedWhileNatsIsLost) {
+TEST_F(EdgeParticipantsTest, StayConnectedWhileNatsIsLost) {
   const auto origin = startOrigin();
   const auto edge = startEdge("small");
   TestPeer peer(edge->server);
@@ -160,7 +160,7 @@ TEST_F(ParticipantsTest, StayConnectedWhileNatsIsLost) {
   EXPECT_GT(ping().server_time_us(), pong.server_time_us());
 }
 
-TEST_F(ParticipantsTest, SeeTheScenesOfTheEdge) {
+TEST_F(EdgeParticipantsTest, SeeTheScenesOfTheEdge) {
   const auto origin = startOrigin();
   const auto edge = startEdge("small");
   TestPeer peer(edge->server);
@@ -175,7 +175,7 @@ TEST_F(ParticipantsTest, SeeTheScenesOfTheEdge) {
   EXPECT_EQ(answer.list_scenes().scenes(0).name(), "small");
 }
 
-TEST_F(ParticipantsTest, ALostEdgeKeepsThePlaceOfItsParticipants) {
+TEST_F(EdgeParticipantsTest, ALostEdgeKeepsThePlaceOfItsParticipants) {
   const auto origin = startOrigin();
   auto edge = startEdge("small");
   v1::Hello hello;
@@ -193,7 +193,7 @@ TEST_F(ParticipantsTest, ALostEdgeKeepsThePlaceOfItsParticipants) {
   EXPECT_TRUE(again.welcome().resumed());
 }
 
-TEST_F(ParticipantsTest, AnOriginThatIsLostCutsThemOff) {
+TEST_F(EdgeParticipantsTest, AnOriginThatIsLostCutsThemOff) {
   auto origin = startOrigin();
   const auto edge = startEdge("small");
   TestPeer peer(edge->server);
