@@ -204,7 +204,8 @@ v1::ServerEntry Directory::selfNow() const {
   const scene::Budget::Usage usage = state.budget->usage();
   now.set_load(usage.load);
   now.set_max_load(usage.load + usage.freeLoad);
-  now.set_max_created_scenes(state.options.maxCreatedScenes);
+  // A server that plays a recording has no device.
+  now.set_max_created_scenes(state.device.info().name.empty() ? 0 : state.options.maxCreatedScenes);
   const std::lock_guard lock(mutex_);
   now.set_stopping(leaves_);
   return now;

@@ -50,10 +50,17 @@ SCENE = {
 MOVING = {
     **SCENE,
     "name": "moving",
-    "simulationRate": 30,
     "streamRate": 30,
-    "substeps": 10,
-    "cloths": [{**SCENE["cloths"][0], "grid": {**SCENE["cloths"][0]["grid"], "rows": 100, "columns": 100}}],
+    "substeps": 12,
+    "cloths": [
+        {
+            **SCENE["cloths"][0],
+            "mass": 2,
+            "structural": {"stiffness": 5, "damping": 0.01},
+            "shear": {"stiffness": 1, "damping": 0.002},
+            "grid": {**SCENE["cloths"][0]["grid"], "rows": 100, "columns": 100},
+        }
+    ],
 }
 MOVES = 6
 
