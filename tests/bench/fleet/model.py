@@ -14,8 +14,8 @@ import random
 
 # Measured: processor time of an edge for one frame to one viewer by WebSocket, s.
 EDGE_FRAME = 15e-6
-# Measured: processor time of nats-server for one message that it sends, s.
-NATS_MESSAGE = 12e-6
+# Measured by fleet.py: processor time of nats-server for one frame that it sends to an edge, s.
+NATS_MESSAGE = 71e-6
 # Part of a processor and of a network card that is used, so that bursts have room.
 USED = 0.6
 # A network card, bit/s.
