@@ -23,7 +23,7 @@
 
 namespace clothstream::fleet {
 
-// What a stream needs of its edge. References must outlive it.
+// Parts of an edge that its streams use. References must outlive the streams.
 struct EdgeContext {
   Nats& nats;
   hosting::SceneServer& server;

@@ -32,9 +32,9 @@ struct OriginOptions {
   std::uint32_t version = 0;
 };
 
-// Offered are the default scene, scenes from files, created scenes and a recording that is played, but
-// neither the other built-in scenes, which every server has, nor recordings in lockstep, nor scenes whose
-// name another server has in the directory.
+// It offers the default scene, scenes from files, created scenes and a recording that is played. It does not
+// offer the other built-in scenes, which every server has, recordings in lockstep, and scenes whose name
+// another server has in the directory.
 //
 // A scene that a client created moves while it runs: the other server loads it, this one stops it after a
 // tick and sends its state, and the other one continues with the next tick. Edges and the participants there
