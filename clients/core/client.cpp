@@ -91,6 +91,7 @@ void Client::connecting(std::uint64_t nowUs) {
   forgetRequests();
   assembly_ = {};
   keyFrameRequest_ = {};
+  nextServer_.clear();
   ++hello_.attempt;
   connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.graceMs);
   sendHello();
@@ -136,6 +137,8 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
       return errorReceived(message->body, message->requestId, nowUs);
     case Body::tickEvents:
       return eventsReceived(message->body);
+    case Body::moving:
+      return movingReceived(message->body);
     case Body::presence:
       return presenceReceived(message->body, nowUs);
     case Body::listScenes:
@@ -446,6 +449,14 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::ui
   errorText_ = std::move(error->text);
   errorServer_ = std::move(error->server);
   return isRedirect ? 0 : CS_EVENT_ERROR;
+}
+
+std::uint32_t Client::movingReceived(Bytes body) {
+  std::optional<std::string> server = readMoving(body);
+  if (!server) return failMalformed("Moving");
+  if (!follows_ || server->empty() || *server == connectServer()) return 0;
+  nextServer_ = std::move(*server);
+  return CS_EVENT_MOVING;
 }
 
 bool Client::isTemporary(const ServerError& error) const {

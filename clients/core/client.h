@@ -45,6 +45,7 @@ class Client {
   std::uint64_t connectAtUs() const;
   // DNS name for the next connection. Empty: the address that the program was given.
   const std::string& connectServer() const { return redirection_.server(); }
+  const std::string& nextServer() const { return nextServer_; }
   const std::string* nextOutgoing();
 
   // Used from the next connection on; also for the current one while its Hello waits. A token replaces a
@@ -179,6 +180,7 @@ class Client {
   std::uint32_t noticeReceived(Bytes body);
   std::uint32_t parametersReceived(Bytes body);
   std::uint32_t errorReceived(Bytes body, std::uint64_t requestId, std::uint64_t nowUs);
+  std::uint32_t movingReceived(Bytes body);
   // Whether the error only ends the connection, so that the client may try again.
   bool isTemporary(const ServerError& error) const;
   std::uint32_t scenesReceived(Bytes body);
@@ -208,6 +210,7 @@ class Client {
   bool follows_ = false;  // the program can connect to another server
   std::uint32_t errorCode_ = 0;
   std::string errorText_, errorServer_;
+  std::string nextServer_;  // to which the scene moves soon; empty: none
   Notice notice_;
   Proof proof_;
   Proof renewing_;           // sent by renew(), not yet accepted; empty without one

@@ -81,7 +81,8 @@ enum {
   CS_EVENT_PLAYBACK = 4096,      /* cs_get_playback */
   CS_EVENT_TOKEN = 8192,         /* pairing has given a token: keep cs_token */
   CS_EVENT_PAIRING_CODE = 16384, /* cs_get_pairing_code */
-  CS_EVENT_ANSWER = 32768        /* cs_get_answer: a request about scenes succeeded or failed */
+  CS_EVENT_ANSWER = 32768,       /* cs_get_answer: a request about scenes succeeded or failed */
+  CS_EVENT_MOVING = 65536        /* cs_next_server: the scene moves there soon */
 };
 
 /* Values of cs_error_code after which the program asks its user for a token or a pairing code. */
@@ -186,6 +187,11 @@ void cs_follow_redirects(cs_client* client, int on) CS_NOEXCEPT;
  * joined stream in between. The next one, and a NOT_FOUND that names the present server, lead to
  * CS_STATE_FAILED. */
 const char* cs_connect_server(const cs_client* client) CS_NOEXCEPT;
+/* Returns the DNS name of the server to which the scene moves soon, of the newest CS_EVENT_MOVING on this
+ * connection; "" if there was none. Reported with cs_follow_redirects(client, 1) only. The program may open a
+ * connection there as for cs_connect_server, send nothing on it, and use it when cs_connect_server returns
+ * this name. */
+const char* cs_next_server(const cs_client* client) CS_NOEXCEPT;
 /* Returns 1 if the last Welcome resumed the participant of this client, or of the one before it
  * (cs_set_resume_token), else 0. */
 int cs_resumed(const cs_client* client) CS_NOEXCEPT;

@@ -133,6 +133,10 @@ const char* cs_connect_server(const cs_client* client) noexcept {
   return client->client.connectServer().c_str();
 }
 
+const char* cs_next_server(const cs_client* client) noexcept {
+  return client->client.nextServer().c_str();
+}
+
 int cs_resumed(const cs_client* client) noexcept {
   return client->client.resumed() ? 1 : 0;
 }

@@ -42,10 +42,16 @@ class GrpcTransport final : public Transport {
 
   void connect(const std::string& server) override {
     current_ = address_.at(server);
-    call_.emplace(current_);
+    call_.emplace(prepared_ && prepared_->server == server ? std::move(prepared_->channel)
+                                                           : makeChannel(current_));
+    prepared_.reset();
     call_->stream = call_->stub.PrepareCall(&call_->context, kJoinMethod, &queue_);
     ++call_->underway;
     call_->stream->StartCall(tagOf(kStarted));
+  }
+  void prepare(const std::string& server) override {
+    prepared_ = {server, makeChannel(address_.at(server))};
+    prepared_->channel->GetState(true);  // begins to connect
   }
   bool active() const override { return call_ && (call_->underway > 0 || call_->received); }
   bool hasOpened() const override { return call_ && call_->started; }
@@ -97,7 +103,7 @@ class GrpcTransport final : public Transport {
  private:
   // State of one connection.
   struct Call {
-    explicit Call(const ServerAddress& address) : stub(makeChannel(address)) {}
+    explicit Call(std::shared_ptr<grpc::Channel> channel) : stub(std::move(channel)) {}
 
     grpc::GenericStub stub;
     grpc::ClientContext context;
@@ -107,6 +113,11 @@ class GrpcTransport final : public Transport {
     int underway = 0;  // operations
     bool started = false, received = false, writing = false, broken = false, halfClosed = false,
          finishing = false;
+  };
+
+  struct Prepared {
+    std::string server;
+    std::shared_ptr<grpc::Channel> channel;
   };
 
   void completed(Operation operation, bool ok) {
@@ -151,6 +162,7 @@ class GrpcTransport final : public Transport {
   grpc::Alarm alarm_;
   std::atomic<bool> wakeUnderway_{false};
   std::optional<Call> call_;
+  std::optional<Prepared> prepared_;
   grpc::Slice message_;
 };
 

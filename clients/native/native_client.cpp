@@ -200,6 +200,7 @@ class NativeClient::Stream {
     const std::uint32_t events =
         cs_receive(core_.get(), reinterpret_cast<const std::uint8_t*>(message.data()), message.size(),
                    NativeClient::nowUs());
+    if ((events & CS_EVENT_MOVING) != 0) transport_->prepare(cs_next_server(core_.get()));
     if (events != 0) announce(events);
   }
 

@@ -27,6 +27,9 @@ class Transport {
   // name in place of the host of that address; empty: the address as it is. With TLS, the certificate is
   // checked against this name.
   virtual void connect(const std::string& server) = 0;
+  // Starts to open a connection for a later connect() with this name. Failures are not reported: connect()
+  // then opens another one.
+  virtual void prepare(const std::string& server) = 0;
   // Whether the connection is opening, open or closing. False before the first connect().
   virtual bool active() const = 0;
   // Whether the newest connection has opened. Stays true after its end.

@@ -3,6 +3,9 @@
 #include "clients/websocket/web_socket_transport.h"
 
 #include <atomic>
+#include <functional>
+#include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -22,34 +25,102 @@ std::string inBrackets(const std::string& text) {
   return text.empty() ? text : " (" + text + ")";
 }
 
-class WebSocketTransport final : public Transport, private WebSocketListener {
+// A connection and what has happened on it.
+class Link final : private WebSocketListener {
  public:
-  explicit WebSocketTransport(const ServerAddress& address)
-      : address_(address), current_(address), work_(net::make_work_guard(io_)), connector_(io_, address) {}
+  // `onEvent` is called, on the thread of the io_context, after each event.
+  Link(WebSocketConnector& connector, std::string server, std::function<void()> onEvent)
+      : server_(std::move(server)), onEvent_(std::move(onEvent)), connection_(connector.open(*this)) {}
 
-  void connect(const std::string& server) override {
-    end_.reset();
-    message_.reset();
-    open_ = opened_ = writing_ = leaving_ = false;
-    current_ = address_.at(server);
-    connection_.reset();
-    connector_.goTo(current_);
-    connection_ = connector_.open(*this);
-  }
-  bool active() const override { return connection_ && (!end_ || message_); }
-  bool hasOpened() const override { return opened_; }
-  bool canWrite() const override { return open_ && !writing_ && !leaving_; }
+  const std::string& server() const { return server_; }
+  const std::optional<WebSocketEnd>& end() const { return end_; }
+  bool hasOpened() const { return opened_; }
+  bool canWrite() const { return opened_ && !end_ && !writing_ && !leaving_; }
+  bool hasMessage() const { return message_.has_value(); }
 
-  void write(std::span<const std::byte> message) override {
+  void write(std::span<const std::byte> message) {
     writing_ = true;
     connection_->write({reinterpret_cast<const char*>(message.data()), message.size()});
   }
-  void leave() override {
+  void leave() {
     if (!canWrite()) return;
     leaving_ = true;
     connection_->close();
   }
-  void cancel() override { connection_->cancel(); }
+  void cancel() { connection_->cancel(); }
+  std::optional<std::span<const std::byte>> receive() {
+    if (message_ && !end_) connection_->read();
+    return std::exchange(message_, std::nullopt);
+  }
+
+ private:
+  void opened() override {
+    opened_ = true;
+    connection_->read();
+    onEvent_();
+  }
+  void received(std::span<const std::byte> message) override {
+    message_ = message;
+    onEvent_();
+  }
+  void written() override {
+    writing_ = false;
+    onEvent_();
+  }
+  void ended(const WebSocketEnd& end) override {
+    end_ = end;
+    onEvent_();
+  }
+
+  const std::string server_;
+  const std::function<void()> onEvent_;
+  std::optional<WebSocketEnd> end_;
+  std::optional<std::span<const std::byte>> message_;
+  bool opened_ = false, writing_ = false, leaving_ = false;
+  std::unique_ptr<WebSocketConnection> connection_;
+};
+
+class WebSocketTransport final : public Transport {
+ public:
+  explicit WebSocketTransport(const ServerAddress& address)
+      : address_(address),
+        current_(address),
+        work_(net::make_work_guard(io_)),
+        connector_(std::make_unique<WebSocketConnector>(io_, address)) {}
+
+  void connect(const std::string& server) override {
+    current_ = address_.at(server);
+    if (prepared_ && !prepared_->end() && prepared_->server() == server) {
+      link_ = std::move(prepared_);
+      std::swap(connector_, spare_);
+      return wake();  // it may be open already
+    }
+    if (prepared_ && !prepared_->end()) prepared_->cancel();
+    link_.reset();
+    connector_->goTo(current_);
+    link_ = makeLink(*connector_, server);
+  }
+  // Does nothing while the connection prepared before ends.
+  void prepare(const std::string& server) override {
+    if (prepared_ && !prepared_->end()) {
+      if (prepared_->server() != server) prepared_->cancel();
+      return;
+    }
+    prepared_.reset();
+    try {
+      if (!spare_) spare_ = std::make_unique<WebSocketConnector>(io_, address_);
+    } catch (const std::invalid_argument&) {
+      return;  // the file of authorities is gone; the first connector has read it
+    }
+    spare_->goTo(address_.at(server));
+    prepared_ = makeLink(*spare_, server);
+  }
+  bool active() const override { return link_ && (!link_->end() || link_->hasMessage()); }
+  bool hasOpened() const override { return link_ && link_->hasOpened(); }
+  bool canWrite() const override { return link_ && link_->canWrite(); }
+  void write(std::span<const std::byte> message) override { link_->write(message); }
+  void leave() override { link_->leave(); }
+  void cancel() override { link_->cancel(); }
 
   void wait(std::chrono::steady_clock::duration atMost) override {
     const auto end = std::chrono::steady_clock::now() + atMost;
@@ -60,8 +131,7 @@ class WebSocketTransport final : public Transport, private WebSocketListener {
   }
 
   std::optional<std::span<const std::byte>> receive() override {
-    if (message_ && !end_) connection_->read();
-    return std::exchange(message_, std::nullopt);
+    return link_ ? link_->receive() : std::nullopt;
   }
 
   // At most one handler is posted.
@@ -73,27 +143,13 @@ class WebSocketTransport final : public Transport, private WebSocketListener {
     });
   }
 
-  bool endedByServer() const override { return end_ && end_->byServer; }
+  bool endedByServer() const override { return link_ && link_->end() && link_->end()->byServer; }
   Failure notJoined() const override;
   Failure lost() const override;
 
  private:
-  void opened() override {
-    open_ = opened_ = happened_ = true;
-    connection_->read();
-  }
-  void received(std::span<const std::byte> message) override {
-    message_ = message;
-    happened_ = true;
-  }
-  void written() override {
-    writing_ = false;
-    happened_ = true;
-  }
-  void ended(const WebSocketEnd& end) override {
-    end_ = end;
-    open_ = false;
-    happened_ = true;
+  std::unique_ptr<Link> makeLink(WebSocketConnector& connector, const std::string& server) {
+    return std::make_unique<Link>(connector, server, [this] { happened_ = true; });
   }
 
   Failure notTrusted() const;
@@ -104,32 +160,31 @@ class WebSocketTransport final : public Transport, private WebSocketListener {
   net::io_context io_;
   net::executor_work_guard<net::io_context::executor_type> work_;
   std::atomic<bool> woken_{false};
-  WebSocketConnector connector_;
-  std::unique_ptr<WebSocketConnection> connection_;  // the newest
-  std::optional<WebSocketEnd> end_;                  // of the newest connection
-  std::optional<std::span<const std::byte>> message_;
-  bool open_ = false, opened_ = false, writing_ = false, leaving_ = false, happened_ = false;
+  std::unique_ptr<WebSocketConnector> connector_, spare_;  // of link_ and of prepared_
+  std::unique_ptr<Link> link_;                             // the newest
+  std::unique_ptr<Link> prepared_;
+  bool happened_ = false;
 };
 
 Failure WebSocketTransport::notTrusted() const {
   const std::string text = "The server at " + current_.address + " is not the one expected: ";
   if (!current_.fingerprint.empty())
-    return {Failure::Kind::refused, text + "it has the fingerprint " + end_->shownKey +
+    return {Failure::Kind::refused, text + "it has the fingerprint " + link_->end()->shownKey +
                                         ". If this is right, use it; otherwise another server answers."};
   return {Failure::Kind::refused, text + "no known authority has signed its certificate for this name" +
-                                      inBrackets(end_->why) +
+                                      inBrackets(link_->end()->why) +
                                       ". Use the file of the authority that has, or the fingerprint of the "
                                       "server's key. This server shows the fingerprint " +
-                                      end_->shownKey + "."};
+                                      link_->end()->shownKey + "."};
 }
 
 Failure WebSocketTransport::notUpgraded() const {
-  const std::string status = std::to_string(end_->httpStatus);
-  if (end_->httpStatus != 0 && end_->isOurs)
+  const std::string status = std::to_string(link_->end()->httpStatus);
+  if (link_->end()->httpStatus != 0 && link_->end()->isOurs)
     return {Failure::Kind::refused,
-            "The server at " + current_.address + " refuses: " + end_->why + " (HTTP status " + status + ")"};
+            "The server at " + current_.address + " refuses: " + link_->end()->why + " (HTTP status " + status + ")"};
   const std::string answer =
-      end_->httpStatus != 0 ? "HTTP status " + status + inBrackets(end_->why) : end_->why;
+      link_->end()->httpStatus != 0 ? "HTTP status " + status + inBrackets(link_->end()->why) : link_->end()->why;
   return {Failure::Kind::refused,
           "No clothstream-server of this release answers at " + current_.address + ", but something else: " +
               answer + ". Use the port of the server's page (--port, default 8080), and " +
@@ -138,34 +193,34 @@ Failure WebSocketTransport::notUpgraded() const {
 
 Failure WebSocketTransport::notJoined() const {
   using Kind = Failure::Kind;
-  switch (end_->stage) {
+  switch (link_->end()->stage) {
     case Stage::lookup:
       return {Kind::unreachable, "The name in the address " + current_.address + " is not known" +
-                                     inBrackets(end_->why) + ": check it, and the network."};
+                                     inBrackets(link_->end()->why) + ": check it, and the network."};
     case Stage::connect:
       return {Kind::unreachable, "No server answers at " + current_.address +
-                                     ": is clothstream-server running there?" + inBrackets(end_->why)};
+                                     ": is clothstream-server running there?" + inBrackets(link_->end()->why)};
     case Stage::tls:
-      if (end_->untrusted) return notTrusted();
+      if (link_->end()->untrusted) return notTrusted();
       return {Kind::refused, "The server at " + current_.address + " does not answer with TLS" +
-                                 inBrackets(end_->why) + ". Use ws:// if it has no TLS."};
+                                 inBrackets(link_->end()->why) + ". Use ws:// if it has no TLS."};
     case Stage::upgrade:
       return notUpgraded();
     case Stage::open:
       break;
   }
-  if (end_->byServer && !end_->why.empty())
-    return {Kind::refused, "The server at " + current_.address + " refuses: " + end_->why};
+  if (link_->end()->byServer && !link_->end()->why.empty())
+    return {Kind::refused, "The server at " + current_.address + " refuses: " + link_->end()->why};
   return {Kind::unreachable, "The server at " + current_.address +
                                  " ended the stream before the scene was described" +
-                                 inBrackets(end_->byServer ? "" : end_->why) + "."};
+                                 inBrackets(link_->end()->byServer ? "" : link_->end()->why) + "."};
 }
 
 Failure WebSocketTransport::lost() const {
-  if (end_->byServer && end_->why.empty())
+  if (link_->end()->byServer && link_->end()->why.empty())
     return {Failure::Kind::lost, "The server at " + current_.address + " ended the stream."};
   return {Failure::Kind::lost,
-          "The stream from " + current_.address + " is lost" + inBrackets(end_->why) + "."};
+          "The stream from " + current_.address + " is lost" + inBrackets(link_->end()->why) + "."};
 }
 
 }  // namespace

@@ -87,6 +87,12 @@ SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_
   return serialise(message);
 }
 
+SharedBytes moving(std::string server) {
+  v1::ServerMessage message;
+  message.mutable_moving()->set_server(std::move(server));
+  return serialise(message);
+}
+
 SharedBytes tooSlow() {
   return error(v1::ERROR_CODE_CUT_OFF,
                "the client is too slow: read the answers of the server, or send fewer requests", true);

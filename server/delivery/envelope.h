@@ -33,6 +33,9 @@ SharedBytes parametersChanged(v1::ParameterChange change, std::uint64_t tick, st
 SharedBytes error(v1::ErrorCode code, std::string text, bool fatal, std::uint64_t requestId = 0,
                   std::string server = {});
 
+// The scene moves to this server soon (Moving).
+SharedBytes moving(std::string server);
+
 // Last message to a peer that does not read its messages. The peer may reconnect.
 SharedBytes tooSlow();
 

@@ -61,7 +61,11 @@ class Mailbox {
 
   // `wake` is called, from any thread, when next() may have something or closed() became true. It must not
   // block.
-  explicit Mailbox(std::function<void()> wake) : wake_(std::move(wake)) {}
+  // `atEdge`: the peer is connected to an edge, and not to this server.
+  explicit Mailbox(std::function<void()> wake, bool atEdge = false)
+      : atEdge_(atEdge), wake_(std::move(wake)) {}
+
+  bool atEdge() const { return atEdge_; }
 
   // Queues an answer to this peer. Returns false if there is no room: the peer sends requests and does not
   // read the answers.
@@ -144,6 +148,7 @@ class Mailbox {
   void dropHeld(std::uint8_t layer);
   void countDropped(std::size_t frames);
 
+  const bool atEdge_;
   mutable std::mutex mutex_;
   bool closed_ = false;
   bool endpointWaits_ = false;  // next() returned nothing, and nothing has arrived since

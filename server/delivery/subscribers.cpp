@@ -77,6 +77,18 @@ void Subscribers::announce(const SharedBytes& message) {
   for (const Subscriber& receiver : receivers) receiver.mailbox->announce(message, merges);
 }
 
+std::size_t Subscribers::announceHere(const SharedBytes& message) {
+  std::vector<Subscriber> receivers;
+  {
+    const std::lock_guard lock(mutex_);
+    receivers = subscribers_;
+  }
+  std::erase_if(receivers, [](const Subscriber& receiver) { return receiver.mailbox->atEdge(); });
+  SharedMerges merges;
+  for (const Subscriber& receiver : receivers) receiver.mailbox->announce(message, merges);
+  return receivers.size();
+}
+
 void Subscribers::closeAll(const SharedBytes& last) {
   // One at a time: if a call throws, for example for a lack of memory, a second call closes the others.
   for (;;) {

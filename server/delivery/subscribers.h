@@ -44,6 +44,8 @@ class Subscribers {
   void publishAgain(std::span<const PublishedFrame> frames);
   // Sends the message to every subscriber. A subscriber that does not read gets it merged with others.
   void announce(const SharedBytes& message);
+  // Sends the message to the subscribers that are connected to this server, and returns how many there are.
+  std::size_t announceHere(const SharedBytes& message);
   // Closes every mailbox with this last message, and removes them all.
   void closeAll(const SharedBytes& last);
   // Frames that all subscribers together request. Call it whenever a frame is made.

@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "server/events/event.h"
 
-#include <fmt/chrono.h>
 #include <nlohmann/json.hpp>
+
+#include "proto/text/utc_time.h"
 
 namespace clothstream::events {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// RFC 3339 in UTC with milliseconds.
-std::string toText(std::chrono::system_clock::time_point time) {
-  const auto milliseconds = std::chrono::floor<std::chrono::milliseconds>(time);
-  const auto seconds = std::chrono::floor<std::chrono::seconds>(milliseconds);
-  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z",
-                     fmt::gmtime(std::chrono::system_clock::to_time_t(seconds)),
-                     (milliseconds - seconds).count());
-}
 
 // Joined or Left.
 template <class Visit>
@@ -54,7 +46,7 @@ std::string toJson(const Event& event, const std::string& server) {
   Json data{{"server", server}, {"scene", event.scene}, {"tenant", event.tenant}};
   std::visit([&](const auto& what) { add(data, what); }, event.what);
   const char* const type = std::visit([](const auto& what) { return typeOf(what); }, event.what);
-  const Json body{{"type", type}, {"timestamp", toText(event.time)}, {"data", std::move(data)}};
+  const Json body{{"type", type}, {"timestamp", utcTime(event.time)}, {"data", std::move(data)}};
   // Invalid UTF-8 is replaced.
   return body.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -34,6 +34,8 @@ constexpr auto kLoadTime = 120s;
 constexpr auto kStartTime = 10s;
 // Edges learn about a prepared scene within this time.
 constexpr auto kEdgeTime = 150ms;
+// Clients of this server have this time to connect to the other one before the scene stops here.
+constexpr auto kConnectTime = 300ms;
 // Interval of attempts to learn which of two servers has a scene.
 constexpr auto kDecidePeriod = 500ms;
 constexpr auto kFlushTime = 2s;
@@ -329,6 +331,9 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
   if (!prepared) return refused("the other server does not answer");
   if (!prepared->has_prepared())
     return refused(fmt::format("the other server says: {}", prepared->refused()));
+  if (!known->public_name().empty() &&
+      scene->subscribers.announceHere(delivery::moving(known->public_name())) > 0)
+    std::this_thread::sleep_for(kConnectTime);
 
   Clock::time_point stopped{};
   if (const std::string why = handOver(talk, *stream, to, stopped); !why.empty()) {

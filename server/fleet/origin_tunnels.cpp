@@ -107,7 +107,8 @@ std::shared_ptr<OriginTunnels::Tunnel> OriginTunnels::open(const Key& key, const
                              {.peer = fmt::format("{} at an edge", request.peer()),
                               .address = request.address().empty() ? kEdgeAddress : request.address(),
                               .token = request.token(),
-                              .continues = request.has_continues()},
+                              .continues = request.has_continues(),
+                              .atEdge = true},
                              [this, key] { wake(key); });
   if (request.has_continues()) {
     v1::ClientMessage hello;

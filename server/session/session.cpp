@@ -36,7 +36,7 @@ Session::Session(hosting::SceneServer::State& server, Arrival arrival, std::func
       peer_(std::move(arrival.peer)),
       address_(std::move(arrival.address)),
       continues_(arrival.continues),
-      mailbox_(std::make_shared<Mailbox>(std::move(wake))),
+      mailbox_(std::make_shared<Mailbox>(std::move(wake), arrival.atEdge)),
       opened_(Clock::now()),
       lastHeard_(opened_),
       upload_(server.uploads, address_),

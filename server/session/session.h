@@ -53,6 +53,8 @@ struct Arrival {
   // The peer had a session with another server, which had the scene before. Its Hello must name a participant
   // of the scene. It gets no Welcome and no description, because it has both.
   bool continues = false;
+  // The peer is connected to an edge, and not to this server.
+  bool atEdge = false;
 };
 
 // Thread-safe. An endpoint opens one for each peer, feeds it what arrives, and writes what next() returns,

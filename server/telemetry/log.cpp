@@ -11,13 +11,13 @@
 #include <string>
 #include <utility>
 
-#include <fmt/chrono.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "proto/text/printable.h"
+#include "proto/text/utc_time.h"
 
 namespace clothstream::telemetry {
 namespace {
@@ -42,20 +42,11 @@ class PrintableText final : public spdlog::custom_flag_formatter {
   }
 };
 
-// RFC 3339 in UTC with milliseconds, such as 2026-11-23T20:15:00.125Z.
-std::string toText(std::chrono::system_clock::time_point time) {
-  const auto milliseconds = std::chrono::floor<std::chrono::milliseconds>(time);
-  const auto seconds = std::chrono::floor<std::chrono::seconds>(milliseconds);
-  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z",
-                     fmt::gmtime(std::chrono::system_clock::to_time_t(seconds)),
-                     (milliseconds - seconds).count());
-}
-
 class JsonLine final : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
     const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);
-    nlohmann::ordered_json object{{"time", toText(message.time)},
+    nlohmann::ordered_json object{{"time", utcTime(message.time)},
                                   {"level", std::string(level.data(), level.size())},
                                   {"message", printable({message.payload.data(), message.payload.size()})}};
     if (!subjectOfThread.scene.empty()) object["scene"] = printable(subjectOfThread.scene);

@@ -20,6 +20,11 @@ class Redirect : public ::testing::Test {
   std::uint32_t refuse(const std::string& name, v1::ErrorCode code = v1::ERROR_CODE_NOT_FOUND) {
     return client.receive(ScriptedServer::error(code, "the scene is elsewhere", true, name), now);
   }
+  std::uint32_t announceMove(const std::string& name) {
+    v1::ServerMessage message;
+    message.mutable_moving()->set_server(name);
+    return client.receive(message.SerializeAsString(), now);
+  }
   // The transport opens a connection, after it has closed the one before.
   void connect() {
     cs_connecting(client.get(), now);
@@ -134,6 +139,24 @@ TEST_F(Redirect, ReturnsWithTheResumeTokenAfterCutOff) {
   EXPECT_EQ(client.outgoing().at(0).hello().resume_token(), "0123456789abcdef");
   join();
   EXPECT_EQ(state(), CS_STATE_JOINED);
+}
+
+TEST_F(Redirect, ReportsWhereTheSceneMovesSoon) {
+  join();
+  EXPECT_EQ(announceMove("b.example"), std::uint32_t{CS_EVENT_MOVING});
+  EXPECT_STREQ(cs_next_server(client.get()), "b.example");
+  EXPECT_THAT(next(), IsEmpty()) << "it has not moved yet";
+  EXPECT_EQ(state(), CS_STATE_JOINED);
+  EXPECT_EQ(refuse("b.example", v1::ERROR_CODE_CUT_OFF), 0u);
+  EXPECT_EQ(next(), "b.example");
+  connect();
+  EXPECT_STREQ(cs_next_server(client.get()), "") << "of the connection before";
+  join();
+  EXPECT_EQ(announceMove("b.example"), 0u) << "it is there already";
+  EXPECT_EQ(announceMove("192.0.2.1"), 0u) << "no DNS name";
+  cs_follow_redirects(client.get(), 0);
+  EXPECT_EQ(announceMove("c.example"), 0u);
+  EXPECT_STREQ(cs_next_server(client.get()), "");
 }
 
 TEST_F(Redirect, IsIgnoredByDefault) {

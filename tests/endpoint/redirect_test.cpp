@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Native clients at two servers on one port: the first one, 127.0.0.2, names the second one, localhost.
 #include <atomic>
+#include <fstream>
 #include <memory>
+#include <set>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,9 +29,11 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 
 constexpr const char* kFirst = "127.0.0.2";
+constexpr const char* kFirstInHexadecimal = "0200007F";  // in /proc/net/tcp
 constexpr const char* kSecond = "localhost";
 
 // The second server is that of the fixture. The first one has only the scene "small".
@@ -106,6 +112,22 @@ class Redirects : public SmallServer, public ::testing::WithParamInterface<Endpo
     return eventually([&] { return frames_ >= wanted; });
   }
 
+  // Addresses of the clients with a TCP connection to the second server, as in /proc/net/tcp.
+  std::set<std::string> clientsOfSecond() const {
+    std::set<std::string> clients;
+    for (const char* table : {"/proc/net/tcp", "/proc/net/tcp6"}) {
+      std::ifstream file(table);
+      std::string line, number, local, remote, state;
+      std::getline(file, line);
+      while (std::getline(file, line) && std::istringstream(line) >> number >> local >> remote >> state) {
+        const bool isFirst = local.find(kFirstInHexadecimal) != std::string::npos;
+        if (state == "01" && local.ends_with(fmt::format(":{:04X}", port_)) && !isFirst)
+          clients.insert(remote);
+      }
+    }
+    return clients;
+  }
+
   // A certificate with these names. It is the only authority for firstTrusted().
   std::shared_ptr<tls::ServerTls> certificateFor(const std::vector<std::string>& names) const {
     return std::make_shared<tls::ServerTls>(
@@ -160,6 +182,38 @@ TEST_P(Redirects, JoinedClientFollowsCutOff) {
   EXPECT_TRUE(streams());
   EXPECT_EQ(server().state().find("small")->subscribers.size(), 1u);
   EXPECT_FALSE((*joined)->ended());
+}
+
+TEST_P(Redirects, JoinedClientConnectsBeforeTheSceneMoves) {
+  const auto key = certificateFor({kFirst, kSecond});
+  listen(key, key);
+  const auto joined = join(firstTrusted(), "small");
+  ASSERT_TRUE(joined) << joined.error().text;
+  ASSERT_THAT(clientsOfSecond(), IsEmpty());
+  scene::LiveScene& scene = *first_->state().find("small");
+  EXPECT_EQ(scene.subscribers.announceHere(delivery::moving(kSecond)), 1u);
+  ASSERT_TRUE(eventually([&] { return clientsOfSecond().size() == 1; }));
+  const auto prepared = clientsOfSecond();
+  EXPECT_TRUE(streams()) << "the scene is still here";
+  EXPECT_EQ(server().state().find("small")->subscribers.size(), 0u);
+  scene.roster.close(delivery::error(v1::ERROR_CODE_CUT_OFF, "the scene has moved", true, 0, kSecond));
+  EXPECT_TRUE(eventually([&] { return returns_ == 1; }));
+  EXPECT_TRUE(streams());
+  EXPECT_EQ(clientsOfSecond(), prepared) << "by the same connection";
+}
+
+TEST_P(Redirects, PreparedConnectionMayBeOverWhenTheSceneMoves) {
+  listen();
+  const auto joined = join(first(), "small");
+  ASSERT_TRUE(joined) << joined.error().text;
+  scene::LiveScene& scene = *first_->state().find("small");
+  scene.subscribers.announceHere(delivery::moving("nowhere.invalid"));
+  EXPECT_TRUE(streams());
+  scene.subscribers.announceHere(delivery::moving(kSecond));
+  EXPECT_TRUE(streams());
+  scene.roster.close(delivery::error(v1::ERROR_CODE_CUT_OFF, "the scene has moved", true, 0, kSecond));
+  EXPECT_TRUE(eventually([&] { return returns_ == 1; }));
+  EXPECT_TRUE(streams());
 }
 
 TEST_P(Redirects, TokenStaysOnThisMachineWithoutTls) {

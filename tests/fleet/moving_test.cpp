@@ -2,6 +2,7 @@
 // Scenes that move between servers, and scenes of a server that is gone.
 #include <algorithm>
 #include <chrono>
+#include <future>
 #include <map>
 #include <string>
 #include <thread>
@@ -142,7 +143,9 @@ TEST_F(MovingTest, WhoIsConnectedToTheServerIsToldToJoinAgain) {
       eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
   TestPeer direct(first_->server);
   direct.join("moves");
-  ASSERT_THAT(first_->origin->move("moves").error(), IsEmpty());
+  auto moved = std::async(std::launch::async, [&] { return first_->origin->move("moves"); });
+  EXPECT_EQ(direct.readUntil(v1::ServerMessage::kMoving).moving().server(), "second.example.com");
+  ASSERT_THAT(moved.get().error(), IsEmpty());
   const auto last = direct.readToTheEnd();
   EXPECT_EQ(last.error().code(), v1::ERROR_CODE_CUT_OFF);
   EXPECT_THAT(last.error().text(), HasSubstr("second.example.com"));

@@ -393,6 +393,7 @@ struct ServerMessage {
   static constexpr Field kParameterChanged{7, WireType::kBytes};
   static constexpr Field kError{8, WireType::kBytes};
   static constexpr Field kTickEvents{9, WireType::kBytes};
+  static constexpr Field kMoving{10, WireType::kBytes};
   static constexpr Field kListScenes{16, WireType::kBytes};
   static constexpr Field kGetScene{17, WireType::kBytes};
   static constexpr Field kCreateScene{18, WireType::kBytes};
@@ -713,6 +714,9 @@ struct Error {
   static constexpr Field kText{2, WireType::kBytes};
   static constexpr Field kFatal{3, WireType::kVarint};
   static constexpr Field kServer{4, WireType::kBytes};
+};
+struct Moving {
+  static constexpr Field kServer{1, WireType::kBytes};
 };
 struct ListScenesResponse {
   static constexpr Field kScenes{1, WireType::kBytes};

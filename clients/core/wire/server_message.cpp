@@ -93,7 +93,8 @@ Body bodyOf(std::uint32_t tag) {
                               Body::getScene,       Body::createScene,
                               Body::deleteScene,    Body::controlScene,
                               Body::startRecording, Body::stopRecording,
-                              Body::listBans,       Body::liftBan};
+                              Body::listBans,       Body::liftBan,
+                              Body::moving};
   for (const Body body : kKnown) {
     if (tag == bytes(static_cast<std::uint32_t>(body))) return body;
   }
@@ -354,6 +355,14 @@ std::string dnsName(Bytes text) {
 }
 
 }  // namespace
+
+std::optional<std::string> readMoving(Bytes message) {
+  return readMessage<std::string>(message, [](std::string& server, std::uint32_t tag, Reader& reader) {
+    if (tag != field::Moving::kServer.tag) return skip(reader);
+    server = dnsName(reader.get_view());
+    return true;
+  });
+}
 
 std::optional<ServerError> readError(Bytes message) {
   using F = field::Error;

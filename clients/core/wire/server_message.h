@@ -26,6 +26,7 @@ enum class Body : std::uint32_t {
   parameterChanged = field::ServerMessage::kParameterChanged.number,
   error = field::ServerMessage::kError.number,
   tickEvents = field::ServerMessage::kTickEvents.number,
+  moving = field::ServerMessage::kMoving.number,
   listScenes = field::ServerMessage::kListScenes.number,
   presence = field::ServerMessage::kPresence.number,
   playback = field::ServerMessage::kPlayback.number,
@@ -164,6 +165,8 @@ struct TickEvents {
 [[nodiscard]] std::optional<OperatingPoint> readOperatingPoint(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
+// DNS name of the server to which the scene moves; empty if it is not a DNS name.
+[[nodiscard]] std::optional<std::string> readMoving(Bytes message);
 // Returns the token of an AuthenticateResponse; empty if it has none.
 [[nodiscard]] std::optional<std::string> readToken(Bytes message);
 [[nodiscard]] std::optional<PairingCode> readPairingCode(Bytes message);

@@ -30,6 +30,8 @@ namespace ClothStream.Core
         readonly AutoResetEvent woken = new AutoResetEvent(false);
         ServerAddress current; // of the newest connection
         StreamSocket socket;
+        StreamSocket prepared; // to preparedAt, for a scene that moves there; null: none
+        string preparedAt = "";
         Events events;
         string failure = "", problem = "";
         volatile bool leaving, isDisposed;
@@ -137,7 +139,7 @@ namespace ClothStream.Core
                 while (!leaving && !HasFailed)
                 {
                     lock (Gate) StartConnection();
-                    using (socket = new StreamSocket(current, fingerprint, woken)) Serve();
+                    using (socket = TakePrepared() ?? new StreamSocket(current, fingerprint, woken)) Serve();
                     WaitForNextAttempt();
                 }
             }
@@ -145,6 +147,23 @@ namespace ClothStream.Core
             {
                 Fail(error.Message);
             }
+            prepared?.Dispose();
+        }
+
+        void Prepare(ServerAddress next)
+        {
+            prepared?.Dispose();
+            preparedAt = next.ToString();
+            prepared = new StreamSocket(next, fingerprint, woken);
+        }
+
+        StreamSocket TakePrepared()
+        {
+            StreamSocket taken = prepared;
+            prepared = null;
+            if (taken != null && preparedAt == current.ToString() && !taken.HasFailed) return taken;
+            taken?.Dispose();
+            return null;
         }
 
         // The scene may be at another server than that of the address. Secrets go to other machines only with TLS.
@@ -194,6 +213,7 @@ namespace ClothStream.Core
             fixed (byte* message = socket.Message)
             {
                 var news = (Events)Native.cs_receive(Handle, message, (UIntPtr)bytes, NowUs);
+                if ((news & Events.Moving) != 0) Prepare(address.At(Utf8.Text(Native.cs_next_server(Handle))));
                 events |= news;
                 Keep(news);
             }

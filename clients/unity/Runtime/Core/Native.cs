@@ -25,6 +25,7 @@ namespace ClothStream.Core
         Token = 8192,
         PairingCode = 16384,
         Answer = 32768,
+        Moving = 65536,
     }
 
     public enum Errors : uint
@@ -492,6 +493,7 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern ulong cs_connect_at(IntPtr client);
         [DllImport(Library)] public static extern void cs_follow_redirects(IntPtr client, int on);
         [DllImport(Library)] public static extern byte* cs_connect_server(IntPtr client);
+        [DllImport(Library)] public static extern byte* cs_next_server(IntPtr client);
         [DllImport(Library)] public static extern int cs_resumed(IntPtr client);
         [DllImport(Library)] public static extern State cs_get_state(IntPtr client);
         [DllImport(Library)] public static extern byte* cs_error_text(IntPtr client);

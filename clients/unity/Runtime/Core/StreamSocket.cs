@@ -45,6 +45,8 @@ namespace ClothStream.Core
 
         public bool IsOpen { get; private set; }
         public bool HasEnded { get; private set; }
+        /// <summary>Whether the connection could not be opened. Poll then says why.</summary>
+        public bool HasFailed { get { return opening.IsFaulted || opening.IsCanceled; } }
         /// <summary>Why the connection has ended; "" if the server closed it without a reason.</summary>
         public string Why { get; private set; } = "";
         /// <summary>With TLS, what the server has shown.</summary>

@@ -150,6 +150,10 @@ export class Client {
   get connectServer(): string {
     return this.core.text(this.core.exports.cs_connect_server(this.handle.pointer));
   }
+  // The same of the server to which the scene moves soon (ClientEvent.moving). "": it does not move.
+  get nextServer(): string {
+    return this.core.text(this.core.exports.cs_next_server(this.handle.pointer));
+  }
 
   // Sends pings and runs timers. Call at least ten times per second.
   update(atUs: bigint = nowUs()): void {

@@ -129,6 +129,7 @@ export class Connection {
     const decodeMs = this.now() - arrivedMs;
     this.flush();
     if (events & ClientEvent.description) this.prepare();
+    if (events & ClientEvent.moving) this.socket.prepare(this.client.nextServer);
     const isFrame = (events & ClientEvent.frame) !== 0;
     const frame = isFrame ? this.pass(message, arrivedMs, decodeMs) : undefined;
     if (frame === "in the ring") return this.port.postMessage(this.options.session, []);

@@ -10,6 +10,7 @@ export interface SocketListener {
 
 export class StreamSocket {
   private socket: WebSocket | undefined;
+  private prepared: { server: string; socket: WebSocket } | undefined;
 
   constructor(
     private readonly url: string,
@@ -25,17 +26,19 @@ export class StreamSocket {
     return this.socket?.readyState === WebSocket.OPEN;
   }
 
-  // Closes the current socket, if any, and opens a new one. `server`: DNS name in place of the host of the URL; "" means
-  // the URL as it is.
+  // Closes the current socket, if any, and opens a new one, or uses the prepared one. `server`: DNS name in place of the
+  // host of the URL; "" means the URL as it is.
   open(server: string): void {
+    const prepared = this.takePrepared(server);
     void this.close();
-    const socket = new WebSocket(at(this.url, server));
+    const socket = prepared ?? new WebSocket(at(this.url, server));
     let wasOpen = false;
-    socket.binaryType = "arraybuffer";
-    socket.onopen = () => {
+    const opened = (): void => {
       wasOpen = true;
       this.listener.opened();
     };
+    socket.binaryType = "arraybuffer";
+    socket.onopen = opened;
     socket.onmessage = (event: MessageEvent) => {
       if (event.data instanceof ArrayBuffer) this.listener.message(event.data);
     };
@@ -44,11 +47,31 @@ export class StreamSocket {
       this.listener.lost(explain(event, wasOpen));
     };
     this.socket = socket;
+    if (this.isOpen) opened();
+  }
+
+  // Starts to open a socket for a later open() with this name.
+  prepare(server: string): void {
+    this.dropPrepared();
+    this.prepared = { server, socket: new WebSocket(at(this.url, server)) };
+  }
+
+  private takePrepared(server: string): WebSocket | undefined {
+    const { prepared } = this;
+    if (prepared?.server !== server || prepared.socket.readyState > WebSocket.OPEN) return undefined;
+    this.prepared = undefined;
+    return prepared.socket;
+  }
+
+  private dropPrepared(): void {
+    this.prepared?.socket.close();
+    this.prepared = undefined;
   }
 
   // Says goodbye, so that the server does not keep the participant's place. Resolves when the socket is closed.
   close(code?: number): Promise<void> {
     const { socket } = this;
+    this.dropPrepared();
     if (!socket) return Promise.resolve();
     this.socket = undefined;
     socket.onopen = socket.onmessage = null;

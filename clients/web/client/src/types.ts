@@ -26,6 +26,7 @@ export const ClientEvent = {
   token: 8192,
   pairingCode: 16384,
   answer: 32768,
+  moving: 65536,
 } as const;
 
 // Values of Client.errorCode and of SessionState: ErrorCode of session.proto. A newer server may have more.

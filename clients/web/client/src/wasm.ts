@@ -24,6 +24,7 @@ export interface CoreExports {
   cs_connect_at(client: Pointer): bigint;
   cs_follow_redirects(client: Pointer, on: number): void;
   cs_connect_server(client: Pointer): Pointer;
+  cs_next_server(client: Pointer): Pointer;
   cs_participant_count(client: Pointer): number;
   cs_get_participant(client: Pointer, index: number, out: Pointer): number;
   cs_create_mirror(scene: Pointer, clientName: Pointer, displayName: Pointer, role: number): Pointer;
