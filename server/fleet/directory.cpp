@@ -9,10 +9,10 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <zlib.h>
 
 #include "server/hosting/server_state.h"
 #include "server/saved_state/contents.h"
+#include "server/saved_state/crc.h"
 #include "server/scene/live_scene.h"
 #include "server/telemetry/log.h"
 
@@ -31,10 +31,6 @@ constexpr std::uint64_t kMaxCheckpointBytes = std::uint64_t{256} << 20;
 constexpr int kMaxParts = static_cast<int>(kMaxCheckpointBytes / kPartBytes) + 1;
 // Servers try to adopt a scene at different times.
 constexpr int kMaxDelay = 500;  // ms
-
-std::uint32_t crcOf(const std::string& bytes) {
-  return static_cast<std::uint32_t>(::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
 
 std::string keyOf(std::uint64_t origin) {
   return fmt::format("{:016x}", origin);
@@ -395,7 +391,7 @@ bool Directory::save(Buckets& buckets, const OwnScene& own) {
   entry.set_created(true);
   v1::StoredCheckpoint& stored = *entry.mutable_checkpoint();
   stored.set_bytes(bytes.size());
-  stored.set_crc(crcOf(bytes));
+  stored.set_crc(saved_state::crcOf(bytes));
   for (std::size_t at = 0; at < bytes.size(); at += kPartBytes) {
     buckets.checkpoints.put(partKey(name, stored.slot(), stored.parts()), bytes.substr(at, kPartBytes));
     stored.set_parts(stored.parts() + 1);
@@ -416,7 +412,7 @@ std::optional<v1::SavedParts> Directory::load(Buckets& buckets, const std::strin
     bytes += entry->value;
   }
   v1::SavedParts parts;
-  if (crcOf(bytes) != stored.crc() || !parts.ParseFromString(bytes)) return std::nullopt;
+  if (saved_state::crcOf(bytes) != stored.crc() || !parts.ParseFromString(bytes)) return std::nullopt;
   return parts;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// CRC-32 of contents of the database, which finds damage.
+// CRC-32 of stored states, which finds damage.
 #pragma once
 
 #include <cstdint>

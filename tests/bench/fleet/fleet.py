@@ -7,7 +7,8 @@ Starts nats-server, two origins that play a recording of 10 frames/s each, and t
 - the CPU time of an origin with 1, 60 and 600 viewers at the edges;
 - the age of frames (packet complete at the origin to arrival) of four viewers at an origin and at an edge;
 - how long viewers are without frames when nats-server, an edge and an origin are killed and started again;
-- how long a scene of 10,000 vertices stands still when it moves between two servers that simulate it.
+- how long a scene of 10,000 vertices stands still when it moves between two servers that simulate it, and how long a
+  participant at an edge, and one that is connected to the server of the scene, has no frame.
 
 One viewer in twenty decodes every frame and compares its hash. Exits with 1 if any frame was wrong or a viewer was lost.
 """
@@ -232,35 +233,83 @@ def longest_gaps(times):
     return sorted((later - earlier for earlier, later in zip(times, times[1:])), reverse=True)
 
 
+class Watcher:
+    """A participant that notes when frames arrive."""
+
+    def __init__(self, fleet, address, scene):
+        command = [fleet.programs / "clothstream", "join", address, "--scene", scene, "--events", "--frames"]
+        self.program = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        self.times = []
+        self.reader = threading.Thread(target=self.read)
+        self.reader.start()
+
+    def read(self):
+        self.times.extend(time.monotonic() for line in self.program.stdout if '"frame"' in line)
+
+    def leave(self):
+        """Returns the seconds between frames, longest first."""
+        left = time.monotonic()
+        self.program.send_signal(signal.SIGINT)
+        self.program.wait()
+        self.reader.join()
+        if not self.times or left - self.times[-1] > 2:
+            sys.exit(f"a participant lost the scene that moved (exit code {self.program.returncode})")
+        return longest_gaps(self.times)
+
+
+def create(fleet, server, name):
+    file = fleet.folder / f"{name}.json"
+    file.write_text(json.dumps({**MOVING, "name": name}))
+    command = [fleet.programs / "clothstream", "create", file, "--server", server.address]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def move(fleet, name, *more):
+    """Returns the seconds for which the scene stood still."""
+    command = [fleet.programs / "clothstream", "move", name, *fleet.options, *more]
+    moved = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    if moved.returncode != 0:
+        sys.exit(f"the scene did not move: {moved.stderr}")
+    return float(moved.stdout.rsplit(" ", 2)[1]) / 1000
+
+
 def moves(fleet):
     """Moves a scene between two servers while a participant watches at an edge. Times are seconds."""
     servers = [fleet.serve(name, port, ["--scene", "sphere_drop"]) for name, port in (("a", 25200), ("b", 25210))]
-    file = fleet.folder / "moving.json"
-    file.write_text(json.dumps(MOVING))
-    clothstream = fleet.programs / "clothstream"
-    subprocess.run([clothstream, "create", file, "--server", servers[0].address], check=True, stdout=subprocess.DEVNULL)
+    create(fleet, servers[0], "moving")
     fleet.edges[0].wait_for("moving: serves this scene")
     time.sleep(3)  # it is in the directory
-    viewer = subprocess.Popen([clothstream, "join", fleet.edges[0].address, "--scene", "moving", "--seconds", str(4 + 3 * MOVES),
-                               "--events", "--frames"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    times, still = [], []
-    reader = threading.Thread(target=lambda: times.extend(time.monotonic() for line in viewer.stdout if '"frame"' in line))
-    reader.start()
+    watcher, still = Watcher(fleet, fleet.edges[0].address, "moving"), []
     time.sleep(3)
     for _ in range(MOVES):
         began = time.monotonic()
-        moved = subprocess.run([clothstream, "move", "moving", *[str(option) for option in fleet.options]],
-                               capture_output=True, text=True)
-        if moved.returncode != 0:
-            sys.exit(f"the scene did not move: {moved.stderr}")
-        still.append(float(moved.stdout.rsplit(" ", 2)[1]) / 1000)
+        still.append(move(fleet, "moving"))
         time.sleep(max(0, 3 - (time.monotonic() - began)))
-    viewer.wait()
-    reader.join()
-    if viewer.returncode != 0 or not times or time.monotonic() - times[-1] > 2:
-        sys.exit(f"the participant lost the scene that moved (exit code {viewer.returncode})")
-    usual = longest_gaps(times)[len(times) // 2]
-    return {"stillSeconds": still, "longestFrameGapsSeconds": longest_gaps(times)[:MOVES], "usualFrameGapSeconds": usual}
+    gaps = watcher.leave()
+    for server in servers:
+        server.stop()
+    return {"stillSeconds": still, "longestFrameGapsSeconds": gaps[:MOVES], "usualFrameGapSeconds": gaps[len(gaps) // 2]}
+
+
+def moves_of_direct_clients(fleet):
+    """The same with participants that are connected to the server which has the scene: one scene for each move, from a
+    server at 127.0.0.2 to one at 127.0.0.1 with the same ports and the name localhost."""
+    options = ["--scene", "sphere_drop", "--insecure"]
+    here = fleet.serve("here", 25220, [*options, "--host", "127.0.0.2", "--public-name", "here.example"])
+    here.address = "127.0.0.2:25221"
+    there = fleet.serve("there", 25220, [*options, "--host", "127.0.0.1", "--public-name", "localhost"])
+    still, gaps = [], []
+    for i in range(MOVES):
+        name = f"direct{i}"
+        create(fleet, here, name)
+        time.sleep(3)  # it is in the directory
+        watcher = Watcher(fleet, here.address, name)
+        time.sleep(3)
+        still.append(move(fleet, name, "--to", "localhost"))
+        time.sleep(2)
+        gaps.append(watcher.leave()[0])
+        subprocess.run([fleet.programs / "clothstream", "delete", name, "--server", there.address], check=True)
+    return {"stillSeconds": still, "longestFrameGapsSeconds": sorted(gaps, reverse=True)}
 
 
 def restart(program, ready):
@@ -309,10 +358,11 @@ def measure(fleet, seconds):
                                  ("the origin", origin, "gRPC ")):
         gaps.append(gap(fleet, lost, program.kill, lambda program=program, ready=ready: restart(program, ready)))
         print(f"| {lost} | {gaps[-1]['longestGapSeconds']:.2f} |", flush=True)
-    moved = moves(fleet)
-    print("\n| a scene of 10,000 vertices moves | time without simulation, ms | longest time without a frame, ms |\n|---|---|---|")
-    for i, (still, frame) in enumerate(zip(sorted(moved["stillSeconds"], reverse=True), moved["longestFrameGapsSeconds"])):
-        print(f"| {i + 1} | {1000 * still:.0f} | {1000 * frame:.0f} |", flush=True)
+    print("\n| a scene of 10,000 vertices moves; client at | time without simulation, ms | longest time without a frame, ms |\n|---|---|---|")
+    moved = {"an edge": moves(fleet), "its server": moves_of_direct_clients(fleet)}
+    for place, figures in moved.items():
+        for still, frame in zip(sorted(figures["stillSeconds"], reverse=True), figures["longestFrameGapsSeconds"]):
+            print(f"| {place} | {1000 * still:.0f} | {1000 * frame:.0f} |", flush=True)
     cost = message_cost(fleet, seconds)
     print(f"\nnats-server takes {1e6 * cost:.1f} us of processor time for one frame that it sends to one edge.", flush=True)
     return {"crowds": crowds, "frameAgeMs": ages, "natsSecondsOfFrame": cost, "gaps": gaps, "moves": moved}
