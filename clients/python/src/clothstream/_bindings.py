@@ -39,6 +39,7 @@ CS_EVENT_PLAYBACK = 4096
 CS_EVENT_TOKEN = 8192
 CS_EVENT_PAIRING_CODE = 16384
 CS_EVENT_ANSWER = 32768
+CS_EVENT_MOVING = 65536
 CS_ERROR_UNAUTHENTICATED = 60
 CS_ERROR_WRONG_PAIRING_CODE = 61
 CS_ROLE_UNSPECIFIED = 0
@@ -576,6 +577,7 @@ FUNCTIONS = {
     "cs_connect_at": (c.c_uint64, [c.c_void_p]),
     "cs_follow_redirects": (None, [c.c_void_p, c.c_int]),
     "cs_connect_server": (c.c_char_p, [c.c_void_p]),
+    "cs_next_server": (c.c_char_p, [c.c_void_p]),
     "cs_resumed": (c.c_int, [c.c_void_p]),
     "cs_get_state": (c.c_int, [c.c_void_p]),
     "cs_error_text": (c.c_char_p, [c.c_void_p]),
