@@ -181,10 +181,11 @@ Failure WebSocketTransport::notTrusted() const {
 Failure WebSocketTransport::notUpgraded() const {
   const std::string status = std::to_string(link_->end()->httpStatus);
   if (link_->end()->httpStatus != 0 && link_->end()->isOurs)
-    return {Failure::Kind::refused,
-            "The server at " + current_.address + " refuses: " + link_->end()->why + " (HTTP status " + status + ")"};
-  const std::string answer =
-      link_->end()->httpStatus != 0 ? "HTTP status " + status + inBrackets(link_->end()->why) : link_->end()->why;
+    return {Failure::Kind::refused, "The server at " + current_.address + " refuses: " + link_->end()->why +
+                                        " (HTTP status " + status + ")"};
+  const std::string answer = link_->end()->httpStatus != 0
+                                 ? "HTTP status " + status + inBrackets(link_->end()->why)
+                                 : link_->end()->why;
   return {Failure::Kind::refused,
           "No clothstream-server of this release answers at " + current_.address + ", but something else: " +
               answer + ". Use the port of the server's page (--port, default 8080), and " +
@@ -199,7 +200,8 @@ Failure WebSocketTransport::notJoined() const {
                                      inBrackets(link_->end()->why) + ": check it, and the network."};
     case Stage::connect:
       return {Kind::unreachable, "No server answers at " + current_.address +
-                                     ": is clothstream-server running there?" + inBrackets(link_->end()->why)};
+                                     ": is clothstream-server running there?" +
+                                     inBrackets(link_->end()->why)};
     case Stage::tls:
       if (link_->end()->untrusted) return notTrusted();
       return {Kind::refused, "The server at " + current_.address + " does not answer with TLS" +

@@ -147,7 +147,7 @@ TEST_F(ChannelTest, TheEndComesAfterAllMessages) {
 }
 
 // What a scene that moves needs: the new server continues after the messages that the former one has used.
-TEST_F(ChannelTest, ANewOtherEndContinuesWhereTheFormerOneStopped) {
+TEST_F(ChannelTest, ReplacedPeerContinuesTheSequence) {
   std::vector<std::string> sent;
   for (int i = 0; i < 40; ++i) {
     sent.push_back(std::to_string(i) + std::string(20'000, '.'));

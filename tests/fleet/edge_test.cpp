@@ -181,7 +181,7 @@ TEST_F(EdgeTest, ParametersAreThoseOfTheOrigin) {
   EXPECT_THAT(refused.error().text(), HasSubstr("yours is viewer"));
 }
 
-TEST_F(EdgeTest, AnOriginSleepsWhenNobodyWatches) {
+TEST_F(EdgeTest, OriginSleepsWithoutViewers) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto scene = server().state().find("small");

@@ -44,7 +44,7 @@ class MovingTest : public tests::FleetTest {
   std::unique_ptr<EdgeServer> edge_;
 };
 
-TEST_F(MovingTest, NobodyAtAnEdgeNoticesAndTheStateIsThatOfASceneThatNeverMoved) {
+TEST_F(MovingTest, StateEqualsThatOfASceneThatNeverMoved) {
   ASSERT_NO_FATAL_FAILURE(startTwo());
   TestPeer viewer(edge_->server), peer(edge_->server);
   viewer.role = v1::ROLE_VIEWER;
@@ -135,7 +135,7 @@ TEST_F(MovingTest, NamesRolesCollidersAndInputsStay) {
   EXPECT_EQ(roster.participants[0].participant.clientName, "test");
 }
 
-TEST_F(MovingTest, WhoIsConnectedToTheServerIsToldToJoinAgain) {
+TEST_F(MovingTest, DirectClientsAreToldWhereToJoin) {
   first_ = startOrigin();
   second_ = startOrigin({.publicName = "second.example.com"});
   ASSERT_THAT(first_->create("moves"), IsEmpty());

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Programs of an earlier version with those of this one: client and server, and recordings in both directions.
 
-Builds the earlier version from the history of this repository, which takes half an hour the first time."""
+Builds the earlier version from the history of this repository, which takes minutes the first time."""
 import contextlib
 import json
 import os

@@ -85,3 +85,40 @@ test("a socket that is closed or replaced reports nothing more", async () => {
   await socket.close();
   assert.deepEqual(events, []);
 });
+
+test("a prepared socket is used for its server, open or not", () => {
+  for (const opens of [true, false]) {
+    events.length = 0;
+    socket.open("");
+    const first = last();
+    socket.prepare("b.example");
+    const prepared = last();
+    assert.equal(prepared.url, "ws://b.example/stream");
+    if (opens) prepared.opens();
+    assert.deepEqual(events, [], "nothing is reported before it is used");
+    socket.open("b.example");
+    assert.strictEqual(last(), prepared);
+    assert.isTrue(first.closed);
+    if (!opens) prepared.opens();
+    assert.deepEqual(events, ["opened"]);
+    socket.send(Uint8Array.of(1));
+    assert.lengthOf(prepared.sent, 1);
+    void socket.close();
+  }
+});
+
+test("a prepared socket that is not used is closed", () => {
+  socket.open("");
+  socket.prepare("b.example");
+  const other = last();
+  socket.prepare("c.example");
+  assert.isTrue(other.closed);
+  const prepared = last();
+  prepared.readyState = 3; // the server has closed it
+  socket.open("c.example");
+  assert.notStrictEqual(last(), prepared);
+  socket.prepare("d.example");
+  const unused = last();
+  void socket.close();
+  assert.isTrue(unused.closed);
+});
