@@ -100,7 +100,7 @@ std::shared_ptr<scene::LiveScene> Session::sceneOf(const v1::Hello& message,
   if (std::ranges::find(message.codecs(), scene->codec()) == message.codecs().end())
     return refused(
         v1::ERROR_CODE_UNSUPPORTED_CODEC,
-        fmt::format("hello.codecs: must contain {}, the codec of '{}'", scene->codec(), scene->name()));
+        fmt::format("hello.codecs: must contain {}, the codec of '{}'; update the client", scene->codec(), scene->name()));
   return scene;
 }
 

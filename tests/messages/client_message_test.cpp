@@ -124,6 +124,7 @@ TEST(ToJoining, RefusesUnsupportedVersionsAndCodecs) {
   message.set_codecs(0, 77);
   const auto joining = toJoining(message, kCodecs);
   EXPECT_EQ(joining.error().code, v1::ERROR_CODE_UNSUPPORTED_CODEC);
+  EXPECT_THAT(joining.error().text, HasSubstr("update the client"));
   EXPECT_THAT(joining.error().text, HasSubstr("1, 5"));
   message.clear_codecs();
   EXPECT_EQ(toJoining(message, kCodecs).error().code, v1::ERROR_CODE_UNSUPPORTED_CODEC);
