@@ -99,7 +99,8 @@ export class Connection {
     const atMs = this.now();
     this.client.disconnected(microseconds(atMs));
     this.post({ kind: "lost", atMs, reason, attemptAtMs: this.client.connectAtMs });
-    if (atMs >= this.client.connectAtMs) this.connect();
+    // Times of the core are whole microseconds, and atMs may be earlier than the one made of it.
+    if (microseconds(atMs) >= microseconds(this.client.connectAtMs)) this.connect();
   }
 
   private tick(): void {
