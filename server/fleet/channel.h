@@ -66,7 +66,7 @@ class Channel {
   // Whether anything has arrived.
   bool heard() const { return heard_; }
   // The other end is replaced by one that has received everything up to received(). Its own messages begin
-  // anew.
+  // with the first sequence number again.
   void restart();
 
  private:
