@@ -138,7 +138,7 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
     case Body::tickEvents:
       return eventsReceived(message->body);
     case Body::moving:
-      return movingReceived(message->body);
+      return movingReceived(message->body, nowUs);
     case Body::presence:
       return presenceReceived(message->body, nowUs);
     case Body::listScenes:
@@ -451,10 +451,10 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::ui
   return isRedirect ? 0 : CS_EVENT_ERROR;
 }
 
-std::uint32_t Client::movingReceived(Bytes body) {
+std::uint32_t Client::movingReceived(Bytes body, std::uint64_t nowUs) {
   std::optional<std::string> server = readMoving(body);
   if (!server) return failMalformed("Moving");
-  if (!follows_ || server->empty() || *server == connectServer()) return 0;
+  if (!follows_ || server->empty() || !redirection_.announce(*server, nowUs)) return 0;
   nextServer_ = std::move(*server);
   return CS_EVENT_MOVING;
 }

@@ -180,7 +180,7 @@ class Client {
   std::uint32_t noticeReceived(Bytes body);
   std::uint32_t parametersReceived(Bytes body);
   std::uint32_t errorReceived(Bytes body, std::uint64_t requestId, std::uint64_t nowUs);
-  std::uint32_t movingReceived(Bytes body);
+  std::uint32_t movingReceived(Bytes body, std::uint64_t nowUs);
   // Whether the error only ends the connection, so that the client may try again.
   bool isTemporary(const ServerError& error) const;
   std::uint32_t scenesReceived(Bytes body);

@@ -159,6 +159,16 @@ TEST_F(Redirect, ReportsWhereTheSceneMovesSoon) {
   EXPECT_STREQ(cs_next_server(client.get()), "");
 }
 
+TEST_F(Redirect, AnnouncesThreeMovesWithinAMinute) {
+  join();
+  for (const char* name : {"b.example", "c.example", "b.example"})
+    EXPECT_EQ(announceMove(name), std::uint32_t{CS_EVENT_MOVING});
+  EXPECT_EQ(announceMove("d.example"), 0u);
+  EXPECT_STREQ(cs_next_server(client.get()), "b.example");
+  now += 60 * kSecond;
+  EXPECT_EQ(announceMove("d.example"), std::uint32_t{CS_EVENT_MOVING});
+}
+
 TEST_F(Redirect, IsIgnoredByDefault) {
   cs_follow_redirects(client.get(), 0);
   join();

@@ -13,7 +13,7 @@ namespace clothstream::client {
 // because the scene may have moved on meanwhile. All times are microseconds.
 class Redirection {
  public:
-  // Most names that are followed in this time without a joined stream in between.
+  // Most names that are followed in this time without a joined stream in between, and most announced ones.
   static constexpr std::uint32_t kMost = 3;
   static constexpr std::uint64_t kWindowUs = 60'000'000;
   static constexpr std::uint32_t kAttemptsPerReturn = 4;
@@ -28,6 +28,15 @@ class Redirection {
     server_ = std::move(name);
     failures_ = 0;
     attempting_ = false;
+    return true;
+  }
+  // The scene moves to a server of this name soon. Returns false if the client must not connect there yet: it
+  // is the present one, or too many names were announced.
+  bool announce(const std::string& name, std::uint64_t nowUs) {
+    if (name == server()) return false;
+    if (announced_ > 0 && nowUs - firstAnnouncedUs_ >= kWindowUs) announced_ = 0;
+    if (announced_ == kMost) return false;
+    if (announced_++ == 0) firstAnnouncedUs_ = nowUs;
     return true;
   }
   void attempting() { attempting_ = true; }
@@ -55,6 +64,8 @@ class Redirection {
   std::string server_;
   std::uint32_t count_ = 0;  // names followed since firstUs_
   std::uint64_t firstUs_ = 0;
+  std::uint32_t announced_ = 0;  // names announced since firstAnnouncedUs_
+  std::uint64_t firstAnnouncedUs_ = 0;
   std::uint32_t failures_ = 0;  // attempts without Welcome since the last one, or since the newest name
   bool attempting_ = false;     // a connection without Welcome exists
 };
