@@ -188,9 +188,9 @@ void cs_follow_redirects(cs_client* client, int on) CS_NOEXCEPT;
  * CS_STATE_FAILED. */
 const char* cs_connect_server(const cs_client* client) CS_NOEXCEPT;
 /* Returns the DNS name of the server to which the scene moves soon, of the newest CS_EVENT_MOVING on this
- * connection; "" if there was none. Reported with cs_follow_redirects(client, 1) only, and at most three times
- * within a minute. The program may open a connection there as for cs_connect_server, send nothing on it, and
- * use it when cs_connect_server returns this name. */
+ * connection; "" if there was none. Reported with cs_follow_redirects(client, 1) only, and at most three
+ * times within a minute. The program may open a connection there as for cs_connect_server, send nothing on
+ * it, and use it when cs_connect_server returns this name. */
 const char* cs_next_server(const cs_client* client) CS_NOEXCEPT;
 /* Returns 1 if the last Welcome resumed the participant of this client, or of the one before it
  * (cs_set_resume_token), else 0. */

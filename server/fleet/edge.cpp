@@ -205,8 +205,8 @@ void Edge::replace(Known& known) {
 void Edge::serve(Known& known) {
   if (!known.next->serve()) return;
   if (known.served)
-    known.served->end(delivery::error(
-        v1::ERROR_CODE_CUT_OFF, "the scene began again at the server that simulates it: join again", true));
+    known.served->end(
+        delivery::error(v1::ERROR_CODE_CUT_OFF, "the server that simulates the scene was replaced", true));
   known.served = std::move(known.next);
   known.lost = false;
   telemetry::log({known.served->scene()->name()}, spdlog::level::info, "serves this scene of another server");

@@ -138,9 +138,10 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
                 v1::ERROR_CODE_UNSUPPORTED_VERSION);
   const auto codec = std::ranges::find_first_of(message.codecs(), codecs);
   if (codec == message.codecs().end())
-    checks.fail(hello / "codecs", "",
-                fmt::format("must contain a codec of this server: {}; update the client", fmt::join(codecs, ", ")),
-                v1::ERROR_CODE_UNSUPPORTED_CODEC);
+    checks.fail(
+        hello / "codecs", "",
+        fmt::format("must contain a codec of this server: {}; update the client", fmt::join(codecs, ", ")),
+        v1::ERROR_CODE_UNSUPPORTED_CODEC);
   if (!message.scene().empty()) checks.name(hello / "scene", message.scene());
   checks.label(hello / "clientName", message.client_name());
   checks.label(hello / "displayName", message.display_name());

@@ -98,9 +98,9 @@ std::shared_ptr<scene::LiveScene> Session::sceneOf(const v1::Hello& message,
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED, why);
   // All subscribers share one stream, which has one codec.
   if (std::ranges::find(message.codecs(), scene->codec()) == message.codecs().end())
-    return refused(
-        v1::ERROR_CODE_UNSUPPORTED_CODEC,
-        fmt::format("hello.codecs: must contain {}, the codec of '{}'; update the client", scene->codec(), scene->name()));
+    return refused(v1::ERROR_CODE_UNSUPPORTED_CODEC,
+                   fmt::format("hello.codecs: must contain {}, the codec of '{}'; update the client",
+                               scene->codec(), scene->name()));
   return scene;
 }
 

@@ -231,7 +231,7 @@ TEST_F(EdgeTest, AnOriginThatStartsAgainIsFollowed) {
   startOrigin();
   const auto last = viewer.readToTheEnd();
   EXPECT_EQ(last.error().code(), v1::ERROR_CODE_CUT_OFF);
-  EXPECT_THAT(last.error().text(), HasSubstr("join again"));
+  EXPECT_THAT(last.error().text(), HasSubstr("was replaced"));
   Viewer again(edge->server);
   again.join("small");
   again.readFrames(5);
