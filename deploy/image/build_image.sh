@@ -26,7 +26,7 @@ mmdebstrap --quiet --mode=root --variant=essential --include=clothstream-server,
   "deb [trusted=yes] copy:$apt bookworm main"
 
 version=$(tar -xOf "$work/root.tar" ./var/lib/dpkg/status |
-  awk '/^Package: clothstream-server$/ { found = 1 } found && /^Version: / { print $2; exit }')
+  awk '/^Package: / { found = $2 == "clothstream-server" } found && /^Version: / { print $2 }')
 container=$(buildah from scratch)
 buildah add --quiet "$container" "$work/root.tar" / >/dev/null
 buildah config --user $kUser:$kUser --workingdir /var/lib/clothstream --port 8080/tcp --port 50051/tcp \

@@ -32,7 +32,7 @@ image=$(podman images --format '{{.Repository}}:{{.Tag}}' | head -1)
 mkdir -p "$work/states" "$work/shaders"
 chown 10001:10001 "$work/states" "$work/shaders"
 start() {
-  podman run --detach --name server --network host --cgroups=disabled --read-only --tmpfs /tmp --cap-drop ALL \
+  podman run --detach --name server --network host --cgroups=disabled --ulimit nofile="$(ulimit -Sn):$(ulimit -Hn)" --ulimit nproc="$(ulimit -Su):$(ulimit -Hu)" --read-only --tmpfs /tmp --cap-drop ALL \
     --security-opt no-new-privileges --volume "$work/states:/var/lib/clothstream" \
     --volume "$work/shaders:/var/cache/clothstream" "$image" --port 18080 --grpc-port 15051 --insecure >/dev/null
   for ((i = 0; i < 300; ++i)); do
