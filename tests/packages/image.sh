@@ -6,13 +6,13 @@ set -euo pipefail
 build=$(realpath "$1") source=$2
 readonly kSkipped=77 # CMake's SKIP_RETURN_CODE for this test
 
-for tool in reprepro mmdebstrap help2man buildah podman crun caddy amtool docker-compose curl; do
+for tool in reprepro mmdebstrap help2man buildah podman runc caddy amtool docker-compose curl; do
   command -v "$tool" >/dev/null || { echo "skipped: $tool is missing (./dev test --long installs it)"; exit $kSkipped; }
 done
 [ "$(id -u)" -eq 0 ] || { echo "skipped: only root can install a Debian into a folder"; exit $kSkipped; }
 
 work=$(mktemp -d)
-podman() { command podman --root "$work/storage" --runroot "$work/run" --storage-driver vfs --cgroup-manager cgroupfs --runtime crun "$@"; }
+podman() { command podman --root "$work/storage" --runroot "$work/run" --storage-driver vfs --cgroup-manager cgroupfs --runtime runc "$@"; }
 caddy=
 finish() {
   [ -z "$caddy" ] || kill "$caddy" 2>/dev/null || true
@@ -32,7 +32,7 @@ image=$(podman images --format '{{.Repository}}:{{.Tag}}' | head -1)
 mkdir -p "$work/states" "$work/shaders"
 chown 10001:10001 "$work/states" "$work/shaders"
 start() {
-  podman run --detach --name server --network host --cgroups=disabled --ulimit nofile="$(ulimit -Sn):$(ulimit -Hn)" --ulimit nproc="$(ulimit -Su):$(ulimit -Hu)" --read-only --tmpfs /tmp --cap-drop ALL \
+  podman run --detach --name server --network host --ulimit nofile=4096:4096 --ulimit nproc=4096:4096 --read-only --tmpfs /tmp --cap-drop ALL \
     --security-opt no-new-privileges --volume "$work/states:/var/lib/clothstream" \
     --volume "$work/shaders:/var/cache/clothstream" "$image" --port 18080 --grpc-port 15051 --insecure >/dev/null
   for ((i = 0; i < 300; ++i)); do
@@ -75,7 +75,7 @@ podman stop --time 20 server >/dev/null
 [ "$(podman inspect --format '{{.State.ExitCode}}' server)" = 0 ] || { podman logs server; exit 1; }
 podman rm server >/dev/null
 start
-later=$(tickAt http://127.0.0.1:15051)
+later=$(tickAt 127.0.0.1:15051)
 [ "$later" -gt "$tick" ] || { echo "the scene began again: tick $later after $tick"; exit 1; }
 
 echo "The other parts"
