@@ -373,6 +373,13 @@ void checkEvents(const ProgramOptions& options) {
     throw OptionError("--events-secret-file has no effect without --events-url URL: give both");
 }
 
+void checkNats(const ProgramOptions& options) {
+  for (const std::string& url : options.natsServers)
+    if (!url.starts_with("nats://") && !url.starts_with("tls://"))
+      throw OptionError(
+          fmt::format("--nats: '{}' begins with neither nats:// nor tls://; use nats://HOST:4222", url));
+}
+
 // Port of the sidecar. Throws OptionError.
 std::uint16_t agonesPort() {
   const char* const text = std::getenv("AGONES_SDK_HTTP_PORT");
@@ -653,6 +660,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     options.keepsScenes = parsed.stateDirectory->count() > 0 && !options.stateDirectory.empty();
     checkTls(options);
     checkEvents(options);
+    checkNats(options);
     options.announces = parsed.announce == "on" ||
                         (parsed.announce == "auto" && options.tlsSelf && !isLoopback(options.host));
     options.server.maxUploadBytes = static_cast<std::size_t>(options.maxUploadMb * 1e6);

@@ -74,6 +74,12 @@ class Directory(unittest.TestCase):
     def run_program(self, *arguments):
         return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120)
 
+    def test_addresses_of_nats_have_a_scheme(self):
+        ended = subprocess.run([SERVER, "edge", "--nats", f"{self.url},http://127.0.0.1:4222"], capture_output=True,
+                               text=True, timeout=60)
+        self.assertEqual(ended.returncode, 1)
+        self.assertIn("--nats: 'http://127.0.0.1:4222' begins with neither nats:// nor tls://", ended.stderr)
+
     def directory(self):
         listed = self.run_program("list", "--nats", self.url, "--json")
         self.assertEqual(listed.returncode, 0, listed.stderr)
