@@ -343,7 +343,8 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
   v1::MoveResponse response;
   response.set_to(to);
   response.set_gap(schedule::seconds(Clock::now() - stopped));
-  // Those who are connected to this server must join again; those at edges follow, and must not hear of it.
+  // Clients of this server must join at the other one. Those at edges follow by themselves, so their tunnels
+  // end first.
   tunnels_.end(stream->subject());
   remove(scene, known->public_name());
   dropStream(stream);

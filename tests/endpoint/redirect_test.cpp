@@ -202,7 +202,7 @@ TEST_P(Redirects, JoinedClientConnectsBeforeTheSceneMoves) {
   EXPECT_EQ(clientsOfSecond(), prepared) << "by the same connection";
 }
 
-TEST_P(Redirects, PreparedConnectionMayBeOverWhenTheSceneMoves) {
+TEST_P(Redirects, FailedPreparationDoesNotStopTheMove) {
   listen();
   const auto joined = join(first(), "small");
   ASSERT_TRUE(joined) << joined.error().text;

@@ -146,7 +146,7 @@ TEST_F(ChannelTest, TheEndComesAfterAllMessages) {
   EXPECT_TRUE(other_.ended);
 }
 
-// What a scene that moves needs: the new server continues after the messages that the former one has used.
+// When a scene moves, the new server continues after the messages that the former one has used.
 TEST_F(ChannelTest, ReplacedPeerContinuesTheSequence) {
   std::vector<std::string> sent;
   for (int i = 0; i < 40; ++i) {

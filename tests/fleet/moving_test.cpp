@@ -135,7 +135,7 @@ TEST_F(MovingTest, NamesRolesCollidersAndInputsStay) {
   EXPECT_EQ(roster.participants[0].participant.clientName, "test");
 }
 
-TEST_F(MovingTest, DirectClientsAreToldWhereToJoin) {
+TEST_F(MovingTest, DirectClientsLearnTheNewServer) {
   first_ = startOrigin();
   second_ = startOrigin({.publicName = "second.example.com"});
   ASSERT_THAT(first_->create("moves"), IsEmpty());

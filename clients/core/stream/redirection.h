@@ -21,10 +21,7 @@ class Redirection {
   // Returns false, and changes nothing, if too many names were followed, or if the present server has named
   // itself.
   bool follow(std::string name, std::uint64_t nowUs) {
-    if (name == server()) return false;
-    if (count_ > 0 && nowUs - firstUs_ >= kWindowUs) count_ = 0;
-    if (count_ == kMost) return false;
-    if (count_++ == 0) firstUs_ = nowUs;
+    if (name == server() || !followed_.add(nowUs)) return false;
     server_ = std::move(name);
     failures_ = 0;
     attempting_ = false;
@@ -33,11 +30,7 @@ class Redirection {
   // The scene moves to a server of this name soon. Returns false if the client must not connect there yet: it
   // is the present one, or too many names were announced.
   bool announce(const std::string& name, std::uint64_t nowUs) {
-    if (name == server()) return false;
-    if (announced_ > 0 && nowUs - firstAnnouncedUs_ >= kWindowUs) announced_ = 0;
-    if (announced_ == kMost) return false;
-    if (announced_++ == 0) firstAnnouncedUs_ = nowUs;
-    return true;
+    return name != server() && announced_.add(nowUs);
   }
   void attempting() { attempting_ = true; }
   void welcomed() {
@@ -45,7 +38,7 @@ class Redirection {
     attempting_ = false;
     failures_ = 0;
   }
-  void joined() { count_ = 0; }
+  void joined() { followed_ = {}; }
   // The connection has ended.
   void ended() {
     if (std::exchange(attempting_, false)) ++failures_;
@@ -59,13 +52,23 @@ class Redirection {
   }
 
  private:
+  // Counts names, at most kMost in a window that begins with the first.
+  struct Names {
+    std::uint32_t count = 0;
+    std::uint64_t firstUs = 0;
+
+    bool add(std::uint64_t nowUs) {
+      if (count > 0 && nowUs - firstUs >= kWindowUs) count = 0;
+      if (count == kMost) return false;
+      if (count++ == 0) firstUs = nowUs;
+      return true;
+    }
+  };
+
   inline static const std::string kNone;
 
   std::string server_;
-  std::uint32_t count_ = 0;  // names followed since firstUs_
-  std::uint64_t firstUs_ = 0;
-  std::uint32_t announced_ = 0;  // names announced since firstAnnouncedUs_
-  std::uint64_t firstAnnouncedUs_ = 0;
+  Names followed_, announced_;
   std::uint32_t failures_ = 0;  // attempts without Welcome since the last one, or since the newest name
   bool attempting_ = false;     // a connection without Welcome exists
 };

@@ -150,7 +150,7 @@ export class Client {
   get connectServer(): string {
     return this.core.text(this.core.exports.cs_connect_server(this.handle.pointer));
   }
-  // The same of the server to which the scene moves soon (ClientEvent.moving). "": it does not move.
+  // DNS name of the server to which the scene moves soon (ClientEvent.moving); "" if there is none.
   get nextServer(): string {
     return this.core.text(this.core.exports.cs_next_server(this.handle.pointer));
   }
