@@ -43,6 +43,7 @@ void Agones::run() {
 
 void Agones::look(Clock::time_point now) {
   hosting::SceneServer::State& state = server_.state();
+  state.device.wake();  // it otherwise sleeps while no scene runs; the next call of look() sees its answer
   std::map<std::string, Count> counts;
   std::set<std::string> names;
   for (const auto& scene : state.scenesNow()) {

@@ -191,8 +191,16 @@ class GameServer(unittest.TestCase):
             self.assertIsNone(process.poll())
             sidecar = Sidecar([], [], port)
             self.until(lambda: sidecar.state == "Ready")
-            self.until(lambda: len(sidecar.health) >= 2)
             sidecar.shutdown()
+
+    def test_a_server_without_participants_stays_healthy(self):
+        sidecar = Sidecar([], [])
+        with game_server(sidecar.port):
+            # Longer than the five seconds in which the device thread must answer.
+            self.until(lambda: sidecar.health and sidecar.health[-1] - sidecar.health[0] > 9)
+            gaps = [b - a for a, b in zip(sidecar.health, sidecar.health[1:])]
+            self.assertLess(max(gaps), 5)
+        sidecar.shutdown()
 
     def test_a_wrong_port_is_explained(self):
         ended = subprocess.run([SERVER, "--agones"], capture_output=True, text=True,
