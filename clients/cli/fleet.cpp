@@ -26,6 +26,8 @@ namespace {
 constexpr std::int64_t kWait = 3000;         // milliseconds
 constexpr std::int64_t kMoveWait = 180'000;  // a large scene is loaded first
 constexpr std::size_t kMaxEntries = 100'000;
+// Subjects for answers to this program, which servers and edges do not subscribe to.
+constexpr const char* kInboxes = "clothstream.inbox.operator";
 constexpr std::int64_t kLease = 5'000'000'000;  // ns, as in the servers
 
 void require(natsStatus status, const std::string& what) {
@@ -56,6 +58,7 @@ Connection connect(const std::vector<std::string>& servers, const std::string& c
   for (const std::string& server : servers) urls.push_back(server.c_str());
   require(natsOptions_SetServers(options.get(), urls.data(), static_cast<int>(urls.size())), "--nats");
   require(natsOptions_SetTimeout(options.get(), kWait), "NATS");
+  require(natsOptions_SetCustomInboxPrefix(options.get(), kInboxes), "NATS");
   require(natsOptions_SetAllowReconnect(options.get(), false), "NATS");
   if (!credentials.empty())
     require(natsOptions_SetUserCredentialsFromFiles(options.get(), credentials.c_str(), nullptr),

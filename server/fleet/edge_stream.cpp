@@ -60,7 +60,7 @@ EdgeStream::EdgeStream(EdgeContext context, std::uint64_t origin, const v1::Offe
       offered_(offered),
       name_(offered.summary().name()),
       subject_(streamSubject(name_, offered.stream())),
-      inbox_(Nats::inbox()),
+      inbox_(edge_.nats.inbox()),
       tunnels_(std::make_shared<EdgeTunnels>(edge_.nats, edge_.edge, subject_)) {
   listen();
   chunks_ =

@@ -10,6 +10,9 @@
 #include <nats/nats.h>
 #include <spdlog/spdlog.h>
 
+#include "server/fleet/random_id.h"
+#include "server/fleet/subjects.h"
+
 namespace clothstream::fleet {
 namespace {
 
@@ -56,13 +59,14 @@ struct Nats::Subscription::Receiver {
     Receiver& receiver = **static_cast<std::shared_ptr<Receiver>*>(closure);
     const std::lock_guard lock(receiver.mutex);
     if (!receiver.handler) return;
-    const char* const reply = natsMsg_GetReply(message);
+    const char* const wanted = natsMsg_GetReply(message);
+    const char* const reply = wanted != nullptr && isInbox(wanted) ? wanted : "";
     const std::span data(reinterpret_cast<const std::byte*>(natsMsg_GetData(message)),
                          static_cast<std::size_t>(natsMsg_GetDataLength(message)));
     receiver.metrics.received.add();
     receiver.metrics.receivedBytes.add(data.size());
     try {
-      receiver.handler(natsMsg_GetSubject(message), reply != nullptr ? reply : "", data);
+      receiver.handler(natsMsg_GetSubject(message), reply, data);
     } catch (const std::exception& failure) {  // such as a lack of memory; the library is written in C
       spdlog::error("a message from NATS failed: {}", failure.what());
     }
@@ -81,7 +85,8 @@ Nats::Subscription::~Subscription() {
   natsSubscription_Destroy(subscription);
 }
 
-Nats::Nats(const NatsOptions& options, telemetry::NatsMetrics& metrics) : metrics_(metrics) {
+Nats::Nats(const NatsOptions& options, telemetry::NatsMetrics& metrics)
+    : inboxes_(inboxSubject(options.role)), metrics_(metrics) {
   natsOptions* made = nullptr;
   require(natsOptions_Create(&made), "NATS");
   const std::unique_ptr<natsOptions, OptionsDeleter> own(made);
@@ -121,6 +126,7 @@ Nats::Nats(const NatsOptions& options, telemetry::NatsMetrics& metrics) : metric
     spdlog::warn("NATS: {}", natsStatus_GetText(status));
   };
   require(natsOptions_SetName(made, options.name.c_str()), "NATS");
+  require(natsOptions_SetCustomInboxPrefix(made, inboxes_.c_str()), "NATS");
   require(natsOptions_SetTimeout(made, kConnectTimeout), "NATS");
   require(natsOptions_SetMaxReconnect(made, -1), "NATS");
   require(natsOptions_SetReconnectWait(made, kReconnectWait), "NATS");
@@ -228,12 +234,8 @@ std::unique_ptr<Nats::Subscription> Nats::subscribe(const std::string& subject, 
   return made;
 }
 
-std::string Nats::inbox() {
-  natsInbox* made = nullptr;
-  require(natsInbox_Create(&made), "NATS");
-  std::string subject = made;
-  natsInbox_Destroy(made);
-  return subject;
+std::string Nats::inbox() const {
+  return fmt::format("{}.{:016x}", inboxes_, randomId());
 }
 
 }  // namespace clothstream::fleet

@@ -30,12 +30,14 @@ struct NatsOptions {
   std::filesystem::path
       authority;     // PEM file of the authorities of the servers' certificates; empty: the system's
   std::string name;  // of this program, for the servers' lists of connections
+  std::string role;  // `server` or `edge`; answers have a subject of this role (inboxSubject)
 };
 
 // Thread-safe. Connects again as often as it takes; servers that cannot be reached are not an error.
 class Nats {
  public:
-  // `reply` is empty, or the subject for an answer.
+  // `reply` is empty, or the subject for an answer, which is an inbox: others may belong to what the sender
+  // must not publish.
   using Handler = std::function<void(const std::string& subject, const std::string& reply,
                                      std::span<const std::byte> data)>;
 
@@ -75,7 +77,7 @@ class Nats {
   // subscription continues with the next connection. `subject` may have the wildcards of NATS.
   std::unique_ptr<Subscription> subscribe(const std::string& subject, Handler handler);
   // Subject for answers to one request.
-  static std::string inbox();
+  std::string inbox() const;
 
  private:
   friend class Bucket;
@@ -87,6 +89,7 @@ class Nats {
   void run();
   void send(const Waiting& message);
 
+  const std::string inboxes_;  // start of the subjects for answers, without a dot at its end
   telemetry::NatsMetrics& metrics_;
   std::atomic<bool> closed_{false};  // the library's last call was made
   void* connection_ = nullptr;

@@ -3,12 +3,16 @@
 
 #include <array>
 #include <charconv>
-#include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>
 
 namespace clothstream::fleet {
+namespace {
+
+constexpr std::string_view kInbox = "clothstream.inbox.";
+
+}  // namespace
 
 // Names of scenes consist of [a-z0-9_-], which subjects may contain.
 std::string streamSubject(const std::string& scene, std::uint64_t stream) {
@@ -62,6 +66,14 @@ std::optional<TunnelId> tunnelOf(const std::string& subject) {
     if (problem != std::errc() || last != first + kDigits) return std::nullopt;
   }
   return TunnelId{numbers[0], numbers[1]};
+}
+
+std::string inboxSubject(const std::string& role) {
+  return std::string(kInbox) + role;
+}
+
+bool isInbox(std::string_view subject) {
+  return subject.starts_with(kInbox);
 }
 
 std::string serverSubject(std::uint64_t origin) {

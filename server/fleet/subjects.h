@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace clothstream::fleet {
 
@@ -35,6 +36,10 @@ std::string downPattern(const std::string& stream, std::uint64_t edge);
 // Reads the end of either subject.
 std::optional<TunnelId> tunnelOf(const std::string& subject);
 
+// Answers to the programs of a role. Only they may subscribe to what begins with it, so that an edge does not
+// see answers to a server.
+std::string inboxSubject(const std::string& role);
+bool isInbox(std::string_view subject);
 // Requests to a server.
 std::string serverSubject(std::uint64_t origin);
 // Both directions of a move.

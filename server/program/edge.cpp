@@ -26,7 +26,7 @@ int edge(const ProgramOptions& options, const Signals& signals) {
   serverOptions.authenticator = makeAuthenticator(options);
   serverOptions.observer = openEvents(options);
   hosting::SceneServer server(serverOptions);
-  const fleet::Edge shown(server, natsOptions(options), serverOptions.reconnectGrace.place);
+  const fleet::Edge shown(server, natsOptions(options, "edge"), serverOptions.reconnectGrace.place);
   shown.waitForOffers();  // clients that come back to an edge that starts again find their scenes
   guard = openEndpoints(
       server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),

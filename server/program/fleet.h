@@ -11,11 +11,13 @@
 
 namespace clothstream::program {
 
-inline fleet::NatsOptions natsOptions(const ProgramOptions& options) {
+// `role`: server or edge.
+inline fleet::NatsOptions natsOptions(const ProgramOptions& options, const char* role) {
   return {.servers = options.natsServers,
           .credentials = options.natsCredentials,
           .authority = options.natsAuthority,
-          .name = kServerName};
+          .name = kServerName,
+          .role = role};
 }
 
 // Clients of other servers are sent to the first public name; an address is none.

@@ -59,7 +59,8 @@ int play(const ProgramOptions& options, const Signals& signals) {
   hosting::SceneServer server(
       scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), serverOptions);
   std::optional<fleet::Origin> origin;
-  if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options), originOptions(options));
+  if (!options.natsServers.empty())
+    origin.emplace(server, natsOptions(options, "server"), originOptions(options));
   guard = openEndpoints(server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
                         intro, [&] { return server.report(); });
   return 0;

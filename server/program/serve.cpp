@@ -77,7 +77,8 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   serverOptions.guestScenes = std::move(builtIn);
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   std::optional<fleet::Origin> origin;
-  if (!options.natsServers.empty()) origin.emplace(server, natsOptions(options), originOptions(options));
+  if (!options.natsServers.empty())
+    origin.emplace(server, natsOptions(options, "server"), originOptions(options));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   guard =
       openEndpoints(server, options, signals, start, authenticator.get(), monitoring.get(),

@@ -44,7 +44,7 @@ class EdgeTest : public tests::ServerTest {
   }
 
   NatsOptions natsOptions() const {
-    return {.servers = {nats_->url()}, .credentials = {}, .authority = {}, .name = "test"};
+    return {.servers = {nats_->url()}, .credentials = {}, .authority = {}, .name = "test", .role = "test"};
   }
 
   void startOrigin(hosting::ServerOptions options = {}) {
@@ -301,22 +301,43 @@ TEST_F(EdgeTest, AServerOfTheSameSceneNameDoesNotReplaceTheFirst) {
   EXPECT_FALSE(viewer.finished());
 }
 
+// Subject of the stream of "small", as any program at NATS learns it.
+std::string smallStream(Nats& nats) {
+  std::atomic<std::uint64_t> stream = 0;
+  const auto offers = nats.subscribe(kOffers, [&](const auto&, const auto&, auto data) {
+    v1::Offer offer;
+    if (parse(data, offer) && offer.scenes_size() > 0) stream = offer.scenes(0).stream();
+  });
+  EXPECT_TRUE(eventually([&] { return stream != 0; }));
+  return streamSubject("small", stream);
+}
+
+TEST_F(EdgeTest, AnswersGoToInboxesOnly) {
+  ASSERT_NO_FATAL_FAILURE(startOrigin());
+  if (IsSkipped()) return;
+  telemetry::NatsMetrics metrics;
+  Nats other(natsOptions(), metrics);
+  const std::string elsewhere = "clothstream.moves.1.up", inbox = other.inbox();
+  std::atomic<int> strays = 0, answers = 0;
+  const auto stray = other.subscribe(elsewhere, [&](const auto&, const auto&, auto) { ++strays; });
+  const auto answer = other.subscribe(inbox, [&](const auto&, const auto&, auto) { ++answers; });
+  const std::string description = descriptionSubject(smallStream(other));
+  // The origin answers in this order.
+  other.publish(description, toBytes(v1::ChunkRequest()), elsewhere);
+  other.publish(description, toBytes(v1::ChunkRequest()), inbox);
+  ASSERT_TRUE(eventually([&] { return answers == 1; }));
+  EXPECT_EQ(strays, 0);
+}
+
 TEST_F(EdgeTest, MessagesThatDoNotBelongToAStreamAreDropped) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
   const auto edge = startEdge();
   Viewer viewer(edge->server);
   viewer.join();
-  // Another program of the network that knows the stream.
   telemetry::NatsMetrics metrics;
   Nats other(natsOptions(), metrics);
-  std::atomic<std::uint64_t> stream = 0;
-  const auto offers = other.subscribe(kOffers, [&](const auto&, const auto&, auto data) {
-    v1::Offer offer;
-    if (parse(data, offer) && offer.scenes_size() > 0) stream = offer.scenes(0).stream();
-  });
-  ASSERT_TRUE(eventually([&] { return stream != 0; }));
-  const std::string subject = streamSubject("small", stream);
+  const std::string subject = smallStream(other);
   const auto send = [&](const std::string& where, const std::string& bytes) {
     const auto* const first = reinterpret_cast<const std::byte*>(bytes.data());
     other.publish(where, std::make_shared<std::vector<std::byte>>(first, first + bytes.size()));

@@ -35,7 +35,7 @@ class FleetTest : public ::testing::Test {
   }
 
   fleet::NatsOptions natsOptions() const {
-    return {.servers = {nats_->url()}, .credentials = {}, .authority = {}, .name = "test"};
+    return {.servers = {nats_->url()}, .credentials = {}, .authority = {}, .name = "test", .role = "test"};
   }
   static hosting::ServerOptions options() {
     hosting::ServerOptions options;

@@ -659,7 +659,7 @@ function documentedUsers() {
   const buckets = [.../^`BUCKET` is each of (.*?)\.$/ms.exec(documentation)[1].matchAll(/`([\w-]+)`/g)].map((match) => match[1]);
   assert.deepEqual([users, buckets.length], [["server", "edge", "operator"], 3]);
   const found = Object.fromEntries(users.map((user) => [user, { publish: [], subscribe: [] }]));
-  for (const [, subject, cells] of documentation.matchAll(/^\| `((?:clothstream\.|_INBOX\.|\$)\S+)` \|(.*)\|$/gm))
+  for (const [, subject, cells] of documentation.matchAll(/^\| `((?:clothstream\.|\$)\S+)` \|(.*)\|$/gm))
     cells.split("|").forEach((cell, i) => {
       const own = users[i] === "server" ? buckets : buckets.slice(0, 2);
       const subjects = subject.includes("BUCKET") ? own.map((bucket) => subject.replaceAll("BUCKET", bucket)) : [subject];
