@@ -11,10 +11,10 @@ import json
 import os
 import pathlib
 import re
-import signal
 import socket
 import ssl
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -22,6 +22,9 @@ import unittest
 import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/support"))
+from programs import Server, free_port, wait_until  # noqa: E402
+
 SERVER, PROGRAM = os.environ["CLOTHSTREAM_SERVER"], os.environ["CLOTHSTREAM_PROGRAM"]
 KEY = os.urandom(32)
 SECRET = "whsec_" + base64.b64encode(KEY).decode()
@@ -101,54 +104,18 @@ def temporary_files():
 
 @contextlib.contextmanager
 def running_server(url, secret, *more, environment=None):
-    """Starts a server, and gives it with its gRPC address, and its log as a list of lines."""
-    command = [SERVER, "--port", "0", "--grpc-port", "0", "--scene", "small", "--scene-file",
-               str(ROOT / "tests/e2e/small.json"), "--events-url", url, "--events-secret-file", str(secret), *more]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                               env={**os.environ, **(environment or {})})
-    log, reader = [], None
-    try:
-        for line in process.stdout:
-            log.append(line)
-            if found := re.match(r"gRPC +(\S+)", line):
-                break
-        else:
-            if "no Vulkan" in "".join(log):
-                raise unittest.SkipTest("the server needs a Vulkan device")
-            raise AssertionError(f"the server ended: {''.join(log)}")
-        reader = threading.Thread(target=lambda: log.extend(process.stdout))
-        reader.start()
-        yield process, found[1], log
-    finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGTERM)
-        process.wait(timeout=60)
-        if reader:
-            reader.join()
-        process.stdout.close()
+    options = ["--scene", "small", "--scene-file", ROOT / "tests/e2e/small.json", "--events-url", url, "--events-secret-file",
+               secret, *more]
+    with tempfile.TemporaryDirectory() as folder:
+        with Server(SERVER, options, pathlib.Path(folder) / "log", {**os.environ, **(environment or {})}) as server:
+            yield server
 
 
-def join(address):
-    subprocess.run([PROGRAM, "join", address, "--seconds", "1"], check=True, stdout=subprocess.DEVNULL)
-
-
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
+def join(server):
+    subprocess.run([PROGRAM, "join", server.address, "--seconds", "1"], check=True, stdout=subprocess.DEVNULL)
 
 
 class Events(unittest.TestCase):
-    def until(self, holds, seconds=60):
-        deadline = time.monotonic() + seconds
-        while not holds():
-            self.assertLess(time.monotonic(), deadline, "it never came")
-            time.sleep(0.05)
-
-    def end(self, process):
-        process.send_signal(signal.SIGTERM)
-        self.assertEqual(process.wait(timeout=60), 0)
-
     def test_joins_leaves_and_usage(self):
         with temporary_files() as (folder, secret):
             keys = folder / "keys"
@@ -160,13 +127,13 @@ class Events(unittest.TestCase):
                 capture_output=True, text=True).stdout)
             backend = Backend()
             with running_server(f"http://127.0.0.1:{backend.port}/in?x=1", secret, "--token-keys", str(keys),
-                                "--hold", "1") as (process, address, _):
+                                "--hold", "1") as server:
                 def clothstream(command, *more):
                     subprocess.run([PROGRAM, command, "--token", str(token), *more], check=True,
                                    stdout=subprocess.DEVNULL)
 
-                clothstream("join", address, "--seconds", "2")
-                self.until(lambda: len(backend.events("participant.left")) == 1)
+                clothstream("join", server.address, "--seconds", "2")
+                wait_until(lambda: len(backend.events("participant.left")) == 1)
                 joined, left = backend.events("participant.joined")[0], backend.events("participant.left")[0]
                 self.assertEqual(joined["data"], {"server": socket.gethostname(), "scene": "small", "participant": 1,
                                                   "role": "owner", "subject": "ada", "tenant": ""})
@@ -180,17 +147,17 @@ class Events(unittest.TestCase):
                     self.assertTrue(0 <= age.total_seconds() < 60, event)
 
                 # A client that is killed has its grace period.
-                with subprocess.Popen([PROGRAM, "join", address, "--token", str(token), "--role", "viewer", "--seconds",
+                with subprocess.Popen([PROGRAM, "join", server.address, "--token", str(token), "--role", "viewer", "--seconds",
                                        "600"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as viewer:
-                    self.until(lambda: len(backend.events("participant.joined")) == 2)
+                    wait_until(lambda: len(backend.events("participant.joined")) == 2)
                     viewer.kill()
-                self.until(lambda: len(backend.events("participant.left")) == 2)
+                wait_until(lambda: len(backend.events("participant.left")) == 2)
                 self.assertEqual(backend.events("participant.left")[1]["data"]["role"], "viewer")
 
-                clothstream("create", "--server", address, "--named", "small", "--name", "mine")
-                clothstream("join", address, "--scene", "mine", "--seconds", "2")
-                clothstream("delete", "--server", address, "mine")
-                self.until(lambda: backend.events("scene.usage", "mine"))
+                clothstream("create", "--server", server.address, "--named", "small", "--name", "mine")
+                clothstream("join", server.address, "--scene", "mine", "--seconds", "2")
+                clothstream("delete", "--server", server.address, "mine")
+                wait_until(lambda: backend.events("scene.usage", "mine"))
                 kinds = [e["type"] for e in backend.events(scene="mine")]
                 self.assertEqual(kinds, ["participant.joined", "participant.left", "scene.usage"])
                 for event in backend.events(scene="mine"):
@@ -201,7 +168,7 @@ class Events(unittest.TestCase):
                 self.assertGreater(usage["sentBytes"], 10_000)
 
                 self.assertEqual(backend.events("scene.usage", "small"), [])  # not yet, after less than a minute
-                self.end(process)
+                server.end()
             # The end of the server reports the rest, and scenes that nobody used are left out.
             self.assertEqual([e["data"]["scene"] for e in backend.events("scene.usage")], ["mine", "small"])
             self.assertEqual(backend.problems, [])
@@ -212,11 +179,11 @@ class Events(unittest.TestCase):
     def test_a_participant_at_the_end_leaves(self):
         with temporary_files() as (_, secret):
             backend = Backend()
-            with running_server(f"http://127.0.0.1:{backend.port}/", secret) as (process, address, _):
-                with subprocess.Popen([PROGRAM, "join", address, "--no-reconnect"], stdout=subprocess.DEVNULL,
+            with running_server(f"http://127.0.0.1:{backend.port}/", secret) as server:
+                with subprocess.Popen([PROGRAM, "join", server.address, "--no-reconnect"], stdout=subprocess.DEVNULL,
                                       stderr=subprocess.DEVNULL):
-                    self.until(lambda: backend.events("participant.joined"))
-                    self.end(process)
+                    wait_until(lambda: backend.events("participant.joined"))
+                    server.end()
             self.assertEqual([e["type"] for e in backend.events()],
                              ["participant.joined", "participant.left", "scene.usage"])
             backend.close()
@@ -226,32 +193,31 @@ class Events(unittest.TestCase):
             backend = Backend()
             state = ("--state-dir", str(folder / "state"), "--hold", "2")
             url = f"http://127.0.0.1:{backend.port}/"
-            with running_server(url, secret, *state) as (process, address, _):
-                with subprocess.Popen([PROGRAM, "join", address, "--no-reconnect"], stdout=subprocess.DEVNULL,
+            with running_server(url, secret, *state) as server:
+                with subprocess.Popen([PROGRAM, "join", server.address, "--no-reconnect"], stdout=subprocess.DEVNULL,
                                       stderr=subprocess.DEVNULL):
-                    self.until(lambda: backend.events("participant.joined"))
-                    self.end(process)
+                    wait_until(lambda: backend.events("participant.joined"))
+                    server.end()
             self.assertEqual(backend.events("participant.left"), [])
             with running_server(url, secret, *state):
-                self.until(lambda: backend.events("participant.left"))  # its grace period ends in the next run
+                wait_until(lambda: backend.events("participant.left"))  # its grace period ends in the next run
             self.assertEqual(len(backend.events("participant.joined")), 1)
             backend.close()
 
     def test_retries_keep_id_and_order(self):
         with temporary_files() as (_, secret):
             backend = Backend(answers=[500, 429, 400])
-            with running_server(f"http://127.0.0.1:{backend.port}/", secret, "--metrics-port", "0") as (
-                    process, address, log):
-                join(address)
-                self.until(lambda: backend.events("participant.left"))
+            with running_server(f"http://127.0.0.1:{backend.port}/", secret, "--metrics-port", "0") as server:
+                join(server)
+                wait_until(lambda: backend.events("participant.left"))
                 self.assertEqual(len({r["id"] for r in backend.requests[:3]}), 1)
                 self.assertEqual({json.dumps(r["body"]) for r in backend.requests[:3]},
                                  {json.dumps(backend.requests[0]["body"])})
                 # The third answer refused the event, so it was dropped.
                 self.assertEqual(backend.requests[0]["body"]["type"], "participant.joined")
                 self.assertEqual(backend.events("participant.joined"), [])
-                self.until(lambda: any("answers with status 400; the event is dropped" in line for line in log))
-                metrics = next(found[1] for line in log if (found := re.match(r"metrics (\S+)", line)))
+                wait_until(lambda: "answers with status 400; the event is dropped" in server.said())
+                metrics = server.wait_for(r"^metrics (\S+)")[1]
                 with urllib.request.urlopen(metrics, timeout=10) as answer:
                     shown = answer.read().decode()
                 for line in ('{result="delivered"} 1', '{result="retried"} 2', '{result="dropped"} 1'):
@@ -262,26 +228,26 @@ class Events(unittest.TestCase):
     def test_a_backend_that_starts_later_gets_all(self):
         with temporary_files() as (_, secret):
             port = free_port()
-            with running_server(f"http://localhost:{port}/", secret) as (process, address, log):
-                join(address)
-                join(address)
-                self.until(lambda: any("trying again" in line for line in log))
+            with running_server(f"http://localhost:{port}/", secret) as server:
+                join(server)
+                join(server)
+                wait_until(lambda: "trying again" in server.said())
                 backend = Backend(port=port)
-                self.until(lambda: len(backend.events()) >= 4)
+                wait_until(lambda: len(backend.events()) >= 4)
                 self.assertEqual([(e["type"].split(".")[1], e["data"]["participant"]) for e in backend.events()],
                                  [("joined", 1), ("left", 1), ("joined", 2), ("left", 2)])
-                self.end(process)
+                server.end()
             self.assertEqual(backend.problems, [])
             backend.close()
 
     def test_a_backend_that_is_down_does_not_delay_the_end(self):
         with temporary_files() as (_, secret):
-            with running_server(f"http://127.0.0.1:{free_port()}/", secret, "--drain", "6") as (process, address, log):
-                join(address)
+            with running_server(f"http://127.0.0.1:{free_port()}/", secret, "--drain", "6") as server:
+                join(server)
                 begin = time.monotonic()
-                self.end(process)
+                server.end()
                 self.assertLess(time.monotonic() - begin, 6)
-            self.assertIn("were not delivered before the end", "".join(log))
+                self.assertIn("were not delivered before the end", server.said())
 
     def test_https_needs_a_trusted_certificate(self):
         with temporary_files() as (folder, secret):
@@ -293,15 +259,15 @@ class Events(unittest.TestCase):
             backend = Backend(certificate=(certificate, key))
             url = f"https://localhost:{backend.port}/in"
             trust = {"SSL_CERT_FILE": certificate}
-            with running_server(url, secret, environment=trust) as (_, address, _):
-                join(address)
-                self.until(lambda: backend.events("participant.left"))
+            with running_server(url, secret, environment=trust) as server:
+                join(server)
+                wait_until(lambda: backend.events("participant.left"))
             self.assertEqual(backend.problems, [])
             before = len(backend.requests)
             for wrong in (url, url.replace("localhost", "127.0.0.1")):  # an unknown authority; another name
-                with running_server(wrong, secret, environment={} if wrong == url else trust) as (_, address, log):
-                    join(address)
-                    self.until(lambda: any("TLS: certificate verify failed" in line for line in log))
+                with running_server(wrong, secret, environment={} if wrong == url else trust) as server:
+                    join(server)
+                    wait_until(lambda: "TLS: certificate verify failed" in server.said())
             self.assertEqual(len(backend.requests), before)
             backend.close()
 

@@ -5,12 +5,15 @@ import json
 import os
 import pathlib
 import shutil
-import signal
-import socket
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/support"))
+from programs import Program, Server, free_port, wait_until  # noqa: E402
 
 SERVER, PROGRAM = os.environ["CLOTHSTREAM_SERVER"], os.environ["CLOTHSTREAM_PROGRAM"]
 NATS_SERVER = shutil.which("nats-server", path=os.environ["PATH"] + ":/usr/sbin")
@@ -22,19 +25,6 @@ SCENE = {
 }
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def eventually(condition, seconds=60):
-    end = time.monotonic() + seconds
-    while not (result := condition()) and time.monotonic() < end:
-        time.sleep(0.1)
-    return result
-
-
 @unittest.skipUnless(NATS_SERVER, "there is no nats-server (apt install nats-server)")
 class Directory(unittest.TestCase):
     def setUp(self):
@@ -44,32 +34,16 @@ class Directory(unittest.TestCase):
         self.nats_port = free_port()
         self.url = f"nats://127.0.0.1:{self.nats_port}"
 
-    def start(self, command, ready, name):
-        log = self.folder / f"{name}.log"
-        with log.open("wb") as output:
-            process = subprocess.Popen([str(part) for part in command], stdout=output, stderr=subprocess.STDOUT)
-
-        def end():
-            if process.poll() is None:
-                process.terminate()
-            process.wait()
-
-        self.stack.callback(end)
-        text = eventually(lambda: (text := log.read_text(errors="replace")) and ready in text and text)
-        self.assertTrue(text, f"{name} does not start: {log.read_text(errors='replace')}")
-        return process, text
-
     def start_nats(self, *more):
-        self.start([NATS_SERVER, "--addr", "127.0.0.1", "--port", self.nats_port, *more], "Server is ready", "nats")
+        command = [NATS_SERVER, "--addr", "127.0.0.1", "--port", self.nats_port, *more]
+        self.stack.enter_context(Program("nats-server", command, self.folder / "nats.log")).wait_for("Server is ready")
 
-    def start_server(self, name, *more):
+    def start_server(self, name):
         scene = self.folder / "first.json"
         scene.write_text(json.dumps({**SCENE, "name": "first"}))
-        process, text = self.start([SERVER, "--port", 0, "--grpc-port", 0, "--scene-file", scene, "--scene", "first",
-                                    "--nats", self.url, "--public-name", f"{name}.example.com",
-                                    "--insecure", "--state-dir", "", *more], "gRPC ", name)
-        process.address = text.split("gRPC ")[1].split()[0]
-        return process
+        options = ["--scene-file", scene, "--scene", "first", "--nats", self.url, "--public-name", f"{name}.example.com",
+                   "--insecure", "--state-dir", ""]
+        return self.stack.enter_context(Server(SERVER, options, self.folder / f"{name}.log"))
 
     def run_program(self, *arguments):
         return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120)
@@ -100,8 +74,8 @@ class Directory(unittest.TestCase):
         self.start_nats("--jetstream", "--store_dir", self.folder / "store")
         first, second = self.start_server("one"), self.start_server("two")
         self.create(first)
-        self.assertTrue(eventually(lambda: self.server_of("moves") == "one.example.com"))
-        self.assertTrue(eventually(lambda: len(self.directory()["servers"]) == 2))
+        wait_until(lambda: self.server_of("moves") == "one.example.com")
+        wait_until(lambda: len(self.directory()["servers"]) == 2)
         table = self.run_program("list", "--nats", self.url).stdout
         for text in ("one.example.com", "two.example.com", "moves", "first", "clothstream-server"):
             self.assertIn(text, table)
@@ -116,24 +90,23 @@ class Directory(unittest.TestCase):
         moved = self.run_program("move", "moves", "--to", "two.example.com", "--nats", self.url)
         self.assertEqual(moved.returncode, 0, moved.stderr)
         self.assertRegex(moved.stdout, r"moves is at server [0-9a-f]{16} now; it stood still for \d+ ms")
-        self.assertTrue(eventually(lambda: self.server_of("moves") == "two.example.com"))
+        wait_until(lambda: self.server_of("moves") == "two.example.com")
 
         # A server that stops moves its scenes, and one that is killed leaves a checkpoint.
         joined = self.run_program("join", second.address, "--scene", "moves", "--seconds", 4)
         self.assertEqual(joined.returncode, 0, joined.stderr)
-        second.terminate()
-        self.assertEqual(second.wait(), 0)
+        second.end()
         self.assertEqual(self.server_of("moves"), "one.example.com")
         third = self.start_server("three")
         time.sleep(4)  # a checkpoint of the scene, and the lease of the third server
-        first.send_signal(signal.SIGKILL)
-        self.assertTrue(eventually(lambda: self.server_of("moves") == "three.example.com"))
+        first.kill()
+        wait_until(lambda: self.server_of("moves") == "three.example.com")
         joined = self.run_program("join", third.address, "--scene", "moves", "--seconds", 2, "--hash")
         self.assertEqual(joined.returncode, 0, joined.stderr)
 
         deleted = self.run_program("delete", "moves", "--server", third.address)
         self.assertEqual(deleted.returncode, 0, deleted.stderr)
-        self.assertTrue(eventually(lambda: self.server_of("moves") is None))
+        wait_until(lambda: self.server_of("moves") is None)
 
     def test_says_what_is_missing(self):
         refused = self.run_program("list", "--nats", self.url)

@@ -6,7 +6,6 @@ import os
 import pathlib
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
@@ -18,8 +17,9 @@ import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MONITORING = ROOT / "deploy" / "monitoring"
-sys.path.insert(0, str(MONITORING))
+sys.path[:0] = [str(MONITORING), str(ROOT / "tests/support")]
 import make_dashboard  # noqa: E402
+from programs import Program, Server, free_port  # noqa: E402
 
 SERVER, PROGRAM = os.environ["CLOTHSTREAM_SERVER"], os.environ["CLOTHSTREAM_PROGRAM"]
 # Counters of what does not happen to a healthy server under this load. Their queries have no series.
@@ -31,42 +31,6 @@ def tool(name):
     if path is None:
         raise unittest.SkipTest(f"{name} is not installed: ./dev test installs Debian's package prometheus")
     return path
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-@contextlib.contextmanager
-def running(command, **options):
-    process = subprocess.Popen(command, **options)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.communicate(timeout=60)
-
-
-@contextlib.contextmanager
-def running_server():
-    """Starts a server on free ports, and gives the addresses that it prints, by name."""
-    command = [SERVER, "--port", "0", "--grpc-port", "0", "--metrics-port", "0", "--scene", "small", "--scene-file",
-               str(ROOT / "tests/e2e/small.json")]
-    with running(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as server:
-        printed, addresses = "", {}
-        for line in server.stdout:
-            printed += line
-            if found := re.match(r"(page|metrics) +http://([^/\s]+)/", line):
-                addresses[found[1]] = found[2]
-            if len(addresses) == 2:
-                break
-        else:
-            if "no Vulkan" in printed:
-                raise unittest.SkipTest("the server needs a Vulkan device")
-            raise AssertionError(f"the server ended: {printed}")
-        yield addresses
 
 
 def queries():
@@ -133,22 +97,23 @@ class WithAServer(unittest.TestCase):
     def test_every_query_has_an_answer(self):
         program = tool("prometheus")
         with contextlib.ExitStack() as stack:
-            addresses = stack.enter_context(running_server())
             folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            options = ["--metrics-port", 0, "--scene", "small", "--scene-file", ROOT / "tests/e2e/small.json"]
+            server = stack.enter_context(Server(SERVER, options, folder / "server.log"))
+            metrics = server.wait_for(r"^metrics +http://([^/\s]+)/")[1]
             shutil.copy(MONITORING / "alerts.yml", folder)
             config = (MONITORING / "prometheus.yml").read_text()
-            for before, now in {"127.0.0.1:9464": addresses["metrics"], "scrape_interval: 5s": "scrape_interval: 500ms",
+            for before, now in {"127.0.0.1:9464": metrics, "scrape_interval: 5s": "scrape_interval: 500ms",
                                 "evaluation_interval: 15s": "evaluation_interval: 1s"}.items():
                 self.assertIn(before, config)
                 config = config.replace(before, now)
             (folder / "prometheus.yml").write_text(config)
             port = free_port()
-            stack.enter_context(running(
-                [program, f"--config.file={folder}/prometheus.yml", f"--storage.tsdb.path={folder}/data",
-                 f"--web.listen-address=127.0.0.1:{port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
-            stack.enter_context(running(
-                [PROGRAM, "load", "--web", addresses["page"], "--participants", "2", "--seconds", "600"],
-                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+            command = [program, f"--config.file={folder}/prometheus.yml", f"--storage.tsdb.path={folder}/data",
+                       f"--web.listen-address=127.0.0.1:{port}"]
+            stack.enter_context(Program("prometheus", command, folder / "prometheus.log"))
+            load = [PROGRAM, "load", "--web", server.url.split("/")[2], "--participants", 2, "--seconds", 600]
+            stack.enter_context(Program("the load", load, folder / "load.log"))
             prometheus = Prometheus(port)
             prometheus.wait_for("sum(rate(clothstream_scene_input_to_packet_seconds_count[5s])) > 0")
             for name, expression in queries():

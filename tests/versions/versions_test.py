@@ -6,12 +6,13 @@ import contextlib
 import json
 import os
 import pathlib
-import socket
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+from programs import Server  # noqa: E402
 
 PRESENT, ROOT, BUILDS = (pathlib.Path(os.environ[f"CLOTHSTREAM_{name}"]) for name in ("PROGRAMS", "ROOT", "BUILDS"))
 VERSION, COMMIT = "0.2.0", "1562918f93d8f520ca1e37fd78499ec1daae569a"
@@ -34,12 +35,6 @@ def build_earlier():
     return programs
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 class Versions(unittest.TestCase):
     earlier = None  # folder of programs
 
@@ -57,21 +52,10 @@ class Versions(unittest.TestCase):
         """Starts a server and returns its address for gRPC."""
         self.count = getattr(self, "count", 0) + 1
         log = self.folder / f"server{self.count}.log"
-        command = [programs / "clothstream-server", *arguments, "--port", free_port(), "--grpc-port", free_port()]
-        with log.open("wb") as output:
-            process = subprocess.Popen(list(map(str, command)), stdout=output, stderr=subprocess.STDOUT, cwd=self.folder,
-                                       env={**os.environ, "HOME": str(self.folder), "XDG_STATE_HOME": str(self.folder)})
-
-        def end():
-            process.terminate()
-            self.assertEqual(process.wait(60), 0, log.read_text(errors="replace"))
-
-        self.stack.callback(end)
-        until = time.monotonic() + 120
-        while "gRPC " not in log.read_text(errors="replace"):
-            self.assertTrue(process.poll() is None and time.monotonic() < until, log.read_text(errors="replace"))
-            time.sleep(0.1)
-        return log.read_text(errors="replace").split("gRPC ")[1].split()[0]
+        home = {**os.environ, "HOME": str(self.folder), "XDG_STATE_HOME": str(self.folder)}
+        server = Server(programs / "clothstream-server", arguments, log, home)
+        self.stack.callback(server.end)
+        return server.address
 
     def join(self, programs, address, *arguments):
         """Checks each frame against the hash of the server, and returns the summary."""

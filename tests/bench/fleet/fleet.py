@@ -24,6 +24,9 @@ import tempfile
 import threading
 import time
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+from programs import MissingProgram, Program, ProgramFailed, find_program  # noqa: E402
+
 EDGES = 3
 NATS_PORT = 24222
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
@@ -66,38 +69,10 @@ MOVING = {
 MOVES = 6
 
 
-class Program:
-    """A child process, whose output goes to a file."""
-
-    def __init__(self, command, log):
-        self.command = [str(part) for part in command]
-        self.log = log
-        self.start()
-
-    def start(self):
-        self.process = subprocess.Popen(self.command, stdout=open(self.log, "ab"), stderr=subprocess.STDOUT)
-
-    def wait_for(self, text):
-        end = time.monotonic() + 60
-        while time.monotonic() < end:
-            if text in self.log.read_text(errors="replace"):
-                return
-            if self.process.poll() is not None:
-                break
-            time.sleep(0.05)
-        sys.exit(f"{' '.join(self.command)}: '{text}' did not come:\n{self.log.read_text(errors='replace')}")
-
+class Measured(Program):
     def cpu_seconds(self):
         fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / CLOCK_TICKS
-
-    def kill(self):
-        self.process.kill()
-        self.process.wait()
-
-    def stop(self):
-        self.process.send_signal(signal.SIGTERM)
-        self.process.wait()
 
 
 class Fleet:
@@ -107,7 +82,7 @@ class Fleet:
         self.started = []
 
     def start(self):
-        nats = ["nats-server", "--addr", "127.0.0.1", "--port", NATS_PORT, "--jetstream", "--store_dir", self.folder / "nats"]
+        nats = [find_program("nats-server", "nats-server"), "--addr", "127.0.0.1", "--port", NATS_PORT, "--jetstream", "--store_dir", self.folder / "nats"]
         self.nats = self.run(nats, "nats", "Server is ready")
         self.options = ["--nats", f"nats://127.0.0.1:{NATS_PORT}"]
         self.origins = []
@@ -119,7 +94,7 @@ class Fleet:
                 edge.wait_for(f"{name}: serves this scene")
 
     def run(self, command, name, ready):
-        program = Program(command, self.folder / f"{name}.log")
+        program = Measured(name, command, self.folder / f"{name}.log")
         self.started.append(program)
         program.wait_for(ready)
         return program
@@ -151,8 +126,7 @@ class Fleet:
 
     def stop(self):
         for program in reversed(self.started):
-            if program.process.poll() is None:
-                program.stop()
+            program.stop(60)
 
 
 def result_of(load):
@@ -313,7 +287,6 @@ def moves_of_direct_clients(fleet):
 
 
 def restart(program, ready):
-    program.log.write_text("")
     program.start()
     program.wait_for(ready)
 
@@ -329,6 +302,8 @@ def main():
         try:
             fleet.start()
             figures = measure(fleet, arguments.seconds)
+        except (MissingProgram, ProgramFailed) as failure:
+            sys.exit(str(failure))
         finally:
             fleet.stop()
     if arguments.json:

@@ -22,11 +22,12 @@ import sys
 import tempfile
 import time
 
-from programs import MissingProgram, Program, ProgramFailed, find_program
-from watching import Load, Page, Viewer
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "tests/support"))
+from programs import MissingProgram, Program, ProgramFailed, find_program  # noqa: E402
+from sidecar import Sidecar  # noqa: E402
+from watching import Load, Page, Viewer  # noqa: E402
 
-FOLDER = pathlib.Path(__file__).resolve().parent
-ROOT = FOLDER.parents[2]
 SCENE = "fleet-demo"
 BOUND_SECONDS = 20  # within which the page must have new frames after a kill
 FRAMES_AFTER = 10  # new frames that the page must have
@@ -55,18 +56,6 @@ class Story:
     @staticmethod
     def title(text):
         print(f"\n{text}", flush=True)
-
-
-def stand_in_of_agones(server, program):
-    """The sidecar that the test of --agones uses."""
-    for name, path in (("CLOTHSTREAM_SERVER", server), ("CLOTHSTREAM_PROGRAM", program)):
-        os.environ.setdefault(name, str(path))
-    sys.path.insert(0, str(FOLDER.parent))
-    from agones_test import Sidecar
-
-    for name in ("CLOTHSTREAM_SERVER", "CLOTHSTREAM_PROGRAM"):
-        del os.environ[name]  # servers would read them as options
-    return Sidecar(["participants", "created-scenes", "load"], ["scenes"])
 
 
 def flag_scene():
@@ -100,7 +89,7 @@ class Fleet:
         self.nats.command[self.nats.command.index("-1")] = self.nats_url.rpartition(":")[2]
         self.nats.wait_for("Server is ready")
         say(f"nats-server with JetStream: {self.nats_url}")
-        self.sidecar = stand_in_of_agones(self.server, self.client)
+        self.sidecar = Sidecar(["participants", "created-scenes", "load"], ["scenes"])
         origin = ["--device", self.arguments.device, "--insecure", "--drain", 3, "--max-load", 1000, "--max-scene-load", 1000]
         agones = ["--public-name", "origin-2.example", "--agones"]
         environment = {**os.environ, "AGONES_SDK_HTTP_PORT": str(self.sidecar.port)}
@@ -189,7 +178,7 @@ class Fleet:
         for program in reversed(self.started):
             program.wait_or_kill(5)
         if self.sidecar:
-            self.sidecar.shutdown()
+            self.sidecar.close()
 
 
 class Demo:
@@ -253,7 +242,7 @@ class Demo:
 
     def move(self, to, picture=""):
         """Moves the scene. A picture that is taken meanwhile keeps the page from showing frames."""
-        fleet, page, say = self.fleet, self.fleet.page, self.story.say
+        page, say = self.fleet.page, self.story.say
         self.story.title(f"The scene moves to {to}" + (f", while {picture}.png is taken" if picture else ""))
         load = self.begin()
         if picture:
@@ -276,7 +265,7 @@ class Demo:
         self.story.detail(fleet.listed() + fleet.agones_line())
 
     def kill(self, name, program, picture, back=True):
-        fleet, page, say = self.fleet, self.fleet.page, self.story.say
+        page, say = self.fleet.page, self.story.say
         self.story.title(f"{name} is killed")
         load = self.begin()
         if not back:
@@ -309,7 +298,7 @@ class Demo:
 
     def note(self, step, since, until, returned, load):
         """Prints and keeps what the page and the viewers saw."""
-        fleet, page, say = self.fleet, self.fleet.page, self.story.say
+        page, say = self.fleet.page, self.story.say
         # Viewers at the other edge may come back later than the page.
         end = time.monotonic() + max(1, since + BOUND_SECONDS - time.time())
         while time.monotonic() < end and not self.viewer.frames_since(until):

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Child processes of the demo. All end with it, even if it is killed."""
+"""Child processes of tests, benchmarks and the demo. All end with their parent, even if it is killed."""
 
 import ctypes
 import pathlib
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import time
+import unittest
 
 PR_SET_PDEATHSIG = 1
 LIBC = ctypes.CDLL(None, use_errno=True)
@@ -15,7 +17,7 @@ START_SECONDS = 60
 
 
 class MissingProgram(Exception):
-    """Something that the demo needs is not installed. The text says how to install it."""
+    """Something that is needed is not installed. The text says how to install it."""
 
 
 class ProgramFailed(Exception):
@@ -31,12 +33,29 @@ def find_program(name, package, path=None):
 
 
 def end_with_parent():
-    """Runs in a new process. It gets SIGKILL when the demo ends, and no SIGINT from the terminal."""
+    """Runs in a new process. It gets SIGKILL when its parent ends, and no SIGINT from the terminal."""
     LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def wait_until(condition, what="it", seconds=60):
+    """Returns the value of `condition()` when it is true. `what` is for the error."""
+    end = time.monotonic() + seconds
+    while not (value := condition()):
+        if time.monotonic() > end:
+            raise AssertionError(f"{what} did not come in {seconds} s")
+        time.sleep(0.05)
+    return value
+
+
 class Program:
-    """A process whose output goes to a log file. `pipes`: its input and output are pipes instead."""
+    """A process whose output goes to a log file. `pipes`: its input and output are pipes instead. It stops at the end of
+    a `with` block."""
 
     def __init__(self, name, command, log, environment=None, pipes=False):
         self.name = name
@@ -58,6 +77,12 @@ class Program:
             self.process = subprocess.Popen(
                 self.command, env=self.environment, start_new_session=True, preexec_fn=end_with_parent, **channels
             )
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stop(60)
 
     @property
     def runs(self):
@@ -103,3 +128,28 @@ class Program:
             self.process.wait(seconds)
         except subprocess.TimeoutExpired:
             self.kill()
+
+
+class Server(Program):
+    """A server or an edge on free ports, which has started. `address` is that of gRPC, and `url` that of the page."""
+
+    def __init__(self, server, arguments, log, environment=None):
+        command = [server, *arguments, "--port", 0, "--grpc-port", 0]
+        super().__init__(pathlib.Path(server).name, command, log, environment)
+
+    def start(self):
+        super().start()
+        try:
+            self.url = self.wait_for(r"^page +(\S+)")[1]
+            self.address = self.wait_for(r"^gRPC +(\S+)")[1]
+        except ProgramFailed:
+            if "no Vulkan" in self.said():
+                raise unittest.SkipTest("the server needs a Vulkan device") from None
+            raise
+
+    def end(self):
+        """SIGTERM. Fails unless the server ends with 0 in time."""
+        self.ask_to_stop()
+        status = self.process.wait(60)
+        if status != 0:
+            raise ProgramFailed(f"{self.name} ended with {status}; its log ends:\n{self.tail()}")
