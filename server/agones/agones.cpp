@@ -69,11 +69,18 @@ void Agones::look(Clock::time_point now) {
 }
 
 void Agones::choosePhase(bool inUse, Clock::time_point now) {
-  if (inUse) lastInUse_ = now;
+  const bool expected = !inUse && phase_ == Phase::ready && wasAllocated();
+  if (inUse || expected) lastInUse_ = now;
+  if (expected) phase_ = Phase::allocated;
   if (phase_ == Phase::starting && done("ready", sidecar_.ready())) phase_ = Phase::ready;
   if (phase_ == Phase::ready && inUse && done("allocate", sidecar_.allocate())) phase_ = Phase::allocated;
   if (phase_ == Phase::allocated && now - lastInUse_ > kStaysAllocated && done("ready", sidecar_.ready()))
     phase_ = Phase::ready;
+}
+
+bool Agones::wasAllocated() {
+  std::string state;
+  return done("gameserver", sidecar_.state(state)) && state == "Allocated";
 }
 
 void Agones::tellCounts(const std::map<std::string, Count>& counts) {

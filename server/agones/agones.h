@@ -27,7 +27,8 @@ inline constexpr const char* kScenes = "scenes";  // list of the names of all sc
 
 // Tells the sidecar that the server is ready, every two seconds that it is healthy, and once per second what
 // has changed of counters and list. While the server has participants or scenes that clients created, it is
-// allocated, so that Agones does not end it; 30 seconds after the last of them it is ready again.
+// allocated, so that Agones does not end it; 30 seconds after the last of them it is ready again. So it is if
+// a backend has allocated it and no client comes for 30 seconds.
 //
 // Calls are made on a thread of its own. A sidecar that does not answer is asked again.
 class Agones {
@@ -52,8 +53,9 @@ class Agones {
 
   void run();
   void look(Clock::time_point now);
-  // Makes the server ready or allocated.
+  // Makes the server ready or allocated, or sees that a backend has allocated it.
   void choosePhase(bool inUse, Clock::time_point now);
+  bool wasAllocated();
   void tellCounts(const std::map<std::string, Count>& counts);
   void tellScenes(const std::set<std::string>& names);
   // Returns whether the call succeeded. Logs the first failure of a row.

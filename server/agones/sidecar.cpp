@@ -70,6 +70,17 @@ Sidecar::Answer Sidecar::post(const std::string& path) {
   return call("POST", path, "{}", answer);
 }
 
+Sidecar::Answer Sidecar::state(std::string& state) {
+  std::string answer;
+  state.clear();
+  const Answer result = call("GET", "/gameserver", "", answer);
+  if (result != Answer::ok) return result;
+  const json read = json::parse(answer, nullptr, false);
+  const json::json_pointer place("/status/state");
+  if (read.contains(place) && read[place].is_string()) state = read[place].get<std::string>();
+  return result;
+}
+
 Sidecar::Answer Sidecar::setCounter(const std::string& name, std::int64_t count, std::int64_t capacity) {
   std::string answer;
   return call("PATCH", "/v1beta1/counters/" + name,

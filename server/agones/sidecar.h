@@ -28,6 +28,8 @@ class Sidecar {
   Answer health() { return post("/health"); }
   Answer allocate() { return post("/allocate"); }
   Answer shutdown() { return post("/shutdown"); }
+  // State of the GameServer, such as "Allocated". Empty if the answer is not `ok`.
+  Answer state(std::string& state);
   Answer setCounter(const std::string& name, std::int64_t count, std::int64_t capacity);
   Answer addToList(const std::string& name, const std::string& value);
   Answer removeFromList(const std::string& name, const std::string& value);

@@ -74,13 +74,19 @@ class GameServer(unittest.TestCase):
             wait_until(lambda: sidecar.state == "Ready")
             sidecar.close()
 
-    def test_a_server_without_participants_stays_healthy(self):
+    def test_a_server_that_nobody_uses_stays_healthy_and_becomes_ready_again(self):
         sidecar = Sidecar([], [])
         with game_server(sidecar.port):
-            # Longer than the five seconds in which the device thread must answer.
-            wait_until(lambda: sidecar.health and sidecar.health[-1] - sidecar.health[0] > 9)
+            wait_until(lambda: sidecar.state == "Ready")
+            sidecar.become("Allocated")  # by a backend
+            allocated = time.monotonic()
+            wait_until(lambda: sidecar.state == "Ready")
+            self.assertGreater(time.monotonic() - allocated, 20)
+            # The device thread must answer every five seconds.
             gaps = [b - a for a, b in zip(sidecar.health, sidecar.health[1:])]
             self.assertLess(max(gaps), 5)
+            self.assertGreater(sidecar.health[-1] - sidecar.health[0], 20)
+        self.assertEqual(sidecar.states, ["Ready", "Allocated", "Ready", "Shutdown"])
         sidecar.close()
 
     def test_a_wrong_port_is_explained(self):

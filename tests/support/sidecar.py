@@ -83,6 +83,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def do_GET(self):
         sidecar = self.server
         with sidecar.lock:
+            if self.path == "/gameserver":
+                return self.answer(200, {"object_meta": {"name": "server"}, "status": {"state": sidecar.state}})
             if found := re.fullmatch(r"/v1beta1/lists/([\w-]+)", self.path):
                 if found[1] not in sidecar.lists:
                     return self.refuse(404, 5, f"list not found: {found[1]}")
