@@ -30,7 +30,7 @@ inline constexpr const char* kScenes = "scenes";  // list of the names of all sc
 // allocated, so that Agones does not end it; 30 seconds after the last of them it is ready again. So it is if
 // a backend has allocated it and no client comes for 30 seconds.
 //
-// Calls are made on a thread of its own. A sidecar that does not answer is asked again.
+// Another thread makes the calls. A sidecar that does not answer is asked again.
 class Agones {
  public:
   static constexpr std::chrono::seconds kPeriod{1}, kHealthPeriod{2}, kStaysAllocated{30};

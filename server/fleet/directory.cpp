@@ -124,6 +124,17 @@ std::vector<v1::ServerEntry> Directory::others() const {
   return others;
 }
 
+bool Directory::isThere(std::uint64_t other) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = servers_.find(other);
+  return found != servers_.end() && Clock::now() - found->second.second < kLease;
+}
+
+bool Directory::isStopping() const {
+  const std::lock_guard lock(mutex_);
+  return leaves_;
+}
+
 void Directory::setStopping() {
   {
     const std::lock_guard lock(mutex_);

@@ -69,8 +69,10 @@ class Directory {
   std::optional<std::string> publicNameOf(const std::string& scene) const;
   // Other servers with a lease.
   std::vector<v1::ServerEntry> others() const;
+  bool isThere(std::uint64_t other) const;
   // This server takes no scenes any more.
   void setStopping();
+  bool isStopping() const;
   // Begins a move of a scene that this server has: its entry does not change until endMove(). Returns the
   // revision of the entry, or nothing if it has none.
   std::optional<std::uint64_t> beginMove(const std::string& name);

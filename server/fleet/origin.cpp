@@ -36,6 +36,8 @@ constexpr auto kStartTime = 10s;
 constexpr auto kEdgeTime = 150ms;
 // Clients of this server have this time to connect to the other one before the scene stops here.
 constexpr auto kConnectTime = 300ms;
+// Interval of looks whether the other server is still there.
+constexpr auto kLook = 200ms;
 // Interval of attempts to learn which of two servers has a scene.
 constexpr auto kDecidePeriod = 500ms;
 constexpr auto kFlushTime = 2s;
@@ -53,6 +55,14 @@ v1::MoveResponse refused(std::string why) {
   v1::MoveResponse response;
   response.set_error(std::move(why));
   return response;
+}
+
+// Tells the other server that the move ends.
+void refuseTo(Conversation& talk, const std::string& why) {
+  v1::MoveMessage message;
+  message.set_refused(why);
+  talk.send(message);
+  talk.flush(kFlushTime);
 }
 
 }  // namespace
@@ -247,7 +257,8 @@ void Origin::hear(std::span<const std::byte> request, const std::string& reply) 
   if (!parse(request, move)) return server_.state().metrics.nats.refused.add();
   const bool queued = move.move() != 0 ? arrivals_->post([this, id = move.move()] { receiveScene(id); })
                                        : departures_->post([this, move, reply] {
-                                           const v1::MoveResponse response = moveNow(move.scene(), move.to());
+                                           const v1::MoveResponse response =
+                                               moveNow(move.scene(), move.to(), Clock::now() + kLoadTime);
                                            if (!reply.empty()) nats_.publish(reply, toBytes(response));
                                          });
   if (!queued && move.move() == 0 && !reply.empty())
@@ -255,9 +266,13 @@ void Origin::hear(std::span<const std::byte> request, const std::string& reply) 
 }
 
 v1::MoveResponse Origin::move(const std::string& scene, std::uint64_t to) {
+  return moveBy(Clock::now() + kLoadTime, scene, to);
+}
+
+v1::MoveResponse Origin::moveBy(Clock::time_point until, const std::string& scene, std::uint64_t to) {
   auto result = std::make_shared<std::promise<v1::MoveResponse>>();
   std::future<v1::MoveResponse> moved = result->get_future();
-  if (!departures_->post([this, scene, to, result] { result->set_value(moveNow(scene, to)); }))
+  if (!departures_->post([this, scene, to, until, result] { result->set_value(moveNow(scene, to, until)); }))
     return refused("too many scenes wait to be moved; try again later");
   try {
     return moved.get();
@@ -268,6 +283,7 @@ v1::MoveResponse Origin::move(const std::string& scene, std::uint64_t to) {
 
 std::size_t Origin::moveAll(Clock::time_point until) {
   directory_->setStopping();
+  lookForScenes();  // some may have been deleted
   std::vector<std::string> names;
   {
     const std::lock_guard lock(mutex_);
@@ -276,7 +292,8 @@ std::size_t Origin::moveAll(Clock::time_point until) {
   }
   std::size_t stay = 0;
   for (const std::string& name : names) {
-    const v1::MoveResponse moved = Clock::now() < until ? move(name) : refused("there was no time");
+    const v1::MoveResponse moved =
+        Clock::now() < until ? moveBy(until, name, 0) : refused("there was no time");
     if (moved.error().empty()) continue;
     ++stay;
     telemetry::log({name}, spdlog::level::warn, "not moved to another server: {}", moved.error());
@@ -299,7 +316,15 @@ std::uint64_t Origin::target(const scene::LiveScene& scene) const {
   return best;
 }
 
-v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
+std::optional<v1::MoveMessage> Origin::receive(Conversation& talk, std::uint64_t other,
+                                               Clock::time_point until) {
+  for (;;) {
+    if (auto message = talk.receive(kLook)) return message;
+    if (stopping_ || Clock::now() >= until || !directory_->isThere(other)) return std::nullopt;
+  }
+}
+
+v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to, Clock::time_point until) {
   const SharedStream stream = streamOf(name);
   if (!stream) return refused(fmt::format("this server has no scene '{:.64}' that edges see", name));
   const std::shared_ptr<scene::LiveScene>& scene = stream->scene();
@@ -327,7 +352,7 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
   message.mutable_prepare()->set_stream(stream->id());
   message.mutable_prepare()->set_origin(id_);
   talk.send(message);
-  const auto prepared = talk.receive(kLoadTime);
+  const auto prepared = receive(talk, to, until);
   if (!prepared) return refused("the other server does not answer");
   if (!prepared->has_prepared())
     return refused(fmt::format("the other server says: {}", prepared->refused()));
@@ -338,6 +363,7 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to) {
   Clock::time_point stopped{};
   if (const std::string why = handOver(talk, *stream, to, stopped); !why.empty()) {
     directory_->endMove(name);
+    refuseTo(talk, why);  // it may wait for the state
     return refused(why);
   }
   v1::MoveResponse response;
@@ -403,14 +429,11 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
 
 void Origin::receiveScene(std::uint64_t move) {
   Conversation talk(nats_, moveDownSubject(move), moveUpSubject(move), stopping_);
-  const auto refuse = [&](std::string why) {
-    v1::MoveMessage message;
-    message.set_refused(std::move(why));
-    talk.send(message);
-    talk.flush(kFlushTime);
-  };
+  const auto refuse = [&](const std::string& why) { refuseTo(talk, why); };
   auto asked = talk.receive(kAnswerTime);
   if (!asked || !asked->has_prepare()) return;
+  constexpr const char* kStops = "it stops";
+  if (directory_->isStopping()) return refuse(kStops);
   auto saved = saved_state::toSaved(std::move(*asked->mutable_prepare()->mutable_scene()));
   if (!saved) return refuse(saved.error());
   const std::string name = saved->start.name;
@@ -430,8 +453,9 @@ void Origin::receiveScene(std::uint64_t move) {
   message.mutable_prepared()->set_stream(stream->id());
   talk.send(message);
 
-  auto state = talk.receive(kLoadTime);
+  auto state = receive(talk, asked->prepare().origin(), Clock::now() + kLoadTime);
   if (!state || !state->has_state()) return giveUp("no state came");
+  if (directory_->isStopping()) return giveUp(kStops);
   auto continued = saved_state::toSaved(std::move(*state->mutable_state()->mutable_scene()), scene->start());
   if (!continued) return giveUp(continued.error());
   tunnels_.expect(stream->subject(), {state->state().tunnels().begin(), state->state().tunnels().end()});

@@ -74,7 +74,11 @@ class Origin {
   void hear(std::span<const std::byte> request, const std::string& reply);
   // The other server with the most room for this scene; 0 if there is none.
   std::uint64_t target(const scene::LiveScene& scene) const;
-  v1::MoveResponse moveNow(const std::string& name, std::uint64_t to);
+  // Gives the scene up to another server only if that has loaded it by this time.
+  v1::MoveResponse moveBy(Clock::time_point until, const std::string& scene, std::uint64_t to);
+  v1::MoveResponse moveNow(const std::string& name, std::uint64_t to, Clock::time_point until);
+  // Next message of another server; nothing if none comes by this time, or if that server is gone.
+  std::optional<v1::MoveMessage> receive(Conversation& talk, std::uint64_t other, Clock::time_point until);
   // Sends the state of a scene that is held, and waits until the other server has it. Returns why it stays.
   std::string handOver(Conversation& talk, const OriginStream& stream, std::uint64_t to,
                        Clock::time_point& stopped);

@@ -60,20 +60,32 @@ class FleetTest : public ::testing::Test {
       v1::CreateSceneRequest request;
       request.set_named("other");
       request.set_name(name);
-      std::string problem = "no answer";
-      std::atomic<bool> done = false;
-      server.createScene(request, [&](const auto& created) {
-        problem = created ? "" : created.error().text();
-        done = true;
-      });
-      EXPECT_TRUE(eventually([&] { return done.load(); }));
-      return problem;
+      return problemOf([&](const auto& done) { server.createScene(request, done); });
+    }
+    // The same for its end.
+    std::string remove(const std::string& name) {
+      v1::DeleteSceneRequest request;
+      request.set_name(name);
+      return problemOf([&](const auto& done) { server.deleteScene(request, done); });
     }
     // Whether the directory says that this server has the scene, and can be asked to move it.
     bool owns(const std::string& scene) { return origin->directory().owns(scene); }
 
     hosting::SceneServer server;
     std::unique_ptr<fleet::Origin> origin;
+
+   private:
+    // Starts something, and waits for its result.
+    static std::string problemOf(const auto& start) {
+      std::string problem = "no answer";
+      std::atomic<bool> done = false;
+      start([&](const auto& result) {
+        problem = result ? "" : result.error().text();
+        done = true;
+      });
+      EXPECT_TRUE(eventually([&] { return done.load(); }));
+      return problem;
+    }
   };
   std::unique_ptr<OriginServer> startOrigin(fleet::OriginOptions originOptions = {}) {
     return std::make_unique<OriginServer>(natsOptions(), options(), std::move(originOptions));

@@ -11,6 +11,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/fleet/bucket.h"
+#include "server/fleet/conversation.h"
+#include "server/fleet/message_bytes.h"
+#include "server/fleet/subjects.h"
 #include "tests/fleet/fleet_test.h"
 
 namespace clothstream::fleet {
@@ -196,11 +200,92 @@ TEST_F(MovingTest, AServerThatStopsMovesItsScenes) {
   ASSERT_NO_FATAL_FAILURE(startTwo());
   TestPeer peer(edge_->server);
   peer.join("moves");
+  // A scene that was deleted just now is nothing to move.
+  ASSERT_THAT(first_->create("brief"), IsEmpty());
+  ASSERT_TRUE(eventually([&] { return first_->owns("brief"); }));
+  ASSERT_THAT(first_->remove("brief"), IsEmpty());
   EXPECT_EQ(first_->origin->moveAll(schedule::Clock::now() + 30s), 0u);
   first_.reset();
   peer.readFrames(20);
   EXPECT_FALSE(peer.finished());
   EXPECT_NE(second_->find("moves"), nullptr);
+}
+
+TEST_F(MovingTest, ServersThatStopTogetherKeepTheirScenesForTheNext) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  ASSERT_THAT(second_->create("stays"), IsEmpty());
+  ASSERT_TRUE(eventually([&] { return second_->owns("stays"); }));
+  const auto stop = [](std::unique_ptr<OriginServer>& server) {
+    const auto until = schedule::Clock::now() + 20s;
+    server->origin->moveAll(until);
+    EXPECT_LT(schedule::Clock::now(), until);
+    server.reset();
+  };
+  auto stopped = std::async(std::launch::async, [&] { stop(first_); });
+  stop(second_);
+  stopped.get();
+  const auto third = startOrigin();
+  EXPECT_TRUE(eventually([&] { return third->find("moves") != nullptr && third->find("stays") != nullptr; }));
+}
+
+// A server in the directory that is none.
+class FalseServer {
+ public:
+  static constexpr std::uint64_t kId = 7;
+
+  explicit FalseServer(const NatsOptions& options)
+      : nats_(options, metrics_),
+        requests_(nats_.subscribe(serverSubject(kId), [this](const auto&, const auto&, auto data) {
+          v1::MoveRequest request;
+          if (parse(data, request)) move_ = request.move();
+        })) {
+    EXPECT_TRUE(eventually([&] { return nats_.connected(); }));
+    v1::ServerEntry entry;
+    entry.set_origin(kId);
+    Bucket(nats_, {.name = Directory::kServers}).put("0000000000000007", entry.SerializeAsString());
+  }
+  // Side of this server in the move that it is asked for.
+  std::unique_ptr<Conversation> talk() {
+    EXPECT_TRUE(eventually([&] { return move_ != 0; }));
+    return std::make_unique<Conversation>(nats_, moveDownSubject(move_), moveUpSubject(move_), stopping_);
+  }
+
+ private:
+  telemetry::NatsMetrics metrics_;
+  Nats nats_;
+  std::atomic<std::uint64_t> move_ = 0;
+  std::atomic<bool> stopping_ = false;
+  std::unique_ptr<Nats::Subscription> requests_;
+};
+
+TEST_F(MovingTest, AMoveToAServerThatIsGoneEndsWithItsLease) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  const FalseServer gone(natsOptions());
+  ASSERT_TRUE(eventually([&] { return first_->origin->directory().isThere(FalseServer::kId); }));
+  const auto began = schedule::Clock::now();
+  EXPECT_THAT(first_->origin->move("moves", FalseServer::kId).error(), HasSubstr("does not answer"));
+  EXPECT_LT(schedule::Clock::now() - began, Directory::kLease + 10s);
+  EXPECT_NE(first_->find("moves"), nullptr);
+}
+
+TEST_F(MovingTest, TheOtherServerLearnsThatAMoveFails) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  FalseServer other(natsOptions());
+  ASSERT_TRUE(eventually([&] { return first_->origin->directory().isThere(FalseServer::kId); }));
+  auto moved =
+      std::async(std::launch::async, [&] { return first_->origin->move("moves", FalseServer::kId); });
+  const auto talk = other.talk();
+  auto message = talk->receive(30s);
+  ASSERT_TRUE(message && message->has_prepare());
+  // Its state can no longer be read when the other server has loaded it.
+  EXPECT_THAT(first_->remove("moves"), IsEmpty());
+  v1::MoveMessage prepared;
+  prepared.mutable_prepared();
+  talk->send(prepared);
+  message = talk->receive(30s);
+  ASSERT_TRUE(message);
+  EXPECT_THAT(message->refused(), HasSubstr("cannot be read"));
+  EXPECT_THAT(moved.get().error(), HasSubstr("cannot be read"));
 }
 
 TEST_F(MovingTest, AnotherServerContinuesTheScenesOfOneThatIsGone) {

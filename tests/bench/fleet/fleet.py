@@ -8,7 +8,8 @@ Starts nats-server, two origins that play a recording of 10 frames/s each, and t
 - the age of frames (packet complete at the origin to arrival) of four viewers at an origin and at an edge;
 - how long viewers are without frames when nats-server, an edge and an origin are killed and started again;
 - how long a scene of 10,000 vertices stands still when it moves between two servers that simulate it, and how long a
-  participant at an edge, and one that is connected to the server of the scene, has no frame.
+  participant at an edge, and one that is connected to the server of the scene, has no frame. The latter also with TLS
+  and a round trip of 50 ms.
 
 One viewer in twenty decodes every frame and compares its hash. Exits with 1 if any frame was wrong or a viewer was lost.
 """
@@ -29,6 +30,9 @@ from programs import MissingProgram, Program, ProgramFailed, find_program  # noq
 
 EDGES = 3
 NATS_PORT = 24222
+NEAR_PORT, FAR_PORT = 25220, 25240
+ROUND_TRIP_MS = 50
+LINK = pathlib.Path(__file__).with_name("link.py")
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 
 SCENE = {
@@ -105,6 +109,16 @@ class Fleet:
         program = self.run(command, name, "gRPC ")
         program.address = f"127.0.0.1:{port + 1}"
         return program
+
+    def certificate(self):
+        """Options of servers for a certificate that clients trust from now on."""
+        key, certificate = self.folder / "key.pem", self.folder / "certificate.pem"
+        names = "DNS:localhost,IP:127.0.0.10,IP:127.0.0.20,IP:127.0.0.2"
+        make = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=localhost"]
+        subprocess.run([*make, "-addext", f"subjectAltName={names}", "-keyout", key, "-out", certificate], check=True,
+                       stderr=subprocess.DEVNULL)
+        os.environ["GRPC_DEFAULT_SSL_ROOTS_FILE_PATH"] = str(certificate)
+        return ["--tls-certificate", certificate, "--tls-key", key]
 
     def record(self, name):
         """Records 20 seconds of the scene, and returns the file."""
@@ -265,24 +279,34 @@ def moves(fleet):
     return {"stillSeconds": still, "longestFrameGapsSeconds": gaps[:MOVES], "usualFrameGapSeconds": gaps[len(gaps) // 2]}
 
 
-def moves_of_direct_clients(fleet):
-    """The same with participants that are connected to the server which has the scene: one scene for each move, from a
-    server at 127.0.0.2 to one at 127.0.0.1 with the same ports and the name localhost."""
-    options = ["--scene", "sphere_drop", "--insecure"]
-    here = fleet.serve("here", 25220, [*options, "--host", "127.0.0.2", "--public-name", "here.example"])
-    here.address = "127.0.0.2:25221"
-    there = fleet.serve("there", 25220, [*options, "--host", "127.0.0.1", "--public-name", "localhost"])
+def moves_of_direct_clients(fleet, far=False):
+    """The same with participants that are connected to the server which has the scene: one scene for each move, between
+    two servers with the same ports. Clients reach the first one at 127.0.0.2, and the other as localhost. `far`: by TLS,
+    over links with a round trip of ROUND_TRIP_MS."""
+    hosts = {"here": ("127.0.0.2", "here.example"), "there": ("127.0.0.1", "localhost")}
+    options = ["--scene", "sphere_drop", "--insecure", *(fleet.certificate() if far else [])]
+    scheme, port, servers, links = "https://" if far else "", FAR_PORT if far else NEAR_PORT, {}, []
+    for name, (host, public) in hosts.items():
+        own = host + "0" if far else host  # clients reach it by the link
+        servers[name] = fleet.serve(f"{name}-{port}", port, [*options, "--host", own, "--public-name", public])
+        servers[name].address = f"{scheme}{own}:{port + 1}"
+        if far:
+            command = [sys.executable, LINK, f"{host}:{port + 1}", f"{own}:{port + 1}", ROUND_TRIP_MS / 2]
+            links.append(fleet.run(command, f"link-{name}", "forwards"))
     still, gaps = [], []
     for i in range(MOVES):
         name = f"direct{i}"
-        create(fleet, here, name)
+        create(fleet, servers["here"], name)
         time.sleep(3)  # it is in the directory
-        watcher = Watcher(fleet, here.address, name)
+        watcher = Watcher(fleet, f"{scheme}{hosts['here'][0]}:{port + 1}", name)
         time.sleep(3)
         still.append(move(fleet, name, "--to", "localhost"))
         time.sleep(2)
         gaps.append(watcher.leave()[0])
-        subprocess.run([fleet.programs / "clothstream", "delete", name, "--server", there.address], check=True)
+        deleted = [fleet.programs / "clothstream", "delete", name, "--server", servers["there"].address]
+        subprocess.run(deleted, check=True)
+    for program in (*links, *servers.values()):
+        program.stop(60)
     return {"stillSeconds": still, "longestFrameGapsSeconds": sorted(gaps, reverse=True)}
 
 
@@ -334,7 +358,11 @@ def measure(fleet, seconds):
         gaps.append(gap(fleet, lost, program.kill, lambda program=program, ready=ready: restart(program, ready)))
         print(f"| {lost} | {gaps[-1]['longestGapSeconds']:.2f} |", flush=True)
     print("\n| a scene of 10,000 vertices moves; client at | time without simulation, ms | longest time without a frame, ms |\n|---|---|---|")
-    moved = {"an edge": moves(fleet), "its server": moves_of_direct_clients(fleet)}
+    moved = {
+        "an edge": moves(fleet),
+        "its server": moves_of_direct_clients(fleet),
+        f"its server, by TLS, {ROUND_TRIP_MS} ms away": moves_of_direct_clients(fleet, far=True),
+    }
     for place, figures in moved.items():
         for still, frame in zip(sorted(figures["stillSeconds"], reverse=True), figures["longestFrameGapsSeconds"]):
             print(f"| {place} | {1000 * still:.0f} | {1000 * frame:.0f} |", flush=True)
