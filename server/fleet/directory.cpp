@@ -324,7 +324,7 @@ void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scene
     const std::lock_guard lock(mutex_);
     for (const auto& [name, known] : known_)
       if (known.entry.origin() == self_.origin() && !arriving_.contains(name) && !leaving_.contains(name) &&
-          std::ranges::none_of(scenes, [&](const OwnScene& own) { return own.scene->name() == name; }))
+          std::ranges::none_of(scenes_, [&](const OwnScene& own) { return own.scene->name() == name; }))
         given.emplace_back(name, known);
   }
   for (const auto& [name, known] : given) {

@@ -185,6 +185,8 @@ void Origin::run() {
 }
 
 void Origin::lookForScenes() {
+  // An older list must not replace a newer one: the directory gives up what is not in it.
+  const std::lock_guard looking(looking_);
   const auto scenes = server_.state().scenesNow();
   std::vector<SharedStream> ended;
   std::vector<Directory::OwnScene> own;
@@ -208,7 +210,7 @@ void Origin::lookForScenes() {
       if (!isOffered && known != streams_.end()) {
         ended.push_back(std::move(known->second));
         streams_.erase(known);
-      } else if (isOffered && known == streams_.end()) {
+      } else if (isOffered && known == streams_.end() && !prepared_.contains(scene->name())) {
         streams_.emplace(scene->name(), std::make_shared<OriginStream>(server_, nats_, tunnels_, scene));
       }
     }
