@@ -97,7 +97,7 @@ class Origin {
   OriginTunnels tunnels_;
 
   std::atomic<bool> stopping_{false};
-  std::mutex looking_;  // held by lookForScenes()
+  std::mutex looking_;        // held by lookForScenes()
   mutable std::mutex mutex_;  // protects the next three
   std::condition_variable changed_;
   std::map<std::string, SharedStream> streams_;   // by name of the scene

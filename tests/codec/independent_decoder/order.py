@@ -3,8 +3,6 @@
 import heapq
 import math
 
-from arithmetic import dot, times
-
 NO_VERTEX = None
 EQUAL = (16, 16, 16, 16)
 

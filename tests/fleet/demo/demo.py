@@ -242,7 +242,7 @@ class Demo:
 
     def move(self, to, picture=""):
         """Moves the scene. A picture that is taken meanwhile keeps the page from showing frames."""
-        page, say = self.fleet.page, self.story.say
+        fleet, page, say = self.fleet, self.fleet.page, self.story.say
         self.story.title(f"The scene moves to {to}" + (f", while {picture}.png is taken" if picture else ""))
         load = self.begin()
         if picture:
@@ -265,7 +265,7 @@ class Demo:
         self.story.detail(fleet.listed() + fleet.agones_line())
 
     def kill(self, name, program, picture, back=True):
-        page, say = self.fleet.page, self.story.say
+        fleet, page, say = self.fleet, self.fleet.page, self.story.say
         self.story.title(f"{name} is killed")
         load = self.begin()
         if not back:
