@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -59,10 +58,13 @@ class Directory(unittest.TestCase):
         self.assertEqual(listed.returncode, 0, listed.stderr)
         return json.loads(listed.stdout)
 
+    def entry_of(self, scene):
+        return next((entry for entry in self.directory()["scenes"] if entry["scene"] == scene), None)
+
     def server_of(self, scene):
-        directory = self.directory()
-        names = {server["server"]: server["publicName"] for server in directory["servers"]}
-        return next((names.get(entry["server"]) for entry in directory["scenes"] if entry["scene"] == scene), None)
+        names = {server["server"]: server["publicName"] for server in self.directory()["servers"]}
+        entry = self.entry_of(scene)
+        return names.get(entry["server"]) if entry else None
 
     def create(self, server):
         scene = self.folder / "moves.json"
@@ -98,7 +100,7 @@ class Directory(unittest.TestCase):
         second.end()
         self.assertEqual(self.server_of("moves"), "one.example.com")
         third = self.start_server("three")
-        time.sleep(4)  # a checkpoint of the scene, and the lease of the third server
+        wait_until(lambda: len(self.directory()["servers"]) == 2 and self.entry_of("moves")["checkpointTick"] > 0)
         first.kill()
         wait_until(lambda: self.server_of("moves") == "three.example.com")
         joined = self.run_program("join", third.address, "--scene", "moves", "--seconds", 2, "--hash")
