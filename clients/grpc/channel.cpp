@@ -98,6 +98,8 @@ bool canConnect(grpc::Channel& channel) {
   }
 }
 
+}  // namespace
+
 std::shared_ptr<grpc::ChannelCredentials> credentialsOf(const ServerAddress& server) {
   if (!server.isEncrypted()) return grpc::InsecureChannelCredentials();
   if (!server.fingerprint.empty()) return trustOnly(server.fingerprint);
@@ -112,14 +114,17 @@ std::shared_ptr<grpc::ChannelCredentials> credentialsOf(const ServerAddress& ser
   return grpc::SslCredentials(options);
 }
 
-}  // namespace
-
-std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server) {
+std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server,
+                                           const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(static_cast<int>(kMaxServerMessageBytes));
   // A separate connection per client, so that two clients of a process do not share flow control.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return grpc::CreateCustomChannel(server.hostAndPort(), credentialsOf(server), arguments);
+  return grpc::CreateCustomChannel(server.hostAndPort(), credentials, arguments);
+}
+
+std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server) {
+  return makeChannel(server, credentialsOf(server));
 }
 
 tl::expected<std::string, Failure> unknownKeyOf(const ServerAddress& server) {

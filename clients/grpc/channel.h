@@ -8,6 +8,7 @@
 
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
+#include <grpcpp/security/credentials.h>
 #include <grpcpp/support/status.h>
 #include <tl/expected.hpp>
 
@@ -20,7 +21,11 @@ namespace clothstream {
 // Longest time of a unary call.
 inline constexpr std::chrono::seconds kCallTimeout{10};
 
-// Throws std::runtime_error if the file of authorities cannot be read.
+// How a server proves who it is. Throws std::runtime_error if the file of authorities cannot be read.
+std::shared_ptr<grpc::ChannelCredentials> credentialsOf(const ServerAddress& server);
+std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server,
+                                           const std::shared_ptr<grpc::ChannelCredentials>& credentials);
+// The same with credentialsOf(server).
 std::shared_ptr<grpc::Channel> makeChannel(const ServerAddress& server);
 
 // Adds the server's token, if any, to a call.

@@ -29,7 +29,8 @@ void* tagOf(Operation operation) {
 
 class GrpcTransport final : public Transport {
  public:
-  explicit GrpcTransport(ServerAddress address) : address_(std::move(address)), current_(address_) {}
+  explicit GrpcTransport(ServerAddress address)
+      : address_(std::move(address)), credentials_(credentialsOf(address_)), current_(address_) {}
   ~GrpcTransport() override {
     if (call_) call_->context.TryCancel();
     alarm_.Cancel();
@@ -43,14 +44,14 @@ class GrpcTransport final : public Transport {
   void connect(const std::string& server) override {
     current_ = address_.at(server);
     call_.emplace(prepared_ && prepared_->server == server ? std::move(prepared_->channel)
-                                                           : makeChannel(current_));
+                                                           : makeChannel(current_, credentials_));
     prepared_.reset();
     call_->stream = call_->stub.PrepareCall(&call_->context, kJoinMethod, &queue_);
     ++call_->underway;
     call_->stream->StartCall(tagOf(kStarted));
   }
   void prepare(const std::string& server) override {
-    prepared_ = {server, makeChannel(address_.at(server))};
+    prepared_ = {server, makeChannel(address_.at(server), credentials_)};
     prepared_->channel->GetState(true);  // begins to connect
   }
   bool active() const override { return call_ && (call_->underway > 0 || call_->received); }
@@ -157,6 +158,8 @@ class GrpcTransport final : public Transport {
   }
 
   const ServerAddress address_;
+  // Read once: files may be gone when the stream connects again.
+  const std::shared_ptr<grpc::ChannelCredentials> credentials_;
   ServerAddress current_;  // of the newest connection
   grpc::CompletionQueue queue_;
   grpc::Alarm alarm_;

@@ -27,6 +27,11 @@ void Subscribers::setRelay(std::shared_ptr<Relay> relay) {
   relay_ = std::move(relay);
 }
 
+void Subscribers::dropRelay(const Relay& relay) {
+  const std::lock_guard lock(mutex_);
+  if (relay_.get() == &relay) relay_ = nullptr;
+}
+
 std::size_t Subscribers::receivers(Clock::time_point now) const {
   const std::lock_guard lock(mutex_);
   return subscribers_.size() + (relay_ && relay_->requested(now).qualities != 0 ? 1 : 0);

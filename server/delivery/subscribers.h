@@ -29,8 +29,10 @@ class Subscribers {
   void remove(const Mailbox& mailbox);
   std::size_t size() const;
 
-  // The relay also gets everything from now on. Null: none.
+  // The relay also gets everything from now on, instead of a former one.
   void setRelay(std::shared_ptr<Relay> relay);
+  // It gets nothing more. Does nothing if there is another one by now.
+  void dropRelay(const Relay& relay);
   // Subscribers, and one more for a relay that needs frames.
   std::size_t receivers(Clock::time_point now) const;
 

@@ -102,10 +102,12 @@ std::uint64_t Bucket::put(const std::string& key, const std::string& value) {
   return revision;
 }
 
-std::optional<std::uint64_t> Bucket::written(int status, std::uint64_t revision, const std::string& key) {
+std::optional<std::uint64_t> Bucket::written(int status, std::uint64_t revision, const std::string& key,
+                                             const std::string& value) {
   if (status == NATS_OK) return revision;
-  // The library does not tell a refusal from other errors.
+  // The library does not tell a refusal from other errors, and only the answer to a write may be lost.
   const std::optional<Entry> present = get(key);
+  if (present && !present->deleted && present->value == value) return present->revision;
   if (present || status == NATS_ERR) return std::nullopt;
   fail(static_cast<natsStatus>(status), name_);
 }
@@ -114,7 +116,7 @@ std::optional<std::uint64_t> Bucket::create(const std::string& key, const std::s
   std::uint64_t revision = 0;
   const natsStatus status =
       kvStore_Create(&revision, storeOf(store_), key.c_str(), value.data(), static_cast<int>(value.size()));
-  return written(status, revision, key);
+  return written(status, revision, key, value);
 }
 
 std::optional<std::uint64_t> Bucket::update(const std::string& key, const std::string& value,
@@ -122,7 +124,7 @@ std::optional<std::uint64_t> Bucket::update(const std::string& key, const std::s
   std::uint64_t now = 0;
   const natsStatus status = kvStore_Update(&now, storeOf(store_), key.c_str(), value.data(),
                                            static_cast<int>(value.size()), revision);
-  return written(status, now, key);
+  return written(status, now, key, value);
 }
 
 void Bucket::remove(const std::string& key) {

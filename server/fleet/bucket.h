@@ -49,7 +49,8 @@ class Bucket {
   std::optional<Entry> next(std::chrono::milliseconds time);
 
  private:
-  std::optional<std::uint64_t> written(int status, std::uint64_t revision, const std::string& key);
+  std::optional<std::uint64_t> written(int status, std::uint64_t revision, const std::string& key,
+                                       const std::string& value);
 
   const std::string name_;
   void* context_ = nullptr;

@@ -28,6 +28,7 @@ class Channel {
   // Bytes that are sent and that the other end has not used; one message more fits always.
   static constexpr std::size_t kWindow = 256 * 1024;
   static constexpr std::size_t kMaxSegmentBytes = 64 * 1024;
+  static constexpr std::size_t kSegmentCost = 128;
   // A received message is at most this long.
   static constexpr std::size_t kMaxMessageBytes = std::size_t{256} << 20;
   static constexpr std::chrono::milliseconds kFirstRepeat{250}, kLongestRepeat{1000}, kAnswerTime{20},
@@ -46,8 +47,10 @@ class Channel {
 
   // Whether another message would be sent at once.
   bool hasRoom() const { return waiting_.empty() && windowBytes_ < kWindow; }
-  // Bytes of messages that the other end has not used.
-  std::size_t bytes() const { return windowBytes_ + waitingBytes_; }
+  // Bytes of messages that the other end has not used, with kSegmentCost for each segment here.
+  std::size_t bytes() const {
+    return windowBytes_ + waitingBytes_ + kSegmentCost * (waiting_.size() + sent_.size());
+  }
   // Whether the other end has received everything.
   bool delivered() const { return waiting_.empty() && sent_.empty(); }
 

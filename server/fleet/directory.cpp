@@ -23,6 +23,10 @@ using namespace std::chrono_literals;
 
 constexpr auto kPeriod = 500ms;
 constexpr auto kRetry = 2s;
+// A server that does not hear of its own renewals for this long does not hear of those of others.
+constexpr auto kSilence = 2s, kLongestSilence = 4s;
+// The name of a scene without server is free again after this time.
+constexpr auto kContinuedBy = 30s;
 // Entries of servers are deleted by NATS after this time without a renewal.
 constexpr auto kServerLifetime = 30s;
 constexpr auto kStateTime = 2s;  // that reading a state may take
@@ -49,27 +53,36 @@ struct Directory::Buckets {
         checkpoints(nats, {.name = kCheckpoints}) {}
   Bucket servers, scenes, checkpoints;
   bool serversRead = false, scenesRead = false;
+  std::set<std::string> read;  // names of scenes, until all present entries are read
 };
 
 Directory::Directory(Nats& nats, hosting::SceneServer& server, v1::ServerEntry self, Adopt adopt)
     : nats_(nats), server_(server), self_(std::move(self)), adopt_(std::move(adopt)) {
   thread_ = std::thread([this] { run(); });
+  renewing_ = std::thread([this] { renew(); });
 }
 
 Directory::~Directory() {
+  end();
+}
+
+void Directory::end() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 void Directory::setScenes(std::vector<OwnScene> scenes) {
   {
     const std::lock_guard lock(mutex_);
     scenes_ = std::move(scenes);
-    for (const OwnScene& own : scenes_) arriving_.erase(own.scene->name());
+    for (const OwnScene& own : scenes_) {
+      arriving_.erase(own.scene->name());
+      had_.insert(own.scene->name());
+    }
   }
   changed_.notify_all();
 }
@@ -79,18 +92,31 @@ std::vector<Directory::OwnScene> Directory::scenesNow() const {
   return scenes_;
 }
 
-bool Directory::isAlive(std::uint64_t origin, Clock::time_point now) const {
-  const auto found = servers_.find(origin);
-  const bool hears = reads_ && now - readAt_ >= kLease;
-  return found != servers_.end() && (now - found->second.second < kLease || !hears);
+bool Directory::hears(Clock::time_point now) const {
+  const auto self = servers_.find(self_.origin());
+  return reads_ && now - readAt_ >= kLease && self != servers_.end() && now - self->second.renewed < kSilence;
 }
 
-bool Directory::isTaken(const std::string& name) const {
-  const std::lock_guard lock(mutex_);
+bool Directory::isAlive(std::uint64_t origin, Clock::time_point now) const {
+  const auto found = servers_.find(origin);
+  return found != servers_.end() && (now - found->second.renewed < kLease || !hears(now));
+}
+
+bool Directory::isTakenLocked(const std::string& name) const {
   const auto found = known_.find(name);
   return found != known_.end() && found->second.entry.origin() != self_.origin() &&
          !leaving_.contains(name) && !arriving_.contains(name) &&
          isAlive(found->second.entry.origin(), Clock::now());
+}
+
+bool Directory::isTaken(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  return isTakenLocked(name);
+}
+
+bool Directory::isRunElsewhere(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  return isTakenLocked(name) && servers_.at(known_.at(name).entry.origin()).isNew;
 }
 
 bool Directory::owns(const std::string& name) const {
@@ -101,10 +127,14 @@ bool Directory::owns(const std::string& name) const {
 std::optional<std::string> Directory::publicNameOf(const std::string& scene) const {
   const std::lock_guard lock(mutex_);
   const auto found = known_.find(scene);
-  if (found == known_.end() || found->second.entry.origin() == self_.origin() ||
-      !isAlive(found->second.entry.origin(), Clock::now()))
-    return std::nullopt;
-  return servers_.at(found->second.entry.origin()).first.public_name();
+  if (found == known_.end() || found->second.entry.origin() == self_.origin()) return std::nullopt;
+  const Clock::time_point now = Clock::now();
+  if (isAlive(found->second.entry.origin(), now))
+    return servers_.at(found->second.entry.origin()).entry.public_name();
+  if (!found->second.entry.created() || !found->second.entry.has_checkpoint()) return std::nullopt;
+  const auto waits = withoutServer_.find(scene);
+  return waits == withoutServer_.end() || now - waits->second < kContinuedBy ? std::optional(std::string())
+                                                                             : std::nullopt;
 }
 
 void Directory::simulateLoss() {
@@ -120,14 +150,13 @@ std::vector<v1::ServerEntry> Directory::others() const {
   const Clock::time_point now = Clock::now();
   std::vector<v1::ServerEntry> others;
   for (const auto& [origin, server] : servers_)
-    if (origin != self_.origin() && now - server.second < kLease) others.push_back(server.first);
+    if (origin != self_.origin() && isAlive(origin, now)) others.push_back(server.entry);
   return others;
 }
 
 bool Directory::isThere(std::uint64_t other) const {
   const std::lock_guard lock(mutex_);
-  const auto found = servers_.find(other);
-  return found != servers_.end() && Clock::now() - found->second.second < kLease;
+  return isAlive(other, Clock::now());
 }
 
 bool Directory::isStopping() const {
@@ -223,7 +252,7 @@ void Directory::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
     const bool last = stopping_;
-    if (lost_) return;
+    if (lost_) break;
     lock.unlock();
     Clock::duration wait = kPeriod;
     try {
@@ -235,6 +264,7 @@ void Directory::run() {
       if (buckets) pass(*buckets);
       if (buckets && last) {
         saveScenes(*buckets, scenesNow(), true);
+        endLease();
         buckets->servers.remove(keyOf(self_.origin()));
       }
       if (buckets) logged_ = false;
@@ -248,19 +278,57 @@ void Directory::run() {
     }
     lock.lock();
     reads_ = buckets && buckets->serversRead && buckets->scenesRead;
-    if (last) return;
+    if (last) break;
     changed_.wait_for(lock, wait, [this] { return stopping_ || lost_; });
+  }
+  lock.unlock();
+  endLease();
+}
+
+void Directory::renew() {
+  std::unique_ptr<Bucket> servers;
+  std::unique_lock lock(mutex_);
+  while (!leaseEnds_ && !lost_) {
+    lock.unlock();
+    try {
+      if (!servers && nats_.connected())
+        servers =
+            std::make_unique<Bucket>(nats_, BucketOptions{.name = kServers, .lifetime = kServerLifetime});
+      if (servers) servers->put(keyOf(self_.origin()), selfNow().SerializeAsString());
+    } catch (const std::exception&) {  // the other thread says why
+      servers.reset();
+    }
+    const Clock::duration wait = servers ? kPeriod : kRetry;
+    lock.lock();
+    changed_.wait_for(lock, wait, [this] { return leaseEnds_ || lost_; });
   }
 }
 
+void Directory::endLease() {
+  {
+    const std::lock_guard lock(mutex_);
+    leaseEnds_ = true;
+  }
+  changed_.notify_all();
+  if (renewing_.joinable()) renewing_.join();
+}
+
 void Directory::pass(Buckets& buckets) {
-  buckets.servers.put(keyOf(self_.origin()), selfNow().SerializeAsString());
   readChanges(buckets);
   if (!buckets.serversRead || !buckets.scenesRead) return;
+  checkHearing();
   const std::vector<OwnScene> scenes = scenesNow();
   claimScenes(buckets, scenes);
   saveScenes(buckets, scenes, false);
   adoptScenes(buckets);
+}
+
+void Directory::checkHearing() {
+  const std::lock_guard lock(mutex_);
+  const auto self = servers_.find(self_.origin());
+  const Clock::time_point heard = self == servers_.end() ? readAt_ : self->second.renewed;
+  if (Clock::now() - heard > kLongestSilence)
+    throw std::runtime_error("NATS does not tell about changes any more");
 }
 
 void Directory::readChanges(Buckets& buckets) {
@@ -272,25 +340,36 @@ void Directory::readChanges(Buckets& buckets) {
     v1::ServerEntry entry;
     if (!change->deleted && !entry.ParseFromString(change->value)) continue;
     const std::lock_guard lock(mutex_);
-    if (change->deleted)
+    const Clock::time_point now = Clock::now();
+    if (change->deleted) {
       std::erase_if(servers_, [&](const auto& known) { return keyOf(known.first) == change->key; });
-    else
-      servers_[entry.origin()] = {entry, Clock::now()};
+      continue;
+    }
+    Server& server = servers_[entry.origin()];
+    // Renewals that were not heard may have been made.
+    if (entry.origin() == self_.origin() && now - server.renewed >= kSilence) readAt_ = now;
+    server = {.entry = entry, .renewed = now, .isNew = buckets.serversRead};
   }
   while (const auto change = buckets.scenes.next(1ms)) {
     if (change->key.empty()) {
       buckets.scenesRead = true;
       const std::lock_guard lock(mutex_);
+      std::erase_if(known_, [&](const auto& known) { return !buckets.read.contains(known.first); });
       readAt_ = Clock::now();
       continue;
     }
     v1::SceneEntry entry;
     if (!change->deleted && !entry.ParseFromString(change->value)) continue;
-    if (!change->deleted) {
+    if (!change->deleted && buckets.scenesRead) {
       know(change->key, entry, change->revision);
       continue;
     }
     const std::lock_guard lock(mutex_);
+    if (!change->deleted) {  // also after NATS has lost everything, and counts from 1 again
+      known_[change->key] = {entry, change->revision};
+      buckets.read.insert(change->key);
+      continue;
+    }
     if (known_[change->key].revision <= change->revision) known_.erase(change->key);
   }
 }
@@ -323,9 +402,14 @@ void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scene
   {
     const std::lock_guard lock(mutex_);
     for (const auto& [name, known] : known_)
-      if (known.entry.origin() == self_.origin() && !arriving_.contains(name) && !leaving_.contains(name) &&
+      if (known.entry.origin() == self_.origin() && had_.contains(name) && !arriving_.contains(name) &&
+          !leaving_.contains(name) &&
           std::ranges::none_of(scenes_, [&](const OwnScene& own) { return own.scene->name() == name; }))
         given.emplace_back(name, known);
+    std::erase_if(had_, [&](const std::string& name) {
+      return !revisionOf(name) &&
+             std::ranges::none_of(scenes_, [&](const OwnScene& own) { return own.scene->name() == name; });
+    });
   }
   for (const auto& [name, known] : given) {
     // Another server may have it by now.
@@ -344,27 +428,35 @@ void Directory::saveScenes(Buckets& buckets, const std::vector<OwnScene>& scenes
     if (!own.scene->created) continue;
     Stored& stored = saved_[own.scene->name()];
     if (!all && Clock::now() - stored.at < kCheckpointPeriod) continue;
-    const std::uint64_t tick = own.scene->tick.load();
-    if (stored.at != Clock::time_point{} && stored.tick == tick) continue;
-    stored.at = Clock::now();
+    // A scene that stands still may have other parameters or participants.
+    const Stored next{
+        .at = Clock::now(),
+        .tick = own.scene->tick.load(),
+        .version = own.scene->version(),
+        .session = saved_state::crcOf(saved_state::stateOf(*own.scene, std::nullopt).SerializeAsString())};
+    const bool isFirst = stored.at == Clock::time_point{};
+    stored.at = next.at;
+    if (!isFirst && stored == next) continue;
     {
       const std::lock_guard lock(mutex_);
       if (leaving_.contains(own.scene->name())) continue;
       saving_ = own.scene->name();
     }
-    bool isSaved = false;
+    bool isSaved = false, isLost = false;
     try {
       isSaved = save(buckets, own);
     } catch (const std::exception& failure) {  // such as a full store
       telemetry::log({own.scene->name()}, spdlog::level::warn,
                      "no checkpoint for other servers: {}; trying again", failure.what());
+      isLost = true;
     }
     {
       const std::lock_guard lock(mutex_);
       saving_.clear();
     }
     changed_.notify_all();
-    if (isSaved) stored.tick = tick;
+    if (isSaved) stored = next;
+    if (isLost) return;  // each attempt takes seconds
   }
 }
 
@@ -434,13 +526,19 @@ void Directory::adoptScenes(Buckets& buckets) {
     const std::lock_guard lock(mutex_);
     if (leaves_ || stopping_ || now - readAt_ < kLease) return;
     std::erase_if(adoptAt_, [&](const auto& waiting) { return !known_.contains(waiting.first); });
+    std::erase_if(withoutServer_, [&](const auto& waiting) { return !known_.contains(waiting.first); });
     for (const auto& [name, known] : known_) {
       const v1::SceneEntry& entry = known.entry;
-      if (!entry.created() || !entry.has_checkpoint() || entry.origin() == self_.origin() ||
-          isAlive(entry.origin(), now)) {
+      // A claim of this server may have come through after it had given up.
+      const bool isOurs = entry.origin() == self_.origin() &&
+                          (had_.contains(name) || arriving_.contains(name) || leaving_.contains(name));
+      const bool isOthers = entry.origin() != self_.origin() && isAlive(entry.origin(), now);
+      if (!entry.created() || !entry.has_checkpoint() || isOurs || isOthers) {
         adoptAt_.erase(name);
+        withoutServer_.erase(name);
         continue;
       }
+      withoutServer_.try_emplace(name, now);
       const auto [waiting, isNew] = adoptAt_.try_emplace(name, now);
       if (isNew) waiting->second += std::chrono::milliseconds(random_() % kMaxDelay);
       if (now >= waiting->second && !next) next.emplace(name, known);

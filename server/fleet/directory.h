@@ -52,8 +52,9 @@ class Directory {
 
   // `self`: the entry of this server, whose numbers are read from the server. References must outlive it.
   Directory(Nats& nats, hosting::SceneServer& server, v1::ServerEntry self, Adopt adopt);
-  // Writes the last checkpoints, and ends the lease.
   ~Directory();
+  // Writes the last checkpoints, ends the lease, and does nothing more.
+  void end();
   Directory(const Directory&) = delete;
   Directory& operator=(const Directory&) = delete;
 
@@ -62,10 +63,12 @@ class Directory {
   // Whether another server has a scene of this name, so that this one must not offer its own. While a scene
   // moves it is not.
   bool isTaken(const std::string& name) const;
+  // Whether isTaken(), and the other server has been heard of since this one began to listen.
+  bool isRunElsewhere(const std::string& name) const;
   // Whether the entry of this scene names this server.
   bool owns(const std::string& name) const;
-  // Name under which clients reach the other server that has a scene; may be empty. Nothing if this one has
-  // it, or none.
+  // Name under which clients reach the other server that has a scene; empty if it has none, or if the scene's
+  // server is gone and another one is about to continue it. Nothing if this one has it, or none.
   std::optional<std::string> publicNameOf(const std::string& scene) const;
   // Other servers with a lease.
   std::vector<v1::ServerEntry> others() const;
@@ -100,14 +103,27 @@ class Directory {
   };
   struct Stored {
     Clock::time_point at{};
-    std::uint64_t tick = 0;
+    // Newest saved state.
+    std::uint64_t tick = 0, version = 0;
+    std::uint32_t session = 0;  // CRC
+    bool operator==(const Stored&) const = default;
+  };
+  struct Server {
+    v1::ServerEntry entry;
+    Clock::time_point renewed{};
+    bool isNew = false;  // heard of after the present entries were read
   };
 
   void run();
+  // Renews the lease, on a thread of its own: a round of the other one may take longer.
+  void renew();
   v1::ServerEntry selfNow() const;
-  // One round: reads changes, renews the lease, claims and gives up scenes, saves and adopts.
+  // One round: reads changes, claims and gives up scenes, saves and adopts.
   void pass(Buckets& buckets);
   void readChanges(Buckets& buckets);
+  // Throws std::runtime_error if the renewals of this server have not come back for some time.
+  void checkHearing();
+  void endLease();
   void claimScenes(Buckets& buckets, const std::vector<OwnScene>& scenes);
   void saveScenes(Buckets& buckets, const std::vector<OwnScene>& scenes, bool all);
   bool save(Buckets& buckets, const OwnScene& own);
@@ -117,8 +133,12 @@ class Directory {
   std::optional<std::uint64_t> revisionOf(const std::string& name) const;
   // Remembers an entry, unless a newer one is known.
   void know(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision);
+  // Whether this server has heard of renewals for long enough to know who is gone. Its own ones come back,
+  // too.
+  bool hears(Clock::time_point now) const;
   // Whether the server has a lease. While this one cannot hear of renewals, every known server has one.
   bool isAlive(std::uint64_t origin, Clock::time_point now) const;
+  bool isTakenLocked(const std::string& name) const;
   std::vector<OwnScene> scenesNow() const;
 
   Nats& nats_;
@@ -129,11 +149,14 @@ class Directory {
   mutable std::mutex mutex_;  // protects the following
   std::condition_variable changed_;
   std::vector<OwnScene> scenes_;
-  std::map<std::uint64_t, std::pair<v1::ServerEntry, Clock::time_point>> servers_;  // with their renewal
+  std::map<std::uint64_t, Server> servers_;
   std::map<std::string, Known> known_;
+  std::set<std::string> had_;  // names of scenes that this server has had
+  std::map<std::string, Clock::time_point>
+      withoutServer_;  // scenes that another server may continue, since when
   std::set<std::string> leaving_, arriving_;
   std::string saving_;  // scene whose entry the thread is about to change
-  bool leaves_ = false, stopping_ = false, lost_ = false;
+  bool leaves_ = false, stopping_ = false, lost_ = false, leaseEnds_ = false;
 
   bool reads_ = false;          // the newest round has worked
   Clock::time_point readAt_{};  // all present entries are known since
@@ -144,7 +167,7 @@ class Directory {
   std::minstd_rand random_{std::random_device{}()};
   bool logged_ = false;  // that there is no directory
 
-  std::thread thread_;
+  std::thread thread_, renewing_;
 };
 
 }  // namespace clothstream::fleet

@@ -86,8 +86,10 @@ Edge::~Edge() {
 void Edge::waitForOffers() const {
   const Clock::time_point start = Clock::now();
   const auto waited = [&] { return Clock::now() - start; };
-  while (waited() < kPatience && (waited() < kFirstOffers || server_.state().scenesNow().empty()))
-    std::this_thread::sleep_for(kLookPeriod);
+  const auto waits = [&] {
+    return waited() < kFirstOffers || loads_ || (waited() < kPatience && server_.state().scenesNow().empty());
+  };
+  while (waited() < kLongestWait && waits()) std::this_thread::sleep_for(kLookPeriod);
 }
 
 void Edge::arrive(std::uint64_t stream, std::span<const std::byte> bytes) {
@@ -126,16 +128,25 @@ void Edge::run() {
           if (parse(*arrival.bytes, offer)) handle(offer, now);
           continue;
         }
-        for (auto& [name, known] : scenes_)
-          if (known->next && known->next->id() == arrival.stream &&
-              known->next->receiveChunk(*arrival.bytes, now))
-            serve(*known);
+        for (auto& [name, known] : scenes_) receiveChunk(*known, arrival, now);
       }
       look(now);
     } catch (const std::exception& failure) {  // such as a lack of memory
       spdlog::error("edge: {}; trying again", failure.what());
     }
     next = now + kLookPeriod;
+  }
+}
+
+void Edge::receiveChunk(Known& known, const Arrival& arrival, Clock::time_point now) {
+  for (auto* stream : {&known.served, &known.next}) {
+    if (!*stream || (*stream)->id() != arrival.stream || !(*stream)->receiveChunk(*arrival.bytes, now))
+      continue;
+    if (stream == &known.next)
+      serve(known);
+    else
+      known.served->serve();
+    return;
   }
 }
 
@@ -217,7 +228,7 @@ void Edge::look(Clock::time_point now) {
   if (connected && !connectedSince_) {
     connectedSince_ = now;
     for (auto& [name, known] : scenes_)
-      if (known->served) known->served->forgetFrames();
+      if (known->served) known->served->refresh(now);
   }
   if (!connected && connectedSince_) {
     connectedSince_.reset();
@@ -225,6 +236,10 @@ void Edge::look(Clock::time_point now) {
       if (known->served) known->served->tell("this server has lost its connection to the others (NATS)");
   }
   std::erase_if(scenes_, [&](auto& entry) { return lookAt(entry.first, *entry.second, now); });
+  loads_ = std::ranges::any_of(scenes_, [](const auto& entry) {
+    const Known& known = *entry.second;
+    return !known.served && known.next && known.next->isLoading();
+  });
 }
 
 bool Edge::lookAt(const std::string& name, Known& known, Clock::time_point now) {

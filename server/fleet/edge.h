@@ -2,6 +2,7 @@
 // Scenes of other servers, which this server shows to its viewers.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -36,13 +37,14 @@ namespace clothstream::fleet {
 // then disconnected once and join again. A scene whose origin does not come back is removed after `keep`.
 class Edge {
  public:
-  static constexpr std::chrono::seconds kPatience{3};
+  static constexpr std::chrono::seconds kPatience{3}, kLongestWait{10};
   static constexpr std::size_t kMaxScenes = 4096;
 
   // The server must outlive it.
   Edge(hosting::SceneServer& server, const NatsOptions& options, schedule::Clock::duration keep);
   ~Edge();
-  // Returns when all origins have had time to offer their scenes, or after kPatience without any.
+  // Returns when all origins have had time to offer their scenes and those are served, after kPatience
+  // without any, or after kLongestWait.
   void waitForOffers() const;
   Edge(const Edge&) = delete;
   Edge& operator=(const Edge&) = delete;
@@ -59,6 +61,7 @@ class Edge {
   EdgeContext context();
   void arrive(std::uint64_t stream, std::span<const std::byte> bytes);
   void wake();
+  void receiveChunk(Known& known, const Arrival& arrival, Clock::time_point now);
   void handle(const v1::Offer& offer, Clock::time_point now);
   void handle(std::uint64_t origin, const v1::OfferedScene& offered, Clock::time_point now);
   // Serves the stream of the server that a scene has moved to. Its viewers notice nothing.
@@ -77,6 +80,8 @@ class Edge {
   // Used by the thread.
   std::map<std::string, std::unique_ptr<Known>> scenes_;  // by name
   std::optional<Clock::time_point> connectedSince_;
+
+  std::atomic<bool> loads_{false};  // a scene that is offered is not served yet
 
   std::mutex mutex_;  // protects the next three
   std::condition_variable changed_;

@@ -145,6 +145,22 @@ bool EdgeSource::receiveEvent(std::span<const std::byte> bytes) {
   return true;
 }
 
+void EdgeSource::setParameters(const v1::StreamDescription& description) {
+  {
+    const std::lock_guard lock(mutex_);
+    parameters_ = recording::ParametersInForce(description);
+  }
+  const delivery::SharedBytes message = scene::parametersMessage(*this, newest().value_or(0));
+  const std::lock_guard lock(mutex_);
+  if (scene_ != nullptr && message) scene_->subscribers.announce(message);
+}
+
+void EdgeSource::setPaused(bool paused) {
+  const std::lock_guard lock(mutex_);
+  if (scene_ == nullptr || scene_->paused.exchange(paused) == paused) return;
+  scene_->subscribers.announce(scene::pausedNotice(*scene_));
+}
+
 std::optional<std::uint64_t> EdgeSource::newest() const {
   const std::lock_guard lock(mutex_);
   std::optional<std::uint64_t> newest;

@@ -53,6 +53,9 @@ class EdgeSource final : public scene::FrameSource {
   // Passes a serialised ServerMessage on to the viewers. Returns false if it is not one that belongs here.
   bool receiveFrame(std::span<const std::byte> message);
   bool receiveEvent(std::span<const std::byte> message);
+  // Parameters and pause as the origin has them now, after events may have been lost.
+  void setParameters(const v1::StreamDescription& description);
+  void setPaused(bool paused);
   // Newest tick of all qualities; nothing before the first frame.
   std::optional<std::uint64_t> newest() const;
   // Frames may be missing from now on, so that none of the kept ones may be given to a viewer.

@@ -63,10 +63,8 @@ EdgeStream::EdgeStream(EdgeContext context, std::uint64_t origin, const v1::Offe
       inbox_(edge_.nats.inbox()),
       tunnels_(std::make_shared<EdgeTunnels>(edge_.nats, edge_.edge, subject_)) {
   listen();
-  chunks_ =
-      edge_.nats.subscribe(inbox_, [this](const auto&, const auto&, auto data) { edge_.arrive(id(), data); });
   sendInterest(Clock::now());
-  ask(Clock::now());
+  askForDescription(Clock::now());
 }
 
 EdgeStream::EdgeStream(EdgeContext context, std::uint64_t origin, const v1::OfferedScene& offered,
@@ -76,6 +74,7 @@ EdgeStream::EdgeStream(EdgeContext context, std::uint64_t origin, const v1::Offe
       offered_(offered),
       name_(offered.summary().name()),
       subject_(streamSubject(name_, offered.stream())),
+      inbox_(edge_.nats.inbox()),
       continues_(true),
       scene_(former.scene_),
       source_(former.source_),
@@ -93,9 +92,17 @@ void EdgeStream::listen() {
                                });
 }
 
+void EdgeStream::askForDescription(Clock::time_point now) {
+  received_ = 0;
+  description_.clear();
+  chunks_ =
+      edge_.nats.subscribe(inbox_, [this](const auto&, const auto&, auto data) { edge_.arrive(id(), data); });
+  ask(now);
+}
+
 bool EdgeStream::receiveChunk(std::span<const std::byte> bytes, Clock::time_point now) {
   v1::ServerMessage message;
-  if (scene_ || !parse(bytes, message) || !message.has_chunk()) return false;
+  if (!chunks_ || !parse(bytes, message) || !message.has_chunk()) return false;
   const v1::Chunk& chunk = message.chunk();
   if (chunk.index() == 0) {
     content_ = chunk.content_id();
@@ -119,6 +126,13 @@ bool EdgeStream::serve() {
   if (description.ParseFromString(description_)) problem = problemOf(description);
   description_ = {};
   chunks_.reset();
+  if (scene_) {
+    const std::lock_guard lock(mutex_);
+    refreshes_ = false;
+    if (problem.empty()) source_->setParameters(description);
+    for (const SharedBytes& event : std::exchange(early_, {})) receive(*event);
+    return true;
+  }
   if (!problem.empty()) {
     telemetry::log({name_}, spdlog::level::warn, "the scene that another server offers is not shown: {}",
                    problem);
@@ -147,8 +161,8 @@ void EdgeStream::end(const SharedBytes& last) {
 
 void EdgeStream::look(Clock::time_point now) {
   if (!isSuccessor()) tunnels_->poll();
+  if (chunks_ && now - asked_ > kAskAgain) ask(now);
   if (!scene_) {
-    if (now - asked_ > kAskAgain && chunks_) ask(now);
     if (now - interestSent_ > kInterestPeriod) sendInterest(now);
     return;
   }
@@ -170,14 +184,22 @@ void EdgeStream::learn(const v1::OfferedScene& offered) {
   const v1::SceneSummary& summary = offered.summary();
   tunnels_->setRoom(!summary.has_playback() && summary.participants() < summary.max_participants());
   if (!scene_) return;
+  if (std::exchange(pauseIsOld_, false)) source_->setPaused(summary.paused());
   std::vector<scene::Ban> bans;
   for (const v1::SavedBan& ban : offered.bans())
     bans.push_back({{.tenant = ban.tenant(), .name = ban.subject()}, ban.display_name()});
   scene_->roster.setBans(std::move(bans));
 }
 
-void EdgeStream::forgetFrames() {
-  if (source_) source_->forgetFrames();
+void EdgeStream::refresh(Clock::time_point now) {
+  source_->forgetFrames();
+  pauseIsOld_ = true;
+  {
+    const std::lock_guard lock(mutex_);
+    refreshes_ = true;
+    early_.clear();
+  }
+  askForDescription(now);
 }
 
 void EdgeStream::tell(const char* why) {
@@ -196,6 +218,7 @@ void EdgeStream::retire() {
   frames_ = {};
   events_.reset();
   down_.reset();
+  chunks_.reset();
 }
 
 void EdgeStream::ask(Clock::time_point now) {
@@ -240,9 +263,8 @@ void EdgeStream::receiveFrame(std::span<const std::byte> data) {
 
 void EdgeStream::event(std::span<const std::byte> data) {
   const std::lock_guard lock(mutex_);
-  if (source_)
-    receive(data);
-  else if (early_.size() < kMaxEarlyEvents)
+  if (source_) receive(data);
+  if ((!source_ || refreshes_) && early_.size() < kMaxEarlyEvents)
     early_.push_back(std::make_shared<std::vector<std::byte>>(data.begin(), data.end()));
 }
 

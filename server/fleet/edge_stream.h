@@ -52,9 +52,12 @@ class EdgeStream {
   // Null until it is served.
   const std::shared_ptr<scene::LiveScene>& scene() const { return scene_; }
 
-  // Returns true once, when the description is complete.
+  // Whether its first description is under way.
+  bool isLoading() const { return !scene_ && chunks_ != nullptr; }
+  // Returns true when the description is complete.
   bool receiveChunk(std::span<const std::byte> bytes, schedule::Clock::time_point now);
-  // Begins to serve the stream. Returns false if it cannot be shown.
+  // Begins to serve the stream, or takes parameters from the description after refresh(). Returns false if
+  // the stream cannot be shown.
   bool serve();
   // Ends it, with this as the last message to everyone in the scene.
   void end(const delivery::SharedBytes& last);
@@ -63,8 +66,8 @@ class EdgeStream {
   void look(schedule::Clock::time_point now);
   // Takes what a later offer says.
   void learn(const v1::OfferedScene& offered);
-  // Frames may be missing from now on.
-  void forgetFrames();
+  // NATS was away: frames and events may be missing.
+  void refresh(schedule::Clock::time_point now);
   // Everyone in the scene reads why the picture stands still.
   void tell(const char* why);
 
@@ -85,6 +88,7 @@ class EdgeStream {
   };
 
   void listen();
+  void askForDescription(Clock::time_point now);
   void ask(Clock::time_point now);
   void sendInterest(Clock::time_point now);
   void receiveFrames(std::uint8_t qualities, Clock::time_point now);
@@ -105,8 +109,11 @@ class EdgeStream {
   delivery::RequestedFrames sent_;
   std::shared_ptr<scene::LiveScene> scene_;  // once it is served
 
-  std::mutex mutex_;  // protects the next two for events, which may come before serve()
+  bool pauseIsOld_ = false;  // until the next offer
+
+  std::mutex mutex_;  // protects the next three for events, which may come before serve()
   std::shared_ptr<EdgeSource> source_;
+  bool refreshes_ = false;
   std::deque<delivery::SharedBytes> early_;
 
   const std::shared_ptr<EdgeTunnels> tunnels_;

@@ -20,12 +20,36 @@ namespace {
 constexpr std::chrono::milliseconds kSilence{1500};
 // Pings and Pongs are not longer.
 constexpr std::size_t kMaxPingBytes = 64;
+// Beyond so many messages for the peer, pings wait for the origin.
+constexpr std::size_t kMaxAnswers = 64;
+// Nor are requests that say who the peer is: Hello, and a token of at most 4096 bytes.
+constexpr std::size_t kMaxRequestBytes = 8192;
+
+constexpr std::chrono::seconds kStrangerTime{30};
+constexpr std::size_t kMaxStrangers = 1024;
 
 }  // namespace
 
+void Strangers::add(std::string resumeToken) {
+  const Clock::time_point now = Clock::now();
+  const std::lock_guard lock(mutex_);
+  std::erase_if(until_, [&](const auto& known) { return known.second < now; });
+  if (until_.size() < kMaxStrangers) until_[std::move(resumeToken)] = now + kStrangerTime;
+}
+
+bool Strangers::contains(const std::string& resumeToken) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = until_.find(resumeToken);
+  return found != until_.end() && Clock::now() <= found->second;
+}
+
 EdgeTunnel::EdgeTunnel(Nats& nats, std::string stream, const TunnelId& id, const scene::RemotePeer& peer,
-                       std::function<void()> wake)
-    : nats_(nats), id_(id), wake_(std::move(wake)), stream_(std::move(stream)) {
+                       std::shared_ptr<Strangers> strangers, std::function<void()> wake)
+    : nats_(nats),
+      id_(id),
+      strangers_(std::move(strangers)),
+      wake_(std::move(wake)),
+      stream_(std::move(stream)) {
   open_.set_peer(peer.name);
   open_.set_address(peer.address);
   open_.set_token(peer.token);
@@ -38,8 +62,7 @@ bool EdgeTunnel::send(std::span<const std::byte> message) {
   if (closed_ || left_) return true;  // the peer learns why
   if (answerPing(message, Clock::now())) return true;
   if (channel_.bytes() + message.size() > kMaxWaiting) return false;
-  if (v1::ClientMessage first; !hello_.protocol_version() && parse(message, first) && first.has_hello())
-    hello_ = first.hello();
+  if (message.size() <= kMaxRequestBytes) readRequest(message);
   channel_.push(std::make_shared<std::vector<std::byte>>(message.begin(), message.end()), Clock::now());
   pollLocked();
   return true;
@@ -48,7 +71,7 @@ bool EdgeTunnel::send(std::span<const std::byte> message) {
 bool EdgeTunnel::answerPing(std::span<const std::byte> message, Clock::time_point now) {
   v1::ClientMessage ping;
   if (!serverAheadUs_ || now - heardAt_ < kSilence || message.size() > kMaxPingBytes ||
-      !parse(message, ping) || !ping.has_ping())
+      messages_.size() > kMaxAnswers || !parse(message, ping) || !ping.has_ping())
     return false;
   v1::ServerMessage answer;
   answer.set_request_id(ping.request_id());
@@ -78,10 +101,14 @@ bool EdgeTunnel::ended() const {
 void EdgeTunnel::end(End how) {
   const std::lock_guard lock(mutex_);
   if (std::exchange(left_, true) || closed_) return;
+  messages_.clear();
+  if (!known_) {  // a peer that tried to join without NATS
+    closed_ = true;
+    return;
+  }
   channel_.pushEnd(how == End::left         ? v1::TUNNEL_END_LEFT
                    : how == End::pageClosed ? v1::TUNNEL_END_PAGE_CLOSED
                                             : v1::TUNNEL_END_LOST);
-  messages_.clear();
   pollLocked();
 }
 
@@ -104,7 +131,7 @@ void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) 
         channel_.use(received.sequence);
         continue;
       }
-      if (!welcomed_) readWelcome(received.message);
+      if (!welcomed_ || !token_.empty()) readAnswer(received.message);
       if (v1::ServerMessage pong;
           received.message->size() <= kMaxPingBytes && parse(*received.message, pong) && pong.has_pong())
         serverAheadUs_ =
@@ -117,12 +144,30 @@ void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) 
   wake_();
 }
 
-void EdgeTunnel::readWelcome(const SharedBytes& message) {
+void EdgeTunnel::readRequest(std::span<const std::byte> message) {
+  v1::ClientMessage parsed;
+  if (!parse(message, parsed)) return;
+  if (parsed.has_hello() && !hello_.protocol_version()) hello_ = parsed.hello();
+  if (!parsed.has_authenticate() || parsed.authenticate().token().empty()) return;
+  token_ = parsed.authenticate().token();
+  tokenRequest_ = parsed.request_id();
+}
+
+void EdgeTunnel::readAnswer(const SharedBytes& message) {
   v1::ServerMessage parsed;
-  if (!parse(*message, parsed) || !parsed.has_welcome()) return;
-  welcomed_ = true;
-  hello_.set_resume_token(parsed.welcome().resume_token());
-  hello_.set_description_content_id(parsed.welcome().description_content_id());
+  if (!parse(*message, parsed)) return;
+  if (parsed.has_welcome()) {
+    welcomed_ = true;
+    hello_.set_resume_token(parsed.welcome().resume_token());
+    hello_.set_description_content_id(parsed.welcome().description_content_id());
+  }
+  // The client tries again, and then views.
+  if (!welcomed_ && parsed.error().code() == v1::ERROR_CODE_RESOURCE_EXHAUSTED &&
+      !hello_.resume_token().empty())
+    strangers_->add(hello_.resume_token());
+  if (token_.empty() || parsed.request_id() != tokenRequest_) return;
+  if (parsed.has_authenticate()) open_.set_token(token_);
+  token_.clear();
 }
 
 bool EdgeTunnel::poll() {
@@ -134,6 +179,7 @@ bool EdgeTunnel::poll() {
 void EdgeTunnel::pollLocked() {
   if (!nats_.connected()) return;
   const bool opens = !channel_.heard();
+  known_ = true;
   channel_.poll(Clock::now(), [&](const v1::Segment& segment) {
     if (!opens) return nats_.publish(upSubject(stream_, id_), toBytes(segment));
     v1::Segment opening = segment;
@@ -180,10 +226,10 @@ void EdgeTunnel::tell(SharedBytes message) {
 
 std::shared_ptr<scene::RemoteSession> EdgeTunnels::connect(const scene::RemotePeer& peer,
                                                            std::function<void()> wake) {
-  if (!hasRoom_) return nullptr;
+  if (!hasRoom_ && (peer.resumeToken.empty() || strangers_->contains(peer.resumeToken))) return nullptr;
   const std::lock_guard lock(mutex_);
   const TunnelId id{edge_, randomId()};
-  auto tunnel = std::make_shared<EdgeTunnel>(nats_, stream_, id, peer, std::move(wake));
+  auto tunnel = std::make_shared<EdgeTunnel>(nats_, stream_, id, peer, strangers_, std::move(wake));
   tunnels_.emplace(id.peer, tunnel);
   return tunnel;
 }

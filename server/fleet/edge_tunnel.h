@@ -23,6 +23,17 @@
 
 namespace clothstream::fleet {
 
+// Resume tokens that the origin did not know while its scene was full, for a few seconds. Thread-safe.
+class Strangers {
+ public:
+  void add(std::string resumeToken);
+  bool contains(const std::string& resumeToken) const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, schedule::Clock::time_point> until_;
+};
+
 // All bytes of the peer go through NATS, both ways, as they are. Thread-safe.
 //
 // While nothing comes from the origin, pings are answered here, with its clock as it was last seen. A client
@@ -36,7 +47,7 @@ class EdgeTunnel final : public scene::RemoteSession {
   static constexpr std::size_t kMaxWaiting = std::size_t{4} << 20;
 
   EdgeTunnel(Nats& nats, std::string stream, const TunnelId& id, const scene::RemotePeer& peer,
-             std::function<void()> wake);
+             std::shared_ptr<Strangers> strangers, std::function<void()> wake);
   ~EdgeTunnel() override;
 
   [[nodiscard]] bool send(std::span<const std::byte> message) override;
@@ -65,11 +76,13 @@ class EdgeTunnel final : public scene::RemoteSession {
   void pollLocked();
   // Answers a ping if the origin cannot. Returns false for other messages.
   bool answerPing(std::span<const std::byte> message, schedule::Clock::time_point now);
-  // Remembers what another server needs to know the participant.
-  void readWelcome(const delivery::SharedBytes& message);
+  // The following two remember what another server needs to know the participant.
+  void readRequest(std::span<const std::byte> message);
+  void readAnswer(const delivery::SharedBytes& message);
 
   Nats& nats_;
   const TunnelId id_;
+  const std::shared_ptr<Strangers> strangers_;
   const std::function<void()> wake_;
 
   mutable std::mutex mutex_;  // protects all below
@@ -77,7 +90,11 @@ class EdgeTunnel final : public scene::RemoteSession {
   v1::OpenTunnel open_;
   v1::Hello hello_;
   bool welcomed_ = false;
+  // Renewed token of the peer that the origin has not accepted yet, and the request that has it.
+  std::string token_;
+  std::uint64_t tokenRequest_ = 0;
   Channel channel_;
+  bool known_ = false;  // the origin may have heard of the peer
   std::deque<Waiting> messages_;
   schedule::Clock::time_point heardAt_{};      // newest segment
   std::optional<std::int64_t> serverAheadUs_;  // clock of the origin, in its newest Pong
@@ -91,7 +108,7 @@ class EdgeTunnels {
   EdgeTunnels(Nats& nats, std::uint64_t edge, std::string stream)
       : nats_(nats), edge_(edge), stream_(std::move(stream)) {}
 
-  // Null if the scene has no room for another participant.
+  // Null if the scene has no room for another participant, unless the peer may have a place in it.
   std::shared_ptr<scene::RemoteSession> connect(const scene::RemotePeer& peer, std::function<void()> wake);
   // Whether the scene has room for participants, as its origin says.
   void setRoom(bool hasRoom) { hasRoom_ = hasRoom; }
@@ -107,6 +124,7 @@ class EdgeTunnels {
 
   Nats& nats_;
   const std::uint64_t edge_;
+  const std::shared_ptr<Strangers> strangers_ = std::make_shared<Strangers>();
   std::atomic<bool> hasRoom_{false};
 
   mutable std::mutex mutex_;  // protects the next two

@@ -163,7 +163,7 @@ Origin::~Origin() {
   endOffers();
   departures_.reset();
   arrivals_.reset();
-  directory_.reset();
+  directory_->end();
   streams_.clear();
   prepared_.clear();
   offer();
@@ -194,7 +194,7 @@ void Origin::lookForScenes() {
   {
     const std::lock_guard lock(mutex_);
     for (auto known = streams_.begin(); known != streams_.end();) {
-      if (std::ranges::find(scenes, known->second->scene()) != scenes.end()) {
+      if (std::ranges::find(scenes, known->second->scene()) != scenes.end() && !known->second->isOver()) {
         ++known;
         continue;
       }
@@ -203,7 +203,7 @@ void Origin::lookForScenes() {
     }
     for (const auto& scene : scenes) {
       const bool isTaken = directory_->isTaken(scene->name());
-      if (isTaken && scene->created) old.push_back(scene);
+      if (isTaken && scene->created && directory_->isRunElsewhere(scene->name())) old.push_back(scene);
       const bool isOffered =
           !scene->sharesAsGuest && !scene->shape().lockstep && scene->quarantined().empty() && !isTaken;
       const auto known = streams_.find(scene->name());
@@ -276,6 +276,7 @@ v1::MoveResponse Origin::moveBy(Clock::time_point until, const std::string& scen
   std::future<v1::MoveResponse> moved = result->get_future();
   if (!departures_->post([this, scene, to, until, result] { result->set_value(moveNow(scene, to, until)); }))
     return refused("too many scenes wait to be moved; try again later");
+  if (moved.wait_until(until) != std::future_status::ready) return refused("there was no time");
   try {
     return moved.get();
   } catch (const std::future_error&) {
@@ -285,6 +286,7 @@ v1::MoveResponse Origin::moveBy(Clock::time_point until, const std::string& scen
 
 std::size_t Origin::moveAll(Clock::time_point until) {
   directory_->setStopping();
+  waitsUntil_ = until;
   lookForScenes();  // some may have been deleted
   std::vector<std::string> names;
   {
@@ -322,7 +324,8 @@ std::optional<v1::MoveMessage> Origin::receive(Conversation& talk, std::uint64_t
                                                Clock::time_point until) {
   for (;;) {
     if (auto message = talk.receive(kLook)) return message;
-    if (stopping_ || Clock::now() >= until || !directory_->isThere(other)) return std::nullopt;
+    if (stopping_ || Clock::now() >= std::min(until, waitsUntil_.load()) || !directory_->isThere(other))
+      return std::nullopt;
   }
 }
 
@@ -355,7 +358,10 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to, Cloc
   message.mutable_prepare()->set_origin(id_);
   talk.send(message);
   const auto prepared = receive(talk, to, until);
-  if (!prepared) return refused("the other server does not answer");
+  if (!prepared) {
+    refuseTo(talk, "there was no time");
+    return refused("the other server does not answer");
+  }
   if (!prepared->has_prepared())
     return refused(fmt::format("the other server says: {}", prepared->refused()));
   if (!known->public_name().empty() &&
@@ -405,7 +411,7 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
   message.mutable_state()->set_revision(*revision);
   for (const v1::MovedTunnel& tunnel : tunnels) *message.mutable_state()->add_tunnels() = tunnel;
   talk.send(message);
-  const auto answer = talk.receive(kStartTime);
+  const auto answer = receive(talk, to, Clock::now() + kStartTime);
   if (answer && answer->has_done()) return {};
   const std::string why = answer ? fmt::format("the other server says: {}", answer->refused())
                                  : "the other server does not answer";
@@ -425,6 +431,20 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
                      "stands still until NATS says which server has it after a move: {}", failure.what());
     }
     if (stopping_) return stay(why);
+    std::this_thread::sleep_for(kDecidePeriod);
+  }
+}
+
+bool Origin::takes(const v1::SceneEntry& entry, const std::string& name, std::uint64_t revision) {
+  for (;;) {
+    try {
+      // A write whose answer was lost is not repeated, because its revision has changed.
+      return directory_->transfer(name, entry, revision) || directory_->ownerOf(name) == id_;
+    } catch (const std::exception& failure) {
+      telemetry::log({name}, spdlog::level::warn,
+                     "waits until NATS says which server has it after a move: {}", failure.what());
+    }
+    if (stopping_) return false;
     std::this_thread::sleep_for(kDecidePeriod);
   }
 }
@@ -467,9 +487,9 @@ void Origin::receiveScene(std::uint64_t move) {
   entry.set_created(true);
   *entry.mutable_checkpoint() = directory_->checkpointOf(name);
   directory_->expect(name);
+  if (!takes(entry, name, state->state().revision()))
+    return giveUp("the directory has another server for it");
   try {
-    if (!directory_->transfer(name, entry, state->state().revision()))
-      return giveUp("the directory has another server for it");
     server_.state().startArrived(scene, std::move(*continued));
   } catch (const std::exception& failure) {
     entry.set_origin(asked->prepare().origin());
@@ -524,6 +544,7 @@ std::string Origin::adopt(v1::SavedParts parts, const std::function<bool()>& cla
   auto arriving = server_.state().prepareArrival(*saved);
   if (!arriving) return arriving.error();
   try {
+    if (stopping_) throw std::runtime_error("this server stops");
     if (!claim()) throw std::runtime_error("another server was faster");
     server_.state().startArrived(*arriving, std::move(*saved));
   } catch (const std::exception& failure) {

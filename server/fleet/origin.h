@@ -83,6 +83,8 @@ class Origin {
   std::string handOver(Conversation& talk, const OriginStream& stream, std::uint64_t to,
                        Clock::time_point& stopped);
   void receiveScene(std::uint64_t move);
+  // Makes a scene this server's in the directory. Returns false if it belongs to another one.
+  bool takes(const v1::SceneEntry& entry, const std::string& name, std::uint64_t revision);
   // Lets a scene of another server begin here.
   SharedStream prepareStream(const std::shared_ptr<scene::LiveScene>& scene, std::uint64_t continues);
   void runStream(const SharedStream& stream);
@@ -97,6 +99,8 @@ class Origin {
   OriginTunnels tunnels_;
 
   std::atomic<bool> stopping_{false};
+  // Other servers are not waited for beyond this time.
+  std::atomic<Clock::time_point> waitsUntil_{Clock::time_point::max()};
   std::mutex looking_;        // held by lookForScenes()
   mutable std::mutex mutex_;  // protects the next three
   std::condition_variable changed_;

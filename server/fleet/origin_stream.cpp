@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/fleet/origin_stream.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <map>
@@ -25,6 +26,10 @@ using namespace std::chrono_literals;
 constexpr auto kInterestTime = 3s;
 // Edges that one scene remembers. Further ones are not heard.
 constexpr std::size_t kMaxEdges = 1024;
+// A description of which an edge has a part is kept for this long after each request, and so many of them
+// are.
+constexpr auto kGivenTime = 5s;
+constexpr std::size_t kMaxGiven = 256;
 
 // Collects what the edges need of one scene, and sends its frames to them.
 class SceneRelay final : public delivery::Relay {
@@ -106,6 +111,7 @@ OriginStream::OriginStream(hosting::SceneServer& server, Nats& nats, OriginTunne
       scene_(live),
       id_(randomId()),
       continues_(continues),
+      restarts_(live->restarts),
       prepared_(continues != 0),
       subject_(streamSubject(live->name(), id_)),
       relay_(std::make_shared<SceneRelay>(nats, subject_, live->shape().qualities)) {
@@ -118,7 +124,7 @@ OriginStream::OriginStream(hosting::SceneServer& server, Nats& nats, OriginTunne
       descriptionSubject(subject_), [this, &nats](const auto&, const std::string& reply, auto data) {
         v1::ChunkRequest request;
         if (reply.empty() || !parse(data, request)) return;
-        const std::shared_ptr<const delivery::DescriptionChunks> chunks = scene_->description();
+        const std::shared_ptr<const delivery::DescriptionChunks> chunks = description(request.content_id());
         const bool same = request.content_id() == chunks->contentId() && request.index() < chunks->count();
         nats.publish(reply, chunks->chunk(same ? request.index() : 0));
       });
@@ -128,10 +134,29 @@ OriginStream::OriginStream(hosting::SceneServer& server, Nats& nats, OriginTunne
   scene_->subscribers.setRelay(relay_);
 }
 
+std::shared_ptr<const delivery::DescriptionChunks> OriginStream::description(std::uint64_t content) {
+  const Clock::time_point now = Clock::now();
+  std::erase_if(given_, [&](const Given& given) { return now - given.at > kGivenTime; });
+  const auto find = [&](std::uint64_t id) {
+    return std::ranges::find(given_, id, [](const Given& given) { return given.chunks->contentId(); });
+  };
+  auto found = find(content);
+  if (found == given_.end()) {
+    auto newest = scene_->description();
+    found = find(newest->contentId());
+    if (found == given_.end()) {
+      if (given_.size() == kMaxGiven) given_.erase(given_.begin());
+      found = given_.insert(given_.end(), {.chunks = std::move(newest), .at = now});
+    }
+  }
+  found->at = now;
+  return found->chunks;
+}
+
 OriginStream::~OriginStream() {
   up_.reset();
   tunnels_.end(subject_);
-  scene_->subscribers.setRelay(nullptr);
+  scene_->subscribers.dropRelay(*relay_);
 }
 
 v1::OfferedScene OriginStream::offer() const {

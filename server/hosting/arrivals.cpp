@@ -97,7 +97,7 @@ void SceneServer::State::removeCreated(const std::shared_ptr<scene::LiveScene>& 
     scene->roster.close(last);
     device.remove(scene).wait();
     scene->discharge();
-    forget(*scene);
+    if (scene->keeper) forget(*scene);  // else the name may be that of another scene
   };
   schedule::retryUntilDone(finish, [&](const std::exception& failure) {
     spdlog::error("{}: not removed: {}; trying again", scene->name(), failure.what());

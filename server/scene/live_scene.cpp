@@ -290,6 +290,7 @@ v1::ParameterChange LiveScene::restart() {
   charge_.restore(definition_);
   definitionChanged();
   tick = 0;
+  ++restarts;
   resetRequested = false;
   return allParameters(start_);
 }

@@ -163,7 +163,8 @@ class LiveScene {
 
   // Written by the device's thread, or by the source.
   std::atomic<bool> running{false};
-  std::atomic<std::uint64_t> tick{0};  // newest complete one
+  std::atomic<std::uint64_t> tick{0};      // newest complete one
+  std::atomic<std::uint32_t> restarts{0};  // calls of restart(), after which ticks begin with 1 again
   std::atomic<schedule::WorkLevel>
       work;  // of the newest tick; less than allWork() while the device is overloaded
 

@@ -16,9 +16,10 @@ namespace clothstream::scene {
 
 // A peer as the other server learns about it.
 struct RemotePeer {
-  std::string name;     // for logs
-  std::string address;  // groups the peers of one machine; empty for programs of this machine
-  std::string token;    // that it has proved its identity with; empty: none
+  std::string name;              // for logs
+  std::string address;           // groups the peers of one machine; empty for programs of this machine
+  std::string token;             // that it has proved its identity with; empty: none
+  std::string resumeToken = {};  // of the place that it wants back; empty: a new one
 };
 
 // Thread-safe. The session ends with the destructor, as a lost connection, unless end() was called.

@@ -166,7 +166,8 @@ bool Session::joinRemotely(const v1::Hello& message, const messages::Joining& jo
   if (!scene->source || onlyViews || scene->roster.knows(message.resume_token())) return false;
   // Messages of the other server come before the last one of this mailbox.
   std::shared_ptr<scene::RemoteSession> remote = scene->source->connect(
-      {.name = peer_, .address = address_, .token = token_}, [mailbox = mailbox_] { mailbox->wake(); });
+      {.name = peer_, .address = address_, .token = token_, .resumeToken = message.resume_token()},
+      [mailbox = mailbox_] { mailbox->wake(); });
   if (!remote) return false;
   v1::ClientMessage first;
   first.set_request_id(requestId_);

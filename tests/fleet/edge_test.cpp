@@ -181,6 +181,52 @@ TEST_F(EdgeTest, ParametersAreThoseOfTheOrigin) {
   EXPECT_THAT(refused.error().text(), HasSubstr("yours is viewer"));
 }
 
+TEST_F(EdgeTest, ViewersLearnWhatChangedWhileNatsWasAway) {
+  ASSERT_NO_FATAL_FAILURE(startOrigin());
+  if (IsSkipped()) return;
+  const auto edge = startEdge();
+  TestPeer direct(server());
+  Viewer viewer(edge->server);
+  direct.join();
+  viewer.join();
+  viewer.readFrames(2);
+  nats_->kill();
+  v1::ParameterChange change;
+  change.mutable_wind()->mutable_value()->set_x(3);
+  direct.change(change);
+  direct.readUntil(v1::ServerMessage::kParameterChanged);
+  v1::ControlSceneRequest pause;
+  pause.set_name("small");
+  pause.set_paused(true);
+  ASSERT_TRUE(server().controlScene(pause));
+  nats_->restart();
+  bool hasWind = false, isPaused = false;
+  viewer.readUntil([&](const v1::ServerMessage& message) {
+    hasWind |= message.parameter_changed().change().wind().value().x() == 3;
+    isPaused |= message.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED;
+    return hasWind && isPaused;
+  });
+}
+
+TEST_F(EdgeTest, ASceneThatBeginsAgainIsFollowed) {
+  ASSERT_NO_FATAL_FAILURE(startOrigin());
+  if (IsSkipped()) return;
+  const auto edge = startEdge();
+  Viewer viewer(edge->server);
+  viewer.join();
+  viewer.readFrames(40);
+  const std::uint64_t tick = viewer.frames().back().tick;
+  // The device thread gives the scene up, and it runs from the beginning.
+  server().state().device.simulateDeviceLossIn("small");
+  ASSERT_TRUE(eventually([&] { return server().state().find("small")->restarts > 0; }));
+  server().state().device.simulateDeviceLossIn("");
+  EXPECT_EQ(viewer.readToTheEnd().error().code(), v1::ERROR_CODE_CUT_OFF);
+  Viewer again(edge->server);
+  again.join();
+  again.readFrames(5);
+  EXPECT_LT(again.frames().front().tick, tick);
+}
+
 TEST_F(EdgeTest, OriginSleepsWithoutViewers) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;

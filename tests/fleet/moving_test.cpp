@@ -244,6 +244,14 @@ class FalseServer {
     entry.set_origin(kId);
     Bucket(nats_, {.name = Directory::kServers}).put("0000000000000007", entry.SerializeAsString());
   }
+  // Takes the name of a scene, with a checkpoint that cannot be read.
+  void claim(const std::string& scene) const {
+    v1::SceneEntry entry;
+    entry.set_origin(kId);
+    entry.set_created(true);
+    entry.mutable_checkpoint()->set_parts(1);
+    Bucket(nats_, {.name = Directory::kScenes}).put(scene, entry.SerializeAsString());
+  }
   // Side of this server in the move that it is asked for.
   std::unique_ptr<Conversation> talk() {
     EXPECT_TRUE(eventually([&] { return move_ != 0; }));
@@ -252,7 +260,7 @@ class FalseServer {
 
  private:
   telemetry::NatsMetrics metrics_;
-  Nats nats_;
+  mutable Nats nats_;
   std::atomic<std::uint64_t> move_ = 0;
   std::atomic<bool> stopping_ = false;
   std::unique_ptr<Nats::Subscription> requests_;
@@ -312,6 +320,39 @@ TEST_F(MovingTest, AnotherServerContinuesTheScenesOfOneThatIsGone) {
     again.hello(hello);
     return again.readUntil([](const auto&) { return true; }).welcome().resumed();
   }));
+}
+
+// A watch of NATS may say nothing for many seconds after that, and no server is gone.
+TEST_F(MovingTest, AfterAShortRestartOfNatsScenesStayWhereTheyAre) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  ASSERT_TRUE(eventually([&] { return second_->origin->directory().checkpointOf("moves").parts() > 0; }));
+  nats_->kill();
+  nats_->restart();
+  std::this_thread::sleep_for(Directory::kLease + 7s);
+  EXPECT_EQ(second_->find("moves"), nullptr);
+  EXPECT_NE(first_->find("moves"), nullptr);
+  EXPECT_TRUE(first_->owns("moves"));
+  EXPECT_TRUE(eventually([&] { return first_->origin->move("moves").error().empty(); }));
+}
+
+TEST_F(MovingTest, TheNameOfASceneWithoutServerWaitsForItsNextServer) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  const FalseServer gone(natsOptions());
+  gone.claim("lost");
+  const Directory& directory = first_->origin->directory();
+  ASSERT_TRUE(eventually([&] { return directory.isTaken("lost"); }));
+  ASSERT_TRUE(eventually([&] { return !directory.isTaken("lost"); }));
+  EXPECT_THAT(first_->create("lost"), HasSubstr("another server of the fleet"));
+}
+
+TEST_F(MovingTest, CheckpointsHaveWhatChangesWhileASceneStandsStill) {
+  ASSERT_NO_FATAL_FAILURE(startTwo());
+  const Directory& directory = first_->origin->directory();
+  ASSERT_TRUE(eventually([&] { return directory.checkpointOf("moves").parts() > 0; }));
+  const auto before = directory.checkpointOf("moves");
+  first_->find("moves")->roster.setBans({{.subject = {.tenant = "", .name = "anna"}, .displayName = "Anna"}});
+  EXPECT_TRUE(eventually([&] { return directory.checkpointOf("moves").crc() != before.crc(); }));
+  EXPECT_EQ(directory.checkpointOf("moves").tick(), before.tick());
 }
 
 TEST_F(MovingTest, ANameIsGivenOnceInAFleet) {

@@ -99,6 +99,39 @@ TEST_F(EdgeParticipantsTest, AFullSceneIsWatched) {
   }));
 }
 
+TEST_F(EdgeParticipantsTest, APlaceInAFullSceneIsKept) {
+  hosting::ServerOptions few = options();
+  few.maxParticipants = 2;
+  OriginServer origin(natsOptions(), few);
+  TestPeer owner(origin.server);
+  owner.join("small");
+  const auto edge = startEdge("small");
+  v1::Hello hello;
+  hello.set_scene("small");
+  TestPeer peer(edge->server);
+  peer.join("small");
+  hello.set_resume_token(peer.welcome().resume_token());
+  // The edge says by now that the scene is full, and the participant is still counted.
+  ASSERT_TRUE(eventually([&] {
+    TestPeer viewer(edge->server);
+    viewer.hello("small");
+    return viewer.readUntil([](const auto&) { return true; }).welcome().role() == v1::ROLE_VIEWER;
+  }));
+  TestPeer again(edge->server);
+  again.hello(hello);
+  again.readUntil(v1::ServerMessage::kWelcome);
+  EXPECT_TRUE(again.welcome().resumed());
+  // Whoever has no place is told so once, and then watches.
+  hello.set_resume_token("of another edge");
+  TestPeer stranger(edge->server);
+  stranger.hello(hello);
+  EXPECT_EQ(stranger.readToTheEnd().error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  TestPeer viewer(edge->server);
+  viewer.hello(hello);
+  viewer.readUntil(v1::ServerMessage::kWelcome);
+  EXPECT_EQ(viewer.welcome().role(), v1::ROLE_VIEWER);
+}
+
 // A ban at the origin holds for viewers of an edge, too.
 TEST_F(EdgeParticipantsTest, BansOfTheOriginHoldOnEdges) {
   const auto origin = startOrigin();
