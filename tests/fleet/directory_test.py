@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -37,11 +38,11 @@ class Directory(unittest.TestCase):
         command = [NATS_SERVER, "--addr", "127.0.0.1", "--port", self.nats_port, *more]
         self.stack.enter_context(Program("nats-server", command, self.folder / "nats.log")).wait_for("Server is ready")
 
-    def start_server(self, name):
+    def start_server(self, name, state=""):
         scene = self.folder / "first.json"
         scene.write_text(json.dumps({**SCENE, "name": "first"}))
         options = ["--scene-file", scene, "--scene", "first", "--nats", self.url, "--public-name", f"{name}.example.com",
-                   "--insecure", "--state-dir", ""]
+                   "--insecure", "--state-dir", state]
         return self.stack.enter_context(Server(SERVER, options, self.folder / f"{name}.log"))
 
     def run_program(self, *arguments):
@@ -109,6 +110,20 @@ class Directory(unittest.TestCase):
         deleted = self.run_program("delete", "moves", "--server", third.address)
         self.assertEqual(deleted.returncode, 0, deleted.stderr)
         wait_until(lambda: self.server_of("moves") is None)
+
+    def test_a_server_that_was_killed_keeps_its_scenes(self):
+        self.start_nats("--jetstream", "--store_dir", self.folder / "store")
+        server = self.start_server("one", self.folder / "state")
+        self.create(server)
+        wait_until(lambda: self.entry_of("moves") and self.entry_of("moves")["checkpointTick"] is not None)
+        former = wait_until(lambda: self.entry_of("moves"))["server"]
+        time.sleep(1)  # its state is on the disk
+        server.kill()
+        server.start()
+        wait_until(lambda: self.entry_of("moves")["server"] != former)  # its own lease had to end
+        self.assertNotIn("removed here", server.said())
+        joined = self.run_program("join", server.address, "--scene", "moves", "--seconds", 1)
+        self.assertEqual(joined.returncode, 0, joined.stderr)
 
     def test_says_what_is_missing(self):
         refused = self.run_program("list", "--nats", self.url)
