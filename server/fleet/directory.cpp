@@ -298,9 +298,8 @@ void Directory::renew() {
     } catch (const std::exception&) {  // the other thread says why
       servers.reset();
     }
-    const Clock::duration wait = servers ? kPeriod : kRetry;
     lock.lock();
-    changed_.wait_for(lock, wait, [this] { return leaseEnds_ || lost_; });
+    changed_.wait_for(lock, kPeriod, [this] { return leaseEnds_ || lost_; });
   }
 }
 

@@ -322,7 +322,7 @@ TEST_F(MovingTest, AnotherServerContinuesTheScenesOfOneThatIsGone) {
   }));
 }
 
-// A watch of NATS may say nothing for many seconds after that, and no server is gone.
+// Renewals may be lost for some seconds then, but no server is gone.
 TEST_F(MovingTest, AfterAShortRestartOfNatsScenesStayWhereTheyAre) {
   ASSERT_NO_FATAL_FAILURE(startTwo());
   ASSERT_TRUE(eventually([&] { return second_->origin->directory().checkpointOf("moves").parts() > 0; }));
