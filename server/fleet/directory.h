@@ -115,7 +115,7 @@ class Directory {
   };
 
   void run();
-  // Renews the lease, on a thread of its own: a round of the other one may take longer.
+  // Renews the lease on another thread, because a round may take longer than the lease.
   void renew();
   v1::ServerEntry selfNow() const;
   // One round: reads changes, claims and gives up scenes, saves and adopts.

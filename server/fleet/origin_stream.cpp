@@ -26,8 +26,7 @@ using namespace std::chrono_literals;
 constexpr auto kInterestTime = 3s;
 // Edges that one scene remembers. Further ones are not heard.
 constexpr std::size_t kMaxEdges = 1024;
-// A description of which an edge has a part is kept for this long after each request, and so many of them
-// are.
+// Descriptions are kept for this long after a request, so that an edge gets all parts of the same one.
 constexpr auto kGivenTime = 5s;
 constexpr std::size_t kMaxGiven = 256;
 

@@ -2,6 +2,7 @@
 // Scenes that move between servers, and scenes of a server that is gone.
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <future>
 #include <map>
 #include <string>
@@ -15,7 +16,10 @@
 #include "server/fleet/conversation.h"
 #include "server/fleet/message_bytes.h"
 #include "server/fleet/subjects.h"
+#include "server/identity/authenticator.h"
+#include "server/identity/token.h"
 #include "tests/fleet/fleet_test.h"
+#include "tests/identity/key_directory.h"
 
 namespace clothstream::fleet {
 namespace {
@@ -161,6 +165,44 @@ TEST_F(MovingTest, DirectClientsLearnTheNewServer) {
   again.hello(hello);
   again.readUntil(v1::ServerMessage::kWelcome);
   EXPECT_TRUE(again.welcome().resumed());
+}
+
+TEST_F(MovingTest, ARenewedTokenComesAlong) {
+  // The second server knows only the key of the renewed token.
+  const tests::KeyDirectory both, second;
+  const identity::TokenKey former = both.make("former.pem"), renewed = both.make("renewed.pem");
+  std::filesystem::copy_file(both.path() / "renewed.pem", second.path() / "renewed.pem");
+  const auto start = [&](const tests::KeyDirectory& keys) {
+    hosting::ServerOptions asking = options();
+    asking.authenticator = std::make_shared<identity::Authenticator>(
+        identity::AuthenticatorOptions{.keyDirectory = keys.path(), .pairing = false, .stateDirectory = {}});
+    return std::make_unique<OriginServer>(natsOptions(), asking);
+  };
+  const auto sign = [](const identity::TokenKey& key) {
+    identity::Claims claims;
+    claims.role = scene::Role::owner;
+    claims.subject = "anna";
+    claims.audience = "clothstream";
+    claims.expires = identity::WallClock::now() + 1h;
+    return identity::sign(key, claims);
+  };
+  first_ = start(both);
+  second_ = start(second);
+  ASSERT_THAT(first_->create("moves"), IsEmpty());
+  ASSERT_TRUE(
+      eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
+  edge_ = startEdge("moves");
+  TestPeer peer(edge_->server, {.peer = "test", .address = {}, .token = sign(former)});
+  peer.join("moves");
+  v1::ClientMessage renew;
+  renew.set_request_id(5);
+  renew.mutable_authenticate()->set_token(sign(renewed));
+  peer.send(renew);
+  peer.readUntil([](const v1::ServerMessage& answer) { return answer.request_id() == 5; });
+  ASSERT_THAT(first_->origin->move("moves").error(), IsEmpty());
+  const std::uint64_t tick = second_->find("moves")->tick;
+  while (peer.frames().back().tick <= tick + 30) peer.readFrames(5);
+  EXPECT_EQ(second_->find("moves")->roster.away(), 0u);
 }
 
 TEST_F(MovingTest, ASceneStaysWhereItIsIfItCannotMove) {

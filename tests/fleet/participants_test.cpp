@@ -121,7 +121,7 @@ TEST_F(EdgeParticipantsTest, APlaceInAFullSceneIsKept) {
   again.hello(hello);
   again.readUntil(v1::ServerMessage::kWelcome);
   EXPECT_TRUE(again.welcome().resumed());
-  // Whoever has no place is told so once, and then watches.
+  // A client without a place is refused once, and then watches.
   hello.set_resume_token("of another edge");
   TestPeer stranger(edge->server);
   stranger.hello(hello);
