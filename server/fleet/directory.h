@@ -30,7 +30,7 @@ namespace clothstream::fleet {
 
 // A server has a lease, which it renews twice a second. A scene belongs to the server in its entry as long as
 // that server's lease lasts; then another server takes its name over or, for a scene that a client created,
-// continues it from its newest checkpoint. Thread-safe; one thread waits for NATS.
+// continues it from its newest checkpoint. Thread-safe; its threads wait for NATS.
 //
 // Without JetStream there is no directory, and edges choose between scenes of the same name.
 class Directory {

@@ -227,8 +227,10 @@ void Edge::look(Clock::time_point now) {
   const bool connected = nats_.connected();
   if (connected && !connectedSince_) {
     connectedSince_ = now;
-    for (auto& [name, known] : scenes_)
+    for (auto& [name, known] : scenes_) {
       if (known->served) known->served->refresh(now);
+      if (known->next && known->next->isLoading()) known->next->refresh(now);
+    }
   }
   if (!connected && connectedSince_) {
     connectedSince_.reset();

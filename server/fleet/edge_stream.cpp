@@ -192,14 +192,16 @@ void EdgeStream::learn(const v1::OfferedScene& offered) {
 }
 
 void EdgeStream::refresh(Clock::time_point now) {
-  source_->forgetFrames();
+  if (source_) source_->forgetFrames();
   pauseIsOld_ = true;
+  // The description of a recording has the parameters of its start.
+  const bool asks = !source_ || !source_->playback();
   {
     const std::lock_guard lock(mutex_);
-    refreshes_ = true;
+    refreshes_ = source_ && asks;
     early_.clear();
   }
-  askForDescription(now);
+  if (asks) askForDescription(now);
 }
 
 void EdgeStream::tell(const char* why) {

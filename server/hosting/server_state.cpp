@@ -347,10 +347,7 @@ tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::State::controlSce
   if (const auto controlled = controlSource(*scene, request); !controlled)
     return tl::unexpected(toMessage(controlled.error()));
   if (request.has_paused() && scene->paused.exchange(request.paused()) != request.paused())
-    scene->subscribers.announce(request.paused()
-                                    ? scene::pausedNotice(*scene, participant)
-                                    : delivery::notice(v1::NOTICE_KIND_SCENE_RESUMED, "the scene is resumed",
-                                                       scene->tick.load(), participant));
+    scene->subscribers.announce(scene::pausedNotice(*scene, participant));
   if (request.reset()) {
     scene->resetRequested = true;
     scene->subscribers.announce(

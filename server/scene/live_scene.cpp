@@ -343,7 +343,9 @@ delivery::SharedBytes workNotice(const LiveScene& scene, std::uint64_t tick) {
 }
 
 delivery::SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {
-  return delivery::notice(v1::NOTICE_KIND_SCENE_PAUSED, "the scene is paused", scene.tick.load(),
+  const bool paused = scene.paused;
+  return delivery::notice(paused ? v1::NOTICE_KIND_SCENE_PAUSED : v1::NOTICE_KIND_SCENE_RESUMED,
+                          paused ? "the scene is paused" : "the scene is resumed", scene.tick.load(),
                           participant);
 }
 

@@ -199,7 +199,7 @@ class LiveScene {
   std::unique_ptr<SceneObserver> observer_;
 };
 
-// Notice that a scene is paused; `participant` as for delivery::notice().
+// Notice that a scene is paused, or resumed, as it is now; `participant` as for delivery::notice().
 delivery::SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant = 0);
 
 // Notice of the work that a scene does, of a change at `tick` or to a peer that joins.

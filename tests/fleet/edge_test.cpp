@@ -206,6 +206,14 @@ TEST_F(EdgeTest, ViewersLearnWhatChangedWhileNatsWasAway) {
     isPaused |= message.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED;
     return hasWind && isPaused;
   });
+  nats_->kill();
+  pause.set_paused(false);
+  ASSERT_TRUE(server().controlScene(pause));
+  nats_->restart();
+  viewer.readUntil([](const v1::ServerMessage& message) {
+    return message.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED;
+  });
+  viewer.readFrames(2);
 }
 
 TEST_F(EdgeTest, ASceneThatBeginsAgainIsFollowed) {
