@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -117,7 +116,6 @@ class Directory(unittest.TestCase):
         self.create(server)
         wait_until(lambda: self.entry_of("moves") and self.entry_of("moves")["checkpointTick"] is not None)
         former = wait_until(lambda: self.entry_of("moves"))["server"]
-        time.sleep(1)  # its state is on the disk
         server.kill()
         server.start()
         wait_until(lambda: self.entry_of("moves")["server"] != former)  # its own lease had to end
