@@ -193,7 +193,7 @@ void EdgeStream::learn(const v1::OfferedScene& offered) {
 
 void EdgeStream::refresh(Clock::time_point now) {
   if (source_) source_->forgetFrames();
-  pauseIsOld_ = true;
+  pauseIsOld_ = source_ != nullptr;
   // The description of a recording has the parameters of its start.
   const bool asks = !source_ || !source_->playback();
   {
