@@ -170,10 +170,11 @@ bool OriginTunnels::pump(Tunnel& tunnel) {
   const Clock::time_point now = Clock::now();
   const std::lock_guard lock(tunnel.mutex);
   while (tunnel.session && !tunnel.closed && tunnel.channel.hasRoom()) {
+    const bool finished = tunnel.session->finished();  // checked before next(), so that no message is lost
     if (const std::optional<delivery::SharedBytes> message = tunnel.session->next()) {
       tunnel.channel.push(*message, now);
     } else {
-      if (!tunnel.session->finished()) break;
+      if (!finished) break;
       tunnel.channel.pushEnd(v1::TUNNEL_END_CLOSED);
       tunnel.closed = true;
       tunnel.removeAt = now + kEndTime;
