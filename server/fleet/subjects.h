@@ -30,7 +30,7 @@ struct TunnelId {
 // Segments to the origin of a stream, and to an edge.
 std::string upSubject(const std::string& stream, const TunnelId& tunnel);
 std::string downSubject(const std::string& stream, const TunnelId& tunnel);
-// Those of all participants, and of all participants on an edge.
+// Subjects of all participants, and of all participants on an edge.
 std::string upPattern(const std::string& stream);
 std::string downPattern(const std::string& stream, std::uint64_t edge);
 // Reads the end of either subject.
