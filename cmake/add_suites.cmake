@@ -3,6 +3,7 @@
 # environment variable LEAVE_OUT_TESTS (separated by colons, with wildcards) are not run.
 if(NOT EXISTS ${program})
   add_test(${name}_is_not_built ${program})
+  set_tests_properties(${name}_is_not_built PROPERTIES LABELS "${labels}")
   return()
 endif()
 execute_process(COMMAND ${program} --gtest_list_tests WORKING_DIRECTORY ${directory} OUTPUT_VARIABLE listing
@@ -19,7 +20,11 @@ string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+\\." suites "${listing}")
 foreach(suite IN LISTS suites)
   string(STRIP "${suite}" suite)
   string(REGEX REPLACE "\\.$" "" suite "${suite}")
+  set(suiteLabels ${labels})
+  if(suite MATCHES "(^|/)Thorough")
+    list(APPEND suiteLabels thorough)
+  endif()
   add_test(${suite} ${program} --gtest_filter=${suite}.*${leftOut} --gtest_brief=1)
-  set_tests_properties(${suite} PROPERTIES LABELS "${labels}" ENVIRONMENT "${environment}" TIMEOUT 900
+  set_tests_properties(${suite} PROPERTIES LABELS "${suiteLabels}" ENVIRONMENT "${environment}" TIMEOUT 900
     WORKING_DIRECTORY ${directory})
 endforeach()

@@ -6,18 +6,37 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <stdexcept>
+#include <utility>
+
+#include <unistd.h>
 
 #include "tests/support/eventually.h"
 
 namespace clothstream::tests {
+namespace {
 
-std::unique_ptr<NatsServer> NatsServer::start() {
-  if (!std::filesystem::exists(CLOTHSTREAM_NATS_SERVER)) return nullptr;
-  return std::unique_ptr<NatsServer>(new NatsServer);
+// Path of nats-server, or an empty path if it is not installed. Debian installs it into /usr/sbin, which the PATH of a
+// user may lack.
+std::filesystem::path findNatsServer() {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(std::string(path != nullptr ? path : "") + ":/usr/sbin");
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const std::filesystem::path program = std::filesystem::path(folder) / "nats-server";
+    if (!folder.empty() && ::access(program.c_str(), X_OK) == 0) return program;
+  }
+  return {};
 }
 
-NatsServer::NatsServer() {
+}  // namespace
+
+std::unique_ptr<NatsServer> NatsServer::start() {
+  const std::filesystem::path program = findNatsServer();
+  return program.empty() ? nullptr : std::unique_ptr<NatsServer>(new NatsServer(program));
+}
+
+NatsServer::NatsServer(std::filesystem::path program) : program_(std::move(program)) {
   std::string name = std::filesystem::temp_directory_path() / "clothstream-nats-XXXXXX";
   if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory");
   directory_ = name;
@@ -32,7 +51,7 @@ NatsServer::~NatsServer() {
 void NatsServer::run(const std::string& port) {
   std::filesystem::create_directories(directory_ / "ports");
   process_ = std::make_unique<e2e::Process>(std::vector<std::string>{
-      CLOTHSTREAM_NATS_SERVER, "--addr", "127.0.0.1", "--port", port, "--ports_file_dir",
+      program_.string(), "--addr", "127.0.0.1", "--port", port, "--ports_file_dir",
       (directory_ / "ports").string(), "--jetstream", "--store_dir", (directory_ / "store").string()});
   // It writes its address into a file: {"nats":["nats://127.0.0.1:39999"]}
   const auto portInFile = [&] {

@@ -25,9 +25,10 @@ class NatsServer {
   void restart();
 
  private:
-  NatsServer();
+  explicit NatsServer(std::filesystem::path program);
   void run(const std::string& port);
 
+  std::filesystem::path program_;
   std::filesystem::path directory_;
   std::string port_;
   std::unique_ptr<e2e::Process> process_;
