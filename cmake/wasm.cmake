@@ -4,8 +4,8 @@
 # hold their paths. These modules import nothing. They export their memory, _initialize, malloc, free and the functions
 # of clients/core/core.h. clothstream_recording_wasm is the core with clients/recording, for programs that read
 # recordings; it imports two functions of the host (clients/recording/wasm). CLOTHSTREAM_RECORDING_WASM holds its path.
-find_program(WASM_CXX NAMES clang++ clang++-14 REQUIRED)
-find_program(WASM_LD NAMES wasm-ld wasm-ld-14 REQUIRED)
+find_program(WASM_CXX clang++ REQUIRED)
+find_program(WASM_LD wasm-ld REQUIRED)
 
 set(wasmOut ${PROJECT_BINARY_DIR}/web-wasm)
 # Only SIMDe is taken from Debian's include folder: its other headers are for the build machine.
