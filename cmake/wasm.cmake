@@ -13,7 +13,7 @@ find_path(SIMDE_INCLUDE simde/x86/sse2.h REQUIRED)
 file(MAKE_DIRECTORY ${wasmOut}/include)
 file(CREATE_LINK ${SIMDE_INCLUDE}/simde ${wasmOut}/include/simde SYMBOLIC)
 set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=hidden -isystem ${wasmOut}/include -std=c++20
-  -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow -Werror -I${PROJECT_SOURCE_DIR})
+  -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow ${CLOTHSTREAM_WERROR_FLAG} -I${PROJECT_SOURCE_DIR})
 
 # clothstream_wasm_exports(RESULT HEADER native...): linker flags that export all functions of a header, except those
 # that only the native library has because they take a path or a function pointer.
