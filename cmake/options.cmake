@@ -1,5 +1,10 @@
 # `clothstream_flags`: warnings, floating-point rules, sanitizers. `clothstream_options`: the same with fmt and spdlog; every
 # target of ours links it. The sources of libclothstream use neither.
+option(CLOTHSTREAM_WERROR "Treat warnings as errors, as .ci/run does. Other compilers have other warnings" OFF)
+set(CLOTHSTREAM_WERROR_FLAG "")
+if(CLOTHSTREAM_WERROR AND NOT CLOTHSTREAM_SANITIZE) # gcc gives false warnings in instrumented code
+  set(CLOTHSTREAM_WERROR_FLAG -Werror)
+endif()
 add_library(clothstream_flags INTERFACE)
 add_library(clothstream_options INTERFACE)
 target_link_libraries(clothstream_options INTERFACE clothstream_flags)
@@ -9,7 +14,7 @@ endif()
 target_include_directories(clothstream_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(clothstream_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Wold-style-cast
-  $<$<NOT:$<BOOL:${CLOTHSTREAM_CLIENT_ONLY}>>:-Werror> # other compilers have other warnings
+  ${CLOTHSTREAM_WERROR_FLAG}
   $<$<AND:$<BOOL:${CMAKE_UNITY_BUILD}>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage> # unity sources
   -ffp-contract=off)
 if(WIN32)
@@ -19,8 +24,7 @@ endif()
 if(CLOTHSTREAM_SANITIZE)
   target_compile_options(clothstream_flags INTERFACE -fsanitize=${CLOTHSTREAM_SANITIZE}
     -fno-sanitize=null,vptr,object-size # they take a third of the compile time, and the address sanitizer finds the same
-    -fno-sanitize-recover=all -fno-omit-frame-pointer
-    -Wno-error) # gcc gives false warnings in instrumented code
+    -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(clothstream_flags INTERFACE -fsanitize=${CLOTHSTREAM_SANITIZE})
   if(CLOTHSTREAM_SANITIZE STREQUAL thread)
     # The thread sanitizer ignores Asio's fences, which only order what Asio's locks already order.

@@ -4,8 +4,8 @@
 # hold their paths. These modules import nothing. They export their memory, _initialize, malloc, free and the functions
 # of clients/core/core.h. clothstream_recording_wasm is the core with clients/recording, for programs that read
 # recordings; it imports two functions of the host (clients/recording/wasm). CLOTHSTREAM_RECORDING_WASM holds its path.
-find_program(WASM_CXX NAMES clang++ clang++-14 REQUIRED)
-find_program(WASM_LD NAMES wasm-ld wasm-ld-14 REQUIRED)
+find_program(WASM_CXX clang++ REQUIRED)
+find_program(WASM_LD wasm-ld REQUIRED)
 
 set(wasmOut ${PROJECT_BINARY_DIR}/web-wasm)
 # Only SIMDe is taken from Debian's include folder: its other headers are for the build machine.
@@ -13,7 +13,7 @@ find_path(SIMDE_INCLUDE simde/x86/sse2.h REQUIRED)
 file(MAKE_DIRECTORY ${wasmOut}/include)
 file(CREATE_LINK ${SIMDE_INCLUDE}/simde ${wasmOut}/include/simde SYMBOLIC)
 set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=hidden -isystem ${wasmOut}/include -std=c++20
-  -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow -Werror -I${PROJECT_SOURCE_DIR})
+  -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow ${CLOTHSTREAM_WERROR_FLAG} -I${PROJECT_SOURCE_DIR})
 
 # clothstream_wasm_exports(RESULT HEADER native...): linker flags that export all functions of a header, except those
 # that only the native library has because they take a path or a function pointer.

@@ -28,7 +28,8 @@ macro(clothstream_package group name section depends recommends summary descript
   set(CPACK_DEBIAN_${upper}_PACKAGE_RECOMMENDS "${recommends}")
   set(CPACK_DEBIAN_${upper}_DESCRIPTION "${summary}\n${description}")
 endmacro()
-set(version ${PROJECT_VERSION})
+set(version ${CLOTHSTREAM_PACKAGE_VERSION})
+set(CPACK_DEBIAN_PACKAGE_VERSION ${version})
 clothstream_package(server_group clothstream-server net
   "clothstream-client (= ${version}), mesa-vulkan-drivers | vulkan-icd, init-system-helpers (>= 1.52)" ""
   "server that simulates cloth on a GPU and streams it"

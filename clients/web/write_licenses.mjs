@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Writes the licences of what others made: of the client package, or of the whole page. Usage: node write_licenses.mjs
 // client|page FILE
-import { readFileSync, writeFileSync } from "node:fs";
+import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 
+const kDebian = "/usr/share/doc";
+// Its name has the version of LLVM. Debian installs one of them at most.
+const libcxx = readdirSync(kDebian).find((name) => /^libc\+\+-\d+-dev-wasm32$/.test(name));
 const kCore = [
-  ["libc++, libc++abi and compiler-rt of LLVM", "/usr/share/doc/libc++-14-dev-wasm32/copyright"],
+  ["libc++, libc++abi and compiler-rt of LLVM", `${kDebian}/${libcxx}/copyright`],
   ["wasi-libc", "/usr/share/doc/wasi-libc/copyright"],
   ["protozero", "/usr/share/doc/libprotozero-dev/copyright"],
 ];

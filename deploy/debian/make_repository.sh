@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# Packs a finished build as Debian packages, and makes the APT repository APT with them.
+# Packs a finished build as Debian packages, and makes the APT repository APT with them, for the release of Debian that
+# built them. The codename is in APT/conf/distributions.
 # Usage: make_repository.sh BUILD APT
 set -euo pipefail
 build=$(realpath "$1") apt=$2
-here=$(dirname "$(realpath "$0")")
 
 cmake --build "$build" --target clothstream_manuals >/dev/null
 rm -rf "$build/debian" "$apt"
 (cd "$build" && cpack >debian.log) || { cat "$build/debian.log" && exit 1; }
 mkdir -p "$apt/conf"
-cp "$here/distributions" "$apt/conf/"
-reprepro --silent --basedir "$apt" includedeb bookworm "$build"/debian/*.deb
+cp "$build/deploy/distributions" "$apt/conf/"
+release=$(sed -n 's/^Codename: //p' "$apt/conf/distributions")
+reprepro --silent --basedir "$apt" includedeb "$release" "$build"/debian/*.deb

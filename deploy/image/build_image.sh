@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
-# Builds the OCI image of the server from the packages in an APT repository (`./dev image`). It has Debian's software
-# Vulkan, and what NVIDIA's driver needs; the host brings the driver of a GPU (docs/operations.md).
+# Builds the OCI image of the server from the packages in an APT repository (`./dev image`), on the release of Debian that
+# the packages are for. It has Debian's software Vulkan, and what NVIDIA's driver needs; the host brings the driver of a
+# GPU (docs/operations.md).
 # Usage: build_image.sh APT ARCHIVE
 set -euo pipefail
 apt=$(realpath "$1") archive=$(realpath -m "$2")
+release=$(sed -n 's/^Codename: //p' "$apt/conf/distributions")
 readonly kUser=10001
 
 work=$(mktemp -d)
@@ -22,11 +24,11 @@ mmdebstrap --quiet --mode=root --variant=essential --include=clothstream-server,
   --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-include=/usr/share/doc/*/copyright' \
   --customize-hook='rm -rf "$1"/var/lib/apt/lists/* "$1"/var/cache/apt/* "$1"/var/log/*' \
   --customize-hook='install -d -o '$kUser' -g '$kUser' -m 700 "$1/var/lib/clothstream" "$1/var/cache/clothstream"' \
-  bookworm "$work/root.tar" 'deb http://deb.debian.org/debian bookworm main' \
-  "deb [trusted=yes] copy:$apt bookworm main"
+  "$release" "$work/root.tar" "deb http://deb.debian.org/debian $release main" \
+  "deb [trusted=yes] copy:$apt $release main"
 
 version=$(tar -xOf "$work/root.tar" ./var/lib/dpkg/status |
-  awk '/^Package: / { found = $2 == "clothstream-server" } found && /^Version: / { print $2 }')
+  awk '/^Package: / { found = $2 == "clothstream-server" } found && /^Version: / { sub(/\+deb.*/, "", $2); print $2 }')
 container=$(buildah from scratch)
 buildah add --quiet "$container" "$work/root.tar" / >/dev/null
 buildah config --user $kUser:$kUser --workingdir /var/lib/clothstream --port 8080/tcp --port 50051/tcp \

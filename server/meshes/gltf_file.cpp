@@ -188,18 +188,37 @@ class NeighbourFiles {
       : folder_(std::filesystem::absolute(folder.empty() ? "." : folder).lexically_normal()), left_(most) {}
 
   tinygltf::FsCallbacks callbacks() {
-    return {.FileExists = [](const std::string& path,
-                             void* self) { return static_cast<const NeighbourFiles*>(self)->holds(path); },
-            .ExpandFilePath = [](const std::string& path, void*) { return path; },
-            .ReadWholeFile =
-                [](std::vector<unsigned char>* bytes, std::string* error, const std::string& path,
-                   void* self) { return static_cast<NeighbourFiles*>(self)->read(path, *bytes, *error); },
-            .WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&,
-                                 void*) { return false; },
-            .user_data = this};
+    tinygltf::FsCallbacks calls{};
+    calls.FileExists = [](const std::string& path, void* self) {
+      return static_cast<const NeighbourFiles*>(self)->holds(path);
+    };
+    calls.ExpandFilePath = [](const std::string& path, void*) { return path; };
+    calls.ReadWholeFile = [](std::vector<unsigned char>* bytes, std::string* error, const std::string& path,
+                             void* self) {
+      return static_cast<NeighbourFiles*>(self)->read(path, *bytes, *error);
+    };
+    calls.WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
+      return false;
+    };
+    setFileSize(calls);
+    calls.user_data = this;
+    return calls;
   }
 
  private:
+  // Versions of tinygltf that know this callback ignore all callbacks if it is missing, and then read any
+  // file.
+  template <typename Callbacks>
+  static void setFileSize(Callbacks& calls) {
+    if constexpr (requires { calls.GetFileSizeInBytes; })
+      calls.GetFileSizeInBytes = [](std::size_t* size, std::string* error, const std::string& path, void*) {
+        std::error_code problem;
+        *size = std::filesystem::file_size(path, problem);
+        if (problem) *error = problem.message();
+        return !problem;
+      };
+  }
+
   bool holds(const std::filesystem::path& path) const {
     const auto inFolder = std::filesystem::absolute(path).lexically_normal().lexically_relative(folder_);
     std::error_code ignored;

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Histograms and quantiles, with Boost.Histogram.
+// Histograms and quantiles, with an axis of Boost.Histogram.
 #include "server/telemetry/histogram.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 
-#include <boost/histogram/accumulators/thread_safe.hpp>
 #include <boost/histogram/axis/regular.hpp>
-#include <boost/histogram/histogram.hpp>
-#include <boost/histogram/make_histogram.hpp>
-#include <boost/histogram/storage_adaptor.hpp>
 
 namespace clothstream::telemetry {
 namespace {
@@ -23,20 +19,24 @@ constexpr unsigned kBinsPerDecade = 48, kDecades = 9;
 constexpr std::size_t kBinsBelowFirstBound = kBinsPerDecade, kBinsPerBucket = kBinsPerDecade / 3;
 
 using Axis = bh::axis::regular<double, bh::axis::transform::log>;
-using Storage = bh::dense_storage<bh::accumulators::thread_safe<std::uint64_t>>;
 
 }  // namespace
 
 struct Histogram::Bins {
-  bh::histogram<std::tuple<Axis>, Storage> counts =
-      bh::make_histogram_with(Storage(), Axis(kBinsPerDecade* kDecades, kShortest, kLongest));
+  Axis axis{kBinsPerDecade * kDecades, kShortest, kLongest};
+  // The first and the last count are of values outside the axis. Boost's own thread-safe counters have
+  // different names in its versions.
+  std::array<std::atomic<std::uint64_t>, kBinsPerDecade * kDecades + 2> counts{};
   std::atomic<double> max{0}, sum{0};
 
-  // A copy is a snapshot while other threads record. Its first and its last count are of values outside the
-  // axis.
+  void count(double seconds) {
+    counts[static_cast<std::size_t>(axis.index(seconds) + 1)].fetch_add(1, std::memory_order_relaxed);
+  }
+
+  // A copy of the counts while other threads record.
   std::vector<std::uint64_t> snapshot() const {
     std::vector<std::uint64_t> now;
-    for (int bin = -1; bin <= counts.axis().size(); ++bin) now.push_back(counts.at(bin).load());
+    for (const auto& count : counts) now.push_back(count.load(std::memory_order_relaxed));
     return now;
   }
 };
@@ -45,7 +45,7 @@ Histogram::Histogram() : bins_(std::make_unique<Bins>()) {}
 Histogram::~Histogram() = default;
 
 void Histogram::record(double seconds) {
-  bins_->counts(std::clamp(seconds, kShortest, kLongest));
+  bins_->count(std::clamp(seconds, kShortest, kLongest));
   bins_->sum.fetch_add(std::max(seconds, 0.0), std::memory_order_relaxed);
   double max = bins_->max.load(std::memory_order_relaxed);
   while (seconds > max && !bins_->max.compare_exchange_weak(max, seconds, std::memory_order_relaxed)) {
@@ -53,7 +53,7 @@ void Histogram::record(double seconds) {
 }
 
 Summary Histogram::summary() const {
-  const Axis& axis = bins_->counts.axis();
+  const Axis& axis = bins_->axis;
   const std::vector<std::uint64_t> counts = bins_->snapshot();
 
   Summary summary;

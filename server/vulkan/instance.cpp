@@ -41,25 +41,26 @@ Messages& messages() {
   return instance;
 }
 
-VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT,
-                                         VkDebugUtilsMessageTypeFlagsEXT,
-                                         const VkDebugUtilsMessengerCallbackDataEXT* data, void*) {
+void onMessage(const char* text) {
   Messages& all = messages();
   {
     const std::lock_guard lock(all.mutex);
     if (all.newest.size() == Messages::kKept) all.newest.pop_front();
-    all.newest.emplace_back(data->pMessage);
+    all.newest.emplace_back(text);
   }
   ++all.count;
-  spdlog::error("Vulkan validation: {}", data->pMessage);
-  return VK_FALSE;
+  spdlog::error("Vulkan validation: {}", text);
 }
 
 vk::DebugUtilsMessengerCreateInfoEXT messengerInfo() {
   using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
   return {.messageSeverity = Severity::eWarning | Severity::eError,
           .messageType = vk::DebugUtilsMessageTypeFlagBitsEXT::eValidation,
-          .pfnUserCallback = onMessage};
+          // Vulkan's headers declare the callback with types of C before 1.4.304, and of C++ since then.
+          .pfnUserCallback = [](auto, auto, const auto* data, void*) -> VkBool32 {
+            onMessage(data->pMessage);
+            return VK_FALSE;
+          }};
 }
 
 // One for each processor this process may use. Measured: ms from submission to completion of ten dependent

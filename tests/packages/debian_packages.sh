@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the Debian packages, checks them with lintian, and installs them on a fresh Debian 12 from an APT repository. There
-# the server serves its page, a program is compiled with the library, and nothing is left after a purge.
+# Builds the Debian packages, checks them with lintian, and installs them on a fresh Debian of this release from an APT
+# repository. There the server serves its page, a program is compiled with the library, and nothing is left after a purge.
 # Usage: debian_packages.sh BUILD SOURCE
 set -euo pipefail
 build=$1 source=$2
@@ -30,13 +30,14 @@ ls -l "${packages[@]}"
 echo "Checking with lintian"
 lintian --fail-on error,warning --allow-root --tag-display-limit 0 "${packages[@]}"
 
-echo "Installing a Debian 12"
+release=$(sed -n 's/^Codename: //p' "$work/apt/conf/distributions")
+echo "Installing Debian $release"
 root=$work/root
-mmdebstrap --quiet --mode=root --variant=minbase --include=gcc,libc6-dev,pkg-config bookworm "$root" \
+mmdebstrap --quiet --mode=root --variant=minbase --include=gcc,libc6-dev,pkg-config "$release" "$root" \
   http://deb.debian.org/debian
 mkdir -p "$root/apt"
 cp -r "$work/apt/." "$root/apt/"
-echo 'deb [trusted=yes] file:///apt bookworm main' >"$root/etc/apt/sources.list.d/clothstream.list"
+echo "deb [trusted=yes] file:///apt $release main" >"$root/etc/apt/sources.list.d/clothstream.list"
 # Nothing starts services here.
 printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d"
 chmod +x "$root/usr/sbin/policy-rc.d"
@@ -47,6 +48,7 @@ inside apt-get -qq -y --no-install-recommends install clothstream-server libclot
 
 echo "Using it"
 version=$(inside dpkg-query -W -f '${Version}' clothstream-server)
+version=${version%+deb*} # the rest names the release of Debian
 inside clothstream-server --version | grep -qF "$version"
 inside clothstream --version | grep -qF "$version"
 [ -s "$root/lib/systemd/system/clothstream-server.service" ]

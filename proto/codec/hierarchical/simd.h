@@ -6,6 +6,9 @@
 #include <bit>
 #include <cstdint>
 
+#ifdef __wasm__
+#define SIMDE_FLOAT16_API 1  // no _Float16, which clang refuses for WebAssembly
+#endif
 #include <simde/x86/sse4.1.h>
 
 namespace clothstream::codec::hierarchical {
