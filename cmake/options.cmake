@@ -35,8 +35,28 @@ if(CLOTHSTREAM_SANITIZE)
   endif()
 endif()
 
-# clothstream_library(NAME sources...): a static library of ours with the common options.
+# clothstream_compile_lightly(TARGET): for code that spends its time in other rooms or in the operating system. It is
+# compiled with the precompiled header of cmake/libraries and, in Release, with -O1: together half of the time of -O3.
+function(clothstream_compile_lightly target)
+  if(NOT MSVC)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  endif()
+  if(TARGET clothstream_header)
+    target_precompile_headers(${target} REUSE_FROM clothstream_header)
+    target_compile_options(${target} PRIVATE $<$<STREQUAL:$<TARGET_PROPERTY:${target},TYPE>,EXECUTABLE>:-fPIC>) # as the header
+    # The header is only valid with the macros with which it was compiled.
+    target_compile_definitions(${target} PRIVATE
+      $<TARGET_PROPERTY:clothstream_network,INTERFACE_COMPILE_DEFINITIONS>)
+  endif()
+endfunction()
+
+# clothstream_library(NAME [ARITHMETIC] sources...): a static library of ours with the common options. ARITHMETIC: its loops
+# over vertices are worth the compiler's full optimisation.
 function(clothstream_library name)
-  add_library(${name} STATIC ${ARGN})
+  cmake_parse_arguments(ARG "ARITHMETIC" "" "" ${ARGN})
+  add_library(${name} STATIC ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PUBLIC clothstream_options)
+  if(NOT ARG_ARITHMETIC)
+    clothstream_compile_lightly(${name})
+  endif()
 endfunction()

@@ -12,10 +12,15 @@ endif()
 
 # Every test program reuses this precompiled header, so all are compiled with -pthread, which gRPC requires. Tests are
 # compiled with -O1, in two thirds of the time of -O3. The libraries under test keep -O3.
+find_package(Boost REQUIRED)
+find_package(Eigen3 REQUIRED)
+find_package(nlohmann_json REQUIRED)
 add_executable(clothstream_test_header EXCLUDE_FROM_ALL ${PROJECT_SOURCE_DIR}/cmake/libraries/testing.cpp)
-target_link_libraries(clothstream_test_header PRIVATE clothstream_options GTest::gtest GTest::gmock GTest::gtest_main)
+target_link_libraries(clothstream_test_header PRIVATE clothstream_options clothstream_network clothstream_openssl clothstream_protos
+  Eigen3::Eigen nlohmann_json::nlohmann_json GTest::gtest GTest::gmock GTest::gtest_main)
 target_compile_options(clothstream_test_header PRIVATE -pthread $<$<CONFIG:Release>:-O1>)
-target_precompile_headers(clothstream_test_header PRIVATE <gmock/gmock.h> <gtest/gtest.h>)
+target_precompile_headers(clothstream_test_header PRIVATE <gmock/gmock.h> <gtest/gtest.h>
+  $<$<BOOL:${CMAKE_UNITY_BUILD}>:${PROJECT_SOURCE_DIR}/cmake/libraries/precompiled.h>)
 
 # Tests of three tiers. `./dev test` runs the first, which shows within minutes whether everything works. `thorough` is the
 # second, at larger sizes and with more scenes, and `long` the third, with other platforms and runs of many minutes. A test
@@ -44,6 +49,7 @@ function(clothstream_test name)
   target_link_libraries(${name} PRIVATE clothstream_options ${ARG_LIBRARIES} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_options(${name} PRIVATE -pthread $<$<CONFIG:Release>:-O1>)
   target_precompile_headers(${name} REUSE_FROM clothstream_test_header)
+  target_compile_definitions(${name} PRIVATE $<TARGET_PROPERTY:clothstream_network,INTERFACE_COMPILE_DEFINITIONS>)
   set(environment ${CLOTHSTREAM_SANITIZER_ENVIRONMENT})
   if("gpu" IN_LIST ARG_LABELS)
     list(APPEND environment "CLOTHSTREAM_VALIDATION=1")

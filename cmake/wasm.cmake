@@ -33,21 +33,33 @@ set_property(GLOBAL PROPERTY CLOTHSTREAM_CORE_EXPORTS ${coreExports})
 set_property(GLOBAL PROPERTY CLOTHSTREAM_WASM_FLAGS ${wasmFlags})
 
 # clothstream_link_wasm(MODULE SOURCES file... FLAGS flag... EXPORTS linker flag...) builds the file MODULE. Objects go to
-# its folder.
+# its folder. As in native builds (CMAKE_UNITY_BUILD), a few units include all sources, so that each header is read a few
+# times instead of fifty.
 function(clothstream_link_wasm module)
   cmake_parse_arguments(ARG "" "" "SOURCES;FLAGS;EXPORTS" ${ARGN})
   get_property(flags GLOBAL PROPERTY CLOTHSTREAM_WASM_FLAGS)
   get_filename_component(folder ${module} DIRECTORY)
-  get_filename_component(moduleName ${module} NAME)
+  get_filename_component(moduleName ${module} NAME_WE)
+  set(unitSize 1)
+  if(CMAKE_UNITY_BUILD)
+    set(unitSize 16)
+  endif()
   set(objects)
-  foreach(source IN LISTS ARG_SOURCES)
-    get_filename_component(name ${source} NAME)
-    set(object ${folder}/${name}.o)
+  set(number 0)
+  list(LENGTH ARG_SOURCES count)
+  math(EXPR last "${count} - 1")
+  foreach(begin RANGE 0 ${last} ${unitSize})
+    list(SUBLIST ARG_SOURCES ${begin} ${unitSize} sources)
+    list(TRANSFORM sources REPLACE "(.+)" "#include \"\\1\"\n" OUTPUT_VARIABLE includes)
+    list(JOIN includes "" includes)
+    set(unit ${folder}/${moduleName}_${number}.cpp)
+    file(CONFIGURE OUTPUT ${unit} CONTENT "@includes@" @ONLY)
+    set(object ${unit}.o)
     add_custom_command(OUTPUT ${object}
-      COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
-      COMMAND ${CMAKE_CXX_COMPILER_LAUNCHER} ${WASM_CXX} ${flags} ${ARG_FLAGS} -MMD -MF ${object}.d -c -o ${object} ${source}
-      DEPENDS ${source} DEPFILE ${object}.d COMMENT "Compiling ${name} to WebAssembly" VERBATIM)
+      COMMAND ${CMAKE_CXX_COMPILER_LAUNCHER} ${WASM_CXX} ${flags} ${ARG_FLAGS} -MMD -MF ${object}.d -c -o ${object} ${unit}
+      DEPENDS ${unit} ${sources} DEPFILE ${object}.d COMMENT "Compiling part ${number} of ${moduleName} to WebAssembly" VERBATIM)
     list(APPEND objects ${object})
+    math(EXPR number "${number} + 1")
   endforeach()
   add_custom_command(OUTPUT ${module}
     COMMAND ${WASM_CXX} --target=wasm32-wasi -mexec-model=reactor -O3 -Wl,--strip-all -Wl,--gc-sections

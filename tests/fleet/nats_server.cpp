@@ -17,8 +17,8 @@
 namespace clothstream::tests {
 namespace {
 
-// Path of nats-server, or an empty path if it is not installed. Debian installs it into /usr/sbin, which the PATH of a
-// user may lack.
+// Path of nats-server, or an empty path if it is not installed. Debian installs it into /usr/sbin, which the
+// PATH of a user may lack.
 std::filesystem::path findNatsServer() {
   const char* path = std::getenv("PATH");
   std::istringstream folders(std::string(path != nullptr ? path : "") + ":/usr/sbin");
