@@ -358,6 +358,19 @@ v1::MoveResponse Origin::tryMove(const std::string& name, std::uint64_t to, Cloc
 
   const std::uint64_t move = randomId();
   Conversation talk(nats_, moveUpSubject(move), moveDownSubject(move), stopping_);
+  try {
+    return moveTo(talk, move, *known, stream, until);
+  } catch (const std::exception& failure) {
+    refuseTo(talk, failure.what());  // it may wait for the state
+    throw;
+  }
+}
+
+v1::MoveResponse Origin::moveTo(Conversation& talk, std::uint64_t move, const v1::ServerEntry& other,
+                                const SharedStream& stream, Clock::time_point until) {
+  const std::shared_ptr<scene::LiveScene>& scene = stream->scene();
+  const std::string& name = scene->name();
+  const std::uint64_t to = other.origin();
   v1::MoveRequest request;
   request.set_scene(name);
   request.set_move(move);
@@ -374,8 +387,8 @@ v1::MoveResponse Origin::tryMove(const std::string& name, std::uint64_t to, Cloc
   }
   if (!prepared->has_prepared())
     return refused(fmt::format("the other server says: {}", prepared->refused()));
-  if (!known->public_name().empty() &&
-      scene->subscribers.announceHere(delivery::moving(known->public_name())) > 0)
+  if (!other.public_name().empty() &&
+      scene->subscribers.announceHere(delivery::moving(other.public_name())) > 0)
     std::this_thread::sleep_for(kConnectTime);
 
   Clock::time_point stopped{};
@@ -396,7 +409,7 @@ v1::MoveResponse Origin::tryMove(const std::string& name, std::uint64_t to, Cloc
   schedule::retryUntilDone(
       [&] {
         tunnels_.end(stream->subject());
-        remove(scene, known->public_name());
+        remove(scene, other.public_name());
         dropStream(stream);
       },
       [&](const std::exception& failure) {
