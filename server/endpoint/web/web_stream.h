@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 #include <boost/asio/buffer.hpp>
@@ -69,8 +70,9 @@ class WebStream {
   template <typename MutableBuffers, typename Handler>
   auto async_read_some(const MutableBuffers& buffers, Handler&& handler) {
     if (!frames_) return readSome(buffers, std::forward<Handler>(handler));
-    return boost::asio::async_compose<Handler, void(boost::beast::error_code, std::size_t)>(
-        CountingRead<MutableBuffers>{*this, buffers}, std::forward<Handler>(handler), next_layer());
+    return boost::asio::async_compose<std::remove_reference_t<Handler>,
+                                      void(boost::beast::error_code, std::size_t)>(
+        CountingRead<MutableBuffers>{*this, buffers}, handler, next_layer());
   }
   template <typename ConstBuffers, typename Handler>
   auto async_write_some(const ConstBuffers& buffers, Handler&& handler) {
