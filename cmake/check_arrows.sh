@@ -11,6 +11,7 @@ proto/text         |
 proto/tls          |
 proto/discovery    |
 proto/hands        |
+server/files       |
 server/model       | proto/parameters
 server/vulkan      |
 proto/wire         |
@@ -20,28 +21,28 @@ server/reference   | server/model
 server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
 server/meshes      | server/model
-server/messages    | server/model server/meshes server/telemetry proto/hands proto/parameters proto/text clothstream
+server/messages    | server/files server/model server/meshes server/telemetry proto/hands proto/parameters proto/text clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
 server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
-server/identity    | server/scene server/schedule server/messages clothstream
-server/saved_state | server/scene server/model server/messages server/telemetry clothstream
+server/identity    | server/files server/scene server/schedule server/messages clothstream
+server/saved_state | server/files server/scene server/model server/messages server/telemetry clothstream
 server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
 server/recording   | server/encode server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
 server/fleet       | server/session server/hosting server/saved_state server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
 server/agones      | server/hosting server/scene server/schedule
-server/events      | proto/text server/scene server/schedule
+server/events      | server/files proto/text server/scene server/schedule
 server/step        | server/model server/vulkan server/simulation server/messages
-server/tls         | proto/tls
+server/tls         | proto/tls server/files
 server/discovery   | proto/discovery
 server/doctor      | server/endpoint/listen server/encode server/messages server/model server/simulation server/tls server/vulkan
 server/endpoint/listen | server/schedule server/telemetry
-server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health
+server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health grpc/reflection
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
-server/options     | proto/recording server/events server/hosting server/recording server/step server/scene server/model
+server/options     | server/files proto/recording server/events server/hosting server/recording server/step server/scene server/model
 server/program     | server/agones server/events server/fleet proto/recording server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
 server/main.cpp    | server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters

@@ -1,5 +1,5 @@
 # Libraries: clothstream_protos holds the messages, clothstream_protos_grpc also our gRPC service, and
-# clothstream_protos_health gRPC's health service. Generated sources are in <build>/proto_generated.
+# clothstream_protos_health and clothstream_protos_reflection those of gRPC. Generated sources are in <build>/proto_generated.
 find_package(Protobuf REQUIRED)
 set(protoOut ${PROJECT_BINARY_DIR}/proto_generated)
 set(protoNames fleet recording saved_state scene session)
@@ -41,13 +41,16 @@ if(CLOTHSTREAM_RPC)
   add_library(clothstream_protos_grpc STATIC ${stem}.grpc.pb.cc ${stem}.grpc.pb.h)
   target_link_libraries(clothstream_protos_grpc PUBLIC clothstream_protos gRPC::grpc++)
 
-  set(stem ${protoOut}/grpc/health/v1/health)
-  set(source ${PROJECT_SOURCE_DIR}/proto/grpc/health/v1/health.proto)
-  add_custom_command(OUTPUT ${stem}.pb.cc ${stem}.pb.h ${stem}.grpc.pb.cc ${stem}.grpc.pb.h
-    COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto --cpp_out=${protoOut} ${generateService} ${source}
-    DEPENDS ${source} VERBATIM)
-  add_library(clothstream_protos_health STATIC ${stem}.pb.cc ${stem}.pb.h ${stem}.grpc.pb.cc ${stem}.grpc.pb.h)
-  set_target_properties(clothstream_protos_health PROPERTIES UNITY_BUILD OFF)
-  target_include_directories(clothstream_protos_health SYSTEM PUBLIC ${protoOut})
-  target_link_libraries(clothstream_protos_health PUBLIC protobuf::libprotobuf gRPC::grpc++)
+  foreach(service health/v1/health reflection/v1alpha/reflection)
+    set(stem ${protoOut}/grpc/${service})
+    set(source ${PROJECT_SOURCE_DIR}/proto/grpc/${service}.proto)
+    add_custom_command(OUTPUT ${stem}.pb.cc ${stem}.pb.h ${stem}.grpc.pb.cc ${stem}.grpc.pb.h
+      COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto --cpp_out=${protoOut} ${generateService} ${source}
+      DEPENDS ${source} VERBATIM)
+    get_filename_component(name ${service} NAME)
+    add_library(clothstream_protos_${name} STATIC ${stem}.pb.cc ${stem}.pb.h ${stem}.grpc.pb.cc ${stem}.grpc.pb.h)
+    set_target_properties(clothstream_protos_${name} PROPERTIES UNITY_BUILD OFF)
+    target_include_directories(clothstream_protos_${name} SYSTEM PUBLIC ${protoOut})
+    target_link_libraries(clothstream_protos_${name} PUBLIC protobuf::libprotobuf gRPC::grpc++)
+  endforeach()
 endif()

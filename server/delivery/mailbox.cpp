@@ -301,8 +301,13 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
     return chunk;
   }
   if (!streaming_) return std::nullopt;
-  if (!announcements_.messages.empty()) return pop(announcements_);
-  if (held_.empty() || !hasRoom()) return std::nullopt;
+  const bool hasFrame = !held_.empty() && hasRoom();
+  if (!announcements_.messages.empty() && !(hasFrame && announcedBytes_ >= kMaxAnnouncedBytes)) {
+    SharedBytes message = pop(announcements_);
+    announcedBytes_ += message->size();
+    return message;
+  }
+  if (!hasFrame) return std::nullopt;
   const OperatingPoint point{held_.front().quality, adaptation_.point().layers};
   if (point != reported_) {
     reported_ = point;
@@ -314,6 +319,7 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
   heldBytes_ -= frame.message->size();
   sent_.push_back({frame.tick, frame.message->size(), now});
   decodable_ = newestSent_ = frame.tick;
+  announcedBytes_ = 0;
   metrics_->framesTaken.add();
   metrics_->send.record(schedule::seconds(now - frame.complete));
   return frame.message;

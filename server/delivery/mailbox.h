@@ -28,6 +28,8 @@ namespace clothstream::delivery {
 // kMaxHeld frames of at most kMaxHeldBytes in all (or one larger frame), and one description. Frames and
 // description are shared with the other subscribers.
 //
+// Announcements are sent before frames, but after kMaxAnnouncedBytes of them a frame that waits comes first.
+//
 // Announcements come from other peers, so they never close a mailbox. Beyond kMaxControlBytes the waiting
 // ones are merged (merged_announcements.h): the subscriber then gets the newest state instead of every step.
 //
@@ -52,6 +54,8 @@ class Mailbox {
   static constexpr std::size_t kMessageOverhead = 128;
   // If merged announcements are large, the next merge happens when this many bytes more wait.
   static constexpr std::size_t kMinMergeBytes = 64 * 1024;
+  // Bytes of announcements that are sent while a frame waits for them.
+  static constexpr std::size_t kMaxAnnouncedBytes = 16 * 1024;
   static constexpr std::size_t kMaxHeld = 3;
   static constexpr std::size_t kMaxHeldBytes = 1024 * 1024;
   static constexpr std::size_t kMinWindow = 2;
@@ -154,6 +158,7 @@ class Mailbox {
   bool endpointWaits_ = false;  // next() returned nothing, and nothing has arrived since
   Control replies_, announcements_;
   std::size_t mergeBeyond_ = kMaxControlBytes;  // bytes of announcements
+  std::size_t announcedBytes_ = 0;              // sent since the newest frame
 
   std::shared_ptr<const DescriptionChunks> description_;
   std::size_t nextChunk_ = 0;

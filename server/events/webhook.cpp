@@ -2,9 +2,7 @@
 #include "server/events/webhook.h"
 
 #include <array>
-#include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <stdexcept>
 #include <vector>
 
@@ -15,6 +13,8 @@
 #include <openssl/rand.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
+
+#include "server/files/regular_file.h"
 
 namespace clothstream::events {
 namespace {
@@ -68,15 +68,10 @@ std::string readSecret(const std::filesystem::path& file) {
   const auto fail = [&](const std::string& why) {
     throw std::runtime_error(fmt::format("--events-secret-file: {} {}", file.string(), why));
   };
-  std::ifstream in(file, std::ios::binary);
-  if (!in) fail(fmt::format("cannot be read: {}", std::strerror(errno)));
-  std::string text(kMaxFileBytes + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad()) fail(fmt::format("cannot be read: {}", std::strerror(errno)));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kMaxFileBytes) fail("is too large for a secret");
-  tl::expected<std::string, std::string> key = parseSecret(text);
-  OPENSSL_cleanse(text.data(), text.size());
+  auto text = files::readRegularFile(file, kMaxFileBytes);
+  if (!text) fail(text.error());
+  tl::expected<std::string, std::string> key = parseSecret(*text);
+  OPENSSL_cleanse(text->data(), text->size());
   if (!key) fail(key.error());
   struct stat status {};
   if (::stat(file.c_str(), &status) == 0 && (status.st_mode & (S_IRWXG | S_IRWXO)) != 0)

@@ -44,6 +44,15 @@ std::string partKey(const std::string& scene, std::uint32_t slot, std::uint32_t 
   return fmt::format("{}.{}.{}", scene, slot, part);
 }
 
+// Deletes the parts of a slot from this one on. `parts` of the slot are known; there may be more, of an older
+// checkpoint. The last one is deleted first, so that an interruption leaves no gap.
+void purgeParts(Bucket& checkpoints, const std::string& scene, std::uint32_t slot, std::uint32_t first,
+                std::uint32_t parts) {
+  std::uint32_t end = std::max(first, parts);
+  while (checkpoints.get(partKey(scene, slot, end))) ++end;
+  while (end > first) checkpoints.purge(partKey(scene, slot, --end));
+}
+
 }  // namespace
 
 struct Directory::Buckets {
@@ -415,9 +424,9 @@ void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scene
     const auto present = buckets.scenes.get(name);
     if (!present || present->revision != known.revision) continue;
     buckets.scenes.remove(name);
+    const v1::StoredCheckpoint& stored = known.entry.checkpoint();
     for (std::uint32_t slot = 0; slot < 2; ++slot)
-      for (std::uint32_t part = 0; part < known.entry.checkpoint().parts(); ++part)
-        buckets.checkpoints.purge(partKey(name, slot, part));
+      purgeParts(buckets.checkpoints, name, slot, 0, slot == stored.slot() ? stored.parts() : 0);
     saved_.erase(name);
   }
 }
@@ -499,8 +508,10 @@ bool Directory::save(Buckets& buckets, const OwnScene& own) {
     stored.set_parts(stored.parts() + 1);
   }
   const auto written = buckets.scenes.update(name, entry.SerializeAsString(), *revision);
-  if (written) know(name, entry, *written);
-  return written.has_value();
+  if (!written) return false;
+  know(name, entry, *written);
+  purgeParts(buckets.checkpoints, name, stored.slot(), stored.parts(), stored.parts());
+  return true;
 }
 
 std::optional<v1::SavedParts> Directory::load(Buckets& buckets, const std::string& name,

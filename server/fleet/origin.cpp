@@ -20,6 +20,7 @@
 #include "server/saved_state/contents.h"
 #include "server/scene/live_scene.h"
 #include "server/schedule/clock.h"
+#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::fleet {
@@ -330,6 +331,15 @@ std::optional<v1::MoveMessage> Origin::receive(Conversation& talk, std::uint64_t
 }
 
 v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to, Clock::time_point until) {
+  try {
+    return tryMove(name, to, until);
+  } catch (const std::exception& failure) {
+    telemetry::log({name}, spdlog::level::err, "moving it failed: {}", failure.what());
+    return refused(fmt::format("moving it failed on this server: {}", failure.what()));
+  }
+}
+
+v1::MoveResponse Origin::tryMove(const std::string& name, std::uint64_t to, Clock::time_point until) {
   const SharedStream stream = streamOf(name);
   if (!stream) return refused(fmt::format("this server has no scene '{:.64}' that edges see", name));
   const std::shared_ptr<scene::LiveScene>& scene = stream->scene();
@@ -348,6 +358,19 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to, Cloc
 
   const std::uint64_t move = randomId();
   Conversation talk(nats_, moveUpSubject(move), moveDownSubject(move), stopping_);
+  try {
+    return moveTo(talk, move, *known, stream, until);
+  } catch (const std::exception& failure) {
+    refuseTo(talk, failure.what());  // it may wait for the state
+    throw;
+  }
+}
+
+v1::MoveResponse Origin::moveTo(Conversation& talk, std::uint64_t move, const v1::ServerEntry& other,
+                                const SharedStream& stream, Clock::time_point until) {
+  const std::shared_ptr<scene::LiveScene>& scene = stream->scene();
+  const std::string& name = scene->name();
+  const std::uint64_t to = other.origin();
   v1::MoveRequest request;
   request.set_scene(name);
   request.set_move(move);
@@ -364,13 +387,17 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to, Cloc
   }
   if (!prepared->has_prepared())
     return refused(fmt::format("the other server says: {}", prepared->refused()));
-  if (!known->public_name().empty() &&
-      scene->subscribers.announceHere(delivery::moving(known->public_name())) > 0)
+  if (!other.public_name().empty() &&
+      scene->subscribers.announceHere(delivery::moving(other.public_name())) > 0)
     std::this_thread::sleep_for(kConnectTime);
 
   Clock::time_point stopped{};
+  const struct EndMove {
+    Directory& directory;
+    const std::string& name;
+    ~EndMove() { directory.endMove(name); }
+  } end{*directory_, name};
   if (const std::string why = handOver(talk, *stream, to, stopped); !why.empty()) {
-    directory_->endMove(name);
     refuseTo(talk, why);  // it may wait for the state
     return refused(why);
   }
@@ -379,10 +406,16 @@ v1::MoveResponse Origin::moveNow(const std::string& name, std::uint64_t to, Cloc
   response.set_gap(schedule::seconds(Clock::now() - stopped));
   // Clients of this server must join at the other one. Those at edges follow by themselves, so their tunnels
   // end first.
-  tunnels_.end(stream->subject());
-  remove(scene, known->public_name());
-  dropStream(stream);
-  directory_->endMove(name);
+  schedule::retryUntilDone(
+      [&] {
+        tunnels_.end(stream->subject());
+        remove(scene, other.public_name());
+        dropStream(stream);
+      },
+      [&](const std::exception& failure) {
+        telemetry::log({name}, spdlog::level::err, "not removed after its move: {}; trying again",
+                       failure.what());
+      });
   telemetry::log({name}, spdlog::level::info, "moved to another server at tick {}", scene->tick.load());
   return response;
 }
@@ -398,31 +431,36 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
     server_.state().device.unhold(scene);
     return why;
   };
-  // Inputs that were used before are in the state, and later ones go to the other server.
-  const std::vector<v1::MovedTunnel> tunnels = tunnels_.freeze(stream.subject());
   v1::MoveMessage message;
   try {
+    // Inputs that were used before are in the state, and later ones go to the other server.
+    const std::vector<v1::MovedTunnel> tunnels = tunnels_.freeze(stream.subject());
     const std::optional<scene::Checkpoint> state = server_.state().device.hold(scene).get();
     stopped = Clock::now();
     *message.mutable_state()->mutable_scene() = saved_state::stateOf(*scene, state);
+    message.mutable_state()->set_revision(*revision);
+    for (const v1::MovedTunnel& tunnel : tunnels) *message.mutable_state()->add_tunnels() = tunnel;
   } catch (const std::exception& failure) {
     return stay(fmt::format("its state cannot be read: {}", failure.what()));
   }
-  message.mutable_state()->set_revision(*revision);
-  for (const v1::MovedTunnel& tunnel : tunnels) *message.mutable_state()->add_tunnels() = tunnel;
-  talk.send(message);
-  const auto answer = receive(talk, to, Clock::now() + kStartTime);
-  if (answer && answer->has_done()) return {};
-  const std::string why = answer ? fmt::format("the other server says: {}", answer->refused())
-                                 : "the other server does not answer";
+  std::string why;
+  try {
+    talk.send(message);
+    const auto answer = receive(talk, to, Clock::now() + kStartTime);
+    if (answer && answer->has_done()) return {};
+    why = answer ? fmt::format("the other server says: {}", answer->refused())
+                 : "the other server does not answer";
+  } catch (const std::exception& failure) {
+    why = fmt::format("its state cannot be sent: {}", failure.what());
+  }
   // The directory decides which of the two has the scene.
-  v1::SceneEntry entry;
-  entry.set_origin(id_);
-  entry.set_stream(stream.id());
-  entry.set_created(true);
-  *entry.mutable_checkpoint() = directory_->checkpointOf(name);
   for (;;) {
     try {
+      v1::SceneEntry entry;
+      entry.set_origin(id_);
+      entry.set_stream(stream.id());
+      entry.set_created(true);
+      *entry.mutable_checkpoint() = directory_->checkpointOf(name);
       if (directory_->transfer(name, entry, *revision)) return stay(why);
       const auto owner = directory_->ownerOf(name);
       return owner == to ? std::string() : stay(why);
@@ -469,43 +507,51 @@ void Origin::receiveScene(std::uint64_t move) {
     directory_->expectNoMore(name);
     refuse(why);
   };
-  offer();
-  std::this_thread::sleep_for(kEdgeTime);
-  v1::MoveMessage message;
-  message.mutable_prepared()->set_stream(stream->id());
-  talk.send(message);
-
-  auto state = receive(talk, asked->prepare().origin(), Clock::now() + kLoadTime);
-  if (!state || !state->has_state()) return giveUp("no state came");
-  if (directory_->isStopping()) return giveUp(kStops);
-  auto continued = saved_state::toSaved(std::move(*state->mutable_state()->mutable_scene()), scene->start());
-  if (!continued) return giveUp(continued.error());
-  tunnels_.expect(stream->subject(), {state->state().tunnels().begin(), state->state().tunnels().end()});
-  v1::SceneEntry entry;
-  entry.set_origin(id_);
-  entry.set_stream(stream->id());
-  entry.set_created(true);
-  *entry.mutable_checkpoint() = directory_->checkpointOf(name);
-  directory_->expect(name);
-  if (!takes(entry, name, state->state().revision()))
-    return giveUp("the directory has another server for it");
+  bool isOurs = false;
   try {
-    server_.state().startArrived(scene, std::move(*continued));
-  } catch (const std::exception& failure) {
-    entry.set_origin(asked->prepare().origin());
-    entry.set_stream(asked->prepare().stream());
+    offer();
+    std::this_thread::sleep_for(kEdgeTime);
+    v1::MoveMessage message;
+    message.mutable_prepared()->set_stream(stream->id());
+    talk.send(message);
+
+    auto state = receive(talk, asked->prepare().origin(), Clock::now() + kLoadTime);
+    if (!state || !state->has_state()) return giveUp("no state came");
+    if (directory_->isStopping()) return giveUp(kStops);
+    auto continued =
+        saved_state::toSaved(std::move(*state->mutable_state()->mutable_scene()), scene->start());
+    if (!continued) return giveUp(continued.error());
+    tunnels_.expect(stream->subject(), {state->state().tunnels().begin(), state->state().tunnels().end()});
+    v1::SceneEntry entry;
+    entry.set_origin(id_);
+    entry.set_stream(stream->id());
+    entry.set_created(true);
+    *entry.mutable_checkpoint() = directory_->checkpointOf(name);
+    directory_->expect(name);
+    if (!takes(entry, name, state->state().revision()))
+      return giveUp("the directory has another server for it");
+    isOurs = true;
     try {
-      if (directory_->ownerOf(name) == id_) directory_->give(name, entry);
-    } catch (const std::exception& again) {
-      spdlog::error("{}: {}", name, again.what());
+      server_.state().startArrived(scene, std::move(*continued));
+    } catch (const std::exception& failure) {
+      entry.set_origin(asked->prepare().origin());
+      entry.set_stream(asked->prepare().stream());
+      try {
+        if (directory_->ownerOf(name) == id_) directory_->give(name, entry);
+      } catch (const std::exception& again) {
+        spdlog::error("{}: {}", name, again.what());
+      }
+      return giveUp(failure.what());
     }
-    return giveUp(failure.what());
+    runStream(stream);
+    message.Clear();
+    message.mutable_done();
+    talk.send(message);
+    talk.flush(kFlushTime);
+  } catch (const std::exception& failure) {
+    if (isOurs) throw;
+    giveUp(failure.what());
   }
-  runStream(stream);
-  message.Clear();
-  message.mutable_done();
-  talk.send(message);
-  talk.flush(kFlushTime);
 }
 
 Origin::SharedStream Origin::prepareStream(const std::shared_ptr<scene::LiveScene>& scene,

@@ -76,7 +76,12 @@ class Origin {
   std::uint64_t target(const scene::LiveScene& scene) const;
   // Gives the scene up to another server only if that has loaded it by this time.
   v1::MoveResponse moveBy(Clock::time_point until, const std::string& scene, std::uint64_t to);
+  // An exception becomes an error of the response.
   v1::MoveResponse moveNow(const std::string& name, std::uint64_t to, Clock::time_point until);
+  v1::MoveResponse tryMove(const std::string& name, std::uint64_t to, Clock::time_point until);
+  // `move` is the number of the move in which both servers talk.
+  v1::MoveResponse moveTo(Conversation& talk, std::uint64_t move, const v1::ServerEntry& other,
+                          const SharedStream& stream, Clock::time_point until);
   // Next message of another server; nothing if none comes by this time, or if that server is gone.
   std::optional<v1::MoveMessage> receive(Conversation& talk, std::uint64_t other, Clock::time_point until);
   // Sends the state of a scene that is held, and waits until the other server has it. Returns why it stays.

@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/files/state_directory.h"
 #include "server/identity/token.h"
 
 namespace clothstream::identity {
@@ -23,11 +24,10 @@ TokenKey pairingKey(const fs::path& stateDirectory) {
   if (stateDirectory.empty())
     throw std::runtime_error("--pairing needs a directory for its key: use --state-dir DIR");
   const fs::path directory = stateDirectory / "identity";
-  std::error_code error;
-  fs::create_directories(directory, error);
-  if (error)
-    throw std::runtime_error(fmt::format("{}: cannot be made: {}", directory.string(), error.message()));
-  fs::permissions(directory, fs::perms::owner_all, error);
+  if (const auto made = files::makeStateDirectory(directory); !made)
+    throw std::runtime_error(fmt::format("{}: {}", directory.string(), made.error()));
+  std::error_code ignored;
+  fs::permissions(directory, fs::perms::owner_all, ignored);
   const fs::path file = directory / fmt::format("{}.secret", kPairingKeyId);
   if (!fs::exists(file)) makeTokenKey(file);
   return readTokenKey(file);

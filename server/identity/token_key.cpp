@@ -5,7 +5,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 #include <memory>
 #include <stdexcept>
@@ -26,6 +25,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "server/files/regular_file.h"
 #include "server/scene/token_hash.h"
 
 namespace clothstream::identity {
@@ -53,14 +53,9 @@ using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
 }
 
 std::string readFile(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) fail(file, fmt::format("cannot be read: {}", std::strerror(errno)));
-  std::string text(kMaxFileBytes + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad()) fail(file, fmt::format("cannot be read: {}", std::strerror(errno)));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kMaxFileBytes) fail(file, "is too large for a key");
-  return text;
+  auto text = files::readRegularFile(file, kMaxFileBytes);
+  if (!text) fail(file, text.error());
+  return std::move(*text);
 }
 
 // Writes a new file with mode 0600 to the disk. Returns 0, or the errno of the first call that failed.

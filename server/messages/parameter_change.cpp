@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Converts parameter changes of clients and checks them against their scene. Applies changes to messages.
 #include <algorithm>
+#include <cstddef>
+#include <map>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -128,6 +131,43 @@ void overwriteEnvironment(const v1::ParameterChange& with, v1::ParameterChange& 
   overwrite(environment, all);
 }
 
+// Fields of ClothChange that a material sets.
+constexpr int kOfMaterials[] = {v1::ClothChange::kStructuralFieldNumber, v1::ClothChange::kShearFieldNumber,
+                                v1::ClothChange::kBendFieldNumber,       v1::ClothChange::kDampingFieldNumber,
+                                v1::ClothChange::kDragFieldNumber,       v1::ClothChange::kLiftFieldNumber,
+                                v1::ClothChange::kFrictionFieldNumber,   v1::ClothChange::kSolverFieldNumber,
+                                v1::ClothChange::kArealMassFieldNumber};
+
+// The message with only this field, if it has it.
+v1::ClothChange only(const google::protobuf::FieldDescriptor* field, const v1::ClothChange& from) {
+  v1::ClothChange part;
+  const google::protobuf::Reflection& access = *from.GetReflection();
+  if (!access.HasField(from, field)) return part;
+  if (field->message_type() == nullptr)
+    access.SetFloat(&part, field, access.GetFloat(from, field));
+  else
+    access.MutableMessage(&part, field)->CopyFrom(access.GetMessage(from, field));
+  return part;
+}
+
+// Adds `change` with this field of all `cloths`: the most frequent value to `change`, others to `exceptions`,
+// which are named and have the order of `cloths`.
+void addField(const google::protobuf::FieldDescriptor* field,
+              const std::vector<const v1::ClothChange*>& cloths, v1::ClothChange& change,
+              std::vector<v1::ClothChange>& exceptions) {
+  std::map<std::string, std::size_t> counts;
+  std::vector<std::string> values;
+  for (const v1::ClothChange* cloth : cloths) {
+    values.push_back(only(field, *cloth).SerializeAsString());
+    ++counts[values.back()];
+  }
+  const std::string& usual =
+      std::ranges::max_element(counts, {}, [](const auto& each) { return each.second; })->first;
+  change.MergeFromString(usual);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (values[i] != usual) exceptions[i].MergeFromString(values[i]);
+}
+
 // Overwrites the element with the same name, or adds one.
 template <typename Element>
 void overwriteNamed(const Element& with, google::protobuf::RepeatedPtrField<Element>& all) {
@@ -176,6 +216,37 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
       checks.fail(path, "", fmt::format("with substeps = {}, {}", scene.substeps, *error));
   }
   return std::move(checks).result(std::move(change));
+}
+
+v1::ParameterChange withMaterials(v1::ParameterChange change, const model::Scene& changed) {
+  if (std::ranges::none_of(change.cloths(), &v1::ClothChange::has_material)) return change;
+  std::vector<double> areas;
+  for (const model::Cloth& cloth : changed.cloths) areas.push_back(model::areaOf(cloth));
+  const v1::ParameterChange all = allParameters(toMessageWithoutMeshes(changed), areas);
+  google::protobuf::RepeatedPtrField<v1::ClothChange> cloths;
+  cloths.Swap(change.mutable_cloths());
+  for (v1::ClothChange& each : cloths) {
+    std::vector<const v1::ClothChange*> addressed;
+    std::vector<v1::ClothChange> exceptions;
+    if (each.has_material())
+      for (const v1::ClothChange& cloth : all.cloths())
+        if (parameters::isFor(each.name(), cloth.name())) {
+          addressed.push_back(&cloth);
+          exceptions.emplace_back();
+        }
+    if (!addressed.empty())
+      for (const int number : kOfMaterials) {
+        const auto* field = v1::ClothChange::descriptor()->FindFieldByNumber(number);
+        if (!each.GetReflection()->HasField(each, field)) addField(field, addressed, each, exceptions);
+      }
+    change.add_cloths()->Swap(&each);
+    for (std::size_t i = 0; i < exceptions.size(); ++i) {
+      if (exceptions[i].ByteSizeLong() == 0) continue;
+      exceptions[i].set_name(addressed[i]->name());
+      change.add_cloths()->Swap(&exceptions[i]);
+    }
+  }
+  return change;
 }
 
 void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all) {

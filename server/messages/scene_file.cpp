@@ -2,15 +2,13 @@
 // Reads and writes scene files.
 #include "server/messages/scene_file.h"
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <optional>
 
 #include <fmt/format.h>
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
 
+#include "server/files/regular_file.h"
 #include "server/meshes/mesh_file.h"
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
@@ -58,23 +56,16 @@ Result<model::Scene> readSceneFile(const std::filesystem::path& path, std::vecto
     return refuse(v1::ERROR_CODE_NOT_FOUND, source, "there is no such file");
   if (kind == std::filesystem::file_type::directory)
     return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source, "is a directory; must be a file");
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source,
-                  fmt::format("cannot be read: {}", std::strerror(errno)));
-  std::string text(limits::kMaxSceneFileBytes + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.bad()) return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source, "cannot be read to its end");
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > limits::kMaxSceneFileBytes)
+  const auto text = files::readRegularFile(path, limits::kMaxSceneFileBytes + 1);
+  if (!text) return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source, text.error());
+  if (text->size() > limits::kMaxSceneFileBytes)
     return refuse(v1::ERROR_CODE_RESOURCE_EXHAUSTED, source,
                   fmt::format("is too large: must have at most {} bytes", limits::kMaxSceneFileBytes));
   const auto readMesh = [&](const std::string& mesh, const meshes::JointRequest* joints) {
     return meshes::readMeshFile(path.parent_path() / mesh,
                                 {.bytes = limits::kMaxMeshFileBytes, .vertices = limits::kMaxNodes}, joints);
   };
-  return parseScene(text, source, readMesh, limits::kMaxNodes, repairs);
+  return parseScene(*text, source, readMesh, limits::kMaxNodes, repairs);
 }
 
 std::string toJson(const model::Scene& scene) {

@@ -38,6 +38,9 @@ v1::Normals toMessage(model::Normals normals);
 // All parameters of environment and cloths as one change. `areas` are the areas of the cloths in m²; a cloth
 // with a missing area or 0 gets no areal mass.
 v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double> areas);
+// `change` with everything that its materials set, as it is in `changed`, the scene after the change: clients
+// do not know the numbers of materials. Names single cloths only where they differ from the others.
+v1::ParameterChange withMaterials(v1::ParameterChange change, const model::Scene& changed);
 // Applies a change to the result of allParameters(), as model::applyChange() applies it to a scene. Safe for
 // any messages: fields that this release does not know are kept, and changes of unknown cloths and of
 // colliders are ignored.

@@ -6,6 +6,9 @@
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 
+#include "server/endpoint/listen/address_rate.h"
+#include "server/endpoint/web/request_body.h"
+
 namespace clothstream::monitoring {
 namespace {
 
@@ -20,12 +23,15 @@ std::string_view view(beast::string_view text) {
 
 HttpConnection::HttpConnection(boost::asio::ip::tcp::socket&& socket, HttpContext& context)
     : context_(context), socket_(std::move(socket)) {
-  ++context_.connections;
   parser_.header_limit(kMaxHeaderBytes);
+  beast::error_code unknown;  // of a peer that has disconnected; it counts as a separate address
+  const auto peer = socket_.socket().remote_endpoint(unknown);
+  if (HttpConnection* const crowded = context_.connections.add(*this, endpoint::addressKey(peer.address())))
+    crowded->socket_.close();  // the operation that is under way then ends, and with it the connection
 }
 
 HttpConnection::~HttpConnection() {
-  --context_.connections;
+  context_.connections.remove(*this);
 }
 
 void HttpConnection::read() {
@@ -48,7 +54,7 @@ void HttpConnection::onHeader(beast::error_code error) {
 
 Answer HttpConnection::answer() const {
   const auto& request = parser_.get();
-  if (parser_.chunked() || parser_.content_length().value_or(0) > 0)
+  if (endpoint::mayHaveBody(parser_))
     return {.status = http::status::payload_too_large, .body = "Requests must not have a body.\n"};
   if (!context_.names.contains(view(request[http::field::host])))
     return {.status = http::status::misdirected_request,

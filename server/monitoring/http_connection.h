@@ -18,6 +18,7 @@
 #include <boost/beast/http/string_body.hpp>
 
 #include "server/endpoint/web/host_names.h"
+#include "server/monitoring/connection_room.h"
 
 namespace clothstream::monitoring {
 
@@ -27,14 +28,13 @@ struct Answer {
   std::string body;
 };
 
+class HttpConnection;
+
 // State that all connections share. Belongs to the thread of the endpoint.
 struct HttpContext {
-  // Maximum number of open connections. Further ones are closed at once.
-  static constexpr std::size_t kMaxConnections = 16;
-
   const endpoint::HostNames names;
   const std::function<Answer(std::string_view target)> answer;
-  std::size_t connections = 0;
+  ConnectionRoom<HttpConnection> connections = {};
 };
 
 // Lives while an operation of its socket is pending. Each request takes at most kRequestTimeout to arrive,

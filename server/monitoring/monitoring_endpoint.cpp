@@ -124,8 +124,7 @@ struct MonitoringEndpoint::State {
         return;
       }
       accept();  // first, so that it goes on if the connection fails
-      if (context.connections < HttpContext::kMaxConnections)
-        std::make_shared<HttpConnection>(std::move(socket), context)->read();
+      std::make_shared<HttpConnection>(std::move(socket), context)->read();
     });
   }
 

@@ -29,7 +29,8 @@ struct MonitoringOptions {
   std::chrono::milliseconds metricsLifetime{200};
 };
 
-// Answers GET and HEAD for these paths, one request per connection:
+// Answers GET and HEAD for these paths, one request per connection. Of many open connections the oldest ends
+// (ConnectionRoom).
 //   /metrics  metrics in the text format of Prometheus
 //   /healthz  200, or 503 with the reason if the device thread does not answer. 200 without a server.
 //   /readyz   200 while the server accepts clients, else 503 with the reason

@@ -6,10 +6,10 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 #include <system_error>
+
+#include "server/files/regular_file.h"
 
 namespace clothstream {
 namespace {
@@ -19,6 +19,7 @@ constexpr std::string_view kEnvironmentPrefix = "CLOTHSTREAM_";
 constexpr std::string_view kForeignVariables[] = {"VALIDATION", "LOSE_DEVICE", "OPTIONS", "SERVER",
                                                   "RECORDING",  "SCREENSHOTS", "SANITIZE"};
 constexpr std::size_t kPageColumns = 118;
+constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
 
 std::string toEnvironmentName(std::string name) {
   for (char& c : name) c = c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
@@ -226,11 +227,9 @@ void OptionTable::applyEnvironment(const char* const* environment, std::vector<s
 }
 
 void OptionTable::applyFile(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
-  if (!in.is_open() || in.bad())
-    throw OptionError(fmt::format("--config: cannot read {}; name a readable TOML file", file));
-  for (const FileEntry& entry : parseOptionFile(text, file)) {
+  const auto text = files::readRegularFile(file, kMaxFileBytes);
+  if (!text) throw OptionError(fmt::format("--config: {} {}; name a readable TOML file", file, text.error()));
+  for (const FileEntry& entry : parseOptionFile(*text, file)) {
     const std::string place = fmt::format("{}:{}: ", file, entry.line);
     const auto matches = [&](const Row& row) { return isConfigurable(row) && row.name == entry.key; };
     const auto row = std::ranges::find_if(rows_, matches);

@@ -229,6 +229,8 @@ void addNetworkOptions(OptionTable& table, Parsed& parsed) {
       "--public-name", options.publicNames, "NAME",
       "Name under which browsers reach the page, such as cloth.example.org; may be repeated. Addresses, "
       "localhost and the name of the machine are always allowed");
+  table.flag("--reflection", options.reflects,
+             "Offer gRPC reflection, by which tools such as grpcurl learn the calls without session.proto");
   table.list("--allow-origin", options.allowedOrigins, "ORIGIN",
              "Origin of another page that may connect, such as https://example.org; may be repeated");
   table.text(

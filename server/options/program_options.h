@@ -76,6 +76,7 @@ struct ProgramOptions {
   // Network.
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080, grpcPort = 50051;
+  bool reflects = false;       // gRPC reflection
   std::filesystem::path page;  // empty: the directory next to the program, if it exists
   std::vector<std::string> publicNames, allowedOrigins;
   // These limits hold for each endpoint.

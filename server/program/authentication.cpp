@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "server/program/authentication.h"
 
-#include <cstdio>
 #include <exception>
 
 #include <fmt/format.h>
@@ -41,12 +40,11 @@ void reload(identity::Authenticator& authenticator) {
   }
 }
 
-void printPairingCode(identity::Authenticator& authenticator) {
+std::string pairingCodeLine(identity::Authenticator& authenticator) {
   const auto made = authenticator.makeCode(scene::Role::owner, identity::Clock::now());
-  if (!made) return;
-  fmt::print("pair    {} makes an owner for {} minutes; SIGUSR2 shows a new code\n", made->code,
-             identity::PairingCodes::kValid.count());
-  std::fflush(stdout);
+  if (!made) return {};
+  return fmt::format("pair    {} makes an owner for {} minutes; SIGUSR2 shows a new code\n", made->code,
+                     identity::PairingCodes::kValid.count());
 }
 
 }  // namespace clothstream::program

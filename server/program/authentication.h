@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "server/identity/authenticator.h"
 #include "server/options/program_options.h"
@@ -16,7 +17,8 @@ std::shared_ptr<identity::Authenticator> makeAuthenticator(const ProgramOptions&
 // Reads the keys of tokens again. Logs the result; if it fails, the old keys stay in use.
 void reload(identity::Authenticator& authenticator);
 
-// Makes a pairing code for an owner: a person who sees the output of the server controls it.
-void printPairingCode(identity::Authenticator& authenticator);
+// Makes a pairing code for an owner, and returns the line that shows it: a person who sees the output of the
+// server controls it. Empty if the server does not pair.
+std::string pairingCodeLine(identity::Authenticator& authenticator);
 
 }  // namespace clothstream::program

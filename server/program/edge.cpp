@@ -23,13 +23,14 @@ int edge(const ProgramOptions& options, const Signals& signals) {
   const auto monitoring = openMonitoring(options);
   std::unique_ptr<EndGuard> guard;  // outlives the server
   hosting::ServerOptions serverOptions = options.server;
-  serverOptions.authenticator = makeAuthenticator(options);
+  const std::shared_ptr<identity::Authenticator> authenticator = makeAuthenticator(options);
+  serverOptions.authenticator = authenticator;
   serverOptions.observer = openEvents(options);
   hosting::SceneServer server(serverOptions);
   const fleet::Edge shown(server, natsOptions(options, "edge"), serverOptions.reconnectGrace.place);
   shown.waitForOffers();  // clients that come back to an edge that starts again find their scenes
   guard = openEndpoints(
-      server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
+      server, options, signals, start, authenticator, monitoring.get(),
       fmt::format("shows   scenes of other servers, by {}\n", fmt::join(options.natsServers, ", ")),
       [&] { return server.report(); });
   return 0;

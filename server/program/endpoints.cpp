@@ -19,6 +19,7 @@
 #include "server/program/addresses.h"
 #include "server/program/authentication.h"
 #include "server/program/monitoring.h"
+#include "server/program/signal_work.h"
 #include "server/program/tls.h"
 #include "server/tls/qr_code.h"
 
@@ -46,27 +47,39 @@ void printHomeAddresses(const ProgramOptions& options, std::uint16_t port, const
   fmt::print("type    {}\n{}", address, tls::qrCode(address));
 }
 
+void print(const std::string& text) {
+  fmt::print("{}", text);
+  std::fflush(stdout);
+}
+
 // Returns after SIGINT, SIGTERM or --seconds, and after SIGHUP if there is neither TLS nor an authenticator.
 // SIGHUP reloads the certificate and the keys of tokens, SIGUSR1 prints the report, SIGUSR2 a pairing code.
-// `tls` and `authenticator` may be null.
-void waitForStop(const Signals& signals, const ProgramOptions& options, tls::ServerTls* tls,
-                 identity::Authenticator* authenticator, const std::function<std::string()>& report) {
+// Files are read and texts are printed elsewhere, so that SIGTERM is answered whatever they wait for. `tls`
+// and `authenticator` may be null.
+void waitForStop(const Signals& signals, const ProgramOptions& options,
+                 const std::shared_ptr<tls::ServerTls>& tls,
+                 const std::shared_ptr<identity::Authenticator>& authenticator,
+                 const std::function<std::string()>& report) {
   using Clock = std::chrono::steady_clock;
+  SignalWork work;
   std::optional<Clock::time_point> end;
   if (options.stopAfter) end = Clock::now() + *options.stopAfter;
   while (!end || Clock::now() < *end) {
     const int signal = end ? signals.wait(*end - Clock::now()) : signals.wait();
     const bool reloads = tls != nullptr || authenticator != nullptr;
     if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && !reloads)) return;
-    if (signal == SIGHUP && tls != nullptr) reload(*tls);
-    if (signal == SIGHUP && !options.tokenKeys.empty()) reload(*authenticator);
     try {
-      if (signal == SIGUSR2 && options.pairing) printPairingCode(*authenticator);
-      if (signal != SIGUSR1) continue;
-      fmt::print("{}", report());
-      std::fflush(stdout);
-    } catch (const std::exception& failure) {  // such as a closed pipe or a lack of memory
-      spdlog::error("printing after a signal failed: {}", failure.what());
+      if (signal == SIGHUP)
+        work.post(signal, [tls, authenticator, readsKeys = !options.tokenKeys.empty()] {
+          if (tls) reload(*tls);
+          if (readsKeys) reload(*authenticator);
+        });
+      else if (signal == SIGUSR1)
+        work.post(signal, [text = report()] { print(text); });
+      else if (signal == SIGUSR2 && options.pairing)
+        work.post(signal, [text = pairingCodeLine(*authenticator)] { print(text); });
+    } catch (const std::exception& failure) {  // such as a lack of memory
+      spdlog::error("what a signal asked for failed: {}", failure.what());
     }
   }
 }
@@ -75,7 +88,7 @@ void waitForStop(const Signals& signals, const ProgramOptions& options, tls::Ser
 
 std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const ProgramOptions& options,
                                         const Signals& signals, StartGuard& start,
-                                        identity::Authenticator* authenticator,
+                                        const std::shared_ptr<identity::Authenticator>& authenticator,
                                         monitoring::MonitoringEndpoint* monitoring, const std::string& intro,
                                         const std::function<std::string()>& report,
                                         const std::function<void(SteadyTime)>& leave) {
@@ -103,7 +116,7 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Prog
                                               .port = options.grpcPort,
                                               .maxStreams = options.maxConnections,
                                               .connections = limits,
-                                              .reflects = options.tokenKeys.empty() && !options.pairing,
+                                              .reflects = options.reflects,
                                               .tls = tls});
 
     fmt::print("{}page    http{}://{}/\ngRPC    {}{}\n", intro, tls ? "s" : "",
@@ -111,7 +124,7 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Prog
                localAddress(options.host, rpc.port()));
     if (options.tlsSelf) printHomeAddresses(options, web.port(), tls->fingerprint());
     std::fflush(stdout);
-    if (options.pairing) printPairingCode(*authenticator);
+    if (options.pairing) print(pairingCodeLine(*authenticator));
     const Monitored monitored(monitoring, server);
     std::optional<discovery::Announcement> announcement;
     if (options.announces)
@@ -124,10 +137,10 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Prog
     std::optional<agones::Agones> gameServer;
     if (options.isGameServer) gameServer.emplace(server, options.agonesPort);
     const std::optional<SteadyTime> stopAt = start.finish();
-    if (!stopAt) waitForStop(signals, options, tls.get(), authenticator, report);
-    spdlog::info("stopping");
+    if (!stopAt) waitForStop(signals, options, tls, authenticator, report);
     guard = std::make_unique<EndGuard>(
         signals, stopAt.value_or(std::chrono::steady_clock::now() + options.server.drain));
+    spdlog::info("stopping");
     announcement.reset();
     monitored.stopping();
     if (leave) leave(std::chrono::steady_clock::now() + kLeaveShare * options.server.drain / 4);

@@ -22,7 +22,7 @@ namespace clothstream::program {
 // limits the time until the process ends.
 [[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(
     hosting::SceneServer& server, const ProgramOptions& options, const Signals& signals, StartGuard& start,
-    identity::Authenticator* authenticator, monitoring::MonitoringEndpoint* monitoring,
+    const std::shared_ptr<identity::Authenticator>& authenticator, monitoring::MonitoringEndpoint* monitoring,
     const std::string& intro, const std::function<std::string()>& report,
     const std::function<void(std::chrono::steady_clock::time_point)>& leave = {});
 

@@ -5,15 +5,19 @@
 #include <stop_token>
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 namespace clothstream::program {
 namespace {
 
 // Interval in which the guards look for signals.
 constexpr std::chrono::milliseconds kGuardInterval{20};
+constexpr unsigned kLogSeconds = 1;  // for the last line of the log
 
 // Ends the process. The kernel closes files and connections; recordings stay readable.
 [[noreturn]] void endNow(const char* why) {
+  // The log may be a pipe that is full. SIGALRM then ends the process.
+  ::alarm(kLogSeconds);
   spdlog::error("ending at once: {}", why);
   spdlog::default_logger()->flush();
   std::_Exit(1);

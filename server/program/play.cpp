@@ -54,15 +54,16 @@ int play(const ProgramOptions& options, const Signals& signals) {
     spdlog::info("faults with the seed {}: frames are dropped and late on purpose", *options.playback.faults);
   std::unique_ptr<EndGuard> guard;  // outlives the server
   hosting::ServerOptions serverOptions = options.server;
-  serverOptions.authenticator = makeAuthenticator(options);
+  const std::shared_ptr<identity::Authenticator> authenticator = makeAuthenticator(options);
+  serverOptions.authenticator = authenticator;
   serverOptions.observer = openEvents(options);
   hosting::SceneServer server(
       scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), serverOptions);
   std::optional<fleet::Origin> origin;
   if (!options.natsServers.empty())
     origin.emplace(server, natsOptions(options, "server"), originOptions(options));
-  guard = openEndpoints(server, options, signals, start, serverOptions.authenticator.get(), monitoring.get(),
-                        intro, [&] { return server.report(); });
+  guard = openEndpoints(server, options, signals, start, authenticator, monitoring.get(), intro,
+                        [&] { return server.report(); });
   return 0;
 }
 

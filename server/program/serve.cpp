@@ -81,7 +81,7 @@ int serve(const ProgramOptions& options, const Signals& signals) {
     origin.emplace(server, natsOptions(options, "server"), originOptions(options));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   guard =
-      openEndpoints(server, options, signals, start, authenticator.get(), monitoring.get(),
+      openEndpoints(server, options, signals, start, authenticator, monitoring.get(),
                     fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.deviceInfo()), sceneList),
                     report, [&](schedule::Clock::time_point until) {
                       if (origin) origin->moveAll(until);

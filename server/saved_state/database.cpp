@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "server/files/state_directory.h"
 #include "server/saved_state/crc.h"
 
 namespace clothstream::saved_state {
@@ -130,22 +131,17 @@ tl::unexpected<std::string> failed(sqlite3* database, int code) {
   return tl::unexpected(std::move(text));
 }
 
-// Creates the file with mode 0600. SQLite gives its log the same mode.
+// Creates the file with mode 0600. SQLite gives its log the same mode. Returns what is wrong, or nothing.
 std::string createFile(const std::filesystem::path& file) {
-  const int opened = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  if (opened < 0) return std::strerror(errno);
+  const int opened =
+      ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, S_IRUSR | S_IWUSR);
+  if (opened < 0)
+    return errno == ELOOP ? files::kIsLink : fmt::format("cannot be created: {}", std::strerror(errno));
   std::string problem;
-  if (::fchmod(opened, S_IRUSR | S_IWUSR) != 0) problem = std::strerror(errno);
+  if (::fchmod(opened, S_IRUSR | S_IWUSR) != 0)
+    problem = fmt::format("cannot be created: {}", std::strerror(errno));
   ::close(opened);
   return problem;
-}
-
-std::string createDirectory(const std::filesystem::path& directory) {
-  std::error_code problem;
-  if (!directory.parent_path().empty()) std::filesystem::create_directories(directory.parent_path(), problem);
-  if (problem) return problem.message();
-  if (::mkdir(directory.c_str(), S_IRWXU) == 0 || errno == EEXIST) return {};
-  return std::strerror(errno);
 }
 
 }  // namespace
@@ -156,11 +152,12 @@ void Database::Close::operator()(sqlite3* database) const {
 
 Database::Database(const DatabaseOptions& options) : file_(options.directory / "scenes.sqlite") {
   if (options.vfs.empty()) {
-    std::string problem = createDirectory(options.directory);
-    if (problem.empty()) problem = createFile(file_);
-    if (!problem.empty())
-      throw std::runtime_error(
-          fmt::format("{}: cannot be created: {}; use another --state-dir", file_.string(), problem));
+    const auto fail = [](const std::filesystem::path& path, const std::string& problem) {
+      throw std::runtime_error(fmt::format("{}: {}; or use another --state-dir", path.string(), problem));
+    };
+    if (const auto made = files::makeStateDirectory(options.directory); !made)
+      fail(options.directory, made.error());
+    if (const std::string problem = createFile(file_); !problem.empty()) fail(file_, problem);
   }
   open(options);
   setUp(options);

@@ -199,23 +199,19 @@ messages::Result<void> LiveScene::countChange(std::uint64_t participant, const c
   return countChangeLocked(participant, call);
 }
 
+messages::Result<void> LiveScene::tooMany(ChangeLimits::Exceeded exceeded, const char* call,
+                                          const char* what) const {
+  if (exceeded == ChangeLimits::Exceeded::nothing) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+      fmt::format("{}: too many {} of '{}'{} in one second; send it again later", call, what, name(),
+                  exceeded == ChangeLimits::Exceeded::byParticipant ? " by one participant" : ""),
+      telemetry::Refusal::parameterChanges});
+}
+
 // Each change is sent to all participants.
 messages::Result<void> LiveScene::countChangeLocked(std::uint64_t participant, const char* call) {
-  const Clock::time_point now = Clock::now();
-  const auto refuse = [&](const char* whose) {
-    return tl::unexpected(messages::FieldError{
-        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-        fmt::format("{}: too many changes of '{}'{} in one second; send it again later", call, name(), whose),
-        telemetry::Refusal::parameterChanges});
-  };
-  for (auto known = changesOf_.begin(); known != changesOf_.end();)
-    known = known->second.isFull(now) ? changesOf_.erase(known) : std::next(known);
-  auto& own =
-      changesOf_.try_emplace(participant, kChangesOfParticipantPerSecond, kChangesOfParticipantPerSecond)
-          .first->second;
-  if (!own.take(now)) return refuse(" by one participant");
-  if (!changes_.take(now)) return refuse("");
-  return {};
+  return tooMany(changes_.count(participant, Clock::now()), call, "changes");
 }
 
 messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
@@ -231,10 +227,11 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   if (!change) return tl::unexpected(std::move(change).error());
   model::Scene changed = definition_;
   model::applyChange(changed, *change);
-  AcceptedChange accepted{participant, *change, message};
-  if (std::ranges::any_of(change->cloths,
-                          [](const model::ClothChange& cloth) { return cloth.material.has_value(); }))
-    *accepted.message.mutable_cloths() = allParameters(changed).cloths();
+  AcceptedChange accepted{participant, *change, messages::withMaterials(message, changed)};
+  if (auto counted = tooMany(changes_.countBytes(participant, accepted.message.ByteSizeLong(), Clock::now()),
+                             "parameterChange", "bytes of changes");
+      !counted)
+    return counted;
   if (const auto charged = charge_.charge("parameterChange", changed); !charged)
     return tl::unexpected(charged.error());
   bool posted = false;

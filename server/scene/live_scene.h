@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -18,6 +17,7 @@
 #include "server/model/scene.h"
 #include "server/model/stability.h"
 #include "server/scene/budget.h"
+#include "server/scene/change_limits.h"
 #include "server/scene/checkpoint.h"
 #include "server/scene/defaults.h"
 #include "server/scene/frame_source.h"
@@ -27,7 +27,6 @@
 #include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
 #include "server/schedule/overload_policy.h"
-#include "server/schedule/token_bucket.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::scene {
@@ -124,13 +123,8 @@ class LiveScene {
   // change.
   std::shared_ptr<const delivery::DescriptionChunks> description();
 
-  // Parameter changes of all participants together.
-  static constexpr double kChangesPerSecond = 240;
-  // Parameter changes, pauses and resets of one participant; peers outside the scene count as one.
-  static constexpr double kChangesOfParticipantPerSecond = kChangesPerSecond / 4;
-
-  // Counts a change by this participant, 0 for peers outside the scene, or returns why there are too many.
-  // `call` begins the text.
+  // Counts a change of parameters, a pause or a reset by this participant, 0 for peers outside the scene, or
+  // returns why there are too many (ChangeLimits). `call` begins the text.
   messages::Result<void> countChange(std::uint64_t participant, const char* call);
 
   // Epoch of the stream; a server has only one.
@@ -171,6 +165,8 @@ class LiveScene {
  private:
   // The same; the caller holds the lock.
   messages::Result<void> countChangeLocked(std::uint64_t participant, const char* call);
+  // Error for what ChangeLimits has counted; nothing if there are not too many.
+  messages::Result<void> tooMany(ChangeLimits::Exceeded exceeded, const char* call, const char* what) const;
   // The definition has changed. The caller holds the lock.
   void definitionChanged() {
     description_.reset();
@@ -189,9 +185,7 @@ class LiveScene {
   Charge charge_;                      // of definition_
   std::atomic<bool> isDearer_{false};  // definition_ costs more than start_
   std::string quarantined_;
-  schedule::TokenBucket changes_{kChangesPerSecond, kChangesPerSecond};
-  // Buckets by participant. Full ones are removed.
-  std::map<std::uint64_t, schedule::TokenBucket> changesOf_;
+  ChangeLimits changes_;
   std::optional<Clock::time_point> emptySince_;                     // of the newest call of hasBeenEmptyFor()
   std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
   std::uint64_t contents_ = 0;                                      // newest content id

@@ -21,7 +21,7 @@ enum class Refusal : std::uint8_t {
   helloTimeout,      // a connection did not join a scene in time
   silence,           // a connection sent nothing for too long
   unreadAnswers,     // a client does not read its answers
-  messageRate,       // too many messages of one kind
+  messageRate,       // too many messages of one kind, or frames of a WebSocket
   messageSize,       // a message from a client is too large
   answerSize,        // an answer is too large for a stream
   uploads,           // no room for an upload

@@ -6,11 +6,11 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
-#include <fstream>
 #include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -26,6 +26,9 @@
 #include <openssl/x509v3.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "server/files/regular_file.h"
+#include "server/files/state_directory.h"
 
 namespace clothstream::tls {
 namespace {
@@ -89,16 +92,9 @@ Key keyOf(const std::string& pem) {
 }
 
 std::string readFile(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error(fmt::format("cannot read {}: {}", file.string(), std::strerror(errno)));
-  std::string text;
-  std::array<char, 4096> piece{};
-  while (in.read(piece.data(), piece.size()), in.gcount() > 0) {
-    text.append(piece.data(), static_cast<std::size_t>(in.gcount()));
-    if (text.size() > kMaxFileBytes)
-      throw std::runtime_error(fmt::format("{} is too large for a certificate or key", file.string()));
-  }
-  return text;
+  auto text = files::readRegularFile(file, kMaxFileBytes);
+  if (!text) throw std::runtime_error(fmt::format("{}: {}", file.string(), text.error()));
+  return std::move(*text);
 }
 
 // Replaces the file at once: a reader sees the old or the new content.
@@ -107,7 +103,7 @@ void writeFile(const fs::path& file, const std::string& content, mode_t mode) {
   const auto fail = [](const fs::path& path) {
     throw std::runtime_error(fmt::format("cannot write {}: {}", path.string(), std::strerror(errno)));
   };
-  const int descriptor = ::open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
+  const int descriptor = ::open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, mode);
   if (descriptor < 0) fail(next);
   const bool written =
       ::fchmod(descriptor, mode) == 0 &&
@@ -289,13 +285,8 @@ std::vector<std::string> namesOfThisMachine() {
 }
 
 Certificate selfSigned(const fs::path& directory, const std::vector<std::string>& names) {
-  std::error_code error;
-  if (!fs::exists(directory, error)) {
-    fs::create_directories(directory, error);
-    if (!error) fs::permissions(directory, fs::perms::owner_all, error);
-  }
-  if (error)
-    throw std::runtime_error(fmt::format("cannot create {}: {}", directory.string(), error.message()));
+  if (const auto made = files::makeStateDirectory(directory); !made)
+    throw std::runtime_error(fmt::format("{}: {}", directory.string(), made.error()));
   const fs::path keyFile = directory / "self.key", chainFile = directory / "self.pem";
   if (!fs::exists(keyFile)) {
     const Key key(check(EVP_EC_gen("P-256"), "key"));

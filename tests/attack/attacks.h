@@ -13,6 +13,10 @@ struct Target {
   std::string grpc, web;  // HOST:PORT of both endpoints
   std::chrono::seconds time;
   std::string token = {};  // of an honest participant of another tenant than the victim's; empty: none
+  // HOST:PORT of the endpoint for operators; empty without --metrics-port.
+  std::string metrics = {};
+  std::string directory = {};  // of Attack::serverArguments
+  int process = 0;             // id of the server's process
 };
 
 // Scene of the honest client.

@@ -119,7 +119,9 @@ Result run(const std::string& self, const std::string& server, const Attack& att
     target.forgetPeak();
     victim.begin();
     Process attacker({self, "--perform", attack.name, "--grpc", trusted.hostAndPort(), "--web", target.web(),
-                      "--seconds", std::to_string(attackSeconds), "--token", othersToken});
+                      "--seconds", std::to_string(attackSeconds), "--token", othersToken, "--metrics",
+                      target.metrics(), "--directory", directory.path().string(), "--process",
+                      std::to_string(target.process().id())});
     const auto begun = Clock::now();
     if (!attack.endsDuring) attacker.waitForEnd(std::chrono::seconds(attackSeconds) + kPatience);
     // An attack that ends at once may have effects later.
@@ -160,7 +162,8 @@ int main(int argc, char** argv) {
       "Attacks a server that it starts, and prints what an honest client sees meanwhile. Exit code 1 if a "
       "goal is missed: 90 % of the frames, no gap above 0.25 s, at most 256 MiB more memory, an end within "
       "10 s, the expected answer, and a log without control characters."};
-  std::string server, perform, grpc, web, token;
+  std::string server, perform;
+  attack::Target given{};
   std::vector<std::string> only;
   int seconds = 6;
   std::vector<std::string> names;
@@ -176,9 +179,12 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   // The program runs itself to attack, so that the honest client has a separate process.
   app.add_option("--perform", perform)->group("");
-  app.add_option("--grpc", grpc)->group("");
-  app.add_option("--web", web)->group("");
-  app.add_option("--token", token)->group("");
+  app.add_option("--grpc", given.grpc)->group("");
+  app.add_option("--web", given.web)->group("");
+  app.add_option("--token", given.token)->group("");
+  app.add_option("--metrics", given.metrics)->group("");
+  app.add_option("--directory", given.directory)->group("");
+  app.add_option("--process", given.process)->group("");
   CLI11_PARSE(app, argc, argv);
 
   // Alternates, so that honest clients of both endpoints are attacked.
@@ -190,9 +196,8 @@ int main(int argc, char** argv) {
         // The attacker's own work must not slow down the server.
         ::setpriority(PRIO_PROCESS, 0, 19);
         std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to connections that the server has closed
-        fmt::print(
-            "{}\n",
-            each.perform({.grpc = grpc, .web = web, .time = std::chrono::seconds(seconds), .token = token}));
+        given.time = std::chrono::seconds(seconds);
+        fmt::print("{}\n", each.perform(given));
         continue;
       }
       joinsWeb = !joinsWeb;

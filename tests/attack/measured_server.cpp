@@ -32,8 +32,14 @@ MeasuredServer::MeasuredServer(const std::string& program, const std::vector<std
   const auto page = process_.waitForLine("page ", kStartTime),
              grpc = process_.waitForLine("gRPC ", kStartTime);
   if (!page || !grpc) throw std::runtime_error("the server did not start: " + process_.errors());
-  const std::size_t host = page->find("//") + 2;
-  web_ = page->substr(host, page->find('/', host) - host);
+  const auto hostOf = [](const std::string& line) {
+    const std::size_t host = line.find("//") + 2;
+    return line.substr(host, line.find('/', host) - host);
+  };
+  web_ = hostOf(*page);
+  // This line comes before those of the endpoints.
+  if (const std::size_t at = process_.output().find("metrics http"); at != std::string::npos)
+    metrics_ = hostOf(process_.output().substr(at));
   grpc_ = grpc->substr(grpc->find_first_not_of(' '));
 }
 

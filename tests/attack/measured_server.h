@@ -20,6 +20,8 @@ class MeasuredServer {
 
   const std::string& grpc() const { return grpc_; }  // HOST:PORT
   const std::string& web() const { return web_; }    // HOST:PORT
+  // HOST:PORT of the endpoint for operators; empty without it.
+  const std::string& metrics() const { return metrics_; }
 
   double megabytes() const { return memory("VmRSS"); }  // resident
   // Highest value of megabytes() since the last call of forgetPeak().
@@ -39,7 +41,7 @@ class MeasuredServer {
   std::string folder() const { return "/proc/" + std::to_string(process_.id()); }
 
   e2e::Process process_;
-  std::string grpc_, web_;
+  std::string grpc_, web_, metrics_;
 };
 
 }  // namespace clothstream::attack

@@ -117,6 +117,19 @@ TEST_F(TlsProgram, ReadsItsCertificateAgainWithoutEndingStreams) {
   server_.reset();
 }
 
+TEST_F(TlsProgram, EndsAlthoughNobodyWritesIntoTheFifoOfItsCertificate) {
+  use("first");
+  startWith({"--tls-certificate", chain(), "--tls-key", key()});
+  if (IsSkipped()) return;
+  std::filesystem::remove(key());
+  ASSERT_EQ(::mkfifo(key().c_str(), 0600), 0);
+  server_->signal(SIGHUP);
+  EXPECT_TRUE(eventually(
+      [&] { return server_->errors().find("key.pem: is not a regular file") != std::string::npos; }));
+  stopServer();
+  server_.reset();
+}
+
 TEST_F(TlsProgram, WarnsOfAKeyThatOthersMayRead) {
   use("first");
   for (const mode_t mode : {mode_t{0640}, mode_t{0600}}) {

@@ -16,6 +16,9 @@
 #include <boost/asio/ip/address_v4.hpp>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
+#include <google/protobuf/descriptor_database.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/support/async_unary_call.h>
 #include <netinet/in.h>
@@ -25,6 +28,7 @@
 
 #include "clothstream/v1/session.grpc.pb.h"
 #include "grpc/health/v1/health.pb.h"
+#include "grpc/reflection/v1alpha/reflection.pb.h"
 #include "server/endpoint/grpc/answer_budget.h"
 #include "server/endpoint/grpc/call_rate.h"
 #include "server/endpoint/grpc/caller.h"
@@ -38,6 +42,7 @@ namespace clothstream::tests {
 namespace {
 
 using namespace std::chrono_literals;
+using testing::AllOf;
 using testing::AnyOf;
 using testing::HasSubstr;
 
@@ -206,20 +211,85 @@ TEST_F(GrpcEndpoint, TellsHealthWatcherThatItCloses) {
   EXPECT_EQ(call.finish().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
-TEST_F(GrpcEndpoint, ListsItsServicesByReflection) {
-  RpcStream call(port(), {.method = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"});
-  ASSERT_TRUE(call.send(std::string("\x3a\x01*")));  // ServerReflectionRequest { string list_services = 7; }
-  const std::optional<std::string> answer = call.receive();
-  ASSERT_TRUE(answer.has_value());
-  EXPECT_THAT(*answer, HasSubstr("clothstream.v1.ClothStream"));
+using ReflectionRequest = grpc::reflection::v1alpha::ServerReflectionRequest;
+using ReflectionResponse = grpc::reflection::v1alpha::ServerReflectionResponse;
+constexpr const char* kReflection = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo";
+
+std::string reflectionRequest(const std::string& symbol) {
+  ReflectionRequest request;
+  request.set_file_containing_symbol(symbol);
+  return request.SerializeAsString();
 }
 
-TEST_F(GrpcEndpoint, HasNoReflectionIfItShouldNot) {
-  open({.reflects = false});
-  RpcStream call(port(), {.method = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"});
-  call.send(std::string("\x3a\x01*"));
+ReflectionResponse reflected(RpcStream& call, const std::string& request) {
+  ReflectionResponse response;
+  EXPECT_TRUE(call.send(request));
+  EXPECT_TRUE(response.ParseFromString(call.receive().value_or("")));
+  return response;
+}
+
+TEST_F(GrpcEndpoint, ReflectsItsServicesIfItShould) {
+  open({.reflects = true});
+  RpcStream call(port(), {.method = kReflection});
+  ReflectionRequest list;
+  list.set_list_services("*");
+  EXPECT_THAT(reflected(call, list.SerializeAsString()).list_services_response().DebugString(),
+              AllOf(HasSubstr("clothstream.v1.ClothStream"), HasSubstr("grpc.health.v1.Health")));
+  const auto files = reflected(call, reflectionRequest("clothstream.v1.ClothStream.Join"))
+                         .file_descriptor_response()
+                         .file_descriptor_proto();
+  google::protobuf::SimpleDescriptorDatabase database;
+  for (const std::string& file : files) {
+    google::protobuf::FileDescriptorProto message;
+    ASSERT_TRUE(message.ParseFromString(file));
+    EXPECT_TRUE(database.Add(message)) << message.name();
+  }
+  google::protobuf::DescriptorPool pool(&database);
+  EXPECT_NE(pool.FindServiceByName("clothstream.v1.ClothStream"), nullptr);
+  ReflectionRequest byName;
+  byName.set_file_by_filename("clothstream/v1/scene.proto");
+  EXPECT_TRUE(reflected(call, byName.SerializeAsString()).has_file_descriptor_response());
+  for (const char* other : {"no.such.Name", "clothstream.v1.SavedParts"})
+    EXPECT_EQ(reflected(call, reflectionRequest(other)).error_response().error_code(),
+              grpc::StatusCode::NOT_FOUND)
+        << other;
+  call.sendDone();
+  EXPECT_TRUE(call.finish().ok());
+}
+
+TEST_F(GrpcEndpoint, HasNoReflectionUnlessAskedFor) {
+  RpcStream call(port(), {.method = kReflection});
+  call.send(reflectionRequest("clothstream.v1.ClothStream"));
   EXPECT_EQ(call.receive(), std::nullopt);
   EXPECT_EQ(call.finish().error_code(), grpc::StatusCode::UNIMPLEMENTED);
+}
+
+TEST_F(GrpcEndpoint, ReflectionHasTheLimitsOfOtherCalls) {
+  open({.answerTimeout = 200ms, .reflects = true});
+  RpcStream call(port(), {.method = kReflection});
+  int answers = 0;
+  while (answers < 1000 && call.send(reflectionRequest("clothstream.v1.ClothStream")) && call.receive())
+    ++answers;
+  EXPECT_LT(answers, 200);
+  EXPECT_THAT(call.finish().error_code(),
+              AnyOf(grpc::StatusCode::RESOURCE_EXHAUSTED, grpc::StatusCode::CANCELLED));
+  RpcStream large(port(), {.method = kReflection});
+  large.send(reflectionRequest(std::string(2000, 'x')));
+  EXPECT_EQ(large.receive(), std::nullopt);
+  EXPECT_EQ(large.finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
+// They neither stay nor take the place of others.
+TEST_F(GrpcEndpoint, IdleReflectionStreamsEnd) {
+  open({.answerTimeout = 200ms, .reflects = true});
+  std::vector<std::unique_ptr<RpcStream>> idle;
+  for (int i = 0; i < 40; ++i) idle.push_back(std::make_unique<RpcStream>(port(), RpcOptions{kReflection}));
+  Joined viewer = join();
+  EXPECT_TRUE(viewer.see(2));
+  for (const auto& stream : idle) {
+    EXPECT_EQ(stream->receive(), std::nullopt);
+    EXPECT_FALSE(stream->finish().ok());
+  }
 }
 
 TEST_F(GrpcEndpoint, RefusesCompressedMessages) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "tests/endpoint/web_client.h"
 
+#include <array>
+
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/http/parser.hpp>
@@ -64,6 +66,24 @@ bool HttpClient::closes() {
   char byte = 0;
   return buffer_.size() == 0 &&
          await(io_, [&](auto handler) { stream_.async_read_some(net::buffer(&byte, 1), handler); }).failed();
+}
+
+bool HttpClient::receives(const std::string& text) {
+  std::string all = beast::buffers_to_string(buffer_.cdata());
+  while (all.find(text) == std::string::npos) {
+    std::array<char, 4096> bytes{};
+    std::size_t count = 0;
+    const beast::error_code error = await(io_, [&](auto handler) {
+      stream_.async_read_some(net::buffer(bytes),
+                              [&count, handler](beast::error_code ended, std::size_t got) {
+                                count = got;
+                                handler(ended);
+                              });
+    });
+    if (error) return false;
+    all.append(bytes.data(), count);
+  }
+  return true;
 }
 
 void HttpClient::shutdownSend() {

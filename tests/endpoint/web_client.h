@@ -48,6 +48,8 @@ class HttpClient {
   Response readResponse(bool headOnly = false);
   // Whether the server closes without sending another byte.
   bool closes();
+  // Reads until this text has come. Returns false if the connection ends before.
+  bool receives(const std::string& text);
   void shutdownSend();
 
  private:

@@ -100,6 +100,29 @@ TEST_F(WebSocketEndpoint, SurvivesUnmaskedFrame) {
   EXPECT_TRUE(other.see(5));
 }
 
+TEST_F(WebSocketEndpoint, ClosesAfterTooManyFramesOfAnyKind) {
+  Joined other = join();
+  const std::string kinds[] = {
+      std::string("\x8a\x80mask", 6),                          // pongs
+      std::string("\x89\x80mask", 6),                          // pings
+      std::string("\x00\x80mask", 6),                          // empty fragments
+      std::string("\x8a\xfdmask", 6) + std::string(125, 'x'),  // pongs with payload
+  };
+  for (const std::string& kind : kinds) {
+    HttpClient raw(port());
+    const Response upgraded =
+        raw.get("/stream",
+                "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+                "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n");
+    ASSERT_EQ(upgraded.result(), http::status::switching_protocols);
+    std::string flood = kind[0] == 0 ? std::string("\x02\x80mask", 6) : "";  // the message of the fragments
+    for (int i = 0; i < 4200; ++i) flood += kind;
+    raw.send(flood);
+    EXPECT_TRUE(raw.receives("\x03\xf0too many WebSocket frames")) << kind;
+  }
+  EXPECT_TRUE(other.see(5));
+}
+
 TEST_F(WebSocketEndpoint, RemovesColliderOfClientThatHalfCloses) {
   Joined watcher = join();
   Joined owner = join();

@@ -82,7 +82,7 @@ TEST(Webhook, ErrorsOfFilesNameTheFile) {
   std::ofstream(file) << "whsec_short\n";
   EXPECT_THAT(problem(), HasSubstr(file.string() + " has no base64 after whsec_"));
   std::ofstream(file) << std::string(5000, 'x');
-  EXPECT_THAT(problem(), HasSubstr("is too large for a secret"));
+  EXPECT_THAT(problem(), HasSubstr("is too large: at most 4096 bytes are allowed"));
   std::ofstream(file) << kSecret << "\n";
   EXPECT_EQ(problem(), "");
   EXPECT_EQ(readSecret(file).size(), 32u);

@@ -402,6 +402,52 @@ TEST_F(MovingTest, CheckpointsHaveWhatChangesWhileASceneStandsStill) {
   EXPECT_EQ(directory.checkpointOf("moves").tick(), before.tick());
 }
 
+// A scene that becomes smaller must not fill the store.
+TEST_F(MovingTest, PartsOfLargerCheckpointsAreDeleted) {
+  telemetry::NatsMetrics metrics;
+  Nats nats(natsOptions(), metrics);
+  ASSERT_TRUE(eventually([&] { return nats.connected(); }));
+  Bucket checkpoints(nats, {.name = Directory::kCheckpoints});
+  const std::vector<std::string> old{"moves.0.1", "moves.0.2", "moves.1.1", "moves.1.2", "moves.1.3"};
+  for (const std::string& key : old) checkpoints.put(key, "old");
+  const auto remain = [&] {
+    return std::ranges::count_if(old,
+                                 [&](const std::string& key) { return checkpoints.get(key).has_value(); });
+  };
+  first_ = startOrigin();
+  ASSERT_THAT(first_->create("moves"), IsEmpty());
+  const Directory& directory = first_->origin->directory();
+  ASSERT_TRUE(eventually([&] { return directory.checkpointOf("moves").parts() > 0; }));
+  EXPECT_TRUE(eventually([&] { return remain() <= 3; })) << "those of the slot that was written";
+  EXPECT_TRUE(checkpoints.get("moves.0.0") || checkpoints.get("moves.1.0"));
+  EXPECT_THAT(first_->remove("moves"), IsEmpty());
+  EXPECT_TRUE(eventually([&] { return remain() == 0; }));
+  EXPECT_TRUE(eventually([&] { return !checkpoints.get("moves.0.0") && !checkpoints.get("moves.1.0"); }));
+}
+
+TEST_F(MovingTest, AMoveThatThrowsIsAnsweredAndCanBeRepeated) {
+  first_ = startOrigin();
+  second_ = startOrigin({.publicName = "second.example"});
+  ASSERT_THAT(first_->create("moves"), IsEmpty());
+  ASSERT_TRUE(
+      eventually([&] { return first_->owns("moves") && !first_->origin->directory().others().empty(); }));
+  // Clients are told of the move through their endpoint.
+  std::atomic<bool> fails = false;
+  first_->find("moves")->paused = true;  // no frames
+  const auto mailbox = std::make_shared<delivery::Mailbox>([&] {
+    if (fails.exchange(false)) throw std::runtime_error("as in a test");
+  });
+  telemetry::SceneMetrics metrics;
+  mailbox->subscribe(nullptr, {.rate = 60}, metrics);
+  first_->find("moves")->subscribers.add(mailbox);
+  fails = true;
+  EXPECT_THAT(first_->origin->move("moves").error(), HasSubstr("failed on this server: as in a test"));
+  EXPECT_FALSE(fails);
+  ASSERT_NE(first_->find("moves"), nullptr);
+  EXPECT_THAT(first_->origin->move("moves").error(), IsEmpty());
+  EXPECT_NE(second_->find("moves"), nullptr);
+}
+
 TEST_F(MovingTest, ANameIsGivenOnceInAFleet) {
   ASSERT_NO_FATAL_FAILURE(startTwo());
   ASSERT_TRUE(eventually([&] { return second_->origin->directory().isTaken("moves"); }));

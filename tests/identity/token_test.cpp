@@ -103,10 +103,11 @@ class TokenTest : public testing::Test {
   }
   // Token with these claims as JSON, signed by libjwt with any algorithm and bytes as key.
   static std::string custom(const std::string& json, const char* kid, jwt_alg_t algorithm,
-                            const std::string& key) {
+                            const std::string& key, const char* headers = "{}") {
     jwt_t* token = nullptr;
     jwt_new(&token);
     jwt_add_grants_json(token, json.c_str());
+    jwt_add_headers_json(token, headers);
     if (kid != nullptr) jwt_add_header(token, "kid", kid);
     jwt_set_alg(token, algorithm, reinterpret_cast<const unsigned char*>(key.data()),
                 static_cast<int>(key.size()));
@@ -189,6 +190,18 @@ TEST_F(TokenTest, RefusesUnknownOrMissingKey) {
   EXPECT_THAT(refusal(sign(other.make("old.pem"), claims)), HasSubstr("(kid)"));
   EXPECT_THAT(refusal(custom(R"({"aud": "clothstream"})", nullptr, JWT_ALG_HS256, "x")),
               HasSubstr("names no key (kid)"));
+}
+
+// RFC 7515 4.1.11
+TEST_F(TokenTest, RefusesExtensionsThatItMustUnderstand) {
+  const auto with = [&](const char* headers) {
+    return refusal(custom(R"({"aud": "clothstream", "exp": 1800000060})", "shared", JWT_ALG_HS256,
+                          keys_.at("shared").signing, headers));
+  };
+  EXPECT_EQ(with(R"({"other": 1})"), "accepted") << "headers that need not be understood are ignored";
+  for (const char* headers : {R"({"crit": ["exp"], "exp": 1})", R"({"crit": ["b64"], "b64": false})",
+                              R"({"crit": []})", R"({"crit": "x"})", R"({"crit": null})"})
+    EXPECT_THAT(with(headers), HasSubstr("requires an extension (crit)")) << headers;
 }
 
 TEST_F(TokenTest, RefusesWrongSignature) {
@@ -336,6 +349,17 @@ TEST(TokenKeyTest, RefusesKeysThatDoNotFit) {
   EXPECT_THAT(problem("empty.pem", ""), HasSubstr("no public or private key"));
   EXPECT_THAT(problem("a b.secret", std::string(32, 'x')), HasSubstr("1 to 64 characters"));
   EXPECT_THAT(problem("huge.secret", std::string(100'000, 'x')), HasSubstr("too large"));
+}
+
+TEST(TokenKeyTest, RefusesAFifoWithoutWaitingForItsWriter) {
+  const KeyDirectory directory;
+  ASSERT_EQ(::mkfifo((directory.path() / "fifo.pem").c_str(), S_IRUSR | S_IWUSR), 0);
+  try {
+    readTokenKeys(directory.path());
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr("fifo.pem"), HasSubstr("not a regular file")));
+  }
 }
 
 TEST(TokenKeyTest, RefusesOtherCurves) {

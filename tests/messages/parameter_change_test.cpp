@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Parameter changes of clients.
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -334,6 +335,75 @@ TEST_F(ToParameterChange, ChangesTheMessageWithAllParametersLikeTheScene) {
   const std::string before = all.DebugString();
   applyChange(message_, all);
   EXPECT_EQ(all.DebugString(), before);
+}
+
+// Cloths of several shapes, materials and solvers.
+model::Scene sceneOfManyCloths(int cloths) {
+  v1::Scene scene = smallScene();
+  constexpr const char* kMaterials[] = {"cotton", "silk", "wool"};
+  for (int i = 1; i < cloths; ++i) {
+    v1::Cloth& cloth = *scene.add_cloths();
+    cloth = scene.cloths(0);
+    cloth.set_name("sheet " + std::to_string(i));
+    cloth.mutable_grid()->set_width(2.0f + static_cast<float>(i % 3));
+    cloth.set_material(kMaterials[i % 3]);
+    cloth.set_drag(0.1f * static_cast<float>(i));
+    if (i % 4 == 0) cloth.mutable_solver()->mutable_implicit_euler()->set_iterations(5 + i);
+  }
+  return *toScene(scene);
+}
+
+v1::ParameterChange allParametersOf(const model::Scene& scene) {
+  std::vector<double> areas;
+  for (const model::Cloth& cloth : scene.cloths) areas.push_back(model::areaOf(cloth));
+  return allParameters(toMessage(scene), areas);
+}
+
+// Clients apply announcements to what they know.
+TEST_F(ToParameterChange, AnnouncedMaterialsLeadClientsToTheParametersOfTheScene) {
+  const auto announced = [&](const model::Scene& before) {
+    model::Scene after = before;
+    const auto change = toParameterChange(message_, before, model::StabilityBound(before));
+    ASSERT_TRUE(change) << change.error().text;
+    model::applyChange(after, *change);
+    v1::ParameterChange all = allParametersOf(before);
+    applyChange(withMaterials(message_, after), all);
+    EXPECT_EQ(all.DebugString(), allParametersOf(after).DebugString()) << message_.DebugString();
+  };
+  const model::Scene scene = sceneOfManyCloths(9);
+  for (const model::Material& material : model::materials()) {
+    message_.Clear();
+    message_.add_cloths()->set_material(std::string(material.name));
+    announced(scene);
+    message_.mutable_cloths(0)->set_name("sheet 3");
+    announced(scene);
+    message_.add_cloths()->set_material("silk");
+    message_.mutable_cloths(1)->set_drag(0.3f);
+    message_.mutable_cloths(1)->mutable_bend();
+    announced(scene);
+    v1::ClothChange& last = *message_.add_cloths();
+    last.set_name("sheet 1");
+    last.set_friction(2);
+    announced(scene);
+    last.set_material("wool");
+    announced(scene);
+  }
+}
+
+TEST_F(ToParameterChange, AnnouncementsOfMaterialsDoNotGrowWithTheScene) {
+  model::Scene scene = *toScene(smallScene());
+  const model::Cloth cloth = scene.cloths[0];
+  for (int i = 1; i < 256; ++i) {
+    scene.cloths.push_back(cloth);
+    scene.cloths.back().name = "sheet " + std::to_string(i);
+  }
+  message_.add_cloths()->set_material("denim");
+  model::Scene changed = scene;
+  model::applyChange(changed, *toParameterChange(message_, scene, model::StabilityBound(scene)));
+  EXPECT_LT(withMaterials(message_, changed).ByteSizeLong(), 150u);
+  message_.Clear();
+  message_.mutable_wind()->mutable_value();
+  EXPECT_EQ(withMaterials(message_, changed).DebugString(), message_.DebugString());
 }
 
 TEST_F(ToParameterChange, ChecksTheCombinedChange) {

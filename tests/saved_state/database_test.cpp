@@ -200,6 +200,36 @@ TEST(StateDatabase, OthersCannotReadItsFiles) {
   EXPECT_EQ(modeOf(database.file().string() + "-wal"), perms::owner_read | perms::owner_write);
 }
 
+TEST(StateDatabase, DoesNotFollowLinksOutOfTheStateDirectory) {
+  const e2e::TemporaryDirectory state, elsewhere;
+  const auto problem = [&] {
+    try {
+      const Database database({.directory = state.path() / "scenes"});
+      return std::string("opened");
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+  };
+  std::filesystem::create_directory_symlink(elsewhere.path(), state.path() / "scenes");
+  EXPECT_THAT(problem(), HasSubstr("scenes: is a symbolic link"));
+  EXPECT_TRUE(std::filesystem::is_empty(elsewhere.path()));
+  std::filesystem::remove(state.path() / "scenes");
+  std::filesystem::create_directory(state.path() / "scenes");
+  const auto target = elsewhere.path() / "of_others";
+  for (const bool exists : {false, true}) {
+    if (exists) std::ofstream(target) << "x";
+    std::filesystem::create_symlink(target, state.path() / "scenes/scenes.sqlite");
+    EXPECT_THAT(problem(), HasSubstr("scenes.sqlite: is a symbolic link"));
+    EXPECT_EQ(std::filesystem::exists(target), exists);
+    std::filesystem::remove(state.path() / "scenes/scenes.sqlite");
+  }
+  EXPECT_EQ(std::filesystem::file_size(target), 1u);
+  EXPECT_EQ(problem(), "opened");
+  // The state directory itself may be reached by a link.
+  std::filesystem::create_directory_symlink(state.path(), elsewhere.path() / "state");
+  const Database linked({.directory = elsewhere.path() / "state/scenes"});
+}
+
 TEST(StateDatabase, IsNotSharedByTwoServers) {
   const e2e::TemporaryDirectory directory;
   const Database database({.directory = directory.path() / "scenes"});

@@ -72,6 +72,17 @@ TEST_F(CertificateTest, SelfSignedNamesFaults) {
   }
 }
 
+TEST_F(CertificateTest, SelfSignedWritesOnlyIntoItsFolder) {
+  const fs::path others = file("others", "x");
+  fs::create_directory(in("elsewhere"));
+  fs::create_directory_symlink(in("elsewhere"), in("tls"));
+  EXPECT_THROW(selfSigned(in("tls"), {"localhost"}), std::runtime_error);
+  EXPECT_TRUE(fs::is_empty(in("elsewhere")));
+  fs::create_symlink(others, in("elsewhere") / "self.key.new");
+  EXPECT_THROW(selfSigned(in("elsewhere"), {"localhost"}), std::runtime_error);
+  EXPECT_EQ(fs::file_size(others), 1u);
+}
+
 TEST_F(CertificateTest, ReadsFilesAndNamesTheirFaults) {
   const Certificate one = selfSigned(in("one"), {"localhost"}), two = selfSigned(in("two"), {"localhost"});
   const fs::path chain = file("chain.pem", one.chain), key = file("key.pem", one.key);
@@ -84,7 +95,10 @@ TEST_F(CertificateTest, ReadsFilesAndNamesTheirFaults) {
   EXPECT_THAT(errorOf(chain, file("other.pem", two.key)),
               AllOf(HasSubstr("other.pem"), HasSubstr("not the key")));
   EXPECT_THAT(errorOf(file("huge.pem", std::string(2 << 20, 'x')), key), HasSubstr("too large"));
-  EXPECT_THAT(errorOf(in("one"), key), HasSubstr("no certificate")) << "a directory";
+  EXPECT_THAT(errorOf(in("one"), key), HasSubstr("not a regular file")) << "a directory";
+  ASSERT_EQ(::mkfifo(in("fifo.pem").c_str(), S_IRUSR | S_IWUSR), 0);
+  EXPECT_THAT(errorOf(in("fifo.pem"), key), HasSubstr("not a regular file"));
+  EXPECT_THAT(errorOf(chain, in("fifo.pem")), HasSubstr("not a regular file"));
 }
 
 TEST(FingerprintTest, AcceptsTheFormsThatPeopleWrite) {

@@ -34,7 +34,8 @@ struct GrpcEndpointContext {
   hosting::SceneServer& server;
   telemetry::ServerMetrics& metrics;
   const std::shared_ptr<CompletionLoop> loop;
-  // One connection may carry many streams, so streams and health watches are admitted like connections.
+  // One connection may carry many streams, so they are admitted like connections. `watches` are those of
+  // health and reflection.
   Admission streams, watches;
   AnswerBudget answers;
   // A call whose answer has not been read by then is cancelled.

@@ -14,10 +14,7 @@
 #include <absl/synchronization/mutex.h>
 #include <boost/asio/thread_pool.hpp>
 #include <grpc/compression.h>
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
-#include <grpcpp/impl/server_builder_option.h>
-#include <grpcpp/impl/server_builder_plugin.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
@@ -27,6 +24,7 @@
 #include "server/endpoint/grpc/call.h"
 #include "server/endpoint/grpc/credentials.h"
 #include "server/endpoint/grpc/health.h"
+#include "server/endpoint/grpc/reflection.h"
 #include "server/endpoint/grpc/service.h"
 #include "server/hosting/server_state.h"
 #include "server/session/session.h"
@@ -46,7 +44,6 @@ constexpr int kHandshakeTimeoutMs = 10'000;
 // Number of connections beyond the limit of streams. Streams on them are refused with the reason.
 constexpr std::size_t kAnsweredBeyondLimit = 64;
 constexpr std::size_t kMaxMemory = std::size_t{256} << 20;
-constexpr int kMaxThreads = 16;
 constexpr int kMaxStreamsPerConnection = 64;
 
 void configure(grpc::ServerBuilder& builder) {
@@ -68,18 +65,9 @@ void configure(grpc::ServerBuilder& builder) {
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   grpc::ResourceQuota quota("clothstream");
-  quota.Resize(kMaxMemory).SetMaxThreads(kMaxThreads);
+  quota.Resize(kMaxMemory);
   builder.SetResourceQuota(quota);
 }
-
-// Removes reflection from one server. gRPC adds it to every server of the process.
-class WithoutReflection final : public grpc::ServerBuilderOption {
- public:
-  void UpdateArguments(grpc::ChannelArguments*) override {}
-  void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
-    std::erase_if(*plugins, [](const auto& plugin) { return plugin->name() == "proto_server_reflection"; });
-  }
-};
 
 // Returns whether this gRPC has vulnerabilities by which a peer can end the process or exhaust its memory:
 // CVE-2023-1428, CVE-2023-33953, CVE-2023-4785 and CVE-2023-44487. Version 1.60 limits the last one.
@@ -95,15 +83,14 @@ bool isVulnerable() {
 struct GrpcEndpoint::State {
   Service service;
   HealthService health;
+  ReflectionService reflection;
   std::unique_ptr<Acceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
   std::optional<GrpcEndpointContext> context;
   boost::asio::thread_pool slowCalls{1};  // for calls that take longer than a frame may wait
 
   State(hosting::SceneServer& scenes, const GrpcEndpointOptions& options) {
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
-    if (!options.reflects) builder.SetOption(std::make_unique<WithoutReflection>());
     configure(builder);
     ConnectionLimits limits = options.connections;
     limits.connections = options.maxStreams + kAnsweredBeyondLimit;
@@ -115,6 +102,7 @@ struct GrpcEndpoint::State {
         scenes.state().metrics);
     builder.RegisterService(&service);
     builder.RegisterService(&health);
+    if (options.reflects) builder.RegisterService(&reflection);
     const auto loop = std::make_shared<CompletionLoop>(builder.AddCompletionQueue());
     server = builder.BuildAndStart();
     if (!server) throw std::runtime_error("gRPC cannot start a server");
@@ -128,6 +116,7 @@ struct GrpcEndpoint::State {
                                         .answerTimeout = options.answerTimeout});
     offerService(*context, service, slowCalls);
     offerHealth(*context, health);
+    if (options.reflects) offerReflection(*context, reflection);
     if (isVulnerable() && !acceptor->isLoopback())
       spdlog::warn(
           "gRPC {} has published weaknesses by which a peer can stop the server (SECURITY.md): listen on "

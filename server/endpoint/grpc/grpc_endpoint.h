@@ -24,15 +24,16 @@ struct GrpcEndpointOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = 50051;  // 0: a free port
   // Maximum number of open Join streams. Further ones end with RESOURCE_EXHAUSTED.
-  // The same holds for health watches.
+  // The same holds for health watches and streams of reflection together.
   std::size_t maxStreams = 256;
-  // Also for Join streams and for health watches, each. `connections` is ignored: it follows from maxStreams.
+  // Also for Join streams, and for health watches with streams of reflection. `connections` is ignored: it
+  // follows from maxStreams.
   ConnectionLimits connections{};
   // Memory of the answers that clients have not read yet, and the time after which their calls are cancelled.
   AnswerLimits answers{};
   std::chrono::milliseconds answerTimeout{10'000};
-  // Offers reflection, to everyone. Without it only clients that have session.proto can make calls.
-  bool reflects = true;
+  // Offers reflection. Without it only clients that have session.proto can make calls.
+  bool reflects = false;
   // Null: no TLS. Must outlive the endpoint.
   std::shared_ptr<const tls::ServerTls> tls{};
 };
@@ -41,8 +42,7 @@ struct GrpcEndpointOptions {
 // session finishes, its stream ends with the status that matches the last Error. A client that vanishes is
 // found within 5 s.
 //
-// The endpoint has one thread for all calls; only reflection runs on threads of gRPC. Create and destroy the
-// endpoint on one thread.
+// The endpoint has one thread for all calls. Create and destroy the endpoint on one thread.
 class GrpcEndpoint {
  public:
   // Listens when it returns. `server` must outlive the endpoint. Throws std::runtime_error with advice if the

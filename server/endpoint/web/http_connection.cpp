@@ -10,6 +10,7 @@
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 
+#include "server/endpoint/web/request_body.h"
 #include "server/endpoint/web/web_socket_stream.h"
 #include "server/hosting/server_state.h"
 
@@ -111,7 +112,7 @@ void HttpConnection::onHeader(beast::error_code error) {
   if (error) return;
   if (beyondLimit_)
     return refuse(http::status::service_unavailable, "The server has no free connection; try again later.\n");
-  if (parser_->chunked() || parser_->content_length().value_or(0) > 0)
+  if (mayHaveBody(*parser_))
     return refuse(http::status::payload_too_large, "Requests must not have a body.\n");
   if (!endpoint_.names.contains(view(parser_->get()[http::field::host])))
     return refuse(

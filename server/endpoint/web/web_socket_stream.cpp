@@ -122,8 +122,21 @@ void WebSocketStream::onAccepted(beast::error_code error) {
   };
   session_ =
       session::Session::open(endpoint_.server, arrivalOf(beast::get_lowest_layer(socket_)), std::move(wake));
+  socket_.next_layer().limitFrames([&io = endpoint_.io, weak = weak_from_this()] {
+    boost::asio::post(io, [weak] {
+      if (const auto self = weak.lock()) self->attempt([&] { self->refuseFrames(); });
+    });
+  });
   read();
   pump();
+}
+
+void WebSocketStream::refuseFrames() {
+  if (closing_) return;
+  telemetry::ServerMetrics& metrics = endpoint_.server.state().metrics;
+  metrics.refuse(telemetry::Refusal::messageRate);
+  metrics.droppedConnections.add();
+  close({ws::close_code::policy_error, "too many WebSocket frames: send at most 2000 small ones per second"});
 }
 
 void WebSocketStream::read() {

@@ -42,6 +42,8 @@ class WebSocketStream : public std::enable_shared_from_this<WebSocketStream> {
   auto handler(void (WebSocketStream::*next)(boost::beast::error_code));
   // Opens the session.
   void onAccepted(boost::beast::error_code error);
+  // Closes the connection of a client that sends too many frames, whatever their kind.
+  void refuseFrames();
   void read();
   void onRead(boost::beast::error_code error);
   void onPauseEnded(boost::beast::error_code cancelled);

@@ -126,5 +126,6 @@ std::span<const Attack> messageAttacks();
 std::span<const Attack> connectionAttacks();
 std::span<const Attack> identityAttacks();
 std::span<const Attack> clientAttacks();
+std::span<const Attack> endpointAttacks();
 
 }  // namespace clothstream::attack

@@ -80,6 +80,24 @@ TEST_F(MailboxTest, SendsRepliesThenDescriptionThenAnnouncementsThenFrames) {
   EXPECT_EQ(mailbox.next(now), key.message);
 }
 
+// Changes that others make again and again must not displace the frames.
+TEST_F(MailboxTest, FramesComeBetweenManyAnnouncements) {
+  join();
+  const std::size_t half = Mailbox::kMaxAnnouncedBytes / 2;
+  for (std::uint64_t tick = 1; tick <= 5; ++tick) {
+    for (int i = 0; i < 4; ++i) mailbox.announce(bytes(half));
+    const PublishedFrame next = frame(tick, tick == 1);
+    mailbox.deliver(next);
+    EXPECT_EQ((*mailbox.next(now))->size(), half);
+    EXPECT_EQ((*mailbox.next(now))->size(), half);
+    EXPECT_EQ(mailbox.next(now), next.message);
+    EXPECT_TRUE(mailbox.acknowledge(tick, now));
+  }
+  int rest = 0;
+  while (mailbox.next(now)) ++rest;
+  EXPECT_EQ(rest, 10) << "without a frame they are sent at once";
+}
+
 TEST_F(MailboxTest, StartsWithAKeyFrame) {
   join();
   mailbox.deliver(frame(5));

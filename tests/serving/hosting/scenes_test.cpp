@@ -130,7 +130,7 @@ TEST_F(ScenesTest, LimitsPausesAndResetsOfOneParticipant) {
   v1::ControlSceneRequest request;
   request.set_paused(false);
   std::string text;
-  for (int i = 0; i <= 10 * scene::LiveScene::kChangesOfParticipantPerSecond && text.empty(); ++i)
+  for (int i = 0; i <= 10 * scene::ChangeLimits::kOfParticipantPerSecond && text.empty(); ++i)
     if (const auto controlled = server().state().controlScene(request, 1); !controlled)
       text = controlled.error().text();
   EXPECT_EQ(

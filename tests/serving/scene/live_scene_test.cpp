@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/serving/small_scene.h"
@@ -85,12 +86,11 @@ Changes changeUntilRefused(LiveScene& live, std::uint64_t participant) {
 TEST(LiveScene, LimitsChangesOfOneParticipantSoThatOthersHaveTheirs) {
   LiveScene live(smallScene());
   const Changes first = changeUntilRefused(live, 1);
-  EXPECT_GE(first.accepted, static_cast<int>(LiveScene::kChangesOfParticipantPerSecond));
+  EXPECT_GE(first.accepted, static_cast<int>(ChangeLimits::kOfParticipantPerSecond));
   EXPECT_EQ(
       first.refused,
       "parameterChange: too many changes of 'small' by one participant in one second; send it again later");
-  EXPECT_GE(changeUntilRefused(live, 2).accepted,
-            static_cast<int>(LiveScene::kChangesOfParticipantPerSecond));
+  EXPECT_GE(changeUntilRefused(live, 2).accepted, static_cast<int>(ChangeLimits::kOfParticipantPerSecond));
 }
 
 TEST(LiveScene, LimitsChangesPerSecondOfAllParticipants) {
@@ -103,8 +103,56 @@ TEST(LiveScene, LimitsChangesPerSecondOfAllParticipants) {
     refused = changes.refused;
     if (refused.find("by one participant") == std::string::npos) break;
   }
-  EXPECT_GE(accepted, static_cast<int>(LiveScene::kChangesPerSecond));
+  EXPECT_GE(accepted, static_cast<int>(ChangeLimits::kPerSecond));
   EXPECT_EQ(refused, "parameterChange: too many changes of 'small' in one second; send it again later");
+}
+
+// Everyone in the scene gets the announcement of a change.
+TEST(LiveScene, LimitsTheBytesOfChangesPerSecond) {
+  LiveScene live(smallScene());
+  v1::ParameterChange change;
+  for (int i = 0; i < 256; ++i) {
+    v1::ClothChange& cloth = *change.add_cloths();
+    cloth.set_name(live.start().cloths[0].name);
+    cloth.set_drag(1);
+    cloth.mutable_structural()->set_stiffness(1);
+  }
+  const auto most =
+      static_cast<int>(ChangeLimits::kOfParticipantBurstBytes / static_cast<double>(change.ByteSizeLong()));
+  ASSERT_LT(most, static_cast<int>(ChangeLimits::kOfParticipantPerSecond));
+  int accepted = 0;
+  messages::Result<void> result;
+  Inputs applied;
+  while (accepted < 1000 && (result = live.change(1, change))) {
+    ++accepted;
+    live.inbox.drain(applied);
+  }
+  EXPECT_GE(accepted, most);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(result.error().text, testing::HasSubstr("too many bytes of changes of 'small' by one"));
+  EXPECT_TRUE(live.change(2, change)) << "others have their share";
+}
+
+TEST(ChangeLimits, CountsNumberAndBytesOfEachParticipantAndOfAll) {
+  using Exceeded = ChangeLimits::Exceeded;
+  ChangeLimits limits;
+  Clock::time_point now = Clock::time_point(std::chrono::hours(1));
+  const auto bytes = static_cast<std::size_t>(ChangeLimits::kOfParticipantBurstBytes);
+  EXPECT_EQ(limits.countBytes(1, bytes, now), Exceeded::nothing);
+  EXPECT_EQ(limits.countBytes(1, 1, now), Exceeded::byParticipant);
+  EXPECT_EQ(limits.countBytes(2, bytes, now), Exceeded::nothing);
+  EXPECT_EQ(limits.countBytes(3, 1, now), Exceeded::byAll);
+  for (int i = 0; i < static_cast<int>(ChangeLimits::kOfParticipantPerSecond); ++i)
+    EXPECT_EQ(limits.count(1, now), Exceeded::nothing);
+  EXPECT_EQ(limits.count(1, now), Exceeded::byParticipant);
+  now += std::chrono::seconds(1);
+  EXPECT_EQ(limits.count(1, now), Exceeded::nothing);
+  const auto perSecond = static_cast<std::size_t>(ChangeLimits::kOfParticipantBytesPerSecond);
+  EXPECT_EQ(limits.countBytes(1, perSecond, now), Exceeded::nothing);
+  EXPECT_EQ(limits.countBytes(1, 100, now), Exceeded::byParticipant);
+  now += std::chrono::hours(1);
+  EXPECT_EQ(limits.countBytes(1, 100 * bytes, now), Exceeded::nothing) << "one change is never too large";
 }
 
 TEST(LiveScene, BecomesAGuestWhileItCostsMoreThanAtItsStart) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What the page says where the browser or the device lacks something. Pure; failure_card shows it.
 
-import type { Failure } from "./failure";
+import { kReload, type Failure } from "./failure";
 
-export const kReload = { label: "Reload the page", action: "reload" } as const;
 const kClose = { label: "Close", action: "close" } as const;
 
 export const kNoWebGl: Failure = {

@@ -2,7 +2,6 @@
 // What the page says about a failure: what happened and what to do. Pure; failure_card shows it.
 
 import { ErrorCode, type SessionState } from "@clothstream/client";
-import { kReload } from "./advice";
 
 // Action of a button of a failure.
 export type FailureAction = "connect" | "join" | "default" | "reload" | "view" | "close";
@@ -36,6 +35,7 @@ const kFullMs = 10_000;
 // Time for which a server takes no more codes (docs/identity.md), ms.
 const kLockoutMs = 60_000;
 
+export const kReload = { label: "Reload the page", action: "reload" } as const;
 const kJoin = { label: "Join again", action: "join" } as const;
 const kDefault = { label: "Join the default scene", action: "default" } as const;
 
