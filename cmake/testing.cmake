@@ -24,21 +24,8 @@ target_precompile_headers(clothstream_test_header PRIVATE <gmock/gmock.h> <gtest
 
 # Tests of three tiers. `./dev test` runs the first, which shows within minutes whether everything works. `thorough` is the
 # second, at larger sizes and with more scenes, and `long` the third, with other platforms and runs of many minutes. A test
-# has the label of its tier; what the second and third need is not in the target `all`.
-add_custom_target(thorough_tests)
-add_custom_target(long_tests)
-
-# clothstream_build_for_tier(TARGET LABELS label...): leaves the target out of `all` if the labels contain a later tier.
-function(clothstream_build_for_tier target)
-  cmake_parse_arguments(ARG "" "" "LABELS" ${ARGN})
-  foreach(tier long thorough)
-    if(tier IN_LIST ARG_LABELS)
-      set_target_properties(${target} PROPERTIES EXCLUDE_FROM_ALL ON)
-      add_dependencies(${tier}_tests ${target})
-      return()
-    endif()
-  endforeach()
-endfunction()
+# of a later tier has its label. The target quick_tests is what the first tier needs, `all` what all need.
+add_custom_target(quick_tests)
 
 # clothstream_test(NAME LABELS label... SOURCES file... LIBRARIES target...): adds a GoogleTest program. Each of its suites
 # is one ctest test with these labels (cmake/add_suites.cmake); the label `gpu` switches Vulkan validation on. A suite whose
@@ -54,7 +41,9 @@ function(clothstream_test name)
   if("gpu" IN_LIST ARG_LABELS)
     list(APPEND environment "CLOTHSTREAM_VALIDATION=1")
   endif()
-  clothstream_build_for_tier(${name} LABELS ${ARG_LABELS})
+  if(NOT ARG_LABELS MATCHES "thorough|long")
+    add_dependencies(quick_tests ${name})
+  endif()
   set(suites ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
   file(GENERATE OUTPUT ${suites} CONTENT "set(name ${name})
 set(program $<TARGET_FILE:${name}>)
