@@ -43,8 +43,8 @@ function(clothstream_compile_lightly target)
   endif()
   if(TARGET clothstream_header)
     target_precompile_headers(${target} REUSE_FROM clothstream_header)
-    target_compile_options(${target} PRIVATE $<$<STREQUAL:$<TARGET_PROPERTY:${target},TYPE>,EXECUTABLE>:-fPIC>) # as the header
-    # The header is only valid with the macros with which it was compiled.
+    # The header is only valid with the options and macros with which it was compiled. gRPC and Avahi require -pthread.
+    target_compile_options(${target} PRIVATE -pthread $<$<STREQUAL:$<TARGET_PROPERTY:${target},TYPE>,EXECUTABLE>:-fPIC>)
     target_compile_definitions(${target} PRIVATE
       $<TARGET_PROPERTY:clothstream_network,INTERFACE_COMPILE_DEFINITIONS>)
   endif()

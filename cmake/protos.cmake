@@ -18,6 +18,7 @@ foreach(name IN LISTS protoNames)
 endforeach()
 add_library(clothstream_protos STATIC ${messageSources})
 set_target_properties(clothstream_protos PROPERTIES UNITY_BUILD OFF) # generated files repeat names
+target_compile_options(clothstream_protos PRIVATE $<$<CONFIG:Release>:-O1>) # half of the time of -O3
 target_include_directories(clothstream_protos SYSTEM PUBLIC ${protoOut})
 # Programs with the property CLOTHSTREAM_STATIC_PROTOBUF link protobuf statically. They cannot use gRPC, which links the
 # shared library.
