@@ -19,7 +19,7 @@ using schedule::Clock;
 constexpr int kMost = static_cast<int>(FrameMeter::kSmallFramesAtOnce);
 
 // A masked frame; first byte 0x80 | opcode with FIN, opcode without it.
-std::string frame(unsigned char first, std::size_t payload) {
+std::string frame(int first, std::size_t payload) {
   std::string bytes(1, static_cast<char>(first));
   const auto add = [&](std::uint64_t number, int size) {
     while (size-- > 0) bytes += static_cast<char>(number >> 8 * size & 0xff);
@@ -36,11 +36,11 @@ bool add(FrameMeter& meter, const std::string& bytes, Clock::time_point now = {}
 }
 
 TEST(FrameMeter, CountsEveryKindOfSmallFrame) {
-  for (const unsigned char first : {0x82, 0x00, 0x02, 0x89, 0x8A, 0x88})
+  for (const int first : {0x82, 0x00, 0x02, 0x89, 0x8A, 0x88})
     for (const std::size_t payload : {0, 1, 125, 126, 1023}) {
       FrameMeter meter;
       for (int i = 0; i < kMost; ++i) ASSERT_TRUE(add(meter, frame(first, payload))) << i;
-      EXPECT_FALSE(add(meter, frame(first, payload))) << int{first} << " " << payload;
+      EXPECT_FALSE(add(meter, frame(first, payload))) << first << " " << payload;
       EXPECT_TRUE(meter.exceeded());
     }
 }
