@@ -33,8 +33,8 @@ struct Claims {
 std::string sign(const TokenKey& key, const Claims& claims);
 
 // Returns the identity that a token proves at the time `now`, or UNAUTHENTICATED and which check failed:
-// size, form, crit, kid, algorithm, signature, audience, time, or the type of a claim. The algorithm follows from
-// the key alone. The text never contains the token.
+// size, form, crit, kid, algorithm, signature, audience, time, or the type of a claim. The algorithm follows
+// from the key alone. The text never contains the token.
 [[nodiscard]] messages::Result<Identity> check(const std::string& token, const TokenKeys& keys,
                                                const std::string& audience, WallClock::time_point now);
 

@@ -23,6 +23,12 @@ constexpr unsigned kLogSeconds = 1;  // for the last line of the log
   std::_Exit(1);
 }
 
+// SIGALRM ends the process soon after this time, even if the guard itself is blocked by a log that nobody
+// reads.
+void endAtLatest(std::chrono::nanoseconds time) {
+  ::alarm(static_cast<unsigned>(std::chrono::ceil<std::chrono::seconds>(time).count()) + kLogSeconds);
+}
+
 }  // namespace
 
 StartGuard::StartGuard(const Signals& signals, std::chrono::nanoseconds drain)
@@ -31,6 +37,7 @@ StartGuard::StartGuard(const Signals& signals, std::chrono::nanoseconds drain)
           const bool signalled = signals.waitForEnd(kGuardInterval);
           if (signalled && stopAt_) endNow("another signal came");
           if (signalled) {
+            endAtLatest(drain);
             spdlog::info("stopping when the start is complete, or after {} s (--drain)",
                          std::chrono::duration<double>(drain).count());
             stopAt_ = std::chrono::steady_clock::now() + drain;

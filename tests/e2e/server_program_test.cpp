@@ -585,7 +585,8 @@ TEST_F(ServerOptions, NamesTheLineOfASyntaxError) {
   refuses("port = [1, 2]\n", "2: port: use one value, not an array");
   refuses("stop = 2026-01-01\n", "2: stop: use a string, a number, true, false, or an array of these");
   refuses("allow-origin = [\n\"a\"\n", "3: ");
-  expectError(run({"--config", "/nowhere/server.toml"}), "--config: /nowhere/server.toml cannot be read: No such file or directory");
+  expectError(run({"--config", "/nowhere/server.toml"}),
+              "--config: /nowhere/server.toml cannot be read: No such file or directory");
 }
 
 TEST_F(ServerOptions, CommandsUseSourcesForOptionsThatTheyShare) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The real clothstream-server with TLS, and `clothstream` as its client.
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -124,8 +125,10 @@ TEST_F(TlsProgram, EndsAlthoughNobodyWritesIntoTheFifoOfItsCertificate) {
   std::filesystem::remove(key());
   ASSERT_EQ(::mkfifo(key().c_str(), 0600), 0);
   server_->signal(SIGHUP);
-  EXPECT_TRUE(eventually(
-      [&] { return server_->errors().find("key.pem: is not a regular file") != std::string::npos; }));
+  EXPECT_TRUE(eventually([&] {
+    server_->waitForEnd(std::chrono::milliseconds(10));  // reads what it prints
+    return server_->errors().find("key.pem: is not a regular file") != std::string::npos;
+  }));
   stopServer();
   server_.reset();
 }

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Scenes that move between servers, and scenes of a server that is gone.
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <future>
 #include <map>
+#include <memory>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,6 +15,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/delivery/mailbox.h"
 #include "server/fleet/bucket.h"
 #include "server/fleet/conversation.h"
 #include "server/fleet/message_bytes.h"

@@ -9,6 +9,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "proto/tls/fingerprint.h"
 #include "server/tls/qr_code.h"

@@ -55,37 +55,60 @@ int openWebSocket(const Target& target) {
   return -1;
 }
 
-// Masked frames of a kind, repeated.
-std::string frames(int kind) {
-  constexpr std::size_t kBytes = 256 * 1024;
-  const std::string ping("\x89\x80mask", 6), pong("\x8a\x80mask", 6), fragment("\x00\x80mask", 6),
-      fullPong = std::string("\x8a\xfdmask", 6) + std::string(125, 'x');
-  const std::array<const std::string*, 4> kinds{&ping, &pong, &fragment, &fullPong};
-  const std::string& frame = *kinds[static_cast<std::size_t>(kind) % kinds.size()];
-  std::string all = &frame == &fragment ? std::string("\x02\x80mask", 6) : "";
-  while (all.size() < kBytes) all += frame;
-  return all;
-}
+// Masked frames without end.
+class FrameFlood {
+ public:
+  // Pings, pongs, empty fragments of a message, or pongs with payload.
+  explicit FrameFlood(int kind) {
+    constexpr std::size_t kBytes = 256 * 1024;
+    const std::array<std::string, 4> kinds{std::string("\x89\x80mask", 6), std::string("\x8a\x80mask", 6),
+                                           std::string("\x00\x80mask", 6),
+                                           std::string("\x8a\xfdmask", 6) + std::string(125, 'x')};
+    const std::string& frame = kinds[static_cast<std::size_t>(kind) % kinds.size()];
+    // The message that the fragments belong to.
+    if (frame[0] == 0) first_ = std::string("\x02\x80mask", 6);
+    while (frames_.size() < kBytes) frames_ += frame;
+  }
+
+  // Sends as much as there is room for. Returns the number of bytes, or -1 at the end of the connection.
+  ssize_t send(int file) {
+    const std::string& bytes = first_.empty() ? frames_ : first_;
+    const ssize_t sent = ::send(file, bytes.data() + at_, bytes.size() - at_, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent < 0) return errno == EAGAIN ? 0 : -1;
+    at_ += static_cast<std::size_t>(sent);
+    if (at_ < bytes.size()) return sent;
+    at_ = 0;
+    first_.clear();
+    return sent;
+  }
+
+ private:
+  std::string first_, frames_;
+  std::size_t at_ = 0;
+};
 
 std::string floodFrames(const Target& target) {
+  constexpr const char* kReason = "too many WebSocket frames";
+  constexpr std::size_t kKept = 200;
   std::atomic<std::uint64_t> bytes = 0, closed = 0, opened = 0;
+  const auto end = Clock::now() + target.time;
   flood(target, [&](int i) {
     const int file = openWebSocket(target);
     if (file < 0) return std::this_thread::sleep_for(50ms);
     ++opened;
-    const std::string flooding = frames(i);
-    std::string answers;
+    FrameFlood frames(i);
+    std::string answers;  // the newest bytes
     bool ended = false;
-    while (!ended) {
-      const ssize_t sent = ::send(file, flooding.data(), flooding.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    while (!ended && Clock::now() < end) {
+      const ssize_t sent = frames.send(file);
       if (sent > 0) bytes += static_cast<std::uint64_t>(sent);
-      // Pongs of the server end with the reason.
-      for (std::string more = received(file, 1ms); !more.empty(); more = received(file, 0ms))
-        answers = answers.substr(answers.size() - std::min<std::size_t>(answers.size(), 100)) + more;
-      ended = answers.find("too many WebSocket frames") != std::string::npos || (sent < 0 && errno != EAGAIN);
-      if (opened > 1000) ended = true;
+      for (std::string more = received(file, 1ms); !more.empty(); more = received(file, 0ms)) {
+        answers += more;
+        answers = answers.substr(answers.size() - std::min(answers.size(), kKept));
+      }
+      ended = sent < 0 || answers.find(kReason) != std::string::npos;
     }
-    if (answers.find("too many WebSocket frames") != std::string::npos) ++closed;
+    if (answers.find(kReason) != std::string::npos) ++closed;
     ::close(file);
     std::this_thread::sleep_for(50ms);
   });
@@ -120,7 +143,6 @@ std::string floodReflection(const Target& target) {
       }
     });
     while (stream->Read(&response)) bytes += response.ByteSizeLong();
-    context.TryCancel();
     writer.join();
     const grpc::Status status = stream->Finish();
     const std::lock_guard lock(mutex);
@@ -247,12 +269,12 @@ std::string changeMaterials(const Target& target) {
   grpc::ClientContext context;
   const auto viewer = stub->Join(&context);
   viewer->Write(helloTo("wardrobe"));
-  std::atomic<std::uint64_t> changes = 0, changeBytes = 0, frames = 0;
+  std::atomic<std::uint64_t> changes = 0, changeBytes = 0, framesSeen = 0;
   std::jthread reader([&] {
     v1::ServerMessage message;
     while (viewer->Read(&message)) {
       if (message.has_frame()) {
-        ++frames;
+        ++framesSeen;
         v1::ClientMessage acknowledge;
         acknowledge.mutable_frame_ack()->set_tick(message.frame().tick());
         viewer->Write(acknowledge);
@@ -275,7 +297,7 @@ std::string changeMaterials(const Target& target) {
   reader.join();
   const std::uint64_t perChange = changeBytes / std::max<std::uint64_t>(changes, 1);
   return fmt::format("{} B for each change{}; {} changes, {} frames", perChange,
-                     perChange > 500 ? ", which is too much" : "", changes.load(), frames.load());
+                     perChange > 500 ? ", which is too much" : "", changes.load(), framesSeen.load());
 }
 
 constexpr Attack kAttacksEndpoint[] = {
