@@ -25,6 +25,7 @@
 #include "clients/cli/motion_commands.h"
 #include "clients/cli/participant_commands.h"
 #include "clients/cli/presence.h"
+#include "clients/cli/print.h"
 #include "clients/cli/recording_commands.h"
 #include "clients/cli/saved_token.h"
 #include "clients/cli/scene.h"
@@ -111,8 +112,8 @@ struct TrustOptions {
     };
     if (isatty(STDIN_FILENO) == 0)
       return refused("If the server prints the same, use it with --fingerprint.");
-    fmt::print(stderr, "The server at {} has the key\n  {}\nDoes the server print the same key? [y/N] ",
-               server.address, *shown);
+    print(stderr, "The server at {} has the key\n  {}\nDoes the server print the same key? [y/N] ",
+          server.address, *shown);
     std::string answer;
     std::getline(std::cin, answer);
     if (answer != "y" && answer != "Y" && answer != "yes") return refused("It is not trusted.");
@@ -330,7 +331,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "clothstream: %s\n", error.what());
+    print(stderr, "clothstream: {}\n", error.what());
     return kFailed;
   }
 }
