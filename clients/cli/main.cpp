@@ -204,7 +204,7 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 3));
   joinCommand
       .add_option("--max-vertices", joinOptions.maxVertices,
-                  "Most vertices to accept from the server; twice as many triangles. Default: 4194304")
+                  "Most vertices to accept from the server; twice as many triangles. Default: 1048576")
       ->check(CLI::Range(1, 67'108'864));
   joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
                        "End when the connection is lost. Default: try to reconnect for a minute");

@@ -23,7 +23,7 @@ inline void put(std::string_view lines) {
   put(stdout, lines);
 }
 
-// Shows a line in place of the one that was shown before, on a terminal. An empty line removes it.
+// Replaces the last line on a terminal. An empty line removes it.
 inline void showStatus(std::FILE* stream, std::string_view line) {
   std::fputs("\r\033[K", stream);
   put(stream, printable(line));
