@@ -21,6 +21,10 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
       ->add_option("--max-vertices", recordOptions_.maxVertices,
                    "Most vertices to accept from the server; twice as many triangles. Default: 1048576")
       ->check(CLI::Range(1u, codec::kMaxVertices));
+  record_->add_flag(
+      "--full-quality", recordOptions_.fullQuality,
+      "End the recording with an error before the first frame that the server sends in a coarser "
+      "quality, because the connection or this machine is too slow for the finest one");
   record_->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
       ->capture_default_str();
 
