@@ -30,7 +30,7 @@ server/identity    | server/files server/scene server/schedule server/messages c
 server/saved_state | server/files server/scene server/model server/messages server/telemetry clothstream
 server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
-server/recording   | server/encode server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording clothstream
+server/recording   | server/encode server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording proto/text clothstream
 server/fleet       | server/session server/hosting server/saved_state server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
 server/agones      | server/hosting server/scene server/schedule
 server/events      | server/files proto/text server/scene server/schedule
@@ -43,8 +43,8 @@ server/endpoint/grpc | server/endpoint/listen server/tls server/session server/h
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/files proto/recording server/events server/hosting server/recording server/step server/scene server/model
-server/program     | server/agones server/events server/fleet proto/recording server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
-server/main.cpp    | server/program server/options server/telemetry
+server/program     | server/agones server/events server/fleet proto/recording proto/text server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
+server/main.cpp    | proto/text server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/touch | clients/core/core.h clients/core/wire proto/codec proto/hands
@@ -158,5 +158,9 @@ $includes" || failed=1
 edges=$(sed -nE 's/^([^:]+\.h):[0-9]+:#include "([^"]+\.h)".*/\2 \1/p' <<<"$includes")
 cycle=$(tsort <<<"$edges" 2>&1 >/dev/null | sed -n 's/^tsort: \(.*\.h\)$/\1/p' | tr '\n' ' ' || true)
 [ -z "$cycle" ] || complain "these headers include each other: $cycle"
+
+# Commands print text of servers and files. print.h escapes what could control a terminal.
+printing=$(grep -nE 'fmt::print\(|std::(cout|cerr|clog)|\b(printf|puts|putchar)\(' clients/cli/*.cpp clients/cli/*.h || true)
+[ -z "$printing" ] || complain "print through clients/cli/print.h: $printing"
 
 exit $failed

@@ -7,6 +7,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "proto/text/printable.h"
 #include "server/options/program_options.h"
 #include "server/program/commands.h"
 #include "server/program/signals.h"
@@ -57,7 +58,7 @@ int main(int argc, char** argv) {
     for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
     return run(options, signals);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "clothstream-server: %s\n", error.what());
+    std::fprintf(stderr, "clothstream-server: %s\n", printableLines(error.what()).c_str());
     return 1;
   }
 }

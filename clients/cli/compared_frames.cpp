@@ -30,24 +30,20 @@ class Frames {
   Frames(PlayedRecording played, std::vector<std::string>& damaged)
       : played_(std::move(played)), damaged_(damaged) {}
 
-  // Continues to the next frame. Returns false at the end.
+  // Continues to the next frame. Returns false at the end, after a note that counts all frames with faults.
   bool next() {
     for (;;) {
       const auto message = played_.next(CS_RECORDED_FRAME);
-      if (message && !*message) return false;
+      if (message && !*message) return end();
       if (message &&
-          frame_.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())))
-        break;
-      note(message ? "a frame cannot be read" : message.error());
-      if (cs_get_state(client()) == CS_STATE_FAILED) return false;
+          frame_.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size()))) {
+        tick_ = (*message)->tick;
+        return true;
+      }
+      if (damaged_.size() < kMaxDamages)
+        damaged_.push_back(message ? "a frame cannot be read" : message.error());
+      if (cs_get_state(client()) == CS_STATE_FAILED) return end();
     }
-    cs_statistics now;
-    cs_get_statistics(client(), 0, &now);
-    tick_ = now.tick;
-    if (now.hash_mismatches > mismatches_)
-      note(fmt::format("the frame of tick {} does not have its recorded hash", tick_));
-    mismatches_ = now.hash_mismatches;
-    return true;
   }
 
   std::uint64_t tick() const { return tick_; }
@@ -57,19 +53,20 @@ class Frames {
   const RecordingReader& reader() const { return played_.reader(); }
 
  private:
-  void note(std::string damage) {
-    if (damaged_.size() < kMaxDamages) damaged_.push_back(std::move(damage));
+  bool end() {
+    if (std::string faults = played_.faults().text(); !faults.empty()) damaged_.push_back(std::move(faults));
+    return false;
   }
 
   PlayedRecording played_;
   v1::Frame frame_;
   std::vector<std::string>& damaged_;
-  std::uint64_t tick_ = 0, mismatches_ = 0;
+  std::uint64_t tick_ = 0;
 };
 
-tl::expected<Frames, Error> open(const std::string& path, double& maxError,
-                                 std::vector<std::string>& damaged) {
-  auto reader = orError(kUnreadable, RecordingReader::open(path, CutFiles::read));
+tl::expected<Frames, Error> open(const std::string& path, const recording::ReadLimits& limits,
+                                 double& maxError, std::vector<std::string>& damaged) {
+  auto reader = orError(kUnreadable, RecordingReader::open(path, CutFiles::read, limits));
   if (!reader) return tl::unexpected(reader.error());
   if (!reader->mcap().indexed()) damaged.emplace_back("its end is missing or damaged");
   if (const auto checked = reader->check(); !checked && damaged.empty()) damaged.push_back(checked.error());
@@ -192,11 +189,12 @@ class Comparison {
 
 }  // namespace
 
-tl::expected<ComparedFrames, Error> compareFrames(const std::array<std::string, 2>& paths) {
+tl::expected<ComparedFrames, Error> compareFrames(const std::array<std::string, 2>& paths,
+                                                  const recording::ReadLimits& limits) {
   ComparedFrames result;
-  auto a = open(paths[0], result.maxError[0], result.damaged[0]);
+  auto a = open(paths[0], limits, result.maxError[0], result.damaged[0]);
   if (!a) return tl::unexpected(a.error());
-  auto b = open(paths[1], result.maxError[1], result.damaged[1]);
+  auto b = open(paths[1], limits, result.maxError[1], result.damaged[1]);
   if (!b) return tl::unexpected(b.error());
   if (auto same = haveTheSameCloths(*a, *b); !same) return tl::unexpected(same.error());
   const double length = static_cast<double>(a->reader().end() - a->reader().start()) * 1e-9;

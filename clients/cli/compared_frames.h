@@ -11,6 +11,7 @@
 #include <tl/expected.hpp>
 
 #include "clients/cli/error.h"
+#include "proto/recording/recording_reader.h"
 
 namespace clothstream::cli {
 
@@ -41,6 +42,7 @@ struct ComparedFrames {
 
 // Paths of the two recordings. An error means that there is nothing to compare: one cannot be read at all, or
 // they show different cloths.
-[[nodiscard]] tl::expected<ComparedFrames, Error> compareFrames(const std::array<std::string, 2>& paths);
+[[nodiscard]] tl::expected<ComparedFrames, Error> compareFrames(const std::array<std::string, 2>& paths,
+                                                                const recording::ReadLimits& limits);
 
 }  // namespace clothstream::cli

@@ -18,11 +18,13 @@ namespace {
 using recording::RecordingReader;
 using recording::Topic;
 
-// Messages of one topic in their order. Parts that cannot be read are left out.
+// Messages of one topic in their order. Chunks that cannot be read are left out; messages that cannot be read
+// are left out and counted.
 template <typename MessageType>
 class Journal {
  public:
-  Journal(RecordingReader& reader, Topic topic) : reader_(reader), topic_(topic) {}
+  Journal(RecordingReader& reader, Topic topic, std::uint64_t& unreadable)
+      : reader_(reader), topic_(topic), unreadable_(unreadable) {}
 
   // Continues to the next message. Returns false at the end.
   bool next() {
@@ -30,6 +32,7 @@ class Journal {
       while (next_ < found_.size()) {
         const std::string_view bytes = found_[next_++].bytes;
         if (message_.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return true;
+        ++unreadable_;
       }
       if (chunk_ == reader_.mcap().chunks().size()) return false;
       auto found = reader_.messages(chunk_++, topic_);
@@ -43,6 +46,7 @@ class Journal {
  private:
   RecordingReader& reader_;
   Topic topic_;
+  std::uint64_t& unreadable_;
   std::vector<recording::RecordedMessage> found_;
   std::size_t chunk_ = 0, next_ = 0;
   MessageType message_;
@@ -59,7 +63,8 @@ v1::RecordedTick inputOf(v1::RecordedTick tick) {
 }
 
 bool compareTicks(Readers& readers, ComparedInput& result) {
-  Journal<v1::RecordedTick> a(readers[0], Topic::ticks), b(readers[1], Topic::ticks);
+  Journal<v1::RecordedTick> a(readers[0], Topic::ticks, result.unreadable[0]),
+      b(readers[1], Topic::ticks, result.unreadable[1]);
   bool moreA = a.next(), moreB = b.next();
   while (moreA || moreB) {
     if (interrupted()) return false;
@@ -87,8 +92,8 @@ bool compareTicks(Readers& readers, ComparedInput& result) {
 
 // Compares messages in their order.
 template <typename MessageType>
-InputDifference compareInOrder(Readers& readers, Topic topic, const char* what) {
-  Journal<MessageType> a(readers[0], topic), b(readers[1], topic);
+InputDifference compareInOrder(Readers& readers, Topic topic, const char* what, ComparedInput& result) {
+  Journal<MessageType> a(readers[0], topic, result.unreadable[0]), b(readers[1], topic, result.unreadable[1]);
   for (std::uint64_t count = 0;; ++count) {
     const bool moreA = a.next(), moreB = b.next();
     if (!moreA && !moreB) return {};
@@ -105,10 +110,11 @@ InputDifference compareInOrder(Readers& readers, Topic topic, const char* what) 
 }
 
 // Compares what a decoder needs, and the definition of the scene.
-InputDifference compareScenes(Readers& readers) {
-  InputDifference difference = compareInOrder<v1::RecordedScene>(readers, Topic::scene, "scenes");
+InputDifference compareScenes(Readers& readers, ComparedInput& result) {
+  InputDifference difference = compareInOrder<v1::RecordedScene>(readers, Topic::scene, "scenes", result);
   if (!difference.text.empty()) return difference;
-  Journal<v1::StreamDescription> a(readers[0], Topic::description), b(readers[1], Topic::description);
+  Journal<v1::StreamDescription> a(readers[0], Topic::description, result.unreadable[0]),
+      b(readers[1], Topic::description, result.unreadable[1]);
   if (!a.next() || !b.next()) return {};
   // The number of the epoch says nothing about the scene.
   a.message().clear_epoch();
@@ -118,10 +124,11 @@ InputDifference compareScenes(Readers& readers) {
 
 }  // namespace
 
-tl::expected<ComparedInput, Error> compareInput(const std::array<std::string, 2>& paths) {
-  auto a = orError(kUnreadable, RecordingReader::open(paths[0], recording::CutFiles::read));
+tl::expected<ComparedInput, Error> compareInput(const std::array<std::string, 2>& paths,
+                                                const recording::ReadLimits& limits) {
+  auto a = orError(kUnreadable, RecordingReader::open(paths[0], recording::CutFiles::read, limits));
   if (!a) return tl::unexpected(a.error());
-  auto b = orError(kUnreadable, RecordingReader::open(paths[1], recording::CutFiles::read));
+  auto b = orError(kUnreadable, RecordingReader::open(paths[1], recording::CutFiles::read, limits));
   if (!b) return tl::unexpected(b.error());
   Readers readers{std::move(*a), std::move(*b)};
   ComparedInput result;
@@ -129,11 +136,11 @@ tl::expected<ComparedInput, Error> compareInput(const std::array<std::string, 2>
                                              readers[1].metadata(recording::kKernelsEntry));
   for (std::size_t i = 0; i < readers.size(); ++i)
     result.devices[i] = fmt::format("{} ({})", readers[i].metadata("device"), readers[i].metadata("driver"));
-  result.scene = compareScenes(readers);
+  result.scene = compareScenes(readers, result);
   result.parameters =
-      compareInOrder<v1::ParameterChanged>(readers, Topic::parameters, "changes of parameters");
+      compareInOrder<v1::ParameterChanged>(readers, Topic::parameters, "changes of parameters", result);
   result.participants =
-      compareInOrder<v1::ParticipantEvent>(readers, Topic::participants, "joins and leaves");
+      compareInOrder<v1::ParticipantEvent>(readers, Topic::participants, "joins and leaves", result);
   if (!compareTicks(readers, result)) return makeError(kFailed, "interrupted");
   return result;
 }

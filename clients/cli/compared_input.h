@@ -10,6 +10,7 @@
 #include <tl/expected.hpp>
 
 #include "clients/cli/error.h"
+#include "proto/recording/recording_reader.h"
 #include "proto/recording/verdict.h"
 
 namespace clothstream::cli {
@@ -29,9 +30,11 @@ struct ComparedInput {
   std::array<std::uint64_t, 2> onlyTicks{};     // ticks only in the first, only in the second
   std::uint64_t differentTicks = 0;             // ticks with another hash of the state
   std::optional<std::uint64_t> firstDifferent;  // the first of them
+  std::array<std::uint64_t, 2> unreadable{};    // messages that are not of their channel's type
 };
 
-// Parts that cannot be read are passed; compareFrames() notes them.
-[[nodiscard]] tl::expected<ComparedInput, Error> compareInput(const std::array<std::string, 2>& paths);
+// Chunks that cannot be read are passed; compareFrames() notes them.
+[[nodiscard]] tl::expected<ComparedInput, Error> compareInput(const std::array<std::string, 2>& paths,
+                                                              const recording::ReadLimits& limits);
 
 }  // namespace clothstream::cli

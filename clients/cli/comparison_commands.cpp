@@ -6,6 +6,8 @@
 #include <map>
 #include <string>
 
+#include "clients/cli/recording_limits.h"
+
 namespace clothstream::cli {
 namespace {
 
@@ -59,6 +61,7 @@ void ComparisonCommands::addDiff(CLI::App& app) {
       ->transform(length())
       ->check(CLI::NonNegativeNumber);
   diff_->add_flag("--json", diffOptions_.json, "Print one JSON object");
+  addLimits(*diff_, diffOptions_.limits);
 }
 
 void ComparisonCommands::addMeasure(CLI::App& app) {
@@ -80,6 +83,7 @@ void ComparisonCommands::addMeasure(CLI::App& app) {
                      "Leave out intersections, which take most of the time");
   CLI::Option* const json = measure_->add_flag("--json", json_, "Print one JSON object with every frame");
   measure_->add_flag("--csv", csv_, "Print a row for each frame and cloth")->excludes(json);
+  addLimits(*measure_, measureOptions_.limits);
 }
 
 void ComparisonCommands::addImport(CLI::App& app) {
@@ -115,6 +119,7 @@ void ComparisonCommands::addGolden(CLI::App& app) {
   golden_->add_option("--device", goldenOptions_.device,
                       "Vulkan device of the server: index or part of its name");
   golden_->add_flag("--json", goldenOptions_.json, "Print one JSON object");
+  addLimits(*golden_, goldenOptions_.limits);
 }
 
 ExitCode ComparisonCommands::run(const std::string& program) {

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "clients/cli/error.h"
+#include "clients/cli/print.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "clients/files/motion_file.h"
@@ -88,8 +89,8 @@ ExitCode decode(const DecodeOptions& options) {
   const auto figures = decodeFile(options);
   if (!figures) return printError(figures.error());
   const files::MotionShape& shape = figures->shape;
-  fmt::print("{}: {}x{} vertices, {} frames; {:.3f} ms to decode a frame, including normals\n", options.out,
-             shape.columns, shape.rows, shape.frames, figures->milliseconds / shape.frames);
+  print("{}: {}x{} vertices, {} frames; {:.3f} ms to decode a frame, including normals\n", options.out,
+        shape.columns, shape.rows, shape.frames, figures->milliseconds / shape.frames);
   return kOk;
 }
 

@@ -10,6 +10,8 @@
 #include "clients/cli/compared_frames.h"
 #include "clients/cli/compared_input.h"
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "proto/text/printable.h"
 
 namespace clothstream::cli {
@@ -137,19 +139,23 @@ std::string toJson(const Difference& difference, const DiffOptions& options) {
   if (const auto first = difference.firstTick()) json["firstDifferentTick"] = *first;
   if (frames.firstDifferent) json["first"] = toJson(frames.first);
   if (frames.largest.metres > 0) json["largest"] = toJson(frames.largest);
-  return json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n';
+  return jsonText(json, 1) + '\n';
 }
 
 }  // namespace
 
 ExitCode diff(const DiffOptions& options) {
   const std::array<std::string, 2> paths{options.a, options.b};
-  auto frames = compareFrames(paths);
+  auto frames = compareFrames(paths, options.limits);
   if (!frames) return printError(frames.error());
-  auto input = compareInput(paths);
+  auto input = compareInput(paths, options.limits);
   if (!input) return printError(input.error());
+  for (std::size_t i = 0; i < paths.size(); ++i)
+    if (input->unreadable[i] > 0)
+      frames->damaged[i].push_back(
+          fmt::format("{} messages of its input cannot be read", input->unreadable[i]));
   const Difference difference{std::move(*frames), std::move(*input), options.tolerance};
-  fmt::print("{}", options.json ? toJson(difference, options) : toText(difference, options));
+  put(options.json ? toJson(difference, options) : toText(difference, options));
   return exitCodeOf(difference.verdict());
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
+#include "proto/recording/recording_reader.h"
 
 namespace clothstream::cli {
 
@@ -12,6 +13,7 @@ struct DiffOptions {
   std::string a, b;      // recordings
   double tolerance = 0;  // largest distance of a vertex that counts as equal, metres; 0 compares bits
   bool json = false;
+  recording::ReadLimits limits{};
 };
 
 // Exit code of the verdict. SIGINT and SIGTERM must be blocked in every thread.

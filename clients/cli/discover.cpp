@@ -18,6 +18,8 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "proto/discovery/service.h"
 #include "proto/text/printable.h"
 #include "proto/tls/fingerprint.h"
@@ -159,12 +161,12 @@ class Search {
 
 void printText(const std::map<std::string, Server>& servers) {
   for (const auto& [name, server] : servers) {
-    fmt::print("{} ({})\n  page  {}\n  join  clothstream join {}\n", name, server.version, server.page(),
-               server.grpc());
-    if (!server.fingerprint.empty()) fmt::print("  key   {}\n", server.fingerprint);
+    print("{} ({})\n  page  {}\n  join  clothstream join {}\n", name, server.version, server.page(),
+          server.grpc());
+    if (!server.fingerprint.empty()) print("  key   {}\n", server.fingerprint);
   }
   if (servers.empty())
-    fmt::print("No server is announced in this network. A server announces itself with --announce on.\n");
+    print("No server is announced in this network. A server announces itself with --announce on.\n");
 }
 
 std::string json(const std::map<std::string, Server>& servers) {
@@ -175,7 +177,7 @@ std::string json(const std::map<std::string, Server>& servers) {
                      {"page", server.page()},
                      {"address", server.grpc()},
                      {"fingerprint", server.fingerprint}});
-  return array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return jsonText(array, 2);
 }
 
 }  // namespace
@@ -196,7 +198,7 @@ ExitCode DiscoverCommand::run() const {
   if (const std::string problem = search.run(limit); !problem.empty())
     return printError(kUnreachable, problem);
   if (json_)
-    fmt::print("{}\n", json(search.servers()));
+    put(json(search.servers()) + '\n');
   else
     printText(search.servers());
   return kOk;

@@ -12,6 +12,8 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "clients/files/motion_file.h"
@@ -106,7 +108,7 @@ struct EncodeFigures {
                                         {"promisedMaxErrorMm", 1e3 * promise()},
                                         {"encodeMs", encodeMs / shape.frames},
                                         {"decodeMs", decodeMs / shape.frames}};
-    return object.dump(2);
+    return jsonText(object, 2);
   }
 };
 
@@ -195,7 +197,7 @@ Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
 ExitCode encode(const EncodeOptions& options) {
   const auto figures = encodeFile(options);
   if (!figures) return printError(figures.error());
-  fmt::print("{}\n", options.json ? figures->json() : figures->text(options.out));
+  put((options.json ? figures->json() : figures->text(options.out)) + '\n');
   return kOk;
 }
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "clients/cli/json_text.h"
 #include "clients/cli/presence.h"
 #include "clients/native/native_client.h"
 
@@ -17,8 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string lineOf(const Json& object) {
-  // Names come from the server and may be invalid UTF-8.
-  return object.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+  return jsonText(object, -1) + '\n';
 }
 
 // Start of each event: its name and the time of the newest frame, in seconds since the first.

@@ -12,7 +12,9 @@
 #include "clients/cli/gltf_animation.h"
 #include "clients/cli/npz_export.h"
 #include "clients/cli/obj_file.h"
+#include "clients/cli/print.h"
 #include "clients/cli/progress.h"
+#include "clients/cli/recording_limits.h"
 #include "clients/cli/signals.h"
 #include "clients/recording/played_recording.h"
 #include "proto/recording/file.h"
@@ -26,7 +28,8 @@ using Done = tl::expected<void, Error>;
 using TakeFrame = std::function<Done(const cs_client*, double)>;
 
 tl::expected<PlayedRecording, Error> open(const ExportOptions& options) {
-  auto reader = orError(kUnreadable, recording::RecordingReader::open(options.recording));
+  auto reader = orError(kUnreadable, recording::RecordingReader::open(
+                                         options.recording, recording::CutFiles::refused, options.limits));
   if (!reader) return tl::unexpected(reader.error());
   auto played = PlayedRecording::open(std::move(*reader));
   if (!played) return makeError(kUnreadable, "{}: {}", options.recording, played.error());
@@ -45,7 +48,7 @@ tl::expected<std::uint32_t, Error> forEachFrame(const ExportOptions& options, Pl
   for (;;) {
     if (interrupted()) return makeError(kNotWritten, "interrupted; {} was not written", options.out);
     const auto more = played.next();
-    if (!more) return makeError(kUnreadable, "{}: {}", options.recording, more.error());
+    if (!more) return tl::unexpected(damageOf(played, options.recording, more.error()));
     if (!*more) break;
     const double now = played.seconds();
     if (now < options.from) continue;
@@ -130,7 +133,7 @@ ExitCode exportFrames(const ExportOptions& options) {
                       : gltf              ? writeGltf(options)
                                           : writeObjs(options);
   if (!frames) return printError(frames.error());
-  fmt::print("{}: {} frames\n", options.out, *frames);
+  print("{}: {} frames\n", options.out, *frames);
   return kOk;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
+#include "proto/recording/recording_reader.h"
 
 namespace clothstream::cli {
 
@@ -16,6 +17,7 @@ struct ExportOptions {
   std::optional<double> rate;  // most frames a second; absent: all for .npz, otherwise kDefaultExportRate
   double from = 0;             // seconds of the recording to skip
   std::optional<double> seconds;
+  recording::ReadLimits limits{};
 };
 
 inline constexpr double kDefaultExportRate = 24;

@@ -17,6 +17,8 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "clothstream/v1/fleet.pb.h"
 #include "proto/text/printable.h"
 
@@ -162,25 +164,24 @@ std::string json(const Directory& directory) {
                       {"server", idOf(scene.origin())},
                       {"created", scene.created()},
                       {"checkpointTick", scene.checkpoint().tick()}});
-  return nlohmann::ordered_json{{"servers", servers}, {"scenes", scenes}}.dump(
-      2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return jsonText(nlohmann::ordered_json{{"servers", servers}, {"scenes", scenes}}, 2);
 }
 
 void print(const Directory& directory) {
-  fmt::print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}\n", "SERVER", "VERSION", "NAME", "PARTICIPANTS",
-             "CREATED", "LOAD");
+  print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}\n", "SERVER", "VERSION", "NAME", "PARTICIPANTS", "CREATED",
+        "LOAD");
   for (const auto& [origin, server] : directory.servers)
-    fmt::print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}{}\n", idOf(origin), printable(server.server_name()),
-               server.public_name().empty() ? "-" : printable(server.public_name()), server.participants(),
-               fmt::format("{} of {}", server.created_scenes(), server.max_created_scenes()),
-               fmt::format("{:.2f} of {:.0f}", server.load(), server.max_load()),
-               !directory.isAlive(origin) ? "  gone"
-               : server.stopping()        ? "  stopping"
-                                          : "");
-  fmt::print("\n{:<32} {:<17} {}\n", "SCENE", "SERVER", "CREATED");
+    print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}{}\n", idOf(origin), printable(server.server_name()),
+          server.public_name().empty() ? "-" : printable(server.public_name()), server.participants(),
+          fmt::format("{} of {}", server.created_scenes(), server.max_created_scenes()),
+          fmt::format("{:.2f} of {:.0f}", server.load(), server.max_load()),
+          !directory.isAlive(origin) ? "  gone"
+          : server.stopping()        ? "  stopping"
+                                     : "");
+  print("\n{:<32} {:<17} {}\n", "SCENE", "SERVER", "CREATED");
   for (const auto& [name, scene] : directory.scenes)
-    fmt::print("{:<32} {:<17} {}{}\n", printable(name), idOf(scene.origin()), scene.created() ? "yes" : "no",
-               directory.isAlive(scene.origin()) ? "" : "  (its server is gone)");
+    print("{:<32} {:<17} {}{}\n", printable(name), idOf(scene.origin()), scene.created() ? "yes" : "no",
+          directory.isAlive(scene.origin()) ? "" : "  (its server is gone)");
 }
 
 }  // namespace
@@ -228,7 +229,7 @@ ExitCode FleetCommands::list(bool asJson) const {
   const Connection connection = connect(servers_, credentials_, authority_);
   const Directory directory = read(connection.get());
   if (asJson)
-    fmt::print("{}\n", json(directory));
+    put(json(directory) + '\n');
   else
     print(directory);
   return kOk;
@@ -264,8 +265,8 @@ ExitCode FleetCommands::move() const {
   if (!response.ParseFromArray(natsMsg_GetData(answered), natsMsg_GetDataLength(answered)))
     return printError(kLost, "the answer is not one");
   if (!response.error().empty()) return printError(kRefused, fmt::format("{}: {}", scene_, response.error()));
-  fmt::print("{} is at server {} now; it stood still for {:.0f} ms\n", printable(scene_), idOf(response.to()),
-             response.gap() * 1000);
+  print("{} is at server {} now; it stood still for {:.0f} ms\n", printable(scene_), idOf(response.to()),
+        response.gap() * 1000);
   return kOk;
 }
 

@@ -13,6 +13,8 @@
 #include "clients/cli/child_program.h"
 #include "clients/cli/error.h"
 #include "clients/cli/golden_manifest.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "clients/cli/signals.h"
 #include "proto/text/printable.h"
 
@@ -87,7 +89,7 @@ class Check {
       add(name, Verdict::missing, "the file does not exist");
       return {};
     }
-    const auto now = readGolden(path);
+    const auto now = readGolden(path, options_.limits);
     if (!now) {
       add(name, Verdict::missing, now.error());
       return {};
@@ -104,7 +106,8 @@ class Check {
   }
 
   tl::expected<void, Error> simulate(const std::string& name, const std::string& path) {
-    std::vector<std::string> command{server_, "resimulate", path, "--json"};
+    std::vector<std::string> command{server_,  "resimulate",     path,
+                                     "--json", "--max-vertices", fmt::format("{}", options_.limits.vertices)};
     if (!options_.device.empty()) command.insert(command.end(), {"--device", options_.device});
     const auto ended = runProgram(command);
     if (!ended) return makeError(kFailed, "{}; name the server with --server", ended.error());
@@ -142,8 +145,8 @@ void print(const std::vector<Checked>& checked, const GoldenOptions& options) {
   const Verdict worst = worstOf(checked);
   if (!options.json) {
     for (const Checked& one : checked)
-      fmt::print("{:<14}{}: {}\n", nameOf(one.verdict), printable(one.name), printable(one.text));
-    fmt::print("{} recordings: {}\n", checked.size(), nameOf(worst));
+      print("{:<14}{}: {}\n", nameOf(one.verdict), printable(one.name), printable(one.text));
+    print("{} recordings: {}\n", checked.size(), nameOf(worst));
     return;
   }
   nlohmann::ordered_json json{{"verdict", nameOf(worst)},
@@ -151,21 +154,21 @@ void print(const std::vector<Checked>& checked, const GoldenOptions& options) {
                               {"recordings", nlohmann::ordered_json::array()}};
   for (const Checked& one : checked)
     json["recordings"].push_back({{"name", one.name}, {"verdict", nameOf(one.verdict)}, {"text", one.text}});
-  fmt::print("{}\n", json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  put(jsonText(json, 1) + '\n');
 }
 
 }  // namespace
 
 ExitCode golden(const GoldenOptions& options) {
   if (options.update) {
-    const auto folder = readFolder(options.directory);
+    const auto folder = readFolder(options.directory, options.limits);
     if (!folder) return printError(kUnreadable, folder.error());
     if (folder->empty())
       return printError(kUnreadable, fmt::format("{} has no recordings (*.mcap)", options.directory));
     if (const auto written = writeManifest(options.directory, *folder); !written)
       return printError(kNotWritten, written.error());
-    fmt::print("{}: {} recordings\n", (std::filesystem::path(options.directory) / kManifestName).string(),
-               folder->size());
+    print("{}: {} recordings\n", (std::filesystem::path(options.directory) / kManifestName).string(),
+          folder->size());
     return kOk;
   }
   const auto manifest = readManifest(options.directory);

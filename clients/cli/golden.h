@@ -5,6 +5,7 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
+#include "proto/recording/recording_reader.h"
 
 namespace clothstream::cli {
 
@@ -14,6 +15,7 @@ struct GoldenOptions {
   std::string device;   // Vulkan device; empty: the server's default
   bool update = false;  // writes golden.json instead of checking
   bool json = false;
+  recording::ReadLimits limits{};
 };
 
 // Checks every recording, or keeps what the folder has now. SIGINT and SIGTERM must be blocked in every

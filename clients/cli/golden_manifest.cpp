@@ -7,11 +7,15 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "clients/cli/json_text.h"
 #include "clients/files/new_file.h"
 #include "clients/files/regular_file.h"
 #include "clothstream/v1/recording.pb.h"
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
+#include "proto/recording/frame_check.h"
+#include "proto/recording/message_types.h"
+#include "proto/recording/recorded_description.h"
 #include "proto/recording/recording_reader.h"
 
 namespace clothstream::cli {
@@ -51,10 +55,16 @@ bool parseHex(const nlohmann::json& text, std::uint64_t& hash) {
 
 }  // namespace
 
-tl::expected<GoldenRecording, std::string> readGolden(const std::string& path) {
-  auto reader = RecordingReader::open(path);
+tl::expected<GoldenRecording, std::string> readGolden(const std::string& path,
+                                                      const recording::ReadLimits& limits) {
+  auto reader = RecordingReader::open(path, recording::CutFiles::refused, limits);
   if (!reader) return tl::unexpected(reader.error());
   if (const auto checked = reader->check(); !checked) return tl::unexpected(checked.error());
+  const auto damaged = [&](const std::string& how) { return tl::unexpected(path + " is damaged: " + how); };
+  const auto description = recording::readDescription(*reader);
+  if (!description) return damaged(description.error());
+  auto check = recording::FrameCheck::make(recording::layoutOf(*description));
+  if (!check) return damaged(check.error());
   GoldenRecording golden;
   Hash frames, ticks;
   v1::Frame frame;
@@ -65,6 +75,10 @@ tl::expected<GoldenRecording, std::string> readGolden(const std::string& path) {
     if (!*message) break;
     const std::string_view bytes = (*message)->bytes;
     const auto size = static_cast<int>(bytes.size());
+    if ((*message)->topic == Topic::frames)
+      check->take(bytes, static_cast<double>((*message)->time - reader->start()) * 1e-9);
+    else if (!recording::isReadable((*message)->topic, bytes))
+      return damaged(fmt::format("a message of {} cannot be read", nameOf((*message)->topic)));
     if ((*message)->topic == Topic::frames && frame.ParseFromArray(bytes.data(), size)) {
       const auto packet = codec::parsePacket(std::as_bytes(std::span(frame.packet())));
       frames.add(packet ? packet->header.tick : 0);
@@ -77,17 +91,19 @@ tl::expected<GoldenRecording, std::string> readGolden(const std::string& path) {
       ++golden.ticks;
     }
   }
+  if (check->faults().any()) return damaged(check->faults().text());
   golden.frameHash = frames.value();
   if (golden.ticks > 0) golden.tickHash = ticks.value();
   return golden;
 }
 
-tl::expected<Manifest, std::string> readFolder(const std::string& directory) {
+tl::expected<Manifest, std::string> readFolder(const std::string& directory,
+                                               const recording::ReadLimits& limits) {
   Manifest manifest;
   std::error_code problem;
   for (const auto& entry : std::filesystem::directory_iterator(directory, problem)) {
     if (entry.path().extension() != ".mcap") continue;
-    const auto golden = readGolden(entry.path().string());
+    const auto golden = readGolden(entry.path().string(), limits);
     if (!golden) return tl::unexpected(golden.error());
     manifest.emplace(entry.path().filename().string(), *golden);
   }
@@ -143,8 +159,7 @@ tl::expected<void, std::string> writeManifest(const std::string& directory, cons
                                 {"tickHash", hexOf(golden.tickHash)}};
   auto file = files::NewFile::create((std::filesystem::path(directory) / kManifestName).string());
   if (!file) return tl::unexpected(file.error());
-  return file->write(json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n')
-      .and_then([&] { return file->finish(); });
+  return file->write(jsonText(json, 1) + '\n').and_then([&] { return file->finish(); });
 }
 
 }  // namespace clothstream::cli

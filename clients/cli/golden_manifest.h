@@ -8,6 +8,8 @@
 
 #include <tl/expected.hpp>
 
+#include "proto/recording/recording_reader.h"
+
 namespace clothstream::cli {
 
 inline constexpr const char* kManifestName = "golden.json";
@@ -22,11 +24,13 @@ struct GoldenRecording {
 
 using Manifest = std::map<std::string, GoldenRecording>;  // by file name
 
-// Reads every byte of a recording and verifies its checksums. The error names the path.
-[[nodiscard]] tl::expected<GoldenRecording, std::string> readGolden(const std::string& path);
+// Reads every byte of a recording, verifies its checksums and decodes every frame. The error names the path.
+[[nodiscard]] tl::expected<GoldenRecording, std::string> readGolden(const std::string& path,
+                                                                    const recording::ReadLimits& limits);
 
 // Recordings of a folder: all files whose names end in .mcap.
-[[nodiscard]] tl::expected<Manifest, std::string> readFolder(const std::string& directory);
+[[nodiscard]] tl::expected<Manifest, std::string> readFolder(const std::string& directory,
+                                                             const recording::ReadLimits& limits);
 
 // Reads or writes DIRECTORY/golden.json.
 [[nodiscard]] tl::expected<Manifest, std::string> readManifest(const std::string& directory);

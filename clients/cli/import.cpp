@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "clients/cli/error.h"
+#include "clients/cli/print.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "clothstream/v1/session.pb.h"
@@ -161,8 +162,8 @@ ExitCode importStates(const ImportOptions& options) {
   if (!motion) return printError(motion.error());
   const auto frames = Import(options, **motion).run();
   if (!frames) return printError(frames.error());
-  fmt::print("{}: {} frames, {} vertices, within {:.3g} m along each axis\n", options.output, *frames,
-             (*motion)->surface().vertexCount(), options.maxError);
+  print("{}: {} frames, {} vertices, within {:.3g} m along each axis\n", options.output, *frames,
+        (*motion)->surface().vertexCount(), options.maxError);
   return kOk;
 }
 

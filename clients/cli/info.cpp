@@ -10,9 +10,13 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "clients/recording/played_recording.h"
+#include "proto/codec/packet_header.h"
+#include "proto/recording/message_types.h"
 #include "proto/text/printable.h"
 
 namespace clothstream::cli {
@@ -29,8 +33,12 @@ struct ChannelFigures {
 struct RecordingFigures {
   std::array<ChannelFigures, recording::kTopicNames.size()> channels{};
   std::uint64_t chunksLost = 0;
-  std::string damage;  // first damage found; empty: none
+  std::array<std::uint64_t, codec::kMaxQualities> qualities{};  // frames by their quality
+  std::uint64_t unreadable = 0;  // messages that are not of their channel's type
+  std::string firstUnreadable;   // channel of the first of them
+  std::string damage;            // first damage found; empty: none
   std::optional<cs_statistics> stream;
+  recording::FrameFaults faults;
 };
 
 double seconds(const RecordingReader& reader) {
@@ -42,6 +50,13 @@ void countByIndex(const RecordingReader& reader, RecordingFigures& figures) {
   for (const auto& [channel, count] : reader.mcap().statistics()->counts)
     if (const auto topic = reader.topicOf(channel))
       figures.channels[static_cast<std::size_t>(*topic)].messages = count;
+}
+
+void countQuality(std::string_view frame, RecordingFigures& figures) {
+  const auto content = recording::frameContentOf(frame);
+  const auto packet = content ? codec::parsePacket(content->packet) : std::nullopt;
+  if (packet && packet->header.quality < figures.qualities.size())
+    ++figures.qualities[packet->header.quality];
 }
 
 // Reads chunk by chunk, so that a damaged chunk does not hide the others.
@@ -63,6 +78,9 @@ tl::expected<void, Error> countByReading(recording::McapReader& mcap, const Reco
       ChannelFigures& channel = figures.channels[static_cast<std::size_t>(*topic)];
       ++channel.messages;
       channel.bytes += message.bytes.size();
+      if (*topic == Topic::frames) countQuality(message.bytes, figures);
+      if (recording::isReadable(*topic, message.bytes)) continue;
+      if (figures.unreadable++ == 0) figures.firstUnreadable = nameOf(*topic);
     }
   }
   return {};
@@ -75,10 +93,14 @@ tl::expected<void, Error> decode(PlayedRecording& played, RecordingFigures& figu
     if (interrupted()) return makeError(kUnreadable, "interrupted");
     progress.show(frame);
     const auto more = played.next();
-    if (!more && figures.damage.empty()) figures.damage = more.error();
-    if (!more || !*more) break;
+    if (more && !*more) break;
+    // Chunks that cannot be read are known, and faults are counted.
+    if (more || cs_get_state(played.client()) != CS_STATE_FAILED) continue;
+    if (figures.damage.empty()) figures.damage = more.error();
+    break;
   }
   cs_get_statistics(played.client(), 0, &figures.stream.emplace());
+  figures.faults = played.faults();
   return {};
 }
 
@@ -87,13 +109,34 @@ std::string damageOf(const RecordingReader& reader, const RecordingFigures& figu
   if (!reader.mcap().indexed())
     return fmt::format("the end is missing or damaged; run clothstream recover {} OUT", options.recording);
   if (!figures.damage.empty()) return figures.damage;
-  if (figures.stream && figures.stream->hash_mismatches > 0)
-    return fmt::format("{} frames differ from the server's", figures.stream->hash_mismatches);
+  if (figures.faults.any())
+    return fmt::format("{}; clothstream recover {} OUT keeps the others", figures.faults.text(),
+                       options.recording);
+  if (figures.unreadable > 0)
+    return fmt::format("{} messages cannot be read, the first is in {}", figures.unreadable,
+                       figures.firstUnreadable);
   return {};
 }
 
 std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.2f} MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+// Says how precise the frames are. Without reading them, as the program that made the recording states.
+std::string qualityText(const RecordingReader& reader, const RecordingFigures& figures,
+                        const InfoOptions& options) {
+  if (options.quick) {
+    const auto stated = reader.metadata().find(recording::kQualitiesEntry);
+    return stated == reader.metadata().end()
+               ? std::string()
+               : fmt::format("quality   {} frames of quality 0, 1, 2, 3\n", printable(stated->second));
+  }
+  std::string list;
+  for (std::size_t quality = 0; quality < figures.qualities.size(); ++quality)
+    if (figures.qualities[quality] > 0)
+      list += fmt::format("{}{} frames of quality {}", list.empty() ? "" : ", ", figures.qualities[quality],
+                          quality);
+  return list.empty() ? list : fmt::format("quality   {}\n", list);
 }
 
 std::string toText(const RecordingReader& reader, const RecordingFigures& figures, const std::string& damage,
@@ -115,9 +158,12 @@ std::string toText(const RecordingReader& reader, const RecordingFigures& figure
   }
   if (figures.stream)
     text += fmt::format(
-        "frames    {} decoded, {} of them key frames, {:.2f} bits a vertex; {} differ from the server's\n",
+        "frames    {} decoded, {} of them key frames, {:.2f} bits a vertex; {} cannot be decoded; {} differ "
+        "from "
+        "the server's\n",
         figures.stream->frames, figures.stream->key_frames, figures.stream->bits_per_vertex,
-        figures.stream->hash_mismatches);
+        figures.faults.undecodable(), figures.faults.different());
+  text += qualityText(reader, figures, options);
   if (!damage.empty()) return text + fmt::format("damaged   {}\n", printable(damage));
   return text +
          (options.quick ? "index     complete; the rest was not read\n" : "complete  all checksums match\n");
@@ -139,15 +185,25 @@ std::string toJson(const RecordingReader& reader, const RecordingFigures& figure
     json["frames"] = {{"decoded", figures.stream->frames},
                       {"keyFrames", figures.stream->key_frames},
                       {"bitsPerVertex", figures.stream->bits_per_vertex},
-                      {"hashMismatches", figures.stream->hash_mismatches}};
+                      {"undecodable", figures.faults.undecodable()},
+                      {"hashMismatches", figures.faults.different()},
+                      {"firstFault", nullptr},
+                      {"qualities", figures.qualities}};
+  if (figures.faults.any())
+    json["frames"]["firstFault"] = {
+        {"tick", figures.faults.firstTick() ? nlohmann::ordered_json(*figures.faults.firstTick())
+                                            : nlohmann::ordered_json(nullptr)},
+        {"seconds", figures.faults.firstSeconds()}};
+  json["unreadableMessages"] = figures.unreadable;
   json["whole"] = damage.empty();
   if (!damage.empty()) json["damage"] = damage;
-  return json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+  return jsonText(json, 1) + '\n';
 }
 
 tl::expected<ExitCode, Error> run(const InfoOptions& options) {
   const auto open = [&] {
-    return orError(kUnreadable, RecordingReader::open(options.recording, recording::CutFiles::read));
+    return orError(kUnreadable,
+                   RecordingReader::open(options.recording, recording::CutFiles::read, options.limits));
   };
   auto reader = open();
   if (!reader) return tl::unexpected(reader.error());
@@ -155,13 +211,16 @@ tl::expected<ExitCode, Error> run(const InfoOptions& options) {
   if (options.quick) {
     countByIndex(*reader, figures);
   } else {
-    auto file = orError(kUnreadable, recording::openFile(options.recording));
-    if (!file) return tl::unexpected(file.error());
-    auto mcap = orError(kUnreadable, recording::McapReader::open(std::move(*file)));
-    if (!mcap) return tl::unexpected(mcap.error());
-    if (auto counted = countByReading(*mcap, *reader, figures); !counted)
-      return tl::unexpected(counted.error());
-    if (auto checked = mcap->check(); !checked && figures.damage.empty()) figures.damage = checked.error();
+    {
+      // Its largest chunk is freed before frames are decoded.
+      auto file = orError(kUnreadable, recording::openFile(options.recording));
+      if (!file) return tl::unexpected(file.error());
+      auto mcap = orError(kUnreadable, recording::McapReader::open(std::move(*file), options.limits.mcap()));
+      if (!mcap) return tl::unexpected(mcap.error());
+      if (auto counted = countByReading(*mcap, *reader, figures); !counted)
+        return tl::unexpected(counted.error());
+      if (auto checked = mcap->check(); !checked && figures.damage.empty()) figures.damage = checked.error();
+    }
     auto toPlay = open();
     if (!toPlay) return tl::unexpected(toPlay.error());
     auto played = PlayedRecording::open(std::move(*toPlay));
@@ -170,7 +229,7 @@ tl::expected<ExitCode, Error> run(const InfoOptions& options) {
       if (auto decoded = decode(*played, figures); !decoded) return tl::unexpected(decoded.error());
   }
   const std::string damage = damageOf(*reader, figures, options);
-  fmt::print("{}", (options.json ? toJson : toText)(*reader, figures, damage, options));
+  put((options.json ? toJson : toText)(*reader, figures, damage, options));
   return damage.empty() ? kOk : kUnreadable;
 }
 

@@ -5,11 +5,13 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
+#include "proto/recording/recording_reader.h"
 
 namespace clothstream::cli {
 
 struct InfoOptions {
   std::string recording;
+  recording::ReadLimits limits{};
   bool quick = false;  // reads only the index
   bool json = false;
 };

@@ -13,6 +13,7 @@
 #include "clients/cli/input_lines.h"
 #include "clients/cli/obj_file.h"
 #include "clients/cli/presence.h"
+#include "clients/cli/print.h"
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
 #include "clients/grpc/grpc_client.h"
@@ -35,7 +36,7 @@ class Listener {
 
   void operator()(cs_client* client, std::uint32_t events) {
     if (lines_) {
-      fmt::print("{}", eventLines_.of(client, events));
+      put(eventLines_.of(client, events));
       std::fflush(stdout);
     }
     if (events == 0 && cs_get_state(client) == CS_STATE_RECONNECTING)
@@ -59,7 +60,7 @@ class Listener {
     if (report_ && (events & CS_EVENT_REPORT) != 0) {
       line_.clear();
       for (const ClothFigures& figures : Report::of(client, NativeClient::nowUs()).cloths)
-        fmt::print("{}\n", text(figures));
+        put(text(figures) + '\n');
       std::fflush(stdout);
     }
   }
@@ -67,7 +68,7 @@ class Listener {
  private:
   void say(const std::string& text) const {
     line_.clear();
-    fmt::print(stderr, "clothstream: {}\n", printable(text));
+    print(stderr, "clothstream: {}\n", printable(text));
   }
 
   void sayParticipants(cs_client* client) const {
@@ -183,9 +184,9 @@ ExitCode join(const JoinOptions& options) {
     });
   }
   if (options.events)
-    fmt::print("{}", summaryLine(report.json(options.hash)));
+    put(summaryLine(report.json(options.hash)));
   else
-    fmt::print("{}\n", options.json ? report.json(options.hash) : report.text(options.hash));
+    put((options.json ? report.json(options.hash) : report.text(options.hash)) + '\n');
   return code;
 }
 

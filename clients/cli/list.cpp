@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "clients/grpc/scene_list.h"
 #include "proto/text/printable.h"
 
@@ -25,15 +27,14 @@ std::string json(const std::vector<SceneSummary>& scenes) {
                      {"paused", scene.paused},
                      {"created", scene.created}});
   }
-  return array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return jsonText(array, 2);
 }
 
 void printTable(const std::vector<SceneSummary>& scenes) {
-  fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", "SCENE", "VERTICES", "CLOTHS", "PARTICIPANTS", "DESCRIPTION");
+  print("{:<20} {:>9} {:>7} {:>13}  {}\n", "SCENE", "VERTICES", "CLOTHS", "PARTICIPANTS", "DESCRIPTION");
   for (const SceneSummary& scene : scenes)
-    fmt::print("{:<20} {:>9} {:>7} {:>13}  {}\n", printable(scene.name), scene.vertexCount, scene.clothCount,
-               fmt::format("{} of {}", scene.participants, scene.maxParticipants),
-               printable(scene.description));
+    print("{:<20} {:>9} {:>7} {:>13}  {}\n", printable(scene.name), scene.vertexCount, scene.clothCount,
+          fmt::format("{} of {}", scene.participants, scene.maxParticipants), printable(scene.description));
 }
 
 }  // namespace
@@ -44,7 +45,7 @@ ExitCode list(const ListOptions& options) {
     return printError(scenes.error());
   }
   if (options.json)
-    fmt::print("{}\n", json(*scenes));
+    put(json(*scenes) + '\n');
   else
     printTable(*scenes);
   return kOk;

@@ -11,6 +11,8 @@
 #include <unistd.h>
 
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "clients/cli/signals.h"
 #include "clients/native/address.h"
 
@@ -91,7 +93,7 @@ std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
   };
   if (serverCpu) object["serverCpuSeconds"] = *serverCpu;
   addPoses(object, report.figures.poses);
-  return object.dump(2);
+  return jsonText(object, 2);
 }
 
 std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
@@ -203,22 +205,22 @@ ExitCode LoadCommand::run(const ServerAddress& address) const {
   if (shows) {
     progress.show = [](const load::LoadReport& last) {
       std::vector<float> ages = last.figures.ages;
-      fmt::print("\r\033[K{} joined, {} left, {} lost  {:.1f} frames/s each  {:.2f} ms p99", last.joined,
-                 last.left, last.lost, last.framesPerSecond(), load::percentile(ages, 99));
-      std::fflush(stdout);
+      showStatus(stdout,
+                 fmt::format("{} joined, {} left, {} lost  {:.1f} frames/s each  {:.2f} ms p99", last.joined,
+                             last.left, last.lost, last.framesPerSecond(), load::percentile(ages, 99)));
     };
   }
   load::LoadOptions options = options_;
   options.token = address.token;
   load::LoadReport report = load::runLoad(*links, options, progress);
-  if (shows) fmt::print("\r\033[K");
+  if (shows) showStatus(stdout, "");
   std::optional<double> serverCpu;
   if (before && after) serverCpu = *after - *before;
   const ExitCode loss = exitCodeOf(report.firstLoss.kind);
   if (report.joined == 0 && report.lost > 0)
     return printError(Error{
         loss, fmt::format("no participant could join at {}: {}", address.address, report.firstLoss.text)});
-  fmt::print("{}\n", json_ ? json(report, serverCpu) : text(report, serverCpu));
+  put((json_ ? json(report, serverCpu) : text(report, serverCpu)) + '\n');
   if (report.lost > 0)
     return printError(Error{loss, fmt::format("{} participants were refused or disconnected; the first: {}",
                                               report.lost, report.firstLoss.text)});

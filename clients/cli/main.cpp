@@ -25,6 +25,7 @@
 #include "clients/cli/motion_commands.h"
 #include "clients/cli/participant_commands.h"
 #include "clients/cli/presence.h"
+#include "clients/cli/print.h"
 #include "clients/cli/recording_commands.h"
 #include "clients/cli/saved_token.h"
 #include "clients/cli/scene.h"
@@ -111,8 +112,8 @@ struct TrustOptions {
     };
     if (isatty(STDIN_FILENO) == 0)
       return refused("If the server prints the same, use it with --fingerprint.");
-    fmt::print(stderr, "The server at {} has the key\n  {}\nDoes the server print the same key? [y/N] ",
-               server.address, *shown);
+    print(stderr, "The server at {} has the key\n  {}\nDoes the server print the same key? [y/N] ",
+          server.address, *shown);
     std::string answer;
     std::getline(std::cin, answer);
     if (answer != "y" && answer != "Y" && answer != "yes") return refused("It is not trusted.");
@@ -203,7 +204,7 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 3));
   joinCommand
       .add_option("--max-vertices", joinOptions.maxVertices,
-                  "Most vertices to accept from the server; twice as many triangles. Default: 4194304")
+                  "Most vertices to accept from the server; twice as many triangles. Default: 1048576")
       ->check(CLI::Range(1, 67'108'864));
   joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
                        "End when the connection is lost. Default: try to reconnect for a minute");
@@ -330,7 +331,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "clothstream: %s\n", error.what());
+    print(stderr, "clothstream: {}\n", error.what());
     return kFailed;
   }
 }

@@ -11,6 +11,8 @@
 
 #include "clients/cli/cloth_measures.h"
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "proto/text/printable.h"
 
 namespace clothstream::cli {
@@ -66,9 +68,9 @@ class Output {
   Output(const Motion& motion, const MeasureOptions& options, const MeasureSettings& settings)
       : motion_(motion), options_(options), settings_(settings), summaries_(motion.surface().cloths.size()) {
     if (options.format != MeasureFormat::csv) return;
-    fmt::print("tick,seconds,cloth");
-    for (const Quantity& quantity : kQuantities) fmt::print(",{}", quantity.key);
-    fmt::print("\n");
+    print("tick,seconds,cloth");
+    for (const Quantity& quantity : kQuantities) print(",{}", quantity.key);
+    print("\n");
   }
 
   void take(const FrameMeasures& frame) {
@@ -90,12 +92,12 @@ class Output {
 
   void printRows(const FrameMeasures& frame) const {
     for (std::size_t i = 0; i < frame.cloths.size(); ++i) {
-      fmt::print("{},{:.6f},{}", frame.tick, frame.seconds, csvName(cloth(i).name));
+      print("{},{:.6f},{}", frame.tick, frame.seconds, csvName(cloth(i).name));
       for (const Quantity& quantity : kQuantities) {
         const auto value = quantity.of(frame.cloths[i]);
-        fmt::print(",{}", value ? fmt::format("{:.9g}", *value) : "");
+        print(",{}", value ? fmt::format("{:.9g}", *value) : "");
       }
-      fmt::print("\n");
+      print("\n");
     }
   }
 
@@ -121,18 +123,18 @@ class Output {
   }
 
   void printTable() const {
-    fmt::print("{}: {} frames, {} ticks/s; coordinates {}\n", options_.file, frames_, motion_.rate(),
-               motion_.maxError() > 0 ? fmt::format("within {:.3g} m of the simulation", motion_.maxError())
-                                      : "as in the file");
+    print("{}: {} frames, {} ticks/s; coordinates {}\n", options_.file, frames_, motion_.rate(),
+          motion_.maxError() > 0 ? fmt::format("within {:.3g} m of the simulation", motion_.maxError())
+                                 : "as in the file");
     for (std::size_t i = 0; i < summaries_.size(); ++i) {
-      fmt::print("\n{}, {} vertices, {:.4g} kg/m^2\n{:<20}{:>12}{:>12}{:>12}{:>12}{:>10}\n",
-                 printable(cloth(i).name), cloth(i).vertexCount, settings_.arealMass[i], "", "first", "last",
-                 "mean", "largest", "at tick");
+      print("\n{}, {} vertices, {:.4g} kg/m^2\n{:<20}{:>12}{:>12}{:>12}{:>12}{:>10}\n",
+            printable(cloth(i).name), cloth(i).vertexCount, settings_.arealMass[i], "", "first", "last",
+            "mean", "largest", "at tick");
       for (std::size_t k = 0; k < kQuantities.size(); ++k) {
         const Summary& summary = summaries_[i][k];
         if (summary.count == 0) continue;
-        fmt::print("{:<20}{:>12.5g}{:>12.5g}{:>12.5g}{:>12.5g}{:>10}\n", kQuantities[k].name, summary.first,
-                   summary.last, summary.mean(), summary.largest, summary.tick);
+        print("{:<20}{:>12.5g}{:>12.5g}{:>12.5g}{:>12.5g}{:>10}\n", kQuantities[k].name, summary.first,
+              summary.last, summary.mean(), summary.largest, summary.tick);
       }
     }
   }
@@ -159,7 +161,7 @@ class Output {
                {"gravity", settings_.gravity},
                {"cloths", std::move(cloths)}};
     whole.update(json_);
-    fmt::print("{}\n", whole.dump(1, ' ', false, Json::error_handler_t::replace));
+    put(jsonText(whole, 1) + '\n');
   }
 
   const Motion& motion_;
@@ -187,7 +189,7 @@ MeasureSettings settingsOf(const Motion& motion, const MeasureOptions& options) 
 }  // namespace
 
 ExitCode measureFile(const MeasureOptions& options) {
-  auto motion = openMotion(options.file, options.arrays);
+  auto motion = openMotion(options.file, options.arrays, options.limits);
   if (!motion) return printError(motion.error());
   const MeasureSettings settings = settingsOf(**motion, options);
   Output output(**motion, options, settings);

@@ -14,6 +14,7 @@
 #include "clients/cli/error.h"
 #include "clients/measure/penetration.h"
 #include "clients/measure/surface.h"
+#include "proto/recording/recording_reader.h"
 
 namespace clothstream::cli {
 
@@ -51,11 +52,13 @@ struct ArrayOptions {
   std::optional<std::uint64_t> first;  // tick of the first frame; absent: of the arrays, otherwise 1
 };
 
-[[nodiscard]] tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(const std::string& path);
+[[nodiscard]] tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(
+    const std::string& path, const recording::ReadLimits& limits);
 [[nodiscard]] tl::expected<std::unique_ptr<Motion>, Error> openArrays(const std::string& path,
                                                                       const ArrayOptions& options);
 // Chooses by the name: .npz is a file of arrays, any other one a recording.
 [[nodiscard]] tl::expected<std::unique_ptr<Motion>, Error> openMotion(const std::string& path,
-                                                                      const ArrayOptions& options);
+                                                                      const ArrayOptions& options,
+                                                                      const recording::ReadLimits& limits);
 
 }  // namespace clothstream::cli

@@ -10,7 +10,9 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/error.h"
+#include "clients/cli/json_text.h"
 #include "clients/cli/presence.h"
+#include "clients/cli/print.h"
 #include "clients/grpc/grpc_client.h"
 #include "proto/text/printable.h"
 
@@ -113,15 +115,14 @@ ExitCode ParticipantCommands::list(const ServerAddress& address) const {
                          {"away", participant.away != 0}});
   });
   if (json_) {
-    // Names come from other clients and may be invalid UTF-8.
-    fmt::print("{}\n", array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    put(jsonText(array, 2) + '\n');
     return kOk;
   }
   for (const auto& participant : array)
-    fmt::print("{:>6}  {:<12}  {}{}\n", participant["id"].get<std::uint64_t>(),
-               participant["role"].get<std::string>(),
-               printable(participant[participant["name"] == "" ? "client" : "name"].get<std::string>()),
-               participant["away"].get<bool>() ? ", currently disconnected" : "");
+    print("{:>6}  {:<12}  {}{}\n", participant["id"].get<std::uint64_t>(),
+          participant["role"].get<std::string>(),
+          printable(participant[participant["name"] == "" ? "client" : "name"].get<std::string>()),
+          participant["away"].get<bool>() ? ", currently disconnected" : "");
   return kOk;
 }
 

@@ -2,6 +2,7 @@
 // Joins and writes every message to the file.
 #include "clients/cli/record.h"
 
+#include <array>
 #include <chrono>
 #include <ctime>
 #include <filesystem>
@@ -10,9 +11,11 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include "clients/cli/error.h"
+#include "clients/cli/print.h"
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
 #include "clients/grpc/grpc_client.h"
@@ -21,6 +24,7 @@
 #include "proto/recording/clock.h"
 #include "proto/recording/file.h"
 #include "proto/recording/recording_writer.h"
+#include "proto/recording/topics.h"
 
 namespace clothstream::cli {
 namespace {
@@ -34,8 +38,9 @@ constexpr std::uint32_t kAskAfterFrames = recording::kMaxKeyFrameDistance - 8;
 // Thread-safe: the stream's thread adds messages, the waiting thread closes chunks.
 class StreamFile {
  public:
-  StreamFile(recording::OutputFile file, std::string program)
-      : file_(std::move(file)), program_(std::move(program)) {}
+  // `fullQuality`: ends before the first frame that is coarser than quality 0.
+  StreamFile(recording::OutputFile file, std::string program, bool fullQuality)
+      : file_(std::move(file)), program_(std::move(program)), fullQuality_(fullQuality) {}
 
   void receive(std::span<const std::byte> bytes) {
     const std::lock_guard lock(mutex_);
@@ -46,17 +51,30 @@ class StreamFile {
     if (message_.has_welcome()) welcome_ = message_.welcome();
     if (message_.has_chunk()) return take(message_.chunk());
     if (!writer_) return;
+    const auto packet = message_.has_frame()
+                            ? codec::parsePacket(std::as_bytes(std::span(message_.frame().packet())))
+                            : std::nullopt;
+    if (fullQuality_ && packet && packet->header.quality > 0) coarse_ = true;
+    if (coarse_) return;
     if (!chunkStart_) chunkStart_ = SteadyClock::now();
     written_ = writer_->write(clock_.now(), message_);
     if (!message_.has_frame()) return;
     ++frames_;
-    sinceKey_ = isKey(message_.frame()) ? 0 : sinceKey_ + 1;
+    if (packet && packet->header.quality < qualities_.size()) ++qualities_[packet->header.quality];
+    const bool isKey = packet && packet->header.kind == codec::PacketKind::key;
+    sinceKey_ = isKey ? 0 : sinceKey_ + 1;
   }
 
   // Whether the recorded stream is over because another one has started.
   bool broken() const {
     const std::lock_guard lock(mutex_);
     return broken_;
+  }
+
+  // Whether the recorded stream is over because a frame is coarser than the quality that it must have.
+  bool coarse() const {
+    const std::lock_guard lock(mutex_);
+    return coarse_;
   }
 
   bool wantsKeyFrame() const {
@@ -77,13 +95,29 @@ class StreamFile {
 
   recording::Written finish() {
     const std::lock_guard lock(mutex_);
-    if (written_ && writer_) written_ = writer_->finish().and_then([&] { return file_.sync(); });
-    return written_;
+    if (!written_ || !writer_) return written_;
+    recording::Metadata metadata = metadata_;
+    metadata[recording::kQualitiesEntry] = fmt::format("{}", fmt::join(qualities_, ", "));
+    return written_ = writer_->finish(metadata).and_then([&] { return file_.sync(); });
   }
 
   std::uint64_t frames() const {
     const std::lock_guard lock(mutex_);
     return frames_;
+  }
+  // Describes the frames that are coarser than quality 0; empty without any.
+  std::string coarseFrames() const {
+    const std::lock_guard lock(mutex_);
+    const std::uint64_t fine = qualities_[0];
+    if (fine == frames_) return {};
+    std::string list;
+    for (std::size_t quality = 1; quality < qualities_.size(); ++quality)
+      if (qualities_[quality] > 0)
+        list += fmt::format("{}{} of quality {}", list.empty() ? "" : ", ", qualities_[quality], quality);
+    return fmt::format(
+        "{} of {} frames are coarser than quality 0, because the connection or this machine was too "
+        "slow: {}",
+        frames_ - fine, frames_, list);
   }
   std::uint64_t bytes() const {
     const std::lock_guard lock(mutex_);
@@ -91,11 +125,6 @@ class StreamFile {
   }
 
  private:
-  static bool isKey(const v1::Frame& frame) {
-    const auto packet = codec::parsePacket(std::as_bytes(std::span(frame.packet())));
-    return packet && packet->header.kind == codec::PacketKind::key;
-  }
-
   // Chunks of one content are in order; the client core refuses other streams.
   void take(const v1::Chunk& chunk) {
     if (chunk.content_id() != welcome_.description_content_id() && writer_ == std::nullopt) return;
@@ -112,17 +141,17 @@ class StreamFile {
   void begin(const v1::StreamDescription& description) {
     std::uint64_t vertices = 0;
     for (const v1::ClothDescription& cloth : description.cloths()) vertices += cloth.vertex_count();
+    metadata_ = {{"server", welcome_.server_name()},
+                 {"scene", description.scene()},
+                 {"started", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},
+                 {"device", welcome_.device_name()},
+                 {"codec", fmt::format("{}", description.codec())},
+                 {"max_error", fmt::format("{}", description.max_error())},
+                 {"vertices", fmt::format("{}", vertices)},
+                 {"simulation_rate", fmt::format("{}", description.simulation_rate())},
+                 {"stream_rate", fmt::format("{}", description.stream_rate())}};
     auto writer = recording::RecordingWriter::begin(
-        [this](std::string_view bytes) { return file_.write(bytes); }, program_,
-        {{"server", welcome_.server_name()},
-         {"scene", description.scene()},
-         {"started", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},
-         {"device", welcome_.device_name()},
-         {"codec", fmt::format("{}", description.codec())},
-         {"max_error", fmt::format("{}", description.max_error())},
-         {"vertices", fmt::format("{}", vertices)},
-         {"simulation_rate", fmt::format("{}", description.simulation_rate())},
-         {"stream_rate", fmt::format("{}", description.stream_rate())}});
+        [this](std::string_view bytes) { return file_.write(bytes); }, program_, metadata_);
     if (writer)
       writer_.emplace(std::move(*writer));
     else
@@ -132,6 +161,7 @@ class StreamFile {
   mutable std::mutex mutex_;
   recording::OutputFile file_;
   const std::string program_;
+  const bool fullQuality_;
   const recording::RecordingClock clock_;
   recording::Written written_;
   std::optional<recording::RecordingWriter> writer_;  // set after the description
@@ -139,9 +169,11 @@ class StreamFile {
   v1::Welcome welcome_;
   std::string content_;
   std::optional<SteadyClock::time_point> chunkStart_;
-  bool broken_ = false;
+  bool broken_ = false, coarse_ = false;
+  recording::Metadata metadata_;
   std::uint64_t frames_ = 0;
-  std::uint32_t sinceKey_ = 0;  // frames since the last key frame
+  std::array<std::uint64_t, codec::kMaxQualities> qualities_{};  // frames by their quality
+  std::uint32_t sinceKey_ = 0;                                   // frames since the last key frame
 };
 
 // Waits for the end of the time, a signal, the end of the stream or a write error.
@@ -164,10 +196,16 @@ std::optional<Error> follow(NativeClient& client, StreamFile& file, const Record
           kLost,
           "the stream could not be resumed, because the connection was lost for too long or the server "
           "was restarted; the recording ends there"};
+    if (file.coarse())
+      return Error{kLost,
+                   fmt::format("the server lowered the quality after {} frames, because the connection or "
+                               "this machine is too slow for full quality; the recording ends there. Without "
+                               "--full-quality it goes on",
+                               file.frames())};
     if (const auto failure = client.ended()) return Error{exitCodeOf(failure->kind), failure->text};
     if (terminal)
-      fmt::print(stderr, "\r\033[K{:.0f} s, {} frames, {:.1f} MiB", passed.count(), file.frames(),
-                 static_cast<double>(file.bytes()) / (1 << 20));
+      showStatus(stderr, fmt::format("{:.0f} s, {} frames, {:.1f} MiB", passed.count(), file.frames(),
+                                     static_cast<double>(file.bytes()) / (1 << 20)));
   }
 }
 
@@ -176,7 +214,7 @@ std::optional<Error> follow(NativeClient& client, StreamFile& file, const Record
 ExitCode record(const RecordOptions& options) {
   auto output = recording::OutputFile::create(options.output);
   if (!output) return printError(Error{kNotWritten, output.error()});
-  StreamFile file(std::move(*output), options.program);
+  StreamFile file(std::move(*output), options.program, options.fullQuality);
   NativeClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream record";
@@ -186,10 +224,10 @@ ExitCode record(const RecordOptions& options) {
   clientOptions.onMessage = [&](std::span<const std::byte> bytes) { file.receive(bytes); };
   const auto onEvents = [&](cs_client* core, std::uint32_t events) {
     if (events == 0 && cs_get_state(core) == CS_STATE_RECONNECTING)
-      fmt::print(stderr,
-                 "clothstream: the connection is lost; reconnecting. Frames of this time will be missing.\n");
+      print(stderr,
+            "clothstream: the connection is lost; reconnecting. Frames of this time will be missing.\n");
     if ((events & CS_EVENT_RETURNED) != 0 && cs_resumed(core) != 0)
-      fmt::print(stderr, "clothstream: reconnected; the recording continues.\n");
+      print(stderr, "clothstream: reconnected; the recording continues.\n");
     if ((events & CS_EVENT_FRAME) != 0 && file.wantsKeyFrame())
       cs_request_key_frame(core, NativeClient::nowUs());
   };
@@ -204,11 +242,12 @@ ExitCode record(const RecordOptions& options) {
     problem = follow(**joined, file, options);
     (*joined)->visit([&](cs_client* core) { report = Report::of(core, NativeClient::nowUs()); });
   }
-  if (isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r\033[K");
+  if (isatty(STDERR_FILENO) != 0) showStatus(stderr, "");
   if (auto finished = file.finish(); !finished && !problem) problem = Error{kNotWritten, finished.error()};
-  fmt::print("{}: {}, {} frames in {:.1f} s, {:.1f} MiB; {} frames were lost\n", options.output,
-             printable(report.scene), file.frames(), report.seconds,
-             static_cast<double>(file.bytes()) / (1 << 20), report.statistics.dropped);
+  print("{}: {}, {} frames in {:.1f} s, {:.1f} MiB; {} frames were lost\n", options.output,
+        printable(report.scene), file.frames(), report.seconds, static_cast<double>(file.bytes()) / (1 << 20),
+        report.statistics.dropped);
+  if (const std::string coarse = file.coarseFrames(); !coarse.empty()) print("{}\n", coarse);
   return problem ? printError(*problem) : kOk;
 }
 

@@ -17,6 +17,7 @@ struct RecordOptions {
   std::string output;
   std::uint32_t maxVertices = 0;  // 0: the default of cs_limits
   std::optional<double> seconds;  // not set: until a signal
+  bool fullQuality = false;       // ends at the first frame that is coarser than quality 0
   std::string program;            // name and version of this program
 };
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "clients/cli/motion.h"
+#include "clients/cli/recording_limits.h"
 #include "clients/recording/played_recording.h"
 #include "proto/recording/recorded_description.h"
 
@@ -25,7 +26,7 @@ class RecordedMotion : public Motion {
 
   tl::expected<bool, Error> next() override {
     const auto more = played_.next();
-    if (!more) return makeError(kUnreadable, "{}: {}", path_, more.error());
+    if (!more) return tl::unexpected(damageOf(played_, path_, more.error()));
     if (!*more) return false;
     cs_statistics now;
     cs_get_statistics(played_.client(), 0, &now);
@@ -70,8 +71,10 @@ class RecordedMotion : public Motion {
 
 }  // namespace
 
-tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(const std::string& path) {
-  auto reader = orError(kUnreadable, recording::RecordingReader::open(path));
+tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(const std::string& path,
+                                                                const recording::ReadLimits& limits) {
+  auto reader =
+      orError(kUnreadable, recording::RecordingReader::open(path, recording::CutFiles::refused, limits));
   if (!reader) return tl::unexpected(reader.error());
   const auto description = orError(kUnreadable, recording::readDescription(*reader));
   if (!description) return tl::unexpected(description.error());
@@ -82,12 +85,12 @@ tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(const std::strin
   return std::make_unique<RecordedMotion>(path, std::move(*played), *description);
 }
 
-tl::expected<std::unique_ptr<Motion>, Error> openMotion(const std::string& path,
-                                                        const ArrayOptions& options) {
+tl::expected<std::unique_ptr<Motion>, Error> openMotion(const std::string& path, const ArrayOptions& options,
+                                                        const recording::ReadLimits& limits) {
   if (path.ends_with(".npz")) return openArrays(path, options);
   if (!options.mesh.empty() || options.rate || options.first)
     return makeError(kUsage, "--mesh, --rate and --first-tick belong to .npz files; {} is a recording", path);
-  return openRecordedMotion(path);
+  return openRecordedMotion(path, limits);
 }
 
 }  // namespace clothstream::cli

@@ -3,6 +3,8 @@
 
 #include <csignal>
 
+#include "clients/cli/recording_limits.h"
+
 namespace clothstream::cli {
 
 void RecordingCommands::add(CLI::App& app, std::string& address) {
@@ -17,8 +19,12 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
       ->check(CLI::PositiveNumber);
   record_
       ->add_option("--max-vertices", recordOptions_.maxVertices,
-                   "Most vertices to accept from the server; twice as many triangles. Default: 4194304")
-      ->check(CLI::Range(1, 67'108'864));
+                   "Most vertices to accept from the server; twice as many triangles. Default: 1048576")
+      ->check(CLI::Range(1u, codec::kMaxVertices));
+  record_->add_flag(
+      "--full-quality", recordOptions_.fullQuality,
+      "End the recording with an error before the first frame that the server sends in a coarser "
+      "quality, because the connection or this machine is too slow for the finest one");
   record_->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
       ->capture_default_str();
 
@@ -26,11 +32,13 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
   info_->add_option("FILE", infoOptions_.recording, "The recording")->required();
   info_->add_flag("--quick", infoOptions_.quick, "Read only the index and check nothing else");
   info_->add_flag("--json", infoOptions_.json, "Print one JSON object");
+  addLimits(*info_, infoOptions_.limits);
 
   recover_ =
       app.add_subcommand("recover", "Write a complete recording from the readable parts of a damaged one");
   recover_->add_option("FILE", recoverOptions_.recording, "Damaged recording; it is not changed")->required();
   recover_->add_option("OUT", recoverOptions_.out, "Recording to write; must not exist")->required();
+  addLimits(*recover_, recoverOptions_.limits);
 
   export_ = app.add_subcommand(
       "export", "Write the frames of a recording as an animated glTF, as OBJ files, or for numpy");
@@ -49,6 +57,7 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
       ->check(CLI::NonNegativeNumber);
   export_->add_option("--seconds", exportOptions_.seconds, "Most seconds of the recording to export")
       ->check(CLI::PositiveNumber);
+  addLimits(*export_, exportOptions_.limits);
 }
 
 bool RecordingCommands::parsed() const {

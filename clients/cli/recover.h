@@ -5,11 +5,13 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
+#include "proto/recording/recording_reader.h"
 
 namespace clothstream::cli {
 
 struct RecoverOptions {
   std::string recording, out;
+  recording::ReadLimits limits{};
 };
 
 // Reads the written file again and compares it; removes it if it differs. SIGINT and SIGTERM must be blocked

@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "clients/cli/json_text.h"
+#include "clients/cli/print.h"
 #include "proto/text/printable.h"
 
 namespace clothstream::cli {
@@ -113,8 +115,7 @@ std::string Report::json(bool hash) const {
                                 {"deviceMs", now.device_ms}});
   }
   if (hash) object["hashMismatches"] = statistics.hash_mismatches;
-  // Names come from the server and may be invalid UTF-8.
-  return object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return jsonText(object, 2);
 }
 
 std::string Report::text(bool hash) const {
@@ -135,18 +136,17 @@ std::string Report::text(bool hash) const {
 void StatusLine::show(const Report& report) const {
   if (!shown_) return;
   const cs_statistics& now = report.statistics;
-  fmt::print(
-      "\r\033[K{}  tick {}  {:.0f} fps{}  {:.0f} kbit/s  {:.1f} ms round trip  {} dropped",
-      printable(report.scene), now.tick, now.frames_per_second,
-      report.frameDivisor > 1 ? fmt::format(" of {}: the server is overloaded", report.streamRate) : "",
-      now.kbit_per_second, now.round_trip_ms, now.dropped);
-  std::fflush(stdout);
+  showStatus(stdout, fmt::format("{}  tick {}  {:.0f} fps{}  {:.0f} kbit/s  {:.1f} ms round trip  {} dropped",
+                                 printable(report.scene), now.tick, now.frames_per_second,
+                                 report.frameDivisor > 1
+                                     ? fmt::format(" of {}: the server is overloaded", report.streamRate)
+                                     : "",
+                                 now.kbit_per_second, now.round_trip_ms, now.dropped));
 }
 
 void StatusLine::clear() const {
   if (!shown_) return;
-  fmt::print("\r\033[K");
-  std::fflush(stdout);
+  showStatus(stdout, "");
 }
 
 }  // namespace clothstream::cli

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "clients/cli/error.h"
+#include "clients/cli/print.h"
 #include "clients/grpc/scene_control.h"
 
 namespace clothstream::cli {
@@ -109,7 +110,7 @@ ExitCode SceneCommands::print(const ServerAddress& address) const {
   const auto status = google::protobuf::util::MessageToJsonString(*scene, &json, format);
   if (!status.ok())
     return printError(kFailed, fmt::format("cannot print the scene: {}", std::string(status.message())));
-  fmt::print("{}", json);
+  put(printableJson(json));
   return kOk;
 }
 
@@ -130,15 +131,16 @@ ExitCode SceneCommands::create() const {
   }
   if (isatty(STDERR_FILENO) != 0)
     create.progress = [](std::size_t sent, std::size_t all) {
-      if (all > (1 << 20))
-        fmt::print(stderr, "\rsent {} of {} KiB{}", sent / 1024, all / 1024, sent == all ? "\n" : "");
+      if (all <= (1 << 20)) return;
+      showStatus(stderr, fmt::format("sent {} of {} KiB", sent / 1024, all / 1024));
+      if (sent == all) put(stderr, "\n");
     };
   const auto created = createScene(options_.address, create);
   if (!created) return printError(created.error());
   for (const v1::MeshRepair& repair : created->repairs())
     for (const std::string& sentence : repair.sentences())
-      fmt::print(stderr, "{}: {}\n", printable(repair.cloth()), printable(sentence));
-  fmt::print("{}\n", printable(created->scene().name()));
+      print(stderr, "{}: {}\n", printable(repair.cloth()), printable(sentence));
+  print("{}\n", printable(created->scene().name()));
   return kOk;
 }
 
@@ -154,9 +156,9 @@ ExitCode SceneCommands::control(const ServerAddress& address) const {
   if (!scene) return printError(scene.error());
   if (!scene->has_playback()) return kOk;
   const v1::Playback& playback = scene->playback();
-  fmt::print("{}: at {:.2f} s of {:.2f} s, speed {}{}{}\n", printable(scene->name()), playback.position(),
-             playback.length(), playback.speed(), playback.loop() ? ", in a loop" : "",
-             scene->paused() ? ", paused" : "");
+  print("{}: at {:.2f} s of {:.2f} s, speed {}{}{}\n", printable(scene->name()), playback.position(),
+        playback.length(), playback.speed(), playback.loop() ? ", in a loop" : "",
+        scene->paused() ? ", paused" : "");
   return kOk;
 }
 
@@ -164,13 +166,12 @@ ExitCode SceneCommands::record(const ServerAddress& address) const {
   if (startRecording_->parsed()) {
     const auto file = startRecording(address, options_.name, options_.recording);
     if (!file) return printError(file.error());
-    fmt::print("{}\n", printable(*file));
+    print("{}\n", printable(*file));
     return kOk;
   }
   const auto stopped = stopRecording(address, options_.name);
   if (!stopped) return printError(stopped.error());
-  fmt::print("{}: {:.1f} MiB\n", printable(stopped->file()),
-             static_cast<double>(stopped->bytes()) / (1 << 20));
+  print("{}: {:.1f} MiB\n", printable(stopped->file()), static_cast<double>(stopped->bytes()) / (1 << 20));
   return kOk;
 }
 

@@ -142,8 +142,8 @@ void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) CS_NOEXCEPT;
  * bytes, a triangle about 30. */
 typedef struct cs_limits {
   uint32_t version;           /* CS_LIMITS_VERSION */
-  uint32_t max_vertices;      /* of all cloths. 1 to 67108864. Default 4194304 */
-  uint32_t max_triangles;     /* of all cloths. 1 to 134217728. Default 8388608 */
+  uint32_t max_vertices;      /* of all cloths. 1 to 67108864. Default 1048576 */
+  uint32_t max_triangles;     /* of all cloths. 1 to 134217728. Default 2097152 */
   uint32_t max_cloths;        /* 1 to 256. Default 256 */
   uint32_t max_participants;  /* 1 to 65536; a Welcome with more fails. Default 4096 */
   uint64_t max_content_bytes; /* of descriptions that are arriving. 1 to 268435456. Default 268435456 */

@@ -24,8 +24,8 @@ class ProgramSource : public recording::ByteSource {
 
 }  // namespace
 
-cs_recording* cs_recording_open(const char* path) noexcept {
-  return openRecording(recording::openFile(path), path);
+cs_recording* cs_recording_open(const char* path, uint32_t max_vertices) noexcept {
+  return openRecording(recording::openFile(path), path, max_vertices);
 }
 
 cs_recording* cs_recording_open_source(const cs_recording_source* source) noexcept {
@@ -33,6 +33,6 @@ cs_recording* cs_recording_open_source(const cs_recording_source* source) noexce
     return openRecording(
         tl::unexpected(std::string("cs_recording_source has an unknown version or no function "
                                    "`read`; use CS_RECORDING_SOURCE_VERSION.")),
-        "");
-  return openRecording(std::make_unique<ProgramSource>(*source), "the recording");
+        "", 0);
+  return openRecording(std::make_unique<ProgramSource>(*source), "the recording", source->max_vertices);
 }

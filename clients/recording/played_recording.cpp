@@ -72,6 +72,13 @@ PlayedRecording::PlayedRecording(recording::RecordingReader reader)
 
 tl::expected<PlayedRecording, std::string> PlayedRecording::open(recording::RecordingReader reader) {
   PlayedRecording played(std::move(reader));
+  cs_limits limits;
+  cs_default_limits(&limits);
+  limits.max_vertices = played.reader_.limits().vertices;
+  limits.max_triangles = 2 * limits.max_vertices;
+  if (cs_set_limits(played.client_.get(), &limits) == 0)
+    return tl::unexpected("a recording of up to " + std::to_string(limits.max_vertices) +
+                          " vertices cannot be played; use 1 to " + std::to_string(codec::kMaxVertices));
   played.frameTime_ = played.time_ = played.reader_.start();
   std::string welcome;
   Writer message(welcome);
@@ -175,18 +182,49 @@ bool PlayedRecording::applyJournal(const RecordedMessage& message, PlayedMessage
 PlayedRecording::Played PlayedRecording::applyFrame(const RecordedMessage& message, PlayedMessage played) {
   played.events = give(field::ServerMessage::kFrame, message.bytes, message.time);
   if (cs_get_state(client()) == CS_STATE_FAILED) return tl::unexpected(std::string(cs_error_text(client())));
-  if ((played.events & CS_EVENT_FRAME) == 0 || !readFrame(bytesOf(message.bytes), frame_))
-    return std::nullopt;
-  if (const auto header = headerOf(frame_.packet)) {
-    played.tick = header->tick;
-    played.key = header->kind == codec::PacketKind::key;
+  if (!readFrame(bytesOf(message.bytes), frame_)) frame_ = {};
+  const double seconds = secondsOf(message.time);
+  const auto header = headerOf(frame_.packet);
+  const auto tick = header ? std::optional(header->tick) : std::nullopt;
+  const std::string name = "the frame of " + recording::FrameFaults::nameOf(tick, seconds);
+  if ((played.events & CS_EVENT_FRAME) == 0) {
+    const bool repeats = newestFrame_ && tick == newestFrame_->tick &&
+                         frame_.reconstructionHash == newestFrame_->reconstructionHash;
+    if (repeats) {
+      faults_.addGood();
+      return std::nullopt;
+    }
+    faults_.addUndecodable(tick, seconds);
+    return fault(name + " cannot be decoded");
   }
+  if (cs_reconstruction_hash(client()) != frame_.reconstructionHash) {
+    faults_.addDifferent(*tick, seconds);
+    return fault(name + " differs from its recorded hash");
+  }
+  faults_.addGood();
+  isLost_ = false;
+  played.tick = *tick;
+  played.key = header->kind == codec::PacketKind::key;
   played.reconstructionHash = frame_.reconstructionHash;
   played.stateHash = frame_.stateHash;
   frameTime_ = message.time;
   newestFrame_ = played;
   newestFrame_->bytes = {};
   return played;
+}
+
+// Frames after a fault refer to it, up to the next key frame.
+PlayedRecording::Played PlayedRecording::fault(std::string what) {
+  if (std::exchange(isLost_, true)) return std::nullopt;
+  return tl::unexpected(std::move(what));
+}
+
+bool PlayedRecording::readToTheEnd() {
+  for (;;) {
+    const Played frame = next(CS_RECORDED_FRAME);
+    if (frame && !*frame) return true;
+    if (!frame && cs_get_state(client()) == CS_STATE_FAILED) return false;
+  }
 }
 
 PlayedRecording::Played PlayedRecording::apply(const RecordedMessage& message) {
@@ -235,6 +273,7 @@ PlayedRecording::Played PlayedRecording::next(std::uint32_t kinds) {
     const auto message = reader_.next();
     if (!message) {
       reader_.passChunk();
+      isLost_ = true;
       return tl::unexpected(message.error());
     }
     if (!*message) return std::nullopt;
@@ -266,6 +305,7 @@ void PlayedRecording::applyHistory(const Place& from, const Place& to) {
 PlayedRecording::Played PlayedRecording::seekTo(std::uint64_t time, std::optional<std::uint64_t> tick) {
   if (cs_get_state(client()) == CS_STATE_FAILED) return tl::unexpected(std::string(cs_error_text(client())));
   const Place here = reader_.place();
+  isLost_ = false;
   if (auto sought = reader_.seek(time); !sought) {
     reader_.go(here);
     return tl::unexpected(sought.error());
@@ -291,6 +331,7 @@ PlayedRecording::Played PlayedRecording::seekTo(std::uint64_t time, std::optiona
     const auto message = reader_.next();
     if (!message) {
       reader_.passChunk();
+      isLost_ = true;
       return tl::unexpected(message.error());
     }
     if (!*message) break;

@@ -79,13 +79,15 @@ int writeElement(const cs_recording* recording, List RecordedTick::*list, std::u
 }  // namespace
 
 cs_recording* openRecording(tl::expected<std::unique_ptr<recording::ByteSource>, std::string> source,
-                            std::string name) {
+                            std::string name, std::uint32_t maxVertices) {
   auto* opened =
       new cs_recording;  // NOLINT(bugprone-unhandled-exception-at-new): out of memory ends the program
   const auto open = [&]() -> tl::expected<PlayedRecording, std::string> {
     if (!source) return tl::unexpected(source.error());
-    auto reader =
-        recording::RecordingReader::open(std::move(*source), std::move(name), recording::CutFiles::read);
+    recording::ReadLimits limits;
+    if (maxVertices > 0) limits.vertices = maxVertices;
+    auto reader = recording::RecordingReader::open(std::move(*source), std::move(name),
+                                                   recording::CutFiles::read, limits);
     if (!reader) return tl::unexpected(reader.error());
     return PlayedRecording::open(std::move(*reader));
   };
@@ -99,10 +101,10 @@ cs_recording* openRecording(tl::expected<std::unique_ptr<recording::ByteSource>,
 
 }  // namespace clothstream::client
 
-cs_recording* cs_recording_open_bytes(const uint8_t* bytes, size_t count) noexcept {
+cs_recording* cs_recording_open_bytes(const uint8_t* bytes, size_t count, uint32_t max_vertices) noexcept {
   return openRecording(
       std::make_unique<BorrowedBytes>(std::string_view(reinterpret_cast<const char*>(bytes), count)),
-      "the recording");
+      "the recording", max_vertices);
 }
 
 void cs_recording_close(cs_recording* recording) noexcept {
@@ -178,6 +180,18 @@ int cs_recording_seek(cs_recording* recording, double seconds, cs_recorded* out)
 
 int cs_recording_seek_tick(cs_recording* recording, uint64_t tick, cs_recorded* out) noexcept {
   return seekWith(recording, &PlayedRecording::seekTick, tick, out);
+}
+
+int cs_recording_get_faults(const cs_recording* recording, cs_recording_faults* out) noexcept {
+  if (!recording->played || out->version != CS_RECORDING_FAULTS_VERSION) return 0;
+  const recording::FrameFaults& faults = recording->played->faults();
+  *out = {.version = CS_RECORDING_FAULTS_VERSION,
+          .frames = faults.frames(),
+          .undecodable = faults.undecodable(),
+          .different = faults.different(),
+          .first_tick = faults.firstTick().value_or(0),
+          .first_seconds = faults.firstSeconds()};
+  return 1;
 }
 
 const uint8_t* cs_recording_message(const cs_recording* recording, size_t* bytes) noexcept {

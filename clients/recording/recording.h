@@ -11,9 +11,10 @@
  * are independent of each other.
  *
  * Errors: no function throws or aborts because of the bytes that it reads. A file that is cut is read up to
- * the cut. Memory is bounded: a chunk of the file has at most 320 MiB, its index at most 256 MiB, and the
- * client has the default cs_limits. If memory runs out, the native library ends the program and WebAssembly
- * traps.
+ * the cut. Memory and time are bounded before a chunk is decompressed: a chunk of the file has at most
+ * 128 MiB, its index at most 256 MiB, all chunks together expand to at most 64 times the file plus 512 MiB,
+ * and the client has the default cs_limits. A larger max_vertices raises these limits. If memory runs out,
+ * the native library ends the program and WebAssembly traps.
  *
  * Pointers and strings that a function returns belong to the recording. They stay valid until the next
  * cs_recording_next, cs_recording_seek or cs_recording_seek_tick, unless the function says otherwise. Strings
@@ -37,22 +38,27 @@ extern "C" {
  *
  * The functions always return a recording; free it with cs_recording_close. cs_recording_is_open says whether
  * it can be read, else cs_recording_error_text says why not.
+ *
+ * max_vertices: most vertices of all cloths, 1 to 67108864, and half of the most triangles. A recording with
+ * more is refused before its geometry is allocated. 0 means the default, 1048576. A chunk of the file has at
+ * most 32 MiB and 96 bytes per vertex.
  */
 
 typedef struct cs_recording cs_recording;
 
 /* Opens a regular file. path: UTF-8. A file that grows is read up to the size that it has now. The
  * WebAssembly module does not export this function. */
-cs_recording* cs_recording_open(const char* path) CS_NOEXCEPT;
+cs_recording* cs_recording_open(const char* path, uint32_t max_vertices) CS_NOEXCEPT;
 /* Opens the bytes of a file in memory. They are not copied: keep them unchanged until cs_recording_close. */
-cs_recording* cs_recording_open_bytes(const uint8_t* bytes, size_t count) CS_NOEXCEPT;
+cs_recording* cs_recording_open_bytes(const uint8_t* bytes, size_t count, uint32_t max_vertices) CS_NOEXCEPT;
 
 #define CS_RECORDING_SOURCE_VERSION 1u
 /* Bytes that a function of the program reads, for example from an archive or over a network. */
 typedef struct cs_recording_source {
   uint32_t version; /* CS_RECORDING_SOURCE_VERSION */
-  uint64_t size;    /* bytes */
-  void* user;       /* first argument of `read`; may be NULL */
+  uint32_t max_vertices;
+  uint64_t size; /* bytes */
+  void* user;    /* first argument of `read`; may be NULL */
   /* Copies `count` bytes from `offset` on, which lie within the size. Returns 1, or 0 if they cannot be read.
    * It is called only while a function of the recording runs, on its thread. */
   int (*read)(void* user, uint64_t offset, uint8_t* bytes, size_t count);
@@ -128,10 +134,11 @@ typedef enum cs_recording_result {
 } cs_recording_result;
 
 /* Reads up to the next message of `kinds`, a set of CS_RECORDED values, and gives it and all messages before
- * it to the client. Frames that cannot be decoded, because a part of the file is damaged, are skipped;
- * cs_get_statistics counts them. out: only its version is read; it is unchanged unless the result is
- * CS_RECORDING_NEXT. An error in a chunk of the file is reported once: the next call continues after this
- * chunk. A malformed message ends the recording, and each later call reports it. */
+ * it to the client. out: only its version is read; it is unchanged unless the result is CS_RECORDING_NEXT.
+ * A chunk of the file that cannot be read is an error, and so is a frame that cannot be decoded or differs
+ * from its recorded hash, whatever the kinds: the next call continues after it. The frames that follow up to
+ * the next key frame depend on it; they are left out without a further error, and cs_recording_get_faults
+ * counts them. A malformed message ends the recording, and each later call reports it. */
 cs_recording_result cs_recording_next(cs_recording* recording, uint32_t kinds, cs_recorded* out) CS_NOEXCEPT;
 /* Goes to a time, in seconds since the start: the client shows the newest frame at or before it, as if the
  * recording had been played up to there, with the parameters and participants of this time. Decoding starts
@@ -141,6 +148,21 @@ cs_recording_result cs_recording_next(cs_recording* recording, uint32_t kinds, c
 int cs_recording_seek(cs_recording* recording, double seconds, cs_recorded* out) CS_NOEXCEPT;
 /* Like cs_recording_seek, to the newest frame with this tick or an earlier one. */
 int cs_recording_seek_tick(cs_recording* recording, uint64_t tick, cs_recorded* out) CS_NOEXCEPT;
+
+#define CS_RECORDING_FAULTS_VERSION 1u
+/* Frames that were read so far. Frames that are read again after a seek count again. */
+typedef struct cs_recording_faults {
+  uint32_t version;     /* CS_RECORDING_FAULTS_VERSION */
+  uint64_t frames;      /* all frames */
+  uint64_t undecodable; /* frames that the decoder refused */
+  uint64_t different;   /* frames that were decoded, but differ from their recorded hash */
+  /* The first of the last two: its tick, 0 if its header cannot be read, and its time since the start. */
+  uint64_t first_tick;
+  double first_seconds;
+} cs_recording_faults;
+/* Fails if the recording is not open or `out->version` is unknown. A program that has read a whole recording
+ * without an error has seen every frame; the counts are then 0. */
+int cs_recording_get_faults(const cs_recording* recording, cs_recording_faults* out) CS_NOEXCEPT;
 
 /* The newest message, as in the file: serialised protobuf of the type that docs/recording.md lists. NULL and
  * 0 before the first, and after a seek. */

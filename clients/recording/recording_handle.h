@@ -21,8 +21,8 @@ struct cs_recording {
 
 namespace clothstream::client {
 
-// `name` is for error messages.
+// `name` is for error messages. `maxVertices` as in recording.h.
 cs_recording* openRecording(tl::expected<std::unique_ptr<recording::ByteSource>, std::string> source,
-                            std::string name);
+                            std::string name, std::uint32_t maxVertices);
 
 }  // namespace clothstream::client

@@ -85,6 +85,10 @@ Decoder::~Decoder() = default;
 DecodeResult Decoder::decode(std::span<const std::byte> packet) {
   return state_->decode(packet);
 }
+void Decoder::restart() {
+  state_->held.clear();
+  state_->hasFrame = false;
+}
 std::uint64_t Decoder::tick() const {
   return state_->tick;
 }

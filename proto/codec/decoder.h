@@ -34,6 +34,8 @@ class Decoder {
 
   // A result other than `ok` leaves the decoder unchanged.
   [[nodiscard]] DecodeResult decode(std::span<const std::byte> packet);
+  // Forgets all frames: only a key frame can follow, with any tick.
+  void restart();
 
   // Tick of the newest decoded frame. Like positions, normals and hash it is undefined before the first
   // frame.

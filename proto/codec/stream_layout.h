@@ -62,6 +62,8 @@ struct StreamLayout {
 
 inline constexpr std::uint8_t kMaxQualities = 4;
 inline constexpr std::uint32_t kMaxVertices = 1u << 26;
+// Vertices that a reader of streams and files accepts unless its caller allows more.
+inline constexpr std::uint32_t kDefaultMaxVertices = 1u << 20;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
 // True if a stream can have this layout: a known codec, 1 to kMaxTemporalLayers layers, at least one cloth,

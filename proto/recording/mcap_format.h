@@ -31,11 +31,10 @@ inline constexpr std::size_t kVersionByte = 5;     // place in the magic
 inline constexpr std::size_t kRecordHead = 1 + 8;  // opcode, length
 inline constexpr std::size_t kFooterBytes = 8 + 8 + 4;
 
-// Limits of a reader. A chunk can hold one message that is larger than a writer's usual chunk: the
-// description of a large mesh.
-inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{320} << 20;
+// Limits of a reader. McapLimits has those that depend on its caller.
 inline constexpr std::uint64_t kMaxSummaryBytes = std::uint64_t{256} << 20;
 inline constexpr std::uint64_t kMaxPlainRecordBytes = std::uint64_t{16} << 20;  // schema, channel, metadata
+inline constexpr std::size_t kMaxChunkMessages = 262'144;
 
 using Metadata = std::map<std::string, std::string>;
 

@@ -18,6 +18,9 @@ tl::unexpected<std::string> broken(std::string text) {
 
 using Done = tl::expected<void, std::string>;
 
+// Bytes of all schemas and channels that are kept.
+constexpr std::uint64_t kMaxDefinitionBytes = std::uint64_t{64} << 20;
+
 // Record that ends the data, before the summary.
 constexpr std::uint64_t kDataEndBytes = kRecordHead + 4;
 
@@ -63,6 +66,7 @@ std::optional<Metadata> parseMap(std::string_view entries) {
 
 struct McapReader::State {
   std::unique_ptr<ByteSource> source;
+  McapLimits limits;
   std::string library;
   std::uint64_t firstRecord = 0;  // offset after the header
   bool indexed = false;
@@ -71,6 +75,7 @@ struct McapReader::State {
   std::vector<ChunkPlace> chunks;
   std::optional<Statistics> statistics;
   std::map<std::string, Metadata> metadata;
+  std::uint64_t metadataBytes = 0, definitionBytes = 0;  // read so far; definitions are schemas and channels
   std::uint64_t dataEnd = 0;
   std::uint64_t summaryStart = 0;  // only if there is an index
 
@@ -91,6 +96,8 @@ struct McapReader::State {
   bool takeMetadata(std::string_view content);
   void scan();
   bool scanChunk(const Record& record);
+  bool chunksOverlap() const;
+  Done checkExpansion() const;
   Done parseMessages(const ChunkHead& head);
 };
 
@@ -139,8 +146,12 @@ bool McapReader::State::takeSchema(std::string_view content) {
   schema.name = reader.text();
   schema.encoding = reader.text();
   schema.data = reader.text();
-  if (reader.ok() && id != 0) schemas.insert_or_assign(id, std::move(schema));
-  return reader.ok();
+  if (!reader.ok() || id == 0) return reader.ok();
+  const auto [known, added] = schemas.try_emplace(id);
+  // Chunks may repeat schemas, and are read several times.
+  if (!added && known->second == schema) return true;
+  known->second = std::move(schema);
+  return (definitionBytes += content.size()) <= kMaxDefinitionBytes;
 }
 
 bool McapReader::State::takeChannel(std::string_view content) {
@@ -151,8 +162,11 @@ bool McapReader::State::takeChannel(std::string_view content) {
   channel.topic = reader.text();
   channel.encoding = reader.text();
   reader.text();  // metadata of the channel
-  if (reader.ok()) channels.insert_or_assign(channel.id, channel);
-  return reader.ok();
+  if (!reader.ok()) return false;
+  const auto [known, added] = channels.try_emplace(channel.id);
+  if (!added && known->second == channel) return true;
+  known->second = std::move(channel);
+  return (definitionBytes += content.size()) <= kMaxDefinitionBytes;
 }
 
 bool McapReader::State::takeMetadata(std::string_view content) {
@@ -177,6 +191,10 @@ bool McapReader::State::takeChunkIndex(std::string_view content) {
     place.channels->push_back(indexes.number<std::uint16_t>());
     indexes.number<std::uint64_t>();  // offset of its messages
   }
+  reader.number<std::uint64_t>();  // length of the message indexes
+  reader.text();                   // name of the compression
+  reader.number<std::uint64_t>();  // compressed size
+  place.size = reader.number<std::uint64_t>();
   const std::uint64_t size = source->size();
   if (!reader.ok() || !indexes.ok() || place.offset > size || place.length > size - place.offset ||
       place.length < kRecordHead)
@@ -208,9 +226,11 @@ bool McapReader::State::takeMetadataIndex(std::string_view content) {
   ByteReader reader(content);
   const auto offset = reader.number<std::uint64_t>();
   const std::optional<Record> record = reader.ok() ? recordAt(offset) : std::nullopt;
+  // Several entries may name one record, so that a small file would be read again and again.
+  if (!record || (metadataBytes += record->length) > source->size()) return false;
   std::string bytes;
-  return record && record->opcode == Opcode::metadata &&
-         this->content(*record, kMaxPlainRecordBytes, bytes) && takeMetadata(bytes);
+  return record->opcode == Opcode::metadata && this->content(*record, kMaxPlainRecordBytes, bytes) &&
+         takeMetadata(bytes);
 }
 
 bool McapReader::State::takeSummaryRecord(Opcode opcode, std::string_view content) {
@@ -256,24 +276,51 @@ bool McapReader::State::readSummary() {
     const std::string_view record = summary.take(summary.number<std::uint64_t>());
     if (!summary.ok() || !takeSummaryRecord(opcode, record)) return false;
   }
+  if (chunksOverlap()) return false;
   summaryStart = start;
   dataEnd = start - std::min(start, kDataEndBytes);
   return true;
 }
 
 bool McapReader::State::scanChunk(const Record& record) {
-  // Reads the times and the few bytes before the messages, with room for the name of a compression.
-  constexpr std::uint64_t kTimes = 16;
+  constexpr std::uint64_t kTimesAndSize = 24;
   std::string bytes;
-  if (record.length < kTimes || !source->read(record.offset, kTimes, bytes)) return false;
+  if (record.length < kTimesAndSize || !source->read(record.offset, kTimesAndSize, bytes)) return false;
   ByteReader reader(bytes);
   ChunkPlace place;
   place.start = reader.number<std::uint64_t>();
   place.end = reader.number<std::uint64_t>();
+  place.size = reader.number<std::uint64_t>();
   place.offset = record.offset - kRecordHead;
   place.length = record.length + kRecordHead;
   chunks.push_back(std::move(place));
   return true;
+}
+
+// Whether the index names bytes twice, so that a small file would have many large chunks.
+bool McapReader::State::chunksOverlap() const {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> places;
+  places.reserve(chunks.size());
+  for (const ChunkPlace& chunk : chunks) places.emplace_back(chunk.offset, chunk.length);
+  std::sort(places.begin(), places.end());
+  for (std::size_t i = 1; i < places.size(); ++i)
+    if (places[i].first - places[i - 1].first < places[i - 1].second) return true;
+  return false;
+}
+
+Done McapReader::State::checkExpansion() const {
+  constexpr std::uint64_t kLargestFile = std::uint64_t{1} << 50;  // so that the product fits
+  std::uint64_t allowed =
+      std::min(source->size(), kLargestFile) * limits.expansion + limits.chunkBytes * limits.freeChunks;
+  for (const ChunkPlace& chunk : chunks) {
+    if (chunk.size > limits.chunkBytes) continue;  // never decompressed
+    if (chunk.size > allowed)
+      return broken("its chunks would expand to more than " + std::to_string(limits.expansion) +
+                    " times the size of the file plus " +
+                    std::to_string(limits.chunkBytes * limits.freeChunks >> 20) + " MiB");
+    allowed -= chunk.size;
+  }
+  return {};
 }
 
 void McapReader::State::scan() {
@@ -311,14 +358,17 @@ McapReader::McapReader(std::unique_ptr<State> state) : state_(std::move(state)) 
 McapReader::~McapReader() = default;
 McapReader::McapReader(McapReader&&) noexcept = default;
 
-tl::expected<McapReader, std::string> McapReader::open(std::unique_ptr<ByteSource> source) {
+tl::expected<McapReader, std::string> McapReader::open(std::unique_ptr<ByteSource> source,
+                                                       const McapLimits& limits) {
   auto state = std::make_unique<State>();
+  state->limits = limits;
   state->source = std::move(source);
   if (Done started = state->readStart(); !started) return tl::unexpected(started.error());
   state->indexed = state->readSummary();
   if (!state->indexed) {
     auto scanned = std::make_unique<State>();
     scanned->source = std::move(state->source);
+    scanned->limits = limits;
     scanned->library = state->library;
     scanned->firstRecord = scanned->dataEnd = state->firstRecord;
     scanned->scan();
@@ -326,6 +376,7 @@ tl::expected<McapReader, std::string> McapReader::open(std::unique_ptr<ByteSourc
   }
   std::stable_sort(state->chunks.begin(), state->chunks.end(),
                    [](const ChunkPlace& a, const ChunkPlace& b) { return a.start < b.start; });
+  if (Done bounded = state->checkExpansion(); !bounded) return tl::unexpected(bounded.error());
   return McapReader(std::move(state));
 }
 
@@ -377,6 +428,8 @@ Done McapReader::State::parseMessages(const ChunkHead& head) {
     if (opcode == Opcode::schema && !takeSchema(content)) return broken("a schema in it is invalid");
     if (opcode == Opcode::channel && !takeChannel(content)) return broken("a channel in it is invalid");
     if (opcode != Opcode::message) continue;
+    if (messages.size() == kMaxChunkMessages)
+      return broken("it has more than " + std::to_string(kMaxChunkMessages) + " messages");
     ByteReader fields(content);
     Message& message = messages.emplace_back();
     message.channel = fields.number<std::uint16_t>();
@@ -403,11 +456,14 @@ tl::expected<std::span<const Message>, std::string> McapReader::read(std::size_t
   const std::optional<Record> record = s.recordAt(place.offset);
   if (!record || record->opcode != Opcode::chunk || record->length != place.length - kRecordHead)
     return wrong("there is none");
-  if (!s.content(*record, kMaxChunkBytes, s.raw))
+  if (place.size > s.limits.chunkBytes)
+    return wrong("it has " + std::to_string(place.size) + " bytes; chunks of at most " +
+                 std::to_string(s.limits.chunkBytes) + " are read (--max-vertices allows more)");
+  if (!s.content(*record, s.limits.chunkBytes, s.raw))
     return wrong("it is too large, or its bytes cannot be read");
   const std::optional<ChunkHead> head = parseChunk(s.raw);
   if (!head) return wrong("it is too short");
-  if (head->size > kMaxChunkBytes) return wrong("it is too large");
+  if (head->size != place.size) return wrong("it has another size than its index says");
   if (head->compression.empty()) {
     if (head->records.size() != head->size) return wrong("it has another size than it says");
     s.records = head->records;

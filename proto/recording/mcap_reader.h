@@ -22,16 +22,29 @@ namespace clothstream::recording {
 struct Channel {
   std::uint16_t id = 0, schema = 0;
   std::string topic, encoding;
+  bool operator==(const Channel&) const = default;
 };
 
 struct ReadSchema {
   std::string name, encoding, data;
+  bool operator==(const ReadSchema&) const = default;
+};
+
+// Bounds of memory and time. A file that is compressed well could otherwise cost thousands of times its size.
+struct McapLimits {
+  // Largest chunk after decompression, bytes. A chunk can hold one message that is larger than a writer's
+  // usual chunk: the description of a large mesh.
+  std::uint64_t chunkBytes = std::uint64_t{128} << 20;
+  // All chunks together may expand to `expansion` times the size of the file, and to `freeChunks` largest
+  // chunks in addition.
+  std::uint64_t expansion = 64, freeChunks = 4;
 };
 
 // Place of a chunk in the file, and the times of its messages in ns.
 struct ChunkPlace {
   std::uint64_t start = 0, end = 0;
   std::uint64_t offset = 0, length = 0;  // place of the record in the file
+  std::uint64_t size = 0;                // bytes of its messages after decompression
   // Channels of its messages, from the index. In a file without an index they come from the message indexes
   // after the chunk. Empty if there are none or the file ends in them.
   std::optional<std::vector<std::uint16_t>> channels = {};
@@ -53,8 +66,10 @@ struct Message {
 // Errors say what is wrong with the bytes, without the file's name.
 class McapReader {
  public:
-  // Finds all chunks: from the index at the end if it is complete, otherwise record by record.
-  [[nodiscard]] static tl::expected<McapReader, std::string> open(std::unique_ptr<ByteSource> source);
+  // Finds all chunks: from the index at the end if it is complete, otherwise record by record. Chunks that
+  // expand to more than the limits allow are an error. No chunk is decompressed.
+  [[nodiscard]] static tl::expected<McapReader, std::string> open(std::unique_ptr<ByteSource> source,
+                                                                  const McapLimits& limits = {});
   ~McapReader();
   McapReader(McapReader&&) noexcept;
   McapReader& operator=(McapReader&&) = delete;
@@ -73,8 +88,8 @@ class McapReader {
 
   // Last chunk that starts at or before `time`; otherwise the first chunk.
   std::size_t chunkAt(std::uint64_t time) const;
-  // Messages of a chunk in their order, valid until the next call. A checksum that does not match is an
-  // error.
+  // Messages of a chunk in their order, valid until the next call. A checksum that does not match and a chunk
+  // that is larger than the limit are errors.
   [[nodiscard]] tl::expected<std::span<const Message>, std::string> read(std::size_t chunk);
 
   // End of the chunks, of their indexes and of everything before them. The index follows, or bytes that

@@ -13,20 +13,31 @@
 
 namespace clothstream::recording {
 
-bool isKeyFrame(std::string_view bytes) {
-  if (!wellFormed(bytes)) return false;
-  std::string_view packet;
+std::optional<FrameContent> frameContentOf(std::string_view bytes) {
+  if (!wellFormed(bytes)) return std::nullopt;
+  using protozero::pbf_wire_type;
+  FrameContent content;
   protozero::pbf_reader frame(bytes.data(), bytes.size());
   while (frame.next()) {
-    if (frame.tag_and_type() !=
-        protozero::tag_and_type(kFramePacket, protozero::pbf_wire_type::length_delimited)) {
-      frame.skip();
-      continue;
+    switch (frame.tag_and_type()) {
+      case protozero::tag_and_type(kFramePacket, pbf_wire_type::length_delimited): {
+        const protozero::data_view view = frame.get_view();
+        content.packet = std::as_bytes(std::span(view.data(), view.size()));
+        break;
+      }
+      case protozero::tag_and_type(kFrameReconstructionHash, pbf_wire_type::fixed64):
+        content.reconstructionHash = frame.get_fixed64();
+        break;
+      default:
+        frame.skip();
     }
-    const protozero::data_view view = frame.get_view();
-    packet = {view.data(), view.size()};
   }
-  const auto parsed = codec::parsePacket(std::as_bytes(std::span(packet.data(), packet.size())));
+  return content;
+}
+
+bool isKeyFrame(std::string_view bytes) {
+  const std::optional<FrameContent> frame = frameContentOf(bytes);
+  const auto parsed = frame ? codec::parsePacket(frame->packet) : std::nullopt;
   return parsed && parsed->header.kind == codec::PacketKind::key;
 }
 
@@ -34,17 +45,28 @@ tl::unexpected<std::string> RecordingReader::broken(std::string_view what) const
   return tl::unexpected(name_ + " is broken: " + std::string(what));
 }
 
-tl::expected<RecordingReader, std::string> RecordingReader::open(const std::string& path, CutFiles cutFiles) {
+std::string ReadLimits::problemOf(std::uint64_t vertexCount, std::uint64_t triangleCount) const {
+  const std::uint64_t most = vertices;
+  const bool tooManyVertices = vertexCount > most;
+  if (!tooManyVertices && triangleCount <= 2 * most) return {};
+  return std::to_string(tooManyVertices ? vertexCount : triangleCount) +
+         (tooManyVertices ? " vertices; at most " : " triangles; at most ") +
+         std::to_string(tooManyVertices ? most : 2 * most) + " are read (--max-vertices allows more)";
+}
+
+tl::expected<RecordingReader, std::string> RecordingReader::open(const std::string& path, CutFiles cutFiles,
+                                                                 const ReadLimits& limits) {
   auto file = openFile(path);
   if (!file) return tl::unexpected(file.error());
-  return open(std::move(*file), path, cutFiles);
+  return open(std::move(*file), path, cutFiles, limits);
 }
 
 tl::expected<RecordingReader, std::string> RecordingReader::open(std::unique_ptr<ByteSource> source,
-                                                                 std::string name, CutFiles cutFiles) {
-  auto mcap = McapReader::open(std::move(source));
+                                                                 std::string name, CutFiles cutFiles,
+                                                                 const ReadLimits& limits) {
+  auto mcap = McapReader::open(std::move(source), limits.mcap());
   if (!mcap) return tl::unexpected(name + " cannot be read: " + mcap.error());
-  RecordingReader reader(std::move(*mcap), std::move(name));
+  RecordingReader reader(std::move(*mcap), std::move(name), limits);
   for (const auto& [id, channel] : reader.mcap_.channels()) {
     const auto known = std::find(kTopicNames.begin(), kTopicNames.end(), channel.topic);
     if (known != kTopicNames.end()) reader.topics_[id] = static_cast<Topic>(known - kTopicNames.begin());

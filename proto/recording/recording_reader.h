@@ -17,6 +17,7 @@
 
 #include <tl/expected.hpp>
 
+#include "proto/codec/stream_layout.h"
 #include "proto/recording/mcap_reader.h"
 #include "proto/recording/topics.h"
 
@@ -28,6 +29,20 @@ struct RecordedMessage {
   std::string_view bytes;  // valid until the next call
 };
 
+// Limits of a reader, so that a small file cannot cost much memory or time. A file that exceeds them is
+// refused before memory is allocated.
+struct ReadLimits {
+  std::uint32_t vertices = codec::kDefaultMaxVertices;  // of all cloths; twice as many triangles
+
+  // Limits of chunks: a description of this size fits into one, with triangles and texture coordinates.
+  McapLimits mcap() const {
+    constexpr std::uint64_t kLeastBytes = std::uint64_t{32} << 20, kBytesPerVertex = 96;
+    return {.chunkBytes = kLeastBytes + kBytesPerVertex * vertices};
+  }
+  // Says what exceeds the limit; empty if nothing does.
+  std::string problemOf(std::uint64_t vertexCount, std::uint64_t triangleCount) const;
+};
+
 // Policy for truncated recordings: refuse them, or read them up to their end.
 enum class CutFiles : std::uint8_t { refused, read };
 
@@ -35,11 +50,16 @@ enum class CutFiles : std::uint8_t { refused, read };
 class RecordingReader {
  public:
   [[nodiscard]] static tl::expected<RecordingReader, std::string> open(const std::string& path,
-                                                                       CutFiles cutFiles = CutFiles::refused);
+                                                                       CutFiles cutFiles = CutFiles::refused,
+                                                                       const ReadLimits& limits = {});
   [[nodiscard]] static tl::expected<RecordingReader, std::string> open(std::unique_ptr<ByteSource> source,
-                                                                       std::string name, CutFiles cutFiles);
+                                                                       std::string name, CutFiles cutFiles,
+                                                                       const ReadLimits& limits = {});
 
   const McapReader& mcap() const { return mcap_; }
+  const ReadLimits& limits() const { return limits_; }
+  // Name of the file for error messages.
+  const std::string& name() const { return name_; }
   [[nodiscard]] tl::expected<void, std::string> check();
   // Metadata: the machine and the program that made the recording.
   const Metadata& metadata() const { return metadata_; }
@@ -76,11 +96,13 @@ class RecordingReader {
   ChunkPlace passChunk();
 
  private:
-  RecordingReader(McapReader mcap, std::string name) : mcap_(std::move(mcap)), name_(std::move(name)) {}
+  RecordingReader(McapReader mcap, std::string name, const ReadLimits& limits)
+      : mcap_(std::move(mcap)), limits_(limits), name_(std::move(name)) {}
   [[nodiscard]] tl::unexpected<std::string> broken(std::string_view what) const;
   [[nodiscard]] tl::expected<void, std::string> load(std::size_t chunk);
 
   McapReader mcap_;
+  ReadLimits limits_;
   std::string name_;
   Metadata metadata_;
   std::map<std::uint16_t, Topic> topics_;
@@ -90,8 +112,16 @@ class RecordingReader {
   std::span<const Message> messages_;
 };
 
-// Field number of Frame.packet.
-inline constexpr std::uint32_t kFramePacket = 1;
+// Field numbers of Frame.packet and Frame.reconstruction_hash.
+inline constexpr std::uint32_t kFramePacket = 1, kFrameReconstructionHash = 4;
+
+// Packet and hash of a serialised Frame.
+struct FrameContent {
+  std::span<const std::byte> packet;  // inside the bytes of the Frame
+  std::uint64_t reconstructionHash = 0;
+};
+// nullopt if the bytes are not a Frame.
+std::optional<FrameContent> frameContentOf(std::string_view frame);
 // True if a serialised Frame can be decoded without earlier frames.
 bool isKeyFrame(std::string_view frame);
 

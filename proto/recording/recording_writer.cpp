@@ -7,38 +7,12 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
 
-#include "clothstream/v1/recording.pb.h"
+#include "proto/recording/message_types.h"
 
 namespace clothstream::recording {
 namespace {
 
 namespace protobuf = google::protobuf;
-
-const protobuf::Descriptor& typeOf(Topic topic) {
-  switch (topic) {
-    case Topic::description:
-      return *v1::StreamDescription::descriptor();
-    case Topic::frames:
-      return *v1::Frame::descriptor();
-    case Topic::reports:
-      return *v1::SimulationReport::descriptor();
-    case Topic::parameters:
-      return *v1::ParameterChanged::descriptor();
-    case Topic::events:
-      return *v1::TickEvents::descriptor();
-    case Topic::notices:
-      return *v1::Notice::descriptor();
-    case Topic::participants:
-      return *v1::ParticipantEvent::descriptor();
-    case Topic::scene:
-      return *v1::RecordedScene::descriptor();
-    case Topic::ticks:
-      return *v1::RecordedTick::descriptor();
-    case Topic::checkpoints:
-      break;
-  }
-  return *v1::Checkpoint::descriptor();
-}
 
 // Adds imported files first.
 void add(const protobuf::FileDescriptor& file, std::set<std::string>& known,

@@ -29,6 +29,12 @@ class RecordingWriter {
 
   [[nodiscard]] Written closeChunk() { return mcap_.closeChunk(); }
   [[nodiscard]] Written finish() { return mcap_.finish(); }
+  // Finishes with other metadata, which replaces that of begin().
+  [[nodiscard]] Written finish(const Metadata& metadata) {
+    return mcap_.closeChunk()
+        .and_then([&] { return mcap_.addMetadata(kMetadataName, metadata); })
+        .and_then([&] { return mcap_.finish(); });
+  }
   std::uint64_t bytes() const { return mcap_.bytes(); }
 
  private:

@@ -37,5 +37,7 @@ inline constexpr std::uint32_t kMaxKeyFrameDistance = 24;
 // Name of the metadata record: machine and program that made the recording. docs/recording.md lists its
 // entries.
 inline constexpr std::string_view kMetadataName = "clothstream";
+// Entry of a finished recording of a client: number of frames of quality 0, 1, 2 and 3.
+inline constexpr const char* kQualitiesEntry = "frames_of_quality";
 
 }  // namespace clothstream::recording

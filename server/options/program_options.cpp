@@ -456,6 +456,13 @@ CLI::App& addDoctorCommand(OptionTable& table, Parsed& parsed) {
   return command;
 }
 
+void addRecordingLimits(OptionTable& table, ProgramOptions& options) {
+  table.number(
+      "--max-vertices", options.recordingLimits.vertices, {.min = 1, .max = codec::kMaxVertices},
+      "Most vertices of the recording, and half of its most triangles, since the file decides how much "
+      "memory is needed");
+}
+
 CLI::App& addResimulateCommand(OptionTable& table, Parsed& parsed) {
   ProgramOptions& options = parsed.options;
   CLI::App& command =
@@ -464,6 +471,7 @@ CLI::App& addResimulateCommand(OptionTable& table, Parsed& parsed) {
   table.text("--states", options.states, "OUT",
              "Write positions and velocities of every tick to this file, in the format of `step`");
   table.flag("--json", options.json, "Print the result as one JSON object");
+  addRecordingLimits(table, options);
   addDeviceOptions(table, parsed);
   command.footer(
       fmt::format("Exit code: 0 if every state is bitwise equal, 1 for other bits although the kernels are "
@@ -500,6 +508,7 @@ CLI::App& addPlayCommand(OptionTable& table, ProgramOptions& options) {
                "Participants that must be there before the first frame");
   table.number("--faults", options.playback.faults, {.min = 0, .max = kMaxSeed, .type = "SEED"},
                "Drop and delay frames. The same seed gives the same faults");
+  addRecordingLimits(table, options);
   command.footer(
       "Options of clothstream-server for participants, network and log apply too. No device is needed.");
   command.fallthrough();

@@ -120,8 +120,9 @@ struct ProgramOptions {
   // Commands.
   step::StepOptions step;
   recording::PlaybackOptions playback;
-  std::string playSpeed = "1";   // of `play`: a number or "max"
-  std::string recording;         // file of `play` and `resimulate`
+  std::string playSpeed = "1";  // of `play`: a number or "max"
+  std::string recording;        // file of `play` and `resimulate`
+  recording::ReadLimits recordingLimits;
   std::string printScene;        // name or file
   std::filesystem::path states;  // file of states that `resimulate` writes; empty: none
   bool json = false;             // `resimulate` and `doctor` print JSON

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/recording/verdict.h"
+#include "proto/text/printable.h"
 #include "server/messages/scene_file.h"
 #include "server/model/scene.h"
 #include "server/program/commands.h"
@@ -79,7 +80,7 @@ class States {
 };
 
 int failedWith(int code, const std::string& error) {
-  fmt::print(stderr, "clothstream-server: {}\n", error);
+  fmt::print(stderr, "clothstream-server: {}\n", printable(error));
   return code;
 }
 
@@ -96,6 +97,7 @@ int runResimulation(const ProgramOptions& options, const Signals& signals) {
   Progress progress;
   recording::ResimulateOptions resimulation{
       .path = options.recording,
+      .limits = options.recordingLimits,
       .device = [&](std::uint32_t nodes) { return deviceOptions(options, nodes); },
       .interrupted = [&] { return signals.interrupted(); },
       .progress = [&](double part) { progress.show(part); }};

@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "proto/recording/verdict.h"
+#include "proto/text/printable.h"
 #include "server/fleet/origin.h"
 #include "server/hosting/scene_server.h"
 #include "server/program/authentication.h"
@@ -39,7 +41,7 @@ void checkWhole(recording::RecordedStream& recording, const std::string& path) {
 int play(const ProgramOptions& options, const Signals& signals) {
   StartGuard start(signals, options.server.drain);
   const auto monitoring = openMonitoring(options);
-  auto recording = recording::RecordedStream::open(options.recording);
+  auto recording = recording::RecordedStream::open(options.recording, options.recordingLimits);
   if (!recording) throw std::runtime_error(recording.error());
   if (options.playback.from > recording->length())
     throw std::runtime_error(fmt::format("--from: {} s is after the end of {}; use 0 to {:.3f}",
@@ -49,7 +51,7 @@ int play(const ProgramOptions& options, const Signals& signals) {
     spdlog::warn("{} is truncated or damaged at its end; the readable part is played", options.recording);
   const std::string scene = recording->scene();
   const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
-                                        recording->length(), scene, recording->device());
+                                        recording->length(), scene, printable(recording->device()));
   if (options.playback.faults)
     spdlog::info("faults with the seed {}: frames are dropped and late on purpose", *options.playback.faults);
   std::unique_ptr<EndGuard> guard;  // outlives the server
@@ -57,14 +59,18 @@ int play(const ProgramOptions& options, const Signals& signals) {
   const std::shared_ptr<identity::Authenticator> authenticator = makeAuthenticator(options);
   serverOptions.authenticator = authenticator;
   serverOptions.observer = openEvents(options);
-  hosting::SceneServer server(
-      scene, std::make_shared<recording::Playback>(std::move(*recording), options.playback), serverOptions);
+  const auto playback = std::make_shared<recording::Playback>(std::move(*recording), options.playback);
+  hosting::SceneServer server(scene, playback, serverOptions);
   std::optional<fleet::Origin> origin;
   if (!options.natsServers.empty())
     origin.emplace(server, natsOptions(options, "server"), originOptions(options));
-  guard = openEndpoints(server, options, signals, start, authenticator, monitoring.get(), intro,
-                        [&] { return server.report(); });
-  return 0;
+  guard = openEndpoints(server, options, signals, start, authenticator, monitoring.get(),
+                        intro, [&] { return server.report(); });
+  const std::string damage = playback->damage();
+  if (damage.empty()) return 0;
+  spdlog::error("{} is damaged: {}; clothstream recover {} OUT keeps what is whole", options.recording,
+                damage, options.recording);
+  return recording::kFileUnreadable;
 }
 
 }  // namespace clothstream::program

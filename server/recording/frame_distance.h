@@ -5,11 +5,11 @@
 
 #include <cstdint>
 #include <deque>
-#include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
-#include "proto/codec/decoder.h"
+#include "proto/recording/frame_check.h"
 #include "server/model/scene.h"
 #include "server/simulation/state_snapshot.h"
 
@@ -27,12 +27,15 @@ class FrameDistance {
   // States that wait for their frame. Older ones are dropped.
   static constexpr std::size_t kMaxWaiting = 16;
 
-  explicit FrameDistance(const model::Scene& scene);
+  // The layout is that of the recorded stream.
+  explicit FrameDistance(const codec::StreamLayout& layout);
 
   // Keeps the state of a tick until its frame comes. Ticks must ascend.
   void add(std::uint64_t tick, std::vector<model::Vec3> positions);
-  // Decodes a serialised Frame. Bytes that cannot be decoded have no effect.
-  void take(std::string_view frame);
+  // Decodes a serialised Frame. `seconds` is its time since the start of the recording.
+  void take(std::string_view frame, double seconds);
+  // Frames that cannot be decoded, or differ from their recorded hash.
+  const FrameFaults& faults() const { return check_ ? check_->faults() : unknown_; }
 
   // Number of frames that were compared, and the one with the largest distance.
   std::uint64_t frames() const { return frames_; }
@@ -44,7 +47,8 @@ class FrameDistance {
     std::vector<model::Vec3> positions;
   };
 
-  std::unique_ptr<codec::Decoder> decoder_;  // null if the scene cannot be streamed
+  std::optional<FrameCheck> check_;  // absent if the layout is impossible
+  FrameFaults unknown_;              // frames without check_
   std::deque<Waiting> waiting_;
   std::uint64_t frames_ = 0;
   Difference largest_;

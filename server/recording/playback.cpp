@@ -78,6 +78,11 @@ v1::ParameterChange Playback::parameters() const {
   return parameters_.now();
 }
 
+std::string Playback::damage() const {
+  const std::lock_guard lock(mutex_);
+  return damage_;
+}
+
 void Playback::run(scene::LiveScene& scene) {
   for (;;) {
     std::optional<Clock::time_point> next;
@@ -299,6 +304,11 @@ void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next, Cloc
   if (const auto* lost = std::get_if<RecordedStream::Lost>(&next)) {
     const std::string text = fmt::format(
         "the recording is damaged: {:.2f} s to {:.2f} s of it cannot be shown", lost->start, lost->end);
+    {
+      const std::string frames = recording_.faults().text();
+      const std::lock_guard lock(mutex_);
+      damage_ = frames.empty() ? lost->reason : frames;
+    }
     if (lossesLogged_.insert(lost->start).second)
       telemetry::log({scene.name()}, spdlog::level::warn, "{}: {}", text, lost->reason);
     scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RECORDING_DAMAGED, text, newest_));

@@ -58,6 +58,9 @@ class Playback final : public scene::FrameSource {
   std::optional<v1::Playback> playback() const override;
   v1::ParameterChange parameters() const override;
 
+  // Describes what could not be shown so far; empty: nothing. Thread-safe.
+  std::string damage() const;
+
   // Publishes everything due by `now`. Returns when to call it again; nullopt means after a wake(). Only the
   // thread that begin() starts may call it. A test that does not call begin() may call it too.
   std::optional<schedule::Clock::time_point> step(scene::LiveScene& scene, schedule::Clock::time_point now);
@@ -94,13 +97,14 @@ class Playback final : public scene::FrameSource {
   void announceParameters(scene::LiveScene& scene, const RecordedStream::TimedMessage& frame);
   void moveTo(double seconds);
 
-  mutable std::mutex mutex_;  // protects the members down to parameters_
+  mutable std::mutex mutex_;  // protects the members down to damage_
   std::condition_variable changed_;
   bool woken_ = false, stopping_ = false;
   Wanted wanted_;
   double position_ = 0, speed_ = 1;  // s; written by step() only
   bool loop_ = false, paused_ = false;
   ParametersInForce parameters_;
+  std::string damage_;
 
   const PlaybackOptions options_;
   const std::optional<FaultPlan> faults_;

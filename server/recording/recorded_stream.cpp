@@ -36,12 +36,39 @@ bool parse(std::string_view bytes, MessageType* message) {
 
 }  // namespace
 
-tl::expected<RecordedStream, std::string> RecordedStream::open(const std::string& path) {
-  auto reader = RecordingReader::open(path, CutFiles::read);
+tl::expected<RecordedStream, std::string> RecordedStream::open(const std::string& path,
+                                                               const ReadLimits& limits) {
+  auto reader = RecordingReader::open(path, CutFiles::read, limits);
   if (!reader) return tl::unexpected(reader.error());
+  const auto refused = [&](const std::string& why) {
+    return tl::unexpected(fmt::format("{} cannot be played: {}", path, why));
+  };
   auto stream = of(std::move(*reader));
-  if (!stream) return tl::unexpected(fmt::format("{} cannot be played: {}", path, stream.error()));
+  if (!stream) return refused(stream.error());
+  for (;;) {
+    const Next next = stream->next();
+    const auto* timed = std::get_if<TimedMessage>(&next);
+    if (timed != nullptr && timed->isFrame()) break;
+    if (!std::holds_alternative<End>(next)) continue;
+    if (stream->faults().any()) return refused(stream->faults().text());
+    break;
+  }
+  stream->seek(0);
   return stream;
+}
+
+tl::expected<void, std::string> RecordedStream::check() {
+  if (auto checked = reader_.check(); !checked) return checked;
+  for (;;) {
+    const Next next = this->next();
+    if (std::holds_alternative<End>(next)) break;
+    if (const auto* lost = std::get_if<Lost>(&next); lost != nullptr && !faults().any())
+      return tl::unexpected(fmt::format("{} is damaged: {}", reader_.name(), lost->reason));
+  }
+  if (faults().any())
+    return tl::unexpected(fmt::format("{} is damaged: {}", reader_.name(), faults().text()));
+  seek(0);
+  return {};
 }
 
 tl::expected<RecordedStream, std::string> RecordedStream::of(RecordingReader reader) {
@@ -54,14 +81,17 @@ tl::expected<RecordedStream, std::string> RecordedStream::of(RecordingReader rea
   if (description->temporal_layers() > codec::kMaxTemporalLayers)
     return tl::unexpected(fmt::format("its stream has {} temporal layers; a stream has at most {}",
                                       description->temporal_layers(), codec::kMaxTemporalLayers));
-  return RecordedStream(std::move(reader), std::move(*description));
+  auto check = FrameCheck::make(layoutOf(*description));
+  if (!check) return tl::unexpected(check.error());
+  return RecordedStream(std::move(reader), std::move(*description), std::move(*check));
 }
 
-RecordedStream::RecordedStream(RecordingReader reader, v1::StreamDescription description)
+RecordedStream::RecordedStream(RecordingReader reader, v1::StreamDescription description, FrameCheck check)
     : reader_(std::move(reader)),
       description_(std::move(description)),
       parameters_(reader_, description_),
-      scene_(isName(description_.scene()) ? description_.scene() : "recording") {}
+      scene_(isName(description_.scene()) ? description_.scene() : "recording"),
+      check_(std::move(check)) {}
 
 double RecordedStream::secondsAt(std::uint64_t time) const {
   return time <= reader_.start() ? 0 : static_cast<double>(time - reader_.start()) * 1e-9;
@@ -71,8 +101,13 @@ std::uint64_t RecordedStream::timeAt(double seconds) const {
   return reader_.start() + static_cast<std::uint64_t>(std::llround(std::clamp(seconds, 0.0, length()) * 1e9));
 }
 
-void RecordedStream::lose(double from, std::string reason) {
+void RecordedStream::restart() {
   newest_.reset();
+  check_.restart();
+}
+
+void RecordedStream::lose(double from, std::string reason) {
+  restart();
   if (!lost_) lost_ = Lost{.start = from, .end = from, .reason = std::move(reason)};
 }
 
@@ -99,10 +134,9 @@ RecordedStream::Next RecordedStream::next() {
 
 void RecordedStream::seek(double seconds) {
   std::uint64_t time = timeAt(seconds);
-  newest_.reset();
+  restart();
   lost_.reset();
   held_.reset();
-  sought_ = true;
   // Skips unreadable parts backwards to the previous readable one.
   while (!reader_.seek(time)) {
     const ChunkPlace place = reader_.mcap().chunks()[reader_.mcap().chunkAt(time)];
@@ -139,27 +173,19 @@ std::optional<RecordedStream::TimedMessage> RecordedStream::timedMessage(const R
 
 std::optional<RecordedStream::TimedMessage> RecordedStream::frame(const RecordedMessage& message) {
   TimedMessage timed{.time = secondsAt(message.time)};
-  const auto refuse = [&](const char* reason) {
-    lose(timed.time, reason);
+  const auto refuse = [&](std::string reason) -> std::optional<TimedMessage> {
+    lose(timed.time, std::move(reason));
     return std::nullopt;
   };
+  const FrameCheck::Outcome outcome = check_.take(message.bytes, timed.time);
+  if (outcome == FrameCheck::Outcome::repeated) return std::nullopt;
+  if (outcome == FrameCheck::Outcome::faulty) return refuse(check_.reason());
   if (!parse(message.bytes, timed.message.mutable_frame())) return refuse("a frame in it cannot be read");
-  const auto packet = codec::parsePacket(std::as_bytes(std::span(timed.message.frame().packet())));
-  if (!packet || packet->header.epoch != description_.epoch() ||
-      packet->header.codec != description_.codec() ||
-      packet->header.temporalLayer >= std::max(description_.temporal_layers(), 1u))
-    return refuse("a frame in it does not belong to its stream");
-  timed.header = packet->header;
+  timed.header = codec::parsePacket(std::as_bytes(std::span(timed.message.frame().packet())))->header;
   const bool key = timed.header.kind == codec::PacketKind::key;
-  if (!key && (!newest_ || timed.header.referenceCount != 1 || !decoded_.find(timed.header.references[0]) ||
-               timed.header.tick - *newest_ > kMaxTickStep)) {
-    if (sought_ && !lost_) return std::nullopt;
-    return refuse("a frame that other frames refer to is missing");
-  }
-  if (key) decoded_.clear();
-  decoded_.hold(timed.header.temporalLayer, timed.header.tick);
+  if (!key && newest_ && timed.header.tick - *newest_ > kMaxTickStep)
+    return refuse("a frame in it is too far from the frame before");
   newest_ = timed.header.tick;
-  sought_ = false;
   return timed;
 }
 

@@ -12,7 +12,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
-#include "proto/codec/temporal_layers.h"
+#include "proto/recording/frame_check.h"
 #include "proto/recording/recording_reader.h"
 #include "server/recording/parameter_history.h"
 #include "server/recording/parameters_in_force.h"
@@ -23,12 +23,15 @@ namespace clothstream::recording {
 inline constexpr std::uint64_t kMaxTickStep = std::uint64_t{1} << 32;
 
 // Yields frames that can be decoded in order, starting with a key frame, and the announcements between them.
-// Leaves out and reports everything that cannot be read or decoded. Safe for any bytes.
+// Decodes each of them; leaves out and reports everything that cannot be read, cannot be decoded or differs
+// from its recorded hash. Safe for any bytes.
 class RecordedStream {
  public:
   // The error names the path and the problem. A truncated file is read up to its end. Reads every chunk with
-  // a change of parameters, so that a seek does not have to.
-  [[nodiscard]] static tl::expected<RecordedStream, std::string> open(const std::string& path);
+  // a change of parameters, so that a seek does not have to. A file with frames of which none can be decoded
+  // is an error.
+  [[nodiscard]] static tl::expected<RecordedStream, std::string> open(const std::string& path,
+                                                                      const ReadLimits& limits = {});
   [[nodiscard]] static tl::expected<RecordedStream, std::string> of(RecordingReader reader);
 
   // Description of the stream at the start of the recording.
@@ -38,8 +41,11 @@ class RecordedStream {
   const std::string& device() const { return reader_.metadata("device"); }
   // True if the end of the file is missing.
   bool truncated() const { return !reader_.mcap().indexed(); }
-  // Reads every byte and checks all checksums. The error names the path and the problem.
-  [[nodiscard]] tl::expected<void, std::string> check() { return reader_.check(); }
+  // Reads every byte, checks all checksums and decodes every frame. The error names the path and the problem.
+  // Call it before the first next().
+  [[nodiscard]] tl::expected<void, std::string> check();
+  // Frames so far; frames that are read again count again.
+  const FrameFaults& faults() const { return check_.faults(); }
   // Length in seconds.
   double length() const { return secondsAt(reader_.end()); }
 
@@ -64,9 +70,11 @@ class RecordedStream {
   ParametersInForce parametersAt(double seconds);
 
  private:
-  RecordedStream(RecordingReader reader, v1::StreamDescription description);
+  RecordedStream(RecordingReader reader, v1::StreamDescription description, FrameCheck check);
   double secondsAt(std::uint64_t time) const;
   std::uint64_t timeAt(double seconds) const;
+  // Only a key frame can follow.
+  void restart();
   void lose(double from, std::string reason);
   // nullopt if the message is not played.
   std::optional<TimedMessage> timedMessage(const RecordedMessage& message);
@@ -76,9 +84,8 @@ class RecordedStream {
   v1::StreamDescription description_;
   ParameterHistory parameters_;
   std::string scene_;
+  FrameCheck check_;
   std::optional<std::uint64_t> newest_;  // tick of the previous frame; absent: only a key frame can follow
-  codec::HeldFrames decoded_;            // valid while newest_ is set
-  bool sought_ = true;                   // no frame since the last seek, so undecodable frames are not a loss
   std::optional<Lost> lost_;             // loss that next() has not returned yet
   std::optional<TimedMessage> held_;     // message after the loss
 };

@@ -11,7 +11,9 @@
 #include <nlohmann/json.hpp>
 
 #include "clothstream/v1/recording.pb.h"
+#include "proto/recording/recorded_description.h"
 #include "proto/recording/recording_reader.h"
+#include "proto/text/printable.h"
 #include "server/messages/scene_message.h"
 #include "server/recording/metadata.h"
 #include "server/recording/tick_message.h"
@@ -39,14 +41,16 @@ Done parse(std::string_view bytes, const char* what, MessageType& message) {
 // Repeats the device work of a SceneHost from its recording.
 class Replay {
  public:
-  Replay(const ResimulateOptions& options, Resimulation& result) : options_(options), result_(result) {}
+  // `layout`: of the recorded stream; an impossible one if it is not known.
+  Replay(const ResimulateOptions& options, Resimulation& result, const codec::StreamLayout& layout)
+      : options_(options), result_(result), frames_(layout) {}
 
   bool started() const { return simulation_ != nullptr; }
   Done take(const v1::RecordedScene& message);
   Done take(v1::Checkpoint& message);
   Done take(const v1::RecordedTick& message);
   // Frames show how far a state is off that differs.
-  void takeFrame(std::string_view frame);
+  void takeFrame(std::string_view frame, double seconds);
   // Reports that a message cannot be read. The replay continues from the next state. States of releases
   // before 0.3 do not contain the nodes that grabs hold, so those with grabs are skipped.
   void lose(std::string reason);
@@ -71,7 +75,7 @@ class Replay {
   std::uint32_t substeps_ = 0;  // of simulation_
   bool lost_ = false;           // waits for a state from which it can continue
   bool keeps_ = false;          // the device has a state for a rollback
-  std::unique_ptr<FrameDistance> frames_;
+  FrameDistance frames_;
   std::unique_ptr<vulkan::Device> device_;
   std::unique_ptr<vulkan::Recorder> recorder_;
   std::unique_ptr<simulation::ClothSimulation> simulation_;
@@ -83,20 +87,20 @@ void Replay::lose(std::string reason) {
 }
 
 Done Replay::take(const v1::RecordedScene& message) {
-  messages::Result<model::Scene> scene = messages::toScene(message.scene());
+  messages::Result<model::Scene> scene =
+      messages::toScene(message.scene(), {}, {.nodes = options_.limits.vertices});
   if (!scene) return broken("its scene is invalid: {}", scene.error().text);
   definition_ = message.scene();
   scene_ = std::move(*scene);
   result_.maxError = double{scene_.stream.maxError};
-  frames_ = std::make_unique<FrameDistance>(scene_);
   return {};
 }
 
-void Replay::takeFrame(std::string_view frame) {
-  if (!frames_) return;
-  frames_->take(frame);
-  result_.frames = frames_->frames();
-  result_.largestOfFrames = frames_->largest();
+void Replay::takeFrame(std::string_view frame, double seconds) {
+  frames_.take(frame, seconds);
+  result_.faults = frames_.faults();
+  result_.frames = frames_.frames();
+  result_.largestOfFrames = frames_.largest();
 }
 
 Done Replay::take(v1::Checkpoint& message) {
@@ -197,7 +201,7 @@ void Replay::compare(const v1::RecordedTick& message, const simulation::TickStat
   if (options_.states || compares) {
     submit([&] { simulation_->recordSaveState(*recorder_); });
     const simulation::StateSnapshot snapshot = simulation_->collectState(message.tick());
-    if (compares && frames_) frames_->add(message.tick(), simulation::unpack(snapshot).positions);
+    if (compares) frames_.add(message.tick(), simulation::unpack(snapshot).positions);
     if (options_.states)
       options_.states({.snapshot = snapshot, .hash = status.stateHash, .same = same, .scene = scene_});
   }
@@ -210,7 +214,9 @@ void Replay::compare(const v1::RecordedTick& message, const simulation::TickStat
 }
 
 Done replay(RecordingReader& reader, const ResimulateOptions& options, Resimulation& result) {
-  Replay replay(options, result);
+  const auto description = readDescription(reader);
+  reader.rewind();
+  Replay replay(options, result, description ? layoutOf(*description) : codec::StreamLayout{});
   v1::RecordedTick tick;
   const auto length = static_cast<double>(reader.end() - reader.start());
   for (;;) {
@@ -230,7 +236,7 @@ Done replay(RecordingReader& reader, const ResimulateOptions& options, Resimulat
       v1::Checkpoint checkpoint;
       done = parse(bytes, "state", checkpoint).and_then([&] { return replay.take(checkpoint); });
     } else if ((*message)->topic == Topic::frames) {
-      replay.takeFrame(bytes);
+      replay.takeFrame(bytes, static_cast<double>((*message)->time - reader.start()) * 1e-9);
     } else if ((*message)->topic == Topic::ticks) {
       done = parse(bytes, "tick", tick).and_then([&] { return replay.take(tick); });
       if (options.progress && length > 0)
@@ -251,7 +257,7 @@ Done replay(RecordingReader& reader, const ResimulateOptions& options, Resimulat
 }  // namespace
 
 tl::expected<Resimulation, std::string> resimulate(const ResimulateOptions& options) {
-  auto reader = RecordingReader::open(options.path);
+  auto reader = RecordingReader::open(options.path, CutFiles::refused, options.limits);
   if (!reader) return tl::unexpected(reader.error());
   Resimulation result;
   result.scene = reader->metadata("scene");
@@ -265,15 +271,17 @@ tl::expected<Resimulation, std::string> resimulate(const ResimulateOptions& opti
 std::string toText(const Resimulation& result) {
   const std::string ticks =
       fmt::format("{} ticks{}", result.ticks, result.interrupted ? " before it was interrupted" : "");
-  std::string text = fmt::format("scene     {}\nrecorded  {}\nagain     {}\nkernels   {}\n", result.scene,
-                                 result.recordedOn, result.device, nameOf(result.kernels));
+  std::string text =
+      fmt::format("scene     {}\nrecorded  {}\nagain     {}\nkernels   {}\n", printable(result.scene),
+                  printable(result.recordedOn), printable(result.device), nameOf(result.kernels));
   for (const Difference& difference : result.differences)
     text += fmt::format("tick {}: nodes differ by at most {:.3g} m, on average by {:.3g} m\n",
                         difference.tick, difference.largest, difference.mean);
   for (const Missing& missing : result.missing)
     text += fmt::format("ticks after {} are missing{}: {}\n", missing.after,
                         missing.until ? fmt::format(" until tick {}", *missing.until) : " to the end",
-                        missing.reason);
+                        printable(missing.reason));
+  if (result.faults.any()) text += fmt::format("{}\n", result.faults.text());
   const char* all = result.missing.empty() ? "all" : "all available ticks";
   if (!result.firstDifferent) return text + fmt::format("{}, {} bit-identical\n", ticks, all);
   if (result.frames > 0)
@@ -320,9 +328,13 @@ std::string toJson(const Resimulation& result) {
     part["reason"] = missing.reason;
   }
   for (const Difference& difference : result.differences) json["states"].push_back(jsonOf(difference));
+  json["frames"]["undecodable"] = result.faults.undecodable();
+  json["frames"]["hashMismatches"] = result.faults.different();
+  json["frames"]["firstFaultTick"] =
+      result.faults.firstTick() ? Json(*result.faults.firstTick()) : Json(nullptr);
   if (result.frames > 0) json["frames"]["largest"] = jsonOf(result.largestOfFrames);
   // Names of devices and files may not be UTF-8.
-  return json.dump(1, ' ', false, Json::error_handler_t::replace) + '\n';
+  return printableJson(json.dump(1, ' ', false, Json::error_handler_t::replace)) + '\n';
 }
 
 }  // namespace clothstream::recording

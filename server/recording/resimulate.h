@@ -10,6 +10,7 @@
 
 #include <tl/expected.hpp>
 
+#include "proto/recording/recording_reader.h"
 #include "proto/recording/verdict.h"
 #include "server/model/scene.h"
 #include "server/recording/frame_distance.h"
@@ -39,12 +40,15 @@ struct Resimulation {
   // Frames are within sqrt(3) max error of the state that they show (metres).
   std::uint64_t frames = 0;
   Difference largestOfFrames;
+  FrameFaults faults;  // frames that cannot be decoded; their states cannot be shown
   double maxError = 0;
   std::string scene, recordedOn, device;  // names; recordedOn and device include the driver
   // Whether this program has the kernels of the recording.
   Kernels kernels = Kernels::unknown;
 
-  Verdict verdict() const { return verdictOf(firstDifferent.has_value(), !missing.empty(), kernels); }
+  Verdict verdict() const {
+    return verdictOf(firstDifferent.has_value(), !missing.empty() || faults.any(), kernels);
+  }
 };
 
 // A state that was simulated, or from which the simulation started or continued.
@@ -58,6 +62,7 @@ struct SimulatedState {
 
 struct ResimulateOptions {
   std::string path;
+  ReadLimits limits{};
   // Options of the device for a scene with this number of nodes.
   std::function<vulkan::DeviceOptions(std::uint32_t nodes)> device;
   // Called after every tick; true stops the simulation.

@@ -417,11 +417,11 @@ INSTANTIATE_TEST_SUITE_P(
                            d.mutable_cloths(0)->set_rows(0x10000);
                            d.mutable_cloths(0)->set_columns(0x10000);
                          },
-                         "8589672450 triangles; this client accepts at most 8388608"},
+                         "8589672450 triangles; this client accepts at most 2097152"},
         WrongDescription{
             "too_many_vertices",
             [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_vertex_count(4'000'000'000); },
-            "4000000000 vertices; this client accepts at most 4194304"},
+            "4000000000 vertices; this client accepts at most 1048576"},
         WrongDescription{"max_error", [](v1::StreamDescription& d) { d.set_max_error(0); }, "max_error"},
         WrongDescription{"temporal_layers", [](v1::StreamDescription& d) { d.set_temporal_layers(257); },
                          "temporal_layers"},

@@ -53,7 +53,7 @@ static int follow(clothstream_stream* stream, unsigned long frames) {
 }
 
 static int read_recording(const char* path) {
-  cs_recording* recording = cs_recording_open(path);
+  cs_recording* recording = cs_recording_open(path, 0);
   cs_recorded message = {.version = CS_RECORDED_VERSION};
   cs_recording_result result;
   int wrong = 0;

@@ -6,6 +6,7 @@ import gzip
 import os
 import pathlib
 import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -47,18 +48,43 @@ def recorded(path):
         return file.read()
 
 
+def recording_without_good_frames(frames):
+    """An MCAP file with a cloth of 2x2 vertices, whose packets are a text. It has no index."""
+    def text(content):
+        return struct.pack("<I", len(content)) + content
+
+    def record(opcode, content):
+        return struct.pack("<BQ", opcode, len(content)) + content
+
+    def field(number, content):
+        return bytes([number << 3 | 2, len(content)]) + content
+
+    def message(channel, time, content):
+        return record(5, struct.pack("<HIQQ", channel, 0, time, time) + content)
+
+    cloth = bytes([2 << 3, 4, 3 << 3, 2, 4 << 3, 2]) + field(5, np.zeros((4, 3), np.float32).tobytes())
+    description = (bytes([1 << 3, 1, 2 << 3, 2, 4 << 3, 60, 5 << 3, 60]) + struct.pack("<Bf", 6 << 3 | 5, 0.001) +
+                   field(8, cloth))
+    messages = message(1, 1, description) + b"".join(message(2, 1 + i, field(1, b"garbage")) for i in range(frames))
+    channels = b"".join(record(4, struct.pack("<HH", number, 0) + text(topic) + text(b"protobuf") + text(b""))
+                        for number, topic in ((1, b"/description"), (2, b"/frames")))
+    chunk = struct.pack("<QQQI", 1, frames, len(messages), 0) + text(b"") + struct.pack("<Q", len(messages)) + messages
+    return (b"\x89MCAP0\r\n" + record(1, text(b"") + text(b"test")) + channels +
+            record(12, text(b"clothstream") + text(text(b"scene") + text(b"sheet"))) + record(6, chunk))
+
+
 class Bindings(unittest.TestCase):
     def test_structs_have_the_layout_of_the_c_compiler(self):
         structs = [kind for kind in vars(_bindings).values() if isinstance(kind, type) and issubclass(kind, ctypes.Structure)]
         self.assertGreater(len(structs), 30)
         wanted, found = {}, {}
         code = "#include <clothstream/clothstream.h>\n#include <clothstream/recording.h>\n#include <stdio.h>\nint main(void) {\n"
-        for struct in structs:
-            name = struct.__name__
-            wanted[name] = ctypes.sizeof(struct)
+        for kind in structs:
+            name = kind.__name__
+            wanted[name] = ctypes.sizeof(kind)
             code += f'printf("{name} %zu\\n", sizeof({name}));\n'
-            for field, _ in struct._fields_:
-                wanted[f"{name}.{field}"] = getattr(struct, field).offset
+            for field, _ in kind._fields_:
+                wanted[f"{name}.{field}"] = getattr(kind, field).offset
                 code += f'printf("{name}.{field} %zu\\n", offsetof({name}, {field}));\n'
         with tempfile.TemporaryDirectory() as folder:
             source, program = pathlib.Path(folder, "layout.c"), pathlib.Path(folder, "layout")
@@ -134,6 +160,18 @@ class Recordings(unittest.TestCase):
                     self.assertGreaterEqual(frames, before)
                     before = frames
         self.assertGreater(before, 0)
+
+    def test_frames_that_cannot_be_decoded_are_an_error_and_are_counted(self):
+        with clothstream.open_recording(recording_without_good_frames(5)) as recording:
+            self.assertEqual(recording.vertex_count, 4)
+            with self.assertRaisesRegex(clothstream.RecordingError, "the frame of an unknown tick at 0.000 s cannot be decoded"):
+                list(recording)
+            self.assertEqual(list(recording), [])
+            self.assertEqual((recording.faults.frames, recording.faults.undecodable), (5, 5))
+
+    def test_more_vertices_than_allowed_are_refused(self):
+        with self.assertRaisesRegex(clothstream.RecordingError, "4 vertices; this client accepts at most 3"):
+            clothstream.open_recording(recording_without_good_frames(1), max_vertices=3)
 
     def test_a_frame_that_is_not_current_says_so(self):
         recording = clothstream.open_recording(recorded(TESTS / "replay/0.2.0/flag.mcap.gz"))

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // @clothstream/client reads recordings in WebAssembly: every frame has the hash that the recording states, a seek gives
 // the frame that playing gives, and damaged files give errors. Usage: client_recording.test.mjs MODULE RECORDING...
-// A recording may be compressed with gzip. The first one is also cut and damaged.
+// A recording may be compressed with gzip. The first one is also cut and damaged; write_sample wrote it, and the same one
+// with packets that cannot be decoded.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -67,6 +68,15 @@ for (const path of paths) {
   recording.close();
   read += frames.length;
 }
+
+const garbage = bytesOf(paths[0].replace(".mcap", ".garbage.mcap"));
+const undecodable = await openRecording(garbage, { wasm });
+assert.throws(() => undecodable.next(), /the frame of an unknown tick at 0.000 s cannot be decoded/);
+assert.equal(undecodable.next(), undefined);
+const { frames: all, undecodable: lost, different, firstTick } = undecodable.faults;
+assert.deepEqual([all, lost, different, firstTick], [undecodable.info.frames, undecodable.info.frames, 0, 0n]);
+undecodable.close();
+await assert.rejects(openRecording(garbage, { wasm, maxVertices: 41 }), /42 vertices; this client accepts at most 41/);
 
 const whole = bytesOf(paths[0]);
 await assert.rejects(openRecording(new Uint8Array([1, 2, 3]), { wasm }), /not an MCAP file/);

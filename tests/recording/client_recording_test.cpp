@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include <zlib.h>
 
 #include "clothstream/v1/recording.pb.h"
+#include "proto/codec/packet_header.h"
 #include "proto/recording/recording_writer.h"
 #include "tests/recording/sample.h"
 
@@ -30,7 +32,7 @@ class Opened {
  public:
   explicit Opened(const std::string& bytes)
       : bytes_(bytes.begin(), bytes.end()),
-        handle_(cs_recording_open_bytes(bytes_.data(), bytes_.size()), &cs_recording_close) {
+        handle_(cs_recording_open_bytes(bytes_.data(), bytes_.size(), 0), &cs_recording_close) {
     bytes_.shrink_to_fit();
   }
   cs_recording* get() const { return handle_.get(); }
@@ -361,6 +363,132 @@ TEST(ClientRecording, ReportsADamagedChunkOnceAndContinuesAfterIt) {
   EXPECT_EQ(message.tick, std::uint64_t{kSampleFrames});
 }
 
+cs_recording_faults faultsOf(const Opened& opened) {
+  cs_recording_faults faults{};
+  EXPECT_EQ(cs_recording_get_faults(opened.get(), &faults), 0) << "the version is unknown";
+  faults.version = CS_RECORDING_FAULTS_VERSION;
+  EXPECT_EQ(cs_recording_get_faults(opened.get(), &faults), 1);
+  return faults;
+}
+
+// Reads to the end. Returns the ticks of the frames, and the texts of the errors.
+struct Read {
+  std::vector<std::uint64_t> ticks;
+  std::vector<std::string> errors;
+};
+Read readFrames(const Opened& opened) {
+  Read read;
+  cs_recorded message = emptyMessage();
+  for (;;) {
+    const cs_recording_result result = cs_recording_next(opened.get(), CS_RECORDED_FRAME, &message);
+    if (result == CS_RECORDING_END) return read;
+    if (result == CS_RECORDING_NEXT)
+      read.ticks.push_back(message.tick);
+    else
+      read.errors.emplace_back(cs_recording_error_text(opened.get()));
+  }
+}
+
+TEST(ClientRecording, ReportsFramesThatCannotBeDecodedOnceAndCountsAll) {
+  const Opened opened(withGarbage(sampleRecording(kSampleFrames)));
+  const Read read = readFrames(opened);
+  EXPECT_TRUE(read.ticks.empty());
+  ASSERT_EQ(read.errors.size(), 1u);
+  EXPECT_EQ(read.errors[0], "the frame of an unknown tick at 0.000 s cannot be decoded");
+  const cs_recording_faults faults = faultsOf(opened);
+  EXPECT_EQ(faults.frames, kSampleFrames);
+  EXPECT_EQ(faults.undecodable, kSampleFrames);
+  EXPECT_EQ(faults.different, 0u);
+  EXPECT_EQ(faults.first_tick, 0u);
+}
+
+TEST(ClientRecording, ContinuesAtTheKeyFrameAfterAFrameThatCannotBeDecoded) {
+  const Opened opened(withFrames(sampleRecording(kSampleFrames), [](std::size_t frame, v1::Frame& changed) {
+    if (frame == 30 || frame == 100) changed.mutable_packet()->back() ^= 1;
+  }));
+  const Read read = readFrames(opened);
+  ASSERT_EQ(read.errors.size(), 2u) << "one error for each gap";
+  EXPECT_THAT(read.errors[0], HasSubstr("the frame of tick 31 at 0.500 s"));
+  EXPECT_THAT(read.errors[1], HasSubstr("the frame of tick 101 at"));
+  // Frames 30 to 47 and 100 to 119 depend on the changed ones.
+  EXPECT_EQ(read.ticks.size(), kSampleFrames - 18u - 20u);
+  const cs_recording_faults faults = faultsOf(opened);
+  EXPECT_EQ(faults.frames, kSampleFrames);
+  EXPECT_EQ(faults.undecodable + faults.different, 38u);
+  EXPECT_EQ(faults.first_tick, 31u);
+  EXPECT_NEAR(faults.first_seconds, 0.5, 1e-6);
+
+  cs_recorded found = emptyMessage();
+  EXPECT_EQ(cs_recording_seek_tick(opened.get(), 40, &found), 0) << "frame 30 is in between";
+  EXPECT_THAT(cs_recording_error_text(opened.get()), HasSubstr("tick 31"));
+  ASSERT_EQ(cs_recording_seek_tick(opened.get(), 60, &found), 1);
+  EXPECT_EQ(found.tick, 60u);
+}
+
+TEST(ClientRecording, ReportsAFrameThatDiffersFromItsHash) {
+  const Opened opened(withFrames(sampleRecording(kSampleFrames), [](std::size_t frame, v1::Frame& changed) {
+    if (frame == 30) changed.set_reconstruction_hash(changed.reconstruction_hash() ^ 1);
+  }));
+  const Read read = readFrames(opened);
+  ASSERT_EQ(read.errors.size(), 1u);
+  EXPECT_EQ(read.errors[0], "the frame of tick 31 at 0.500 s differs from its recorded hash");
+  EXPECT_EQ(faultsOf(opened).different, 1u);
+}
+
+// A wrong tick in a key frame makes all later frames look old.
+TEST(ClientRecording, CountsFramesAfterATickThatIsTooLarge) {
+  const Opened opened(withFrames(sampleRecording(kSampleFrames), [](std::size_t frame, v1::Frame& changed) {
+    if (frame != 48) return;
+    const std::string packet = changed.packet();
+    auto parsed = codec::parsePacket(std::as_bytes(std::span(packet)));
+    parsed->header.tick = std::uint64_t{1} << 40;
+    std::vector<std::byte> made(codec::headerBound(parsed->header));
+    made.resize(codec::writeHeader(parsed->header, made));
+    made.insert(made.end(), parsed->body.begin(), parsed->body.end());
+    changed.set_packet(made.data(), made.size());
+  }));
+  const Read read = readFrames(opened);
+  EXPECT_EQ(read.errors.size(), 1u);
+  EXPECT_EQ(read.ticks.size(), 49u);
+  EXPECT_EQ(faultsOf(opened).undecodable, kSampleFrames - 49u);
+}
+
+TEST(ClientRecording, AcceptsARepeatedFrame) {
+  std::string last;
+  const Opened opened(withFrames(sampleRecording(kSampleFrames), [&](std::size_t frame, v1::Frame& changed) {
+    if (frame % kMaxKeyFrameDistance == 23) changed.ParseFromString(last);
+    changed.SerializeToString(&last);
+  }));
+  const Read read = readFrames(opened);
+  EXPECT_TRUE(read.errors.empty());
+  EXPECT_EQ(faultsOf(opened).frames, kSampleFrames);
+}
+
+TEST(ClientRecording, RefusesMoreVerticesThanAllowed) {
+  const auto bytesOf = [](std::uint32_t vertices) {
+    return withMessages(sampleRecording(3), Topic::description, [&](std::size_t, std::string& bytes) {
+      v1::StreamDescription description = sampleDescription();
+      v1::ClothDescription& cloth = *description.mutable_cloths(0);
+      cloth.set_vertex_count(vertices);
+      cloth.set_rows(1);
+      cloth.set_columns(vertices);
+      bytes = description.SerializeAsString();
+    });
+  };
+  const auto errorOf = [&](std::uint32_t vertices, std::uint32_t most) {
+    const std::string bytes = bytesOf(vertices);
+    const Handle opened(
+        cs_recording_open_bytes(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), most),
+        &cs_recording_close);
+    EXPECT_EQ(cs_recording_is_open(opened.get()), 0);
+    return std::string(cs_recording_error_text(opened.get()));
+  };
+  EXPECT_THAT(errorOf(1'048'577, 0), HasSubstr("1048577 vertices; this client accepts at most 1048576"));
+  EXPECT_THAT(errorOf(1'048'577, 1'048'577), HasSubstr("rest_positions"));
+  EXPECT_THAT(errorOf(50, 49), HasSubstr("50 vertices; this client accepts at most 49"));
+  EXPECT_THAT(errorOf(42, 67'108'865), HasSubstr("use 1 to 67108864"));
+}
+
 TEST(ClientRecording, ReadsAnyBytesSafely) {
   const std::string whole = sampleWithSliders(40);
   std::mt19937 random(1);
@@ -413,10 +541,10 @@ TEST(ClientRecording, EndsAtAMalformedMessage) {
 }
 
 TEST(ClientRecording, SaysWhyItCannotBeOpened) {
-  const Handle missing(cs_recording_open("no such file.mcap"), &cs_recording_close);
+  const Handle missing(cs_recording_open("no such file.mcap", 0), &cs_recording_close);
   EXPECT_EQ(cs_recording_is_open(missing.get()), 0);
   EXPECT_THAT(cs_recording_error_text(missing.get()), HasSubstr("cannot read no such file.mcap"));
-  const Handle folder(cs_recording_open("tests"), &cs_recording_close);
+  const Handle folder(cs_recording_open("tests", 0), &cs_recording_close);
   EXPECT_THAT(cs_recording_error_text(folder.get()), HasSubstr("not a regular file"));
   const Opened other("PNG");
   EXPECT_THAT(cs_recording_error_text(other.get()), HasSubstr("not an MCAP file"));
@@ -440,7 +568,7 @@ TEST(ClientRecording, ReadsThroughAFunction) {
     from.read += count;
     return from.fails ? 0 : 1;
   };
-  cs_recording_source given{CS_RECORDING_SOURCE_VERSION, source.bytes.size(), &source, read};
+  cs_recording_source given{CS_RECORDING_SOURCE_VERSION, 0, source.bytes.size(), &source, read};
   const Handle opened(cs_recording_open_source(&given), &cs_recording_close);
   ASSERT_EQ(cs_recording_is_open(opened.get()), 1) << cs_recording_error_text(opened.get());
   cs_recorded message = emptyMessage();

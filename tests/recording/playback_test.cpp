@@ -8,6 +8,7 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -440,6 +441,46 @@ TEST_F(PlaybackTest, PlaysTheRestOfADamagedFileAndReportsTheLoss) {
   pause(false);
   seek(static_cast<double>(first + 1) / kSampleRate);
   EXPECT_LE(frameOf(viewer->frames.back()), first);
+}
+
+TEST_F(PlaybackTest, LeavesOutFramesThatCannotBeDecodedAndReportsThem) {
+  const std::string bytes =
+      withFrames(sampleRecording(kSampleFrames), [](std::size_t frame, v1::Frame& changed) {
+        if (frame == 30) changed.mutable_packet()->back() ^= 1;
+        if (frame == 72) changed.set_packet("garbage");
+      });
+  play(bytes);
+  join();
+  pass(kLength + 0.1);
+  ASSERT_EQ(viewer->notices.size(), 3u);
+  EXPECT_EQ(viewer->notices[0].text(), "the recording is damaged: 0.50 s to 0.80 s of it cannot be shown");
+  EXPECT_EQ(viewer->notices[1].text(), "the recording is damaged: 1.20 s to 1.60 s of it cannot be shown");
+  ASSERT_EQ(viewer->frames.size(), kSampleFrames - 18u - 24u);
+  for (const Seen& seen : viewer->frames) EXPECT_LT(frameOf(seen), kSampleFrames);
+  EXPECT_THAT(playback->damage(), HasSubstr("the first is that of tick 31 at 0.500 s"));
+
+  RecordedStream stream = streamOf(bytes);
+  const auto checked = stream.check();
+  ASSERT_FALSE(checked.has_value());
+  EXPECT_THAT(checked.error(), HasSubstr("of 150 frames"));
+  RecordedStream whole = streamOf(sampleRecording(kSampleFrames));
+  EXPECT_TRUE(whole.check().has_value());
+  EXPECT_TRUE(std::holds_alternative<RecordedStream::TimedMessage>(whole.next()))
+      << "it plays from the start";
+}
+
+TEST_F(PlaybackTest, RefusesADescriptionBeyondTheLimits) {
+  const std::string bytes =
+      withMessages(sampleRecording(3), Topic::description, [](std::size_t, std::string& message) {
+        v1::StreamDescription description = sampleDescription();
+        description.mutable_cloths(0)->set_vertex_count(1u << 26);
+        description.mutable_cloths(0)->set_rows(1u << 13);
+        description.mutable_cloths(0)->set_columns(1u << 13);
+        message = description.SerializeAsString();
+      });
+  const auto refused = RecordedStream::of(readerOf(bytes));
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error(), HasSubstr("67108864 vertices; at most 1048576 are read"));
 }
 
 TEST_F(PlaybackTest, PlaysATruncatedFileToItsEnd) {

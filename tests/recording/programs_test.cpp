@@ -123,9 +123,11 @@ TEST_F(RecordingPrograms, RecordAStreamCompletelyWithKeyFrames) {
   ASSERT_EQ(recorded.code, 0) << recorded.errors;
   const Ended info = clothstream({"info", path});
   EXPECT_EQ(info.code, 0) << info.output << info.errors;
-  EXPECT_THAT(info.output, HasSubstr("; 0 differ from the server's"));
+  EXPECT_THAT(info.output, HasSubstr("; 0 cannot be decoded; 0 differ from the server's"));
   EXPECT_THAT(info.output, HasSubstr("all checksums match"));
-  EXPECT_THAT(clothstream({"info", "--quick", path}).output, HasSubstr("index     complete"));
+  const std::string quick = clothstream({"info", "--quick", path}).output;
+  EXPECT_THAT(quick, HasSubstr("index     complete"));
+  EXPECT_THAT(quick, HasSubstr("frames of quality 0, 1, 2, 3"));
   EXPECT_THAT(clothstream({"info", "--json", path}).output, HasSubstr("\"whole\": true"));
 
   auto reader = RecordingReader::open(path);
@@ -240,6 +242,157 @@ TEST_F(RecordingPrograms, RecoverReportsTheLoss) {
   EXPECT_TRUE(reader->check().has_value());
   EXPECT_EQ(countMessages(*reader, Topic::frames), 138u);  // a fifth of a second is missing
   EXPECT_EQ(clothstream({"recover", path, out}).code, 6);  // the file exists already
+}
+
+// Files that are whole for every checksum, but whose packets are not.
+TEST_F(RecordingPrograms, EveryReaderFailsAtFramesThatCannotBeDecoded) {
+  const std::string whole = sampleRecording(kSampleFrames);
+  std::filesystem::create_directory(pathOf("golden"));
+  const std::string good = pathOf("good.mcap"), out = pathOf("out.mcap"),
+                    garbage = pathOf("golden/garbage.mcap"), holes = pathOf("holes.mcap");
+  std::ofstream(good, std::ios::binary) << whole;
+  std::ofstream(garbage, std::ios::binary) << withGarbage(whole);
+  std::ofstream(holes, std::ios::binary) << withFrames(whole, [](std::size_t frame, v1::Frame& changed) {
+    if (frame == 30) changed.set_packet("garbage");
+  });
+  const char* const all =
+      "of 150 frames 150 cannot be decoded, the first is that of an unknown tick at 0.000 s";
+  const char* const some = "of 150 frames 18 cannot be decoded, the first is that of";
+  for (const auto& [path, faults] : {std::pair(garbage, all), std::pair(holes, some)}) {
+    const Ended info = clothstream({"info", path});
+    EXPECT_EQ(info.code, 7);
+    EXPECT_THAT(info.output, HasSubstr(faults));
+    EXPECT_THAT(info.output, ::testing::Not(HasSubstr("all checksums match")));
+    EXPECT_THAT(clothstream({"info", "--json", path}).output, HasSubstr("\"whole\": false"));
+    for (const char* format : {"frames.npz", "frames.glb", "frames"}) {
+      const Ended exported = clothstream({"export", path, pathOf(format)});
+      EXPECT_EQ(exported.code, 7) << format;
+      EXPECT_THAT(exported.errors, HasSubstr(faults));
+      EXPECT_FALSE(std::filesystem::exists(pathOf(format))) << format;
+    }
+    const Ended measured = clothstream({"measure", path, "--json"});
+    EXPECT_EQ(measured.code, 7);
+    EXPECT_THAT(measured.errors, HasSubstr(faults));
+    const Ended compared = clothstream({"diff", path, good});
+    EXPECT_EQ(compared.code, 10) << compared.output;
+    EXPECT_THAT(compared.output, HasSubstr(faults));
+    const Ended played =
+        run({CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "play", path, "--lockstep"});
+    EXPECT_EQ(played.code, 1);
+    EXPECT_THAT(played.errors, HasSubstr(faults));
+    const Ended recovered = clothstream({"recover", path, out});
+    EXPECT_EQ(recovered.code, 7);
+    EXPECT_THAT(recovered.errors, HasSubstr(faults));
+    EXPECT_THAT(recovered.output, HasSubstr("verified, but not complete"));
+    const Ended result = clothstream({"info", out});
+    EXPECT_EQ(result.code, 0) << result.output;
+    std::filesystem::remove(out);
+  }
+  EXPECT_EQ(clothstream({"golden", pathOf("golden"), "--update"}).code, 7);
+  EXPECT_THAT(run({CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "play", garbage}).errors,
+              HasSubstr(all));
+}
+
+TEST_F(RecordingPrograms, RefuseMoreVerticesThanAllowed) {
+  const std::string large = pathOf("large.mcap"), out = pathOf("out.mcap");
+  std::ofstream(large, std::ios::binary)
+      << withMessages(sampleRecording(3), Topic::description, [](std::size_t, std::string& message) {
+           v1::StreamDescription description = sampleDescription();
+           v1::ClothDescription& cloth = *description.mutable_cloths(0);
+           cloth.set_vertex_count(2000 * 1000);
+           cloth.set_rows(2000);
+           cloth.set_columns(1000);
+           cloth.set_rest_positions(std::string(std::size_t{12} * 2000 * 1000, '\0'));
+           message = description.SerializeAsString();
+         });
+  EXPECT_LT(std::filesystem::file_size(large), 500'000u);
+  const std::vector<std::vector<std::string>> commands{{"info", large},
+                                                       {"export", large, pathOf("frames.npz")},
+                                                       {"measure", large},
+                                                       {"recover", large, out},
+                                                       {"diff", large, large}};
+  for (const std::vector<std::string>& command : commands) {
+    const Ended refused = clothstream(command);
+    EXPECT_EQ(refused.code, 7) << command[0];
+    EXPECT_THAT(refused.output + refused.errors, HasSubstr("2000000 vertices")) << command[0];
+  }
+  for (const char* command : {"play", "resimulate"}) {
+    const Ended help = run({CLOTHSTREAM_SERVER, command, "--help"});
+    EXPECT_THAT(help.output, HasSubstr("--max-vertices")) << command;
+  }
+  EXPECT_THAT(run({CLOTHSTREAM_SERVER, "play", large}).errors,
+              HasSubstr("2000000 vertices; at most 1048576"));
+  // The limit can be raised. Then the frames, which have other vertices, cannot be decoded.
+  EXPECT_THAT(clothstream({"info", large, "--max-vertices", "2000000"}).output,
+              HasSubstr("cannot be decoded"));
+}
+
+TEST_F(RecordingPrograms, SayWhichQualityARecordingHolds) {
+  const std::string source = pathOf("coarse.mcap"), kept = pathOf("kept.mcap"), full = pathOf("full.mcap");
+  std::ofstream(source, std::ios::binary) << withCoarseFrames(sampleRecording(kSampleFrames), 48);
+  EXPECT_THAT(clothstream({"info", source}).output,
+              HasSubstr("48 frames of quality 0, 102 frames of quality 1"));
+  const auto record = [&](std::vector<std::string> options) {
+    Process server({CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "play", source, "--lockstep",
+                    "--speed", "max"});
+    const auto line = server.waitForLine("gRPC ", kPatience);
+    EXPECT_TRUE(line) << server.errors();
+    options.insert(options.begin(),
+                   {"record", "--seconds", "1", "--server", line->substr(line->find_first_not_of(' '))});
+    return clothstream(options);
+  };
+  const Ended recorded = record({"-o", kept});
+  EXPECT_EQ(recorded.code, 0) << recorded.errors;
+  EXPECT_THAT(recorded.output, HasSubstr("102 of 150 frames are coarser than quality 0"));
+  EXPECT_THAT(recorded.output, HasSubstr("102 of quality 1"));
+  EXPECT_THAT(clothstream({"info", "--quick", kept}).output,
+              HasSubstr("quality   48, 102, 0, 0 frames of quality 0, 1, 2, 3"));
+  EXPECT_THAT(clothstream({"info", "--json", kept}).output,
+              HasSubstr("\"frames_of_quality\": \"48, 102, 0, 0\""));
+
+  const Ended insisted = record({"-o", full, "--full-quality"});
+  EXPECT_EQ(insisted.code, 5);
+  EXPECT_THAT(insisted.errors, HasSubstr("the server lowered the quality after 48 frames"));
+  const Ended info = clothstream({"info", full});
+  EXPECT_EQ(info.code, 0) << info.output;
+  EXPECT_THAT(info.output, HasSubstr("quality   48 frames of quality 0\n"));
+}
+
+// A hostile server, here one that plays a hostile file.
+TEST_F(RecordingPrograms, EscapeControlCharactersInLinesOfEvents) {
+  const std::string path = pathOf("hostile.mcap"), hostile =
+                                                       "a\x1b[2J\xc2\x9b"
+                                                       "1m\xe2\x80\xae"
+                                                       "b\xe2\x80\x8b";
+  std::string bytes;
+  auto writer = RecordingWriter::begin(
+      [&](std::string_view more) {
+        bytes += more;
+        return Written();
+      },
+      "test", {{"scene", "sample"}, {"device", hostile}});
+  RecordingReader reader = readerOf(sampleRecording(30));
+  for (auto message = reader.next(); *message; message = reader.next()) {
+    ASSERT_TRUE(writer->write((*message)->topic, (*message)->time, (*message)->bytes));
+    v1::Notice notice;
+    notice.set_kind(v1::NOTICE_KIND_SCENE_RESET);
+    notice.set_text(hostile);
+    ASSERT_TRUE(writer->write(Topic::notices, (*message)->time, notice.SerializeAsString()));
+  }
+  ASSERT_TRUE(writer->finish());
+  std::ofstream(path, std::ios::binary) << bytes;
+  Process server(
+      {CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "play", path, "--lockstep", "--speed", "max"});
+  const auto line = server.waitForLine("gRPC ", kPatience);
+  ASSERT_TRUE(line) << server.errors();
+  const std::string address = line->substr(line->find_first_not_of(' '));
+  const Ended joined = clothstream({"join", address, "--events", "--seconds", "0.5"});
+  const Ended shown = clothstream({"join", address, "--seconds", "0.5"});
+  EXPECT_THAT(joined.output, HasSubstr("\\u001b[2J\\u009b1m\\u202eb\\u200b"));
+  EXPECT_THAT(joined.errors, HasSubstr("\\x1b[2J\\xc2\\x9b1m\\xe2\\x80\\xaeb"));
+  for (const std::string& text : {joined.output, joined.errors, shown.output, shown.errors, server.output()})
+    for (const char* control : {"\x1b", "\xc2\x9b", "\xe2\x80\xae", "\xe2\x80\x8b"})
+      EXPECT_THAT(text, ::testing::Not(HasSubstr(control)));
 }
 
 TEST_F(RecordingPrograms, EscapeControlCharactersOfOtherPrograms) {

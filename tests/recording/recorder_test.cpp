@@ -239,6 +239,21 @@ TEST_F(RecorderTest, FindsAndMeasuresADifferingTick) {
   EXPECT_THAT(toText(result), HasSubstr("first tick 100"));
 }
 
+TEST_F(RecorderTest, ReportsFramesThatCannotBeDecoded) {
+  RecordedScene recorded(options());
+  recorded.ticks(20);
+  std::ifstream file(recorded.finish(), std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  const std::string path = (directory_.path() / "garbage.mcap").string();
+  std::ofstream(path, std::ios::binary) << withGarbage(bytes);
+  const Resimulation result = again(path);
+  EXPECT_EQ(result.different, 0u);
+  EXPECT_GT(result.faults.undecodable(), 5u);
+  EXPECT_EQ(result.verdict(), Verdict::missing);
+  EXPECT_THAT(toText(result), HasSubstr("cannot be decoded"));
+  EXPECT_THAT(toJson(result), HasSubstr("\"undecodable\": "));
+}
+
 TEST_F(RecorderTest, RefusesBytesThatAreNoTickOfTheScene) {
   RecordedScene recorded(options());
   recorded.ticks(5);

@@ -11,6 +11,7 @@
 #include "clothstream/v1/recording.pb.h"
 #include "proto/codec/packet_header.h"
 #include "proto/recording/file.h"
+#include "proto/recording/frame_check.h"
 #include "proto/recording/mcap_reader.h"
 #include "proto/recording/recorded_description.h"
 #include "proto/recording/recording_reader.h"
@@ -165,6 +166,110 @@ TEST(Recording, ReadsAnyBytesSafely) {
     (void)readDescription(*reader);
     (void)reader->check();
   }
+}
+
+// A file with chunks of zeros, which are compressed to almost nothing.
+std::string zeros(std::size_t chunks, std::size_t bytes) {
+  std::string file;
+  McapWriter writer([&](std::string_view more) {
+    file += more;
+    return Written();
+  });
+  EXPECT_TRUE(writer.begin("test"));
+  const auto channel = writer.addChannel("/zeros", {"Zeros", ""});
+  EXPECT_TRUE(channel.has_value());
+  for (std::size_t i = 0; i < chunks; ++i) {
+    EXPECT_TRUE(writer.write(*channel, i, std::string(bytes, '\0')));
+    EXPECT_TRUE(writer.closeChunk());
+  }
+  EXPECT_TRUE(writer.finish());
+  return file;
+}
+
+TEST(Recording, RefusesChunksThatExpandTooMuchBeforeReadingThem) {
+  constexpr McapLimits kLimits{.chunkBytes = 100'000, .expansion = 2, .freeChunks = 3};
+  const auto open = [&](const std::string& file) {
+    return McapReader::open(std::make_unique<MemorySource>(file), kLimits);
+  };
+  EXPECT_TRUE(open(zeros(3, 90'000)).has_value());
+  const std::string bomb = zeros(10, 90'000);
+  ASSERT_LT(bomb.size(), 10'000u);
+  const auto refused = open(bomb);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error(), HasSubstr("would expand to more than 2 times the size of the file"));
+  // Without its index it is refused, too.
+  const auto reader = McapReader::open(std::make_unique<MemorySource>(bomb));
+  const auto cut = open(bomb.substr(0, reader->dataEnd()));
+  ASSERT_FALSE(cut.has_value());
+  EXPECT_THAT(cut.error(), HasSubstr("would expand"));
+}
+
+TEST(Recording, ReadsTheOthersIfAChunkIsTooLarge) {
+  auto reader = McapReader::open(std::make_unique<MemorySource>(zeros(3, 90'000)), {.chunkBytes = 80'000});
+  ASSERT_TRUE(reader.has_value()) << reader.error();
+  const auto messages = reader->read(1);
+  ASSERT_FALSE(messages.has_value());
+  EXPECT_THAT(messages.error(), HasSubstr("90031 bytes; chunks of at most 80000 are read"));
+  EXPECT_FALSE(reader->check().has_value());
+}
+
+// An index that names one chunk many times would make a small file cost as much as a large one.
+TEST(Recording, IgnoresAnIndexThatNamesAChunkTwice) {
+  std::string file = zeros(2, 1000);
+  const auto whole = McapReader::open(std::make_unique<MemorySource>(file));
+  ASSERT_TRUE(whole.has_value() && whole->indexed());
+  const std::uint64_t first = whole->chunks()[0].offset, second = whole->chunks()[1].offset;
+  const std::string was(reinterpret_cast<const char*>(&second), sizeof second),
+      is(reinterpret_cast<const char*>(&first), sizeof first);
+  const std::size_t at = file.rfind(was);
+  ASSERT_NE(at, file.npos);
+  file.replace(at, was.size(), is);
+  constexpr std::size_t kCrcBytes = 4;
+  file.replace(file.size() - kMagic.size() - kCrcBytes, kCrcBytes, kCrcBytes, '\0');  // 0: unknown
+  const auto reader = McapReader::open(std::make_unique<MemorySource>(file));
+  ASSERT_TRUE(reader.has_value());
+  EXPECT_FALSE(reader->indexed());
+  EXPECT_EQ(reader->chunks().size(), 2u);
+  EXPECT_EQ(reader->chunks()[1].offset, second);
+}
+
+TEST(Recording, RefusesADescriptionBeyondTheLimits) {
+  const std::string bytes =
+      withMessages(sampleRecording(3), Topic::description, [](std::size_t, std::string& message) {
+        v1::StreamDescription description = sampleDescription();
+        description.mutable_cloths(0)->set_vertex_count(4'000'000);
+        message = description.SerializeAsString();
+      });
+  RecordingReader reader = readerOf(bytes);
+  const auto description = readDescription(reader);
+  ASSERT_FALSE(description.has_value());
+  EXPECT_THAT(description.error(), HasSubstr("4000000 vertices; at most 1048576 are read"));
+}
+
+FrameFaults faultsOf(const std::string& bytes) {
+  RecordingReader reader = readerOf(bytes);
+  auto check = FrameCheck::make(layoutOf(*readDescription(reader)));
+  for (auto message = reader.next(); *message; message = reader.next())
+    if ((*message)->topic == Topic::frames)
+      check->take((*message)->bytes, static_cast<double>((*message)->time - reader.start()) * 1e-9);
+  return check->faults();
+}
+
+TEST(FrameCheck, CountsFramesWithFaultsAndNamesTheFirst) {
+  const std::string whole = sampleRecording(kSampleFrames);
+  EXPECT_FALSE(faultsOf(whole).any());
+  EXPECT_EQ(faultsOf(whole).frames(), kSampleFrames);
+  EXPECT_EQ(faultsOf(withGarbage(whole)).text(),
+            "of 150 frames 150 cannot be decoded, the first is that of an unknown tick at 0.000 s");
+  // All frames that refer to a frame with a fault are left out with it.
+  EXPECT_EQ(
+      faultsOf(withFrames(whole,
+                          [](std::size_t frame, v1::Frame& changed) {
+                            if (frame == 30) changed.set_reconstruction_hash(0);
+                          }))
+          .text(),
+      "of 150 frames 17 cannot be decoded and 1 differ from their recorded hash, the first is that of tick "
+      "31 at 0.500 s");
 }
 
 TEST(Recording, ReportsTheKindOfOtherFiles) {

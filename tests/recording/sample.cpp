@@ -134,6 +134,64 @@ std::string sampleRecording(std::uint32_t frames, std::uint8_t layers) {
   return bytes;
 }
 
+std::string withMessages(const std::string& recording, Topic topic,
+                         const std::function<void(std::size_t, std::string&)>& change) {
+  RecordingReader reader = readerOf(recording);
+  std::string bytes;
+  auto writer = RecordingWriter::begin(
+      [&](std::string_view more) {
+        bytes += more;
+        return Written();
+      },
+      "sample", reader.metadata());
+  if (!writer) throw std::runtime_error(writer.error());
+  std::size_t count = 0;
+  for (auto message = reader.next(); message && *message; message = reader.next()) {
+    std::string content((*message)->bytes);
+    if ((*message)->topic == topic) change(count++, content);
+    must(writer->write((*message)->topic, (*message)->time, content));
+  }
+  must(writer->finish());
+  return bytes;
+}
+
+std::string withFrames(const std::string& recording,
+                       const std::function<void(std::size_t, v1::Frame&)>& change) {
+  return withMessages(recording, Topic::frames, [&](std::size_t number, std::string& bytes) {
+    v1::Frame frame;
+    if (!frame.ParseFromString(bytes)) throw std::runtime_error("a frame cannot be read");
+    change(number, frame);
+    bytes = frame.SerializeAsString();
+  });
+}
+
+std::string withGarbage(const std::string& recording) {
+  return withFrames(recording, [](std::size_t, v1::Frame& frame) { frame.set_packet("garbage"); });
+}
+
+std::string withCoarseFrames(const std::string& recording, std::uint32_t first) {
+  codec::StreamLayout layout = kLayout;
+  layout.qualities = 2;
+  const std::string described =
+      withMessages(recording, Topic::description, [&](std::size_t, std::string& bytes) {
+        v1::StreamDescription description = sampleDescription();
+        description.set_qualities(layout.qualities);
+        bytes = description.SerializeAsString();
+      });
+  const auto encoder = codec::Encoder::make(layout, {.quality = 1});
+  std::vector<std::byte> packet(encoder->packetBound());
+  return withFrames(described, [&](std::size_t number, v1::Frame& frame) {
+    if (number < first) return;
+    const auto i = static_cast<std::uint32_t>(number);
+    const bool key = i % kMaxKeyFrameDistance == 0;
+    const std::size_t bytes =
+        encoder->encode(i + 1, key ? codec::PacketKind::key : codec::PacketKind::predicted,
+                        codec::sampleMotion(layout, i, 0.05f).positions, {}, packet);
+    frame.set_packet(packet.data(), bytes);
+    frame.set_reconstruction_hash(encoder->reconstructionHash());
+  });
+}
+
 RecordingReader readerOf(std::string bytes, CutFiles cutFiles) {
   auto reader = RecordingReader::open(std::make_unique<MemorySource>(std::move(bytes)), "sample", cutFiles);
   if (!reader) throw std::runtime_error(reader.error());

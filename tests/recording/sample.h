@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "clothstream/v1/session.pb.h"
@@ -38,6 +39,19 @@ struct SampleSliders {
   float wind = 0, stiffness = 0;
 };
 SampleSliders sampleSliders(std::uint32_t frame);
+
+// The same recording with other messages of a topic; all checksums of the file are valid. `change` takes the
+// number of the message and its bytes.
+std::string withMessages(const std::string& recording, Topic topic,
+                         const std::function<void(std::size_t, std::string&)>& change);
+// The same for frames.
+std::string withFrames(const std::string& recording,
+                       const std::function<void(std::size_t, v1::Frame&)>& change);
+// Every packet is a text.
+std::string withGarbage(const std::string& recording);
+
+// The frames from this one on have quality 1. It must be a key frame.
+std::string withCoarseFrames(const std::string& recording, std::uint32_t first);
 
 // Fails the test if the bytes cannot be opened.
 RecordingReader readerOf(std::string bytes, CutFiles cutFiles = CutFiles::refused);

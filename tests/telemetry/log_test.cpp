@@ -46,6 +46,36 @@ TEST(Printable, EscapesControlCharactersAndKeepsOtherText) {
   EXPECT_EQ(printable("\xc2"), "\xc2");                    // truncated, not a control character
 }
 
+TEST(Printable, EscapesWhatHasNoWidth) {
+  EXPECT_EQ(printable("a\xe2\x80\x8b"
+                      "b"),
+            "a\\xe2\\x80\\x8bb");                                    // U+200B, zero-width space
+  EXPECT_EQ(printable("\xef\xbb\xbf"), "\\xef\\xbb\\xbf");           // U+FEFF, byte-order mark
+  EXPECT_EQ(printable("\xc2\xad"), "\\xc2\\xad");                    // U+00AD, soft hyphen
+  EXPECT_EQ(printable("\xe3\x85\xa4"), "\\xe3\\x85\\xa4");           // U+3164, filler of Hangul
+  EXPECT_EQ(printable("\xf3\xa0\x81\x81"), "\\xf3\\xa0\\x81\\x81");  // U+E0041, tag
+  EXPECT_EQ(printable("\xf0\x9f\xa7\xb5\xe3\x85\xa5"), "\xf0\x9f\xa7\xb5\xe3\x85\xa5");
+}
+
+TEST(Printable, KeepsTheEndsOfLines) {
+  EXPECT_EQ(printableLines("a\n\x1b[2J\r\nb\n"), "a\n\\x1b[2J\\x0d\nb\n");
+  EXPECT_EQ(printableLines(""), "");
+}
+
+TEST(Printable, EscapesJsonWithoutChangingItsMeaning) {
+  const nlohmann::json hostile = {{"name",
+                                   "a\x1b[2J\xc2\x9b"
+                                   "1m\xe2\x80\xae"
+                                   "b\xe2\x80\x8b\xf3\xa0\x81\x81\x7f\n\t\"\xc3\xa9\xf0\x9f\xa7\xb5"}};
+  for (const int indent : {-1, 2}) {
+    const std::string text = printableJson(hostile.dump(indent));
+    EXPECT_EQ(nlohmann::json::parse(text), hostile);
+    EXPECT_EQ(printableLines(text), text) << "nothing is left to escape";
+    EXPECT_THAT(text, HasSubstr("\\u009b1m\\u202eb\\u200b\\udb40\\udc41\\u007f"));
+    EXPECT_THAT(text, HasSubstr("\xc3\xa9\xf0\x9f\xa7\xb5"));
+  }
+}
+
 TEST(Log, WritesOneLineForAMessageFromOutside) {
   setUpLog("info");
   testing::internal::CaptureStderr();

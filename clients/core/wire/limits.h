@@ -14,8 +14,8 @@ namespace clothstream::client {
 
 // Ranges and defaults are those of cs_limits.
 struct Limits {
-  std::uint32_t vertices = 4'194'304, triangles = 8'388'608, cloths = codec::kMaxClothRanges,
-                participants = 4096;
+  std::uint32_t vertices = codec::kDefaultMaxVertices, triangles = 2 * codec::kDefaultMaxVertices,
+                cloths = codec::kMaxClothRanges, participants = 4096;
   std::uint64_t contentBytes = kMostContentBytes;
 
   static constexpr std::uint64_t kMostContentBytes = std::uint64_t{256} << 20;

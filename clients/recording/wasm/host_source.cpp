@@ -18,8 +18,9 @@ extern "C" {
 [[clang::import_module("clothstream"), clang::import_name("decompress")]] int clothstream_host_decompress(
     const char* frame, std::uint32_t frameBytes, char* out, std::uint32_t size);
 
-// Opens a source of the host. `source` is its number; `bytes` its size.
-cs_recording* cs_recording_open_host(std::uint32_t source, double bytes);
+// Opens a source of the host. `source` is its number; `bytes` its size; `maxVertices` as in
+// recording.h.
+cs_recording* cs_recording_open_host(std::uint32_t source, double bytes, std::uint32_t maxVertices);
 
 }  // extern "C"
 
@@ -52,7 +53,7 @@ bool decompressZstd(std::string_view frame, std::uint64_t size, std::string& out
 
 }  // namespace clothstream::recording
 
-cs_recording* cs_recording_open_host(std::uint32_t source, double bytes) {
+cs_recording* cs_recording_open_host(std::uint32_t source, double bytes, std::uint32_t maxVertices) {
   return openRecording(std::make_unique<HostSource>(source, static_cast<std::uint64_t>(bytes)),
-                       "the recording");
+                       "the recording", maxVertices);
 }

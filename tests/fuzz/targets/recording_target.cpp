@@ -259,7 +259,7 @@ void readToTheEnd(cs_recording* recording, std::size_t most) {
 
 void playInClient(const std::string& bytes, const RecordingInput& input) {
   cs_recording* recording =
-      cs_recording_open_bytes(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+      cs_recording_open_bytes(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), 0);
   require((cs_recording_is_open(recording) == 1) == (cs_recording_client(recording) != nullptr),
           "an open recording has a client");
   if (cs_recording_is_open(recording) == 1) {

@@ -13,7 +13,7 @@
 Arrays of a frame are views of the library's memory, valid until the next frame: copy what is to stay."""
 from ._library import Error, lib as _lib, text as _text
 from .client_state import ClientState, Frame
-from .recording import (Info, Message, Pose, Recorded, RecordedCollider, RecordedFrame, RecordedGrab, RecordedTick, Recording,
+from .recording import (Faults, Info, Message, Pose, Recorded, RecordedCollider, RecordedFrame, RecordedGrab, RecordedTick, Recording,
                         RecordingError, open_recording)
 from .simulation import Simulation, SimulationFailed, simulate
 from .stream import ConnectionFailed, RequestRefused, Stream, join
@@ -24,7 +24,7 @@ __version__: str = _text(_lib.clothstream_version())
 
 __all__ = [
     "ClientState", "Cloth", "ClothReport", "ClothSettings", "Collider", "ConnectionFailed", "ContactEvent", "Environment", "Error",
-    "Event", "Frame", "Grab", "GrabEvent", "Info", "Message", "OwnCollider", "Participant", "Pose", "Presence", "Recorded",
+    "Event", "Faults", "Frame", "Grab", "GrabEvent", "Info", "Message", "OwnCollider", "Participant", "Pose", "Presence", "Recorded",
     "RecordedCollider", "RecordedFrame", "RecordedGrab", "RecordedTick", "Recording", "RecordingError", "RequestRefused", "Role",
     "SceneSummary", "Shape", "Simulation", "SimulationFailed", "Solver", "Statistics", "Stream", "join", "open_recording", "simulate",
 ]

@@ -91,6 +91,7 @@ CS_LEAVE_REMOVED = 3
 CS_RECORDING_SOURCE_VERSION = 1
 CS_RECORDING_INFO_VERSION = 1
 CS_RECORDED_VERSION = 1
+CS_RECORDING_FAULTS_VERSION = 1
 CS_RECORDED_TICK_VERSION = 1
 CS_RECORDED_FRAME = 1
 CS_RECORDED_PARAMETERS = 2
@@ -445,6 +446,7 @@ class cs_cloth_report(c.Structure):
 class cs_recording_source(c.Structure):
     _fields_ = [
         ("version", c.c_uint32),
+        ("max_vertices", c.c_uint32),
         ("size", c.c_uint64),
         ("user", c.c_void_p),
         ("read", c.c_void_p),  # a function
@@ -473,6 +475,17 @@ class cs_recorded(c.Structure):
         ("tick", c.c_uint64),
         ("reconstruction_hash", c.c_uint64),
         ("state_hash", c.c_uint64),
+    ]
+
+
+class cs_recording_faults(c.Structure):
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("frames", c.c_uint64),
+        ("undecodable", c.c_uint64),
+        ("different", c.c_uint64),
+        ("first_tick", c.c_uint64),
+        ("first_seconds", c.c_double),
     ]
 
 
@@ -693,8 +706,8 @@ FUNCTIONS = {
     "cs_get_cloth_report": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_cloth_report)]),
     "cs_want_constraints": (None, [c.c_void_p, c.c_int, c.c_uint64]),
     "cs_constraint_ends": (c.POINTER(c.c_uint32), [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
-    "cs_recording_open": (c.c_void_p, [c.c_char_p]),
-    "cs_recording_open_bytes": (c.c_void_p, [c.POINTER(c.c_uint8), c.c_size_t]),
+    "cs_recording_open": (c.c_void_p, [c.c_char_p, c.c_uint32]),
+    "cs_recording_open_bytes": (c.c_void_p, [c.POINTER(c.c_uint8), c.c_size_t, c.c_uint32]),
     "cs_recording_open_source": (c.c_void_p, [c.POINTER(cs_recording_source)]),
     "cs_recording_close": (None, [c.c_void_p]),
     "cs_recording_is_open": (c.c_int, [c.c_void_p]),
@@ -705,6 +718,7 @@ FUNCTIONS = {
     "cs_recording_next": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_recorded)]),
     "cs_recording_seek": (c.c_int, [c.c_void_p, c.c_double, c.POINTER(cs_recorded)]),
     "cs_recording_seek_tick": (c.c_int, [c.c_void_p, c.c_uint64, c.POINTER(cs_recorded)]),
+    "cs_recording_get_faults": (c.c_int, [c.c_void_p, c.POINTER(cs_recording_faults)]),
     "cs_recording_message": (c.POINTER(c.c_uint8), [c.c_void_p, c.POINTER(c.c_size_t)]),
     "cs_recording_get_tick": (c.c_int, [c.c_void_p, c.POINTER(cs_recorded_tick)]),
     "cs_recording_get_collider": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_recorded_collider)]),

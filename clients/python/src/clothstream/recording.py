@@ -46,6 +46,17 @@ class Info:
 
 
 @dataclasses.dataclass(frozen=True)
+class Faults:
+    """Frames that were read so far and cannot be shown as they were recorded."""
+
+    frames: int  # all frames; frames that are read again after a seek count again
+    undecodable: int  # the decoder refused them
+    different: int  # decoded, but different from their recorded hash
+    first_tick: int  # of the first such frame; 0 if its header cannot be read
+    first_seconds: float  # since the start of the recording
+
+
+@dataclasses.dataclass(frozen=True)
 class Pose:
     position: Vec3  # m
     orientation: Quaternion
@@ -178,13 +189,21 @@ class Recording(ClientState):
         lib.cs_recording_get_info(self._opened(), c.byref(found))
         return to(Info, found)
 
+    @property
+    def faults(self) -> Faults:
+        """Counts of frames with faults. A recording that was read without an error has none."""
+        found = versioned(b.cs_recording_faults, b.CS_RECORDING_FAULTS_VERSION)
+        lib.cs_recording_get_faults(self._opened(), c.byref(found))
+        return to(Faults, found)
+
     def metadata(self, name: str) -> str:
         """Entry of the metadata, such as "server", "scene", "started" or "device"; "" if there is none."""
         return text(lib.cs_recording_metadata(self._opened(), name.encode()))
 
     def next(self, kinds: int = Recorded.ALL) -> RecordedFrame | Message | None:
         """Reads the next message of these kinds; None at the end. A frame is a RecordedFrame. Raises RecordingError for a
-        damaged chunk; the next call continues after it."""
+        damaged chunk, and for a frame that cannot be decoded or differs from its recorded hash; the next call continues
+        after it. The frames that depend on such a frame are left out without a further error; `faults` counts them."""
         recorded = versioned(b.cs_recorded, b.CS_RECORDED_VERSION)
         self._end_frame()
         result = lib.cs_recording_next(self._opened(), int(kinds), c.byref(recorded))
@@ -195,7 +214,7 @@ class Recording(ClientState):
         return self._shown(recorded) if recorded.kind == b.CS_RECORDED_FRAME else Message(recorded)
 
     def frames(self) -> Iterator[RecordedFrame]:
-        """The frames from here to the end."""
+        """The frames from here to the end. Raises RecordingError as next() does; a new iteration continues after it."""
         while (frame := self.next(Recorded.FRAME)) is not None:
             assert isinstance(frame, RecordedFrame)
             yield frame
@@ -260,11 +279,12 @@ class Recording(ClientState):
         return (tick.value, array(pointer, (nodes.value, 6), np.float32).copy()) if pointer else None
 
 
-def open_recording(source: str | os.PathLike[str] | bytes | bytearray | memoryview) -> Recording:
+def open_recording(source: str | os.PathLike[str] | bytes | bytearray | memoryview, max_vertices: int = 1_048_576) -> Recording:
     """Opens a recording (MCAP): a path, or the bytes of a file. Raises RecordingError if it cannot be read. A file that is
-    cut is read up to the cut."""
+    cut is read up to the cut. max_vertices, 1 to 67108864: a recording with more vertices is refused before memory is
+    used."""
     if isinstance(source, (bytes, bytearray, memoryview)):
         kept = bytes(source)  # the library reads it until the recording is closed
         memory = c.cast(c.c_char_p(kept), c.POINTER(c.c_uint8))
-        return Recording(lib.cs_recording_open_bytes(memory, len(kept)), kept)
-    return Recording(lib.cs_recording_open(os.fsencode(source)))
+        return Recording(lib.cs_recording_open_bytes(memory, len(kept), max_vertices), kept)
+    return Recording(lib.cs_recording_open(os.fsencode(source), max_vertices))

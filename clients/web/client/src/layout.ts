@@ -14,6 +14,7 @@ export const CS_STAGE_STATISTICS_VERSION = 1;
 export const CS_CLOTH_REPORT_VERSION = 1;
 export const CS_RECORDING_INFO_VERSION = 1;
 export const CS_RECORDED_VERSION = 1;
+export const CS_RECORDING_FAULTS_VERSION = 1;
 export const CS_RECORDED_TICK_VERSION = 1;
 export const cs_limits = {
   sizeof: 32,
@@ -302,6 +303,15 @@ export const cs_recorded = {
   tick: 24,
   reconstruction_hash: 32,
   state_hash: 40,
+} as const;
+export const cs_recording_faults = {
+  sizeof: 48,
+  version: 0,
+  frames: 8,
+  undecodable: 16,
+  different: 24,
+  first_tick: 32,
+  first_seconds: 40,
 } as const;
 export const cs_recorded_tick = {
   sizeof: 80,

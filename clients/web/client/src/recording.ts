@@ -5,12 +5,14 @@ import { decompress } from "fzstd";
 import {
   CS_RECORDED_TICK_VERSION,
   CS_RECORDED_VERSION,
+  CS_RECORDING_FAULTS_VERSION,
   CS_RECORDING_INFO_VERSION,
   cs_recorded,
   cs_recorded_collider,
   cs_recorded_grab,
   cs_recorded_pose,
   cs_recorded_tick,
+  cs_recording_faults,
   cs_recording_info,
 } from "./layout";
 import { Frames } from "./frames";
@@ -46,6 +48,9 @@ export interface RecordingOptions {
   // clothstream_recording.wasm: its address, its bytes, or the compiled module, which several recordings may share.
   // Default: the file next to this module.
   wasm?: string | URL | BufferSource | WebAssembly.Module;
+  // Most vertices of all cloths, 1 to 67108864, and half of the most triangles. A larger recording is refused. Default:
+  // 1048576.
+  maxVertices?: number;
 }
 
 export interface RecordingInfo {
@@ -55,6 +60,15 @@ export interface RecordingInfo {
   bytes: number;
   frames: number; // 0 if the file is not complete
   ticks: number; // 0 in recordings of clients
+}
+
+// Frames that were read so far and cannot be shown as they were recorded.
+export interface RecordingFaults {
+  frames: number; // all frames; frames that are read again after a seek count again
+  undecodable: number; // the decoder refused them
+  different: number; // decoded, but different from their recorded hash
+  firstTick: bigint; // of the first such frame; 0 if its header cannot be read
+  firstSeconds: number; // since the start of the recording
 }
 
 export interface RecordedMessage {
@@ -117,7 +131,8 @@ export interface RecordedState {
 // Opens a recording. Throws if it cannot be read; the message says why.
 export async function openRecording(source: ArrayBuffer | Uint8Array | RecordingSource, options: RecordingOptions = {}): Promise<Recording> {
   const bytes = source instanceof ArrayBuffer || source instanceof Uint8Array ? memorySource(source) : source;
-  return Recording.open(bytes, await compile(options.wasm ?? new URL("./clothstream_recording.wasm", import.meta.url)));
+  const module = await compile(options.wasm ?? new URL("./clothstream_recording.wasm", import.meta.url));
+  return Recording.open(bytes, module, options.maxVertices ?? 0);
 }
 
 function memorySource(source: ArrayBuffer | Uint8Array): RecordingSource {
@@ -157,7 +172,7 @@ export class Recording {
     this.people = new People(this.handle);
   }
 
-  static async open(source: RecordingSource, module: WebAssembly.Module): Promise<Recording> {
+  static async open(source: RecordingSource, module: WebAssembly.Module, maxVertices: number): Promise<Recording> {
     const core: CoreModule<RecordingExports> = await CoreModule.startWith<RecordingExports>(module, {
       clothstream: {
         read: (_source: number, offset: number, out: number, count: number) =>
@@ -169,7 +184,7 @@ export class Recording {
           succeeded(() => decompress(core.bytes(frame, frameBytes), core.bytes(out, size)).length === size),
       },
     });
-    const pointer = core.exports.cs_recording_open_host(0, source.size);
+    const pointer = core.exports.cs_recording_open_host(0, source.size, maxVertices);
     if (core.exports.cs_recording_is_open(pointer) === 0) throw new Error(core.text(core.exports.cs_recording_error_text(pointer)));
     return new Recording(core, pointer);
   }
@@ -193,13 +208,28 @@ export class Recording {
     };
   }
 
+  // Counts of frames with faults. A recording that was read without an error has none.
+  get faults(): RecordingFaults {
+    const at = this.prepared(CS_RECORDING_FAULTS_VERSION);
+    this.core.exports.cs_recording_get_faults(this.pointer, at);
+    const view = this.core.view();
+    return {
+      frames: Number(view.getBigUint64(at + cs_recording_faults.frames, true)),
+      undecodable: Number(view.getBigUint64(at + cs_recording_faults.undecodable, true)),
+      different: Number(view.getBigUint64(at + cs_recording_faults.different, true)),
+      firstTick: view.getBigUint64(at + cs_recording_faults.first_tick, true),
+      firstSeconds: view.getFloat64(at + cs_recording_faults.first_seconds, true),
+    };
+  }
+
   // Entry of the metadata, such as "server" or "scene" (docs/recording.md); "" without one.
   metadata(name: string): string {
     return this.core.with([name], (text) => this.core.text(this.core.exports.cs_recording_metadata(this.pointer, text!)));
   }
 
-  // Continues to the next message of these kinds; undefined at the end. Throws for a damaged chunk; the next call
-  // continues after it.
+  // Continues to the next message of these kinds; undefined at the end. Throws for a damaged chunk, and for a frame that
+  // cannot be decoded or differs from its recorded hash; the next call continues after it. The frames that depend on
+  // such a frame are left out without a further error; `faults` counts them.
   next(kinds: number = Recorded.frame): RecordedMessage | undefined {
     const out = this.prepared(CS_RECORDED_VERSION);
     const result = this.core.exports.cs_recording_next(this.pointer, kinds, out);
@@ -208,7 +238,7 @@ export class Recording {
   }
 
   // Goes to the newest frame at or before a time, in seconds since the start; undefined without such a
-  // frame. Throws if it cannot be read.
+  // frame. Throws if it cannot be read, or if a frame between it and its key frame has a fault.
   seek(seconds: number): RecordedMessage | undefined {
     const out = this.prepared(CS_RECORDED_VERSION);
     if (this.core.exports.cs_recording_seek(this.pointer, seconds, out) === 0) throw this.error();

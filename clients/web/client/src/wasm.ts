@@ -126,7 +126,7 @@ export interface CoreExports {
 
 // Functions of clients/recording/recording.h, which only clothstream_recording.wasm has.
 export interface RecordingExports extends CoreExports {
-  cs_recording_open_host(source: number, bytes: number): Pointer;
+  cs_recording_open_host(source: number, bytes: number, maxVertices: number): Pointer;
   cs_recording_close(recording: Pointer): void;
   cs_recording_is_open(recording: Pointer): number;
   cs_recording_error_text(recording: Pointer): Pointer;
@@ -136,6 +136,7 @@ export interface RecordingExports extends CoreExports {
   cs_recording_next(recording: Pointer, kinds: number, out: Pointer): number;
   cs_recording_seek(recording: Pointer, seconds: number, out: Pointer): number;
   cs_recording_seek_tick(recording: Pointer, tick: bigint, out: Pointer): number;
+  cs_recording_get_faults(recording: Pointer, out: Pointer): number;
   cs_recording_message(recording: Pointer, bytes: Pointer): Pointer;
   cs_recording_get_tick(recording: Pointer, out: Pointer): number;
   cs_recording_get_collider(recording: Pointer, index: number, out: Pointer): number;
