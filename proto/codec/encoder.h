@@ -49,7 +49,8 @@ class Encoder {
   // Makes the next frame a key frame.
   void forgetHistory();
 
-  // Layer and reference of the newest frame, as in its header; the reference of a key frame is 0.
+  // Kind, layer and reference of the newest frame, as in its header; the reference of a key frame is 0.
+  PacketKind kind() const;
   std::uint8_t layer() const;
   std::uint64_t referenceTick() const;
 
