@@ -9,6 +9,7 @@ import sys
 
 from arithmetic import REACHED
 from decoder import Decoder, parse
+from examples import check_mesh, check_packets
 
 GOLDEN = "tests/golden/"
 # Corners of the format that the golden packets must reach, so that every decoder is tested there.
@@ -41,6 +42,7 @@ def expect(what, packet, found, expected):
 
 
 def main():
+    print("the page's examples are right: %d packets, a mesh of %d vertices" % (check_packets(), check_mesh()))
     packets = refused = normals = 0
     for stream in json.load(open(GOLDEN + "streams.json")):
         decoder, coarse = Decoder(stream), Decoder(stream, coarse=True)
