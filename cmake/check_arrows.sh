@@ -11,7 +11,7 @@ proto/text         |
 proto/tls          |
 proto/discovery    |
 proto/hands        |
-server/model       | proto/parameters
+server/model       | proto/codec proto/parameters
 server/vulkan      |
 proto/wire         |
 proto/codec        |
