@@ -12,7 +12,7 @@ proto/tls          |
 proto/discovery    |
 proto/hands        |
 server/files       |
-server/model       | proto/parameters
+server/model       | proto/codec proto/parameters
 server/vulkan      |
 proto/wire         |
 proto/codec        |

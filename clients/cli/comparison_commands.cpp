@@ -99,8 +99,8 @@ void ComparisonCommands::addImport(CLI::App& app) {
   import_->add_option("--scene", importOptions_.scene, "Name of the scene. Default: the name of FILE");
   import_
       ->add_option("--max-error", importOptions_.maxError,
-                   "Largest error along each axis, 5um to 1m: a number with um, mm, cm or m, or in metres. "
-                   "Default: 10um")
+                   "Max error, 5um to 1m: a number with um, mm, cm or m, or in metres. A vertex is at most "
+                   "sqrt(3) times that away from its place. Default: 10um")
       ->transform(length())
       ->check(CLI::Range(5e-6, 1.0));
 }

@@ -3,7 +3,6 @@
 #include "clients/cli/encode.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 #include <vector>
@@ -11,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "clients/cli/checked_encoder.h"
 #include "clients/cli/error.h"
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
@@ -18,8 +18,6 @@
 #include "clients/cli/signals.h"
 #include "clients/files/motion_file.h"
 #include "clients/files/recording.h"
-#include "proto/codec/decoder.h"
-#include "proto/codec/encoder.h"
 #include "proto/codec/vertex_normals.h"
 
 namespace clothstream::cli {
@@ -28,17 +26,7 @@ namespace {
 template <typename T>
 using Expected = tl::expected<T, Error>;
 
-// Largest coordinate that every codec can represent and for which floats are precise enough: in m, and in max
-// errors. The larger of the two applies.
-constexpr float kReach = 32, kReachInErrors = 65536;
-
 constexpr std::uint32_t kEpoch = 1;
-
-double millisecondsOf(const auto& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
 
 Expected<float> maxErrorFor(const EncodeOptions& options, const files::MotionShape& shape,
                             std::span<const float> first) {
@@ -72,9 +60,8 @@ struct EncodeFigures {
   float maxError = 0;
   std::uint64_t packetBytes = 0, keyBytes = 0, fileBytes = 0;
   std::uint32_t keyFrames = 0;
-  double largestError = 0, encodeMs = 0, decodeMs = 0;
+  double largestError = 0, promise = 0, encodeMs = 0, decodeMs = 0;
 
-  double promise() const { return std::sqrt(3.0) * double{maxError}; }
   double bitsPerVertex(std::uint64_t bytes) const {
     return 8 * static_cast<double>(bytes) / (1.0 * shape.frames * shape.vertexCount());
   }
@@ -91,7 +78,7 @@ struct EncodeFigures {
         out, shape.columns, shape.rows, shape.frames, seconds, files::kMotionRate, 1e3 * double{maxError},
         bitsPerVertex(packetBytes), bitsPerVertex(fileBytes), fileBytes,
         8e-3 * static_cast<double>(packetBytes) / seconds, keyFrames, keyFrames == 1 ? "frame" : "frames",
-        keyBytes / keyFrames, 1e3 * largestError, 1e3 * promise(), encodeMs / shape.frames,
+        keyBytes / keyFrames, 1e3 * largestError, 1e3 * promise, encodeMs / shape.frames,
         decodeMs / shape.frames);
   }
 
@@ -105,50 +92,24 @@ struct EncodeFigures {
                                         {"keyFrames", keyFrames},
                                         {"keyBytes", keyBytes / keyFrames},
                                         {"measuredMaxErrorMm", 1e3 * largestError},
-                                        {"promisedMaxErrorMm", 1e3 * promise()},
+                                        {"promisedMaxErrorMm", 1e3 * promise},
                                         {"encodeMs", encodeMs / shape.frames},
                                         {"decodeMs", decodeMs / shape.frames}};
     return jsonText(object, 2);
   }
 };
 
-double largestDistance(std::span<const float> a, std::span<const float> b) {
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); i += 3) {
-    const auto off = [&](std::size_t c) { return double{a[i + c]} - double{b[i + c]}; };
-    largest = std::max(largest, off(0) * off(0) + off(1) * off(1) + off(2) * off(2));
-  }
-  return std::sqrt(largest);
-}
-
-Expected<void> encodeFrame(codec::Encoder& encoder, codec::Decoder& decoder, std::uint32_t frame,
-                           std::span<const float> positions, const EncodeOptions& options,
-                           std::span<std::byte> packet, files::RecordingWriter& out, EncodeFigures& figures) {
-  const float reach = std::max(kReach, kReachInErrors * figures.maxError);
-  const auto far = std::ranges::find_if(positions, [=](float x) { return std::abs(x) > reach; });
-  if (far != positions.end())
-    return makeError(
-        kUnreadable,
-        "{}: in frame {}, vertex {} has a coordinate of {} m; this max error allows at most {} m",
-        options.motion, frame, (far - positions.begin()) / 3, *far, reach);
+Expected<void> encodeFrame(CheckedEncoder& encoder, std::uint32_t frame, std::span<const float> positions,
+                           const EncodeOptions& options, files::RecordingWriter& out,
+                           EncodeFigures& figures) {
   const bool key = frame == 0 || (options.keyEvery > 0 && frame % options.keyEvery == 0);
-  std::size_t bytes = 0;
-  figures.encodeMs += millisecondsOf([&] {
-    bytes = encoder.encode(frame + 1, key ? codec::PacketKind::key : codec::PacketKind::predicted, positions,
-                           {}, packet);
-  });
-  codec::DecodeResult result{};
-  figures.decodeMs += millisecondsOf([&] { result = decoder.decode(packet.first(bytes)); });
-  if (result != codec::DecodeResult::ok || decoder.reconstructionHash() != encoder.reconstructionHash())
-    return makeError(kHashMismatch, "frame {} decodes to something else than was encoded", frame);
-  figures.largestError = std::max(figures.largestError, largestDistance(positions, decoder.positions()));
-  if (figures.largestError > figures.promise())
-    return makeError(kHashMismatch, "in frame {} a vertex has an error of {} m; promised {} m", frame,
-                     figures.largestError, figures.promise());
-  figures.packetBytes += bytes;
+  const auto packet =
+      encoder.encode(frame + 1, key ? codec::PacketKind::key : codec::PacketKind::predicted, positions);
+  if (!packet) return tl::unexpected(packet.error());
+  figures.packetBytes += packet->size();
   figures.keyFrames += key ? 1 : 0;
-  figures.keyBytes += key ? bytes : 0;
-  return orError(kNotWritten, out.append(packet.first(bytes), encoder.reconstructionHash()));
+  figures.keyBytes += key ? packet->size() : 0;
+  return orError(kNotWritten, out.append(*packet, encoder.reconstructionHash()));
 }
 
 Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
@@ -171,14 +132,11 @@ Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
   auto out = orError(kNotWritten, files::RecordingWriter::create(options.out, {layout, files::kMotionRate,
                                                                                figures.shape.frames, *side}));
   if (!out) return tl::unexpected(out.error());
-  const auto encoder = codec::Encoder::make(layout);
-  const auto decoder = codec::Decoder::make(layout);
-  if (!encoder || !decoder)
-    return makeError(kFailed, "not enough memory for {} vertices", figures.shape.vertexCount());
-  std::vector<std::byte> packet(encoder->packetBound());
+  auto encoder = CheckedEncoder::make(layout, options.motion);
+  if (!encoder) return tl::unexpected(encoder.error());
   Progress progress("encode", figures.shape.frames);
   for (std::uint32_t frame = 0;;) {
-    if (auto done = encodeFrame(*encoder, *decoder, frame, *positions, options, packet, *out, figures); !done)
+    if (auto done = encodeFrame(*encoder, frame, *positions, options, *out, figures); !done)
       return tl::unexpected(done.error());
     progress.show(++frame);
     if (frame == figures.shape.frames) break;
@@ -189,6 +147,10 @@ Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
   }
   if (auto done = orError(kNotWritten, out->finish()); !done) return tl::unexpected(done.error());
   figures.fileBytes = out->bytes();
+  figures.largestError = encoder->largestError();
+  figures.promise = encoder->promise();
+  figures.encodeMs = encoder->encodeMs();
+  figures.decodeMs = encoder->decodeMs();
   return figures;
 }
 

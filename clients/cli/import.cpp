@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
+#include "clients/cli/checked_encoder.h"
 #include "clients/cli/error.h"
 #include "clients/cli/print.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "clothstream/v1/session.pb.h"
-#include "proto/codec/encoder.h"
 #include "proto/recording/file.h"
 #include "proto/recording/recording_writer.h"
 
@@ -57,7 +57,9 @@ v1::StreamDescription descriptionOf(const Motion& motion, const codec::StreamLay
   description.set_simulation_rate(static_cast<std::uint32_t>(motion.rate()));
   description.set_stream_rate(static_cast<std::uint32_t>(motion.rate()));
   description.set_max_error(layout.maxError);
+  description.set_normals(v1::NORMALS_NONE);
   description.set_temporal_layers(layout.temporalLayers);
+  description.set_qualities(layout.qualities);
   const measure::Surface& surface = motion.surface();
   for (std::size_t i = 0; i < surface.cloths.size(); ++i) {
     const std::vector<float> rest = restOf(surface, surface.cloths[i]);
@@ -78,29 +80,33 @@ class Import {
   Import(const ImportOptions& options, Motion& motion)
       : options_(options), motion_(motion), layout_(layoutOf(motion.surface(), options.maxError)) {}
 
+  // Largest distance of a decoded vertex from its place, and the largest that was promised. Metres.
+  double largestError() const { return largestError_; }
+  double promise() const { return promise_; }
+
   // Returns the number of frames.
   tl::expected<std::uint32_t, Error> run() {
     if (!(motion_.rate() <= kMaxStreamRate) || std::floor(motion_.rate()) != motion_.rate())
       return makeError(kUsage, "--rate: {} is not allowed; a recording has 1 to {} whole ticks per second",
                        motion_.rate(), kMaxStreamRate);
-    const auto encoder = codec::Encoder::make(layout_);
-    if (!encoder)
-      return makeError(kUnreadable, "{} cannot be encoded: its cloths are not possible", options_.states);
+    auto encoder = CheckedEncoder::make(layout_, options_.states);
+    if (!encoder) return tl::unexpected(encoder.error());
     auto file = orError(kNotWritten, recording::OutputFile::create(options_.output));
     if (!file) return tl::unexpected(file.error());
     auto frames = write(*file, *encoder);
     if (!frames) std::filesystem::remove(options_.output);
+    largestError_ = encoder->largestError();
+    promise_ = encoder->promise();
     return frames;
   }
 
  private:
-  tl::expected<std::uint32_t, Error> write(recording::OutputFile& file, codec::Encoder& encoder) {
+  tl::expected<std::uint32_t, Error> write(recording::OutputFile& file, CheckedEncoder& encoder) {
     auto writer = orError(kNotWritten, recording::RecordingWriter::begin(
                                            [&](std::string_view bytes) { return file.write(bytes); },
                                            options_.program, metadata()));
     if (!writer) return tl::unexpected(writer.error());
     const std::string description = descriptionOf(motion_, layout_, options_.scene).SerializeAsString();
-    std::vector<std::byte> packet(encoder.packetBound());
     Progress progress("import", static_cast<std::uint32_t>(motion_.frames()));
     std::uint32_t frames = 0;
     for (;; ++frames) {
@@ -116,11 +122,12 @@ class Import {
           return tl::unexpected(written.error());
       }
       const bool key = frames % recording::kMaxKeyFrameDistance == 0;
-      const std::size_t bytes =
+      const auto packet =
           encoder.encode(motion_.frame().tick, key ? codec::PacketKind::key : codec::PacketKind::predicted,
-                         motion_.frame().positions, {}, packet);
+                         motion_.frame().positions);
+      if (!packet) return tl::unexpected(packet.error());
       v1::Frame& frame = *message_.mutable_frame();
-      frame.set_packet(packet.data(), bytes);
+      frame.set_packet(packet->data(), packet->size());
       frame.set_tick_time_us(time / 1000);
       frame.set_packet_time_us(time / 1000);
       frame.set_reconstruction_hash(encoder.reconstructionHash());
@@ -152,6 +159,7 @@ class Import {
   const ImportOptions& options_;
   Motion& motion_;
   const codec::StreamLayout layout_;
+  double largestError_ = 0, promise_ = 0;
   v1::ServerMessage message_;
 };
 
@@ -160,10 +168,13 @@ class Import {
 ExitCode importStates(const ImportOptions& options) {
   auto motion = openArrays(options.states, options.arrays);
   if (!motion) return printError(motion.error());
-  const auto frames = Import(options, **motion).run();
+  Import importing(options, **motion);
+  const auto frames = importing.run();
   if (!frames) return printError(frames.error());
-  print("{}: {} frames, {} vertices, within {:.3g} m along each axis\n", options.output, *frames,
-        (*motion)->surface().vertexCount(), options.maxError);
+  print(
+      "{}: {} frames, {} vertices; every vertex is within {:.3g} m of its place, promised were {:.3g} m\n",
+      options.output, *frames, (*motion)->surface().vertexCount(), importing.largestError(),
+      importing.promise());
   return kOk;
 }
 

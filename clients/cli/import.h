@@ -14,7 +14,7 @@ struct ImportOptions {
   ArrayOptions arrays;
   std::string output;      // recording; must not exist
   std::string scene;       // name of the scene in the recording
-  double maxError = 1e-5;  // largest error of a coordinate, metres
+  double maxError = 1e-5;  // metres; a vertex is at most sqrt(3) times that away from its place
   std::string program;     // name and version of this program
 };
 

@@ -69,6 +69,10 @@ void Encoder::forgetHistory() {
   state_->frame = 0;
 }
 
+PacketKind Encoder::kind() const {
+  return state_->newest.kind;
+}
+
 std::uint8_t Encoder::layer() const {
   return state_->newest.layer;
 }

@@ -38,18 +38,20 @@ class Encoder {
   std::size_t packetBound() const;
 
   // Encodes one frame into `out`, which has at least packetBound() bytes, and returns the size of the packet.
-  // `positions` are metres, 3 floats a vertex. Coordinates beyond about 2^27 units (at least 32 m) are
-  // clamped, and NaN too. `normals` have about unit length, or are empty if the layout has none. `tick` must
-  // grow from call to call, except after forgetHistory(). The first frame is always a key frame. A predicted
-  // frame refers to the previous frame; with temporal layers, to the newest frame of a lower layer or, in the
-  // base, to the previous frame of the base. The packet header names the reference.
+  // `positions` are metres, 3 floats a vertex. Coordinates beyond reachOf() (reach.h) are clamped, and NaN
+  // too: the packet then decodes, but not to these positions. Callers check. `normals` have about unit
+  // length, or are empty if the layout has none. `tick` must grow from call to call, except after
+  // forgetHistory(). The first frame is always a key frame. A predicted frame refers to the previous frame;
+  // with temporal layers, to the newest frame of a lower layer or, in the base, to the previous frame of the
+  // base. The packet header names the reference.
   std::size_t encode(std::uint64_t tick, PacketKind kind, std::span<const float> positions,
                      std::span<const float> normals, std::span<std::byte> out);
 
   // Makes the next frame a key frame.
   void forgetHistory();
 
-  // Layer and reference of the newest frame, as in its header; the reference of a key frame is 0.
+  // Kind, layer and reference of the newest frame, as in its header; the reference of a key frame is 0.
+  PacketKind kind() const;
   std::uint8_t layer() const;
   std::uint64_t referenceTick() const;
 

@@ -93,9 +93,12 @@ inline bool isPossible(const StreamLayout& layout) {
   return vertices > 0;
 }
 
-// Max error of a quality of the layout.
+// Max error of a quality of a stream whose finest quality has `maxError`.
+constexpr float maxErrorOf(float maxError, std::uint8_t quality) {
+  return maxError * static_cast<float>(1u << quality);
+}
 constexpr float maxErrorOf(const StreamLayout& layout, std::uint8_t quality) {
-  return layout.maxError * static_cast<float>(1u << quality);
+  return maxErrorOf(layout.maxError, quality);
 }
 
 }  // namespace clothstream::codec

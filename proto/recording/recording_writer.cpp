@@ -3,6 +3,8 @@
 #include "proto/recording/recording_writer.h"
 
 #include <set>
+#include <string>
+#include <utility>
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -14,19 +16,76 @@ namespace {
 
 namespace protobuf = google::protobuf;
 
-// Adds imported files first.
-void add(const protobuf::FileDescriptor& file, std::set<std::string>& known,
-         protobuf::FileDescriptorSet& files) {
-  if (!known.insert(file.name()).second) return;
-  for (int i = 0; i < file.dependency_count(); ++i) add(*file.dependency(i), known, files);
-  file.CopyTo(files.add_file());
+// The messages and enums that messages of a type can contain, by full name. Types inside of others are with
+// these.
+class Contents {
+ public:
+  explicit Contents(const protobuf::Descriptor& type) { take(type); }
+
+  bool has(const std::string& name) const { return names_.contains(name); }
+
+ private:
+  void take(const protobuf::Descriptor& type) {
+    if (const protobuf::Descriptor* outer = type.containing_type()) return take(*outer);
+    if (names_.insert(type.full_name()).second) takeFields(type);
+  }
+  void take(const protobuf::EnumDescriptor& type) {
+    if (const protobuf::Descriptor* outer = type.containing_type()) return take(*outer);
+    names_.insert(type.full_name());
+  }
+  void takeFields(const protobuf::Descriptor& type) {
+    for (int i = 0; i < type.field_count(); ++i) {
+      if (const protobuf::Descriptor* message = type.field(i)->message_type()) take(*message);
+      if (const protobuf::EnumDescriptor* choice = type.field(i)->enum_type()) take(*choice);
+    }
+    for (int i = 0; i < type.nested_type_count(); ++i) takeFields(*type.nested_type(i));
+  }
+
+  std::set<std::string> names_;
+};
+
+template <typename Types>
+void keepOnly(const Contents& contents, const std::string& package, Types& types) {
+  for (int i = types.size(); i-- > 0;)
+    if (!contents.has(package + '.' + types.Get(i).name())) types.DeleteSubrange(i, 1);
 }
 
+// Files of a schema, imported ones first. A file without any of the contents is left out, and so are other
+// types.
+class Files {
+ public:
+  Files(const protobuf::FileDescriptor& file, const Contents& contents) : contents_(contents) { add(file); }
+
+  std::string serialised() const { return files_.SerializeAsString(); }
+
+ private:
+  void add(const protobuf::FileDescriptor& file) {
+    if (!seen_.insert(file.name()).second) return;
+    protobuf::FileDescriptorProto reduced;
+    file.CopyTo(&reduced);
+    reduced.clear_service();
+    reduced.clear_dependency();
+    reduced.clear_public_dependency();
+    reduced.clear_weak_dependency();
+    for (int i = 0; i < file.dependency_count(); ++i) {
+      add(*file.dependency(i));
+      if (kept_.contains(file.dependency(i)->name())) reduced.add_dependency(file.dependency(i)->name());
+    }
+    keepOnly(contents_, file.package(), *reduced.mutable_message_type());
+    keepOnly(contents_, file.package(), *reduced.mutable_enum_type());
+    if (reduced.message_type().empty() && reduced.enum_type().empty()) return;
+    kept_.insert(file.name());
+    *files_.add_file() = std::move(reduced);
+  }
+
+  const Contents& contents_;
+  std::set<std::string> seen_, kept_;
+  protobuf::FileDescriptorSet files_;
+};
+
 Schema schemaOf(const protobuf::Descriptor& type) {
-  std::set<std::string> known;
-  protobuf::FileDescriptorSet files;
-  add(*type.file(), known, files);
-  return {type.full_name(), files.SerializeAsString()};
+  const Contents contents(type);
+  return {type.full_name(), Files(*type.file(), contents).serialised()};
 }
 
 }  // namespace

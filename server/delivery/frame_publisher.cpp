@@ -112,7 +112,7 @@ void FramePublisher::publish(const CompleteFrame::Recorded& recorded, const enco
   const PublishedFrame published{
       .message = serialiseFrame(*frame_.fields, std::span(packet_).first(encoded.bytes)),
       .tick = recorded.frame.tick,
-      .key = recorded.frame.kind == codec::PacketKind::key,
+      .key = encoded.kind == codec::PacketKind::key,
       .referenceTick = encoded.referenceTick,
       .quality = recorded.quality,
       .layer = encoded.layer,

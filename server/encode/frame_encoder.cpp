@@ -31,6 +31,12 @@ std::vector<float> coordinatesOf(const model::Mesh& mesh) {
   return coordinates;
 }
 
+// Frees a slot at the end of a scope, also if an exception leaves it.
+struct Release {
+  std::atomic<bool>& taken;
+  ~Release() { taken.store(false, std::memory_order_release); }
+};
+
 }  // namespace
 
 std::uint8_t codecOf(const model::Scene& scene) {
@@ -127,16 +133,13 @@ void FrameEncoder::forgetHistory() {
 }
 
 EncodedFrame FrameEncoder::entropyCode(const RecordedFrame& frame, std::span<std::byte> out) {
-  // The slot becomes free also if the stage throws.
-  const struct Release {
-    std::atomic<bool>& taken;
-    ~Release() { taken.store(false, std::memory_order_release); }
-  } release{state_->taken[frame.slot]};
+  const Release release{state_->taken[frame.slot]};
   return state_->stage->entropyCode(frame, out);
 }
 
 void FrameEncoder::discard(const RecordedFrame& frame) {
-  state_->taken[frame.slot].store(false, std::memory_order_release);
+  const Release release{state_->taken[frame.slot]};
+  state_->stage->discard(frame);
 }
 
 std::size_t FrameEncoder::packetBound() const {

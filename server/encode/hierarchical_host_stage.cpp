@@ -45,8 +45,15 @@ class HierarchicalHostStage final : public EncodeStage {
     const std::size_t bytes = encoder_->encode(frame.tick, frame.kind, positions_, normals_, out);
     return {.bytes = bytes,
             .reconstructionHash = encoder_->reconstructionHash(),
+            .kind = encoder_->kind(),
             .layer = encoder_->layer(),
             .referenceTick = encoder_->referenceTick()};
+  }
+
+  // The encoder has not seen the frame, so the next one refers to an older frame, which decoders hold. After
+  // a discarded key frame the next one is a key frame, because older frames may belong to a dropped history.
+  void discard(const RecordedFrame& frame) override {
+    if (frame.kind == codec::PacketKind::key) encoder_->forgetHistory();
   }
 
  private:

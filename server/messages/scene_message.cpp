@@ -3,6 +3,7 @@
 #include "server/messages/scene_message.h"
 
 #include <algorithm>
+#include <cmath>
 #include <unordered_set>
 
 #include <fmt/format.h>
@@ -192,6 +193,22 @@ void checkSelections(Checks& checks, const model::Scene& scene) {
                     tests, limits::kMaxSelectionTests));
 }
 
+// A stream holds no coordinate beyond its reach, and a cloth that starts there could not be sent.
+void checkReach(Checks& checks, const model::Scene& scene) {
+  const float reach = model::reachOf(scene.stream);
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
+    const float farthest = model::farthestCoordinate(scene.cloths[i]);
+    if (std::abs(farthest) <= reach) continue;
+    return checks.fail(
+        Path().at("cloths", static_cast<int>(i)), "",
+        fmt::format(
+            "has a node with a coordinate of {:.6g} m; must be within {:.4g} m of the origin along each "
+            "axis, which is what a stream with a maxError of {:.4g} m holds: place the cloth nearer to the "
+            "origin, or set stream.maxError to {} or more",
+            farthest, reach, scene.stream.maxError, model::maxErrorFor(std::abs(farthest))));
+  }
+}
+
 // Checks the attachments of all cloths together: unique names, number, and colliders that exist.
 void checkAttachments(Checks& checks, const model::Scene& scene) {
   std::unordered_set<std::string_view> names;
@@ -351,6 +368,13 @@ std::optional<std::string> instability(const model::Scene& scene, const model::S
       limits::kMaxSubsteps);
 }
 
+std::string outOfReach(const model::StreamSettings& stream) {
+  return fmt::format(
+      "cloth left the range that the stream holds, {:.4g} m from the origin along each axis at a "
+      "maxError of {:.4g} m",
+      model::reachOf(stream), stream.maxError);
+}
+
 Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh, const SceneLimits& most,
                              std::vector<v1::MeshRepair>* repairs) {
   std::vector<v1::MeshRepair> unasked;
@@ -396,6 +420,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   if (!message.stream().has_max_error() && !checks.failed())
     scene.stream.maxError = model::suitedMaxError(scene);
   most.cancellation.check();
+  if (!checks.failed()) checkReach(checks, scene);
   checkUnique(checks, "cloths", scene.cloths);
   checkUnique(checks, "colliders", scene.colliders);
   checkAttachments(checks, scene);

@@ -66,4 +66,7 @@ std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::C
 // scene before any change of its parameters.
 std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound);
 
+// Says that cloth is where the stream cannot hold it, and which max error would.
+std::string outOfReach(const model::StreamSettings& stream);
+
 }  // namespace clothstream::messages

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <span>
 
+#include "proto/codec/reach.h"
 #include "server/model/mesh.h"
 
 namespace clothstream::model {
@@ -148,6 +150,31 @@ float suitedMaxError(const Scene& scene) {
   double error = kCoarsest;
   for (const Cloth& cloth : scene.cloths) error = std::min(error, kPartOfEdge * meanEdge(cloth));
   return static_cast<float>(std::max(error, kFinest));
+}
+
+float reachOf(const StreamSettings& stream) {
+  return codec::reachOf(stream.maxError, stream.qualities);
+}
+
+float maxErrorFor(float coordinate) {
+  return codec::maxErrorFor(coordinate);
+}
+
+float farthestCoordinate(const Cloth& cloth) {
+  float farthest = 0;
+  const auto look = [&](std::span<const Vec3> positions) {
+    for (const Vec3& position : positions)
+      for (int axis = 0; axis < 3; ++axis)
+        if (std::abs(position[axis]) > std::abs(farthest)) farthest = position[axis];
+  };
+  if (cloth.mesh) {
+    look(cloth.mesh->shape.positions);
+  } else {
+    Grid corners = cloth.grid;
+    corners.rows = corners.columns = 2;
+    look(restPositions(corners));
+  }
+  return farthest;
 }
 
 }  // namespace clothstream::model

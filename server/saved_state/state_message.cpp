@@ -339,7 +339,8 @@ Read<scene::Checkpoint> toCheckpoint(const v1::SavedCheckpoint& message, const m
   auto state = scene::toSnapshot(message.state(), start.nodeCount());
   if (!state) return wrong(("state " + state.error()).c_str());
   checkpoint.state = std::move(*state);
-  if (!simulation::statusOf(checkpoint.state).healthy) return wrong("state is invalid");
+  if (!simulation::statusOf(checkpoint.state, model::reachOf(start.stream)).healthy)
+    return wrong("state is invalid");
   Read<model::Scene> parameters = withParameters(message.parameters(), start);
   if (!parameters) return tl::unexpected(std::move(parameters).error());
   checkpoint.scene = std::move(*parameters);

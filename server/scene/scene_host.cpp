@@ -10,6 +10,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/description.h"
+#include "server/messages/scene_message.h"
 #include "server/model/wind.h"
 #include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
@@ -409,7 +410,8 @@ void SceneHost::encodePausedFrame(Clock::time_point now) {
   }
   on.simulation.recordSaveState(on.recorder);
   on.device.wait(on.device.submit(on.recorder));
-  const simulation::TickStatus status = simulation::statusOf(on.simulation.collectState(tick_));
+  const simulation::TickStatus status =
+      simulation::statusOf(on.simulation.collectState(tick_), model::reachOf(scene_.stream));
   describeFrame(now);
   frame_.repeated = true;
   frame_.fields->clear_report();
@@ -539,13 +541,12 @@ void SceneHost::recover() {
   const bool repeated = lastRecovery_ && tick_ - *lastRecovery_ <= rate_;
   lastRecovery_ = tick_;
   sinceHealthy_ = 0;
-  std::string text;
+  std::string text =
+      status_.outOfReach ? messages::outOfReach(scene_.stream) : "the simulation became unstable";
   if (repeated) {
     recovery_ = Recovery::reset;
     live_.metrics.resets.add();
-    text =
-        "the simulation became unstable twice within a second: it continues from its start, with the start's "
-        "parameters";
+    text += " twice within a second: the scene continues from its start, with the start's parameters";
     const v1::ParameterChange start = live_.resetParameters();
     scene_.environment = live_.start().environment;
     scene_.cloths = live_.start().cloths;
@@ -555,7 +556,7 @@ void SceneHost::recover() {
   } else {
     recovery_ = Recovery::rollback;
     live_.metrics.rollbacks.add();
-    text = "the simulation became unstable: it continues from its newest healthy state, at most a second old";
+    text += ": the scene continues from its newest healthy state, at most a second old";
   }
   if (!recoveryNotices_.take(Clock::now())) return;
   telemetry::log({live_.name()}, spdlog::level::warn, "tick {}: {}", tick_, text);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cstring>
 #include <iterator>
@@ -168,6 +169,7 @@ struct ClothSimulation::Pipeline {
   float tickRate;
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
+  std::uint32_t reach;  // HashPush::reach
   std::vector<shared::ClothRecord> records;
   std::vector<float> masses;       // 1/kg, by node
   std::vector<float> clothMasses;  // kg
@@ -214,6 +216,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       tickRate(static_cast<float>(scene.simulationRate)),
       offsets(simulation::clothOffsets(scene.cloths)),
       nodes(offsets.back()),
+      reach(std::bit_cast<std::uint32_t>(model::reachOf(scene.stream))),
       records(clothRecords(scene.cloths, substepSeconds)),
       masses(inverseMasses(scene.cloths)),
       clothMasses(massesOf(scene.cloths)),
@@ -461,7 +464,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
 void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.beginStage("hash");
   recorder.barrier();
-  recorder.dispatch(hash.from[present], shared::HashPush{nodes}, hashInvocations(device, nodes));
+  recorder.dispatch(hash.from[present], shared::HashPush{nodes, reach}, hashInvocations(device, nodes));
   if (motionBound)
     motionBound->recordDepths(recorder, present, collision.push(substeps - 1, substeps, tickRate));
   recorder.barrier();
@@ -580,7 +583,8 @@ std::vector<std::vector<std::uint32_t>> ClothSimulation::constraintEnds() const 
 TickStatus ClothSimulation::status() const {
   const shared::StatusRecord& record =
       pipeline_->buffers.statusReadback.mapped<shared::StatusRecord>()[pipeline_->slot];
-  TickStatus status{std::uint64_t{record.hashHigh} << 32 | record.hashLow, record.unhealthy == 0};
+  TickStatus status{std::uint64_t{record.hashHigh} << 32 | record.hashLow, record.unhealthy == 0,
+                    record.unhealthy == shared::kOutOfReach};
   if (pipeline_->selfCollision) {
     const shared::CrowdReport& report = pipeline_->selfCollision->report(pipeline_->slot);
     status.crowded = report.lists + report.balls;

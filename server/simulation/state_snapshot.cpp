@@ -6,6 +6,7 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
+#include <span>
 
 #include "shaders/shared/state_hash.h"
 
@@ -37,11 +38,11 @@ StateSnapshot pack(const NodeState& state, std::uint64_t tick) {
   return snapshot;
 }
 
-TickStatus statusOf(const StateSnapshot& snapshot) {
+TickStatus statusOf(const StateSnapshot& snapshot, float reach) {
   assert(snapshot.bytes.size() % kSnapshotBytesPerNode == 0);
   const auto nodes = static_cast<std::uint32_t>(snapshot.bytes.size() / kSnapshotBytesPerNode);
   shared::NodeHash sum{0, 0};
-  bool healthy = true;
+  bool isInWorld = true, isInReach = true;
   for (std::uint32_t i = 0; i < nodes; ++i) {
     std::array<std::uint32_t, 6> words;
     std::memcpy(words.data(), snapshot.bytes.data() + i * kSnapshotBytesPerNode, sizeof(words));
@@ -49,9 +50,11 @@ TickStatus statusOf(const StateSnapshot& snapshot) {
         shared::hashNode(i, words[0], words[1], words[2], words[3], words[4], words[5]);
     sum.low += hash.low;
     sum.high += hash.high;
-    for (const std::uint32_t word : words) healthy = healthy && !shared::isOutsideWorld(word);
+    for (const std::uint32_t word : words) isInWorld = isInWorld && !shared::isOutsideWorld(word);
+    for (const std::uint32_t word : std::span(words).first(3))
+      isInReach = isInReach && !shared::isBeyond(word, std::bit_cast<std::uint32_t>(reach));
   }
-  return {std::uint64_t{sum.high} << 32 | sum.low, healthy};
+  return {std::uint64_t{sum.high} << 32 | sum.low, isInWorld && isInReach, isInWorld && !isInReach};
 }
 
 }  // namespace clothstream::simulation

@@ -46,14 +46,19 @@ StateSnapshot pack(const NodeState& state, std::uint64_t tick);
 // Status of a tick.
 struct TickStatus {
   std::uint64_t stateHash = 0;  // of positions and velocities, bits
-  bool healthy = true;          // true: every component is finite and within kWorldExtent of zero (m; m/s)
+  // True: every component is finite and within kWorldExtent of zero (m; m/s), and no position is out of
+  // reach.
+  bool healthy = true;
+  // True: the state is unhealthy only because a position is out of reach, and so cannot be streamed.
+  bool outOfReach = false;
   // Self-collision: number of lists of neighbours that were too long, plus number of balls that touched too
   // many others.
   std::uint32_t crowded = 0;
 };
 inline constexpr float kWorldExtent = 8192;
 
-// Computes the status of a state on the CPU. A device with the same bits reports the same status.
-TickStatus statusOf(const StateSnapshot& snapshot);
+// Computes the status of a state on the CPU. A device with the same bits reports the same status. `reach`:
+// model::reachOf() of the scene's stream.
+TickStatus statusOf(const StateSnapshot& snapshot, float reach = kWorldExtent);
 
 }  // namespace clothstream::simulation

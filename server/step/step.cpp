@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "server/messages/scene_file.h"
+#include "server/messages/scene_message.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/step/state_file.h"
 #include "server/vulkan/recorder.h"
@@ -104,8 +105,9 @@ Outcome run(vulkan::Device& device, const model::Scene& scene, const StepOptions
     const simulation::TickStatus status = simulation.status();
     if (!status.healthy) {
       outcome = Outcome::unhealthy;
-      fmt::print(stderr,
-                 "tick {}: the state left the range of numbers; {} ends with the {} frames before it\n", tick,
+      fmt::print(stderr, "tick {}: {}; {} ends with the {} frames before it\n", tick,
+                 status.outOfReach ? messages::outOfReach(scene.stream)
+                                   : std::string("the state left the range of numbers"),
                  options.out.string(), file.frames());
     } else if (wanted) {
       file.append(simulation.collectState(tick).bytes);

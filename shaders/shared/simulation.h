@@ -238,14 +238,19 @@ struct FinishPush {
 
 struct HashPush {
   uint32_t nodeCount;
+  uint32_t reach;  // bits of the largest magnitude of a position's component, m
 };
+
+// A component is not finite or outside the world; a component of a position is beyond HashPush::reach.
+const uint32_t kOutsideWorld = 1;
+const uint32_t kOutOfReach = 2;
 
 // Result of a tick. The hash is the sum of the nodes' hashes modulo 2^32, so that their order does not
 // matter.
 struct StatusRecord {
   uint32_t hashLow;
   uint32_t hashHigh;
-  uint32_t unhealthy;  // not 0: a component is not finite or outside the world
+  uint32_t unhealthy;  // kOutsideWorld, kOutOfReach, or both
   uint32_t reserved;
 };
 
@@ -263,7 +268,7 @@ static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, wind) == 16 &&
 static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 48 && sizeof(SolvePush) == 24 &&
               sizeof(ApplyPush) == 64 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&
               sizeof(FinishPush) == 48 && sizeof(StretchedPush) == 48 && sizeof(MarkPush) == 20 &&
-              sizeof(HashPush) == 4);
+              sizeof(HashPush) == 8);
 static_assert(sizeof(StatusRecord) == 16 && offsetof(StatusRecord, unhealthy) == 8);
 }  // namespace clothstream::shared
 #else

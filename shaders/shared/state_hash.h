@@ -38,10 +38,16 @@ CLOTHSTREAM_SHARED_FUNCTION NodeHash hashNode(uint32_t index, uint32_t px, uint3
   return absorbWord(hash, 0xC2B2AE3Du);
 }
 
-// True if a float with these bits is infinite, not a number, or further than 8192 from zero. Without the
-// sign, the bits of floats have the order of their magnitudes, and non-finite floats come last.
+// True if a float with these bits is infinite, not a number, or further from zero than the float with the
+// bits `limit`. Without the sign, the bits of floats have the order of their magnitudes, and non-finite
+// floats come last.
+CLOTHSTREAM_SHARED_FUNCTION bool isBeyond(uint32_t bits, uint32_t limit) {
+  return (bits & 0x7FFFFFFFu) > limit;
+}
+
+// True if a float with these bits is infinite, not a number, or further than 8192 from zero.
 CLOTHSTREAM_SHARED_FUNCTION bool isOutsideWorld(uint32_t bits) {
-  return (bits & 0x7FFFFFFFu) > 0x46000000u;
+  return isBeyond(bits, 0x46000000u);
 }
 
 CLOTHSTREAM_SHARED_END

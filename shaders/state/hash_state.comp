@@ -22,19 +22,24 @@ layout(push_constant) uniform Push {
 void main() {
   uint stride = gl_NumWorkGroups.x * gl_WorkGroupSize.x;
   NodeHash sum = NodeHash(0, 0);
-  bool unhealthy = false;
+  uint unhealthy = 0;
   for (uint node = gl_GlobalInvocationID.x; node < push.nodeCount; node += stride) {
     uvec3 p = floatBitsToUint(texelFetch(positions, int(node)).xyz);
     uvec3 v = floatBitsToUint(texelFetch(velocities, int(node)).xyz);
     NodeHash hash = hashNode(node, p.x, p.y, p.z, v.x, v.y, v.z);
     sum.low += hash.low;
     sum.high += hash.high;
-    unhealthy = unhealthy || isOutsideWorld(p.x) || isOutsideWorld(p.y) || isOutsideWorld(p.z) ||
-                isOutsideWorld(v.x) || isOutsideWorld(v.y) || isOutsideWorld(v.z);
+    if (isOutsideWorld(p.x) || isOutsideWorld(p.y) || isOutsideWorld(p.z) || isOutsideWorld(v.x) ||
+        isOutsideWorld(v.y) || isOutsideWorld(v.z)) {
+      unhealthy |= kOutsideWorld;
+    }
+    if (isBeyond(p.x, push.reach) || isBeyond(p.y, push.reach) || isBeyond(p.z, push.reach)) {
+      unhealthy |= kOutOfReach;
+    }
   }
   atomicAdd(status.hashLow, sum.low);
   atomicAdd(status.hashHigh, sum.high);
-  if (unhealthy) {
-    atomicOr(status.unhealthy, 1u);
+  if (unhealthy != 0) {
+    atomicOr(status.unhealthy, unhealthy);
   }
 }

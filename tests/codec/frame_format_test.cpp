@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Compares the tables of FRAME_FORMAT.md with residual_tables.cpp.
+// Compares tables of FRAME_FORMAT.md with the codec: those of the residuals, and the order of a mesh.
+#include <algorithm>
 #include <charconv>
 #include <fstream>
 #include <map>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "proto/codec/hierarchical/coding_order.h"
 #include "proto/codec/hierarchical/residual_model.h"
 
 namespace clothstream::codec::hierarchical {
@@ -74,6 +77,49 @@ TEST(FrameFormat, DistributionsEqualResidualTables) {
         distributionOf(components.at(key.first), static_cast<std::uint32_t>(std::stoul(key.second)));
     const Distribution& distribution = kDistributions.at(place);
     EXPECT_EQ(row, Numbers(distribution.begin(), distribution.end())) << key.first << ' ' << key.second;
+  }
+}
+
+// Whole numbers between spaces and commas; -1 for a dash, which is the origin.
+Numbers numbersOf(std::string text) {
+  std::ranges::replace(text, ',', ' ');
+  std::istringstream words(text);
+  Numbers numbers;
+  for (std::string word; words >> word;) numbers.push_back(word == "-" ? -1 : std::stoi(word));
+  return numbers;
+}
+
+template <typename Values>
+Numbers numbersOf(const Values& values) {
+  return Numbers(values.begin(), values.end());
+}
+
+TEST(FrameFormat, MeshHasTheOrderOfThePage) {
+  ClothLayout cloth;
+  std::vector<std::vector<Numbers>> rows;
+  std::ifstream page("proto/FRAME_FORMAT.md");
+  std::string line;
+  while (std::getline(page, line) && line != "### A mesh") {
+  }
+  while (std::getline(page, line) && !line.starts_with("## ")) {
+    if (line.starts_with("    "))
+      for (const int vertex : numbersOf(line)) cloth.triangles.push_back(static_cast<std::uint32_t>(vertex));
+    const Cells cells = cellsOf(line);
+    int vertex = 0;
+    if (cells.size() != 7 || !isNumber(cells[0], vertex)) continue;
+    rows.emplace_back();
+    for (const std::string& cell : cells) rows.back().push_back(numbersOf(cell));
+    for (const int coordinate : rows.back()[1]) cloth.restPositions.push_back(static_cast<float>(coordinate));
+  }
+  ASSERT_EQ(rows.size(), 20u);
+  cloth.vertexCount = 20;
+  const CodingOrder order = orderMesh(cloth);
+  for (std::size_t v = 0; v < rows.size(); ++v) {
+    EXPECT_EQ(rows[v][2], Numbers{static_cast<int>(order.ranks[v])}) << v;
+    EXPECT_EQ(rows[v][3], numbersOf(order.neighbours[v].parents)) << v;
+    EXPECT_EQ(rows[v][4], numbersOf(order.neighbours[v].weights)) << v;
+    EXPECT_EQ(rows[v][5], numbersOf(order.neighbours[v].ring)) << v;
+    EXPECT_EQ(rows[v][6], numbersOf(order.nearest[v])) << v;
   }
 }
 

@@ -39,6 +39,11 @@ std::vector<std::byte> readBytes(const std::string& path) {
   return bytes;
 }
 
+void writeBytes(const std::string& path, const std::vector<std::byte>& bytes) {
+  std::ofstream out(path, std::ios::binary);
+  for (const std::byte byte : bytes) out.put(static_cast<char>(byte));
+}
+
 GoldenStream readStream(const nlohmann::json& json) {
   GoldenStream stream;
   stream.name = json.at("name");
@@ -61,6 +66,8 @@ GoldenStream readStream(const nlohmann::json& json) {
                               fromHexadecimal(packet.at("positionsHash")),
                               fromHexadecimal(packet.at("coarsePositionsHash"))});
   }
+  for (const std::string file : json.value("refused", nlohmann::json::array()))
+    stream.refused.push_back({file, readBytes(kFolder + file)});
   for (const nlohmann::json& normal : json.at("normalSamples"))
     stream.normals.push_back({normal.at("vertex"), normal.at("normal")});
   return stream;
@@ -89,6 +96,7 @@ nlohmann::ordered_json describe(const GoldenStream& stream) {
                                {"positionsHash", hexadecimal(packet.positionsHash)},
                                {"coarsePositionsHash", hexadecimal(packet.coarsePositionsHash)}});
   }
+  for (const GoldenRefusal& refused : stream.refused) json["refused"].push_back(refused.file);
   for (const GoldenNormal& normal : stream.normals)
     json["normalSamples"].push_back({{"vertex", normal.vertex}, {"normal", normal.xyz}});
   return json;
@@ -107,10 +115,8 @@ void writeGoldenStreams(const std::vector<GoldenStream>& streams) {
   nlohmann::ordered_json json;
   for (const GoldenStream& stream : streams) {
     json.push_back(describe(stream));
-    for (const GoldenPacket& packet : stream.packets) {
-      std::ofstream out(kFolder + packet.file, std::ios::binary);
-      for (const std::byte byte : packet.bytes) out.put(static_cast<char>(byte));
-    }
+    for (const GoldenPacket& packet : stream.packets) writeBytes(kFolder + packet.file, packet.bytes);
+    for (const GoldenRefusal& refused : stream.refused) writeBytes(kFolder + refused.file, refused.bytes);
   }
   std::ofstream(kFolder + "streams.json") << json.dump(2) << '\n';
 }

@@ -31,10 +31,18 @@ struct GoldenNormal {
 };
 inline constexpr double kNormalSteps = 1e6;
 
+// A packet with one fault. A decoder that holds all packets of the stream refuses it and stays as it
+// is.
+struct GoldenRefusal {
+  std::string file;
+  std::vector<std::byte> bytes;
+};
+
 struct GoldenStream {
   std::string name;
   StreamLayout layout;
   std::vector<GoldenPacket> packets;  // in order of decoding; the first is a key frame
+  std::vector<GoldenRefusal> refused = {};
   std::vector<GoldenNormal> normals;  // normals of some vertices after the last packet
 };
 

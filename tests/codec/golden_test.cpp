@@ -34,6 +34,10 @@ TEST(GoldenPackets, DecodeToTheSameBitsForever) {
       ASSERT_EQ(coarse->decode(smaller), DecodeResult::ok) << packet.file;
       EXPECT_EQ(hashFloats(coarse->positions()), packet.coarsePositionsHash) << packet.file;
     }
+    for (const GoldenRefusal& refused : stream.refused) {
+      EXPECT_EQ(decoder->decode(refused.bytes), DecodeResult::malformed) << refused.file;
+      EXPECT_EQ(decoder->reconstructionHash(), stream.packets.back().reconstructionHash) << refused.file;
+    }
     ASSERT_FALSE(stream.normals.empty()) << stream.name;
     for (const GoldenNormal& normal : stream.normals) {
       for (std::size_t c = 0; c < 3; ++c) {

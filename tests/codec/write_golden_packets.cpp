@@ -10,6 +10,7 @@
 #include "tests/codec/cut_grid.h"
 #include "tests/codec/golden.h"
 #include "tests/codec/motion.h"
+#include "tests/codec/packet_crafter.h"
 
 namespace clothstream::codec {
 namespace {
@@ -21,34 +22,70 @@ struct Moment {
   std::uint8_t quality = 0;
 };
 
+// A stream that is being made: its packets are decoded at once.
+class Making {
+ public:
+  Making(const std::string& name, const StreamLayout& layout)
+      : stream_{.name = name, .layout = layout, .packets = {}, .normals = {}},
+        decoder_(Decoder::make(layout)),
+        coarse_(Decoder::make(layout, Detail::coarse)) {}
+
+  // False if a decoder refuses the packet, which is then left out.
+  bool add(std::span<const std::byte> packet) {
+    const std::optional<ParsedPacket> parsed = parsePacket(packet);
+    std::vector<std::byte> smaller(packet.size());
+    smaller.resize(makeCoarsePacket(packet, smaller));
+    if (decoder_->decode(packet) != DecodeResult::ok) return false;
+    const std::string file = stream_.name + "_" + std::to_string(parsed->header.tick) + ".bin";
+    if (coarse_->decode(smaller) != DecodeResult::ok) throw std::runtime_error(file + " is not coarse, too");
+    stream_.packets.push_back({.file = file,
+                               .bytes = {packet.begin(), packet.end()},
+                               .tick = parsed->header.tick,
+                               .kind = parsed->header.kind,
+                               .reconstructionHash = decoder_->reconstructionHash(),
+                               .positionsHash = hashFloats(decoder_->positions()),
+                               .coarsePositionsHash = hashFloats(coarse_->positions())});
+    return true;
+  }
+
+  void refuse(const std::string& why, std::vector<std::byte> packet) {
+    const std::string file = stream_.name + "_" + why + ".bin";
+    if (decoder_->decode(packet) != DecodeResult::malformed)
+      throw std::runtime_error(file + " is not refused");
+    stream_.refused.push_back({file, std::move(packet)});
+  }
+
+  std::uint64_t reconstructionHash() const { return decoder_->reconstructionHash(); }
+  const GoldenStream& stream() const { return stream_; }
+  FrameRole next(PacketKind kind) const {
+    const std::uint64_t tick = decoder_->hasFrame() ? decoder_->tick() : 0;
+    return {.tick = tick + 1, .kind = kind, .referenceTick = tick};
+  }
+  GoldenStream take() {
+    stream_.normals = sampleNormals(decoder_->normals());
+    return std::move(stream_);
+  }
+
+ private:
+  GoldenStream stream_;
+  std::unique_ptr<Decoder> decoder_, coarse_;
+};
+
 GoldenStream makeStream(const std::string& name, const StreamLayout& layout,
                         const std::vector<Moment>& moments) {
-  GoldenStream stream{.name = name, .layout = layout, .packets = {}, .normals = {}};
+  Making making(name, layout);
   std::vector<std::unique_ptr<Encoder>> encoders;  // indexed by quality
   for (std::uint8_t quality = 0; quality < layout.qualities; ++quality)
     encoders.push_back(Encoder::make(layout, {.quality = quality}));
-  const auto decoder = Decoder::make(layout), coarse = Decoder::make(layout, Detail::coarse);
-  std::vector<std::byte> packet(encoders[0]->packetBound()), smaller(packet.size());
+  std::vector<std::byte> packet(encoders[0]->packetBound());
   for (const auto& [tick, kind, frame, quality] : moments) {
     Encoder* const encoder = encoders[quality].get();
     const std::size_t bytes = encoder->encode(tick, kind, frame.positions, frame.normals, packet);
-    GoldenPacket golden{.file = name + "_" + std::to_string(tick) + ".bin",
-                        .bytes = {packet.begin(), packet.begin() + static_cast<std::ptrdiff_t>(bytes)},
-                        .tick = tick,
-                        .kind = kind,
-                        .reconstructionHash = encoder->reconstructionHash(),
-                        .positionsHash = 0,
-                        .coarsePositionsHash = 0};
-    const std::size_t coarseBytes = makeCoarsePacket(golden.bytes, smaller);
-    if (decoder->decode(golden.bytes) != DecodeResult::ok ||
-        coarse->decode(std::span(smaller).first(coarseBytes)) != DecodeResult::ok)
-      throw std::runtime_error(golden.file + " cannot be decoded");
-    golden.positionsHash = hashFloats(decoder->positions());
-    golden.coarsePositionsHash = hashFloats(coarse->positions());
-    stream.packets.push_back(std::move(golden));
+    if (!making.add(std::span(packet).first(bytes)) ||
+        making.reconstructionHash() != encoder->reconstructionHash())
+      throw std::runtime_error(name + " cannot be decoded");
   }
-  stream.normals = sampleNormals(decoder->normals());
-  return stream;
+  return making.take();
 }
 
 // A motion, a still moment and a jump, so that every prediction is used.
@@ -114,6 +151,88 @@ GoldenStream makeMeshStream(const std::string& name, std::uint8_t codec) {
   return makeStream(name, {.epoch = 9, .codec = codec, .cloths = {mesh.cloth(), grid}}, moments);
 }
 
+// The smallest grid with all kinds of vertices. The page FRAME_FORMAT.md shows these packets.
+GoldenStream makeSmallStream(const std::string& name, std::uint8_t codec) {
+  const StreamLayout layout{
+      .epoch = 5, .codec = codec, .maxError = 0.01f, .cloths = {{.vertexCount = 9, .rows = 3, .columns = 3}}};
+  Making making(name, layout);
+  const auto encoder = Encoder::make(layout);
+  std::vector<std::byte> packet(encoder->packetBound());
+  const auto encode = [&](std::uint64_t tick, PacketKind kind, std::uint64_t moment) {
+    MotionFrame frame = sampleMotion(layout, moment, 0.3f);
+    if (tick == 4) frame.positions[3 * 4] += 0.2f;
+    const std::size_t bytes = encoder->encode(tick, kind, frame.positions, {}, packet);
+    return std::span<const std::byte>(packet).first(bytes);
+  };
+  // The third frame has no residuals; in the fourth only the vertex in the middle moves.
+  const bool isComplete =
+      making.add(encode(1, PacketKind::key, 1)) && making.add(encode(2, PacketKind::predicted, 5)) &&
+      making.add(encode(3, PacketKind::predicted, 5)) && making.add(encode(4, PacketKind::predicted, 5));
+  if (!isComplete) throw std::runtime_error(name + " cannot be decoded");
+  const std::span<const std::byte> next = encode(5, PacketKind::predicted, 12);
+  if (codec == kCodecPacked) {
+    making.refuse("boundary_of_groups", withBoundaryMoved(next, hierarchical::kCoarseGroups, 1));
+  } else {
+    making.refuse("boundary_of_symbols", withBoundaryMoved(next, hierarchical::kCoarseSymbols, 2));
+    making.refuse("boundary_of_bits", withBoundaryMoved(next, hierarchical::kCoarseBits, 1));
+  }
+  return making.take();
+}
+
+// A mesh with triangles that have equal corners, a grid with borders, and a vertex. Coordinates reach 60 m.
+StreamLayout extremeLayout(std::uint8_t codec, NormalMode normals) {
+  ClothLayout mesh = CutGrid(6).cloth();
+  mesh.triangles.insert(mesh.triangles.end(), {3, 3, 7, 5, 5, 5, 11, 30, 11});
+  return {.epoch = 5,
+          .codec = codec,
+          .maxError = 0.00001f,
+          .normals = normals,
+          .cloths = {std::move(mesh), {35, 5, 7}, {1, 1, 1}}};
+}
+
+// Weights and residuals of every size.
+GoldenStream makeExtremeStream(const std::string& name, std::uint8_t codec, NormalMode normals) {
+  const StreamLayout layout = extremeLayout(codec, normals);
+  Making making(name, layout);
+  if (codec == kCodecHierarchical) {
+    const auto encoder = Encoder::make(layout);
+    std::vector<std::byte> packet(encoder->packetBound());
+    for (std::uint64_t tick = 1; tick <= 3; ++tick) {
+      const MotionFrame frame = scatter(layout, static_cast<std::uint32_t>(tick), 30);
+      const std::size_t bytes = encoder->encode(tick, PacketKind::predicted, frame.positions, {}, packet);
+      if (!making.add(std::span(packet).first(bytes))) throw std::runtime_error(name + " cannot be decoded");
+    }
+  }
+  PacketCrafter crafter(layout);
+  std::uint32_t seed = 0;
+  const auto craft = [&](PacketKind kind) {
+    while (!making.add(crafter.craft(making.next(kind), ++seed)))
+      if (seed == 100'000) throw std::runtime_error(name + " has no packet within the range");
+    crafter.keep();
+  };
+  if (codec == kCodecPacked) craft(PacketKind::key);
+  for (int i = 0; i < 4; ++i) craft(PacketKind::predicted);
+  using Fault = PacketCrafter::Fault;
+  const FrameRole role = making.next(PacketKind::predicted);
+  making.refuse("weight", crafter.craftWrong(role, Fault::weightBeyondTheLimit));
+  making.refuse("gamma_number", crafter.craftWrong(role, Fault::gammaNumberOf31Bits));
+  if (codec == kCodecPacked)
+    making.refuse("coordinate", crafter.craftWrong(role, Fault::coordinateBeyondTheLimit));
+  return making.take();
+}
+
+// A triangle from one end of the range to the other, so often that the sums of its normals need all of their
+// 64 bits.
+GoldenStream makeFarNormalsStream() {
+  StreamLayout layout{
+      .epoch = 5, .maxError = 0.00001f, .normals = NormalMode::octahedral, .cloths = {{.vertexCount = 3}}};
+  for (int i = 0; i < 140; ++i)
+    layout.cloths[0].triangles.insert(layout.cloths[0].triangles.end(), {0, 1, 2});
+  const MotionFrame frame{.positions = {-59, -59, 1, 59, -59, 1, -59, 59, 2},
+                          .normals = {0, 0, 1, 0, 0, 1, 0.6f, 0, 0.8f}};
+  return makeStream("far_normals", layout, {{1, PacketKind::key, frame}});
+}
+
 }  // namespace
 }  // namespace clothstream::codec
 
@@ -156,7 +275,10 @@ int main() try {
                        .cloths = {{.vertexCount = 2400, .rows = 60, .columns = 40}}},
                       3),
        makeQualityStream("qualities", kCodecHierarchical),
-       makeQualityStream("packed_qualities", kCodecPacked)});
+       makeQualityStream("packed_qualities", kCodecPacked), makeSmallStream("small", kCodecHierarchical),
+       makeSmallStream("packed_small", kCodecPacked),
+       makeExtremeStream("extreme", kCodecHierarchical, NormalMode::none),
+       makeExtremeStream("packed_extreme", kCodecPacked, NormalMode::octahedral), makeFarNormalsStream()});
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

@@ -123,6 +123,11 @@ Session goldenSession(const std::string& name) {
       frame.set_reconstruction_hash(packet.reconstructionHash);
       session.messages.push_back(ScriptedServer::serialise(frame));
     }
+    for (const codec::GoldenRefusal& refused : stream.refused) {
+      v1::Frame frame;
+      frame.set_packet(refused.bytes.data(), refused.bytes.size());
+      session.messages.push_back(ScriptedServer::serialise(frame));
+    }
     return session;
   }
   throw std::invalid_argument("tests/golden has no stream " + name);

@@ -33,7 +33,7 @@ struct Observation {
 // Regular streams, the golden packets of tests/golden, and hundreds of sessions with corrupted bytes. The
 // working directory must be the project's root. The result is the same in every run.
 std::vector<Session> recordedSessions();
-// Session of one stream of tests/golden: its description, then one frame per packet.
+// Session of one stream of tests/golden: its description, then one frame per packet, refused ones last.
 Session goldenSession(const std::string& stream);
 
 // Returns one observation per message. Message i arrives at i * kStepUs.

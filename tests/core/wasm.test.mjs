@@ -121,10 +121,16 @@ for (const session of sessions) {
 
   const stream = golden.find(({ name }) => session.name === `golden ${name}`);
   if (!stream) continue;
-  const frames = observations.slice(-stream.packets.length);
-  stream.packets.forEach((packet, index) => {
+  const { packets, refused = [] } = stream;
+  const frames = observations.slice(-packets.length - refused.length);
+  packets.forEach((packet, index) => {
     const { positionsHash, reconstructionHash } = packet;
     assert.deepEqual({ ...frames[index], positionsHash, reconstructionHash }, frames[index], packet.file);
+  });
+  const { reconstructionHash } = packets.at(-1);
+  refused.forEach((file, index) => {
+    const after = frames[packets.length + index];
+    assert.deepEqual({ ...after, decodeErrors: index + 1, reconstructionHash }, after, file);
   });
   stream.seen = true;
 }

@@ -97,6 +97,80 @@ TEST_P(FrameEncoder, MakesThePacketsOfMeshes) {
     encoding.tick(tick, tick % 10 == 0);
 }
 
+// Frames are recorded on a motion that lasts, so that weights are sent and matter.
+class Discarding {
+ public:
+  explicit Discarding(const Sort& sort)
+      : scene_(sort.cloths()),
+        simulation_(device(), scene_),
+        layout_(encode::streamLayout(scene_, kEpoch)),
+        encoder_(device(), simulation_, layout_, sort.prediction),
+        recorder_(device()),
+        decoder_(codec::Decoder::make(layout_)),
+        packet_(encoder_.packetBound()) {}
+
+  encode::RecordedFrame record(std::uint64_t tick, bool forceKey) {
+    recorder_.begin();
+    simulation_.recordTick(recorder_, inputsOf(scene_, sphereAt(tick)));
+    simulation_.recordNormals(recorder_);
+    const encode::RecordedFrame frame = encoder_.record(recorder_, tick, forceKey);
+    submitAndWait(device(), recorder_);
+    return frame;
+  }
+  void discard(std::uint64_t tick, bool forceKey = false) { encoder_.discard(record(tick, forceKey)); }
+  codec::DecodeResult send(std::uint64_t tick, bool forceKey = false) {
+    const encode::EncodedFrame encoded = encoder_.entropyCode(record(tick, forceKey), packet_);
+    const auto packet = std::span<const std::byte>(packet_).first(encoded.bytes);
+    EXPECT_EQ(codec::parsePacket(packet)->header.kind, encoded.kind) << tick;
+    const codec::DecodeResult result = decoder_->decode(packet);
+    if (result == codec::DecodeResult::ok) {
+      EXPECT_EQ(decoder_->reconstructionHash(), encoded.reconstructionHash) << tick;
+    }
+    return result;
+  }
+  void forgetHistory() { encoder_.forgetHistory(); }
+  void restartDecoder() { decoder_ = codec::Decoder::make(layout_); }
+
+ private:
+  model::Scene scene_;
+  simulation::ClothSimulation simulation_;
+  codec::StreamLayout layout_;
+  encode::FrameEncoder encoder_;
+  vulkan::Recorder recorder_;
+  std::unique_ptr<codec::Decoder> decoder_;
+  std::vector<std::byte> packet_;
+};
+
+TEST_P(FrameEncoder, KeyFrameHealsTheStreamAfterADiscardedFrame) {
+  Discarding frames(GetParam());
+  std::uint64_t tick = 0;
+  const auto sendAll = [&](int count) {
+    for (int i = 0; i < count; ++i) EXPECT_EQ(frames.send(++tick), codec::DecodeResult::ok) << tick;
+  };
+  sendAll(9);
+  frames.discard(++tick);
+  // The frames after it can be decoded only if they do not refer to it.
+  for (int i = 0; i < 3; ++i) frames.send(++tick);
+  EXPECT_EQ(frames.send(++tick, true), codec::DecodeResult::ok);
+  sendAll(12);
+  // A discarded key frame.
+  frames.discard(++tick, true);
+  for (int i = 0; i < 2; ++i) frames.send(++tick);
+  EXPECT_EQ(frames.send(++tick, true), codec::DecodeResult::ok);
+  sendAll(12);
+}
+
+TEST_P(FrameEncoder, StartsANewHistoryAlthoughItsKeyFrameIsDiscarded) {
+  Discarding frames(GetParam());
+  for (std::uint64_t tick = 101; tick <= 104; ++tick) frames.send(tick);
+  // Ticks start again, as after a restore.
+  frames.forgetHistory();
+  frames.restartDecoder();
+  frames.discard(5);
+  EXPECT_NE(frames.send(6), codec::DecodeResult::malformed);
+  EXPECT_EQ(frames.send(7, true), codec::DecodeResult::ok);
+}
+
 class FrameEncoderSlots : public GpuTest {};
 
 TEST_F(FrameEncoderSlots, AreFreedByEntropyCodingOnAnotherThread) {

@@ -235,6 +235,25 @@ TEST_F(MotionCommands, RefuseInvalidMotionFiles) {
   EXPECT_THAT(filesThere(), IsEmpty());
 }
 
+TEST_F(MotionCommands, EncodeWhatTheFormatReaches) {
+  // 514.2 m at 0.5 mm. Beyond 16 m the rounding of float32 adds to the promise.
+  const auto moveTo = [&](float x) {
+    content_.floats[2 * 3 * kShape.vertexCount() * std::size_t{30}] = x;
+    writeMotion(content_, motion_);
+  };
+  moveTo(-514.2f);
+  const nlohmann::json summary = roundTrip({"--max-error", "0.0005"});
+  EXPECT_NEAR(summary.at("promisedMaxErrorMm").get<double>(), 0.969, 0.001);
+  EXPECT_NEAR(readMotion(frames_).positions(30)[0], -514.2, 0.001);
+  std::filesystem::remove(stream_);
+  moveTo(-514.3f);
+  const Result refused = clothstream({"encode", motion_, stream_, "--max-error", "0.0005"});
+  EXPECT_EQ(refused.code, kUnreadable);
+  EXPECT_THAT(refused.errors, AllOf(HasSubstr("in frame 30, vertex 0 has a coordinate of -514.3 m"),
+                                    HasSubstr("Use a max error of 0.000501 m or more")));
+  EXPECT_FALSE(std::filesystem::exists(stream_));
+}
+
 TEST_F(MotionCommands, RefuseInvalidStreamFiles) {
   const auto refused = [&](const std::string& bytes, const std::string& reason) {
     std::ofstream(stream_, std::ios::binary) << bytes;

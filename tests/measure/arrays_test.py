@@ -158,6 +158,20 @@ class Import(Arrays):
         far = numpy.linalg.norm(coarse["positions"] - arrays["positions"], axis=-1).max()
         self.assertTrue(REACH < far < numpy.sqrt(3) * 0.002 + 1e-6, far)
 
+    def test_checks_what_it_claims(self):
+        arrays = waves(4)
+        arrays["positions"] += 55
+        said = self.succeed("import", self.save("far.npz", arrays), "-o", self.path("far.mcap"))
+        out = self.exported(self.path("far.mcap"))
+        largest = numpy.linalg.norm(out["positions"].astype(float) - arrays["positions"], axis=-1).max()
+        self.assertIn("every vertex is within %.3g m of its place, promised were " % largest, said)
+        # At 10 um coordinates reach 60.3 m.
+        arrays["positions"] += 6
+        self.refuse([self.save("far.npz", arrays)], 7, "Use a max error of ")
+        error = self.run_program("import", self.path("far.npz"), "-o", self.path("refused.mcap")).stderr
+        self.succeed("import", self.path("far.npz"), "-o", self.path("farther.mcap"), "--max-error",
+                     error.split("Use a max error of ")[1].split(" ")[0])
+
     def test_makes_a_recording_that_is_whole(self):
         recording = self.imported("waves", waves())
         about = json.loads(self.succeed("info", "--json", recording))

@@ -593,6 +593,12 @@ const BadScene kBadScenes[] = {
        s.set_substeps(2);
      },
      "springs"},
+    {"cloths[0] has a node with a coordinate of 801 m",
+     [](v1::Scene& s) { grid(s).mutable_pose()->mutable_position()->set_x(800); },
+     "set stream.maxError to 0.000778 or more"},
+    {"cloths[0] has a node with a coordinate of -521.5 m",
+     [](v1::Scene& s) { grid(s).mutable_pose()->mutable_position()->set_y(-520); },
+     "must be within 514.2 m of the origin along each axis"},
     {"substeps = 10: no number up to 256",
      [](v1::Scene& s) {
        cloth(s).mutable_bend()->set_stiffness(1e6f);
@@ -630,6 +636,15 @@ TEST_P(ToSceneRefuses, WithPathValueAndAllowedRange) {
 
 INSTANTIATE_TEST_SUITE_P(All, ToSceneRefuses, testing::ValuesIn(kBadScenes),
                          [](const auto& bad) { return nameOf(bad.param) + "_" + std::to_string(bad.index); });
+
+TEST(ToScene, AcceptsTheMaximumErrorThatItRequested) {
+  v1::Scene message = smallScene();
+  grid(message).mutable_pose()->mutable_position()->set_x(800);
+  ASSERT_FALSE(toScene(message));
+  message.mutable_stream()->set_max_error(0.000778f);
+  const Result<model::Scene> scene = toScene(message);
+  EXPECT_TRUE(scene) << scene.error().text;
+}
 
 TEST(ToScene, AcceptsTheSubstepsThatItRequested) {
   v1::Scene message = smallScene();

@@ -122,6 +122,42 @@ TEST_F(State, DetectsBadNumbersInTheSameTickAndRollsBack) {
   }
 }
 
+TEST_F(State, HasTheHashOfTheExampleInFrameFormat) {
+  const NodeState state{{{0, 0, 0}, {1, -2, 0.5f}}, {{0, 0, 0}, {0, 0, -9.81f}}};
+  EXPECT_EQ(simulation::statusOf(simulation::pack(state, 0)).stateHash, 0x8ffef53b60285831u);
+}
+
+TEST_F(State, DetectsAPositionThatTheStreamCannotHold) {
+  const float reach = model::reachOf(scene.stream);
+  Running running(scene);
+  run(running, 0, 4);
+  const StateSnapshot good = running.save();
+  const auto statusAt = [&](float coordinate, float speed) {
+    NodeState state = simulation::unpack(good);
+    for (model::Vec3& velocity : state.velocities) velocity = {0, 0, 0};
+    state.positions.back().z() = coordinate;
+    state.velocities.back().z() = speed;
+    return simulation::statusOf(simulation::pack(state, 4), reach);
+  };
+  EXPECT_TRUE(statusAt(-reach, 2 * reach).healthy);
+  EXPECT_FALSE(statusAt(-reach, 2 * reach).outOfReach);
+  EXPECT_FALSE(statusAt(std::nextafter(reach, 1e6f), 0).healthy);
+  EXPECT_TRUE(statusAt(std::nextafter(reach, 1e6f), 0).outOfReach);
+  // A state that is wrong anyway is not called out of reach.
+  EXPECT_FALSE(statusAt(2 * simulation::kWorldExtent, 0).outOfReach);
+  EXPECT_FALSE(statusAt(0, std::numeric_limits<float>::quiet_NaN()).outOfReach);
+
+  // The device says the same.
+  NodeState far = simulation::unpack(good);
+  for (model::Vec3& position : far.positions) position.x() += 1.01f * reach;
+  running.restore(far);
+  const simulation::TickStatus status = running.tick(inputs(4));
+  EXPECT_FALSE(status.healthy);
+  EXPECT_TRUE(status.outOfReach);
+  EXPECT_EQ(status.stateHash, simulation::statusOf(running.save(), reach).stateHash);
+  EXPECT_TRUE(simulation::statusOf(running.save(), reach).outOfReach);
+}
+
 TEST_F(State, RollsBackADivergingState) {
   // The scene is far beyond the stability bound, so its motion diverges within a few ticks.
   model::Scene stiff = sceneOf({calmCloth(16, 16)});

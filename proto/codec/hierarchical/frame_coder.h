@@ -19,6 +19,11 @@ struct LatticeUnit {
 // error. That margin is the rounding of decoded floats at 32 m. Takes as many stepBits as this leaves room
 // for.
 LatticeUnit latticeUnit(float maxError);
+// Largest magnitude of a wanted coordinate in units. The residual ends within a step of it and must stay
+// within kMaxCoordinate.
+inline constexpr std::int32_t kMaxWanted = kMaxCoordinate - (4 << 8);
+// Units of a max error, less 2^-19 m, with 8 step bits.
+inline constexpr int kUnitsInMaxError = (1 << 7) + 2;
 
 // Factor from metres to units, which are rounded to nearest even. It is 1 / unit to so few bits that its
 // product with a float32 is exact in a float64 and in integers. Its error is at most an eighth of a unit; the

@@ -155,15 +155,13 @@ struct HierarchicalEncoder::State {
 };
 
 void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
-  // A residual ends within a step of the wanted position, which must stay within the limit.
-  constexpr std::int32_t kLimit = kMaxCoordinate - (4 << 8);
-  constexpr double limit = kLimit;
+  constexpr double limit = kMaxWanted;
   const Array<std::uint32_t>& vertexOf = predictor.hierarchy().vertexOf;
   const double perUnit = quantisationScale(unit.unit);
   const auto coordinate = [&](float x) {
     const double q = static_cast<double>(x) * perUnit;
-    if (!(q >= -limit)) return -kLimit;  // also catches NaN
-    return q > limit ? kLimit : simde_mm_cvtsd_si32(simde_mm_set_sd(q));
+    if (!(q >= -limit)) return -kMaxWanted;  // also catches NaN
+    return q > limit ? kMaxWanted : simde_mm_cvtsd_si32(simde_mm_set_sd(q));
   };
   const auto quantiseSlots = [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
     for (std::size_t slot = begin; slot < end; ++slot) {

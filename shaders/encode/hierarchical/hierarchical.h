@@ -21,11 +21,11 @@ const uint32_t kEqualParentWeights = 0x01004010u;
 
 // A moment has one node per vertex, then the origin, then these rows. Three words are two vectors of 16-bit
 // components, as in Record (proto/codec/hierarchical/predictor.h). The first vector is in the low halves.
-const uint32_t kRowAverage = 0;       // 32-bit components; W0 - W1 (x y)
-const uint32_t kRowDetail = 1;        // E and G; W0 - W1 (z)
+const uint32_t kRowAverage = 0;       // 32-bit components; T0 - T1 (x y)
+const uint32_t kRowDetail = 1;        // E and G; T0 - T1 (z)
 const uint32_t kRowChange = 2;        // change of these two since the frame before
 const uint32_t kRowChangeBefore = 3;  // the same of the frame before
-const uint32_t kRowTwist = 4;         // Q and W
+const uint32_t kRowTwist = 4;         // Q and T
 const uint32_t kRowLocal = 5;         // D, and that of the frame before
 const uint32_t kRowCurvature = 6;     // C, and that of the frame before; sums of magnitudes
 const uint32_t kRecordRows = 7;

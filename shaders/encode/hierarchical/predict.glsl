@@ -85,8 +85,8 @@ struct Prediction {
   SurfaceFrame frame;
   ivec3 twist;   // Q
   ivec3 ring;    // G
-  ivec3 moved;   // W
-  ivec3 faster;  // W0 - W1
+  ivec3 moved;   // T
+  ivec3 faster;  // T0 - T1
   // Sums over the parents and over the ring, in the format of a node.
   uint parentMagnitudes;
   uint ringMagnitudes;

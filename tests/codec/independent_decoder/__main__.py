@@ -7,9 +7,25 @@ import json
 import struct
 import sys
 
+from arithmetic import REACHED
 from decoder import Decoder, parse
+from examples import check_mesh, check_packets
 
 GOLDEN = "tests/golden/"
+# Corners of the format that the golden packets must reach, so that every decoder is tested there.
+CORNERS = [
+    "D1 - D2 beyond 16 bits",
+    "a number beyond 32 bits",
+    "a packet with symbols of no coarse vertices and no others",
+    "a packet with symbols of no coarse vertices and some others",
+    "a packet with symbols of some coarse vertices and no others",
+    "a packet with symbols of some coarse vertices and some others",
+    "a residual beyond 16 bits",
+    "a sum of S beyond 32 bits",
+    "a sum of face normals beyond 64 bits",
+    "a triangle with two equal corners",
+    "a vertex that stays",
+]
 
 
 def fnv(floats):
@@ -26,7 +42,8 @@ def expect(what, packet, found, expected):
 
 
 def main():
-    packets = normals = 0
+    print("the page's examples are right: %d packets, a mesh of %d vertices" % (check_packets(), check_mesh()))
+    packets = refused = normals = 0
     for stream in json.load(open(GOLDEN + "streams.json")):
         decoder, coarse = Decoder(stream), Decoder(stream, coarse=True)
         for packet in stream["packets"]:
@@ -37,6 +54,14 @@ def main():
             expect("the hash of the positions", packet, fnv(decoder.metres()), packet["positionsHash"])
             expect("the hash of the coarse positions", packet, fnv(coarse.metres()), packet["coarsePositionsHash"])
             packets += 1
+        for file in stream.get("refused", []):
+            try:
+                decoder.decode(parse(open(GOLDEN + file, "rb").read()))
+            except AssertionError:
+                expect("the reconstruction hash", {"file": file}, decoder.hash(), packet["reconstructionHash"])
+            else:
+                sys.exit("%s is not refused" % file)
+            refused += 1
         decoded = decoder.normals()
         for sample in stream["normalSamples"]:
             normal = decoded[sample["vertex"]]
@@ -44,8 +69,12 @@ def main():
                 sys.exit("%s: the normal of vertex %d is %s instead of %s" % (
                     stream["name"], sample["vertex"], normal, sample["normal"]))
             normals += 1
-    assert packets > 0 and normals > 0
-    print("%d packets give the expected positions, whole and coarse, and %d normals" % (packets, normals))
+    assert packets > 0 and refused > 0 and normals > 0
+    missed = [corner for corner in CORNERS if corner not in REACHED]
+    if missed:
+        sys.exit("the golden packets do not reach: " + "; ".join(missed))
+    print("%d packets give the expected positions, whole and coarse, and %d normals; %d are refused" % (
+        packets, normals, refused))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,22 @@
 """Integers and vectors of three of them."""
 
 
+# Number of times that decoding reached a corner of the format.
+REACHED = {}
+
+
+def reach(corner, times=1):
+    REACHED[corner] = REACHED.get(corner, 0) + times
+
+
+def wrap(x, bits, what):
+    """The number in two's complement that has the lowest bits of x."""
+    half = 1 << bits - 1
+    if not -half <= x < half:
+        reach(what)
+    return (x + half) % (2 * half) - half
+
+
 def sat16(x):
     return max(-32768, min(32767, x))
 

@@ -3,9 +3,9 @@
 import math
 import struct
 
-from arithmetic import add, cross, dot, frame, sat, sat16, shift, sub, subs, times
+from arithmetic import add, cross, dot, frame, reach, sat, sat16, shift, sub, subs, times, wrap
 from entropy import Bits, DISTRIBUTIONS, Groups, SCALE_WEIGHTS, Symbols, unzigzag
-from order import Cloths
+from order import Cloths, EQUAL
 
 
 def float32(x):
@@ -55,6 +55,7 @@ class Decoder:
                         if bits.get(1):
                             for f in (6, 7) if key else range(16):
                                 weights[c][f] += unzigzag(bits.gamma(4))
+                                assert abs(weights[c][f]) <= 2047
             bits.check_end()
         return used, [alone(2, 700)] * 3 if key else left
 
@@ -64,9 +65,7 @@ class Decoder:
             emptied = (2,) if self.packed else (2, 4)
             sections = [b"" if i in emptied else section for i, section in enumerate(sections)]
         self.history = []
-        if key:
-            self.held = {}
-        else:
+        if not key:
             at = next(frame for frame in self.held.values() if frame["tick"] == reference)
             assert at["layer"] <= layer < self.layers and at["quality"] == quality
             self.history = [at, at["history"][0], at["history"][1]]
@@ -76,6 +75,9 @@ class Decoder:
             symbols, bits = self.read_packed(sections), Bits(b"")
         else:
             symbols, bits = Symbols(sections[1] + sections[2]), Bits(sections[3] + sections[4])
+            if not self.coarse:
+                reach("a packet with symbols of %s coarse vertices and %s others" % (
+                    "some" if len(sections[1]) > 16 else "no", "some" if sections[2] else "no"))
         now = {name: [None] * self.count for name in "RSGQEDMW"}
         now["rests"] = [False] * self.count
         for number, (weight_class, phase) in enumerate(self.cloths.phases):
@@ -109,7 +111,8 @@ class Decoder:
                 now["R"][v] = self.guess(now, v)
         now.update(tick=tick, layer=layer, weights=left, quality=quality)
         now["history"] = self.history[:2] or [now, now]
-        self.newest = self.held[layer] = now
+        self.held = {layer: now} if key else {**self.held, layer: now}
+        self.newest = now
 
     def read_packed(self, sections):
         """The residuals of all vertices along u, v, n (None for n if the vertex stays), and those of the normals."""
@@ -138,6 +141,7 @@ class Decoder:
         expected = [256, 256]
         normals = []
         for v, n in enumerate(sums):
+            n = tuple(wrap(x, 64, "a sum of face normals beyond 64 bits") for x in n)
             top = max((2, 0, 1), key=lambda c: abs(n[c]))
             facing = top, n[top] < 0
             down = abs(n[top]).bit_length() - 15
@@ -203,9 +207,13 @@ class Decoder:
         """The parents of a vertex, their weighted mean S, and the mean of its ring."""
         at = lambda n: (0, 0, 0) if n is None else now["R"][n]
         p = [at(n) for n in self.cloths.parents[v]]
-        w1, w2, w3 = self.cloths.weights[v][1:]
-        off = add(times(sub(p[1], p[0]), w1), times(sub(p[2], p[0]), w2), times(sub(p[3], p[0]), w3), (32, 32, 32))
-        return p, add(p[0], shift(off, 6)), shift(add(*(at(n) for n in self.cloths.ring[v]), (4, 4, 4)), 3)
+        weights = self.cloths.weights[v]
+        if weights == EQUAL:
+            mean = shift(add(*p, (2, 2, 2)), 2)
+        else:
+            off = add(*(times(sub(p[i], p[0]), weights[i]) for i in (1, 2, 3)), (32, 32, 32))
+            mean = add(p[0], tuple(wrap(x, 32, "a sum of S beyond 32 bits") >> 6 for x in off))
+        return p, mean, shift(add(*(at(n) for n in self.cloths.ring[v]), (4, 4, 4)), 3)
 
     def guess(self, now, v):
         """The position of a vertex that a coarse packet does not hold."""
@@ -225,6 +233,8 @@ class Decoder:
         moved = sat(shift(sub(s, s1), f)) if self.history else (0, 0, 0)
         d1, d2 = past("D", 1), past("D", 2)
         pairs = (w[12], w[14]), (w[12], w[14]), (w[13], w[15])
+        if any(abs(x - y) > 32767 and b for (_, b), x, y in zip(pairs, d1, d2)):
+            reach("D1 - D2 beyond 16 bits")
         turned = [sat16(a * x + b * (x - y) + 128 >> 8) for (a, b), x, y in zip(pairs, d1, d2)]
         features = [e1, g1, subs(e1, e2), subs(g1, g2), subs(e2, e3), subs(g2, g3), subs(q, past("Q", 1)), subs(g, g1),
                     past("C", 1), past("C", 2), subs(moved, past("W", 1)), subs(past("W", 1), past("W", 2))]
@@ -278,11 +288,15 @@ class Decoder:
     def place(self, now, v, predicted, r, stays):
         position, (u, v_, n) = predicted
         r1 = self.past("R", 1, v)
+        if max(map(abs, r)) > 32767:
+            reach("a residual beyond 16 bits")
         if stays:
+            reach("a vertex that stays")
             position = r1
         else:
             moved = add(times(u, r[0]), times(v_, r[1]), times(n, r[2]), (1 << 13 - self.k,) * 3)
             position = add(position, shift(moved, 14 - self.k))
+        assert max(map(abs, position)) <= 1 << 27
         now["R"][v] = position
         now["rests"][v] = bool(self.history) and position == r1
         now["M"][v] = tuple(min(abs(x), 31) for x in r)

@@ -2,6 +2,8 @@
 """Contents of the sections of a packet: bits, symbols, residuals."""
 import struct
 
+from arithmetic import reach
+
 FORMAT = "proto/FRAME_FORMAT.md"
 
 
@@ -63,6 +65,10 @@ class Symbols:
 
 
 def unzigzag(z):
+    """The residual of a number, of which the lowest 32 bits count."""
+    if z >> 32:
+        reach("a number beyond 32 bits")
+    z &= 0xffffffff
     return z >> 1 ^ -(z & 1)
 
 

@@ -3,6 +3,8 @@
 import heapq
 import math
 
+from arithmetic import reach
+
 NO_VERTEX = None
 EQUAL = (16, 16, 16, 16)
 
@@ -95,6 +97,8 @@ class MeshOrder(Order):
                 if a != b:
                     near[a].add(b), near[b].add(a)
                     sides[min(a, b), max(a, b)] = sides.get((min(a, b), max(a, b)), 0) + 1
+                else:
+                    reach("a triangle with two equal corners")
         self.border = {v for side, times in sides.items() if times == 1 for v in side}
         levels = [(list(range(count)), {v: self.sorted(v, near[v]) for v in range(count)})]
         while len(levels) < 62 and len(levels[-1][0]) > 16:

@@ -393,6 +393,28 @@ TEST_F(SceneHostTest, UnhealthyStateIsNotSentAndRollsBack) {
   EXPECT_EQ(hosted.live.metrics.resets.value(), 0u);
 }
 
+TEST_F(SceneHostTest, ClothThatLeavesTheRangeOfTheStreamIsNotSentAndRollsBack) {
+  model::Scene scene = smallScene();
+  scene.stream.maxError = 0.00005f;  // 49.6 m
+  HostedScene hosted(scene);
+  hosted.ticks(50);
+  hosted.change(gravity(-1000));
+  int ticks = 0;
+  while (hosted.live.metrics.rollbacks.value() == 0) {
+    ASSERT_LT(++ticks, 100);
+    hosted.tick();
+  }
+  EXPECT_TRUE(hosted.host.status().outOfReach);
+  for (const v1::Frame& frame : hosted.frames) EXPECT_NE(frame.state_hash(), hosted.host.status().stateHash);
+  for (const float coordinate : hosted.decoder->positions()) EXPECT_LT(std::abs(coordinate), 49.7f);
+  const v1::Notice& notice = hosted.announced.back().notice();
+  EXPECT_EQ(notice.kind(), v1::NOTICE_KIND_ROLLED_BACK);
+  EXPECT_EQ(
+      notice.text(),
+      "cloth left the range that the stream holds, 49.63 m from the origin along each axis at a maxError of "
+      "5e-05 m: the scene continues from its newest healthy state, at most a second old");
+}
+
 TEST_F(SceneHostTest, SecondUnhealthyStateResetsStateAndParameters) {
   HostedScene hosted;
   hosted.ticks(50);
