@@ -272,16 +272,6 @@ delivery::StreamShape LiveScene::shape() const {
           .lockstep = source->inLockstep()};
 }
 
-v1::ParameterChange LiveScene::resetParameters() {
-  const std::lock_guard lock(mutex_);
-  inbox.keepColliderChanges();
-  definition_.environment = start_.environment;
-  definition_.cloths = start_.cloths;
-  charge_.restore(definition_);
-  definitionChanged();
-  return allParameters(start_);
-}
-
 v1::ParameterChange LiveScene::restart() {
   const std::lock_guard lock(mutex_);
   inbox.dropChanges();

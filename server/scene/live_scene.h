@@ -109,10 +109,6 @@ class LiveScene {
 
   // Puts the change into the inbox, or returns what is wrong with it.
   messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message);
-  // Resets environment and cloths to the start, and drops waiting changes of them. Returns the change that
-  // announces it.
-  v1::ParameterChange resetParameters();
-
   // Resets everything to the start, because a new simulation begins; drops all waiting changes. Returns the
   // change that announces it.
   v1::ParameterChange restart();
