@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cstring>
 #include <iterator>
@@ -35,6 +36,7 @@
 #include "server/simulation/texel.h"
 #include "server/simulation/xpbd_stage.h"
 #include "server/vulkan/kernel.h"
+#include "shaders/shared/state_hash.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -581,6 +583,10 @@ TickStatus ClothSimulation::status() const {
   const shared::StatusRecord& record =
       pipeline_->buffers.statusReadback.mapped<shared::StatusRecord>()[pipeline_->slot];
   TickStatus status{std::uint64_t{record.hashHigh} << 32 | record.hashLow, record.unhealthy == 0};
+  for (int axis = 0; axis < 3; ++axis) {
+    status.low[axis] = std::bit_cast<float>(shared::bitsInOrder(~record.invertedLow[axis]));
+    status.high[axis] = std::bit_cast<float>(shared::bitsInOrder(record.high[axis]));
+  }
   if (pipeline_->selfCollision) {
     const shared::CrowdReport& report = pipeline_->selfCollision->report(pipeline_->slot);
     status.crowded = report.lists + report.balls;

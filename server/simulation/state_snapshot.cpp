@@ -6,6 +6,7 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
+#include <limits>
 
 #include "shaders/shared/state_hash.h"
 
@@ -42,6 +43,8 @@ TickStatus statusOf(const StateSnapshot& snapshot) {
   const auto nodes = static_cast<std::uint32_t>(snapshot.bytes.size() / kSnapshotBytesPerNode);
   shared::NodeHash sum{0, 0};
   bool healthy = true;
+  constexpr float kFar = std::numeric_limits<float>::max();
+  model::Vec3 low = model::Vec3::Constant(kFar), high = -low;
   for (std::uint32_t i = 0; i < nodes; ++i) {
     std::array<std::uint32_t, 6> words;
     std::memcpy(words.data(), snapshot.bytes.data() + i * kSnapshotBytesPerNode, sizeof(words));
@@ -50,8 +53,12 @@ TickStatus statusOf(const StateSnapshot& snapshot) {
     sum.low += hash.low;
     sum.high += hash.high;
     for (const std::uint32_t word : words) healthy = healthy && !shared::isOutsideWorld(word);
+    const model::Vec3 place(std::bit_cast<float>(words[0]), std::bit_cast<float>(words[1]),
+                            std::bit_cast<float>(words[2]));
+    low = low.cwiseMin(place);
+    high = high.cwiseMax(place);
   }
-  return {std::uint64_t{sum.high} << 32 | sum.low, healthy};
+  return {.stateHash = std::uint64_t{sum.high} << 32 | sum.low, .healthy = healthy, .low = low, .high = high};
 }
 
 }  // namespace clothstream::simulation

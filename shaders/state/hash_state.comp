@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Computes the hash of the state and whether it is healthy, by integer sums, whose order does not matter.
+// Computes the hash of the state, whether it is healthy, and where it is, by integer sums and maxima, whose
+// order does not matter.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -23,12 +24,17 @@ void main() {
   uint stride = gl_NumWorkGroups.x * gl_WorkGroupSize.x;
   NodeHash sum = NodeHash(0, 0);
   bool unhealthy = false;
+  uvec3 invertedLow = uvec3(0u);
+  uvec3 high = uvec3(0u);
   for (uint node = gl_GlobalInvocationID.x; node < push.nodeCount; node += stride) {
     uvec3 p = floatBitsToUint(texelFetch(positions, int(node)).xyz);
     uvec3 v = floatBitsToUint(texelFetch(velocities, int(node)).xyz);
     NodeHash hash = hashNode(node, p.x, p.y, p.z, v.x, v.y, v.z);
     sum.low += hash.low;
     sum.high += hash.high;
+    uvec3 place = uvec3(orderOf(p.x), orderOf(p.y), orderOf(p.z));
+    invertedLow = max(invertedLow, ~place);
+    high = max(high, place);
     unhealthy = unhealthy || isOutsideWorld(p.x) || isOutsideWorld(p.y) || isOutsideWorld(p.z) ||
                 isOutsideWorld(v.x) || isOutsideWorld(v.y) || isOutsideWorld(v.z);
   }
@@ -36,5 +42,9 @@ void main() {
   atomicAdd(status.hashHigh, sum.high);
   if (unhealthy) {
     atomicOr(status.unhealthy, 1u);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    atomicMax(status.invertedLow[axis], invertedLow[axis]);
+    atomicMax(status.high[axis], high[axis]);
   }
 }
