@@ -447,6 +447,7 @@ void SceneHost::finish() {
   if (status_.healthy) {
     ++sinceHealthy_;
     live_.tick = tick_;
+    live_.setClothBounds({status_.low, status_.high});
     if (recoveries_.valid(tick_)) {
       provenEnvironment_ = scene_.environment;
       provenCloths_ = scene_.cloths;
