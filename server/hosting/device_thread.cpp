@@ -419,11 +419,28 @@ void DeviceThread::checkPrice(Run& run) {
   const double slowdown =
       std::max(now.nodeStepSeconds / speed_.nodeStepSeconds, now.dispatchSeconds / speed_.dispatchSeconds);
   if (run.price.isExcessive(slowdown))
-    quarantine(run, fmt::format("a tick took {:.3f} s, and its price is {:.3f} s", seconds, price));
+    stop(run, fmt::format("a tick took {:.3f} s, and its price is {:.3f} s", seconds, price));
+}
+
+void DeviceThread::stop(Run& run, const std::string& why) {
+  if (run.scene->created) return quarantine(run, why);
+  const Clock::time_point now = Clock::now();
+  const Clock::duration pause = run.comeback.fail(now);
+  publisher_.drain();
+  run.price = {};
+  if (pause == Clock::duration::zero())
+    return dismiss(
+        run, fmt::format("it harms other scenes: {}; join again to start it with its own parameters", why));
+  metrics_.quarantines.add();
+  run.scene->refuseUntil(
+      now + pause,
+      fmt::format("the scene '{}' is stopped because it harms other scenes: {}", run.scene->name(), why));
+  dismiss(run, fmt::format("it harms other scenes: {}; join again in {} s", why,
+                           std::chrono::ceil<std::chrono::seconds>(pause).count()));
 }
 
 void DeviceThread::quarantine(Run& run, const std::string& why) {
-  if (!run.scene->created && !std::exchange(run.hasHarmed, true)) {
+  if (!run.scene->created && !std::exchange(run.hasLostDevice, true)) {
     publisher_.drain();
     run.price = {};
     return dismiss(

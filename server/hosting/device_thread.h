@@ -23,6 +23,7 @@
 #include "server/scene/scene_host.h"
 #include "server/scene/scene_loader.h"
 #include "server/scene/scene_on_device.h"
+#include "server/schedule/back_off.h"
 #include "server/schedule/overload_policy.h"
 #include "server/schedule/price_watch.h"
 #include "server/schedule/slow_watch.h"
@@ -54,9 +55,10 @@ using schedule::Clock;
 //
 // A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), or if the device
 // is lost twice within kLossWindow while it works on this scene: runs a tick, or loads it. A scene that the
-// server started with gets a second chance, because a participant's change may be the reason: the first time
-// it is given up, so that the next join starts it with its own parameters. A scene that add() loads is
-// refused if the device is lost meanwhile.
+// server started with gets a second chance, because a participant may be the reason: the first time it is
+// given up, so that the next join starts it with its own parameters. If it takes more than its price again,
+// it can be joined again after kComebackPause, and after twice that each time, up to kLongestPause. A scene
+// that add() loads is refused if the device is lost meanwhile.
 //
 // If the device worked on several scenes when it was lost, none of them is to blame yet. If that happens
 // again within kLossWindow, each of them runs alone for kLossWindow: the device works on nothing else
@@ -64,6 +66,7 @@ using schedule::Clock;
 class DeviceThread {
  public:
   static constexpr std::chrono::seconds kLossWindow{60};
+  static constexpr std::chrono::seconds kComebackPause{10}, kLongestPause{600};
 
   // Returns when the device and the first scene are ready, and the budget knows the device's speed. Without
   // scenes there is no device, and none can be added. All arguments must outlive the thread. Throws what the
@@ -168,7 +171,8 @@ class DeviceThread {
     std::optional<Clock::time_point> lostDevice;  // newest loss while the device worked on this scene
     bool lostDeviceTwice = false;                 // within kLossWindow, the second time on it alone
     Clock::time_point aloneUntil{};  // the device works on nothing else while it works on this scene
-    bool hasHarmed = false;          // it was given up once instead of a quarantine
+    bool hasLostDevice = false;      // it was given up once instead of a quarantine
+    schedule::BackOff comeback{kComebackPause, kLongestPause};
     schedule::SlowWatch slow;
     schedule::PriceWatch price;
     schedule::OverloadPolicy overload;
@@ -203,7 +207,9 @@ class DeviceThread {
   void adaptToLoad(Run& run, Clock::time_point now);
   // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
   void checkPrice(Run& run);
-  // Stops a scene that harms others; a scene of the server is only given up the first time.
+  // Stops a scene that takes far more than its price. A scene of the server comes back.
+  void stop(Run& run, const std::string& why);
+  // Stops a scene for good; a scene of the server is only given up the first time.
   void quarantine(Run& run, const std::string& why);
   // Makes the host of a scene that is loaded, or gives it the new device.
   void begin(Run& run, std::unique_ptr<scene::SceneOnDevice> loaded);

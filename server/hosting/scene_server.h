@@ -69,6 +69,11 @@ struct ServerOptions {
   // Limit for each scene, disconnected participants included. At most kMaxParticipants. A peer that creates
   // a scene may set a lower limit.
   std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
+  // The same of one address, other than loopback; 0: half of maxParticipants.
+  std::uint32_t maxParticipantsPerAddress = 0;
+  std::uint32_t placesOfAddress() const {
+    return maxParticipantsPerAddress > 0 ? maxParticipantsPerAddress : (maxParticipants + 1) / 2;
+  }
   // Scenes that peers may create, in addition to those that the server starts with.
   std::uint32_t maxCreatedScenes = 16;
   // Nodes, springs and attachments of a scene that a peer creates, and springs of one node of its meshes.

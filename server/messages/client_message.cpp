@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "proto/text/visible.h"
 #include "server/messages/grab_place.h"
 #include "server/messages/hands.h"
 #include "server/messages/limits.h"
@@ -156,8 +157,8 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
   return Joining{std::min(message.protocol_version(), kProtocolVersion),
                  *codec,
                  message.scene(),
-                 message.client_name(),
-                 message.display_name(),
+                 visible(message.client_name()),
+                 visible(message.display_name()),
                  message.role(),
                  static_cast<std::uint8_t>(message.quality()),
                  static_cast<std::uint8_t>(layer + 1)};

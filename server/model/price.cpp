@@ -189,14 +189,13 @@ Work PriceModel::solverWork(const Scene& scene, const Cloth& cloth, const ClothC
   return work;
 }
 
-Work PriceModel::work(const Scene& scene, std::size_t colliderCount) const {
+Work PriceModel::work(const Scene& scene, double colliders) const {
   assert(scene.cloths.size() == cloths_.size());
   const double substeps = scene.substeps;
-  const auto colliders = static_cast<double>(colliderCount);
   double collisions = 0;
   for (const Collider& collider : scene.colliders) collisions += colliderWork(collider.shape);
-  if (colliderCount > scene.colliders.size())
-    collisions += static_cast<double>(colliderCount - scene.colliders.size()) * colliderWork(Box{});
+  const auto own = static_cast<double>(scene.colliders.size());
+  if (colliders > own) collisions += (colliders - own) * colliderWork(Box{});
   const double framesPerTick = static_cast<double>(scene.streamRate) / scene.simulationRate;
   Work work{.dispatches = kTickDispatches + kFrameDispatches * framesPerTick + substeps,
             .serialSteps = substeps * collisions};

@@ -75,9 +75,9 @@ class PriceModel {
 
   // Work of a tick and its frame. `scene` is the scene of the constructor, whose parameters may have changed
   // since. `colliders` includes those of participants, whose shapes are assumed to be boxes, the costliest
-  // that participants may have.
-  Work work(const Scene& scene, std::size_t colliders) const;
-  Work work(const Scene& scene) const { return work(scene, scene.colliders.size()); }
+  // that participants may have. A part of a collider is one that fewer nodes are near.
+  Work work(const Scene& scene, double colliders) const;
+  Work work(const Scene& scene) const { return work(scene, static_cast<double>(scene.colliders.size())); }
   // Memory on the device and on the host, in bytes.
   double bytes(const Scene& scene) const;
 

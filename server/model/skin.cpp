@@ -80,6 +80,8 @@ Pose poseOf(const Frame& frame) {
   return pose;
 }
 
+}  // namespace
+
 Pose between(const Pose& a, const Pose& b, double part) {
   const Four from = fourOf(a.orientation), to = fourOf(b.orientation);
   const double dot = from[0] * to[0] + from[1] * to[1] + from[2] * to[2] + from[3] * to[3];
@@ -93,8 +95,6 @@ Pose between(const Pose& a, const Pose& b, double part) {
   }
   return poseOf(frame);
 }
-
-}  // namespace
 
 void compose(const Skin& skin, std::span<const Pose> local, std::vector<Pose>& poses) {
   Frames frames;

@@ -68,6 +68,7 @@ void write(const Slot& slot, v1::SavedGrab& message) {
   message.set_participant_id(slot.participant);
   message.set_id(slot.now.id);
   messages::write(slot.now.pose, *message.mutable_pose());
+  messages::write(slot.before, *message.mutable_before());
   message.set_radius(slot.now.radius);
   message.set_reach(slot.now.reach);
   message.set_max_force(slot.now.maxForce);
@@ -86,7 +87,7 @@ Slot toSlot(const v1::SavedGrab& message) {
                     .reach = message.reach(),
                     .maxForce = message.max_force(),
                     .slipDistance = message.slip_distance()},
-            .before = toPose(message.pose()),
+            .before = toPose(message.has_before() ? message.before() : message.pose()),
             .phase = Slot::Phase::holds,
             .number = message.number(),
             .age = message.age()};
@@ -150,12 +151,13 @@ bool readColliders(const v1::SavedCheckpoint& message, const model::Scene& scene
                                {.id = from.id(), .pose = toPose(from.pose()), .shape = shape},
                                toPose(from.before()),
                                toPose(from.before()),
-                               {}});
+                               {},
+                               from.depth()});
     if (from.has_yield()) state.colliders.back().yield = toYield(from.yield());
   }
   return std::ranges::all_of(state.scenePoses, isFinite) &&
          std::ranges::all_of(state.colliders, [](const scene::ColliderSet::Placed& placed) {
-           return isFinite(placed.before) && isFinite(placed.now.pose) &&
+           return isFinite(placed.before) && isFinite(placed.now.pose) && placed.depth >= 0 &&
                   (!placed.yield || isUsable(*placed.yield));
          });
 }
@@ -181,7 +183,9 @@ bool readGrabs(const v1::SavedCheckpoint& message, const model::Scene& scene,
     }
     const bool holds = slot.phase == Slot::Phase::holds;
     // The device must know what the grab holds.
-    if (holds && (!isFinite(slot.now.pose) || state.slots.size() > held.grabs.size())) return false;
+    if (holds &&
+        (!isFinite(slot.now.pose) || !isFinite(slot.before) || state.slots.size() > held.grabs.size()))
+      return false;
   }
   return std::ranges::all_of(held.nodes, [&](const simulation::HeldNode& node) {
     return node.grab < state.slots.size() && state.slots[node.grab].phase == Slot::Phase::holds;
@@ -294,6 +298,7 @@ v1::SavedCheckpoint toMessage(const scene::Checkpoint& checkpoint) {
     messages::write(placed.before, *to.mutable_before());
     messages::write(placed.now.pose, *to.mutable_pose());
     messages::write(placed.now.shape, *to.mutable_shape());
+    to.set_depth(placed.depth);
     if (placed.yield) write(*placed.yield, *to.mutable_yield());
   }
   for (std::size_t i = 0; i < checkpoint.grabs.moved.size(); ++i) {

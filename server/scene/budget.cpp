@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +12,9 @@ namespace clothstream::scene {
 namespace {
 
 constexpr double kMegabyte = 1e6;
+// Least room for the hands of a scene, as a sum of weights: about four pairs of hands at a cloth of one
+// metre.
+constexpr double kLeastHands = 16;
 
 // Largest number from 1 to `most` that fits, or 0. A larger number never fits if a smaller one does not.
 std::uint32_t largest(std::uint32_t most, const std::function<bool(std::uint32_t)>& fits) {
@@ -85,8 +89,8 @@ Charge::~Charge() {
 }
 
 double Charge::load(const model::Scene& scene) const {
-  return model_.work(scene, scene.colliders.size() + participantColliders_).seconds(budget_->speed()) *
-         scene.simulationRate;
+  const double colliders = static_cast<double>(scene.colliders.size()) + colliders_.hands + colliders_.others;
+  return model_.work(scene, colliders).seconds(budget_->speed()) * scene.simulationRate;
 }
 
 void Charge::release() {
@@ -96,17 +100,48 @@ void Charge::release() {
 }
 
 Charge::Amount Charge::priceOf(const model::Scene& scene) const {
-  const double seconds =
-      model_.work(scene, scene.colliders.size() + participantColliders_).seconds(budget_->speed_) -
-      freeWork_.seconds(budget_->speed_);
-  return {.load = std::max(0.0, seconds) * scene.simulationRate,
+  return {.load = std::max(0.0, loadWith(scene, colliders_.others)),
           .megabytes = std::max(0.0, model_.bytes(scene) / kMegabyte - freeMegabytes_)};
+}
+
+double Charge::loadWith(const model::Scene& scene, double colliders) const {
+  const double all = static_cast<double>(scene.colliders.size()) + colliders;
+  const double seconds =
+      model_.work(scene, all).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
+  return seconds * scene.simulationRate;
+}
+
+double Charge::mostLoad(const model::Scene& scene) const {
+  const BudgetLimits& limits = budget_->limits_;
+  if (limits.tickSeconds <= 0) return limits.sceneLoad;
+  return std::min(limits.sceneLoad, limits.tickSeconds * scene.simulationRate);
+}
+
+double Charge::roomForHands(const model::Scene& scene) const {
+  const std::lock_guard lock(budget_->mutex_);
+  // A load grows evenly with the colliders.
+  const double none = loadWith(scene, 0), each = loadWith(scene, 1) - none;
+  if (each <= 0) return std::numeric_limits<double>::infinity();
+  return std::max(kLeastHands, (mostLoad(scene) - none) / each);
+}
+
+double Charge::roomForOthers(const model::Scene& scene, double hands) const {
+  const std::lock_guard lock(budget_->mutex_);
+  const double none = loadWith(scene, 0), each = loadWith(scene, 1) - none;
+  if (each <= 0) return std::numeric_limits<double>::infinity();
+  const double free = budget_->limits_.load - (budget_->load_ - charged_.load) - std::max(0.0, none);
+  return std::max(0.0, std::min((mostLoad(scene) - none) / each - hands, free / 2 / each));
+}
+
+void Charge::chargeColliders(const model::Scene& scene, const ColliderLoad& colliders) {
+  const std::lock_guard lock(budget_->mutex_);
+  colliders_ = colliders;
+  if (!released_) replace(priceOf(scene));
 }
 
 bool Charge::exceedsStart(const model::Scene& scene) const {
   const std::lock_guard lock(budget_->mutex_);
-  const double seconds = model_.work(scene, scene.colliders.size()).seconds(budget_->speed_);
-  return seconds > freeWork_.seconds(budget_->speed_) || model_.bytes(scene) / kMegabyte > freeMegabytes_;
+  return loadWith(scene, 0) > 0 || model_.bytes(scene) / kMegabyte > freeMegabytes_;
 }
 
 void Charge::replace(const Amount& next) {
@@ -171,28 +206,6 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   replace(price);
   made_ = true;
   return {};
-}
-
-messages::Result<void> Charge::chargeColliders(const std::string& path, const model::Scene& scene,
-                                               std::size_t count) {
-  const std::lock_guard lock(budget_->mutex_);
-  const std::size_t before = std::exchange(participantColliders_, count);
-  if (released_) return {};
-  const Amount price = priceOf(scene);
-  const Room room = roomFor(scene);
-  if (count <= before || price.load <= charged_.load || price.load <= room.load) {
-    replace(price);
-    return {};
-  }
-  const std::uint32_t fit = largest(static_cast<std::uint32_t>(count - 1), [&](std::uint32_t fewer) {
-    participantColliders_ = fewer;
-    return priceOf(scene).load <= room.load;
-  });
-  participantColliders_ = before;
-  return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                                             fmt::format("{}: {} colliders of participants {}: {} would fit",
-                                                         path, count, excessOf(scene, price.load, room), fit),
-                                             telemetry::Refusal::colliders});
 }
 
 }  // namespace clothstream::scene

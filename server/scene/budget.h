@@ -10,6 +10,7 @@
 #include "server/messages/field_error.h"
 #include "server/model/price.h"
 #include "server/model/scene.h"
+#include "server/scene/collider_shares.h"
 
 namespace clothstream::scene {
 
@@ -62,10 +63,14 @@ class Charge {
   // Charges the scene as it will be. If that exceeds the budget, changes nothing and returns an error that
   // names price, budget and what would fit. `path` begins its text.
   messages::Result<void> charge(const std::string& path, const model::Scene& scene);
-  // Charges the scene with this number of colliders of its participants, like charge(). Fewer than before are
-  // always allowed.
-  messages::Result<void> chargeColliders(const std::string& path, const model::Scene& scene,
-                                         std::size_t count);
+  // Room for the hands of participants, and for their other colliders next to these hands, as sums of weights
+  // (collider_shares.h). Hands only need room in their scene, and always have some: they are no part of the
+  // server's load, so that nobody else can use up their room. Other colliders have half of the load that is
+  // free, so that the other half is there for those of the next scene. Infinite until the speed is known.
+  double roomForHands(const model::Scene& scene) const;
+  double roomForOthers(const model::Scene& scene, double hands) const;
+  // Charges the scene with these colliders of its participants, also beyond the budget.
+  void chargeColliders(const model::Scene& scene, const ColliderLoad& colliders);
   // Charges the scene with parameters that it had before, also beyond the budget.
   void restore(const model::Scene& scene);
   // Returns whether a free scene would cost more than it did at first. Colliders of participants do not
@@ -79,7 +84,7 @@ class Charge {
   double load(const model::Scene& scene) const;
   // Work of a tick of the charged scene with this number of colliders.
   model::Work work(const model::Scene& scene, std::size_t colliders) const {
-    return model_.work(scene, colliders);
+    return model_.work(scene, static_cast<double>(colliders));
   }
 
  private:
@@ -87,6 +92,11 @@ class Charge {
     double load = 0, megabytes = 0;
   };
   Amount priceOf(const model::Scene& scene) const;  // the budget's mutex is held
+  // Load that the scene adds to what it is free of, with these colliders of participants; negative if it is
+  // cheaper. The budget's mutex is held.
+  double loadWith(const model::Scene& scene, double colliders) const;
+  // Largest load that the scene may have by its own limits.
+  double mostLoad(const model::Scene& scene) const;
   // A load that the scene may have, and the limit that it follows from. The budget's mutex is held.
   struct Room {
     double load = 0;
@@ -100,7 +110,7 @@ class Charge {
 
   const std::shared_ptr<Budget> budget_;
   const model::PriceModel model_;
-  std::size_t participantColliders_ = 0;
+  ColliderLoad colliders_;  // of participants
   model::Work freeWork_;
   double freeMegabytes_ = 0;
   Amount charged_;

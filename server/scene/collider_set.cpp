@@ -10,46 +10,18 @@
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/description.h"
 #include "server/messages/skin_message.h"
+#include "server/scene/hand_limits.h"
 
 namespace clothstream::scene {
 namespace {
 
-// Start pose of a collider that was moved by a message: its former pose, or the new one if the motion exceeds
-// the limits of one tick.
-model::Pose startOf(const model::Pose& before, const model::Pose& now, double tickSeconds) {
-  const float reach = kMaxColliderSpeed * static_cast<float>(tickSeconds);
-  const bool jumped = (now.position - before.position).squaredNorm() > reach * reach ||
-                      std::abs(now.orientation.dot(before.orientation)) < kMaxColliderTurn;
-  return jumped ? now : before;
-}
-
-// Least and largest distance of the surface from the middle. Shapes of participants are spheres, capsules and
-// boxes.
-float leastRadius(const model::Shape& shape) {
-  if (const auto* box = std::get_if<model::Box>(&shape)) return box->size.minCoeff() / 2;
-  if (const auto* capsule = std::get_if<model::Capsule>(&shape)) return capsule->radius;
-  if (const auto* sphere = std::get_if<model::Sphere>(&shape)) return sphere->radius;
-  return 0;
-}
-float largestRadius(const model::Shape& shape) {
-  if (const auto* box = std::get_if<model::Box>(&shape)) return box->size.norm() / 2;
-  if (const auto* capsule = std::get_if<model::Capsule>(&shape)) return capsule->radius + capsule->length / 2;
-  return leastRadius(shape);
-}
-
-// At least the longest way of a point of the shape from one pose to another.
-float wayOf(const model::Shape& shape, const model::Pose& from, const model::Pose& to) {
-  return (to.position - from.position).norm() +
-         largestRadius(shape) * to.orientation.angularDistance(from.orientation);
-}
-
-// The pose on the way from `from` to `to` after at most `step` metres.
-model::Pose towards(const model::Shape& shape, const model::Pose& from, const model::Pose& to, float step) {
-  const float way = wayOf(shape, from, to);
-  if (way <= step) return to;
-  const float share = step / way;
-  return {from.position + share * (to.position - from.position),
-          from.orientation.slerp(share, to.orientation)};
+// Whether a collider that a message moved exceeds the limits of one tick. `radius` is that of its shape, 0 if
+// it is not limited.
+bool hasJumped(float radius, const model::Pose& before, const model::Pose& now, double tickSeconds) {
+  const float reach = kMaxHandSpeed * static_cast<float>(tickSeconds);
+  return (now.position - before.position).squaredNorm() > reach * reach ||
+         std::abs(now.orientation.dot(before.orientation)) < kMaxHandTurn ||
+         radius * now.orientation.angularDistance(before.orientation) > 2 * reach;
 }
 
 const model::Skin* skinOf(const model::Collider& collider) {
@@ -63,7 +35,11 @@ ColliderSet::ColliderSet(const model::Scene& scene) {
   for (const model::Collider& collider : scene.colliders) {
     state_.scenePoses.push_back(model::poseAt(collider, 0));
     Joints& joints = state_.joints.emplace_back();
-    if (const model::Skin* skin = skinOf(collider)) model::jointsAt(*skin, 0, joints.now);
+    std::optional<JointFollower>& follower = followers_.emplace_back();
+    const model::Skin* const skin = skinOf(collider);
+    if (skin == nullptr) continue;
+    model::jointsAt(*skin, 0, joints.now);
+    follower.emplace(std::get<model::Solid>(collider.shape));
   }
 }
 
@@ -87,25 +63,30 @@ void ColliderSet::placeJoints(std::span<const model::ColliderJoints> moved) {
   for (const model::ColliderJoints& put : moved) state_.joints[put.collider].target = put.joints;
 }
 
-// Joints that a message moves too fast appear at their new poses, like colliders.
+bool ColliderSet::isTouched() const {
+  return !state_.colliders.empty() ||
+         std::ranges::any_of(state_.joints, [](const Joints& joints) { return !joints.target.empty(); });
+}
+
+void ColliderSet::letGo() {
+  state_.colliders.clear();
+  for (Joints& joints : state_.joints)
+    if (!joints.target.empty()) joints = {};
+}
+
 void ColliderSet::advanceJoints(const model::Skin& skin, double endSeconds, double tickSeconds,
-                                Joints& joints, simulation::MovingCollider& collider) {
-  const bool byItself = joints.target.empty();
-  if (byItself)
+                                std::size_t index, simulation::MovingCollider& collider) {
+  Joints& joints = state_.joints[index];
+  if (joints.target.empty()) {
     model::jointsAt(skin, endSeconds, end_);
-  else
-    end_ = joints.target;
+    if (joints.now.empty()) joints.now = end_;  // after letGo()
+  } else {
+    if (joints.now.empty()) joints.now = joints.target;
+    followers_[index]->follow(joints.now, joints.target, kMaxBodySpeed * static_cast<float>(tickSeconds),
+                              end_);
+  }
   model::compose(skin, joints.now, collider.jointsStart);
   model::compose(skin, end_, collider.jointsEnd);
-  for (std::size_t i = 0; i < end_.size() && !byItself; ++i) {
-    const model::Pose& start = collider.jointsStart[i];
-    const model::Pose& end = collider.jointsEnd[i];
-    if (startOf(start, end, tickSeconds).position == start.position &&
-        startOf(start, end, tickSeconds).orientation.coeffs() == start.orientation.coeffs())
-      continue;
-    collider.jointsStart = collider.jointsEnd;
-    break;
-  }
   joints.now = end_;
 }
 
@@ -120,24 +101,31 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
     const bool byItself = !collider.motion.keys.empty();
     simulation::MovingCollider& to = colliders[i];
     to.shape = collider.shape;
-    to.start = byItself ? state_.scenePoses[i] : startOf(state_.scenePoses[i], end, scene.tickSeconds());
+    const bool jumped = !byItself && hasJumped(0, state_.scenePoses[i], end, scene.tickSeconds());
+    to.start = jumped ? end : state_.scenePoses[i];
     to.end = end;
     to.friction = collider.friction;
     if (const model::Skin* skin = skinOf(collider))
-      advanceJoints(*skin, endSeconds, scene.tickSeconds(), state_.joints[i], to);
+      advanceJoints(*skin, endSeconds, scene.tickSeconds(), i, to);
     state_.scenePoses[i] = end;
   }
   for (std::size_t i = 0; i < state_.colliders.size(); ++i) {
     Placed& collider = state_.colliders[i];
+    const float radius = largestRadius(collider.now.shape);
     model::Pose end = collider.now.pose;
     if (collider.yield) {
       Yield& yield = *collider.yield;
-      end = yield.refused ? yield.accepted : towards(collider.now.shape, collider.before, end, yield.step);
-      yield.stands = wayOf(collider.now.shape, end, collider.now.pose) > 0;
+      end = yield.refused ? yield.accepted : towards(radius, collider.before, end, yield.step);
+      yield.stands = wayOf(radius, end, collider.now.pose) > 0;
     }
-    colliders[own + i] = {collider.now.shape, startOf(collider.before, end, scene.tickSeconds()), end, 1};
-    collider.start = colliders[own + i].start;
+    const bool jumped = hasJumped(radius, collider.before, end, scene.tickSeconds());
+    const float grown = jumped || collider.depth == 0
+                            ? 0
+                            : collider.depth + kMaxHandSpeed * static_cast<float>(scene.tickSeconds());
+    collider.depth = std::min(leastRadius(collider.now.shape), std::max(grown, kMaxAppearance));
+    collider.start = jumped ? end : collider.before;
     collider.before = end;
+    colliders[own + i] = {thinned(collider.now.shape, collider.depth), collider.start, end, 1};
   }
 }
 
@@ -150,7 +138,7 @@ void ColliderSet::settle(std::span<const float> depths) {
     const bool fits = depth <= std::min(kYieldDepth, kYieldShare * leastRadius(collider.now.shape));
     if (!collider.yield) {
       if (fits) continue;
-      const float moved = wayOf(collider.now.shape, collider.start, collider.before);
+      const float moved = wayOf(largestRadius(collider.now.shape), collider.start, collider.before);
       collider.yield = Yield{.accepted = collider.start,
                              .depth = depth,
                              .step = std::max(moved / 2, kLeastStep),
@@ -196,6 +184,7 @@ void ColliderSet::write(const model::Scene& scene, v1::Frame& frame) const {
   for (const Placed& collider : state_.colliders) {
     v1::ColliderState& state = *states.Add();
     model::ParticipantCollider shown = collider.now;
+    shown.shape = thinned(shown.shape, collider.depth);
     if (collider.yield && collider.yield->stands) {
       shown.pose = collider.before;
       state.set_yields(true);

@@ -11,15 +11,14 @@
 #include "server/delivery/wire_types.h"
 #include "server/model/input.h"
 #include "server/model/scene.h"
+#include "server/scene/joint_follower.h"
 #include "server/simulation/collision/moving_collider.h"
 
 namespace clothstream::scene {
 
-// Limits of a collider's motion in one tick: speed in m/s, and rotation as the cosine of half the angle (120
-// degrees). A collider that was moved by a message and exceeds a limit is not swept: it appears at its new
-// pose, at rest.
-inline constexpr float kMaxColliderSpeed = 30;
-inline constexpr float kMaxColliderTurn = 0.5f;
+// A collider that a message moved and that exceeds the limits of hand_limits.h is not swept: it appears at
+// its new pose, at rest. A collider of a participant that appears is at most kMaxAppearance deep, and grows
+// from there as fast as hands move.
 
 // A collider of a participant yields to cloth that nothing passes through. It yields if a node is deeper
 // inside than kYieldDepth (m), or than kYieldShare of the shape's least radius. It then returns to its last
@@ -40,8 +39,14 @@ class ColliderSet {
   // appears at rest, and a missing one is removed.
   void place(std::uint64_t participant, std::span<const model::ParticipantCollider> colliders);
 
-  // Moves joints of colliders of the scene over the next tick. They stay there until they are moved again.
+  // Moves joints of colliders of the scene, in one tick or as fast as bodies move (JointFollower). They stay
+  // there until they are moved again.
   void placeJoints(std::span<const model::ColliderJoints> moved);
+
+  // Whether participants have colliders or have moved joints.
+  bool isTouched() const;
+  // Removes all colliders of participants. Joints that they moved follow their animation again.
+  void letGo();
 
   // Advances to the end of the next tick, in seconds of simulated time. Writes all colliders, each with its
   // start and end pose, to `colliders`.
@@ -81,6 +86,7 @@ class ColliderSet {
     model::Pose before;          // at the end of the newest tick
     model::Pose start;           // at its start
     std::optional<Yield> yield;  // absent: it has moved as the participant said
+    float depth = 0;             // m, of its shape in the newest tick; 0: it is new
   };
   // Joints of a collider of the scene, relative to their parents; empty if it has none.
   struct Joints {
@@ -98,11 +104,12 @@ class ColliderSet {
   void restore(State state);
 
  private:
-  void advanceJoints(const model::Skin& skin, double endSeconds, double tickSeconds, Joints& joints,
+  void advanceJoints(const model::Skin& skin, double endSeconds, double tickSeconds, std::size_t index,
                      simulation::MovingCollider& collider);
 
   State state_;
-  std::vector<model::Pose> end_;  // reused in every tick
+  std::vector<std::optional<JointFollower>> followers_;  // of the colliders of the scene
+  std::vector<model::Pose> end_;                         // reused in every tick
 };
 
 }  // namespace clothstream::scene

@@ -6,6 +6,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/model/mesh.h"
+#include "server/scene/hand_limits.h"
 
 namespace clothstream::scene {
 namespace {
@@ -47,8 +48,7 @@ void GrabsAndAttachments::place(std::uint64_t participant, std::span<const model
   for (Slot& slot : state_.slots) {
     const bool wanted = std::ranges::find(grabs, slot.now.id, &model::Grab::id) != grabs.end();
     if (slot.phase == Slot::Phase::empty || slot.participant != participant || wanted) continue;
-    // The device does not know a grab that has not begun.
-    slot.phase = slot.phase == Slot::Phase::takes ? Slot::Phase::empty : Slot::Phase::ends;
+    release(slot);
   }
   for (const model::Grab& grab : grabs) {
     if (Slot* known = find(participant, grab.id)) {
@@ -66,6 +66,23 @@ void GrabsAndAttachments::place(std::uint64_t participant, std::span<const model
   }
 }
 
+// The device does not know a grab that has not begun.
+void GrabsAndAttachments::release(Slot& slot) {
+  if (slot.phase == Slot::Phase::empty) return;
+  slot.phase = slot.phase == Slot::Phase::takes ? Slot::Phase::empty : Slot::Phase::ends;
+}
+
+bool GrabsAndAttachments::isTouched() const {
+  return std::ranges::any_of(state_.slots,
+                             [](const Slot& slot) { return slot.phase != Slot::Phase::empty; }) ||
+         std::ranges::any_of(state_.moved, [](const auto& moved) { return moved.has_value(); });
+}
+
+void GrabsAndAttachments::letGo() {
+  std::ranges::for_each(state_.slots, release);
+  std::ranges::fill(state_.moved, std::nullopt);
+}
+
 void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
                                   simulation::TickInputs& inputs) {
   inputs.attachments.clear();
@@ -77,6 +94,8 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
   while (!state_.slots.empty() && state_.slots.back().phase == Slot::Phase::empty) state_.slots.pop_back();
   inputs.grabs.clear();
   released_.clear();
+  const float mostForce = maxGrabForce(scene);
+  const float mostWay = kMaxHandSpeed * static_cast<float>(scene.tickSeconds());
   for (Slot& slot : state_.slots) {
     simulation::Grab& grab = inputs.grabs.emplace_back();
     if (slot.phase == Slot::Phase::ends) released_.emplace_back(slot.participant, slot.now.id);
@@ -85,12 +104,14 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
       continue;
     }
     const bool takes = slot.phase == Slot::Phase::takes;
+    const float held = slot.now.radius + slot.now.reach;
+    const model::Pose start = takes ? slot.now.pose : slot.before;
     grab = {.state = takes ? simulation::Grab::State::takes : simulation::Grab::State::holds,
-            .start = takes ? slot.now.pose : slot.before,
-            .end = slot.now.pose,
+            .start = start,
+            .end = towards(held, start, slot.now.pose, mostWay),
             .radius = slot.now.radius,
             .reach = slot.now.reach,
-            .maxForce = slot.now.maxForce,
+            .maxForce = std::min(slot.now.maxForce, mostForce),
             .slipDistance = slot.now.slipDistance};
     if (takes) slot.age = 0;
     if (slot.now.place) {
@@ -99,7 +120,7 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
       grab.leftAtEnd = distanceLeft(slot.age + 1, scene.tickSeconds());
     }
     ++slot.age;
-    slot.before = slot.now.pose;
+    slot.before = grab.end;
     slot.phase = Slot::Phase::holds;
   }
 }

@@ -15,7 +15,8 @@
 
 namespace clothstream::scene {
 
-// Belongs to the device's thread.
+// Belongs to the device's thread. Grabs follow their participants at most at kMaxHandSpeed, with at most
+// maxGrabForce() (hand_limits.h).
 class GrabsAndAttachments {
  public:
   explicit GrabsAndAttachments(const model::Scene& scene);
@@ -25,6 +26,11 @@ class GrabsAndAttachments {
   // there. A new grab has no effect while there are kMaxGrabs grabs.
   void place(std::uint64_t participant, std::span<const model::Grab> grabs,
              std::span<const model::AttachmentPose> attachments);
+
+  // Whether participants have grabs or have moved attachments.
+  bool isTouched() const;
+  // Releases all grabs. Attachments that participants moved follow their own motion again.
+  void letGo();
 
   // Writes grabs and attachments of the next tick, which ends at this simulated time in seconds.
   void advance(const model::Scene& scene, double endSeconds, simulation::TickInputs& inputs);
@@ -59,6 +65,7 @@ class GrabsAndAttachments {
 
  private:
   Slot* find(std::uint64_t participant, std::uint32_t id);
+  static void release(Slot& slot);
 
   State state_;
   std::uint64_t newest_ = 0;                                       // number of the newest grab

@@ -71,18 +71,6 @@ void Inbox::dropPoses() {
   inputs_.poses.clear();
 }
 
-void Inbox::keepColliderChanges() {
-  const std::lock_guard lock(mutex_);
-  for (AcceptedChange& accepted : inputs_.changes) {
-    accepted.change = {.colliders = std::move(accepted.change.colliders)};
-    v1::ParameterChange kept;
-    kept.mutable_colliders()->Swap(accepted.message.mutable_colliders());
-    accepted.message = std::move(kept);
-  }
-  std::erase_if(inputs_.changes,
-                [](const AcceptedChange& accepted) { return accepted.change.colliders.empty(); });
-}
-
 void Inbox::forEachChange(const std::function<void(const model::ParameterChange&)>& visit) {
   const std::lock_guard lock(mutex_);
   for (const AcceptedChange& accepted : inputs_.changes) visit(accepted.change);

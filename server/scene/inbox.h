@@ -70,8 +70,6 @@ class Inbox {
   [[nodiscard]] bool postChange(AcceptedChange change);
   void dropChanges();
   void dropPoses();
-  // Keeps, of the waiting changes, only what they change of the scene's colliders.
-  void keepColliderChanges();
 
   // Visits the waiting changes, oldest first. `visit` must not call this inbox.
   void forEachChange(const std::function<void(const model::ParameterChange&)>& visit);

@@ -2,6 +2,7 @@
 #include "server/scene/live_scene.h"
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <random>
 #include <utility>
@@ -74,7 +75,7 @@ LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<J
       maxParticipants(most),
       journal(std::move(kept)),
       subscribers(tapOf(journal)),
-      roster(subscribers, inbox, journal.get(), [this](std::size_t count) { return chargeColliders(count); }),
+      roster(subscribers, inbox, journal.get(), this),
       work(schedule::WorkLevel{1, definition.substeps}),
       start_(std::move(definition)),
       stability_(start_),
@@ -161,9 +162,30 @@ messages::Result<void> LiveScene::charge(const std::string& path) {
   return charge_.charge(path, definition_);
 }
 
-messages::Result<void> LiveScene::chargeColliders(std::size_t count) {
+double LiveScene::roomForHands() const {
   const std::lock_guard lock(mutex_);
-  return charge_.chargeColliders("colliderPoses", definition_, count);
+  return charge_.roomForHands(definition_);
+}
+
+double LiveScene::roomForOthers(double hands) const {
+  const std::lock_guard lock(mutex_);
+  return charge_.roomForOthers(definition_, hands);
+}
+
+void LiveScene::chargeColliders(const ColliderLoad& load) {
+  const std::lock_guard lock(mutex_);
+  charge_.chargeColliders(definition_, load);
+}
+
+void LiveScene::setClothBounds(const ClothBounds& bounds) {
+  const std::lock_guard lock(boundsMutex_);
+  clothBounds_ = bounds;
+}
+
+bool LiveScene::boundsOfCloth(ClothBounds& bounds) const {
+  const std::lock_guard lock(boundsMutex_);
+  if (clothBounds_) bounds = *clothBounds_;
+  return clothBounds_.has_value();
 }
 
 void LiveScene::discharge() {
@@ -185,13 +207,22 @@ void LiveScene::quarantine(const std::string& why) {
   {
     const std::lock_guard lock(mutex_);
     quarantined_ = why;
+    quarantinedUntil_.reset();
   }
   roster.close(delivery::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, why, true));
 }
 
-std::string LiveScene::quarantined() const {
+void LiveScene::refuseUntil(Clock::time_point until, const std::string& why) {
   const std::lock_guard lock(mutex_);
-  return quarantined_;
+  quarantined_ = why;
+  quarantinedUntil_ = until;
+}
+
+std::string LiveScene::quarantined(Clock::time_point now) const {
+  const std::lock_guard lock(mutex_);
+  if (!quarantinedUntil_ || quarantined_.empty()) return quarantined_;
+  const auto left = std::chrono::ceil<std::chrono::seconds>(*quarantinedUntil_ - now).count();
+  return left > 0 ? fmt::format("{}; join again in {} s", quarantined_, left) : std::string();
 }
 
 messages::Result<void> LiveScene::countChange(std::uint64_t participant, const char* call) {
@@ -269,16 +300,6 @@ delivery::StreamShape LiveScene::shape() const {
           .lockstep = source->inLockstep()};
 }
 
-v1::ParameterChange LiveScene::resetParameters() {
-  const std::lock_guard lock(mutex_);
-  inbox.keepColliderChanges();
-  definition_.environment = start_.environment;
-  definition_.cloths = start_.cloths;
-  charge_.restore(definition_);
-  definitionChanged();
-  return allParameters(start_);
-}
-
 v1::ParameterChange LiveScene::restart() {
   const std::lock_guard lock(mutex_);
   inbox.dropChanges();
@@ -286,6 +307,10 @@ v1::ParameterChange LiveScene::restart() {
   restored_.reset();
   charge_.restore(definition_);
   definitionChanged();
+  {
+    const std::lock_guard boundsLock(boundsMutex_);
+    clothBounds_.reset();
+  }
   tick = 0;
   ++restarts;
   resetRequested = false;

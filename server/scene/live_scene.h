@@ -19,6 +19,7 @@
 #include "server/scene/budget.h"
 #include "server/scene/change_limits.h"
 #include "server/scene/checkpoint.h"
+#include "server/scene/collider_shares.h"
 #include "server/scene/defaults.h"
 #include "server/scene/frame_source.h"
 #include "server/scene/inbox.h"
@@ -32,7 +33,7 @@
 namespace clothstream::scene {
 
 // Thread-safe. The endpoints' threads and the device's thread meet here.
-class LiveScene {
+class LiveScene : private ColliderBudget {
  public:
   // A simulated scene. `definition` must be valid. `created`: a peer created it while the server runs.
   // `journal` gets everything that happens in the scene; it may be null. `maxParticipants` includes
@@ -46,7 +47,7 @@ class LiveScene {
   // rates.
   LiveScene(std::string name, std::shared_ptr<FrameSource> source,
             std::uint32_t maxParticipants = kDefaultMaxParticipants);
-  ~LiveScene();
+  ~LiveScene() override;
 
   const std::string& name() const { return start_.name; }
   // Definition at the start.
@@ -82,8 +83,8 @@ class LiveScene {
   // Charges a created scene before it first runs, or returns why it exceeds the budget. `path` begins the
   // text; without it the text begins with a verb, as in "would take".
   messages::Result<void> charge(const std::string& path = "createScene.scene");
-  // Charges the colliders that all participants have together, or returns why they exceed the budget.
-  messages::Result<void> chargeColliders(std::size_t count);
+  // Place of the cloth after a tick.
+  void setClothBounds(const ClothBounds& bounds);
   // Gives the charge back, because the scene has been deleted. Others may hold the object for longer.
   void discharge();
   // Returns whether the scene shares the device as a guest (schedule::TickSchedule): a peer created it, it is
@@ -103,15 +104,14 @@ class LiveScene {
   // Ends the scene for good because it harms others: `why` is the last message to its participants, and every
   // later join is refused with it.
   void quarantine(const std::string& why);
-  // Empty if the scene is not in quarantine.
-  std::string quarantined() const;
+  // Refuses joins until then, with this reason.
+  void refuseUntil(Clock::time_point until, const std::string& why);
+  // Why the scene cannot be joined at this time: it is in quarantine, or refuseUntil() holds. Otherwise
+  // empty.
+  std::string quarantined(Clock::time_point now = Clock::now()) const;
 
   // Puts the change into the inbox, or returns what is wrong with it.
   messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message);
-  // Resets environment and cloths to the start, and drops waiting changes of them. Returns the change that
-  // announces it.
-  v1::ParameterChange resetParameters();
-
   // Resets everything to the start, because a new simulation begins; drops all waiting changes. Returns the
   // change that announces it.
   v1::ParameterChange restart();
@@ -163,6 +163,10 @@ class LiveScene {
       work;  // of the newest tick; less than allWork() while the device is overloaded
 
  private:
+  double roomForHands() const override;
+  double roomForOthers(double hands) const override;
+  void chargeColliders(const ColliderLoad& load) override;
+  bool boundsOfCloth(ClothBounds& bounds) const override;
   // The same; the caller holds the lock.
   messages::Result<void> countChangeLocked(std::uint64_t participant, const char* call);
   // Error for what ChangeLimits has counted; nothing if there are not too many.
@@ -185,10 +189,14 @@ class LiveScene {
   Charge charge_;                      // of definition_
   std::atomic<bool> isDearer_{false};  // definition_ costs more than start_
   std::string quarantined_;
+  std::optional<Clock::time_point> quarantinedUntil_;  // absent: for good
   ChangeLimits changes_;
   std::optional<Clock::time_point> emptySince_;                     // of the newest call of hasBeenEmptyFor()
   std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
   std::uint64_t contents_ = 0;                                      // newest content id
+
+  mutable std::mutex boundsMutex_;
+  std::optional<ClothBounds> clothBounds_;  // after the newest tick
 
   std::unique_ptr<SceneObserver> observer_;
 };

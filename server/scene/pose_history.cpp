@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/scene/collider_set.h"
+#include "server/scene/hand_limits.h"
 
 namespace clothstream::scene {
 namespace {
@@ -13,12 +13,12 @@ namespace {
 // Pose between `from` (part 0) and `to` (part 1); a part above 1 extrapolates. A pose that jumps stays at
 // `from` until part 1.
 model::Pose interpolate(const model::Pose& from, const model::Pose& to, float part, double stepSeconds) {
-  const float reach = kMaxColliderSpeed * static_cast<float>(stepSeconds);
+  const float reach = kMaxHandSpeed * static_cast<float>(stepSeconds);
   if ((to.position - from.position).squaredNorm() > reach * reach) return part < 1 ? from : to;
   const float turn = from.orientation.dot(to.orientation);
   model::Pose pose{.position = from.position + part * (to.position - from.position),
                    .orientation = to.orientation};
-  if (std::abs(turn) < kMaxColliderTurn && part > 1) return pose;
+  if (std::abs(turn) < kMaxHandTurn && part > 1) return pose;
   const Eigen::Vector4f other =
       turn < 0 ? Eigen::Vector4f(-to.orientation.coeffs()) : to.orientation.coeffs();
   const Eigen::Vector4f mean = (1 - part) * from.orientation.coeffs() + part * other;
@@ -76,6 +76,10 @@ void PoseHistory::add(Track& track, TimedPoses&& poses) {
   }
   if (entries.size() == kMaxPoses) entries.erase(entries.begin());
   entries.push_back(std::move(entry));
+}
+
+void PoseHistory::repeat() {
+  for (Track& track : tracks_) track.settled = false;
 }
 
 void PoseHistory::prune(Track& track, Clock::time_point time) {

@@ -41,6 +41,9 @@ class PoseHistory {
   void place(Clock::time_point time,
              const std::function<void(std::uint64_t participant, const model::ParticipantPoses&)>& place);
 
+  // The next place() is called for all participants that have colliders or grabs.
+  void repeat();
+
  private:
   struct Entry {
     Clock::time_point trueAt{};

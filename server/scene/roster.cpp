@@ -5,7 +5,6 @@
 #include <chrono>
 #include <iterator>
 #include <random>
-#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -129,6 +128,8 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
       throw;
     }
   }
+  const bool hasMany = !request.address.empty() && placesOf(request.address) >= request.placesOfAddress;
+  if (hasMany && !makeRoom(now, request.address)) return tl::unexpected(Refusal::addressHasMany);
   if (entries_.size() >= limit && !makeRoom(now)) return tl::unexpected(Refusal::full);
 
   const bool isOwned =
@@ -142,6 +143,7 @@ tl::expected<Roster::Admission, Roster::Refusal> Roster::join(const JoinRequest&
   entry.subject = request.subject;
   entry.rights = request.rights;
   entry.attempt = request.attempt;
+  entry.address = request.address;
   entry.connectedSince = now;
   entry.participant = {.id = ++ids,
                        .displayName = request.displayName,
@@ -181,10 +183,11 @@ Roster::Admission Roster::resume(Entry& entry, const JoinRequest& request,
   // Announced before the participant subscribes, because its Welcome already contains its role.
   limitRole(entry, request.rights, now);
   subscribers_.add(mailbox, entry.participant.id);
-  if (!entry.posed && !(entry.poses.colliders.empty() && entry.poses.grabs.empty()) &&
-      charge(entry, entry.poses.colliders.size())) {
-    inbox_.postPoses(entry.participant.id, entry.poses, now);
+  if (!entry.posed && !(entry.poses.colliders.empty() && entry.poses.grabs.empty())) {
     entry.posed = true;
+    model::ParticipantPoses poses = entry.poses;
+    limit(entry, poses.colliders);
+    inbox_.postPoses(entry.participant.id, std::move(poses), now);
   }
   return admissionOf(entry, request.token, true);
 }
@@ -252,6 +255,7 @@ void Roster::expire(Clock::time_point now) {
     else
       ++entry;
   }
+  divideAgain(now);
 }
 
 void Roster::setAway(Entry& entry, Clock::time_point now) {
@@ -270,23 +274,75 @@ void Roster::removePoses(Entry& entry, Clock::time_point now) {
   if (!entry.posed) return;
   inbox_.postPoses(entry.participant.id, {}, now);
   entry.posed = false;
-  std::ignore = charge(entry, 0);  // fewer colliders are always allowed
+  entry.needs = entry.uses = {};
+  entry.acting = 0;
+  charge();
 }
 
-messages::Result<void> Roster::charge(const Entry& entry, std::size_t count) {
-  if (!charge_) return {};
-  for (const Entry& other : entries_)
-    if (other.posed && other.participant.id != entry.participant.id) count += other.poses.colliders.size();
-  return charge_(count);
+ColliderLoad Roster::shareOfEach() const {
+  std::vector<double> hands, others;
+  for (const Entry& entry : entries_) {
+    hands.push_back(entry.needs.hands);
+    others.push_back(entry.needs.others);
+  }
+  ColliderLoad share;
+  share.hands = fairShare(hands, budget_->roomForHands());
+  double used = 0;
+  for (const double need : hands) used += std::min(need, share.hands);
+  share.others = fairShare(others, budget_->roomForOthers(used));
+  return share;
 }
 
-bool Roster::makeRoom(Clock::time_point now) {
+void Roster::limit(Entry& entry, std::vector<model::ParticipantCollider>& colliders) {
+  if (budget_ != nullptr && !(colliders.empty() && entry.acting == 0)) {
+    ClothBounds bounds;
+    const ClothBounds* const cloth = budget_->boundsOfCloth(bounds) ? &bounds : nullptr;
+    const ColliderLoad needs = loadOf(colliders, cloth);
+    if (needs != std::exchange(entry.needs, needs)) share_ = shareOfEach();
+    const ColliderLoad uses = trim(colliders, share_, cloth) ? loadOf(colliders, cloth) : needs;
+    if (uses != std::exchange(entry.uses, uses)) charge();
+  }
+  entry.acting = colliders.size();
+}
+
+void Roster::divideAgain(Clock::time_point now) {
+  if (budget_ == nullptr) return;
+  ClothBounds bounds;
+  const ClothBounds* const cloth = budget_->boundsOfCloth(bounds) ? &bounds : nullptr;
+  for (Entry& entry : entries_)
+    if (entry.posed) entry.needs = loadOf(entry.poses.colliders, cloth);
+  share_ = shareOfEach();
+  for (Entry& entry : entries_) {
+    if (!entry.posed) continue;
+    model::ParticipantPoses poses = entry.poses;
+    trim(poses.colliders, share_, cloth);
+    entry.uses = loadOf(poses.colliders, cloth);
+    if (poses.colliders.size() == std::exchange(entry.acting, poses.colliders.size())) continue;
+    inbox_.postPoses(entry.participant.id, std::move(poses), now);
+  }
+  charge();
+}
+
+void Roster::charge() {
+  if (budget_ == nullptr) return;
+  ColliderLoad all;
+  for (const Entry& entry : entries_) all += entry.uses;
+  budget_->chargeColliders(all);
+}
+
+std::size_t Roster::placesOf(const std::string& address) const {
+  return static_cast<std::size_t>(std::ranges::count(entries_, address, &Entry::address));
+}
+
+bool Roster::makeRoom(Clock::time_point now, const std::string& address) {
   // After a restart of the server, all participants have been away equally long.
-  const auto longestAway = std::ranges::min_element(entries_, {}, [](const Entry& entry) {
-    return std::pair(entry.participant.away ? entry.placeExpires : Clock::time_point::max(),
-                     entry.participant.role);
+  const auto isAway = [&](const Entry& entry) {
+    return entry.participant.away && (address.empty() || entry.address == address);
+  };
+  const auto longestAway = std::ranges::min_element(entries_, {}, [&](const Entry& entry) {
+    return std::pair(isAway(entry) ? entry.placeExpires : Clock::time_point::max(), entry.participant.role);
   });
-  if (longestAway == entries_.end() || !longestAway->participant.away) return false;
+  if (longestAway == entries_.end() || !isAway(*longestAway)) return false;
   erase(longestAway, LeaveReason::timedOut, 0, now);
   return true;
 }
@@ -333,7 +389,7 @@ void Roster::clear() {
   for (const Entry& entry : entries_) reportLeft(entry, Clock::now());
   entries_.clear();
   inbox_.dropPoses();
-  if (charge_) std::ignore = charge_(0);
+  charge();
 }
 
 void Roster::dismiss(const SharedBytes& last) {
@@ -445,16 +501,23 @@ messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPo
   const auto entry = find(mailbox);
   if (entry == entries_.end()) return {};
   if (auto permitted = permit(entry->participant.role, message, permissions); !permitted) return permitted;
-  const std::size_t before = entry->posed ? entry->poses.colliders.size() : 0;
-  if (poses.colliders.size() != before)
-    if (auto charged = charge(*entry, poses.colliders.size()); !charged) return charged;
   entry->posed = true;
   entry->poses = {.colliders = poses.colliders,
                   .grabs = poses.grabs,
                   .wantsContacts = poses.wantsContacts,
                   .wantsConstraints = poses.wantsConstraints};
+  const std::size_t sent = poses.colliders.size();
+  limit(*entry, poses.colliders);
+  const bool begins = !std::exchange(entry->limited, entry->acting < sent) && entry->limited;
   inbox_.postPoses(entry->participant.id, std::move(poses), arrival, poseTime(message, arrival));
-  return {};
+  if (!begins) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+      fmt::format(
+          "colliderPoses: {} of {} colliders act, hands and head first: the participants of a scene share "
+          "its room for colliders evenly (--max-scene-load, --max-load); send fewer or smaller ones",
+          entry->acting, sent),
+      telemetry::Refusal::colliders});
 }
 
 messages::Result<Roster::Entries::iterator> Roster::target(const char* field, std::uint64_t id) {

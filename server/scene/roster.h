@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -19,6 +19,7 @@
 #include "server/messages/field_error.h"
 #include "server/model/input.h"
 #include "server/scene/ban_list.h"
+#include "server/scene/collider_shares.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/roles.h"
@@ -103,13 +104,9 @@ class Roster {
   // Accepted range of pose times. Later times count as unknown, earlier ones as kMaxBehind.
   static constexpr std::chrono::milliseconds kMaxAhead{100}, kMaxBehind{10'000};
 
-  // Charges this number of colliders, of all participants together, or returns why there are too many. Fewer
-  // than before are always allowed.
-  using ChargeColliders = std::function<messages::Result<void>(std::size_t colliders)>;
-
-  // All must outlive the roster. `journal` and `charge` may be null.
-  Roster(delivery::Subscribers& subscribers, Inbox& inbox, Journal* journal, ChargeColliders charge = {})
-      : subscribers_(subscribers), inbox_(inbox), journal_(journal), charge_(std::move(charge)) {}
+  // All must outlive the roster. `journal` may be null. Without `budget` there is room for all colliders.
+  Roster(delivery::Subscribers& subscribers, Inbox& inbox, Journal* journal, ColliderBudget* budget = nullptr)
+      : subscribers_(subscribers), inbox_(inbox), journal_(journal), budget_(budget) {}
 
   struct JoinRequest {
     std::string clientName, displayName;
@@ -118,6 +115,8 @@ class Roster {
     Subject subject;            // of the peer's identity; empty without one
     Rights rights{};            // of the peer's identity
     std::uint32_t attempt = 0;  // grows with each connection of the participant
+    std::string address{};      // of the peer; empty: its places are not limited
+    std::size_t placesOfAddress = std::numeric_limits<std::size_t>::max();
   };
   struct Admission {
     std::uint64_t id = 0;
@@ -126,14 +125,14 @@ class Roster {
     bool resumed = false;
     std::vector<Participant> participants;  // all, in the order in which they joined
   };
-  enum class Refusal : std::uint8_t { full, closed, late, removed };
+  enum class Refusal : std::uint8_t { full, addressHasMany, closed, late, removed };
 
   // Adds the mailbox to the subscribers. A request with the token of a participant resumes that participant
   // and closes its former session; it is refused as late if that session has a higher attempt number. The
   // subject must be the same. A banned subject, or the token of a removed participant, is refused as removed.
   // Other requests get the next number of `ids`. If there are `limit` participants, the one that has been
   // away longest is evicted (in a tie, the one with the lowest role). If none is away, the request is refused
-  // as full.
+  // as full. The same holds among the participants of one address, if they have `placesOfAddress` places.
   //
   // An exception, for example for a lack of memory, removes a new participant again. A participant that
   // returned then counts as disconnected.
@@ -147,7 +146,8 @@ class Roster {
   void leave(const delivery::Mailbox& mailbox, LeaveReason reason, Clock::time_point now);
   // The connection is lost: the participant is away and may come back.
   void disconnect(const delivery::Mailbox& mailbox, const ReconnectGrace& grace, Clock::time_point now);
-  // Removes poses and places whose grace period is over. Call it about once a second.
+  // Removes poses and places whose grace period is over, and divides the room for colliders again. Call it
+  // about once a second.
   void expire(Clock::time_point now);
   // Removes all participants, with this as their last message, and drops the poses that no tick has used.
   void dismiss(const delivery::SharedBytes& last);
@@ -178,7 +178,8 @@ class Roster {
   bool owned() const;
 
   // Puts the participant's poses into the inbox. `poses` is the content of `message`. Returns an error if the
-  // role is too low, or if there are more colliders than before and they exceed the budget.
+  // role is too low. Participants share the budget of colliders evenly, hands and heads first: colliders
+  // beyond the participant's share do not act, and an error says so when that begins.
   [[nodiscard]] messages::Result<void> post(const delivery::Mailbox& mailbox,
                                             const v1::ColliderPoses& message, model::ParticipantPoses poses,
                                             const Permissions& permissions, Clock::time_point arrival);
@@ -214,9 +215,13 @@ class Roster {
     std::uint32_t attempt = 0;                        // of the newest session
     model::ParticipantPoses poses;                    // the newest, without attachments
     bool posed = false;                               // the scene may have colliders or grabs of it
+    ColliderLoad needs, uses;                         // of the colliders in `poses`, while posed
+    std::size_t acting = 0;                           // number of them that the scene has
+    bool limited = false;                             // the newest message had more
     Clock::time_point posesExpire{}, placeExpires{};  // while it is away
     Clock::time_point connectedSince{};               // while it is not away
     Clock::duration connected{};                      // before
+    std::string address;                              // as in JoinRequest
   };
   using Entries = std::vector<Entry>;
   enum class Presence : std::uint8_t { joined, roleChanged, disconnected, returned };
@@ -240,8 +245,9 @@ class Roster {
   Admission resume(Entry& entry, const JoinRequest& request,
                    const std::shared_ptr<delivery::Mailbox>& mailbox, Clock::time_point now);
   // Evicts the participant that has been away longest; in a tie, the one with the lowest role. Returns false
-  // if all are connected.
-  bool makeRoom(Clock::time_point now);
+  // if all are connected. With an address only its participants count.
+  bool makeRoom(Clock::time_point now, const std::string& address = {});
+  std::size_t placesOf(const std::string& address) const;
   // Returns the next entry. `by` is the participant that caused it, or 0.
   Entries::iterator erase(Entries::iterator entry, LeaveReason reason, std::uint64_t by,
                           Clock::time_point now);
@@ -250,8 +256,13 @@ class Roster {
   // Tells the observer that the participant left.
   void reportLeft(const Entry& entry, Clock::time_point now);
   void removePoses(Entry& entry, Clock::time_point now);
-  // Charges the colliders of all participants, with `count` for this one.
-  messages::Result<void> charge(const Entry& entry, std::size_t count);
+  // What each participant's colliders may weigh.
+  ColliderLoad shareOfEach() const;
+  // Removes colliders beyond the participant's share, and charges the others.
+  void limit(Entry& entry, std::vector<model::ParticipantCollider>& colliders);
+  // Divides the room again, because cloth has moved, or participants have come or gone.
+  void divideAgain(Clock::time_point now);
+  void charge();
   void changeRole(Entry& entry, Role role, std::uint64_t by, Clock::time_point now);
   // Gives the scene an owner if it has none.
   void ensureOwner(Clock::time_point now);
@@ -263,10 +274,11 @@ class Roster {
   delivery::Subscribers& subscribers_;
   Inbox& inbox_;
   Journal* const journal_;
-  const ChargeColliders charge_;
+  ColliderBudget* const budget_;
 
   mutable std::mutex mutex_;  // held during announcements, so that all subscribers get them in the same order
   Entries entries_;           // in the order in which they joined
+  ColliderLoad share_;        // of each participant's colliders; found when a need changes, and every second
   BanList bans_;
   std::deque<std::string> refusedTokens_;  // hashes of those of removed participants, newest last
   std::deque<Subject> demoted_;            // made viewers by an owner, newest last

@@ -45,11 +45,14 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
       wantedWork_(scene.allWork()),
       work_(wantedWork_),
       leastSubsteps_(scene.leastSubsteps(scene_)),
+      recoveries_(rate_),
       onDevice_(std::move(loaded)) {
   live_.work = work_;
   newestState_ = onDevice_->start;
   const std::shared_ptr<const LiveScene::Restored> restored = live_.restored();
   if (restored) continueFrom(*restored);
+  provenEnvironment_ = scene_.environment;
+  provenCloths_ = scene_.cloths;
   const bool atStart = tick_ == 0;
   const double seconds = static_cast<double>(tick_) * scene_.tickSeconds();
   if (live_.journal && live_.journal->due())
@@ -69,7 +72,7 @@ void SceneHost::continueFrom(const LiveScene::Restored& restored) {
     easeUntil_ = from.easeUntil;
     colliders_.restore(from.colliders);
     grabs_.restore(from.grabs);
-    lastRecovery_ = from.lastRecovery;
+    recoveries_.restore(from.lastRecovery);
     newestState_ = from.state;
     grabsThen_ = grabs_.state().slots;
     wantedWork_ = work_ = from.work;
@@ -97,7 +100,7 @@ Checkpoint SceneHost::checkpoint() const {
           .easeUntil = easeUntil_,
           .colliders = colliders_.state(),
           .grabs = grabs_.state(),
-          .lastRecovery = lastRecovery_,
+          .lastRecovery = recoveries_.newest(),
           .work = work_};
 }
 
@@ -254,6 +257,7 @@ void SceneHost::applyInputs() {
     if (moves && poseArrivals_.size() < kMaxPoseArrivals) poseArrivals_.push_back(poses.now.arrival);
     poses_.add(std::move(poses));
   }
+  if (recoveries_.ignores(tick_)) return;
   poses_.place(tickStart_, [this](std::uint64_t participant, const model::ParticipantPoses& poses) {
     colliders_.place(participant, poses.colliders);
     colliders_.placeJoints(poses.joints);
@@ -279,6 +283,7 @@ bool SceneHost::apply(const model::ParameterChange& change, std::string& problem
   }
   scene_ = std::move(changed);
   parametersChanged_ = true;
+  recoveries_.changed(tick_);
   return true;
 }
 
@@ -444,6 +449,11 @@ void SceneHost::finish() {
   if (status_.healthy) {
     ++sinceHealthy_;
     live_.tick = tick_;
+    live_.setClothBounds({status_.low, status_.high});
+    if (recoveries_.valid(tick_)) {
+      provenEnvironment_ = scene_.environment;
+      provenCloths_ = scene_.cloths;
+    }
     if (savesState_) {
       newestState_ = on.simulation.collectState(tick_);
       if (recordsState_ && live_.journal) live_.journal->saved(newestState_);
@@ -538,29 +548,50 @@ void SceneHost::announceEvents() {
 }
 
 void SceneHost::recover() {
-  const bool repeated = lastRecovery_ && tick_ - *lastRecovery_ <= rate_;
-  lastRecovery_ = tick_;
+  using Cure = RecoveryPolicy::Cure;
+  const Cure cure = recoveries_.invalid(tick_, isTouched());
   sinceHealthy_ = 0;
+  recovery_ = cure == Cure::rollback ? Recovery::rollback : Recovery::reset;
+  (cure == Cure::rollback ? live_.metrics.rollbacks : live_.metrics.resets).add();
   std::string text =
       status_.outOfReach ? messages::outOfReach(scene_.stream) : "the simulation became unstable";
-  if (repeated) {
-    recovery_ = Recovery::reset;
-    live_.metrics.resets.add();
-    text += " twice within a second: the scene continues from its start, with the start's parameters";
-    const v1::ParameterChange start = live_.resetParameters();
-    scene_.environment = live_.start().environment;
-    scene_.cloths = live_.start().cloths;
-    setCloths(scene_.cloths);
-    parametersChanged_ = true;
-    live_.subscribers.announce(delivery::parametersChanged(start, tick_ + 1));
-  } else {
-    recovery_ = Recovery::rollback;
-    live_.metrics.rollbacks.add();
-    text += ": the scene continues from its newest healthy state, at most a second old";
+  switch (cure) {
+    case Cure::rollback:
+      text += ": the scene continues from its newest healthy state, at most a second old";
+      break;
+    case Cure::reset:
+      text += " twice within a second: its cloths continue from their start";
+      break;
+    case Cure::resetAndLetGo:
+      text +=
+          " twice within a second: its cloths continue from their start, and colliders and grabs of "
+          "participants act again after a second";
+      break;
+    case Cure::resetAndUndo:
+      text +=
+          " twice within a second: its cloths continue from their start, without the newest changes of "
+          "parameters";
+      break;
   }
+  if (cure == Cure::resetAndLetGo) letGo();
+  if (cure == Cure::resetAndUndo) undoChanges();
   if (!recoveryNotices_.take(Clock::now())) return;
   telemetry::log({live_.name()}, spdlog::level::warn, "tick {}: {}", tick_, text);
   live_.subscribers.announce(delivery::notice(v1::NOTICE_KIND_ROLLED_BACK, text, tick_));
+}
+
+void SceneHost::letGo() {
+  colliders_.letGo();
+  grabs_.letGo();
+  poses_.repeat();
+}
+
+void SceneHost::undoChanges() {
+  scene_.environment = provenEnvironment_;
+  scene_.cloths = provenCloths_;
+  setCloths(scene_.cloths);
+  parametersChanged_ = true;
+  live_.subscribers.announce(delivery::parametersChanged(live_.revertTo(scene_), tick_ + 1));
 }
 
 void SceneHost::releaseCoarseEncoders() {

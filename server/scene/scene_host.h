@@ -18,6 +18,7 @@
 #include "server/scene/grabs_and_attachments.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/pose_history.h"
+#include "server/scene/recovery_policy.h"
 #include "server/scene/requests.h"
 #include "server/scene/scene_on_device.h"
 #include "server/schedule/token_bucket.h"
@@ -38,8 +39,8 @@ namespace clothstream::scene {
 //
 // Recovery bounds the loss. Every second of healthy ticks a checkpoint is kept on the device; an unhealthy
 // state goes back to it. Every five seconds a snapshot is kept on the CPU; after a device loss the scene
-// continues from it. A state that becomes unhealthy twice within a second goes back to the scene's start,
-// with the start's parameters.
+// continues from it. A state that becomes unhealthy again within a second goes back to the scene's start
+// (RecoveryPolicy). Parameters stay, except for changes that may be the reason.
 class SceneHost {
  public:
   // Minimum interval between requested key frames of one quality. One key frame serves all subscribers.
@@ -150,6 +151,12 @@ class SceneHost {
   void writeReport(double deviceSeconds);
   void announceEvents();
   void recover();
+  // Whether participants act on the cloth: by colliders, grabs, or what they moved.
+  bool isTouched() const { return colliders_.isTouched() || grabs_.isTouched(); }
+  // Participants act on nothing until they send poses again.
+  void letGo();
+  // Parameters go back to those that were proven.
+  void undoChanges();
   bool every(std::uint32_t seconds) const { return sinceHealthy_ % (std::uint64_t{seconds} * rate_) == 0; }
 
   LiveScene& live_;
@@ -177,15 +184,17 @@ class SceneHost {
   std::uint64_t tick_ = 0;
   simulation::TickStatus status_;
   std::optional<double> ownSeconds_, deviceSeconds_;
-  Clock::duration beginTime_{};                // of recording the current tick
-  Recovery recovery_ = Recovery::none;         // before the next tick
-  Recovery recovered_ = Recovery::none;        // before the current tick
-  bool keepsState_ = false;                    // the current tick keeps a checkpoint
-  bool journalBegan_ = false;                  // before the current tick
-  bool recorded_ = false;                      // announced to the subscribers
-  bool clothsChanged_ = false;                 // since the newest complete tick
-  std::optional<std::uint64_t> lastRecovery_;  // tick
-  std::uint64_t sinceHealthy_ = 0;             // healthy ticks since the start or the newest recovery
+  Clock::duration beginTime_{};          // of recording the current tick
+  Recovery recovery_ = Recovery::none;   // before the next tick
+  Recovery recovered_ = Recovery::none;  // before the current tick
+  bool keepsState_ = false;              // the current tick keeps a checkpoint
+  bool journalBegan_ = false;            // before the current tick
+  bool recorded_ = false;                // announced to the subscribers
+  bool clothsChanged_ = false;           // since the newest complete tick
+  RecoveryPolicy recoveries_;
+  model::Environment provenEnvironment_;  // a second of valid ticks has proven them
+  std::vector<model::Cloth> provenCloths_;
+  std::uint64_t sinceHealthy_ = 0;  // healthy ticks since the start or the newest recovery
   schedule::TokenBucket recoveryNotices_{1, 5};
 
   simulation::StateSnapshot newestState_;

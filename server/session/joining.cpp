@@ -117,6 +117,12 @@ void Session::failToJoin(scene::Roster::Refusal refusal, const scene::LiveScene&
       return fail(v1::ERROR_CODE_REMOVED, fmt::format("an owner removed you from '{}'", scene.name()));
     case Refusal::late:
       return fail(v1::ERROR_CODE_TAKEN_OVER, "this participant has a newer connection");
+    case Refusal::addressHasMany:
+      server_.metrics.refuse(telemetry::Refusal::participants);
+      return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+                  fmt::format("'{}' has {} participants from your address, its maximum "
+                              "(--max-participants-per-address); try again later",
+                              scene.name(), server_.options.placesOfAddress()));
     case Refusal::full:
       server_.metrics.refuse(telemetry::Refusal::participants);
       return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
@@ -200,7 +206,9 @@ void Session::hello(const v1::Hello& message) {
                                        .token = message.resume_token(),
                                        .subject = identity_->subject,
                                        .rights = rightsIn(*scene),
-                                       .attempt = message.attempt()},
+                                       .attempt = message.attempt(),
+                                       .address = address_,
+                                       .placesOfAddress = server_.options.placesOfAddress()},
                                       mailbox_, server_.participants, scene->maxParticipants, now_);
   if (!admission) return failToJoin(admission.error(), *scene);
   scene_ = scene;

@@ -36,6 +36,7 @@
 #include "server/simulation/texel.h"
 #include "server/simulation/xpbd_stage.h"
 #include "server/vulkan/kernel.h"
+#include "shaders/shared/state_hash.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -583,8 +584,13 @@ std::vector<std::vector<std::uint32_t>> ClothSimulation::constraintEnds() const 
 TickStatus ClothSimulation::status() const {
   const shared::StatusRecord& record =
       pipeline_->buffers.statusReadback.mapped<shared::StatusRecord>()[pipeline_->slot];
-  TickStatus status{std::uint64_t{record.hashHigh} << 32 | record.hashLow, record.unhealthy == 0,
-                    record.unhealthy == shared::kOutOfReach};
+  TickStatus status{.stateHash = std::uint64_t{record.hashHigh} << 32 | record.hashLow,
+                    .healthy = record.unhealthy == 0,
+                    .outOfReach = record.unhealthy == shared::kOutOfReach};
+  for (int axis = 0; axis < 3; ++axis) {
+    status.low[axis] = std::bit_cast<float>(shared::bitsInOrder(~record.invertedLow[axis]));
+    status.high[axis] = std::bit_cast<float>(shared::bitsInOrder(record.high[axis]));
+  }
   if (pipeline_->selfCollision) {
     const shared::CrowdReport& report = pipeline_->selfCollision->report(pipeline_->slot);
     status.crowded = report.lists + report.balls;

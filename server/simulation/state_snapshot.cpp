@@ -6,6 +6,7 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
+#include <limits>
 #include <span>
 
 #include "shaders/shared/state_hash.h"
@@ -43,6 +44,8 @@ TickStatus statusOf(const StateSnapshot& snapshot, float reach) {
   const auto nodes = static_cast<std::uint32_t>(snapshot.bytes.size() / kSnapshotBytesPerNode);
   shared::NodeHash sum{0, 0};
   bool isInWorld = true, isInReach = true;
+  constexpr float kFar = std::numeric_limits<float>::max();
+  model::Vec3 low = model::Vec3::Constant(kFar), high = -low;
   for (std::uint32_t i = 0; i < nodes; ++i) {
     std::array<std::uint32_t, 6> words;
     std::memcpy(words.data(), snapshot.bytes.data() + i * kSnapshotBytesPerNode, sizeof(words));
@@ -53,8 +56,16 @@ TickStatus statusOf(const StateSnapshot& snapshot, float reach) {
     for (const std::uint32_t word : words) isInWorld = isInWorld && !shared::isOutsideWorld(word);
     for (const std::uint32_t word : std::span(words).first(3))
       isInReach = isInReach && !shared::isBeyond(word, std::bit_cast<std::uint32_t>(reach));
+    const model::Vec3 place(std::bit_cast<float>(words[0]), std::bit_cast<float>(words[1]),
+                            std::bit_cast<float>(words[2]));
+    low = low.cwiseMin(place);
+    high = high.cwiseMax(place);
   }
-  return {std::uint64_t{sum.high} << 32 | sum.low, isInWorld && isInReach, isInWorld && !isInReach};
+  return {.stateHash = std::uint64_t{sum.high} << 32 | sum.low,
+          .healthy = isInWorld && isInReach,
+          .outOfReach = isInWorld && !isInReach,
+          .low = low,
+          .high = high};
 }
 
 }  // namespace clothstream::simulation

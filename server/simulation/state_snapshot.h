@@ -54,6 +54,7 @@ struct TickStatus {
   // Self-collision: number of lists of neighbours that were too long, plus number of balls that touched too
   // many others.
   std::uint32_t crowded = 0;
+  model::Vec3 low = model::Vec3::Zero(), high = model::Vec3::Zero();  // box of all nodes, if healthy
 };
 inline constexpr float kWorldExtent = 8192;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Fits the boxes of a mesh's tree to the vertices that joints moved. A box contains its triangles during the
-// whole tick. Each invocation handles the nodes below one node, from the lowest to that one. Writes cannot
-// race: these nodes belong to one invocation.
+// Fits the boxes of a mesh's tree to the vertices that joints moved. A node has two boxes, which contain its
+// triangles at the start and at the end of the tick. Each invocation handles the nodes below one node, from
+// the lowest to that one. Writes cannot race: these nodes belong to one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -19,7 +19,7 @@ layout(push_constant) uniform Push {
   RefitPush push;
 };
 
-const float kRounding = 1e-6;  // of a vertex between the start and the end of the tick, per metre
+const float kRounding = 4e-6;  // of a vertex and a box between the start and the end of the tick, per metre
 
 struct Box {
   vec3 low;
@@ -31,7 +31,8 @@ void include_(inout Box box, vec3 point) {
   box.high = max(box.high, point);
 }
 
-Box boxOfLeaf(SolidRecord solid, uint leaf) {
+// `when` is 0 at the start of the tick, 1 at its end.
+Box boxOfLeaf(SolidRecord solid, uint leaf, int when) {
   Box box = Box(vec3(1e30), vec3(-1e30));
   uint leaves = uint(solid.leafCount), triangles = uint(solid.triangleCount);
   uint shift = uint(findMSB(leaves));
@@ -40,8 +41,7 @@ Box boxOfLeaf(SolidRecord solid, uint leaf) {
     uvec3 corners = cornersAt(table, solid, t);
     for (uint corner = 0u; corner < 3u; ++corner) {
       int texel = int(uint(solid.firstVertex) + CLOTHSTREAM_MOVING_VERTEX_TEXELS * corners[corner]);
-      include_(box, texelFetch(table, texel).xyz);
-      include_(box, texelFetch(table, texel + 2).xyz);
+      include_(box, texelFetch(table, texel + CLOTHSTREAM_VERTEX_TEXELS * when).xyz);
     }
   }
   precise vec3 size = max(abs(box.low), abs(box.high));
@@ -61,17 +61,21 @@ void main() {
     uint depth = level - 1u;
     uint end = (root + 1u) << depth;
     for (uint node = root << depth; node < end; ++node) {
-      uint texel = first + CLOTHSTREAM_BOX_TEXELS * node;
-      Box box;
-      if (node >= leaves) {
-        box = boxOfLeaf(solid, node - leaves);
-      } else {
-        uint child = first + CLOTHSTREAM_BOX_TEXELS * 2u * node;
-        box = Box(min(solids[child].xyz, solids[child + 2u].xyz),
-                  max(solids[child + 1u].xyz, solids[child + 3u].xyz));
+      for (int when = 0; when < 2; ++when) {
+        uint offset = first + CLOTHSTREAM_BOX_TEXELS * uint(when);
+        uint texel = offset + CLOTHSTREAM_MOVING_BOX_TEXELS * node;
+        Box box;
+        if (node >= leaves) {
+          box = boxOfLeaf(solid, node - leaves, when);
+        } else {
+          uint child = offset + CLOTHSTREAM_MOVING_BOX_TEXELS * 2u * node;
+          uint other = child + CLOTHSTREAM_MOVING_BOX_TEXELS;
+          box = Box(min(solids[child].xyz, solids[other].xyz),
+                    max(solids[child + 1u].xyz, solids[other + 1u].xyz));
+        }
+        solids[texel] = vec4(box.low, 0.0);
+        solids[texel + 1u] = vec4(box.high, 0.0);
       }
-      solids[texel] = vec4(box.low, 0.0);
-      solids[texel + 1u] = vec4(box.high, 0.0);
     }
   }
 }

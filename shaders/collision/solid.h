@@ -14,7 +14,9 @@ CLOTHSTREAM_SHARED_BEGIN
 struct SolidRecord {
   float firstTriangle;  // CLOTHSTREAM_TRIANGLE_TEXELS each, in the order of the leaves
   float firstVertex;
-  float firstBox;  // CLOTHSTREAM_BOX_TEXELS for each node of the tree, which is in the order of a heap
+  // CLOTHSTREAM_BOX_TEXELS for each node of the tree, which is in the order of a heap, or
+  // CLOTHSTREAM_MOVING_BOX_TEXELS if joints move the mesh.
+  float firstBox;
   float leafCount;
 
   float triangleCount;
@@ -52,7 +54,10 @@ struct VertexRecord {
   float reserved1;
 };
 
+// A box of the tree. A mesh that joints move has two for each node of the tree, for the start and for the end
+// of the tick. In between, its triangles are in the box that is in between.
 #define CLOTHSTREAM_BOX_TEXELS 2
+#define CLOTHSTREAM_MOVING_BOX_TEXELS 4
 struct BoxRecord {
   vec3 low;
   float reserved0;

@@ -146,11 +146,18 @@ vec3 pseudonormal(SolidRecord solid, uint triangle, uint part, float progress) {
   return normal;
 }
 
-// Square of the distance from a box.
-float squaredFromBox(vec3 p, SolidRecord solid, uint node) {
-  int texel = int(uint(solid.firstBox) + CLOTHSTREAM_BOX_TEXELS * node);
-  precise vec3 below = texelFetch(solids, texel).xyz - p;
-  precise vec3 above = p - texelFetch(solids, texel + 1).xyz;
+// Square of the distance from the box of a node, at a share of the tick.
+float squaredFromBox(vec3 p, SolidRecord solid, uint node, float progress) {
+  uint texels = moves(solid) ? CLOTHSTREAM_MOVING_BOX_TEXELS : CLOTHSTREAM_BOX_TEXELS;
+  int texel = int(uint(solid.firstBox) + texels * node);
+  precise vec3 low = texelFetch(solids, texel).xyz;
+  precise vec3 high = texelFetch(solids, texel + 1).xyz;
+  if (moves(solid)) {
+    low = low + progress * (texelFetch(solids, texel + CLOTHSTREAM_BOX_TEXELS).xyz - low);
+    high = high + progress * (texelFetch(solids, texel + CLOTHSTREAM_BOX_TEXELS + 1).xyz - high);
+  }
+  precise vec3 below = low - p;
+  precise vec3 above = p - high;
   vec3 outside = max(max(below, above), vec3(0.0));
   return dotProduct(outside, outside);
 }
@@ -173,7 +180,7 @@ Nearest nearestOnSolid(SolidRecord solid, float progress, vec3 p, float bound) {
   TrianglePoint at = TrianglePoint(0.0, 0.0, kFace);
   uint node = 1u;
   while (node != 0u) {
-    bool near = squaredFromBox(p, solid, node) < best;
+    bool near = squaredFromBox(p, solid, node, progress) < best;
     if (near && node >= leaves) {
       uint leaf = node - leaves;
       uint end = ((leaf + 1u) * triangles) >> shift;

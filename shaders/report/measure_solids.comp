@@ -38,7 +38,7 @@ float depthIn(uint number, vec3 position) {
   SolidRecord solid = solidRecordAt(solids, solidTexelOf(frame.shape));
   precise vec3 offset = position - collider.after;
   vec3 p = rotateBack(frame.after, offset);
-  if (squaredFromBox(p, solid, 1u) > 0.0) {
+  if (squaredFromBox(p, solid, 1u, push.collision.progressAfter) > 0.0) {
     return 0.0;
   }
   precise float depth = -nearestPoint(solid, push.collision.progressAfter, p, kFar).distance;

@@ -252,6 +252,11 @@ struct StatusRecord {
   uint32_t hashHigh;
   uint32_t unhealthy;  // kOutsideWorld, kOutOfReach, or both
   uint32_t reserved;
+  // Box of the positions, as orderOf() the bits of its components. Those of the low end are inverted, so that
+  // both are largest values.
+  uint32_t invertedLow[3];
+  uint32_t high[3];
+  uint32_t reserved1[2];
 };
 
 CLOTHSTREAM_SHARED_END
@@ -269,7 +274,8 @@ static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 48 && sizeof(S
               sizeof(ApplyPush) == 64 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&
               sizeof(FinishPush) == 48 && sizeof(StretchedPush) == 48 && sizeof(MarkPush) == 20 &&
               sizeof(HashPush) == 8);
-static_assert(sizeof(StatusRecord) == 16 && offsetof(StatusRecord, unhealthy) == 8);
+static_assert(sizeof(StatusRecord) == 48 && offsetof(StatusRecord, unhealthy) == 8 &&
+              offsetof(StatusRecord, high) == 28);
 }  // namespace clothstream::shared
 #else
 

@@ -50,6 +50,20 @@ CLOTHSTREAM_SHARED_FUNCTION bool isOutsideWorld(uint32_t bits) {
   return isBeyond(bits, 0x46000000u);
 }
 
+// A number whose order is that of the floats with these bits. Floats that are not numbers come first or last.
+CLOTHSTREAM_SHARED_FUNCTION uint32_t orderOf(uint32_t bits) {
+  return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
+}
+
 CLOTHSTREAM_SHARED_END
+
+#ifdef __cplusplus
+namespace clothstream::shared {
+// Bits of the float whose number is `order`.
+inline uint32_t bitsInOrder(uint32_t order) {
+  return (order & 0x80000000u) != 0u ? order & 0x7FFFFFFFu : ~order;
+}
+}  // namespace clothstream::shared
+#endif
 
 #endif

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Computes the hash of the state and whether it is healthy, by integer sums, whose order does not matter.
+// Computes the hash of the state, whether it is healthy, and where it is, by integer sums and maxima, whose
+// order does not matter.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -23,6 +24,8 @@ void main() {
   uint stride = gl_NumWorkGroups.x * gl_WorkGroupSize.x;
   NodeHash sum = NodeHash(0, 0);
   uint unhealthy = 0;
+  uvec3 invertedLow = uvec3(0u);
+  uvec3 high = uvec3(0u);
   for (uint node = gl_GlobalInvocationID.x; node < push.nodeCount; node += stride) {
     uvec3 p = floatBitsToUint(texelFetch(positions, int(node)).xyz);
     uvec3 v = floatBitsToUint(texelFetch(velocities, int(node)).xyz);
@@ -36,10 +39,17 @@ void main() {
     if (isBeyond(p.x, push.reach) || isBeyond(p.y, push.reach) || isBeyond(p.z, push.reach)) {
       unhealthy |= kOutOfReach;
     }
+    uvec3 place = uvec3(orderOf(p.x), orderOf(p.y), orderOf(p.z));
+    invertedLow = max(invertedLow, ~place);
+    high = max(high, place);
   }
   atomicAdd(status.hashLow, sum.low);
   atomicAdd(status.hashHigh, sum.high);
   if (unhealthy != 0) {
     atomicOr(status.unhealthy, unhealthy);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    atomicMax(status.invertedLow[axis], invertedLow[axis]);
+    atomicMax(status.high[axis], high[axis]);
   }
 }

@@ -74,7 +74,7 @@ bool isPrintable(const std::string& text) {
 Result run(const std::string& self, const std::string& server, const Attack& attack, int attackSeconds,
            bool web) {
   const e2e::TemporaryDirectory directory;
-  std::vector<std::string> options;
+  std::vector<std::string> options{"--scene", kVictimScene};
   std::istringstream further(attack.serverArguments);
   for (std::string word; further >> word;)
     options.push_back(word == "DIRECTORY" ? directory.path().string() : word);

@@ -142,5 +142,35 @@ TEST(ToJoining, RefusesNamesWithControlCharacters) {
   EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.scene = \"../etc\":"));
 }
 
+// Names that look like "Ann Lee" are "Ann Lee".
+TEST(ToJoining, NamesAreWhatPeopleSee) {
+  for (const char* name :
+       {"Ann Lee", "A\u200bnn Lee", "Ann Lee\u2060", "\ufeffAnn Lee", "Ann\u00a0Lee",
+        "\u3164 Ann \u200d\u2003 Lee ", "Ann\u00ad Lee\ufe0f", "\U000e0041Ann Lee\u2800"}) {
+    v1::Hello message = hello();
+    message.set_display_name(name);
+    message.set_client_name(name);
+    const auto joining = toJoining(message, kCodecs);
+    ASSERT_TRUE(joining) << joining.error().text;
+    EXPECT_EQ(joining->displayName, "Ann Lee");
+    EXPECT_EQ(joining->clientName, "Ann Lee");
+  }
+}
+
+TEST(ToJoining, NamesKeepPicturesAndLettersOfAllScripts) {
+  // A woman with a laptop, a red heart, and names with combining and right-to-left letters.
+  for (const char* name : {"\U0001f469\u200d\U0001f4bb", "\u2764\ufe0f Bo", "Zo\u0065\u0308",
+                           "\u05d3\u05d5\u05d3", "\u0928\u092e\u0938\u094d\u0924\u0947", "\u5f20\u4f1f"}) {
+    v1::Hello message = hello();
+    message.set_display_name(name);
+    EXPECT_EQ(toJoining(message, kCodecs)->displayName, name);
+  }
+  v1::Hello message = hello();
+  message.set_display_name("\u2764\u200dBo\ufe0f");  // a joiner and a style without a picture
+  EXPECT_EQ(toJoining(message, kCodecs)->displayName, "\u2764Bo");
+  message.set_display_name("\u200b\u2800 \u3164");
+  EXPECT_EQ(toJoining(message, kCodecs)->displayName, "");
+}
+
 }  // namespace
 }  // namespace clothstream::messages

@@ -28,7 +28,8 @@ std::uint32_t append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
   const std::size_t firstBox = firstVertex + vertexTexels * mesh.vertices.size();
   texels.push_back({static_cast<float>(firstTriangle), static_cast<float>(firstVertex),
                     static_cast<float>(firstBox), static_cast<float>(tree.leafCount)});
-  const std::size_t firstGrid = firstBox + CLOTHSTREAM_BOX_TEXELS * tree.boxes.size();
+  const std::size_t boxTexels = mesh.skin ? CLOTHSTREAM_MOVING_BOX_TEXELS : CLOTHSTREAM_BOX_TEXELS;
+  const std::size_t firstGrid = firstBox + boxTexels * tree.boxes.size();
   texels.push_back({static_cast<float>(mesh.triangles.size()), static_cast<float>(vertexTexels),
                     mesh.distanceCell > 0 ? static_cast<float>(firstGrid) : 0, 0});
 
@@ -48,8 +49,10 @@ std::uint32_t append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
     }
   }
   for (const TriangleTree::Box& box : tree.boxes) {
-    texels.push_back(texel(box.low, 0));
-    texels.push_back(texel(box.high, 0));
+    for (std::size_t k = 0; k < boxTexels; k += CLOTHSTREAM_BOX_TEXELS) {
+      texels.push_back(texel(box.low, 0));
+      texels.push_back(texel(box.high, 0));
+    }
   }
   assert(texels.size() == firstGrid);
   if (mesh.distanceCell > 0) {

@@ -85,6 +85,8 @@ class Joined {
     return open_;
   }
   bool open() const { return open_ && !ended_; }
+  // Notices that the simulation went back to an earlier state.
+  int rolledBack() const { return rolledBack_; }
   std::string lastError() {
     const std::lock_guard lock(mutex_);
     return lastError_;
@@ -94,6 +96,7 @@ class Joined {
   void read() {
     v1::ServerMessage message;
     while (stream_->Read(&message)) {
+      if (message.notice().kind() == v1::NOTICE_KIND_ROLLED_BACK) ++rolledBack_;
       if (!message.has_error()) continue;
       const std::lock_guard lock(mutex_);
       lastError_ = message.error().text();
@@ -105,6 +108,7 @@ class Joined {
   std::unique_ptr<grpc::ClientReaderWriter<v1::ClientMessage, v1::ServerMessage>> stream_;
   bool open_;
   std::atomic<bool> ended_{false};
+  std::atomic<int> rolledBack_{0};
   std::mutex mutex_;
   std::string lastError_;
   std::jthread reader_;
@@ -127,5 +131,6 @@ std::span<const Attack> connectionAttacks();
 std::span<const Attack> identityAttacks();
 std::span<const Attack> clientAttacks();
 std::span<const Attack> endpointAttacks();
+std::span<const Attack> handAttacks();
 
 }  // namespace clothstream::attack

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -203,6 +204,33 @@ std::string controlCharacters(const Target& target) {
   return fmt::format("{} names sent", sent);
 }
 
+// Names that look like that of an honest participant. Returns how many different ones others get.
+std::string imitate(const Target& target) {
+  const auto stub = stubOf(target);
+  struct Named {
+    Named(Stub& stub, const std::string& name) : stream(stub.Join(&context)) {
+      v1::ClientMessage message = helloTo("flag");
+      message.mutable_hello()->set_display_name(name);
+      stream->Write(message);
+      while (!welcome.has_welcome() && stream->Read(&welcome)) {
+      }
+    }
+    ~Named() { context.TryCancel(); }
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReaderWriter<v1::ClientMessage, v1::ServerMessage>> stream;
+    v1::ServerMessage welcome;
+  };
+  std::vector<std::unique_ptr<Named>> joined;
+  for (const char* name : {"Ann Lee", "A\u200bnn Lee", "Ann Lee\u2060", "\ufeffAnn Lee", "Ann\u00a0Lee",
+                           "\u3164 Ann Lee", "Ann Lee\u00ad", "Ann Lee\U000e0041"})
+    joined.push_back(std::make_unique<Named>(*stub, name));
+  std::set<std::string> seen;
+  for (const v1::Participant& participant : joined.back()->welcome.welcome().participants())
+    seen.insert(participant.display_name());
+  return fmt::format("{} participants with {} names", joined.back()->welcome.welcome().participants_size(),
+                     seen.size());
+}
+
 constexpr Attack kAttacksMessage[] = {
     {"parameter_changes", "send parameter changes from eight streams without end", &floodChanges,
      "[0-9]+ changes sent; [0-8] of 8 streams stay open"},
@@ -223,6 +251,8 @@ constexpr Attack kAttacksMessage[] = {
      "[0-9]+ refused with code [0-9]+(, [0-9]+ refused with code [0-9]+)*", "--owners-alone"},
     {"control_characters", "join and create scenes with control characters in names", &controlCharacters,
      "[1-9][0-9]* names sent", "--log-level debug --log-rate 50"},
+    {"look_alikes", "join with names that differ from another one only in what nobody sees", &imitate,
+     "8 participants with 1 names"},
     {"log_flood", "join and leave without end, with a log", &floodLog, "[1-9][0-9]* joins",
      "--log-level info --log-rate 50"},
 };

@@ -49,8 +49,8 @@ class Ticks {
 
   void run() {
     if (live_.resetRequested.exchange(false)) {
-      live_.subscribers.announce(delivery::parametersChanged(live_.resetParameters(), tick_ + 1));
       scene_ = live_.start();
+      live_.subscribers.announce(delivery::parametersChanged(live_.revertTo(scene_), tick_ + 1));
     }
     live_.inbox.drain(inputs_);
     for (const scene::AcceptedChange& accepted : inputs_.changes) {

@@ -380,23 +380,5 @@ TEST(Inbox, LimitsWaitingChanges) {
   EXPECT_TRUE(inbox.postChange({}));
 }
 
-TEST(Inbox, KeepsOnlyColliderChanges) {
-  Inbox inbox;
-  v1::ParameterChange message;
-  message.set_air_density(2);
-  message.add_colliders()->set_name("ball");
-  model::ParameterChange both = gravity(-1);
-  both.colliders.emplace_back().name = "ball";
-  ASSERT_TRUE(inbox.postChange({.change = both, .message = message}));
-  ASSERT_TRUE(inbox.postChange({.change = gravity(-3)}));
-  inbox.keepColliderChanges();
-  Inputs inputs;
-  inbox.drain(inputs);
-  ASSERT_EQ(inputs.changes.size(), 1u);
-  EXPECT_FALSE(inputs.changes[0].change.gravity);
-  EXPECT_FALSE(inputs.changes[0].message.has_air_density());
-  EXPECT_EQ(inputs.changes[0].message.colliders_size(), 1);
-}
-
 }  // namespace
 }  // namespace clothstream::scene

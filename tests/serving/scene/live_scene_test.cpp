@@ -170,7 +170,7 @@ TEST(LiveScene, BecomesAGuestWhileItCostsMoreThanAtItsStart) {
   cloth.mutable_solver()->mutable_constraint()->set_iterations(100);
   ASSERT_TRUE(live.change(1, change));
   EXPECT_TRUE(live.isGuest());
-  live.resetParameters();
+  live.revertTo(live.start());
   EXPECT_FALSE(live.isGuest());
 }
 

@@ -221,6 +221,27 @@ TEST_F(RosterTest, EvictsTheLongestDisconnectedWhenFull) {
   EXPECT_FALSE(tryJoin(fourth, {}, first.admission.token).has_value());
 }
 
+TEST_F(RosterTest, OneAddressCannotHoldAllPlaces) {
+  limit = 4;
+  std::vector<Member> members(6);
+  const auto from = [&](std::size_t member, const char* address) {
+    return roster.join({.address = address, .placesOfAddress = 2}, members[member].mailbox, ids, limit, now);
+  };
+  const auto first = from(0, "192.0.2.1");
+  ASSERT_TRUE(first);
+  ASSERT_TRUE(from(1, "192.0.2.1"));
+  EXPECT_EQ(from(2, "192.0.2.1").error(), Roster::Refusal::addressHasMany);
+  EXPECT_TRUE(from(2, "192.0.2.2"));
+  // Whoever is disconnected makes room for others of the address, and comes back while there is room.
+  lose(members[0]);
+  EXPECT_TRUE(from(3, "192.0.2.1"));
+  EXPECT_EQ(roster.size(), 3u);
+  EXPECT_EQ(from(4, "192.0.2.1").error(), Roster::Refusal::addressHasMany);
+  EXPECT_FALSE(roster.knows(first->token));
+  EXPECT_TRUE(from(4, "")) << "programs of this machine have no such limit";
+  EXPECT_EQ(from(5, "").error(), Roster::Refusal::full);
+}
+
 TEST_F(RosterTest, WithoutGracePeriodDisconnectRemovesAtOnce) {
   Member watcher = join(), lost = join();
   ASSERT_TRUE(pose(lost, 1).has_value());

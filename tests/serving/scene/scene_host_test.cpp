@@ -415,7 +415,7 @@ TEST_F(SceneHostTest, ClothThatLeavesTheRangeOfTheStreamIsNotSentAndRollsBack) {
       "5e-05 m: the scene continues from its newest healthy state, at most a second old");
 }
 
-TEST_F(SceneHostTest, SecondUnhealthyStateResetsStateAndParameters) {
+TEST_F(SceneHostTest, SecondUnhealthyStateResetsTheClothsAndUndoesNewChanges) {
   HostedScene hosted;
   hosted.ticks(50);
   hosted.change(gravity(-1e30f));
@@ -432,6 +432,27 @@ TEST_F(SceneHostTest, SecondUnhealthyStateResetsStateAndParameters) {
   EXPECT_EQ(reset.parameter_changed().participant_id(), 0u);
   EXPECT_NEAR(reset.parameter_changed().change().gravity().value().y(), -9.81, 1e-6);
   EXPECT_EQ(hosted.announced.back().notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
+}
+
+TEST_F(SceneHostTest, HandsThatMakeTheStateUnhealthyCostNoParameter) {
+  HostedScene hosted;
+  hosted.change(wind(7));
+  hosted.ticks(50);
+  hosted.announced.clear();
+  const auto grabAt = [&](float x) {
+    hosted.live.inbox.postPoses(
+        9, {.grabs = {{.id = 1, .pose = {Vec3(x, -0.5f, 0), model::Quaternion::Identity()}, .radius = 0.5f}}},
+        hosted.now);
+    hosted.tick();
+  };
+  grabAt(0);
+  EXPECT_TRUE(hosted.host.status().healthy);
+  for (int i = 0; i < 60; ++i) grabAt(i % 2 == 0 ? NAN : 0);  // messages cannot carry it
+  EXPECT_GE(hosted.live.metrics.resets.value(), 1u);
+  hosted.live.inbox.postPoses(9, {}, hosted.now);
+  hosted.ticks(50);
+  EXPECT_TRUE(hosted.host.status().healthy);
+  for (const v1::ServerMessage& message : hosted.announced) EXPECT_FALSE(message.has_parameter_changed());
 }
 
 TEST_F(SceneHostTest, ContinuesOnAnotherDeviceFromTheNewestSnapshot) {

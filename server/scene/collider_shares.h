@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// Divides the room for colliders among participants.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/model/input.h"
+#include "server/model/scene.h"
+
+namespace clothstream::scene {
+
+// Box of all nodes of a scene, m.
+struct ClothBounds {
+  model::Vec3 low, high;
+};
+
+// Weight of a collider: its price as a share of that of a large one, which a third of the nodes are near.
+// `cloth` is null if nothing is known about the place of the cloth.
+//
+// The share of nodes that a small collider can be near follows from its size. A collider that is farther from
+// all cloth than kFarAway weighs next to nothing.
+inline constexpr double kFarWeight = 0.01, kLeastWeight = 0.05;
+inline constexpr float kFarAway = 2;  // m
+double weightOf(const model::ParticipantCollider& collider, const ClothBounds* cloth);
+
+// Whether it is the head or a part of a hand (protocol.md).
+bool isHandOrHead(const model::ParticipantCollider& collider);
+
+// Sums of the weights of colliders.
+struct ColliderLoad {
+  double hands = 0, others = 0;  // hands includes the head
+  bool operator==(const ColliderLoad&) const = default;
+  ColliderLoad& operator+=(const ColliderLoad& other) {
+    hands += other.hands;
+    others += other.others;
+    return *this;
+  }
+};
+ColliderLoad loadOf(std::span<const model::ParticipantCollider> colliders, const ClothBounds* cloth);
+
+// The largest amount that each may have if all together have `room`: whoever needs less leaves the rest to
+// the others. Infinite if there is room for all.
+double fairShare(std::span<const double> needs, double room);
+
+// Removes colliders beyond a share, from the end. Returns whether any was removed.
+bool trim(std::vector<model::ParticipantCollider>& colliders, const ColliderLoad& share,
+          const ClothBounds* cloth);
+
+// Where the room for the colliders of participants comes from. Thread-safe.
+class ColliderBudget {
+ public:
+  virtual ~ColliderBudget() = default;
+  // Room for the hands and heads of all participants together, as a sum of weights.
+  virtual double roomForHands() const = 0;
+  // Room for all other colliders, next to these hands.
+  virtual double roomForOthers(double hands) const = 0;
+  // Charges what the participants have, also beyond the room.
+  virtual void chargeColliders(const ColliderLoad& load) = 0;
+  // Place of the cloth after the newest tick. Returns false if there was none.
+  virtual bool boundsOfCloth(ClothBounds& bounds) const = 0;
+};
+
+}  // namespace clothstream::scene

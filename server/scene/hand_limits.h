@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// Limits of what participants do to cloth in one tick. They bound the energy that a tick can get. Hands,
+// heads and trackers stay far below them.
+#pragma once
+
+#include "server/model/collider.h"
+#include "server/model/scene.h"
+
+namespace clothstream::scene {
+
+// Maximum speed of a collider, a grab or a body part that a participant moves, m/s.
+inline constexpr float kMaxHandSpeed = 30;
+// Maximum rotation in one tick, as the cosine of half the angle (120 degrees).
+inline constexpr float kMaxHandTurn = 0.5f;
+// Depth of a shape that appears, m: cloth inside it leaves by at most this way.
+inline constexpr float kMaxAppearance = 0.25f;
+// Force that every grab may have, N. Heavier cloth may be held more strongly.
+inline constexpr float kLeastMaxForce = 100;
+
+// Least and largest distance of the surface from the middle. Only for the shapes of participants: spheres,
+// capsules and boxes.
+float leastRadius(const model::Shape& shape);
+float largestRadius(const model::Shape& shape);
+// The shape, made thinner where a point of it is deeper inside than `depth`.
+model::Shape thinned(const model::Shape& shape, float depth);
+
+// At least the longest way of a point that is at most `radius` from the origin of the pose.
+float wayOf(float radius, const model::Pose& from, const model::Pose& to);
+// The pose on the way from `from` to `to`, after at most `step` metres of such a point.
+model::Pose towards(float radius, const model::Pose& from, const model::Pose& to, float step);
+
+// Maximum force of a grab, N: it gives all the cloth of the scene kMaxHandSpeed in one tick.
+float maxGrabForce(const model::Scene& scene);
+
+}  // namespace clothstream::scene

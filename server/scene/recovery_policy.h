@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Chooses how a scene continues after a tick whose state is not valid.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+
+namespace clothstream::scene {
+
+// Gives up as little as possible: first the newest second of motion, then the motion since the start, then
+// what participants do to the cloth, and at last the newest changes of parameters. Parameters that a second
+// of valid ticks has proven are never given up.
+//
+// Ticks are numbers that only grow. Not thread-safe.
+class RecoveryPolicy {
+ public:
+  explicit RecoveryPolicy(std::uint32_t ticksPerSecond) : second_(ticksPerSecond) {}
+
+  enum class Cure : std::uint8_t {
+    rollback,       // to the newest valid state
+    reset,          // of the cloths to their start
+    resetAndLetGo,  // the same; colliders, grabs and moved attachments of participants are ignored for a
+                    // second
+    resetAndUndo,   // the same as reset; parameters go back to those that were proven
+  };
+
+  // The parameters have changed since `tick`.
+  void changed(std::uint64_t tick) { changed_ = tick; }
+  // Returns whether the present parameters have just been proven, by a valid `tick`.
+  bool valid(std::uint64_t tick) {
+    const std::uint64_t since = std::max(changed_.value_or(tick), newest_.value_or(0));
+    if (!changed_ || tick - since < second_) return false;
+    changed_.reset();
+    return true;
+  }
+  // Cure for the state of `tick`, which is not valid. `touched`: participants act on the cloth.
+  Cure invalid(std::uint64_t tick, bool touched) {
+    const bool again = newest_ && tick - *newest_ <= second_;
+    newest_ = tick;
+    if (!again) return Cure::rollback;
+    if (touched && !ignores(tick)) {
+      ignoredUntil_ = tick + second_;
+      return Cure::resetAndLetGo;
+    }
+    if (!changed_) return Cure::reset;
+    changed_.reset();
+    return Cure::resetAndUndo;
+  }
+  // Whether what participants do has no effect in the tick after `tick`.
+  bool ignores(std::uint64_t tick) const { return tick < ignoredUntil_; }
+
+  // Newest tick whose state was not valid.
+  std::optional<std::uint64_t> newest() const { return newest_; }
+  void restore(std::optional<std::uint64_t> newest) { newest_ = newest; }
+
+ private:
+  const std::uint64_t second_;            // ticks
+  std::optional<std::uint64_t> changed_;  // the parameters are not proven yet
+  std::optional<std::uint64_t> newest_;
+  std::uint64_t ignoredUntil_ = 0;
+};
+
+}  // namespace clothstream::scene

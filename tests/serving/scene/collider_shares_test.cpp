@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+// How participants share the room for colliders.
+#include "server/scene/collider_shares.h"
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/messages/hands.h"
+#include "tests/serving/scene/roster_test.h"
+#include "tests/serving/small_scene.h"
+
+namespace clothstream::scene {
+namespace {
+
+using model::Vec3;
+using ::testing::HasSubstr;
+using tests::handAt;
+
+const ClothBounds kCurtain{.low = Vec3(-1, 0, -0.1f), .high = Vec3(1, 2, 0.1f)};
+
+model::ParticipantCollider boxAt(std::uint32_t id, float x, float size = 1) {
+  model::ParticipantCollider box = handAt(id, x);
+  box.shape = model::Box{Vec3::Constant(size)};
+  return box;
+}
+
+std::vector<model::ParticipantCollider> boxes(std::uint32_t count, float x) {
+  std::vector<model::ParticipantCollider> all;
+  for (std::uint32_t id = 1; id <= count; ++id) all.push_back(boxAt(id, x));
+  return all;
+}
+
+// The capsules of a hand.
+std::vector<model::ParticipantCollider> hand() {
+  std::vector<model::ParticipantCollider> bones;
+  for (std::uint32_t i = 0; i < messages::kHandBones; ++i) {
+    bones.push_back(handAt(messages::kFirstBoneId + i, 0.2f, 1));
+    bones.back().shape = model::Capsule{.radius = 0.01f, .length = 0.03f};
+  }
+  return bones;
+}
+
+TEST(ColliderShares, CollidersThatCanTouchNothingWeighNextToNothing) {
+  EXPECT_EQ(weightOf(boxAt(1, 990), &kCurtain), kFarWeight);
+  EXPECT_EQ(weightOf(boxAt(1, 0, 3), &kCurtain), 1);
+  EXPECT_EQ(weightOf(boxAt(1, 990), nullptr), 1) << "nothing is known about the cloth";
+  EXPECT_LT(loadOf(boxes(60, 990), &kCurtain).others, 1);
+  EXPECT_EQ(loadOf(boxes(60, 990), &kCurtain).hands, 0);
+}
+
+TEST(ColliderShares, AHandWeighsLessThanTwoLargeColliders) {
+  const ColliderLoad load = loadOf(hand(), &kCurtain);
+  EXPECT_EQ(load.others, 0);
+  EXPECT_LE(load.hands, 2);
+  EXPECT_GT(load.hands, 0.5);
+}
+
+TEST(ColliderShares, WhoNeedsLessLeavesTheRest) {
+  EXPECT_EQ(fairShare(std::vector{1.0, 2.0, 3.0}, 6), INFINITY);
+  EXPECT_DOUBLE_EQ(fairShare(std::vector{60.0, 1.0, 60.0}, 11), 5);
+  EXPECT_DOUBLE_EQ(fairShare(std::vector{60.0, 60.0}, 0), 0);
+  EXPECT_DOUBLE_EQ(fairShare(std::vector{60.0}, -1), 0);
+  EXPECT_EQ(fairShare({}, 1), INFINITY);
+}
+
+TEST(ColliderShares, TrimmingKeepsHands) {
+  std::vector<model::ParticipantCollider> colliders = boxes(20, 0);
+  const std::vector<model::ParticipantCollider> bones = hand();
+  colliders.insert(colliders.end(), bones.begin(), bones.end());
+  const ColliderLoad all = loadOf(colliders, &kCurtain);
+  EXPECT_FALSE(trim(colliders, all, &kCurtain));
+  EXPECT_TRUE(trim(colliders, {.hands = all.hands, .others = all.others / 4}, &kCurtain));
+  EXPECT_EQ(colliders.size(), bones.size() + 5);
+  EXPECT_TRUE(trim(colliders, {.hands = all.hands, .others = 0}, &kCurtain));
+  EXPECT_EQ(colliders.size(), bones.size());
+}
+
+// Room for 12 large colliders, next to any number of hands.
+class Room : public ColliderBudget {
+ public:
+  double roomForHands() const override { return 16; }
+  double roomForOthers(double) const override { return 12; }
+  void chargeColliders(const ColliderLoad& load) override { charged = load; }
+  bool boundsOfCloth(ClothBounds& bounds) const override {
+    bounds = kCurtain;
+    return true;
+  }
+  ColliderLoad charged;
+};
+
+class SharingTest : public ::testing::Test {
+ protected:
+  // Lets a participant send poses. Returns the error.
+  std::string send(Member& member, std::vector<model::ParticipantCollider> colliders) {
+    const auto posted = roster.post(*member.mailbox, {}, {.colliders = std::move(colliders)}, {}, now);
+    return posted ? std::string() : posted.error().text;
+  }
+  // Colliders that a participant has after the next tick; those of the tick before if it has none waiting.
+  std::size_t acting(std::uint64_t id) {
+    Inputs inputs;
+    inbox.drain(inputs);
+    for (const Poses& poses : inputs.poses) has[poses.participant] = poses.now.poses.colliders.size();
+    return has[id];
+  }
+  void join(Member& member) { ASSERT_TRUE(roster.join({}, member.mailbox, ids, 8, now)); }
+
+  Clock::time_point now = Clock::now();
+  std::atomic<std::uint64_t> ids{0};
+  delivery::Subscribers subscribers;
+  Inbox inbox;
+  Room room;
+  Roster roster{subscribers, inbox, nullptr, &room};
+  std::map<std::uint64_t, std::size_t> has;
+};
+
+TEST_F(SharingTest, OneParticipantTakesNothingFromOthers) {
+  Member greedy, other;
+  join(greedy);
+  join(other);
+  const std::string error = send(greedy, [] {
+    std::vector<model::ParticipantCollider> large;
+    for (std::uint32_t id = 1; id <= 60; ++id) large.push_back(boxAt(id, 0, 3));
+    return large;
+  }());
+  EXPECT_THAT(error, HasSubstr("12 of 60 colliders act"));
+  EXPECT_EQ(acting(1), 12u);
+  EXPECT_EQ(send(other, hand()), "");
+  EXPECT_EQ(acting(2), hand().size());
+  // The other one comes with colliders, too: each gets half, at the latest a second later.
+  std::vector<model::ParticipantCollider> four;
+  for (std::uint32_t id = 1; id <= 4; ++id) four.push_back(boxAt(id, 0, 3));
+  EXPECT_EQ(send(other, four), "");
+  EXPECT_EQ(acting(2), 4u);
+  roster.expire(now);
+  EXPECT_EQ(acting(1), 8u);
+  EXPECT_LE(room.charged.others, 12.001);
+  // Whoever leaves gives its share back.
+  roster.leave(*other.mailbox, LeaveReason::left, now);
+  roster.expire(now);
+  EXPECT_EQ(acting(1), 12u);
+}
+
+TEST_F(SharingTest, AReconnectWinsNothing) {
+  Member greedy, back, other;
+  auto admission = roster.join({}, greedy.mailbox, ids, 8, now);
+  ASSERT_TRUE(admission);
+  join(other);
+  std::vector<model::ParticipantCollider> large;
+  for (std::uint32_t id = 1; id <= 60; ++id) large.push_back(boxAt(id, 0, 3));
+  send(greedy, large);
+  large.resize(10);
+  EXPECT_THAT(send(other, large), HasSubstr("6 of 10 colliders act"));
+  ReconnectGrace grace;
+  roster.disconnect(*greedy.mailbox, grace, now);
+  now += grace.poses;
+  roster.expire(now);
+  EXPECT_EQ(acting(2), 10u);
+  ASSERT_TRUE(roster.join({.token = admission->token, .attempt = 1}, back.mailbox, ids, 8, now));
+  EXPECT_EQ(acting(1), 6u);
+  roster.expire(now);
+  EXPECT_EQ(acting(2), 6u);
+}
+
+TEST_F(SharingTest, SaysOnceThatCollidersDoNotAct) {
+  Member greedy;
+  join(greedy);
+  std::vector<model::ParticipantCollider> large;
+  for (std::uint32_t id = 1; id <= 13; ++id) large.push_back(boxAt(id, 0, 3));
+  EXPECT_NE(send(greedy, large), "");
+  EXPECT_EQ(send(greedy, large), "");
+  large.pop_back();
+  EXPECT_EQ(send(greedy, large), "");
+  large.push_back(boxAt(99, 0, 3));
+  EXPECT_NE(send(greedy, large), "");
+}
+
+// Parameters, other scenes and boxes cannot use up the room for hands.
+TEST(ColliderShares, HandsAlwaysHaveRoom) {
+  const model::Scene scene = tests::smallScene();
+  auto budget = std::make_shared<Budget>(BudgetLimits{.sceneLoad = 0, .load = 0});
+  budget->setSpeed({.nodeStepSeconds = 1e-6, .dispatchSeconds = 0, .workgroupFactor = 1});
+  Charge charge(budget, scene, true);
+  EXPECT_GE(charge.roomForHands(scene), 16);
+  EXPECT_EQ(charge.roomForOthers(scene, 0), 0);
+  charge.chargeColliders(scene, {.hands = 16, .others = 0});
+  EXPECT_EQ(budget->usage().load, 0);
+}
+
+TEST(ColliderShares, AScenesCollidersLeaveHalfOfTheFreeLoadToTheNext) {
+  const model::Scene scene = tests::smallScene();
+  const auto budget = std::make_shared<Budget>(BudgetLimits{.sceneLoad = 1e9, .load = 1, .tickSeconds = 0});
+  budget->setSpeed({.nodeStepSeconds = 1e-6, .dispatchSeconds = 0, .workgroupFactor = 1});
+  Charge first(budget, scene, true), second(budget, scene, true);
+  const double room = first.roomForOthers(scene, 0);
+  first.chargeColliders(scene, {.hands = 0, .others = room});
+  EXPECT_NEAR(budget->usage().load, 0.5, 1e-6);
+  EXPECT_NEAR(second.roomForOthers(scene, 0), room / 2, 1e-6 * room);
+  EXPECT_NEAR(first.roomForOthers(scene, 0), room, 1e-6 * room) << "its own colliders count once";
+}
+
+}  // namespace
+}  // namespace clothstream::scene
