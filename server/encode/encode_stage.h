@@ -20,8 +20,10 @@ class EncodeStage {
   virtual std::size_t packetBound() const = 0;
   // Called after a barrier, in the stage "encode".
   virtual void record(vulkan::Recorder& recorder, std::uint32_t slot, bool predicted) = 0;
-  // Called in the order of record().
+  // One of the two is called for each frame, in the order of record(). Later frames stay decodable for
+  // everyone who has their references.
   virtual EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) = 0;
+  virtual void discard(const RecordedFrame& frame) = 0;
 };
 
 std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,

@@ -136,6 +136,7 @@ EncodedFrame FrameEncoder::entropyCode(const RecordedFrame& frame, std::span<std
 }
 
 void FrameEncoder::discard(const RecordedFrame& frame) {
+  state_->stage->discard(frame);
   state_->taken[frame.slot].store(false, std::memory_order_release);
 }
 

@@ -82,9 +82,9 @@ class FrameEncoder {
   void forgetHistory();
 
   // Codes a frame whose recording is complete, in the order of record(). Frees the slot. `out` has at least
-  // packetBound() bytes.
+  // packetBound() bytes. Throws std::runtime_error if the key frame that this frame needs was discarded.
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out);
-  // Frees the slot of a frame that is not coded.
+  // Frees the slot of a frame that is not coded, instead of entropyCode().
   void discard(const RecordedFrame& frame);
 
   std::size_t packetBound() const;

@@ -40,8 +40,21 @@ class HierarchicalDeviceStage final : public EncodeStage {
   }
 
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) override;
+  // The device has predicted later frames with the weights that follow from this one.
+  void discard(const RecordedFrame& frame) override {
+    const codec::FrameRole role = roleOf(frame);
+    beginWeights(frame, role);
+    endWeights(frame, addResiduals(frame.slot));
+  }
 
  private:
+  static codec::FrameRole roleOf(const RecordedFrame& frame) {
+    return {.tick = frame.tick, .kind = frame.kind, .referenceTick = frame.referenceTick};
+  }
+  // Advances the plan of the weights to this frame. Returns the bytes of its weights.
+  std::size_t beginWeights(const RecordedFrame& frame, const codec::FrameRole& role);
+  // Fits the weights of later frames. `any`: the frame has residuals.
+  void endWeights(const RecordedFrame& frame, bool any);
   // These give the writer all residuals of a frame, or of one phase. They return whether a vertex stays or
   // has a residual that is not 0.
   bool addResiduals(std::uint32_t slot);
@@ -85,20 +98,28 @@ bool HierarchicalDeviceStage::addPhase(std::uint32_t slot, const Phase& phase) {
   return any;
 }
 
-EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, std::span<std::byte> out) {
+std::size_t HierarchicalDeviceStage::beginWeights(const RecordedFrame& frame, const codec::FrameRole& role) {
   const bool key = frame.kind == codec::PacketKind::key;
-  const codec::FrameRole role{.tick = frame.tick, .kind = frame.kind, .referenceTick = frame.referenceTick};
-  const shared::SlotStatus& status = predictor_.status(frame.slot);
   sinceKey_ = key ? 0 : sinceKey_ + 1;
   plan_.begin(role);
-  const std::size_t weightBytes = plan_.write(!key && status.moved == 0, weightBytes_.data());
-  const bool any = addResiduals(frame.slot);
-  const std::size_t bytes = writer_->write(role, std::span(weightBytes_).first(weightBytes), out);
+  return plan_.write(!key && predictor_.status(frame.slot).moved == 0, weightBytes_.data());
+}
+
+void HierarchicalDeviceStage::endWeights(const RecordedFrame& frame, bool any) {
   std::array<Phase, FitSchedule::kMaxChunks> chunks;
   const std::size_t count = fitted_.select(sinceKey_, chunks);
   for (std::size_t i = 0; i < count; ++i)
     plan_.add(chunks[i].weightClass, predictor_.products(frame.slot, i));
   plan_.end(!any);
+}
+
+EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, std::span<std::byte> out) {
+  const codec::FrameRole role = roleOf(frame);
+  const shared::SlotStatus& status = predictor_.status(frame.slot);
+  const std::size_t weightBytes = beginWeights(frame, role);
+  const bool any = addResiduals(frame.slot);
+  const std::size_t bytes = writer_->write(role, std::span(weightBytes_).first(weightBytes), out);
+  endWeights(frame, any);
   return {.bytes = bytes,
           .reconstructionHash = std::uint64_t{status.hashHigh} << 32 | status.hashLow,
           .layer = role.layer,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Prediction on the host: the device only copies positions, and normals if they are sent.
 #include <array>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -41,12 +42,21 @@ class HierarchicalHostStage final : public EncodeStage {
     unpack(slot.positions, positions_);
     if (!normals_.empty()) unpack(slot.normals, normals_);
     // Earlier frames may belong to a history that was dropped, with later ticks.
-    if (frame.kind == codec::PacketKind::key) encoder_->forgetHistory();
+    if (frame.kind == codec::PacketKind::key)
+      encoder_->forgetHistory();
+    else if (lacksKey_)
+      throw std::runtime_error("the key frame before it was discarded");
+    lacksKey_ = false;
     const std::size_t bytes = encoder_->encode(frame.tick, frame.kind, positions_, normals_, out);
     return {.bytes = bytes,
             .reconstructionHash = encoder_->reconstructionHash(),
             .layer = encoder_->layer(),
             .referenceTick = encoder_->referenceTick()};
+  }
+
+  // Later frames refer to the newest frame that was coded.
+  void discard(const RecordedFrame& frame) override {
+    lacksKey_ = lacksKey_ || frame.kind == codec::PacketKind::key;
   }
 
  private:
@@ -67,6 +77,7 @@ class HierarchicalHostStage final : public EncodeStage {
   const simulation::ClothSimulation& simulation_;
   std::unique_ptr<codec::Encoder> encoder_;
   std::vector<float> positions_, normals_;
+  bool lacksKey_ = false;  // the newest key frame was discarded
   std::array<Slot, kFrameSlots> slots_;
 };
 

@@ -179,6 +179,34 @@ TEST_P(DevicePrediction, EqualsTheReferenceForEveryNumberOfWaitingFrames) {
   }
 }
 
+// A frame is discarded if there is no memory for its packet.
+TEST_P(DevicePrediction, EqualsTheReferenceAfterDiscardedFrames) {
+  const model::Scene scene = squareOf(24, GetParam());
+  simulation::ClothSimulation simulation(device(), scene);
+  const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
+  encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
+  const auto reference = codec::Encoder::make(layout, {.weightLag = encode::kWeightLag});
+  vulkan::Recorder recorder(device());
+  std::vector<std::byte> packet(encoder.packetBound()), expected(reference->packetBound());
+  const std::set<std::uint64_t> keys{1, 13, 26}, discarded{4, 5, 12, 13, 20, 31};
+  for (std::uint64_t tick = 1; tick <= 40; ++tick) {
+    const std::vector<float> positions = codec::sampleMotion(layout, tick, 0.03f).positions;
+    recorder.begin();
+    simulation.recordRestoreState(recorder, simulation::pack(Playing::stateOf(positions), tick));
+    const encode::RecordedFrame frame = encoder.record(recorder, tick, keys.contains(tick));
+    submitAndWait(device(), recorder);
+    const std::size_t bytes = reference->encode(tick, frame.kind, positions, {}, expected);
+    if (discarded.contains(tick)) {
+      encoder.discard(frame);
+      continue;
+    }
+    const encode::EncodedFrame encoded = encoder.entropyCode(frame, packet);
+    ASSERT_TRUE(std::ranges::equal(std::span(packet).first(encoded.bytes), std::span(expected).first(bytes)))
+        << tick;
+    EXPECT_EQ(encoded.reconstructionHash, reference->reconstructionHash()) << tick;
+  }
+}
+
 TEST_P(DevicePrediction, EqualsTheReferenceIfAnotherThreadCodes) {
   const model::Scene scene = squareOf(20, GetParam());
   simulation::ClothSimulation simulation(device(), scene);
