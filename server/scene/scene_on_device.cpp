@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "server/scene/live_scene.h"
 
 namespace clothstream::scene {
@@ -26,7 +28,13 @@ SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene,
       encoders(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch), &workers),
       recorder(device_),
       sliceInvocations_(device_.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice) {
-  recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_));
+  const std::uint32_t most = device.limits().maxAllocations;
+  if (device.allocations() + kSpareAllocations > most)
+    throw std::runtime_error(
+        fmt::format("its buffers would leave fewer than {} of the {} allocations of memory that {} allows: "
+                    "delete a scene first",
+                    kSpareAllocations, most, device.info().name));
+  sliceRecordings();
   recorder.begin();
   simulation.recordSaveState(recorder);
   submitAndWait();

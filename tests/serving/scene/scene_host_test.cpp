@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,19 @@ using tests::smallScene;
 using tests::wind;
 
 class SceneHostTest : public tests::GpuTest {};
+
+TEST_F(SceneHostTest, RefusesASceneThatLeavesTooFewAllocations) {
+  vulkan::Device few({.maxAllocations = SceneOnDevice::kSpareAllocations + 10});
+  LiveScene live(smallScene(), false);
+  delivery::FramePublisher publisher(1, [] {});
+  try {
+    const SceneHost host(few, live, publisher);
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& refused) {
+    EXPECT_NE(std::string(refused.what()).find("allocations of memory"), std::string::npos) << refused.what();
+  }
+  EXPECT_EQ(few.allocations(), 0u);
+}
 
 TEST_F(SceneHostTest, SameInputsGiveTheSameStatesForAnySubscribers) {
   const auto simulate = [](std::size_t subscribers) {
