@@ -75,6 +75,14 @@ void DeviceThread::simulateDeviceLossIn(std::string scene) {
   losesDeviceIn_ = std::move(scene);
 }
 
+void DeviceThread::simulateFailure() {
+  {
+    const std::lock_guard lock(mutex_);
+    fail_ = true;
+  }
+  changed_.notify_all();
+}
+
 void DeviceThread::checkSimulatedLoss(const Run& run) const {
   const std::lock_guard lock(mutex_);
   if (!losesDeviceIn_.empty() && losesDeviceIn_ == run.scene->name())
@@ -267,11 +275,13 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       runDueTicks();
       runSlice();
       readStates();
-    } catch (const std::exception& failure) {
-      // A lack of memory may also end the attempt.
+    } catch (const vulkan::DeviceLost& failure) {
+      // A lack of memory may end the attempt.
       schedule::retryUntilDone(
           [&] { rebuildDevice(failure.what()); },
           [](const std::exception& again) { spdlog::error("device: {}; trying again", again.what()); });
+    } catch (const std::exception& failure) {
+      endure(failure);
     }
   }
   abandonLoading();
@@ -304,6 +314,14 @@ void DeviceThread::saveLast() {
   }
 }
 
+void DeviceThread::endure(const std::exception& failure) {
+  try {
+    spdlog::error("device thread: {}; trying again", failure.what());
+  } catch (const std::exception&) {  // memory may be missing for the text
+  }
+  std::this_thread::sleep_for(schedule::kRetryPause);
+}
+
 bool DeviceThread::waitForWork() {
   deviceMemory_ = device_ ? device_->allocatedBytes() : 0;
   lastAnswer_ = Clock::now();
@@ -311,7 +329,7 @@ bool DeviceThread::waitForWork() {
   const Clock::time_point guestsFrom = scheduler_.guestsFrom(schedules(), lastAnswer_);
   for (const auto& run : runs_)
     due = std::min(due, run->guest && run->running ? std::max(run->due(), guestsFrom) : run->due());
-  const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
+  const auto something = [&] { return stopping_ || woken_ || loseDevice_ || fail_; };
 
   std::unique_lock lock(mutex_);
   if (due != Clock::time_point::max())
@@ -508,8 +526,11 @@ void DeviceThread::runDueTicks() {
   }
   Clock::time_point before = Clock::now();
   scheduler_.choose(schedules(), before, chosen_);
+    if (std::exchange(fail_, false)) throw std::runtime_error("a failure is simulated");
   const bool oneByOne = std::ranges::any_of(runs_, [&](const auto& run) { return run->aloneUntil > before; });
   for (schedule::TickSchedule* due : chosen_) {
+  // Slices that an exception kept from being waited for.
+  for (const auto& run : runs_) waitForFirstSlice(*run, before);
     Run& run = static_cast<Run&>(*due);
     run.used = {};
     run.begun = run.inFlight = survives(run, [&] { begin(run, Clock::now()); });
@@ -593,11 +614,7 @@ void DeviceThread::rebuildScene(Run& run, const std::string& reason) {
   publisher_.drain();
   device_->drain();
   const std::uint64_t ticks = run.host->tick();
-  if (run.failed && ticks - *run.failed < run.scene->start().simulationRate) return dismiss(run, reason);
-  run.failed = ticks;
-  run.rebuildFailed = false;
-  run.begun = false;
-  run.rebuiltAfter = "a tick failed";
+  // The scene is off the device before anything here can fail.
   run.host->release();
   wake();
 }

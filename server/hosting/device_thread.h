@@ -45,9 +45,9 @@ using schedule::Clock;
 // Device loss: a new device is created. This is tried once a second until it succeeds. The scenes are then
 // loaded again one by one, the default scene first, then those with the most subscribers. Each continues from
 // its newest snapshot on the CPU as soon as it is loaded, while others are still being loaded. If a tick
-// fails in another way, only its scene is rebuilt like this. A scene is given up if a tick fails again within
-// a simulated second, or if rebuilding it fails twice: all participants are dismissed, and the next join
-// starts it from the beginning.
+// fails in another way, only its scene is rebuilt like this. Any other exception, such as for a lack of
+// memory, costs a short pause. A scene is given up if a tick fails again within a simulated second, or if
+// rebuilding it fails twice: all participants are dismissed, and the next join starts it from the beginning.
 //
 // With `adaptsToLoad`, a scene whose ticks do not fit its share of the device does less work
 // (schedule::OverloadPolicy).
@@ -113,6 +113,8 @@ class DeviceThread {
   // Treats the device as lost whenever it has loaded this scene or has worked on a tick of it. An empty name
   // ends this. For tests.
   void simulateDeviceLossIn(std::string scene);
+  // Throws an exception that belongs to no scene, once before the next tick. For tests.
+  void simulateFailure();
 
  private:
   struct Run : schedule::TickSchedule {
@@ -223,6 +225,8 @@ class DeviceThread {
   // Accounts for the time since `before`, and finishes the tick if it has no more slices.
   void endSlice(Run& run, Clock::time_point before);
   // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost,
+  // Reports a failure that belongs to no scene, such as a lack of memory. Nothing is lost by it.
+  static void endure(const std::exception& failure);
   // and counts that as the scene's.
   bool survives(Run& run, const std::function<void()>& partOfTick);
   // Throws vulkan::DeviceLost if simulateDeviceLossIn() asks for that.
@@ -249,7 +253,7 @@ class DeviceThread {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   // Initially woken, because a scene may run without subscribers.
-  bool stopping_ = false, woken_ = true, loseDevice_ = false;
+  bool stopping_ = false, woken_ = true, loseDevice_ = false, fail_ = false;
   std::string losesDeviceIn_;
   vulkan::DeviceInfo info_;
   std::vector<std::packaged_task<void()>> tasks_;
