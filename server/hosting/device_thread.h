@@ -52,11 +52,11 @@ using schedule::Clock;
 // With `adaptsToLoad`, a scene whose ticks do not fit its share of the device does less work
 // (schedule::OverloadPolicy).
 //
-// A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), or if the device
-// is lost twice within kLossWindow while it works on this scene: runs a tick, or loads it. A scene that the
-// server started with gets a second chance, because a participant's change may be the reason: the first time
-// it is given up, so that the next join starts it with its own parameters. A scene that add() loads is
-// refused if the device is lost meanwhile.
+// A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), also in the
+// middle of a tick, or if the device is lost twice within kLossWindow while it works on this scene: runs a
+// tick, or loads it. A scene that the server started with gets a second chance, because a participant's
+// change may be the reason: the first time it is given up, so that the next join starts it with its own
+// parameters. A scene that add() loads is refused if the device is lost meanwhile.
 //
 // If the device worked on several scenes when it was lost, none of them is to blame yet. If that happens
 // again within kLossWindow, each of them runs alone for kLossWindow: the device works on nothing else
@@ -173,6 +173,7 @@ class DeviceThread {
     bool hasHarmed = false;          // it was given up once instead of a quarantine
     schedule::SlowWatch slow;
     schedule::PriceWatch price;
+    double tickPrice = 0;  // s, of the newest tick
     schedule::OverloadPolicy overload;
     double slippedBefore = 0;  // ticks by which simulated time fell behind before the current tick
     double slipped = 0;        // ticks that are not counted yet, below 1
@@ -203,8 +204,14 @@ class DeviceThread {
   void measureSpeed();
   // Lets the scene do less work if it overloads the device, and more if there is room again.
   void adaptToLoad(Run& run, Clock::time_point now);
-  // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
-  void checkPrice(Run& run);
+  // Puts the scene into quarantine if it takes far more than its price; it may be in the middle of a tick,
+  // with no slice in flight. `isLate`: PriceWatch says so, on a device of the speed that it assumes. Throws
+  // vulkan::DeviceLost.
+  void checkPrice(Run& run, bool isLate);
+  // Returns whether the device works for anything but ticks.
+  bool isDisturbed() const;
+  // Gives the time of this thread at the start of a tick to the scene, other than its commands.
+  void chargeMaking(Run& run, Clock::time_point& deviceFree);
   // Stops a scene that harms others; a scene of the server is only given up the first time.
   void quarantine(Run& run, const std::string& why);
   // Makes the host of a scene that is loaded, or gives it the new device.
@@ -218,6 +225,8 @@ class DeviceThread {
   // Schedules of all scenes, valid until the next call.
   std::span<schedule::TickSchedule* const> schedules();
   void runDueTicks();
+  // Reports a failure that belongs to no scene, such as a lack of memory. Nothing is lost by it.
+  static void endure(const std::exception& failure);
   // Waits for the first slice of a tick that began when the device was busy until `deviceFree`.
   void waitForFirstSlice(Run& run, Clock::time_point& deviceFree);
   // Runs one slice of a tick that has begun and takes longer than a slice.
@@ -225,8 +234,6 @@ class DeviceThread {
   // Accounts for the time since `before`, and finishes the tick if it has no more slices.
   void endSlice(Run& run, Clock::time_point before);
   // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost,
-  // Reports a failure that belongs to no scene, such as a lack of memory. Nothing is lost by it.
-  static void endure(const std::exception& failure);
   // and counts that as the scene's.
   bool survives(Run& run, const std::function<void()>& partOfTick);
   // Throws vulkan::DeviceLost if simulateDeviceLossIn() asks for that.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 #include <vector>
 
 #include "kernels/apply_velocities.h"
@@ -95,7 +96,6 @@ constexpr std::uint32_t kPrepareWork = 12;
 
 // lavapipe allows an invocation 65,535 loop rounds, over all loops together. Beyond that it ends each loop
 // after one round.
-std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
 WholeLimits wholeLimits(const vulkan::Device& device, const SolveCut& cut) {
   return {.nodes = cut.wholeNodes,
           .workgroup = cut.iterationWorkgroup,
@@ -103,6 +103,7 @@ WholeLimits wholeLimits(const vulkan::Device& device, const SolveCut& cut) {
           .mostLoops = device.isSoftware() ? 65'535 : ~0u};
 }
 
+std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
                                     const SolveCut& cut) {
   const std::uint32_t nodes = std::max(1u, group.smallChunks * kChunkNodes);
   const std::uint32_t most = std::max(1u, nodesPerDispatch(device) / nodes);
@@ -199,7 +200,7 @@ struct SolveStage::Kernels {
   StretchedKernels stretched;
 };
 
-// Everything whose size follows from the cloths, and its bindings.
+// With the bindings.
 struct SolveStage::Systems {
   // A group with its bindings, one for each index of the state buffer that has the state.
   struct Group {
@@ -348,8 +349,7 @@ SolveStage::SolveStage(const vulkan::Device& device, std::span<const model::Clot
           device, cutSolves(device, workgroupSize, wholeNodes),
           stretchedLimits(device, workgroupSize,
                           wholeNodes.value_or(CLOTHSTREAM_STRETCHED_CHUNKS * kChunkNodes)))) {
-  makeTables(cloths);
-  takeTables();
+  systems_ = makeSystems(cloths);
 }
 
 SolveStage::~SolveStage() = default;
@@ -360,8 +360,8 @@ std::shared_ptr<SolveStage::Systems> SolveStage::makeSystems(std::span<const mod
   return tables.systems.empty() ? nullptr : std::make_shared<Systems>(device_, tables, state_, *kernels_);
 }
 
-void SolveStage::takeTables() {
-  systems_ = std::move(nextSystems_);
+std::shared_ptr<SolveStage::Systems> SolveStage::exchange(std::shared_ptr<Systems> systems) {
+  return std::exchange(systems_, std::move(systems));
 }
 
 void SolveStage::recordTables(vulkan::Recorder& recorder) const {
