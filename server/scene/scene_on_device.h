@@ -37,6 +37,7 @@ struct SceneOnDevice {
 
  private:
   double sliceInvocations_;
+  void sliceRecordings();
   void submitAndWait();
   // Runs everything that a tick and a frame may need. Software devices compile a kernel when it first runs,
   // which takes up to tenths of a second. Leaves the start state.

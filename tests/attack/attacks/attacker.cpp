@@ -170,7 +170,7 @@ std::span<const Attack> attacks() {
   static const std::vector<Attack> all = [] {
     std::vector<Attack> attacks;
     for (const auto part : {workAttacks(), contentAttacks(), messageAttacks(), connectionAttacks(),
-                            identityAttacks(), clientAttacks()})
+                            identityAttacks(), clientAttacks(), hiddenCostAttacks()})
       attacks.insert(attacks.end(), part.begin(), part.end());
     return attacks;
   }();
