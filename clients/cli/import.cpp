@@ -171,10 +171,9 @@ ExitCode importStates(const ImportOptions& options) {
   Import importing(options, **motion);
   const auto frames = importing.run();
   if (!frames) return printError(frames.error());
-  print(
-      "{}: {} frames, {} vertices; every vertex is within {:.3g} m of its place, promised were {:.3g} m\n",
-      options.output, *frames, (*motion)->surface().vertexCount(), importing.largestError(),
-      importing.promise());
+  print("{}: {} frames, {} vertices; every vertex is within {:.3g} m of its place, promised were {:.3g} m\n",
+        options.output, *frames, (*motion)->surface().vertexCount(), importing.largestError(),
+        importing.promise());
   return kOk;
 }
 

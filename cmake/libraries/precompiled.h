@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Headers of other projects, and of the messages, that most rooms read. The compiler reads them once for all rooms.
+// Headers of other projects, and of the messages, that most rooms read. The compiler reads them once for all
+// rooms.
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -32,8 +35,6 @@
 #include <variant>
 #include <vector>
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "server/delivery/frame_publisher.h"
 
-#include <cassert>
 #include <exception>
 #include <span>
 #include <utility>
@@ -35,8 +34,8 @@ FramePublisher::~FramePublisher() {
 
 void FramePublisher::push(CompleteFrame& frame) {
   {
-    const std::lock_guard lock(mutex_);
-    assert(waiting_ < ring_.size());
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return waiting_ < ring_.size(); });
     std::swap(ring_[(first_ + waiting_++) % ring_.size()], frame);
   }
   changed_.notify_all();
@@ -67,6 +66,7 @@ void FramePublisher::run() {
       }
     }
     if (busy_) {
+      changed_.notify_all();
       encode();
       const std::lock_guard lock(mutex_);
       busy_ = false;

@@ -47,16 +47,16 @@ struct CompleteFrame {
 // Owns the thread that encodes and publishes. push() and drain() belong to the device's thread.
 class FramePublisher {
  public:
-  // At most `capacity` frames wait: the number of slots in all encoders. `everySecond` is called about once a
-  // second on the publisher's thread. `encoderThreads` is the number of threads, the publisher's included,
-  // that predict large frames.
+  // At most `capacity` frames wait, at least 1. The number of slots in all encoders is enough for push()
+  // never to wait. `everySecond` is called about once a second on the publisher's thread. `encoderThreads` is
+  // the number of threads, the publisher's included, that predict large frames.
   FramePublisher(std::size_t capacity, std::function<void()> everySecond, std::uint32_t encoderThreads = 1);
   // Publishes the frames that wait, then ends.
   ~FramePublisher();
   FramePublisher(const FramePublisher&) = delete;
   FramePublisher& operator=(const FramePublisher&) = delete;
 
-  // Swaps `frame` with an older one, whose memory the caller reuses.
+  // Swaps `frame` with an older one, whose memory the caller reuses. Waits while `capacity` frames wait.
   void push(CompleteFrame& frame);
   // Returns when every frame is published. No encoder and no scene of a pushed frame is used after that.
   void drain();

@@ -24,18 +24,24 @@ tl::unexpected<v1::Error> cannotAdd(v1::ErrorCode code, std::string text) {
 
 }  // namespace
 
-tl::expected<void, v1::Error> SceneServer::State::roomFor(const std::string& name, const std::string& tenant,
-                                                          bool isNew) {
-  const std::vector<std::shared_ptr<scene::LiveScene>> present = scenesNow();
+tl::expected<SceneServer::State::HeldPlace, v1::Error> SceneServer::State::takePlace(
+    const std::string& name, const std::string& tenant, bool isNew) {
+  if (isNew && otherServerOf(name))
+    return cannotAdd(
+        v1::ERROR_CODE_INVALID_ARGUMENT,
+        fmt::format("createScene: another server of the fleet has a scene '{}'; choose another name", name));
+  const std::lock_guard lock(mutex);
   const auto created = static_cast<std::uint32_t>(
-      std::ranges::count_if(present, [](const auto& scene) { return scene->created; }));
+      std::ranges::count_if(scenes, [](const auto& scene) { return scene->created; }) + std::ssize(places));
   if (created >= options.maxCreatedScenes) {
     metrics.refuse(telemetry::Refusal::createdScenes);
     return cannotAdd(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                      fmt::format("the server has {} created scenes, its maximum: delete one first", created));
   }
-  const auto ofTenant = static_cast<std::uint32_t>(std::ranges::count_if(
-      present, [&](const auto& scene) { return scene->created && scene->tenant == tenant; }));
+  const auto ofTenant = static_cast<std::uint32_t>(
+      std::ranges::count_if(scenes,
+                            [&](const auto& scene) { return scene->created && scene->tenant == tenant; }) +
+      std::ranges::count(places, tenant, &Place::tenant));
   if (ofTenant >= scenesPerTenant()) {
     metrics.refuse(telemetry::Refusal::scenesOfTenant);
     return cannotAdd(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
@@ -43,20 +49,23 @@ tl::expected<void, v1::Error> SceneServer::State::roomFor(const std::string& nam
                                  "delete one first",
                                  ofTenant));
   }
-  if (std::ranges::any_of(present, [&](const auto& scene) { return scene->name() == name; }))
+  if (std::ranges::any_of(scenes, [&](const auto& scene) { return scene->name() == name; }) ||
+      std::ranges::count(places, name, &Place::name) > 0)
     return cannotAdd(v1::ERROR_CODE_INVALID_ARGUMENT,
                      fmt::format("createScene: a scene '{}' exists already; choose another name", name));
-  if (isNew && otherServerOf(name))
-    return cannotAdd(
-        v1::ERROR_CODE_INVALID_ARGUMENT,
-        fmt::format("createScene: another server of the fleet has a scene '{}'; choose another name", name));
-  return {};
+  places.push_back({++newestPlace, name, tenant});
+  return HeldPlace(*this, newestPlace);
+}
+
+void SceneServer::State::leavePlace(std::uint64_t number) {
+  const std::lock_guard lock(mutex);
+  std::erase_if(places, [&](const Place& place) { return place.number == number; });
 }
 
 tl::expected<std::shared_ptr<scene::LiveScene>, std::string> SceneServer::State::prepareArrival(
     scene::SavedScene saved) {
-  if (auto room = roomFor(saved.start.name, saved.tenant, false); !room)
-    return tl::unexpected(room.error().text());
+  auto place = takePlace(saved.start.name, saved.tenant, false);
+  if (!place) return tl::unexpected(place.error().text());
   const auto scene = std::make_shared<scene::LiveScene>(
       saved.start, true, options.journals ? options.journals(saved.start) : nullptr,
       std::min(saved.maxParticipants, options.maxParticipants), budget);
@@ -71,12 +80,12 @@ tl::expected<std::shared_ptr<scene::LiveScene>, std::string> SceneServer::State:
     scene->discharge();
     return tl::unexpected(fmt::format("the device cannot run it: {}", failure.what()));
   }
+  place->keep();
   return scene;
 }
 
 void SceneServer::State::startArrived(const std::shared_ptr<scene::LiveScene>& scene,
                                       scene::SavedScene saved) {
-  if (find(scene->name())) throw std::runtime_error("a scene of this name was created meanwhile");
   raiseNewestParticipant(saved);
   scene->restore(std::move(saved), options.reconnectGrace, Clock::now());
   keep(scene);
@@ -88,6 +97,8 @@ void SceneServer::State::startArrived(const std::shared_ptr<scene::LiveScene>& s
 
 void SceneServer::State::abandonArrival(const std::shared_ptr<scene::LiveScene>& scene) {
   removeCreated(scene, nullptr);
+  const std::lock_guard lock(mutex);
+  std::erase_if(places, [&](const Place& place) { return place.name == scene->name(); });
 }
 
 void SceneServer::State::removeCreated(const std::shared_ptr<scene::LiveScene>& scene,

@@ -75,6 +75,14 @@ void DeviceThread::simulateDeviceLossIn(std::string scene) {
   losesDeviceIn_ = std::move(scene);
 }
 
+void DeviceThread::simulateFailure() {
+  {
+    const std::lock_guard lock(mutex_);
+    fail_ = true;
+  }
+  changed_.notify_all();
+}
+
 void DeviceThread::checkSimulatedLoss(const Run& run) const {
   const std::lock_guard lock(mutex_);
   if (!losesDeviceIn_.empty() && losesDeviceIn_ == run.scene->name())
@@ -267,11 +275,13 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       runDueTicks();
       runSlice();
       readStates();
-    } catch (const std::exception& failure) {
-      // A lack of memory may also end the attempt.
+    } catch (const vulkan::DeviceLost& failure) {
+      // A lack of memory may end the attempt.
       schedule::retryUntilDone(
           [&] { rebuildDevice(failure.what()); },
           [](const std::exception& again) { spdlog::error("device: {}; trying again", again.what()); });
+    } catch (const std::exception& failure) {
+      endure(failure);
     }
   }
   abandonLoading();
@@ -304,6 +314,14 @@ void DeviceThread::saveLast() {
   }
 }
 
+void DeviceThread::endure(const std::exception& failure) {
+  try {
+    spdlog::error("device thread: {}; trying again", failure.what());
+  } catch (const std::exception&) {  // memory may be missing for the text
+  }
+  std::this_thread::sleep_for(schedule::kRetryPause);
+}
+
 bool DeviceThread::waitForWork() {
   deviceMemory_ = device_ ? device_->allocatedBytes() : 0;
   lastAnswer_ = Clock::now();
@@ -311,7 +329,7 @@ bool DeviceThread::waitForWork() {
   const Clock::time_point guestsFrom = scheduler_.guestsFrom(schedules(), lastAnswer_);
   for (const auto& run : runs_)
     due = std::min(due, run->guest && run->running ? std::max(run->due(), guestsFrom) : run->due());
-  const auto something = [&] { return stopping_ || woken_ || loseDevice_; };
+  const auto something = [&] { return stopping_ || woken_ || loseDevice_ || fail_; };
 
   std::unique_lock lock(mutex_);
   if (due != Clock::time_point::max())
@@ -405,21 +423,24 @@ void DeviceThread::adaptToLoad(Run& run, Clock::time_point now) {
        .own = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(own)),
        .share = schedule::shareOf(run, schedules()),
        .idle = idle_,
-       .disturbed = std::ranges::any_of(runs_, [](const auto& other) { return other->loading.valid(); })},
+       .disturbed = isDisturbed() || run.host->makingTime() > Clock::duration::zero()},
       leastSubsteps);
   if (changed) run.host->setWork(run.overload.level());
 }
 
-// Waiting for other work, such as the kernels of a scene that is loaded, does not count.
-void DeviceThread::checkPrice(Run& run) {
-  const double price = run.scene->tickWork(run.host->colliders()).seconds(budget_.speed());
-  const double seconds = run.host->deviceSeconds().value_or(schedule::seconds(run.used));
-  if (!run.price.note(seconds, price)) return;
+bool DeviceThread::isDisturbed() const {
+  return std::ranges::any_of(runs_, [](const auto& run) { return run->loading.valid(); });
+}
+
+void DeviceThread::checkPrice(Run& run, bool isLate) {
+  if (!isLate) return;
   const model::DeviceSpeed now = meter_->measure();
   const double slowdown =
       std::max(now.nodeStepSeconds / speed_.nodeStepSeconds, now.dispatchSeconds / speed_.dispatchSeconds);
   if (run.price.isExcessive(slowdown))
-    stop(run, fmt::format("a tick took {:.3f} s, and its price is {:.3f} s", seconds, price));
+    stop(run, fmt::format("its ticks take far longer than their price of {:.3f} s; the newest one has "
+                          "taken {:.3f} s{}",
+                          run.tickPrice, schedule::seconds(run.used), run.begun ? " so far" : ""));
 }
 
 void DeviceThread::stop(Run& run, const std::string& why) {
@@ -522,17 +543,29 @@ void DeviceThread::runDueTicks() {
   {
     const std::lock_guard lock(mutex_);
     if (std::exchange(loseDevice_, false)) throw vulkan::DeviceLost("the loss of the device is simulated");
+    if (std::exchange(fail_, false)) throw std::runtime_error("a failure is simulated");
   }
   Clock::time_point before = Clock::now();
+  // Slices that an exception kept from being waited for.
+  for (const auto& run : runs_) waitForFirstSlice(*run, before);
   scheduler_.choose(schedules(), before, chosen_);
   const bool oneByOne = std::ranges::any_of(runs_, [&](const auto& run) { return run->aloneUntil > before; });
   for (schedule::TickSchedule* due : chosen_) {
     Run& run = static_cast<Run&>(*due);
     run.used = {};
     run.begun = run.inFlight = survives(run, [&] { begin(run, Clock::now()); });
+    if (run.begun) chargeMaking(run, before);
     if (oneByOne) waitForFirstSlice(run, before);
   }
   for (schedule::TickSchedule* due : chosen_) waitForFirstSlice(static_cast<Run&>(*due), before);
+}
+
+// The scenes whose slices this thread waits for afterwards are not charged for it.
+void DeviceThread::chargeMaking(Run& run, Clock::time_point& deviceFree) {
+  const Clock::duration making = run.host->makingTime();
+  run.used += making;
+  scheduler_.used(run, making);
+  deviceFree = std::min(deviceFree + making, Clock::now());
 }
 
 void DeviceThread::waitForFirstSlice(Run& run, Clock::time_point& deviceFree) {
@@ -566,12 +599,15 @@ void DeviceThread::endSlice(Run& run, Clock::time_point before) {
   const Clock::duration time = run.served - before;
   run.used += time;
   scheduler_.used(run, time);
-  if (run.host->hasSlices() || !survives(run, [&] { run.host->finish(); })) return;
+  // While a scene is loaded, its kernels lengthen slices. The end of the tick shows what the device did.
+  const bool isLate = run.price.addSlice(schedule::seconds(time)) && !isDisturbed();
+  if (run.host->hasSlices()) return checkPrice(run, isLate);
+  if (!survives(run, [&] { run.host->finish(); })) return;
   run.begun = false;
   const Clock::time_point ended = Clock::now();
   run.tickEnded(run.used, ended);
   adaptToLoad(run, ended);
-  checkPrice(run);
+  checkPrice(run, run.price.end(run.host->deviceSeconds()));
 }
 
 bool DeviceThread::survives(Run& run, const std::function<void()>& partOfTick) {
@@ -606,17 +642,18 @@ void DeviceThread::countLoss(const Run& noticed) {
 }
 
 void DeviceThread::rebuildScene(Run& run, const std::string& reason) {
-  telemetry::log({run.scene->name()}, spdlog::level::err, "a tick failed: {}", reason);
   publisher_.drain();
   device_->drain();
   const std::uint64_t ticks = run.host->tick();
-  if (run.failed && ticks - *run.failed < run.scene->start().simulationRate) return dismiss(run, reason);
-  run.failed = ticks;
-  run.rebuildFailed = false;
-  run.begun = false;
-  run.rebuiltAfter = "a tick failed";
+  // The scene is off the device before anything here can fail.
   run.host->release();
+  run.begun = run.inFlight = false;
+  run.rebuiltAfter = "a tick failed";
+  run.rebuildFailed = false;
+  const std::optional<std::uint64_t> before = std::exchange(run.failed, ticks);
   wake();
+  telemetry::log({run.scene->name()}, spdlog::level::err, "a tick failed: {}", reason);
+  if (before && ticks - *before < run.scene->start().simulationRate) dismiss(run, reason);
 }
 
 void DeviceThread::begin(Run& run, Clock::time_point now) {
@@ -634,6 +671,8 @@ void DeviceThread::begin(Run& run, Clock::time_point now) {
     scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RUNNING_SLOW, text, run.host->tick()));
   }
   run.host->begin(now);
+  run.tickPrice = scene.tickWork(run.host->colliders()).seconds(budget_.speed());
+  run.price.begin(run.tickPrice);
 }
 
 void DeviceThread::rebuildDevice(const std::string& reason) {

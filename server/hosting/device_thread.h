@@ -46,19 +46,19 @@ using schedule::Clock;
 // Device loss: a new device is created. This is tried once a second until it succeeds. The scenes are then
 // loaded again one by one, the default scene first, then those with the most subscribers. Each continues from
 // its newest snapshot on the CPU as soon as it is loaded, while others are still being loaded. If a tick
-// fails in another way, only its scene is rebuilt like this. A scene is given up if a tick fails again within
-// a simulated second, or if rebuilding it fails twice: all participants are dismissed, and the next join
-// starts it from the beginning.
+// fails in another way, only its scene is rebuilt like this. Any other exception, such as for a lack of
+// memory, costs a short pause. A scene is given up if a tick fails again within a simulated second, or if
+// rebuilding it fails twice: all participants are dismissed, and the next join starts it from the beginning.
 //
 // With `adaptsToLoad`, a scene whose ticks do not fit its share of the device does less work
 // (schedule::OverloadPolicy).
 //
-// A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), or if the device
-// is lost twice within kLossWindow while it works on this scene: runs a tick, or loads it. A scene that the
-// server started with gets a second chance, because a participant may be the reason: the first time it is
-// given up, so that the next join starts it with its own parameters. If it takes more than its price again,
-// it can be joined again after kComebackPause, and after twice that each time, up to kLongestPause. A scene
-// that add() loads is refused if the device is lost meanwhile.
+// A scene is put into quarantine if it takes far more than its price (schedule::PriceWatch), also in the
+// middle of a tick, or if the device is lost twice within kLossWindow while it works on this scene: runs a
+// tick, or loads it. A scene that the server started with gets a second chance, because a participant may be
+// the reason: the first time it is given up, so that the next join starts it with its own parameters. If it
+// takes more than its price again, it can be joined again after kComebackPause, and after twice that each
+// time, up to kLongestPause. A scene that add() loads is refused if the device is lost meanwhile.
 //
 // If the device worked on several scenes when it was lost, none of them is to blame yet. If that happens
 // again within kLossWindow, each of them runs alone for kLossWindow: the device works on nothing else
@@ -116,6 +116,8 @@ class DeviceThread {
   // Treats the device as lost whenever it has loaded this scene or has worked on a tick of it. An empty name
   // ends this. For tests.
   void simulateDeviceLossIn(std::string scene);
+  // Throws an exception that belongs to no scene, once before the next tick. For tests.
+  void simulateFailure();
 
  private:
   struct Run : schedule::TickSchedule {
@@ -175,6 +177,7 @@ class DeviceThread {
     schedule::BackOff comeback{kComebackPause, kLongestPause};
     schedule::SlowWatch slow;
     schedule::PriceWatch price;
+    double tickPrice = 0;  // s, of the newest tick
     schedule::OverloadPolicy overload;
     double slippedBefore = 0;  // ticks by which simulated time fell behind before the current tick
     double slipped = 0;        // ticks that are not counted yet, below 1
@@ -205,8 +208,14 @@ class DeviceThread {
   void measureSpeed();
   // Lets the scene do less work if it overloads the device, and more if there is room again.
   void adaptToLoad(Run& run, Clock::time_point now);
-  // Puts the scene into quarantine if it takes far more than its price. Throws vulkan::DeviceLost.
-  void checkPrice(Run& run);
+  // Puts the scene into quarantine if it takes far more than its price; it may be in the middle of a tick,
+  // with no slice in flight. `isLate`: PriceWatch says so, on a device of the speed that it assumes. Throws
+  // vulkan::DeviceLost.
+  void checkPrice(Run& run, bool isLate);
+  // Returns whether the device works for anything but ticks.
+  bool isDisturbed() const;
+  // Gives the time of this thread at the start of a tick to the scene, other than its commands.
+  void chargeMaking(Run& run, Clock::time_point& deviceFree);
   // Stops a scene that takes far more than its price. A scene of the server comes back.
   void stop(Run& run, const std::string& why);
   // Stops a scene for good; a scene of the server is only given up the first time.
@@ -222,6 +231,8 @@ class DeviceThread {
   // Schedules of all scenes, valid until the next call.
   std::span<schedule::TickSchedule* const> schedules();
   void runDueTicks();
+  // Reports a failure that belongs to no scene, such as a lack of memory. Nothing is lost by it.
+  static void endure(const std::exception& failure);
   // Waits for the first slice of a tick that began when the device was busy until `deviceFree`.
   void waitForFirstSlice(Run& run, Clock::time_point& deviceFree);
   // Runs one slice of a tick that has begun and takes longer than a slice.
@@ -255,7 +266,7 @@ class DeviceThread {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   // Initially woken, because a scene may run without subscribers.
-  bool stopping_ = false, woken_ = true, loseDevice_ = false;
+  bool stopping_ = false, woken_ = true, loseDevice_ = false, fail_ = false;
   std::string losesDeviceIn_;
   vulkan::DeviceInfo info_;
   std::vector<std::packaged_task<void()>> tasks_;

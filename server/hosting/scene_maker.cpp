@@ -299,7 +299,8 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
     return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
                    fmt::format("createScene.maxParticipants = {}: must be at most {}, the server's maximum",
                                request.max_participants(), most));
-  if (auto room = server_.roomFor(definition->name, tenant, true); !room) return tl::unexpected(room.error());
+  const auto place = server_.takePlace(definition->name, tenant, true);
+  if (!place) return tl::unexpected(place.error());
   std::shared_ptr<scene::Journal> journal =
       server_.options.journals ? server_.options.journals(*definition) : nullptr;
   const auto scene = std::make_shared<scene::LiveScene>(

@@ -232,6 +232,7 @@ void SceneServer::State::insert(std::shared_ptr<scene::LiveScene> scene) {
   if (options.observer) scene->observe(options.observer->observe(*scene));
   const std::lock_guard lock(mutex);
   scenes.push_back(std::move(scene));
+  std::erase_if(places, [&](const Place& place) { return place.name == scenes.back()->name(); });
 }
 
 void SceneServer::State::erase(const scene::LiveScene& scene) {

@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <tl/expected.hpp>
@@ -40,6 +41,7 @@ struct SceneServer::State {
   // Scene of this name, or null; the default scene for an empty name.
   std::shared_ptr<scene::LiveScene> find(const std::string& name) const;
   std::vector<std::shared_ptr<scene::LiveScene>> scenesNow() const;
+  // Ends the place of this name, if there is one.
   void insert(std::shared_ptr<scene::LiveScene> scene);
   void erase(const scene::LiveScene& scene);
   // Error text such as: there is no scene 'x'; there are curtain, flag. Lists only scenes that the peer may
@@ -104,11 +106,31 @@ struct SceneServer::State {
   void flushStore(const scene::LiveScene& scene) const;
   // No later participant gets a number of a saved one.
   void raiseNewestParticipant(const scene::SavedScene& saved);
-  // Returns why no scene of this name can be added for a client of this tenant. `isNew`: it does not come
-  // from another server.
-  tl::expected<void, v1::Error> roomFor(const std::string& name, const std::string& tenant, bool isNew);
+  // The name and one of the places for created scenes. No other scene gets them until insert(), or until this
+  // is destroyed. It must not outlive the state.
+  class HeldPlace {
+   public:
+    HeldPlace(State& state, std::uint64_t number) : state_(&state), number_(number) {}
+    HeldPlace(HeldPlace&& other) noexcept
+        : state_(std::exchange(other.state_, nullptr)), number_(other.number_) {}
+    HeldPlace& operator=(HeldPlace&&) = delete;
+    ~HeldPlace() {
+      if (state_ != nullptr) state_->leavePlace(number_);
+    }
+    // The place stays taken until insert() or abandonArrival().
+    void keep() { state_ = nullptr; }
+
+   private:
+    State* state_;
+    std::uint64_t number_;
+  };
+  // Takes them for a client of this tenant. `isNew`: the scene does not come from another server. Returns why
+  // that is not possible.
+  tl::expected<HeldPlace, v1::Error> takePlace(const std::string& name, const std::string& tenant,
+                                               bool isNew);
+  void leavePlace(std::uint64_t number);
   // Loads a scene that a client created on another server, and that still runs there. Until
-  // startArrived() nobody can join it. Returns why it cannot run here.
+  // startArrived() nobody can join it. Returns why it cannot run here. Otherwise the scene has a place.
   tl::expected<std::shared_ptr<scene::LiveScene>, std::string> prepareArrival(scene::SavedScene saved);
   // Continues it here with this session and state; its definition is not used. Throws std::runtime_error if
   // that fails; then call abandonArrival().
@@ -131,9 +153,17 @@ struct SceneServer::State {
   // Set when peers can join; before, no reconnect grace ends.
   std::atomic<bool> started{false};
 
-  mutable std::mutex mutex;  // protects the next five
+  // Name and tenant of a scene that is being made or arrives.
+  struct Place {
+    std::uint64_t number = 0;
+    std::string name, tenant;
+  };
+
+  mutable std::mutex mutex;  // protects the next seven
   FindServer otherServers;
   std::vector<std::shared_ptr<scene::LiveScene>> scenes;
+  std::vector<Place> places;
+  std::uint64_t newestPlace = 0;
   std::vector<std::weak_ptr<Peer>> peers;
   bool stopping = false;
   std::map<scene::Subject, std::uint32_t> connectionsOfSubjects;  // without zeros

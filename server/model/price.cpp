@@ -17,6 +17,11 @@ namespace {
 constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
 constexpr double kRungeKutta = 14;  // as a factor
 constexpr double kAir = 0.5, kHinge = 2, kSelfCollision = 20, kMotionBound = 120;
+// Crowding of a few layers, which kSelfCollision and kMotionBound include. Beyond it each node costs
+// kCrowdedBall in each of the searches of a tick, and kCrowdedTriangle in a substep, for one more ball or
+// triangle in its cell. Both are limited, as the searches are (SelfCollisionStage, MotionBoundStage).
+constexpr double kFewBalls = 12, kMostBalls = 1024, kCrowdedBall = 2.5, kSearches = 3;
+constexpr double kFewTriangles = 8, kMostTriangles = 40, kCrowdedTriangle = 100;
 // Each node and collider costs these. Each plane of a shape costs kPlane more.
 constexpr double kCollider = 0.5, kPlane = 0.05, kBoxPlanes = 6, kGatherCollider = 0.1;
 // Each spring of the linear system costs these. ACAD is assumed to have a quarter of its springs active.
@@ -128,7 +133,7 @@ PriceModel::ClothCounts PriceModel::countsOf(const Grid& grid) {
   return counts;
 }
 
-PriceModel::PriceModel(const Scene& scene) {
+PriceModel::PriceModel(const Scene& scene) : crowding_(crowdingOf(scene)) {
   for (const Cloth& cloth : scene.cloths) {
     if (!cloth.mesh) {
       cloths_.push_back(countsOf(cloth.grid));
@@ -196,6 +201,8 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
   for (const Collider& collider : scene.colliders) collisions += colliderWork(collider.shape);
   const auto own = static_cast<double>(scene.colliders.size());
   if (colliders > own) collisions += (colliders - own) * colliderWork(Box{});
+  const double crowdedBalls = std::clamp(crowding_.balls - kFewBalls, 0.0, kMostBalls);
+  const double crowdedTriangles = std::clamp(crowding_.triangles - kFewTriangles, 0.0, kMostTriangles);
   const double framesPerTick = static_cast<double>(scene.streamRate) / scene.simulationRate;
   Work work{.dispatches = kTickDispatches + kFrameDispatches * framesPerTick + substeps,
             .serialSteps = substeps * collisions};
@@ -210,6 +217,8 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
     if (cloth.selfCollision)
       step += (boundsMotion(cloth) ? kSelfCollision + kMotionBound : kSelfCollision) * nodes;
+    if (cloth.selfCollision) work.nodeSteps += kSearches * kCrowdedBall * crowdedBalls * nodes;
+    if (boundsMotion(cloth)) step += kCrowdedTriangle * crowdedTriangles * nodes;
     step += collisions * nodes;
     work.nodeSteps +=
         substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/model/crowding.h"
 #include "server/model/scene.h"
 #include "server/model/springs.h"
 
@@ -64,8 +65,11 @@ inline constexpr double kGridWork = 3;
 // assumed to be near each collider.
 double colliderWork(const Shape& shape);
 
-// The constructor takes time linear in nodes and springs; the other functions only depend on the number of
-// cloths, so parameters can be priced often.
+// The constructor takes time linear in nodes and springs, and n log n in nodes with self-collision; the other
+// functions only depend on the number of cloths, so parameters can be priced often.
+//
+// Searches for pairs are priced for the crowding of the scene's start. Cloth that crowds later costs more
+// than its price, up to limits in proportion to the nodes.
 //
 // Solvers that end early are priced with all their iterations. The weights in the .cpp are fitted to measured
 // ticks on software Vulkan (clothstream-bench price) and were compared with an NVIDIA H200.
@@ -95,6 +99,7 @@ class PriceModel {
   Work solverWork(const Scene& scene, const Cloth& cloth, const ClothCounts& counts) const;
 
   std::vector<ClothCounts> cloths_;
+  SceneCrowding crowding_;
 };
 
 }  // namespace clothstream::model

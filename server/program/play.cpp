@@ -64,8 +64,8 @@ int play(const ProgramOptions& options, const Signals& signals) {
   std::optional<fleet::Origin> origin;
   if (!options.natsServers.empty())
     origin.emplace(server, natsOptions(options, "server"), originOptions(options));
-  guard = openEndpoints(server, options, signals, start, authenticator, monitoring.get(),
-                        intro, [&] { return server.report(); });
+  guard = openEndpoints(server, options, signals, start, authenticator, monitoring.get(), intro,
+                        [&] { return server.report(); });
   const std::string damage = playback->damage();
   if (damage.empty()) return 0;
   spdlog::error("{} is damaged: {}; clothstream recover {} OUT keeps what is whole", options.recording,

@@ -2,6 +2,7 @@
 #include "server/scene/inbox.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace clothstream::scene {
@@ -59,6 +60,12 @@ bool Inbox::postChange(AcceptedChange change) {
   if (inputs_.changes.size() >= kMaxChanges) return false;
   inputs_.changes.push_back(std::move(change));
   return true;
+}
+
+void Inbox::putBack(std::span<AcceptedChange> changes) {
+  const std::lock_guard lock(mutex_);
+  inputs_.changes.insert(inputs_.changes.begin(), std::make_move_iterator(changes.begin()),
+                         std::make_move_iterator(changes.end()));
 }
 
 void Inbox::dropChanges() {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "clothstream/v1/session.pb.h"
@@ -70,6 +71,10 @@ class Inbox {
   [[nodiscard]] bool postChange(AcceptedChange change);
   void dropChanges();
   void dropPoses();
+
+  // Returns changes that drain() moved out, oldest first: the next drain() moves them again, before newer
+  // ones. They may exceed kMaxChanges; until there is room again no change can be posted.
+  void putBack(std::span<AcceptedChange> changes);
 
   // Visits the waiting changes, oldest first. `visit` must not call this inbox.
   void forEachChange(const std::function<void(const model::ParameterChange&)>& visit);

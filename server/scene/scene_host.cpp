@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -139,6 +140,8 @@ SceneHost::~SceneHost() {
 void SceneHost::begin(Clock::time_point now) {
   const Clock::time_point began = Clock::now();
   tickStart_ = now;
+  makingTime_ = {};
+  making_.beginTick();
   beginJournal();
   if (live_.resetRequested.exchange(false)) reset();
   endEasing();
@@ -243,13 +246,7 @@ void SceneHost::reset() {
 
 void SceneHost::applyInputs() {
   live_.inbox.drain(inputs_);
-  std::string problem;
-  for (const AcceptedChange& accepted : inputs_.changes) {
-    if (!apply(accepted.change, problem)) continue;
-    live_.subscribers.announce(
-        delivery::parametersChanged(accepted.message, tick_ + 1, accepted.participant));
-  }
-  if (!problem.empty()) revertChanges(problem);
+  applyChanges();
   for (Poses& poses : inputs_.poses) {
     const model::ParticipantPoses& now = poses.now.poses;
     const bool moves =
@@ -267,23 +264,55 @@ void SceneHost::applyInputs() {
   });
 }
 
-bool SceneHost::apply(const model::ParameterChange& change, std::string& problem) {
+void SceneHost::applyChanges() {
+  const std::span<AcceptedChange> changes = inputs_.changes;
+  if (changes.empty()) return;
   model::Scene changed = scene_;
-  model::applyChange(changed, change);
-  easeSolverChanges(changed);
-  if (!change.cloths.empty()) {
+  for (const AcceptedChange& accepted : changes) model::applyChange(changed, accepted.change);
+  if (onDevice_->simulation.makesStages(changed.cloths) && !making_.allows(tickStart_))
+    return live_.inbox.putBack(changes);
+  std::string problem;
+  if (apply(changes, problem)) return;
+  // One of them has room, or is the problem.
+  if (changes.size() > 1 && apply(changes.first(1), problem)) return live_.inbox.putBack(changes.subspan(1));
+  live_.inbox.putBack(changes.subspan(1));
+  revertChanges(problem);
+}
+
+bool SceneHost::apply(std::span<const AcceptedChange> changes, std::string& problem) {
+  const model::Scene before = scene_;
+  const std::vector<std::uint64_t> easedBefore = easeUntil_;
+  const std::uint64_t made = onDevice_->simulation.stagesMade();
+  const Clock::duration madeIn = makingTime_;
+  bool hasRoom = true;
+  for (const AcceptedChange& accepted : changes) {
+    model::Scene changed = scene_;
+    model::applyChange(changed, accepted.change);
+    easeSolverChanges(changed);
+    scene_ = std::move(changed);
+  }
+  if (std::ranges::any_of(changes, [](const AcceptedChange& each) { return !each.change.cloths.empty(); })) {
     try {
-      setCloths(changed.cloths);
+      setCloths(scene_.cloths);
     } catch (const vulkan::DeviceLost&) {
       throw;
     } catch (const std::runtime_error& noRoom) {
       problem = noRoom.what();
-      return false;
+      hasRoom = false;
     }
   }
-  scene_ = std::move(changed);
+  if (onDevice_->simulation.stagesMade() > made)
+    making_.pay(tickStart_, schedule::seconds(makingTime_ - madeIn));
+  if (!hasRoom) {
+    scene_ = before;
+    easeUntil_ = easedBefore;
+    return false;
+  }
   parametersChanged_ = true;
   recoveries_.changed(tick_);
+  for (const AcceptedChange& accepted : changes)
+    live_.subscribers.announce(
+        delivery::parametersChanged(accepted.message, tick_ + 1, accepted.participant));
   return true;
 }
 
@@ -308,6 +337,11 @@ void SceneHost::endEasing() {
 }
 
 void SceneHost::setCloths(const std::vector<model::Cloth>& cloths) {
+  const struct Measure {
+    Clock::duration& time;
+    Clock::time_point began = Clock::now();
+    ~Measure() { time += Clock::now() - began; }
+  } measure{makingTime_};
   onDevice_->simulation.setCloths(cloths);
   clothsChanged_ = true;
 }
@@ -490,6 +524,8 @@ void SceneHost::finish() {
   metrics.crowdedBalls.add(status_.crowded);
   metrics.tick.record(schedule::seconds(done - tickStart_));
   metrics.deviceTotal.record(total);
+  // A device may compile new kernels when they first run.
+  if (making_.made()) making_.pay(tickStart_, std::max(0.0, total - deviceSeconds_.value_or(total)));
   deviceSeconds_ = total > 0 ? std::optional(total) : std::nullopt;
   ownSeconds_ =
       total > 0 ? std::optional(total + schedule::seconds(beginTime_ + (Clock::now() - done))) : std::nullopt;

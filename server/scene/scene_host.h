@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,7 @@
 #include "server/scene/recovery_policy.h"
 #include "server/scene/requests.h"
 #include "server/scene/scene_on_device.h"
+#include "server/schedule/making_limit.h"
 #include "server/schedule/token_bucket.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/vulkan/device.h"
@@ -98,6 +100,8 @@ class SceneHost {
   std::optional<double> ownSeconds() const { return ownSeconds_; }
   // The part of it on the device.
   std::optional<double> deviceSeconds() const { return deviceSeconds_; }
+  // Time of this thread that changes of cloths took at the start of the newest tick.
+  Clock::duration makingTime() const { return makingTime_; }
 
   // Gives the state after the newest complete tick to the keeper, because the server ends. No tick may have
   // begun. Throws vulkan::DeviceLost.
@@ -129,8 +133,12 @@ class SceneHost {
   // Announces that a recording started or stopped.
   void announceRecording();
   void applyInputs();
-  // Returns false and changes nothing if the device has no room for the change; `problem` says why.
-  bool apply(const model::ParameterChange& change, std::string& problem);
+  // Applies the changes of the inbox, or lets all of them wait for a later tick, if they would make stages
+  // and earlier ones are not paid for (schedule::MakingLimit).
+  void applyChanges();
+  // Applies these changes together, or changes nothing and returns false, because the device has no room for
+  // them; `problem` says why.
+  bool apply(std::span<const AcceptedChange> changes, std::string& problem);
   // Begins the work that setWork() asks for.
   void applyWork();
   // Announces that changes were undone.
@@ -184,7 +192,9 @@ class SceneHost {
   std::uint64_t tick_ = 0;
   simulation::TickStatus status_;
   std::optional<double> ownSeconds_, deviceSeconds_;
-  Clock::duration beginTime_{};          // of recording the current tick
+  Clock::duration beginTime_{};   // of recording the current tick
+  Clock::duration makingTime_{};  // the part of it in setCloths()
+  schedule::MakingLimit making_;
   Recovery recovery_ = Recovery::none;   // before the next tick
   Recovery recovered_ = Recovery::none;  // before the current tick
   bool keepsState_ = false;              // the current tick keeps a checkpoint

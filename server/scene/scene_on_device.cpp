@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "server/scene/live_scene.h"
 
 namespace clothstream::scene {
@@ -16,6 +18,9 @@ namespace {
 constexpr double kFirstSlice = 1 << 19, kMinSlice = 1 << 12, kMaxSlice = 1e15;
 // A GPU is faster by at least this factor.
 constexpr double kGpuFactor = 64;
+// Most work of a slice, in slices: work that depends on the state, such as the pairs of a heap, can be that
+// much more than in the ticks before. It is limited by the first slice, because slices of calm ticks grow.
+constexpr double kMostFactor = 16;
 
 }  // namespace
 
@@ -26,7 +31,13 @@ SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene,
       encoders(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch), &workers),
       recorder(device_),
       sliceInvocations_(device_.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice) {
-  recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_));
+  const std::uint32_t most = device.limits().maxAllocations;
+  if (device.allocations() + kSpareAllocations > most)
+    throw std::runtime_error(
+        fmt::format("its buffers would leave fewer than {} of the {} allocations of memory that {} allows: "
+                    "delete a scene first",
+                    kSpareAllocations, most, device.info().name));
+  sliceRecordings();
   recorder.begin();
   simulation.recordSaveState(recorder);
   submitAndWait();
@@ -35,8 +46,14 @@ SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene,
 }
 
 void SceneOnDevice::scaleSlices(double factor) {
-  sliceInvocations_ = std::clamp(sliceInvocations_ * std::clamp(factor, 0.5, 1.25), kMinSlice, kMaxSlice);
-  recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_));
+  sliceInvocations_ = std::clamp(sliceInvocations_ * std::clamp(factor, 0.25, 1.25), kMinSlice, kMaxSlice);
+  sliceRecordings();
+}
+
+void SceneOnDevice::sliceRecordings() {
+  const double first = device.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice;
+  recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_),
+                      static_cast<std::uint64_t>(kMostFactor * std::min(sliceInvocations_, first)));
 }
 
 void SceneOnDevice::submitAndWait() {

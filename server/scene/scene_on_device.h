@@ -17,9 +17,14 @@ namespace clothstream::scene {
 struct SceneOnDevice {
   // Uploads the scene, runs every kernel once and restores the start state. `device` and `workers` must
   // outlive it. Takes up to seconds, but occupies the device only for short times. Throws std::runtime_error
-  // if the device has no room for the scene, or soon after a stop was requested.
+  // if the device has no room for the scene, or soon after a stop was requested. Room includes allocations
+  // that the scenes on the device may need later (kSpareAllocations).
   SceneOnDevice(vulkan::Device& device, const model::Scene& scene, codec::Workers& workers,
                 const std::stop_token& stop = {});
+
+  // Allocations of memory that a new scene leaves free: buffers for grabs, reports and coarser qualities of
+  // running scenes are made when they are first needed.
+  static constexpr std::uint32_t kSpareAllocations = 256;
 
   vulkan::Device& device;
   simulation::ClothSimulation simulation;
@@ -32,6 +37,7 @@ struct SceneOnDevice {
 
  private:
   double sliceInvocations_;
+  void sliceRecordings();
   void submitAndWait();
   // Runs everything that a tick and a frame may need. Software devices compile a kernel when it first runs,
   // which takes up to tenths of a second. Leaves the start state.

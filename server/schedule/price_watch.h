@@ -3,48 +3,60 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
+#include <optional>
 
 namespace clothstream::schedule {
 
-// Not thread-safe.
+// Counts the time beyond what the price allows, in seconds, so that one very long tick is enough. A tick is
+// judged while it runs: after each of its slices, and at its end. Takes times as arguments. Not thread-safe.
 class PriceWatch {
  public:
-  // Ticks in a row that must each take kFactor times their price.
-  static constexpr int kTicks = 5;
-  static constexpr double kFactor = 10;
-  // Shorter ticks harm no other scene, and a busy machine lengthens them by more than kFactor.
-  static constexpr double kMinSeconds = 0.1;
+  // A tick may take kFactor times its price. Ticks below kMinSeconds harm no other scene, and a busy machine
+  // lengthens them by more than kFactor.
+  static constexpr double kFactor = 10, kMinSeconds = 0.1;
+  // Seconds beyond what is allowed, over all ticks since the scene was last within it.
+  static constexpr double kMostExcess = 1;
+  // Seconds that one slice counts at most. The work of a slice is bounded, so that a longer one shows that
+  // the machine stood still.
+  static constexpr double kMostOfSlice = 0.25;
 
-  // Records a tick and its price, both in seconds. Returns true at every kTicks-th such tick in a row. The
-  // device may then be slower than the price assumes, because other programs use the machine: measure its
-  // speed, and call isExcessive().
-  bool note(double seconds, double price) {
-    const double factor = seconds / price;
-    if (seconds < kMinSeconds || !(factor > kFactor)) {
-      restart();
-      return false;
-    }
-    leastFactor_ = std::min(leastFactor_, factor);
-    return ++ticks_ % kTicks == 0;
+  // A tick with this price begins, in seconds. A tick that was not ended does not count any more.
+  void begin(double price) {
+    tick_ = 0;
+    tickAllowed_ = std::max(kFactor * price, kMinSeconds);
   }
 
-  // Returns whether each of these ticks took kFactor times its price on a device that is `slowdown` times as
-  // slow as the price assumes. Otherwise counting starts again.
+  // A slice of the tick took these seconds. Returns true if the excess is too large by now. The device may be
+  // slower than the price assumes, because other programs use the machine: measure its speed, and call
+  // isExcessive().
+  bool addSlice(double seconds) {
+    tick_ += std::min(seconds, kMostOfSlice);
+    return excess(1) > kMostExcess;
+  }
+
+  // The tick has ended. `device`: seconds that the device worked on it, if that is known; the rest of its
+  // slices was waiting. Returns the same.
+  bool end(std::optional<double> device) {
+    seconds_ += device ? std::min(*device, tick_) : tick_;
+    allowed_ += tickAllowed_;
+    tick_ = tickAllowed_ = 0;
+    if (seconds_ <= allowed_) seconds_ = allowed_ = 0;
+    return excess(1) > kMostExcess;
+  }
+
+  // Returns whether the excess is too large on a device that is `slowdown` times as slow as the price
+  // assumes. Otherwise counting starts again.
   bool isExcessive(double slowdown) {
-    if (leastFactor_ > kFactor * std::max(1.0, slowdown)) return true;
-    restart();
+    if (excess(std::max(1.0, slowdown)) > kMostExcess) return true;
+    seconds_ = allowed_ = tick_ = 0;
     return false;
   }
 
  private:
-  void restart() {
-    ticks_ = 0;
-    leastFactor_ = std::numeric_limits<double>::infinity();
-  }
+  double excess(double slowdown) const { return seconds_ + tick_ - slowdown * (allowed_ + tickAllowed_); }
 
-  int ticks_ = 0;
-  double leastFactor_ = std::numeric_limits<double>::infinity();
+  double seconds_ = 0, allowed_ = 0;   // of complete ticks
+  double tick_ = 0, tickAllowed_ = 0;  // of the present one
 };
 
 }  // namespace clothstream::schedule

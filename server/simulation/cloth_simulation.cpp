@@ -24,6 +24,7 @@
 #include "server/simulation/collision/skin_stage.h"
 #include "server/simulation/collision/solid_stage.h"
 #include "server/simulation/grid_stage.h"
+#include "server/simulation/kept_stages.h"
 #include "server/simulation/mass_stage.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/motion_bound/motion_bound_stage.h"
@@ -110,13 +111,6 @@ std::vector<float> massesOf(std::span<const model::Cloth> cloths) {
   return masses;
 }
 
-// True if two solvers need the same tables. The way in which systems are solved may differ.
-bool sameTables(const model::Solver& a, const model::Solver& b) {
-  return a.kind == b.kind && a.bendConstraints == b.bendConstraints && a.path == b.path &&
-         a.acadMode == b.acadMode &&
-         (a.kind == model::SolverKind::massSpring || a.iterations == b.iterations);
-}
-
 // Cloths collide in the advance kernel if no other stage follows.
 AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool colliders,
                          Follow follow) {
@@ -151,6 +145,9 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<AssembledStage> makeAssembled(std::span<const model::Cloth> cloths);
   void makeBending(std::span<const model::Cloth> cloths);
   void makeAttachments(const AttachmentTables& tables);
+  // Returns whether makeBending() and setSolvers() need more than what there is.
+  bool makes(std::span<const model::Cloth> cloths) const;
+  SolverStages makeSolvers(std::span<const model::Cloth> cloths);
   void setSolvers(std::span<const model::Cloth> cloths);
   void makeMassStage();
   void setMasses(std::span<const model::Cloth> cloths);
@@ -191,6 +188,9 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<SelfCollisionStage> selfCollision;  // null if no cloth uses it
   std::unique_ptr<MotionBoundStage> motionBound;      // null if no cloth uses it
   std::vector<model::Solver> solvers;                 // of the cloths in the tables
+  std::uint64_t solverBytes = 0;                      // SolverStages::bytes of the present stages
+  KeptStages kept;                                    // stages of earlier solvers
+  std::uint64_t made = 0;                             // ClothSimulation::stagesMade()
   std::vector<SpringStiffness> stiffness;             // of the cloths' springs
   std::unique_ptr<SolidStage> solids;                 // null if no collider is a triangle mesh
   std::unique_ptr<SkinStage> skins;                   // null if no mesh has joints
@@ -298,28 +298,51 @@ std::unique_ptr<AssembledStage> ClothSimulation::Pipeline::makeAssembled(
                                           asked.solveWholeNodes);
 }
 
+// Cloths that bent once stay in the tables, so that each cloth needs new ones at most once.
 void ClothSimulation::Pipeline::makeBending(std::span<const model::Cloth> cloths) {
   const bool wanted = BendingStage::isIn(cloths);
   if (wanted && !(bending && bending->serves(cloths))) {
-    bending = std::make_unique<BendingStage>(device, cloths, stateOf(buffers, collision), workgroupSize);
+    std::vector<model::Cloth> all(cloths.begin(), cloths.end());
+    for (std::size_t i = 0; bending && i < all.size(); ++i)
+      if (bending->bends(i)) all[i].dihedralBending = 1;
+    bending = std::make_unique<BendingStage>(device, all, stateOf(buffers, collision), workgroupSize);
+    ++made;
     tabled = false;
   }
   bends = wanted;
 }
 
+bool ClothSimulation::Pipeline::makes(std::span<const model::Cloth> cloths) const {
+  if (BendingStage::isIn(cloths) && !(bending && bending->serves(cloths))) return true;
+  const std::vector<model::Solver> wanted = solversOf(cloths);
+  return !std::ranges::equal(wanted, solvers, sameTables) && !kept.has(wanted);
+}
+
+SolverStages ClothSimulation::Pipeline::makeSolvers(std::span<const model::Cloth> cloths) {
+  ++made;
+  const std::uint64_t before = device.allocatedBytes();
+  SolverStages stages{.solvers = solversOf(cloths),
+                      .systems = solves.makeSystems(cloths),
+                      .xpbd = makeXpbd(cloths),
+                      .assembled = makeAssembled(cloths)};
+  const std::uint64_t after = device.allocatedBytes();
+  stages.bytes = after > before ? after - before : 0;
+  return stages;
+}
+
 void ClothSimulation::Pipeline::setSolvers(std::span<const model::Cloth> cloths) {
-  std::vector<model::Solver> wanted = solversOf(cloths);
+  const std::vector<model::Solver> wanted = solversOf(cloths);
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
   // Memory is allocated before anything changes, because that may fail.
-  solves.makeTables(cloths);
-  std::unique_ptr<XpbdStage> otherXpbd = makeXpbd(cloths);
-  std::unique_ptr<AssembledStage> otherAssembled = makeAssembled(cloths);
-  solves.takeTables();
-  xpbd = std::move(otherXpbd);
-  assembled = std::move(otherAssembled);
+  std::optional<SolverStages> known = kept.take(wanted);
+  SolverStages next = known ? std::move(*known) : makeSolvers(cloths);
+  kept.keep({.solvers = std::exchange(solvers, std::move(next.solvers)),
+             .systems = solves.exchange(std::move(next.systems)),
+             .xpbd = std::exchange(xpbd, std::move(next.xpbd)),
+             .assembled = std::exchange(assembled, std::move(next.assembled)),
+             .bytes = std::exchange(solverBytes, next.bytes)});
   grids.setTiles(cloths);
   if (meshes) meshes->setTiles(meshTiles(cloths, workgroupSize));
-  solvers = std::move(wanted);
   tabled = false;
 }
 
@@ -350,11 +373,13 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   if (xpbd) xpbd->recordTables(recorder);
   if (assembled) assembled->recordTables(recorder);
   if (bending) bending->recordTables(recorder);
-  if (coarse) coarse->recordTables(recorder);
-  if (selfCollision) selfCollision->recordTables(recorder);
-  if (solids) solids->recordTables(recorder);
-  if (skins) skins->recordTables(recorder);
-  if (motionBound) motionBound->recordTables(recorder);
+  if (!started) {
+    if (coarse) coarse->recordTables(recorder);
+    if (selfCollision) selfCollision->recordTables(recorder);
+    if (solids) solids->recordTables(recorder);
+    if (skins) skins->recordTables(recorder);
+    if (motionBound) motionBound->recordTables(recorder);
+  }
   recorder.barrier();
   if (!weighed) {
     massChange->record(recorder);
@@ -502,6 +527,14 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
   if (pipeline_->attachments) pipeline_->attachments->setSlack(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
+}
+
+bool ClothSimulation::makesStages(std::span<const model::Cloth> cloths) const {
+  return pipeline_->makes(cloths);
+}
+
+std::uint64_t ClothSimulation::stagesMade() const {
+  return pipeline_->made;
 }
 
 void ClothSimulation::setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths) {

@@ -73,8 +73,13 @@ class ClothSimulation {
   // Sets the parameters of the cloths from the next recorded tick on. Shapes, pins and attachments must be
   // those of construction, and the same cloths must have self-collision and tethers. The state stays. No tick
   // may be in flight. Throws std::runtime_error and changes nothing if the device has too little memory.
-  // Kernels are created when a cloth first needs them and are kept.
+  // Kernels are created when a cloth first needs them and are kept, and so are the stages of the newest
+  // combinations of solvers (KeptStages).
   void setCloths(std::span<const model::Cloth> cloths);
+  // Returns whether setCloths() would make stages, which takes milliseconds to tenths of a second.
+  bool makesStages(std::span<const model::Cloth> cloths) const;
+  // Number of times that setCloths() has made stages.
+  std::uint64_t stagesMade() const;
 
   // Sets the number of substeps from the next recorded tick on, at least 1; it is initially that of the
   // scene. `cloths` are the present ones. The motion has the same bits as that of a simulation that was

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 #include <vector>
 
 #include "kernels/apply_velocities.h"
@@ -95,20 +96,20 @@ constexpr std::uint32_t kPrepareWork = 12;
 
 // lavapipe allows an invocation 65,535 loop rounds, over all loops together. Beyond that it ends each loop
 // after one round.
+WholeLimits wholeLimits(const vulkan::Device& device, const SolveCut& cut) {
+  return {.nodes = cut.wholeNodes,
+          .workgroup = cut.iterationWorkgroup,
+          .spread = cut.spread,
+          .mostLoops = device.isSoftware() ? 65'535 : ~0u};
+}
+
 std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
-                                    std::uint32_t listed, const SolveCut& cut) {
+                                    const SolveCut& cut) {
   const std::uint32_t nodes = std::max(1u, group.smallChunks * kChunkNodes);
   const std::uint32_t most = std::max(1u, nodesPerDispatch(device) / nodes);
-  if (!device.isSoftware()) return most;
-  const std::uint32_t workgroup = cut.iterationWorkgroup;
-  const std::uint32_t rows = cut.spread ? 1 : CLOTHSTREAM_SOLVE_WALK;
-  const std::uint32_t places = kSolveLanes * CLOTHSTREAM_SOLVE_WALK / rows;
-  const std::uint32_t tree = 3 * kSolveLanes / workgroup + 17;
-  const std::uint32_t walks = places / workgroup;
-  const std::uint32_t walk = group.mesh ? rows * (listed + 2) + 2 : 1;
-  const std::uint32_t chunk = walks * (walk + 2) + tree;
-  const std::uint32_t iteration = group.smallChunks * (chunk + 2) + tree + group.smallChunks;
-  return std::max(1u, std::min((65'535 - 2 * iteration) / iteration, most));
+  if (group.smallLoops == 0) return most;
+  // At least one, because the system would not be small otherwise.
+  return std::min(wholeLimits(device, cut).mostLoops / group.smallLoops - kSpareIterations, most);
 }
 
 }  // namespace
@@ -199,7 +200,7 @@ struct SolveStage::Kernels {
   StretchedKernels stretched;
 };
 
-// Everything whose size follows from the cloths, and its bindings.
+// With the bindings.
 struct SolveStage::Systems {
   // A group with its bindings, one for each index of the state buffer that has the state.
   struct Group {
@@ -246,10 +247,9 @@ struct SolveStage::Systems {
     named = activeTables(tables);
     std::uint32_t size = 0;
     for (const SolveGroup& on : tables.groups) {
-      groups.push_back(
-          {.on = on,
-           .iterationsPerDispatch = simulation::iterationsPerDispatch(device, on, tables.listed, cut),
-           .firstSize = size});
+      groups.push_back({.on = on,
+                        .iterationsPerDispatch = simulation::iterationsPerDispatch(device, on, cut),
+                        .firstSize = size});
       size += roundsOf(on) * sizesOfRound(on);
       for (const std::size_t from : {0, 1}) bind(device, kernels, state, from, groups.back());
     }
@@ -349,20 +349,19 @@ SolveStage::SolveStage(const vulkan::Device& device, std::span<const model::Clot
           device, cutSolves(device, workgroupSize, wholeNodes),
           stretchedLimits(device, workgroupSize,
                           wholeNodes.value_or(CLOTHSTREAM_STRETCHED_CHUNKS * kChunkNodes)))) {
-  makeTables(cloths);
-  takeTables();
+  systems_ = makeSystems(cloths);
 }
 
 SolveStage::~SolveStage() = default;
 
-void SolveStage::makeTables(std::span<const model::Cloth> cloths) {
-  nextSystems_.reset();
-  const SolveTables tables = solveTables(cloths, kernels_->cut.wholeNodes, kernels_->stretched.limits());
-  if (!tables.systems.empty()) nextSystems_ = std::make_unique<Systems>(device_, tables, state_, *kernels_);
+std::shared_ptr<SolveStage::Systems> SolveStage::makeSystems(std::span<const model::Cloth> cloths) {
+  const SolveTables tables =
+      solveTables(cloths, wholeLimits(device_, kernels_->cut), kernels_->stretched.limits());
+  return tables.systems.empty() ? nullptr : std::make_shared<Systems>(device_, tables, state_, *kernels_);
 }
 
-void SolveStage::takeTables() {
-  systems_ = std::move(nextSystems_);
+std::shared_ptr<SolveStage::Systems> SolveStage::exchange(std::shared_ptr<Systems> systems) {
+  return std::exchange(systems_, std::move(systems));
 }
 
 void SolveStage::recordTables(vulkan::Recorder& recorder) const {

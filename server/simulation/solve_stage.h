@@ -31,14 +31,17 @@ class SolveStage {
              std::uint32_t workgroupSize, std::optional<std::uint32_t> wholeNodes);
   ~SolveStage();
 
-  // makeTables() prepares other cloths, or none; takeTables() makes them current, with no work of this stage
-  // in flight. Existing kernels are kept. If makeTables() throws, nothing changes.
-  void makeTables(std::span<const model::Cloth> cloths);
-  void takeTables();
+  // Everything whose size follows from the cloths.
+  struct Systems;
+  // Makes the systems of other cloths; null if there are none. Kernels are kept. Throws std::runtime_error
+  // like the constructor, and then changes nothing.
+  std::shared_ptr<Systems> makeSystems(std::span<const model::Cloth> cloths);
+  // Makes them current, and returns the former ones. No work of this stage may be in flight.
+  std::shared_ptr<Systems> exchange(std::shared_ptr<Systems> systems);
   // True if there is a system. Otherwise nothing below may be called.
   bool active() const { return systems_ != nullptr; }
 
-  // Uploads the tables, before the first substep with them.
+  // Uploads the tables, before the first substep with the present systems.
   void recordTables(vulkan::Recorder& recorder) const;
   // Records one substep of `substepSeconds`. The free motion led from state `from` to the other state, which
   // is corrected in place. Begins with a barrier. `last`: the tick's last substep, which the report is about.
@@ -64,13 +67,11 @@ class SolveStage {
 
  private:
   struct Kernels;
-  struct Systems;
 
   const vulkan::Device& device_;
   StateBuffers state_;
   std::unique_ptr<Kernels> kernels_;  // created at their first use
-  std::unique_ptr<Systems> systems_;  // null if there is no system
-  std::unique_ptr<Systems> nextSystems_;
+  std::shared_ptr<Systems> systems_;  // null if there is no system
 };
 
 }  // namespace clothstream::simulation

@@ -3,7 +3,10 @@
 #include "server/simulation/solve_tables.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "server/model/springs.h"
 #include "server/simulation/scene_tables.h"
@@ -37,9 +40,7 @@ void appendMesh(const model::Cloth& cloth, std::size_t number, std::uint32_t fir
   for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node) {
     const std::size_t first = tables.lists.size();
     appendList(adjacency.of(node), links, node, firstNode, tables.lists);
-    const auto listed = static_cast<std::uint32_t>(tables.lists.size() - first);
     tables.incidences[firstNode + node] = shared::listRecord(first, tables.lists.size());
-    tables.listed = std::max(tables.listed, listed);
   }
 }
 
@@ -78,19 +79,60 @@ bool isOf(const model::Cloth& cloth, const SolveGroup& group) {
          !model::isAssembled(cloth.solver) && (cloth.mesh != nullptr) == group.mesh;
 }
 
+// Upper bound of the loop rounds of an invocation: in a chunk, and in one iteration of a solve by one
+// workgroup.
+struct Loops {
+  std::uint64_t chunk, iteration;
+};
+
+Loops loopsOf(const model::Cloth& cloth, const WholeLimits& whole) {
+  constexpr std::uint64_t kLanes = CLOTHSTREAM_SOLVE_LANES;
+  const std::uint64_t rows = whole.spread ? 1 : CLOTHSTREAM_SOLVE_WALK;
+  const std::uint64_t walks = kLanes * CLOTHSTREAM_SOLVE_WALK / rows / whole.workgroup;
+  const std::uint64_t tree = 3 * kLanes / whole.workgroup + 17;
+  std::uint64_t walk = 1;
+  if (cloth.mesh) {
+    const model::SpringAdjacency adjacency =
+        model::springAdjacency(model::systemLinks(cloth), cloth.nodeCount());
+    std::uint64_t most = 0;
+    for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node)
+      most = std::max<std::uint64_t>(most, adjacency.of(node).size());
+    walk = rows * ((most + 1) / 2 + 2) + 2;
+  }
+  const std::uint64_t chunk = walks * (walk + 2) + tree, chunks = chunksOf(cloth);
+  return {chunk, chunks * (chunk + 2) + tree + chunks};
+}
+
+// True if one workgroup solves the system of a cloth.
+bool isSmall(const model::Cloth& cloth, const SolveGroup& group, const Loops& loops,
+             const WholeLimits& whole) {
+  if (group.stretched) return true;
+  return cloth.nodeCount() <= whole.nodes && loops.iteration <= whole.mostLoops / (kSpareIterations + 1);
+}
+
 // Appends the small or the large cloths of a group.
 void appendCloths(std::span<const model::Cloth> cloths, SolveGroup& group, bool large,
-                  std::uint32_t wholeNodes, SolveTables& tables) {
+                  const WholeLimits& whole, SolveTables& tables) {
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     const model::Cloth& cloth = cloths[i];
-    if (!isOf(cloth, group) || (!group.stretched && cloth.nodeCount() > wholeNodes) != large) continue;
+    if (!isOf(cloth, group) || (group.stretched && large)) continue;
+    if (!group.stretched && !large && cloth.nodeCount() > whole.nodes) continue;
+    const Loops loops = group.stretched ? Loops{} : loopsOf(cloth, whole);
+    if (isSmall(cloth, group, loops, whole) == large) continue;
+    if (!group.stretched && loops.chunk > whole.mostLoops)
+      throw std::runtime_error(
+          fmt::format("cloth '{}': so many springs meet at a vertex that a solve takes {} rounds of loops, "
+                      "and this device allows {}; connect fewer triangles to one vertex, or use another "
+                      "solver",
+                      cloth.name, loops.chunk, whole.mostLoops));
     appendSystem(cloth, i, firstNode, tables);
     group.bend = group.bend || group.kind == model::SolverKind::implicitEuler || cloth.solver.bendConstraints;
     group.iterations = std::max(group.iterations, model::iterationsOf(cloth.solver));
     if (large) continue;
     ++group.smallSystems;
     group.smallChunks = std::max(group.smallChunks, chunksOf(cloth));
+    group.smallLoops = std::max(group.smallLoops, static_cast<std::uint32_t>(loops.iteration));
   }
 }
 
@@ -131,7 +173,7 @@ std::uint32_t roundsOf(const SolveGroup& group) {
   return limit ? model::kLimitRounds : 1;
 }
 
-SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t wholeNodes,
+SolveTables solveTables(std::span<const model::Cloth> cloths, const WholeLimits& whole,
                         const StretchedLimits& stretched) {
   SolveTables tables;
   for (const model::Cloth& cloth : cloths) tables.nodes += cloth.nodeCount();
@@ -150,9 +192,9 @@ SolveTables solveTables(std::span<const model::Cloth> cloths, std::uint32_t whol
       group.firstChunk = count(tables.chunks);
       group.firstSpring = count(tables.springs);
       chooseStretched(cloths, group, stretched);
-      appendCloths(cloths, group, false, wholeNodes, tables);
+      appendCloths(cloths, group, false, whole, tables);
       group.firstLargeChunk = count(tables.chunks);
-      appendCloths(cloths, group, true, wholeNodes, tables);
+      appendCloths(cloths, group, true, whole, tables);
       group.endChunk = count(tables.chunks);
       group.endSpring = count(tables.springs);
       group.endSystem = count(tables.systems);

@@ -83,6 +83,12 @@ Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
     mapped_ = handles_->hostBytes.data();
     return;
   }
+  handles_->counted = true;
+  if (++handles_->device.allocations > limits.maxAllocations)
+    throw std::runtime_error(fmt::format(
+        "a buffer of {} bytes would be more than the {} allocations of memory that {} allows: use "
+        "fewer scenes",
+        bytes, limits.maxAllocations, device.info().name));
   const Traits traits = traitsOf(purpose);
   const vk::raii::Device& vulkan = device.handles().device;
   try {
@@ -92,7 +98,7 @@ Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
         vulkan, vk::MemoryAllocateInfo{.allocationSize = needs.size,
                                        .memoryTypeIndex = memoryType(device, needs.memoryTypeBits, traits)});
     handles_->bytes = needs.size;
-    *handles_->allocatedBytes += needs.size;
+    handles_->device.allocatedBytes += needs.size;
     handles_->buffer.bindMemory(*handles_->memory, 0);
     if (mapped) mapped_ = handles_->memory.mapMemory(0, VK_WHOLE_SIZE);
     if (texels)

@@ -19,8 +19,8 @@ enum class BufferPurpose : std::uint8_t {
   indirect,  // state that also has dispatch sizes
 };
 
-// Move-only. The contents start undefined. Throws std::runtime_error, which names the size, if memory runs
-// out.
+// Move-only. The contents start undefined. Throws std::runtime_error, which names the size, if memory or
+// the device's allocations (Limits::maxAllocations) run out.
 class Buffer {
  public:
   Buffer();

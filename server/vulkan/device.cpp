@@ -47,7 +47,8 @@ Limits limitsOf(const vk::raii::PhysicalDevice& physical) {
           .parallelWorkgroups = kGpuWorkgroups,
           .subgroupSize = chain.get<vk::PhysicalDeviceVulkan11Properties>().subgroupSize,
           .timestampPeriod = limits.timestampPeriod,
-          .deviceMemoryBytes = memory};
+          .deviceMemoryBytes = memory,
+          .maxAllocations = limits.maxMemoryAllocationCount};
 }
 
 bool offersStatistics(const vk::raii::PhysicalDevice& physical) {
@@ -165,6 +166,7 @@ Device::Device(const DeviceOptions& options)
                                                              : options.kernels == KernelSettings::gpu;
   limits_ = limitsOf(chosen.physical);
   if (chosen.info.kind == DeviceKind::software) limits_.parallelWorkgroups = threads.count();
+  if (options.maxAllocations > 0) limits_.maxAllocations = options.maxAllocations;
   handles_->queueFamily = chosen.queueFamily;
   info_ = std::move(chosen.info);
   handles_->physical = std::move(chosen.physical);
@@ -231,6 +233,10 @@ void Device::drain() {
     last = submitted_;
   }
   wait(last);
+}
+
+std::uint32_t Device::allocations() const {
+  return handles_->allocations;
 }
 
 std::uint64_t Device::allocatedBytes() const {

@@ -47,6 +47,8 @@ struct DeviceOptions {
   // submitted. A driver without a GPU is enough. Kernels keep the statistics of their compiler
   // (kernel_statistics.h).
   bool compileOnly = false;
+  // Buffers that the device may have at a time; 0: as many as the driver allows. For tests.
+  std::uint32_t maxAllocations = 0;
 };
 
 struct Limits {
@@ -62,6 +64,7 @@ struct Limits {
   std::uint32_t subgroupSize = 0;
   float timestampPeriod = 0;  // ns per tick of the timestamp counter
   std::uint64_t deviceMemoryBytes = 0;
+  std::uint32_t maxAllocations = 0;  // allocations of memory at a time; each buffer is one
 };
 
 // A value of the queue's timeline. It is reached when all earlier submissions are complete.
@@ -123,6 +126,8 @@ class Device {
 
   // Memory of all buffers on the device, in bytes.
   std::uint64_t allocatedBytes() const;
+  // Allocations of memory that buffers on the device have now.
+  std::uint32_t allocations() const;
 
   // Only for this folder (handles.h).
   struct Handles;

@@ -43,6 +43,7 @@ struct Device::Handles {
   std::uint32_t queueFamily = 0;
   bool keepsStatistics = false;  // of kernels: kernel_statistics.h
   mutable std::atomic<std::uint64_t> allocatedBytes{0};
+  mutable std::atomic<std::uint32_t> allocations{0};
   // Pipelines that kernels use.
   mutable std::mutex pipelinesMutex{};
   mutable std::map<PipelineKey, std::weak_ptr<const Kernel::Handles>> pipelines{};
@@ -53,13 +54,17 @@ struct Device::Handles {
 };
 
 struct Buffer::Handles {
-  explicit Handles(const Device& of) : allocatedBytes(&of.handles().allocatedBytes) {}
-  ~Handles() { *allocatedBytes -= bytes; }
+  explicit Handles(const Device& of) : device(of.handles()) {}
+  ~Handles() {
+    device.allocatedBytes -= bytes;
+    if (counted) --device.allocations;
+  }
   Handles(const Handles&) = delete;
   Handles& operator=(const Handles&) = delete;
 
-  std::atomic<std::uint64_t>* allocatedBytes;  // of the device
-  std::uint64_t bytes = 0;                     // of `memory`
+  const Device::Handles& device;
+  std::uint64_t bytes = 0;  // of `memory`
+  bool counted = false;     // among the device's allocations
   vk::raii::DeviceMemory memory = nullptr;
   std::vector<std::byte> hostBytes;  // on a device that only compiles, which has no `memory`
   vk::raii::Buffer buffer = nullptr;

@@ -78,7 +78,7 @@ void Recorder::begin() {
   if (*handles_->timestamps) handles_->current().resetQueryPool(*handles_->timestamps, 0, kMaxTimestamps);
   marks_.clear();
   timedSlices_ = 0;
-  largestDispatch_ = 0;
+  largestDispatch_ = mostOfDispatch_ = 0;
 }
 
 void Recorder::beginSlice() {
@@ -90,7 +90,7 @@ void Recorder::beginSlice() {
     handles_->slices.push_back(std::move(all.front()));
   }
   ++handles_->used;
-  invocations_ = 0;
+  invocations_ = most_ = 0;
   since_ = 0;
   before_.fill(0);
   handles_->current().begin(vk::CommandBufferBeginInfo{});
@@ -103,8 +103,9 @@ void Recorder::endSlice() {
   handles_->current().end();
 }
 
-void Recorder::count(std::uint64_t invocations) {
-  if (invocations_ > 0 && invocations_ + invocations > sliceInvocations_) {
+void Recorder::count(std::uint64_t invocations, std::uint64_t most) {
+  most = std::max(most, invocations);
+  if (most_ > 0 && (invocations_ + invocations > sliceInvocations_ || most_ + most > sliceMost_)) {
     if (marks_.empty() || timedSlices_ == kMaxTimedSlices) {
       endSlice();
       beginSlice();
@@ -118,7 +119,9 @@ void Recorder::count(std::uint64_t invocations) {
     }
   }
   invocations_ += invocations;
+  most_ += most;
   largestDispatch_ = std::max(largestDispatch_, invocations);
+  mostOfDispatch_ = std::max(mostOfDispatch_, most);
 }
 
 void Recorder::beginRehearsal() {
@@ -150,9 +153,14 @@ void Recorder::mark() {
                                        static_cast<std::uint32_t>(marks_.size()));
 }
 
-std::uint64_t Recorder::groupsPerDispatch(const Kernel& kernel, std::uint64_t work) const {
+std::uint64_t Recorder::groupsPerDispatch(const Kernel& kernel, std::uint64_t work,
+                                          std::uint64_t most) const {
   const std::uint64_t parallel = device_->limits().parallelWorkgroups;
-  const std::uint64_t groups = std::max(sliceInvocations_, kLeastDispatch) / (kernel.workgroupSize() * work);
+  const auto within = [&](std::uint64_t limit, std::uint64_t each) {
+    return std::max(limit, kLeastDispatch) / (kernel.workgroupSize() * each);
+  };
+  const std::uint64_t groups =
+      std::min(within(sliceInvocations_, work), within(sliceMost_, std::max(most, work)));
   // The parts keep all processors of the device busy.
   return std::max(parallel, groups - groups % parallel);
 }
@@ -163,22 +171,23 @@ bool Recorder::divides(const Bindings& bindings, std::uint64_t threads, std::uin
 }
 
 void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                             std::uint64_t threads, std::uint64_t work) {
+                             std::uint64_t threads, std::uint64_t work, std::uint64_t most) {
   if (threads == 0) return;
   if (rehearses_) return note(bindings, threads);
   const Kernel& kernel = bindings.kernel();
   const std::uint64_t groups = (threads + kernel.workgroupSize() - 1) / kernel.workgroupSize();
-  const std::uint32_t most = device_->limits().maxDispatchX;
-  if (groups > most)
+  const std::uint32_t allowed = device_->limits().maxDispatchX;
+  if (groups > allowed)
     throw std::runtime_error(fmt::format(
         "kernel {}: {} invocations are {} workgroups of {}, more than the {} that {} runs at once; make the "
         "workgroups larger or the invocations fewer",
-        kernel.name(), threads, groups, kernel.workgroupSize(), most, device_->info().name));
-  const std::uint64_t each = work == 0 ? groups : std::min(groups, groupsPerDispatch(kernel, work));
+        kernel.name(), threads, groups, kernel.workgroupSize(), allowed, device_->info().name));
+  const std::uint64_t each = work == 0 ? groups : std::min(groups, groupsPerDispatch(kernel, work, most));
   for (std::uint64_t first = 0; first < groups; first += each) {
     const std::uint64_t now = std::min(each, groups - first);
     const std::uint64_t done = first * kernel.workgroupSize();
-    count(std::min(now * kernel.workgroupSize(), threads - done) * std::max<std::uint64_t>(work, 1));
+    const std::uint64_t invocations = std::min(now * kernel.workgroupSize(), threads - done);
+    count(invocations * std::max<std::uint64_t>(work, 1), invocations * most);
     bind(bindings, push, pushBytes);
     // Synchronisation checks of the validation layer do not know vkCmdDispatchBase.
     if (first == 0)
@@ -190,10 +199,11 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
 }
 
 void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                                     const Buffer& groups, std::size_t offset, std::uint64_t most) {
+                                     const Buffer& groups, std::size_t offset, std::uint64_t expected,
+                                     std::uint64_t most) {
   assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
-  if (rehearses_) return note(bindings, most);
-  count(most);
+  if (rehearses_) return note(bindings, std::max(expected, most));
+  count(expected, most);
   waitBefore(sizeCommand);
   bind(bindings, push, pushBytes);
   handles_->current().dispatchIndirect(*groups.handles().buffer, offset);

@@ -40,12 +40,18 @@ class Recorder {
 
   // Divides recordings, from the next begin() on, into slices that can be submitted one by one, so that other
   // work can run between them. A slice ends before the first dispatch that would exceed `invocations` in all,
-  // and has one dispatch at least. A dispatch with a stated work (below) that exceeds `invocations` by itself
-  // is divided. By default a recording has one slice.
-  void sliceAfter(std::uint64_t invocations) { sliceInvocations_ = invocations; }
+  // and has one dispatch at least. It also ends before the first one with which the most work of its
+  // dispatches would exceed `most`. A dispatch with a stated work (below) that exceeds `invocations` or
+  // `most` by itself is divided. By default a recording has one slice.
+  void sliceAfter(std::uint64_t invocations, std::uint64_t most = ~std::uint64_t{0}) {
+    sliceInvocations_ = invocations;
+    sliceMost_ = most;
+  }
   std::uint32_t sliceCount() const;
   // Work of the largest dispatch since begin(), in invocations as slices count them.
   std::uint64_t largestDispatch() const { return largestDispatch_; }
+  // The most work of the dispatch that may become the largest.
+  std::uint64_t mostOfDispatch() const { return mostOfDispatch_; }
 
   // Clears the recording. Earlier submissions of all its slices that were submitted must be complete.
   void begin();
@@ -81,22 +87,25 @@ class Recorder {
 
   // The same for a kernel whose invocations take `work` times as long as an invocation that moves one node by
   // its springs. Slices count threads times work. If that is more than a slice, several dispatches share the
-  // workgroups, without barriers between them. The kernel must not use gl_NumWorkGroups.
+  // workgroups, without barriers between them. The kernel must not use gl_NumWorkGroups. `most`: the most
+  // work that an invocation may take, if it depends on the data; 0: `work`.
   template <typename Push>
-  void dispatch(const Bindings& bindings, const Push& push, std::uint64_t threads, std::uint64_t work) {
+  void dispatch(const Bindings& bindings, const Push& push, std::uint64_t threads, std::uint64_t work,
+                std::uint64_t most = 0) {
     static_assert(std::is_trivially_copyable_v<Push>);
-    dispatchBytes(bindings, &push, sizeof(Push), threads, work);
+    dispatchBytes(bindings, &push, sizeof(Push), threads, work, most);
   }
   // True if several dispatches would share this work.
   bool divides(const Bindings& bindings, std::uint64_t threads, std::uint64_t work) const;
 
   // Runs as many workgroups as three 32-bit numbers (x, y, z) in `groups` say at run time. `groups` must be a
-  // buffer with purpose `indirect`. `most` is the number of invocations that slices count for it.
+  // buffer with purpose `indirect`. `expected` is the number of invocations that slices count for it, and
+  // `most` the most work that it may have; 0: `expected`.
   template <typename Push>
   void dispatchIndirect(const Bindings& bindings, const Push& push, const Buffer& groups, std::size_t offset,
-                        std::uint64_t most) {
+                        std::uint64_t expected, std::uint64_t most = 0) {
     static_assert(std::is_trivially_copyable_v<Push>);
-    dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset, most);
+    dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset, expected, most);
   }
 
   // Makes earlier work (kernels, copies, fills, dispatch sizes) visible to later work. The device waits when
@@ -123,13 +132,14 @@ class Recorder {
  private:
   // A work of 0 means 1, without division.
   void dispatchBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                     std::uint64_t threads, std::uint64_t work = 0);
-  // Workgroups of each dispatch that shares this work.
-  std::uint64_t groupsPerDispatch(const Kernel& kernel, std::uint64_t work) const;
+                     std::uint64_t threads, std::uint64_t work = 0, std::uint64_t most = 0);
+  // Workgroups of each dispatch that shares this work, of an invocation.
+  std::uint64_t groupsPerDispatch(const Kernel& kernel, std::uint64_t work, std::uint64_t most = 0) const;
   void dispatchIndirectBytes(const Bindings& bindings, const void* push, std::uint32_t pushBytes,
-                             const Buffer& groups, std::size_t offset, std::uint64_t most);
+                             const Buffer& groups, std::size_t offset, std::uint64_t expected,
+                             std::uint64_t most);
   // Counts a dispatch, and ends the slice before it if it is full.
-  void count(std::uint64_t invocations);
+  void count(std::uint64_t invocations, std::uint64_t most);
   void beginSlice();
   void endSlice();
   void note(const Bindings& bindings, std::uint64_t invocations);
@@ -148,7 +158,8 @@ class Recorder {
   std::vector<StageTime> times_;
   std::vector<RehearsedKernel> rehearsed_;
   std::uint64_t sliceInvocations_ = ~std::uint64_t{0}, invocations_ = 0;  // limit, and of the current slice
-  std::uint64_t largestDispatch_ = 0;
+  std::uint64_t sliceMost_ = ~std::uint64_t{0}, most_ = 0;                // the same of the most work
+  std::uint64_t largestDispatch_ = 0, mostOfDispatch_ = 0;
   std::uint32_t timedSlices_ = 0;  // slices whose start was marked
   // Types of the commands since the last call of barrier(), and of those before it that a command of a type
   // has not waited for, as bits.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Lists the pairs of a node and a triangle, and of two edges, without a common node, that could meet in the
 // substep: those of two triangles whose boxes overlap. Each node and each edge belongs to one triangle. A
-// pair farther apart than its longest motions and the gap is omitted.
+// pair farther apart than its longest motions and the gap is omitted. If the list of triangles is too short,
+// no node moves, so that nothing needs to be found.
 //
 // The order of the pairs is arbitrary, and does not change the result. If there are more than a list holds,
 // their number says so.
@@ -20,19 +21,21 @@ layout(std430, binding = 3) readonly buffer FacePairs {
   uvec2 facePairs[];
 };
 layout(std430, binding = 4) readonly buffer FaceGroups {
-  PairGroups faceGroups;
+  PairCounts faceCounts;
 };
 layout(std430, binding = 5) writeonly buffer NodePairs {
   uvec2 nodePairs[];  // node and triangle
 };
 layout(std430, binding = 6) buffer NodeGroups {
-  PairGroups nodeGroups;
+  PairCounts nodeCounts;
+  uint nodeSizes[];
 };
 layout(std430, binding = 7) writeonly buffer EdgePairs {
   uvec2 edgePairs[];  // two edges
 };
 layout(std430, binding = 8) buffer EdgeGroups {
-  PairGroups edgeGroups;
+  PairCounts edgeCounts;
+  uint edgeSizes[];
 };
 
 layout(push_constant) uniform Push {
@@ -90,10 +93,10 @@ void addNodes(Face one, Face other) {
     for (bool found =
              apart && nodeMayMeet(one.corners[i], other.corners[0], other.corners[1], other.corners[2]);
          found; found = false) {
-      uint place = atomicAdd(nodeGroups.count, 1u);
+      uint place = atomicAdd(nodeCounts.count, 1u);
       if (place < push.nodePairs) {
         nodePairs[place] = uvec2(node, other.number);
-        atomicMax(nodeGroups.x, place / gl_WorkGroupSize.x + 1);
+        atomicMax(nodeSizes[3 * (place / kPartPairs)], place % kPartPairs / gl_WorkGroupSize.x + 1);
       }
     }
   }
@@ -109,10 +112,10 @@ void addEdges(Face one, Face other) {
       for (bool found =
                apart && edgesMayMeet(one.corners[i], one.corners[i2], other.corners[k], other.corners[k2]);
            found; found = false) {
-        uint place = atomicAdd(edgeGroups.count, 1u);
+        uint place = atomicAdd(edgeCounts.count, 1u);
         if (place < push.edgePairs) {
           edgePairs[place] = uvec2(one.edges[i], other.edges[k]);
-          atomicMax(edgeGroups.x, place / gl_WorkGroupSize.x + 1);
+          atomicMax(edgeSizes[3 * (place / kPartPairs)], place % kPartPairs / gl_WorkGroupSize.x + 1);
         }
       }
     }
@@ -120,10 +123,12 @@ void addEdges(Face one, Face other) {
 }
 
 void main() {
-  if (gl_GlobalInvocationID.x >= min(faceGroups.count, push.facePairs)) {
+  uint place = push.firstPair + gl_GlobalInvocationID.x;
+  if (gl_GlobalInvocationID.x >= kPartPairs || place >= faceCounts.count ||
+      faceCounts.count > push.facePairs) {
     return;
   }
-  uvec2 pair = facePairs[gl_GlobalInvocationID.x];
+  uvec2 pair = facePairs[place];
   Face one = fetchFace(pair.x), other = fetchFace(pair.y);
   addNodes(one, other);
   addNodes(other, one);

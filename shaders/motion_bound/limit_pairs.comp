@@ -9,7 +9,8 @@
 // plane, which stands where both demand the same share of the room. A node gets the largest share of its
 // motion that keeps it on its side of all planes. Sides are convex, so that they stay apart all the way.
 //
-// Writes are atomic minima and sums of integers, whose order does not matter.
+// Writes are atomic minima and sums of integers, whose order does not matter. If the list is too short, no
+// node moves, so that nothing needs to be computed.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -29,7 +30,7 @@ layout(std430, binding = 4) readonly buffer Pairs {
   uvec2 pairs[];
 };
 layout(std430, binding = 5) readonly buffer Groups {
-  PairGroups groups;
+  PairCounts counts;
 };
 layout(std430, binding = 6) buffer Corrections {
   int corrections[];  // x, y, z in units and weight, by node
@@ -65,10 +66,12 @@ void limitTo(uint node, float share) {
 }
 
 void main() {
-  if (gl_GlobalInvocationID.x >= min(groups.count, kEdges ? push.edgePairs : push.nodePairs)) {
+  uint place = push.firstPair + gl_GlobalInvocationID.x;
+  uint capacity = kEdges ? push.edgePairs : push.nodePairs;
+  if (gl_GlobalInvocationID.x >= kPartPairs || place >= counts.count || counts.count > capacity) {
     return;
   }
-  uvec2 pair = pairs[gl_GlobalInvocationID.x];
+  uvec2 pair = pairs[place];
   uint nodes[4];
   if (kEdges) {
     PartRecord part = partAt(parts, pair.x);

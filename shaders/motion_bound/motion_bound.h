@@ -38,11 +38,20 @@ struct BranchRecord {
 // in an inner box).
 #define CLOTHSTREAM_TREE_BOX_TEXELS 2
 
-// Dispatch sizes of the kernels that work on a list of pairs, and the number of pairs.
-struct PairGroups {
-  uint32_t x, y, z;
+// A list of pairs is worked on in parts of this many pairs, a dispatch each, so that no dispatch is long.
+const uint32_t kPartPairs = 32768;
+// What a list of pairs has at its start: the number of pairs, and, of the pairs of triangles, how many
+// kVisitBlock boxes of the tree the searches have visited. Then the dispatch sizes of its parts follow: x, y,
+// z each.
+struct PairCounts {
   uint32_t count;
+  uint32_t visits;
 };
+const uint32_t kPartSizes = 2;  // number at which the dispatch sizes begin
+const uint32_t kVisitBlock = 256;
+// Limit on the boxes that one search visits. lavapipe allows an invocation 65,535 loop rounds, and a visit
+// takes up to two.
+const uint32_t kMostVisits = 24576;
 
 struct TreePush {
   uint32_t first;  // record
@@ -56,7 +65,9 @@ struct PairPush {
   uint32_t facePairs;  // capacities of the lists
   uint32_t nodePairs;
   uint32_t edgePairs;
-  float gap;  // m
+  float gap;           // m
+  uint32_t visits;     // in blocks, that all searches may make together
+  uint32_t firstPair;  // of the part
 };
 
 struct NodePush {
@@ -88,7 +99,8 @@ static_assert(sizeof(PartRecord) == 16 && sizeof(BranchRecord) == 16);
 static_assert(sizeof(FaceRecord) == CLOTHSTREAM_FACE_TEXELS * sizeof(vec4) &&
               offsetof(FaceRecord, edges) == 16);
 static_assert(sizeof(DepthPush) == 48);
-static_assert(sizeof(PairGroups) == 16 && sizeof(PairPush) == 24 && sizeof(NodePush) == 24);
+static_assert(sizeof(PairCounts) == kPartSizes * sizeof(std::uint32_t));
+static_assert(sizeof(PairPush) == 32 && sizeof(NodePush) == 24);
 }  // namespace clothstream::shared
 #else
 

@@ -23,13 +23,13 @@ layout(std430, binding = 4) buffer Shares {
   uint shares[];
 };
 layout(std430, binding = 5) readonly buffer FaceGroups {
-  PairGroups faceGroups;
+  PairCounts faceCounts;
 };
 layout(std430, binding = 6) readonly buffer NodeGroups {
-  PairGroups nodeGroups;
+  PairCounts nodeCounts;
 };
 layout(std430, binding = 7) readonly buffer EdgeGroups {
-  PairGroups edgeGroups;
+  PairCounts edgeCounts;
 };
 layout(std430, binding = 8) buffer Report {
   uint report[];  // overflows, shortened motions
@@ -44,8 +44,8 @@ void main() {
     return;
   }
   uint node = uint(partAt(parts, gl_GlobalInvocationID.x).first);
-  bool overflows = faceGroups.count > push.facePairs || nodeGroups.count > push.nodePairs ||
-                   edgeGroups.count > push.edgePairs;
+  bool overflows = faceCounts.count > push.facePairs || nodeCounts.count > push.nodePairs ||
+                   edgeCounts.count > push.edgePairs;
   if (gl_GlobalInvocationID.x == 0 && overflows) {
     atomicAdd(report[0], 1u);
   }

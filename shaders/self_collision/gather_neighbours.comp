@@ -3,8 +3,8 @@
 // sum of the radii, plus the way that their relative velocity brings them together. If these are too many,
 // only those that are near now are listed.
 //
-// The list is in the order of the cells around the ball and, within a cell, of the nodes. Writes cannot race:
-// each list belongs to one invocation.
+// The list is in the order of the cells around the ball and, within a cell, of the nodes. A search ends when
+// the list is more than full. Writes cannot race: each list belongs to one invocation.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -71,7 +71,8 @@ bool mayTouch(Ball self, uint node, float squared, float aheadSeconds) {
   return squared < nearSquared;
 }
 
-// Lists the neighbours and returns their number. `passed` says whether cells were skipped.
+// Lists the neighbours and returns their number, at most kMaxNeighbours + 1. `passed` says whether cells were
+// skipped before.
 uint list(Ball self, uint total, float aheadSeconds, out bool passed) {
   uint words = push.cellCount + push.cellCount / kCellBlock;
   float search = uintBitsToFloat(table[words + kSearchWord]);
@@ -81,7 +82,7 @@ uint list(Ball self, uint total, float aheadSeconds, out bool passed) {
   uint first = self.node * kNeighbourStride + kNeighbourHead;
   uint count = 0;
   passed = false;
-  for (int row = 0; row < 9; ++row) {
+  for (int row = 0; row < 9 && count <= kMaxNeighbours; ++row) {
     ivec3 centre = cell + ivec3(0, row % 3 - 1, row / 3 - 1);
     // Three cells along the row are consecutive in the table, which wraps round.
     uint entry = entryOf(centre - ivec3(1, 0, 0), push.cellCount);
@@ -110,7 +111,7 @@ uint list(Ball self, uint total, float aheadSeconds, out bool passed) {
           ++count;
         }
       }
-      ++at;
+      at = count > kMaxNeighbours ? end : at + 1;
     }
   }
   for (uint i = min(count, kMaxNeighbours); (i & 3u) != 0; ++i) {

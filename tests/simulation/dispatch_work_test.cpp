@@ -124,5 +124,21 @@ TEST_F(DispatchWorkTest, DividedDispatchesGiveTheSameBits) {
   expectSameBitsInSlices(scene, tests::inputsOf(scene, boxes(200)));
 }
 
+// Pairs of cloth depend on the state. No dispatch may be long, whatever it finds.
+TEST_F(DispatchWorkTest, HeapsAreSearchedInBoundedDispatches) {
+  model::Scene scene = manyCloths(64, 12, {});
+  for (model::Cloth& cloth : scene.cloths)
+    cloth.selfCollision = model::SelfCollision{.radius = 0.01f, .friction = 0, .nothingPasses = true};
+  constexpr std::uint64_t kMost = 4 * kSlice;
+  ClothSimulation simulation(tests::device(), scene);
+  vulkan::Recorder recorder(tests::device());
+  recorder.sliceAfter(1 << 30, kMost);
+  recorder.begin();
+  simulation.recordTick(recorder, tests::inputsOf(scene));
+  EXPECT_LE(recorder.mostOfDispatch(), kMost);
+  recorder.finish();
+  EXPECT_GT(recorder.sliceCount(), 2 * scene.substeps);
+}
+
 }  // namespace
 }  // namespace clothstream::simulation

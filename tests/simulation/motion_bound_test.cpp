@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -200,6 +203,52 @@ TEST_F(MotionBound, ReachesTheHashOfEveryOtherDevice) {
   EXPECT_EQ(hashOfWildMotion(true, 0), kHash);
   EXPECT_EQ(hashOfWildMotion(true, 32), kHash);
   EXPECT_NE(hashOfWildMotion(false, 0), kHash);
+}
+
+// `count` sheets in one place, each of which moves down.
+Motion heapOfSheets(std::size_t count) {
+  std::vector<model::Cloth> sheets;
+  for (std::size_t i = 0; i < count; ++i) {
+    sheets.push_back(bounded(calmCloth(12, 12)));
+    sheets.back().name = std::to_string(i);
+  }
+  model::Scene scene = sceneOf(std::move(sheets));
+  Motion motion{scene, simulation::restState(scene.cloths), {}};
+  motion.end = motion.start;
+  for (std::size_t i = 0; i < motion.end.positions.size(); ++i) {
+    motion.end.velocities[i] = model::Vec3(0, -1, 0);
+    motion.end.positions[i].y() -= 0.001f;
+  }
+  return motion;
+}
+
+// More pairs than the lists hold: the search ends early, nothing is computed for the pairs, and no node
+// moves. The result does not depend on the order in which invocations run.
+TEST_F(MotionBound, AHeapThatIsTooDenseStandsStill) {
+  const Motion motion = heapOfSheets(48);
+  const Bound bound(motion), narrow(motion, 8);
+  EXPECT_EQ(bound.report().overflows, 1u);
+  const NodeState state = bound.state();
+  EXPECT_EQ(simulation::pack(state, 1).bytes, simulation::pack(narrow.state(), 1).bytes);
+  for (std::size_t i = 0; i < state.positions.size(); ++i) {
+    ASSERT_EQ(state.positions[i], motion.start.positions[i]);
+    ASSERT_EQ(state.velocities[i], model::Vec3(0, 0, 0));
+  }
+}
+
+// Triangles whose boxes the search cannot tell apart, because they moved far from their places at rest: few
+// pairs, but every search would visit most of the tree.
+TEST_F(MotionBound, ASearchOfTooManyBoxesEndsToo) {
+  Motion motion = heapOfSheets(40);
+  // Node i of the sheets gets the place of another one, so that triangles become long and cross everything.
+  std::mt19937 random(4);
+  for (NodeState* state : {&motion.start, &motion.end})
+    for (model::Vec3& position : state->positions) position.x() += 1;
+  std::shuffle(motion.start.positions.begin(), motion.start.positions.end(), random);
+  motion.end.positions = motion.start.positions;
+  const Bound bound(motion), narrow(motion, 8);
+  EXPECT_EQ(bound.report().overflows, 1u);
+  EXPECT_EQ(simulation::pack(bound.state(), 1).bytes, simulation::pack(narrow.state(), 1).bytes);
 }
 
 TEST_F(MotionBound, CalmClothKeepsItsMotion) {

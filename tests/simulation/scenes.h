@@ -83,6 +83,7 @@ class Running {
   // The same with the names of the active constraints: their ends, by cloth.
   std::vector<std::vector<std::uint32_t>> tickAndName(simulation::TickInputs inputs);
   void setCloths(std::span<const model::Cloth> cloths) { simulation_.setCloths(cloths); }
+  std::uint64_t stagesMade() const { return simulation_.stagesMade(); }
   void setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths) {
     simulation_.setSubsteps(substeps, cloths);
   }

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Linear systems on the device: the same bits for every partition of the work.
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -65,6 +70,63 @@ TEST_F(Solve, GivesTheSameHashesInLongRuns) {
   scene.simulationRate = 288;
   for (model::Cloth& cloth : scene.cloths) cloth.solver.iterations = 4;
   expectSameLongRuns(scene, passingBall, {.workgroupSize = 16, .solveWholeNodes = 0});
+}
+
+// A wheel: `spokes` nodes in each ring around a hub, which has a spring to each node of the first ring.
+model::Cloth wheel(std::uint32_t spokes, std::uint32_t rings) {
+  model::MeshShape shape;
+  shape.positions.emplace_back(0, 0, 0);
+  for (std::uint32_t ring = 1; ring <= rings; ++ring)
+    for (std::uint32_t spoke = 0; spoke < spokes; ++spoke) {
+      const double angle = 2 * std::numbers::pi * spoke / spokes, radius = 0.4 + 0.02 * ring;
+      shape.positions.emplace_back(static_cast<float>(radius * std::cos(angle)), 0,
+                                   static_cast<float>(radius * std::sin(angle)));
+    }
+  for (std::uint32_t ring = 0; ring < rings; ++ring)
+    for (std::uint32_t spoke = 0; spoke < spokes; ++spoke) {
+      const std::uint32_t next = (spoke + 1) % spokes, inner = 1 + (ring - 1) * spokes,
+                          outer = 1 + ring * spokes;
+      if (ring == 0) {
+        shape.triangles.push_back({0, outer + next, outer + spoke});
+        continue;
+      }
+      shape.triangles.push_back({inner + spoke, inner + next, outer + spoke});
+      shape.triangles.push_back({inner + next, outer + next, outer + spoke});
+    }
+  shape.submeshes = {{"", 0, static_cast<std::uint32_t>(shape.triangles.size())}};
+  model::Cloth cloth = calmCloth(2, 2);
+  cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(std::move(shape)));
+  cloth.mass = 0.02f * static_cast<float>(cloth.nodeCount());
+  cloth.pinnedVertices = {1};
+  return cloth;
+}
+
+// One iteration of one workgroup would be more loop rounds than lavapipe runs. It would then end its loops
+// early, without an error.
+TEST_F(Solve, GivesTheSameBitsIfManySpringsMeetAtAVertex) {
+  for (const model::SolverKind kind : {model::SolverKind::constraint, model::SolverKind::implicitEuler}) {
+    model::Scene scene = sceneOf({named("wheel", wheel(124, 33), kind)});
+    ASSERT_GT(scene.nodeCount(), 4'000u);
+    ASSERT_LE(scene.nodeCount(), 4'096u);
+    scene.substeps = 1;
+    scene.simulationRate = 720;
+    scene.cloths[0].solver.iterations = 6;
+    const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 4'096},
+                                                  {.workgroupSize = 8, .solveWholeNodes = 0}};
+    expectSameBits(scene, passingBall, 2, ways);
+  }
+}
+
+// The same for a chunk: no partition is small enough.
+TEST_F(Solve, RefusesAVertexWithMoreSpringsThanTheDeviceHasLoopRounds) {
+  if (!device().isSoftware()) GTEST_SKIP() << "only software devices limit the loop rounds";
+  const model::Scene scene = sceneOf({named("fan", wheel(5'000, 1), model::SolverKind::constraint)});
+  try {
+    const Running running(scene);
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& refused) {
+    EXPECT_NE(std::string(refused.what()).find("cloth 'fan'"), std::string::npos) << refused.what();
+  }
 }
 
 // The hash is the same on every device.

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "server/model/springs.h"
+#include "server/simulation/kept_stages.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
@@ -70,6 +71,48 @@ TEST_F(SolverChange, ContinuesAsIfTheClothAlwaysHadTheSolver) {
       const model::Scene changed = withSolvers(scene, first, second);
       expectGoesOnAsAlways(changing, changed, inputs, 6);
     }
+}
+
+// Stages of recent solvers are kept, so that a change to and fro makes nothing. The motion has the bits of a
+// scene whose stages are new.
+TEST_F(SolverChange, ToAndFroMakesNothing) {
+  const model::Scene scene = softScene();
+  const simulation::TickInputs inputs = inputsWithBall(scene);
+  Running changing(scene);
+  using enum SolverKind;
+  for (const SolverKind kind : {constraint, xpbd, implicitEuler})
+    expectGoesOnAsAlways(changing, withSolvers(scene, kind, kind), inputs, 1);
+  const std::uint64_t made = changing.stagesMade();
+  EXPECT_EQ(made, 3u);
+  for (const SolverKind kind : {xpbd, implicitEuler, constraint, massSpring, xpbd, constraint})
+    expectGoesOnAsAlways(changing, withSolvers(scene, kind, kind), inputs, 2);
+  EXPECT_EQ(changing.stagesMade(), made);
+  // More combinations than are kept.
+  for (std::uint32_t iterations = 1; iterations <= simulation::KeptStages::kMost + 1; ++iterations) {
+    model::Scene other = withSolvers(scene, constraint, constraint);
+    other.cloths[0].solver.iterations = iterations;
+    changing.setCloths(other.cloths);
+  }
+  EXPECT_EQ(changing.stagesMade(), made + simulation::KeptStages::kMost + 1);
+  expectGoesOnAsAlways(changing, withSolvers(scene, xpbd, xpbd), inputs, 2);
+  EXPECT_EQ(changing.stagesMade(), made + simulation::KeptStages::kMost + 2);
+}
+
+// Cloths whose dihedral bending changes by turns need tables once each.
+TEST_F(SolverChange, BendingToAndFroMakesNothing) {
+  const model::Scene scene = softScene();
+  const simulation::TickInputs inputs = inputsWithBall(scene);
+  Running changing(scene);
+  std::uint64_t made = 0;
+  for (int round = 0; round < 3; ++round) {
+    for (const std::size_t bends : {0, 1}) {
+      model::Scene changed = scene;
+      changed.cloths[bends].dihedralBending = 1e-5f;
+      expectGoesOnAsAlways(changing, changed, inputs, 2);
+    }
+    if (round == 0) made = changing.stagesMade();
+  }
+  EXPECT_EQ(changing.stagesMade(), made);
 }
 
 // The number of substeps changes between ticks. The motion has the same bits as that of a simulation that was

@@ -239,6 +239,32 @@ TEST_F(ComputeTest, DispatchLargerThanASliceIsDivided) {
   EXPECT_EQ(contents<std::uint32_t>(readback), countedUp(kCount, 1));
 }
 
+// Work that depends on the data: few slices by what is expected, and more by what there may be at most.
+TEST_F(ComputeTest, SlicesAndDispatchesAreBoundedByTheirMostWork) {
+  constexpr std::uint64_t kLimit = 1 << 20, kMost = 1 << 18;
+  const Kernel kernel = countUp();
+  Buffer values = uploadOf(std::vector<std::uint32_t>(1 << 14, 0)), counts = uploadOf({0});
+  const Bindings bindings(tests::device(), kernel, {&values, &counts});
+  Recorder recorder(tests::device());
+  const auto record = [&](std::uint64_t most) {
+    recorder.begin();
+    for (int i = 0; i < 4; ++i) {
+      recorder.barrier();
+      recorder.dispatch(bindings, std::uint32_t{0}, 1 << 14, 1, most);
+    }
+    recorder.finish();
+    return recorder.sliceCount();
+  };
+  recorder.sliceAfter(kLimit);
+  EXPECT_EQ(record(16), 1u);
+  recorder.sliceAfter(kLimit, kMost);
+  EXPECT_EQ(record(0), 1u);
+  EXPECT_EQ(record(16), 4u) << "one dispatch fills a slice";
+  EXPECT_EQ(recorder.mostOfDispatch(), kMost);
+  EXPECT_EQ(record(64), 16u) << "each dispatch is divided into four";
+  EXPECT_EQ(recorder.mostOfDispatch(), kMost);
+}
+
 TEST_F(ComputeTest, WorkBetweenSlicesBelongsToNoStage) {
   constexpr std::uint32_t kCount = 256, kSteps = 6;
   constexpr std::size_t kHeavyBytes = 64u << 20;
@@ -416,6 +442,18 @@ TEST_F(ComputeTest, TooLargeABufferIsRefusedWithItsSizeAndTheLimit) {
                 const Buffer buffer(tests::device(), BufferPurpose::readback, std::size_t{1} << 60);
               }),
               HasSubstr(std::to_string(std::size_t{1} << 60)));
+}
+
+TEST_F(ComputeTest, ABufferBeyondTheDevicesAllocationsIsRefused) {
+  const Device few({.maxAllocations = 3});
+  EXPECT_GE(tests::device().limits().maxAllocations, 4096u);
+  std::vector<Buffer> buffers;
+  for (int i = 0; i < 3; ++i) buffers.emplace_back(few, BufferPurpose::state, 16);
+  EXPECT_THAT(runtimeErrorOf([&] { const Buffer fourth(few, BufferPurpose::state, 16); }),
+              HasSubstr("more than the 3 allocations of memory"));
+  EXPECT_EQ(few.allocations(), 3u);
+  buffers.pop_back();
+  EXPECT_NO_THROW(Buffer(few, BufferPurpose::state, 16));
 }
 
 TEST_F(ComputeTest, TooLargeADispatchIsRefusedNamingTheKernel) {

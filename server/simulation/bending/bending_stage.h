@@ -2,6 +2,7 @@
 // Dihedral bending on the device: model/hinges.h.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,6 +28,8 @@ class BendingStage {
   static bool isIn(std::span<const model::Cloth> cloths);
   // True if the tables have the hinges of all cloths that bend now.
   bool serves(std::span<const model::Cloth> cloths) const;
+  // True if the tables have the hinges of this cloth.
+  bool bends(std::size_t cloth) const { return bends_[cloth]; }
 
   // Uploads the tables, before the next substep.
   void recordTables(vulkan::Recorder& recorder) const;

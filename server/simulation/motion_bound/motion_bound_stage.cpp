@@ -6,6 +6,7 @@
 #include <bit>
 #include <cassert>
 #include <cstddef>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -30,6 +31,9 @@ using vulkan::kTexels;
 // Work of an invocation (vulkan::Recorder::dispatch): of a triangle that searches the tree, and of the
 // expected pairs of a triangle or a node.
 constexpr std::uint32_t kSearchWork = 32, kFindWork = 24, kLimitWork = 24;
+// Boxes that a search visits at most, in the mean, and the most work of a search and of a pair.
+constexpr std::uint64_t kMeanVisits = 2048;
+constexpr std::uint32_t kMostSearchWork = 512, kFindPairWork = 16, kLimitPairWork = 12;
 // Places for pairs, for each node of the cloths.
 constexpr std::uint64_t kFacePairs = 128, kNodePairs = 16, kEdgePairs = 48;
 // The gap, as a share of the smallest radius.
@@ -79,7 +83,17 @@ MotionBoundStage::List::List(const vulkan::Device& device, std::uint64_t places,
     : capacity(static_cast<std::uint32_t>(
           std::min(places, std::uint64_t{device.limits().maxDispatchX} * workgroupSize))),
       pairs(device, BufferPurpose::state, std::size_t{capacity} * 2 * sizeof(std::uint32_t)),
-      groups(device, BufferPurpose::indirect, sizeof(shared::PairGroups)) {}
+      emptyGroups(device, BufferPurpose::upload,
+                  (shared::kPartSizes + std::size_t{3} * parts()) * sizeof(std::uint32_t)),
+      groups(device, BufferPurpose::indirect, emptyGroups.bytes()) {
+  const std::span<std::uint32_t> numbers = emptyGroups.mapped<std::uint32_t>();
+  std::ranges::fill(numbers, 0u);
+  for (std::size_t i = shared::kPartSizes; i < numbers.size(); i += 3) numbers[i + 1] = numbers[i + 2] = 1;
+}
+
+void MotionBoundStage::List::recordClear(vulkan::Recorder& recorder) const {
+  recorder.copy(emptyGroups, groups, groups.bytes());
+}
 
 MotionBoundStage::Limits::Limits(const vulkan::Device& device, const StateBuffers& state,
                                  const MotionBoundStage& stage, const List& list, bool edges,
@@ -174,13 +188,25 @@ void MotionBoundStage::recordTables(vulkan::Recorder& recorder) const {
   branches_.recordUpload(recorder);
   recorder.fill(corrections_, 0, corrections_.bytes());
   recorder.fill(shares_, std::bit_cast<std::uint32_t>(1.0f), shares_.bytes());
-  for (const List* list : {&facePairs_, &nodePairs_, &edgePairs_})
-    recorder.fill(list->groups, 1, list->groups.bytes());
 }
 
 void MotionBoundStage::recordClear(vulkan::Recorder& recorder) const {
   recorder.fill(report_, 0, report_.bytes());
   recorder.fill(depths_, 0, depths_.bytes());
+}
+
+void MotionBoundStage::recordParts(vulkan::Recorder& recorder, const vulkan::Bindings& bindings,
+                                   shared::PairPush push, const List& list, std::uint64_t expected,
+                                   std::uint64_t work) {
+  for (std::uint32_t part = 0; part < list.parts(); ++part) {
+    push.firstPair = part * shared::kPartPairs;
+    const std::uint64_t pairs = std::min(shared::kPartPairs, list.capacity - push.firstPair);
+    const std::uint64_t now = std::min(expected, pairs * work);
+    recorder.dispatchIndirect(bindings, push, list.groups,
+                              (shared::kPartSizes + 3 * std::size_t{part}) * sizeof(std::uint32_t), now,
+                              pairs * work);
+    expected -= now;
+  }
 }
 
 void MotionBoundStage::recordTree(vulkan::Recorder& recorder, std::uint32_t from) const {
@@ -195,12 +221,15 @@ void MotionBoundStage::recordTree(vulkan::Recorder& recorder, std::uint32_t from
 
 void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t from) const {
   const auto faceCount = static_cast<std::uint32_t>(tables_.faces.size());
-  const shared::PairPush push{.faceCount = faceCount,
-                              .boxCount = tables_.boxCount,
-                              .facePairs = facePairs_.capacity,
-                              .nodePairs = nodePairs_.capacity,
-                              .edgePairs = edgePairs_.capacity,
-                              .gap = gap_};
+  const shared::PairPush push{
+      .faceCount = faceCount,
+      .boxCount = tables_.boxCount,
+      .facePairs = facePairs_.capacity,
+      .nodePairs = nodePairs_.capacity,
+      .edgePairs = edgePairs_.capacity,
+      .gap = gap_,
+      .visits = static_cast<std::uint32_t>(kMeanVisits * faceCount / shared::kVisitBlock),
+      .firstPair = 0};
   const shared::NodePush nodePush{.nodeCount = tables_.nodeCount,
                                   .facePairs = facePairs_.capacity,
                                   .nodePairs = nodePairs_.capacity,
@@ -210,20 +239,17 @@ void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t f
   const auto onPairs = [&](Stage Limits::*kernel) {
     const std::uint64_t most = std::uint64_t{tables_.nodeCount} * kLimitWork;
     recorder.barrier();
-    recorder.dispatchIndirect((nodeLimits_.*kernel).from[from], push, nodePairs_.groups, 0, most);
-    recorder.dispatchIndirect((edgeLimits_.*kernel).from[from], push, edgePairs_.groups, 0, most);
+    recordParts(recorder, (nodeLimits_.*kernel).from[from], push, nodePairs_, most, kLimitPairWork);
+    recordParts(recorder, (edgeLimits_.*kernel).from[from], push, edgePairs_, most, kLimitPairWork);
   };
   recorder.barrier();
-  for (const List* list : {&facePairs_, &nodePairs_, &edgePairs_}) {
-    recorder.fill(list->groups, 0, sizeof(std::uint32_t), offsetof(shared::PairGroups, x));
-    recorder.fill(list->groups, 0, sizeof(std::uint32_t), offsetof(shared::PairGroups, count));
-  }
+  for (const List* list : {&facePairs_, &nodePairs_, &edgePairs_}) list->recordClear(recorder);
   recordTree(recorder, from);
   recorder.barrier();
-  recorder.dispatch(findBindings_, push, faceCount, kSearchWork);
+  recorder.dispatch(findBindings_, push, faceCount, kSearchWork, kMostSearchWork);
   recorder.barrier();
-  recorder.dispatchIndirect(findPairs_.from[from], push, facePairs_.groups, 0,
-                            std::uint64_t{faceCount} * kFindWork);
+  recordParts(recorder, findPairs_.from[from], push, facePairs_, std::uint64_t{faceCount} * kFindWork,
+              kFindPairWork);
   onPairs(&Limits::slide);
   recorder.barrier();
   recorder.dispatch(slideNodes_.from[from], nodePush, tables_.nodeCount);

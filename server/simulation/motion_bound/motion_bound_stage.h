@@ -21,7 +21,8 @@ namespace clothstream::simulation {
 
 // Belongs to the device's thread. The last stage of a substep. It finds all pairs of a node and a triangle,
 // and of two edges, that could meet between the substep's start and its end. It separates those that come too
-// near, and then shortens the motion of nodes so that no pair meets (docs/simulation.md).
+// near, and then shortens the motion of nodes so that no pair meets (docs/simulation.md). Pairs and visits of
+// the search are limited in proportion to the nodes.
 class MotionBoundStage {
  public:
   // At least one cloth must have model::boundsMotion(). Throws std::runtime_error if the device has too
@@ -49,7 +50,9 @@ class MotionBoundStage {
                     const shared::CollisionPush& collision) const;
 
   struct Report {
-    std::uint32_t overflows = 0;  // substeps in which a list of pairs was too short and no node moved
+    // Substeps in which no node moved, because a list of pairs was too short or the search for them took too
+    // long.
+    std::uint32_t overflows = 0;
     std::uint32_t shortened = 0;  // motions that were shortened
   };
   // Copies the report to the CPU, after a barrier; report() has it once the recording is complete.
@@ -60,12 +63,16 @@ class MotionBoundStage {
   std::span<const float> depths(std::uint32_t slot) const;
 
  private:
-  // A list of pairs, and its dispatch sizes.
+  // A list of pairs, and its counts and dispatch sizes. A dispatch works on one part of the list, so that its
+  // time is bounded, however many pairs there are.
   struct List {
     List(const vulkan::Device& device, std::uint64_t places, std::uint32_t workgroupSize);
+    // Begins an empty list.
+    void recordClear(vulkan::Recorder& recorder) const;
+    std::uint32_t parts() const { return (capacity + shared::kPartPairs - 1) / shared::kPartPairs; }
 
     std::uint32_t capacity;
-    vulkan::Buffer pairs, groups;
+    vulkan::Buffer pairs, emptyGroups, groups;
   };
   // Kernels that separate and limit one kind of pairs.
   struct Limits {
@@ -75,6 +82,10 @@ class MotionBoundStage {
     Stage slide, limit;
   };
 
+  // Runs a kernel on each part of a list. Most parts are empty: `expected` is the work of all of them, and
+  // `work` that of a pair (vulkan::Recorder::dispatch).
+  static void recordParts(vulkan::Recorder& recorder, const vulkan::Bindings& bindings, shared::PairPush push,
+                          const List& list, std::uint64_t expected, std::uint64_t work);
   void recordTree(vulkan::Recorder& recorder, std::uint32_t from) const;
 
   MotionBoundTables tables_;

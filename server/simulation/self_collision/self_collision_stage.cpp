@@ -29,6 +29,8 @@ using vulkan::kTexels;
 constexpr std::uint32_t kListsATick = 3;
 // Work of a node (vulkan::Recorder::dispatch) when its neighbours are listed, and in a contact iteration.
 constexpr std::uint32_t kGatherWork = 8, kContactWork = 4;
+// The most of the former: a search passes over kMaxInRow balls in each of nine rows, twice.
+constexpr std::uint32_t kMostGatherWork = 2 * 9 * shared::kMaxInRow / 8;
 // Factor of the time until the next search, because velocities change in it.
 constexpr float kAhead = 1.25f;
 
@@ -253,7 +255,7 @@ void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint3
   dispatch(fillCells_, nodeCount_);
   dispatch(sortCells_, nodeCount_);
   recorder.barrier();
-  recorder.dispatch(gather_.on[state], push, nodeCount_, kGatherWork);
+  recorder.dispatch(gather_.on[state], push, nodeCount_, kGatherWork, kMostGatherWork);
 }
 
 void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_t state,

@@ -125,6 +125,7 @@ std::string holdConnections(const Target& target, const std::string& address, in
 
 // Attacks by theme.
 std::span<const Attack> workAttacks();
+std::span<const Attack> hiddenCostAttacks();
 std::span<const Attack> contentAttacks();
 std::span<const Attack> messageAttacks();
 std::span<const Attack> connectionAttacks();

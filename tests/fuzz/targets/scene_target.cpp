@@ -33,7 +33,7 @@ struct Tables {
   explicit Tables(const model::Scene& scene)
       : meshes(simulation::meshTables(scene.cloths, 64)),
         solve(simulation::solveTables(
-            scene.cloths, 1024,
+            scene.cloths, {.nodes = 1024, .workgroup = 64, .spread = true, .mostLoops = ~0u},
             {.wholeNodes = 65'536, .workgroup = 8, .widestWorkgroup = 512, .mostLoops = 60'000})),
         assembled(simulation::assembledTables(scene.cloths,
                                               {.workgroup = 64, .wholeNodes = 1024, .rounds = 1 << 20})),

@@ -105,6 +105,26 @@ TEST_F(DeviceLossTest, RunsScenesAgainOneByOneDefaultFirst) {
   EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 1u);
 }
 
+TEST_F(DeviceLossTest, AFailureThatBelongsToNoSceneRebuildsNothing) {
+  const auto order = std::make_shared<NamesInOrder>();
+  ServerOptions options;
+  options.journals = [order](const model::Scene& scene) {
+    return std::make_shared<NotingJournal>(scene.name, order);
+  };
+  start(std::move(options));
+  if (IsSkipped()) return;
+  TestPeer first(server()), second(server());
+  first.join("small");
+  second.join("other");
+  for (int i = 0; i < 3; ++i) {
+    device().simulateFailure();
+    first.readFrames(2);
+    second.readFrames(2);
+  }
+  EXPECT_THAT(order->names(), testing::IsEmpty());
+  EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 0u);
+}
+
 TEST_F(DeviceLossTest, SceneThatIsLostWhileItLoadsIsGivenUpThenStopped) {
   start();
   if (IsSkipped()) return;

@@ -90,6 +90,24 @@ TEST_F(ScenesTest, LimitsCreatedScenes) {
   EXPECT_TRUE(createNamed(maker, "small", "two").has_create_scene());
 }
 
+// A scene that is being made or arrives from another server has its name and its place already.
+TEST_F(ScenesTest, ASceneThatIsBeingMadeHasItsNameAndItsPlace) {
+  ServerOptions options;
+  options.maxCreatedScenes = 2;
+  START(options);
+  SceneServer::State& state = server().state();
+  TestPeer peer(server());
+  auto arrives = std::make_optional(state.takePlace("arrives", "", false));
+  ASSERT_TRUE(*arrives);
+  EXPECT_THAT(state.takePlace("arrives", "", true).error().text(), HasSubstr("'arrives' exists already"));
+  EXPECT_THAT(createNamed(peer, "small", "arrives").error().text(), HasSubstr("'arrives' exists already"));
+  EXPECT_TRUE(createNamed(peer, "small", "first").has_create_scene());
+  EXPECT_THAT(createNamed(peer, "small", "second").error().text(),
+              HasSubstr("the server has 2 created scenes"));
+  arrives.reset();
+  EXPECT_TRUE(createNamed(peer, "small", "arrives").has_create_scene());
+}
+
 TEST_F(ScenesTest, SceneHasItsOwnParticipantLimit) {
   ServerOptions options;
   options.maxParticipants = 5;

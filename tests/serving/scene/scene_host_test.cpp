@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,19 @@ using tests::smallScene;
 using tests::wind;
 
 class SceneHostTest : public tests::GpuTest {};
+
+TEST_F(SceneHostTest, RefusesASceneThatLeavesTooFewAllocations) {
+  vulkan::Device few({.maxAllocations = SceneOnDevice::kSpareAllocations + 10});
+  LiveScene live(smallScene(), false);
+  delivery::FramePublisher publisher(1, [] {});
+  try {
+    const SceneHost host(few, live, publisher);
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& refused) {
+    EXPECT_NE(std::string(refused.what()).find("allocations of memory"), std::string::npos) << refused.what();
+  }
+  EXPECT_EQ(few.allocations(), 0u);
+}
 
 TEST_F(SceneHostTest, SameInputsGiveTheSameStatesForAnySubscribers) {
   const auto simulate = [](std::size_t subscribers) {
@@ -193,6 +207,62 @@ TEST_F(SceneHostTest, SubstepsStayWithinTheStabilityBoundOfThePresentParameters)
   hosted.ticks(80);
   EXPECT_TRUE(hosted.host.status().healthy);
   EXPECT_EQ(hosted.live.metrics.rollbacks.value(), 0u);
+}
+
+model::ParameterChange constraints(std::uint32_t iterations) {
+  model::ParameterChange change;
+  model::Solver solver;
+  solver.kind = model::SolverKind::constraint;
+  solver.iterations = iterations;
+  change.cloths.push_back({.solver = solver});
+  return change;
+}
+
+TEST_F(SceneHostTest, ChangesOfOneTickMakeStagesOnce) {
+  HostedScene hosted;
+  hosted.tick();
+  hosted.announced.clear();
+  for (const std::uint32_t iterations : {3u, 4u, 5u}) hosted.change(constraints(iterations));
+  hosted.change(wind(1));
+  hosted.tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 0u);
+  EXPECT_GT(hosted.host.makingTime(), Clock::duration::zero());
+  std::vector<std::uint64_t> ticks;
+  for (const v1::ServerMessage& message : hosted.announced)
+    if (message.has_parameter_changed()) ticks.push_back(message.parameter_changed().tick());
+  EXPECT_EQ(ticks, std::vector<std::uint64_t>(4, 2u));
+}
+
+// Stands still in time, so that nothing is paid for, until the changes of a second wait.
+TEST_F(SceneHostTest, ChangesThatMakeStagesWaitUntilEarlierOnesArePaidFor) {
+  HostedScene hosted;
+  hosted.tick();
+  const auto tickAtOnce = [&] {
+    hosted.now -= std::chrono::seconds(1);
+    hosted.tick();
+  };
+  for (std::uint32_t iterations = 1; iterations < 10'000 && hosted.live.inbox.depth().changes == 0;
+       ++iterations) {
+    hosted.change(constraints(iterations));
+    tickAtOnce();
+  }
+  ASSERT_EQ(hosted.live.inbox.depth().changes, 1u);
+  hosted.change(wind(1));
+  tickAtOnce();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 2u) << "later changes keep their place";
+  hosted.now += std::chrono::minutes(10);
+  hosted.tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 0u);
+}
+
+TEST_F(SceneHostTest, ChangesOfSolversToAndFroDoNotWait) {
+  HostedScene hosted;
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    hosted.change(constraints(3 + i % 2));
+    hosted.now += std::chrono::seconds(i < 2 ? 60 : -1);
+    hosted.tick();
+    EXPECT_EQ(hosted.live.inbox.depth().changes, 0u);
+  }
 }
 
 TEST_F(SceneHostTest, HandIsPlacedAtTheTimeOfTheTick) {
