@@ -109,10 +109,10 @@ class Roster {
       : subscribers_(subscribers), inbox_(inbox), journal_(journal), budget_(budget) {}
 
   struct JoinRequest {
-    std::string clientName, displayName;
+    std::string clientName{}, displayName{};
     Role role = Role::none;     // requested
-    std::string token;          // of a participant that reconnects; else empty
-    Subject subject;            // of the peer's identity; empty without one
+    std::string token{};        // of a participant that reconnects; else empty
+    Subject subject{};          // of the peer's identity; empty without one
     Rights rights{};            // of the peer's identity
     std::uint32_t attempt = 0;  // grows with each connection of the participant
     std::string address{};      // of the peer; empty: its places are not limited

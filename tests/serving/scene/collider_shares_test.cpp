@@ -2,14 +2,19 @@
 // How participants share the room for colliders.
 #include "server/scene/collider_shares.h"
 
+#include <atomic>
 #include <cmath>
+#include <map>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/messages/hands.h"
+#include "server/scene/budget.h"
 #include "tests/serving/scene/roster_test.h"
 #include "tests/serving/small_scene.h"
 
