@@ -28,7 +28,7 @@ inline constexpr std::array<CharacterRange, 8> kSpaces{{{0x20, 0x20},
                                                         {0x205f, 0x205f},
                                                         {0x2800, 0x2800},
                                                         {0x3000, 0x3000}}};
-// Pictures, after which a joiner or a choice of their style has an effect.
+// Pictures, which a joiner makes one of.
 inline constexpr std::array<CharacterRange, 2> kPictures{{{0x2190, 0x2bff}, {0x1f000, 0x1faff}}};
 
 constexpr bool isIn(std::span<const CharacterRange> ranges, std::uint32_t character) {
@@ -38,10 +38,10 @@ constexpr bool isIn(std::span<const CharacterRange> ranges, std::uint32_t charac
 }
 
 // Returns the text without what nobody sees, so that two names that look alike are not different because of
-// it: characters that show nothing, and spaces at its ends. Other spaces become single ones (U+0020). Joiners
-// (U+200D) and styles (U+FE0E, U+FE0F) stay where they form one picture. `text` must be well-formed UTF-8.
+// it: characters that show nothing, and spaces at its ends. Other spaces become single ones (U+0020). A
+// joiner (U+200D) stays between two pictures. `text` must be well-formed UTF-8.
 inline std::string visible(std::string_view text) {
-  constexpr std::uint32_t kJoiner = 0x200d, kTextStyle = 0xfe0e, kPictureStyle = 0xfe0f;
+  constexpr std::uint32_t kJoiner = 0x200d;
   std::string shown;
   std::string_view waiting;  // a space or joiner, which stays if something visible follows
   std::uint32_t before = 0;  // the newest character that stays
@@ -50,13 +50,9 @@ inline std::string visible(std::string_view text) {
     const std::string_view character = text.substr(0, bytes);
     const std::uint32_t code = codePointOf(character);
     text.remove_prefix(bytes);
-    const bool afterPicture = isIn(kPictures, before);
     if (isIn(kSpaces, code)) {
       waiting = shown.empty() ? std::string_view() : std::string_view(" ");
-    } else if ((code == kTextStyle || code == kPictureStyle) && afterPicture && waiting.empty()) {
-      shown += character;
-      before = code;
-    } else if (code == kJoiner && (afterPicture || before == kPictureStyle) && waiting.empty()) {
+    } else if (code == kJoiner && isIn(kPictures, before) && waiting.empty()) {
       waiting = character;
     } else if (!isInvisible(code)) {
       if (waiting == " " || isIn(kPictures, code)) shown += waiting;
