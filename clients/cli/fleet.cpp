@@ -167,7 +167,7 @@ std::string json(const Directory& directory) {
   return jsonText(nlohmann::ordered_json{{"servers", servers}, {"scenes", scenes}}, 2);
 }
 
-void print(const Directory& directory) {
+void printTables(const Directory& directory) {
   print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}\n", "SERVER", "VERSION", "NAME", "PARTICIPANTS", "CREATED",
         "LOAD");
   for (const auto& [origin, server] : directory.servers)
@@ -231,7 +231,7 @@ ExitCode FleetCommands::list(bool asJson) const {
   if (asJson)
     put(json(directory) + '\n');
   else
-    print(directory);
+    printTables(directory);
   return kOk;
 }
 

@@ -141,7 +141,7 @@ Verdict worstOf(const std::vector<Checked>& checked) {
   return Verdict::equal;
 }
 
-void print(const std::vector<Checked>& checked, const GoldenOptions& options) {
+void printVerdicts(const std::vector<Checked>& checked, const GoldenOptions& options) {
   const Verdict worst = worstOf(checked);
   if (!options.json) {
     for (const Checked& one : checked)
@@ -175,7 +175,7 @@ ExitCode golden(const GoldenOptions& options) {
   if (!manifest) return printError(kUnreadable, manifest.error());
   const auto checked = Check(options, *manifest).run();
   if (!checked) return printError(checked.error());
-  print(*checked, options);
+  printVerdicts(*checked, options);
   return exitCodeOf(worstOf(*checked));
 }
 
