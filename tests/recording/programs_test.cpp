@@ -299,10 +299,10 @@ TEST_F(RecordingPrograms, RefuseMoreVerticesThanAllowed) {
       << withMessages(sampleRecording(3), Topic::description, [](std::size_t, std::string& message) {
            v1::StreamDescription description = sampleDescription();
            v1::ClothDescription& cloth = *description.mutable_cloths(0);
-           cloth.set_vertex_count(2000 * 1000);
-           cloth.set_rows(2000);
+           cloth.set_vertex_count(1100 * 1000);
+           cloth.set_rows(1100);
            cloth.set_columns(1000);
-           cloth.set_rest_positions(std::string(std::size_t{12} * 2000 * 1000, '\0'));
+           cloth.set_rest_positions(std::string(std::size_t{12} * 1100 * 1000, '\0'));
            message = description.SerializeAsString();
          });
   EXPECT_LT(std::filesystem::file_size(large), 500'000u);
@@ -314,16 +314,16 @@ TEST_F(RecordingPrograms, RefuseMoreVerticesThanAllowed) {
   for (const std::vector<std::string>& command : commands) {
     const Ended refused = clothstream(command);
     EXPECT_EQ(refused.code, 7) << command[0];
-    EXPECT_THAT(refused.output + refused.errors, HasSubstr("2000000 vertices")) << command[0];
+    EXPECT_THAT(refused.output + refused.errors, HasSubstr("1100000 vertices")) << command[0];
   }
   for (const char* command : {"play", "resimulate"}) {
     const Ended help = run({CLOTHSTREAM_SERVER, command, "--help"});
     EXPECT_THAT(help.output, HasSubstr("--max-vertices")) << command;
   }
   EXPECT_THAT(run({CLOTHSTREAM_SERVER, "play", large}).errors,
-              HasSubstr("2000000 vertices; at most 1048576"));
+              HasSubstr("1100000 vertices; at most 1048576"));
   // The limit can be raised. Then the frames, which have other vertices, cannot be decoded.
-  EXPECT_THAT(clothstream({"info", large, "--max-vertices", "2000000"}).output,
+  EXPECT_THAT(clothstream({"info", large, "--max-vertices", "1100000"}).output,
               HasSubstr("cannot be decoded"));
 }
 
