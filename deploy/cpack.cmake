@@ -1,4 +1,4 @@
-# Which files each Debian package has, and what the packages say of themselves.
+# Files and descriptions of the Debian packages.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME clothstream)
 set(CPACK_PACKAGE_VENDOR ClothStream)

@@ -159,7 +159,7 @@ TEST_F(HttpEndpoint, RefusesBodyWithoutReadingIt) {
               std::string(20'000, 'x'));
   EXPECT_EQ(client.readResponse().result(), http::status::payload_too_large);
   for (const char* encoding : {"chunked", "xchunked", "identity", "gzip", "gzip, xchunked"}) {
-    // What follows the header must not count as a request.
+    // The bytes after the header must not count as a request.
     HttpClient encoded(endpoint_->port());
     encoded.send("POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: " + std::string(encoding) +
                  "\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");

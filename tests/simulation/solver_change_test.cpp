@@ -98,7 +98,7 @@ TEST_F(SolverChange, ToAndFroMakesNothing) {
   EXPECT_EQ(changing.stagesMade(), made + simulation::KeptStages::kMost + 2);
 }
 
-// Cloths whose dihedral bending changes by turns need tables once each.
+// Cloths whose dihedral bending alternates need tables once each.
 TEST_F(SolverChange, BendingToAndFroMakesNothing) {
   const model::Scene scene = softScene();
   const simulation::TickInputs inputs = inputsWithBall(scene);

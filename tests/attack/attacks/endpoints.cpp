@@ -35,7 +35,7 @@ using grpc::reflection::v1alpha::ServerReflectionRequest;
 using grpc::reflection::v1alpha::ServerReflectionResponse;
 using namespace std::chrono_literals;
 
-// What has arrived at a socket within this time; empty at its end.
+// Bytes that arrive at a socket within this time; empty at its end.
 std::string received(int file, std::chrono::milliseconds time) {
   pollfd waits{file, POLLIN, 0};
   std::array<char, 4096> bytes{};
@@ -229,7 +229,7 @@ std::string smuggleRequest(const Target& target) {
   return text;
 }
 
-// Puts a FIFO that nobody writes in the place of each of these files, and lets the server read them again.
+// Puts a FIFO without a writer in the place of each of these files, and lets the server read them again.
 std::string blockFiles(const Target& target, const std::vector<std::string>& names) {
   std::this_thread::sleep_for(1s);
   for (const std::string& name : names) {

@@ -251,7 +251,7 @@ constexpr Attack kAttacksMessage[] = {
      "[0-9]+ refused with code [0-9]+(, [0-9]+ refused with code [0-9]+)*", "--owners-alone"},
     {"control_characters", "join and create scenes with control characters in names", &controlCharacters,
      "[1-9][0-9]* names sent", "--log-level debug --log-rate 50"},
-    {"look_alikes", "join with names that differ from another one only in what nobody sees", &imitate,
+    {"look_alikes", "join with names that differ from another one only in invisible characters", &imitate,
      "8 participants with 1 names"},
     {"log_flood", "join and leave without end, with a log", &floodLog, "[1-9][0-9]* joins",
      "--log-level info --log-rate 50"},

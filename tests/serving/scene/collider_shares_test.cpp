@@ -143,7 +143,7 @@ TEST_F(SharingTest, OneParticipantTakesNothingFromOthers) {
   roster.expire(now);
   EXPECT_EQ(acting(1), 8u);
   EXPECT_LE(room.charged.others, 12.001);
-  // Whoever leaves gives its share back.
+  // A participant that leaves gives its share back.
   roster.leave(*other.mailbox, LeaveReason::left, now);
   roster.expire(now);
   EXPECT_EQ(acting(1), 12u);

@@ -232,7 +232,7 @@ TEST_F(RosterTest, OneAddressCannotHoldAllPlaces) {
   ASSERT_TRUE(from(1, "192.0.2.1"));
   EXPECT_EQ(from(2, "192.0.2.1").error(), Roster::Refusal::addressHasMany);
   EXPECT_TRUE(from(2, "192.0.2.2"));
-  // Whoever is disconnected makes room for others of the address, and comes back while there is room.
+  // A disconnected participant makes room for others of its address, and comes back while there is room.
   lose(members[0]);
   EXPECT_TRUE(from(3, "192.0.2.1"));
   EXPECT_EQ(roster.size(), 3u);
