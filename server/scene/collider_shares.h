@@ -40,7 +40,7 @@ struct ColliderLoad {
 };
 ColliderLoad loadOf(std::span<const model::ParticipantCollider> colliders, const ClothBounds* cloth);
 
-// The largest amount that each may have if all together have `room`: whoever needs less leaves the rest to
+// The largest amount that each may have if all together have `room`: one that needs less leaves the rest to
 // the others. Infinite if there is room for all.
 double fairShare(std::span<const double> needs, double room);
 
