@@ -64,7 +64,7 @@ TEST(ColliderShares, AHandWeighsLessThanTwoLargeColliders) {
   EXPECT_GT(load.hands, 0.5);
 }
 
-TEST(ColliderShares, WhoNeedsLessLeavesTheRest) {
+TEST(ColliderShares, AParticipantThatNeedsLessLeavesTheRest) {
   EXPECT_EQ(fairShare(std::vector{1.0, 2.0, 3.0}, 6), INFINITY);
   EXPECT_DOUBLE_EQ(fairShare(std::vector{60.0, 1.0, 60.0}, 11), 5);
   EXPECT_DOUBLE_EQ(fairShare(std::vector{60.0, 60.0}, 0), 0);
