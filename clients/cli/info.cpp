@@ -106,16 +106,16 @@ tl::expected<void, Error> decode(PlayedRecording& played, RecordingFigures& figu
 
 std::string damageOf(const RecordingReader& reader, const RecordingFigures& figures,
                      const InfoOptions& options) {
-  if (!reader.mcap().indexed())
-    return fmt::format("the end is missing or damaged; run clothstream recover {} OUT", options.recording);
-  if (!figures.damage.empty()) return figures.damage;
-  if (figures.faults.any())
-    return fmt::format("{}; clothstream recover {} OUT keeps the others", figures.faults.text(),
-                       options.recording);
+  std::string text;
+  const auto add = [&](const std::string& part) { text += (text.empty() ? "" : "; ") + part; };
+  if (!reader.mcap().indexed()) add("the end is missing or damaged");
+  if (!figures.damage.empty()) add(figures.damage);
+  if (figures.faults.any()) add(figures.faults.text());
   if (figures.unreadable > 0)
-    return fmt::format("{} messages cannot be read, the first is in {}", figures.unreadable,
-                       figures.firstUnreadable);
-  return {};
+    add(fmt::format("{} messages cannot be read, the first is in {}", figures.unreadable,
+                    figures.firstUnreadable));
+  if (!text.empty()) add(fmt::format("run clothstream recover {} OUT", options.recording));
+  return text;
 }
 
 std::string mebibytes(std::uint64_t bytes) {
@@ -219,7 +219,8 @@ tl::expected<ExitCode, Error> run(const InfoOptions& options) {
       if (!mcap) return tl::unexpected(mcap.error());
       if (auto counted = countByReading(*mcap, *reader, figures); !counted)
         return tl::unexpected(counted.error());
-      if (auto checked = mcap->check(); !checked && figures.damage.empty()) figures.damage = checked.error();
+      if (mcap->indexed() && figures.damage.empty())
+        if (auto checked = mcap->check(); !checked) figures.damage = checked.error();
     }
     auto toPlay = open();
     if (!toPlay) return tl::unexpected(toPlay.error());

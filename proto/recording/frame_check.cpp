@@ -47,4 +47,9 @@ void FrameCheck::restart() {
   decoder_->restart();
 }
 
+void FrameCheck::clear() {
+  restart();
+  faults_ = {};
+}
+
 }  // namespace clothstream::recording

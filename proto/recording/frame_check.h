@@ -31,6 +31,8 @@ class FrameCheck {
   Outcome take(std::string_view frame, double seconds);
   // Forgets all frames, for a seek: a key frame with any tick may follow. Counts continue.
   void restart();
+  // The same, and counts start again.
+  void clear();
 
   const FrameFaults& faults() const { return faults_; }
   // Describes the newest faulty frame.

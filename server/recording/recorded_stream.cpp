@@ -54,6 +54,7 @@ tl::expected<RecordedStream, std::string> RecordedStream::open(const std::string
     break;
   }
   stream->seek(0);
+  stream->check_.clear();
   return stream;
 }
 
@@ -68,6 +69,7 @@ tl::expected<void, std::string> RecordedStream::check() {
   if (faults().any())
     return tl::unexpected(fmt::format("{} is damaged: {}", reader_.name(), faults().text()));
   seek(0);
+  check_.clear();
   return {};
 }
 
