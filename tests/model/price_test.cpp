@@ -12,7 +12,7 @@ namespace {
 
 constexpr DeviceSpeed kSpeed{.nodeStepSeconds = 1e-8, .dispatchSeconds = 1e-5, .workgroupFactor = 2};
 
-Scene sheet(std::uint32_t size, SolverKind kind = SolverKind::massSpring) {
+Scene sheetScene(std::uint32_t size, SolverKind kind = SolverKind::massSpring) {
   Cloth cloth;
   cloth.name = "sheet";
   cloth.grid = {.rows = size, .columns = size, .width = 1, .height = 1, .pose = {}};
@@ -29,7 +29,7 @@ double secondsOf(const Scene& scene) {
 }
 
 TEST(Price, TimeGrowsWithNodesSubstepsIterationsAndColliders) {
-  const Scene plain = sheet(100);
+  const Scene plain = sheetScene(100);
   const double before = secondsOf(plain);
   EXPECT_GT(before, 0);
   Scene scene = plain;
@@ -37,7 +37,7 @@ TEST(Price, TimeGrowsWithNodesSubstepsIterationsAndColliders) {
   // Frames cost the same.
   EXPECT_GT(secondsOf(scene) / before, 1.3);
   EXPECT_LT(secondsOf(scene) / before, 2);
-  EXPECT_NEAR(secondsOf(sheet(200)) / before, 4, 0.5);
+  EXPECT_NEAR(secondsOf(sheetScene(200)) / before, 4, 0.5);
   scene = plain;
   scene.colliders.resize(10);
   EXPECT_GT(secondsOf(scene), 2 * before);
@@ -49,7 +49,7 @@ TEST(Price, TimeGrowsWithNodesSubstepsIterationsAndColliders) {
   EXPECT_GT(secondsOf(scene), 4 * balls);
   for (const SolverKind kind :
        {SolverKind::constraint, SolverKind::acad, SolverKind::xpbd, SolverKind::implicitEuler}) {
-    Scene few = sheet(100, kind), many = sheet(100, kind);
+    Scene few = sheetScene(100, kind), many = sheetScene(100, kind);
     few.cloths[0].solver.iterations = 10;
     many.cloths[0].solver.iterations = 1000;
     EXPECT_GT(secondsOf(few), before);
@@ -68,18 +68,19 @@ TEST(Price, GpusDivideClothsThatOneThreadOfASoftwareDeviceSolves) {
   DeviceSpeed software = gpu;
   software.gpu = false;
   for (const SolverKind kind : {SolverKind::constraint, SolverKind::acad, SolverKind::implicitEuler}) {
-    EXPECT_LT(on(gpu, sheet(64, kind)), 0.2 * on(software, sheet(64, kind))) << static_cast<int>(kind);
-    EXPECT_EQ(on(gpu, sheet(32, kind)), on(software, sheet(32, kind))) << static_cast<int>(kind);
-    EXPECT_EQ(on(gpu, sheet(65, kind)), on(software, sheet(65, kind))) << static_cast<int>(kind);
+    EXPECT_LT(on(gpu, sheetScene(64, kind)), 0.2 * on(software, sheetScene(64, kind)))
+        << static_cast<int>(kind);
+    EXPECT_EQ(on(gpu, sheetScene(32, kind)), on(software, sheetScene(32, kind))) << static_cast<int>(kind);
+    EXPECT_EQ(on(gpu, sheetScene(65, kind)), on(software, sheetScene(65, kind))) << static_cast<int>(kind);
   }
-  EXPECT_LT(on(gpu, sheet(32, SolverKind::xpbd)), 0.2 * on(software, sheet(32, SolverKind::xpbd)));
+  EXPECT_LT(on(gpu, sheetScene(32, SolverKind::xpbd)), 0.2 * on(software, sheetScene(32, SolverKind::xpbd)));
 }
 
 // Few nodes take as long as many, because each tests all colliders.
 TEST(Price, CollidersCostTheTimeOfAnInvocation) {
   DeviceSpeed gpu = kSpeed;
   gpu.serialStepSeconds = 1e-6;
-  Scene scene = sheet(2);
+  Scene scene = sheetScene(2);
   scene.colliders.resize(64);
   const Work work = PriceModel(scene).work(scene);
   EXPECT_DOUBLE_EQ(work.seconds(gpu) - work.seconds(kSpeed),
@@ -89,7 +90,7 @@ TEST(Price, CollidersCostTheTimeOfAnInvocation) {
 // Collision with a polyhedron tests its planes, one after the other.
 TEST(Price, CollidersCostMoreWithMorePlanes) {
   const auto priceWith = [](const Shape& shape) {
-    Scene scene = sheet(100);
+    Scene scene = sheetScene(100);
     scene.colliders.resize(8);
     for (Collider& collider : scene.colliders) collider.shape = shape;
     return secondsOf(scene);
@@ -104,7 +105,7 @@ TEST(Price, CollidersCostMoreWithMorePlanes) {
   EXPECT_GT(priceWith(hull(32)), priceWith(Box{}));
   EXPECT_GT(priceWith(hull(128)), 2 * priceWith(hull(32)));
   // Participants may have boxes, but no hulls.
-  const Scene plain = sheet(100);
+  const Scene plain = sheetScene(100);
   Scene boxes = plain;
   boxes.colliders.resize(8);
   for (Collider& collider : boxes.colliders) collider.shape = Box{};
@@ -120,7 +121,7 @@ TEST(Price, MeshesWithJointsCostMoreWithMoreTriangles) {
       mesh.skin->vertices.resize(mesh.vertices.size(), {{}, {1, 0, 0, 0}});
       mesh.skin->keys = {{0, {Pose{}}}, {1, {Pose{}}}};
     }
-    Scene made = sheet(32);
+    Scene made = sheetScene(32);
     made.colliders.resize(1);
     made.colliders[0].shape = std::make_shared<const ClosedMesh>(std::move(mesh));
     return made;
@@ -134,7 +135,7 @@ TEST(Price, MeshesWithJointsCostMoreWithMoreTriangles) {
 
 TEST(Price, MemoryGrowsWithListsKeysAndTextureCoordinates) {
   constexpr std::size_t kEntries = 10'000;
-  const Scene plain = sheet(100);
+  const Scene plain = sheetScene(100);
   const double before = PriceModel(plain).bytes(plain);
   const auto added = [&](const Scene& scene) { return PriceModel(scene).bytes(scene) - before; };
   Scene scene = plain;
@@ -161,7 +162,7 @@ TEST(Price, MemoryGrowsWithListsKeysAndTextureCoordinates) {
 
 // The scene that stopped every other scene for good before scenes had a price.
 TEST(Price, HostileSceneCostsManyTimesTheDevice) {
-  Scene scene = sheet(512, SolverKind::constraint);
+  Scene scene = sheetScene(512, SolverKind::constraint);
   scene.cloths[0].solver.iterations = 10'000;
   scene.cloths[0].solver.tolerance = 0;
   scene.substeps = 64;
@@ -169,7 +170,7 @@ TEST(Price, HostileSceneCostsManyTimesTheDevice) {
 }
 
 TEST(Price, MeshOfQuadsCostsAboutAsMuchAsTheGrid) {
-  const Scene grid = sheet(40, SolverKind::constraint);
+  const Scene grid = sheetScene(40, SolverKind::constraint);
   Scene mesh = grid;
   mesh.cloths[0] = asMesh(grid.cloths[0]);
   ASSERT_EQ(mesh.nodeCount(), grid.nodeCount());
@@ -178,7 +179,7 @@ TEST(Price, MeshOfQuadsCostsAboutAsMuchAsTheGrid) {
 }
 
 TEST(Price, MemoryOfAssembledSystemGrowsWithPairsOfSprings) {
-  Scene scene = sheet(64, SolverKind::constraint);
+  Scene scene = sheetScene(64, SolverKind::constraint);
   const double free = PriceModel(scene).bytes(scene);
   scene.cloths[0].solver.path = ConstraintPath::assembled;
   EXPECT_GT(PriceModel(scene).bytes(scene), free + 4096 * 64 * 20.0);
