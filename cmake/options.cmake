@@ -47,6 +47,8 @@ function(clothstream_compile_lightly target)
     target_compile_options(${target} PRIVATE -pthread $<$<STREQUAL:$<TARGET_PROPERTY:${target},TYPE>,EXECUTABLE>:-fPIC>)
     target_compile_definitions(${target} PRIVATE
       $<TARGET_PROPERTY:clothstream_network,INTERFACE_COMPILE_DEFINITIONS>)
+    # Asio's headers refer to its error categories wherever they are included.
+    target_link_libraries(${target} PRIVATE $<LINK_ONLY:clothstream_network> $<LINK_ONLY:clothstream_openssl>)
   endif()
 endfunction()
 
