@@ -33,7 +33,7 @@ using vulkan::kTexels;
 constexpr std::uint32_t kSearchWork = 32, kFindWork = 24, kLimitWork = 24;
 // Boxes that a search visits at most, in the mean, and the most work of a search and of a pair.
 constexpr std::uint64_t kMeanVisits = 2048;
-constexpr std::uint32_t kMostSearchWork = 512, kFindPairWork = 16, kLimitPairWork = 12;
+constexpr std::uint32_t kMostSearchWork = 512, kFindPairWork = 32, kLimitPairWork = 24;
 // Places for pairs, for each node of the cloths.
 constexpr std::uint64_t kFacePairs = 128, kNodePairs = 16, kEdgePairs = 48;
 // The gap, as a share of the smallest radius.
