@@ -12,6 +12,7 @@
 #include "clients/cli/error.h"
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
+#include "proto/codec/reach.h"
 #include "proto/text/printable.h"
 
 namespace clothstream::cli {
@@ -44,6 +45,11 @@ struct Difference {
 
 std::string lengthOf(double metres) {
   return metres < 0.1 ? fmt::format("{:.4g} mm", 1000 * metres) : fmt::format("{:.4g} m", metres);
+}
+
+// Largest distance of a vertex from its place, for a max error.
+std::string precisionOf(double maxError) {
+  return lengthOf(codec::promisedDistance(static_cast<float>(maxError), 0));
 }
 
 std::string placeOf(const VertexDistance& place) {
@@ -89,9 +95,8 @@ std::string toText(const Difference& difference, const DiffOptions& options) {
           frames.first.metres > 0 ? "by at most " + placeOf(frames.first) : "only in its exact state");
     text += fmt::format("\ndistance  largest {}, tick {}; mean {}\n", placeOf(frames.largest),
                         frames.largest.tick, lengthOf(frames.mean));
-    text += fmt::format(
-        "precision positions of A are within {} of the simulation along each axis, of B within {}\n",
-        lengthOf(frames.maxError[0]), lengthOf(frames.maxError[1]));
+    text += fmt::format("precision vertices of A are within {} of the simulation, of B within {}\n",
+                        precisionOf(frames.maxError[0]), precisionOf(frames.maxError[1]));
   }
   const bool tolerates = difference.verdict() == Verdict::equal && difference.firstTick();
   return text + fmt::format("{}{}\n", nameOf(difference.verdict()), tolerates ? " within the tolerance" : "");

@@ -13,6 +13,7 @@
 #include "clients/cli/error.h"
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
+#include "proto/codec/reach.h"
 #include "proto/text/printable.h"
 
 namespace clothstream::cli {
@@ -23,6 +24,11 @@ using Json = nlohmann::ordered_json;
 // Default of cloths without a material (scene.proto).
 constexpr double kDefaultArealMass = 0.2;
 constexpr measure::Point kDefaultGravity{0, -9.81, 0};
+
+// Largest distance of a vertex from its place, for a max error. Metres.
+double distanceOf(double maxError) {
+  return codec::promisedDistance(static_cast<float>(maxError), 0);
+}
 
 // One quantity of a cloth, with its name in tables and in JSON.
 struct Quantity {
@@ -124,8 +130,9 @@ class Output {
 
   void printTable() const {
     print("{}: {} frames, {} ticks/s; coordinates {}\n", options_.file, frames_, motion_.rate(),
-          motion_.maxError() > 0 ? fmt::format("within {:.3g} m of the simulation", motion_.maxError())
-                                 : "as in the file");
+          motion_.maxError() > 0
+              ? fmt::format("within {:.3g} m of the simulation", distanceOf(motion_.maxError()))
+              : "as in the file");
     for (std::size_t i = 0; i < summaries_.size(); ++i) {
       print("\n{}, {} vertices, {:.4g} kg/m^2\n{:<20}{:>12}{:>12}{:>12}{:>12}{:>10}\n",
             printable(cloth(i).name), cloth(i).vertexCount, settings_.arealMass[i], "", "first", "last",

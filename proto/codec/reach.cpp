@@ -32,7 +32,8 @@ float maxErrorFor(float coordinate) {
   const double unit = std::max(double{coordinate}, 40.0) / kMaxWanted;
   const double error = unit * hierarchical::kUnitsInMaxError + 0x1p-19;
   double micrometres = std::ceil(1e6 * error);
-  while (reachOf(static_cast<float>(1e-6 * micrometres)) < coordinate) ++micrometres;
+  while (reachOf(static_cast<float>(1e-6 * micrometres)) < coordinate)
+    micrometres = std::ceil(1.000001 * micrometres);
   return static_cast<float>(1e-6 * micrometres);
 }
 

@@ -83,13 +83,17 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
   const auto nameOf = [](const model::Attachment* attachment) -> const std::string& {
     return attachment->name;
   };
+  const double reach = model::reachOf(scene.stream);
   for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i) {
     const v1::AttachmentPose& from = message.attachments(i);
     const Path path = poses.at("attachments", i);
     checkKnown(checks, path / "name", from.name(), known, v1::ERROR_CODE_NOT_FOUND, nameOf);
     const auto found = std::ranges::find(known, from.name(), nameOf);
-    to.attachments.push_back(
-        {static_cast<std::size_t>(found - known.begin()), toPose(checks, path / "pose", from.pose())});
+    const model::Pose pose = toPose(checks, path / "pose", from.pose());
+    // Cloth that follows its attachment out of the stream's range would roll the scene back for everyone.
+    for (int axis = 0; axis < 3; ++axis)
+      checks.number(path / "pose", pose.position[axis], {.min = -reach, .max = reach});
+    to.attachments.push_back({static_cast<std::size_t>(found - known.begin()), pose});
   }
 }
 

@@ -32,7 +32,6 @@ TEST(Reach, IsAtLeastFortyMetres) {
   for (const float error : maxErrors()) EXPECT_GE(reachOf(error), 39.99f) << error;
 }
 
-// Half a step, as float32 gives it at the ends of the range.
 double largestDistance(std::span<const float> a, std::span<const float> b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.size(); i += 3)
@@ -53,7 +52,7 @@ TEST(Reach, CoordinatesWithinItKeepThePromise) {
       std::vector<float> positions(3 * 12);
       for (float& x : positions) {
         // Both ends, and everything between.
-        const std::uint32_t place = random() % 5;
+        const auto place = random() % 5;
         x = place == 0   ? reach
             : place == 1 ? -reach
                          : std::ldexp(reach, -30) * static_cast<float>(random() >> 2);
@@ -77,8 +76,8 @@ TEST(Reach, CoordinatesBeyondItBecomeItsEnd) {
   EXPECT_NEAR(decoder->positions()[1], -reachOf(0.0005f), 0.001);
 }
 
-TEST(Reach, OfAStreamIsThatOfTheQualityWithTheSmallestOne) {
-  // Quality 0 has five bits in a step and reaches 72 m; quality 1 has six and reaches 42 m.
+TEST(Reach, StreamHasThatOfItsNarrowestQuality) {
+  // Quality 0 has four bits in a step and reaches 71 m; quality 1 has six and reaches 49 m.
   const float error = 0.00000726f;
   ASSERT_GT(reachOf(error), 60);
   ASSERT_LT(reachOf(maxErrorOf(error, 1)), 60);
@@ -92,6 +91,7 @@ TEST(Reach, MaxErrorForACoordinateHoldsItAndSoDoLargerOnes) {
   for (const float coordinate : {1.0f, 40.0f, 60.0f, 514.3f, 800.0f, 1000.0f}) {
     const float least = maxErrorFor(coordinate);
     EXPECT_LT(least, 0.001f);
+    EXPECT_GE(reachOf(maxErrorFor(1e30f)), 1e30f);
     for (float error = least; error < 1; error *= 1.01f)
       EXPECT_GE(reachOf(error, kMaxQualities), coordinate) << error;
   }

@@ -90,7 +90,8 @@ TEST_P(DevicePrediction, EqualsTheReferenceForEveryPlaceOfKeyFrames) {
 
 TEST_P(DevicePrediction, EqualsTheReferenceAtEveryMaxErrorAndWithWideResiduals) {
   for (const float maxError : {5e-6f, 1e-4f, 0.0005f, 0.01f, 1.0f}) {
-    model::Scene scene = squareOf(16, GetParam());
+    // The mesh has uneven weights of parents, whose sums need more than 32 bits here.
+    model::Scene scene = codedAs(GetParam(), sceneOf({calmCloth(16, 16), discCloth(12)}));
     scene.stream.maxError = maxError;
     Playing playing(scene);
     std::mt19937 random(3);

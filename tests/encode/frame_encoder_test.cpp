@@ -160,7 +160,7 @@ TEST_P(FrameEncoder, KeyFrameHealsTheStreamAfterADiscardedFrame) {
   sendAll(12);
 }
 
-TEST_P(FrameEncoder, StartsANewHistoryAlthoughItsKeyFrameIsDiscarded) {
+TEST_P(FrameEncoder, NewHistorySurvivesADiscardedKeyFrame) {
   Discarding frames(GetParam());
   for (std::uint64_t tick = 101; tick <= 104; ++tick) frames.send(tick);
   // Ticks start again, as after a restore.

@@ -15,6 +15,7 @@
 #include <zlib.h>
 
 #include "clothstream/v1/recording.pb.h"
+#include "proto/recording/recorded_description.h"
 #include "proto/recording/recording_writer.h"
 #include "tests/e2e/process.h"
 #include "tests/e2e/temporary_directory.h"
@@ -341,6 +342,20 @@ TEST_F(GoldenRecordings, NamesTheServerThatCannotRun) {
   const Ended ended = clothstream({"golden", directory_.path().string(), "--server", "/nowhere/server"});
   EXPECT_EQ(ended.code, 8);
   EXPECT_THAT(ended.errors, HasSubstr("cannot run /nowhere/server"));
+}
+
+TEST_F(Comparison, ImportedRecordingDescribesNormalsAndQualities) {
+  const std::string states = pathOf("states.npz"), imported = pathOf("imported.mcap");
+  ASSERT_EQ(clothstream({"export", write("sample.mcap"), states}).code, 0);
+  const Ended ended = clothstream({"import", states, "-o", imported});
+  ASSERT_EQ(ended.code, 0) << ended.errors;
+  auto reader = RecordingReader::open(imported);
+  ASSERT_TRUE(reader) << reader.error();
+  const auto description = readDescription(*reader);
+  ASSERT_TRUE(description) << description.error();
+  EXPECT_EQ(description->normals(), v1::NORMALS_NONE);
+  EXPECT_EQ(description->qualities(), 1u);
+  EXPECT_EQ(description->temporal_layers(), 1u);
 }
 
 }  // namespace

@@ -41,6 +41,19 @@ Result<std::vector<model::ParticipantCollider>> collidersOf(const v1::ColliderPo
   return toPoses(message, sceneWithAttachments()).map([](const auto& poses) { return poses.colliders; });
 }
 
+TEST(ToPoses, RefusesAttachmentsOutsideOfTheRangeOfTheStream) {
+  v1::ColliderPoses message;
+  message.add_attachments()->set_name("knot");
+  v1::Vec3& position = *message.mutable_attachments(0)->mutable_pose()->mutable_position();
+  position.set_y(-514);
+  EXPECT_TRUE(toPoses(message, sceneWithAttachments()));
+  position.set_y(-515);
+  const auto poses = toPoses(message, sceneWithAttachments());
+  ASSERT_FALSE(poses);
+  EXPECT_THAT(poses.error().text,
+              testing::HasSubstr("attachments[0].pose = -515: must be a finite number from -514"));
+}
+
 TEST(ToPoses, ReturnsGrabsWithDefaultsAndAttachmentsByIndex) {
   v1::ColliderPoses message;
   v1::Grab& placed = *message.add_grabs();

@@ -593,10 +593,10 @@ const BadScene kBadScenes[] = {
        s.set_substeps(2);
      },
      "springs"},
-    {"cloths[0] has a node with a coordinate of 801 m",
+    {"cloths[0]: has a node with a coordinate of 801 m",
      [](v1::Scene& s) { grid(s).mutable_pose()->mutable_position()->set_x(800); },
      "set stream.maxError to 0.000778 or more"},
-    {"cloths[0] has a node with a coordinate of -521.5 m",
+    {"cloths[0]: has a node with a coordinate of -521.5 m",
      [](v1::Scene& s) { grid(s).mutable_pose()->mutable_position()->set_y(-520); },
      "must be within 514.2 m of the origin along each axis"},
     {"substeps = 10: no number up to 256",

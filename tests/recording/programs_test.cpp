@@ -486,7 +486,7 @@ TEST_F(RecordingPrograms, StartAndStopRecordingsForClients) {
 
 TEST_F(RecordingPrograms, RefuseFilesThatAreNoRecordings) {
   std::ofstream(pathOf("text")) << "This is a text.";
-  std::ofstream(pathOf("headers"), std::ios::binary) << sampleRecording(3).substr(0, 40'000);
+  std::ofstream(pathOf("headers"), std::ios::binary) << sampleRecording(3).substr(0, 20'000);
   for (const char* command : {"info", "recover"}) {
     for (const char* file : {"missing", "text", "headers"}) {
       std::vector<std::string> arguments{command, pathOf(file)};
@@ -503,9 +503,9 @@ TEST_F(RecordingPrograms, FullDiskEndsTheClientsRecording) {
   startServer();
   if (IsSkipped() || HasFatalFailure()) return;
   const std::string path = pathOf("stream.mcap");
-  // 250 KiB, in blocks of 1024 bytes, of which schemas take 150.
+  // 130 KiB, in blocks of 1024 bytes, of which schemas take 33.
   const Ended recorded = run({"/bin/bash", "-c",
-                              "ulimit -f 250; exec " + std::string(CLOTHSTREAM) + " record -o " + path +
+                              "ulimit -f 130; exec " + std::string(CLOTHSTREAM) + " record -o " + path +
                                   " --server " + address_ + " --seconds 50"});
   EXPECT_EQ(recorded.code, 6);
   EXPECT_THAT(recorded.errors, HasSubstr("File too large"));

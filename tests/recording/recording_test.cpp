@@ -6,6 +6,8 @@
 #include <string>
 
 #include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/recording.pb.h"
@@ -50,6 +52,23 @@ TEST(Recording, RoundTrips) {
   }
   EXPECT_EQ(frames, kSampleFrames);
   EXPECT_EQ(ticks, kSampleFrames);
+}
+
+TEST(Recording, SchemasHaveWhatTheirMessagesContainAndNothingElse) {
+  RecordingReader reader = readerOf(sampleRecording(1));
+  ASSERT_EQ(reader.mcap().schemas().size(), kTopicNames.size());
+  std::size_t bytes = 0;
+  for (const auto& [id, schema] : reader.mcap().schemas()) {
+    bytes += schema.data.size();
+    google::protobuf::FileDescriptorSet files;
+    ASSERT_TRUE(files.ParseFromString(schema.data)) << schema.name;
+    google::protobuf::DescriptorPool pool;
+    for (const google::protobuf::FileDescriptorProto& file : files.file())
+      EXPECT_NE(pool.BuildFile(file), nullptr) << schema.name << ' ' << file.name();
+    EXPECT_NE(pool.FindMessageTypeByName(schema.name), nullptr) << schema.name;
+    EXPECT_EQ(pool.FindMessageTypeByName("clothstream.v1.ClientMessage"), nullptr) << schema.name;
+  }
+  EXPECT_LT(bytes, 40'000u);
 }
 
 TEST(Recording, HasChunksOfAtMostAFifthOfASecond) {
