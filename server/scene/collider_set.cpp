@@ -121,7 +121,7 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
     const bool jumped = hasJumped(radius, collider.before, end, scene.tickSeconds());
     const float grown = jumped || collider.depth == 0
                             ? 0
-                            : collider.depth + kMaxHandSpeed * static_cast<float>(scene.tickSeconds());
+                            : collider.depth + kGrowth * static_cast<float>(scene.tickSeconds());
     collider.depth = std::min(leastRadius(collider.now.shape), std::max(grown, kMaxAppearance));
     collider.start = jumped ? end : collider.before;
     collider.before = end;

@@ -18,7 +18,7 @@ namespace clothstream::scene {
 
 // A collider that a message moved and that exceeds the limits of hand_limits.h is not swept: it appears at
 // its new pose, at rest. A collider of a participant that appears is at most kMaxAppearance deep, and grows
-// from there as fast as hands move.
+// from there by kGrowth.
 
 // A collider of a participant yields to cloth that nothing passes through. It yields if a node is deeper
 // inside than kYieldDepth (m), or than kYieldShare of the shape's least radius. It then returns to its last

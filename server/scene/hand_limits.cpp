@@ -46,7 +46,8 @@ model::Pose towards(float radius, const model::Pose& from, const model::Pose& to
 float maxGrabForce(const model::Scene& scene) {
   float mass = 0;
   for (const model::Cloth& cloth : scene.cloths) mass += cloth.mass;
-  return std::max(kLeastMaxForce, mass * kMaxHandSpeed / static_cast<float>(scene.tickSeconds()));
+  const float seconds = std::max(kPullSeconds, static_cast<float>(scene.tickSeconds()));
+  return std::max(kLeastMaxForce, mass * kMaxHandSpeed / seconds);
 }
 
 }  // namespace clothstream::scene

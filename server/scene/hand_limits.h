@@ -12,10 +12,14 @@ namespace clothstream::scene {
 inline constexpr float kMaxHandSpeed = 30;
 // Maximum rotation in one tick, as the cosine of half the angle (120 degrees).
 inline constexpr float kMaxHandTurn = 0.5f;
-// Depth of a shape that appears, m: cloth inside it leaves by at most this way.
-inline constexpr float kMaxAppearance = 0.25f;
-// Force that every grab may have, N. Heavier cloth may be held more strongly.
-inline constexpr float kLeastMaxForce = 100;
+// Depth of a shape that appears, m: cloth inside it leaves by at most this way. Its depth then grows by
+// kGrowth, m/s.
+inline constexpr float kMaxAppearance = 0.1f;
+inline constexpr float kGrowth = 3;
+// Force that every grab may have, N. Heavier cloth may be held more strongly: all of it gets kMaxHandSpeed in
+// kPullSeconds, or in one tick if that is longer.
+inline constexpr float kLeastMaxForce = 20;
+inline constexpr float kPullSeconds = 0.1f;
 
 // Least and largest distance of the surface from the middle. Only for the shapes of participants: spheres,
 // capsules and boxes.
@@ -29,7 +33,7 @@ float wayOf(float radius, const model::Pose& from, const model::Pose& to);
 // The pose on the way from `from` to `to`, after at most `step` metres of such a point.
 model::Pose towards(float radius, const model::Pose& from, const model::Pose& to, float step);
 
-// Maximum force of a grab, N: it gives all the cloth of the scene kMaxHandSpeed in one tick.
+// Maximum force of a grab on the cloth of this scene, N.
 float maxGrabForce(const model::Scene& scene);
 
 }  // namespace clothstream::scene
