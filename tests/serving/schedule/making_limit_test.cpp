@@ -10,13 +10,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Clock::time_point kStart{1h};
+constexpr Clock::time_point kBegin{1h};
 
 TEST(MakingLimitTest, KnowsWhatWasPaidForInThisTick) {
   MakingLimit limit;
   limit.beginTick();
   EXPECT_FALSE(limit.made());
-  limit.pay(kStart, 0.01);
+  limit.pay(kBegin, 0.01);
   EXPECT_TRUE(limit.made());
   limit.beginTick();
   EXPECT_FALSE(limit.made());
@@ -25,17 +25,17 @@ TEST(MakingLimitTest, KnowsWhatWasPaidForInThisTick) {
 TEST(MakingLimitTest, ChangesWaitUntilEarlierOnesArePaidFor) {
   MakingLimit limit;
   limit.beginTick();
-  ASSERT_TRUE(limit.allows(kStart));
-  limit.pay(kStart, MakingLimit::kBurst + 0.1);  // 0.1 s too much, which take 2 s
+  ASSERT_TRUE(limit.allows(kBegin));
+  limit.pay(kBegin, MakingLimit::kBurst + 0.1);  // 0.1 s too much, which take 2 s
   limit.beginTick();
-  EXPECT_FALSE(limit.allows(kStart + 1900ms));
-  EXPECT_TRUE(limit.allows(kStart + 2100ms));
+  EXPECT_FALSE(limit.allows(kBegin + 1900ms));
+  EXPECT_TRUE(limit.allows(kBegin + 2100ms));
 }
 
 TEST(MakingLimitTest, TakesTheShareInTheLongRun) {
   MakingLimit limit;
   double made = 0;
-  for (auto now = kStart; now < kStart + 100s; now += 10ms) {
+  for (auto now = kBegin; now < kBegin + 100s; now += 10ms) {
     limit.beginTick();
     if (!limit.allows(now)) continue;
     limit.pay(now, 0.08);
