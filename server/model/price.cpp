@@ -33,6 +33,7 @@ constexpr double kCorrection = 0.45;  // of a spring, with xpbd
 // kCoarseLink in a sweep.
 constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
+constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
 // Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
@@ -236,6 +237,19 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
   work.dispatches +=
       (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
   work.dispatches += kBoundDispatches * substeps * any(boundsMotion);
+  return work;
+}
+
+// The path of a node that is near a fast body is followed in strides.
+Work PriceModel::movedJointsWork(const Scene& scene) const {
+  double nodes = 0, bodies = 0;
+  for (const ClothCounts& counts : cloths_) nodes += static_cast<double>(counts.nodes);
+  for (const Collider& collider : scene.colliders) {
+    const auto* solid = std::get_if<Solid>(&collider.shape);
+    if (solid != nullptr && (*solid)->skin) ++bodies;
+  }
+  Work work;
+  work.nodeSteps = bodies * nodes * scene.substeps * kSolidWork * (kStrides - 1);
   return work;
 }
 

@@ -82,6 +82,8 @@ class PriceModel {
   // that participants may have. A part of a collider is one that fewer nodes are near.
   Work work(const Scene& scene, double colliders) const;
   Work work(const Scene& scene) const { return work(scene, static_cast<double>(scene.colliders.size())); }
+  // Work of a tick in addition to that, while participants move the joints of colliders.
+  Work movedJointsWork(const Scene& scene) const;
   // Memory on the device and on the host, in bytes.
   double bytes(const Scene& scene) const;
 

@@ -90,7 +90,7 @@ Charge::~Charge() {
 
 double Charge::load(const model::Scene& scene) const {
   const double colliders = static_cast<double>(scene.colliders.size()) + colliders_.hands + colliders_.others;
-  return model_.work(scene, colliders).seconds(budget_->speed()) * scene.simulationRate;
+  return work(scene, colliders).seconds(budget_->speed()) * scene.simulationRate;
 }
 
 void Charge::release() {
@@ -106,9 +106,22 @@ Charge::Amount Charge::priceOf(const model::Scene& scene) const {
 
 double Charge::loadWith(const model::Scene& scene, double colliders) const {
   const double all = static_cast<double>(scene.colliders.size()) + colliders;
-  const double seconds =
-      model_.work(scene, all).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
+  const double seconds = work(scene, all).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
   return seconds * scene.simulationRate;
+}
+
+model::Work Charge::work(const model::Scene& scene, double colliders) const {
+  model::Work work = model_.work(scene, colliders);
+  if (movesJoints_) work += model_.movedJointsWork(scene);
+  return work;
+}
+
+messages::Result<void> Charge::chargeJoints(const std::string& path, const model::Scene& scene) {
+  if (movesJoints_) return {};
+  movesJoints_ = true;
+  messages::Result<void> charged = charge(path, scene);
+  if (!charged) movesJoints_ = false;
+  return charged;
 }
 
 double Charge::mostLoad(const model::Scene& scene) const {

@@ -71,6 +71,10 @@ class Charge {
   double roomForOthers(const model::Scene& scene, double hands) const;
   // Charges the scene with these colliders of its participants, also beyond the budget.
   void chargeColliders(const model::Scene& scene, const ColliderLoad& colliders);
+  // Charges the scene with participants that move the joints of its colliders, from now on, like charge().
+  messages::Result<void> chargeJoints(const std::string& path, const model::Scene& scene);
+  // The scene starts again: nobody has moved joints.
+  void forgetJoints() { movesJoints_ = false; }
   // Charges the scene with parameters that it had before, also beyond the budget.
   void restore(const model::Scene& scene);
   // Returns whether a free scene would cost more than it did at first. Colliders of participants do not
@@ -84,13 +88,14 @@ class Charge {
   double load(const model::Scene& scene) const;
   // Work of a tick of the charged scene with this number of colliders.
   model::Work work(const model::Scene& scene, std::size_t colliders) const {
-    return model_.work(scene, static_cast<double>(colliders));
+    return work(scene, static_cast<double>(colliders));
   }
 
  private:
   struct Amount {
     double load = 0, megabytes = 0;
   };
+  model::Work work(const model::Scene& scene, double colliders) const;
   Amount priceOf(const model::Scene& scene) const;  // the budget's mutex is held
   // Load that the scene adds to what it is free of, with these colliders of participants; negative if it is
   // cheaper. The budget's mutex is held.
@@ -111,6 +116,7 @@ class Charge {
   const std::shared_ptr<Budget> budget_;
   const model::PriceModel model_;
   ColliderLoad colliders_;  // of participants
+  bool movesJoints_ = false;
   model::Work freeWork_;
   double freeMegabytes_ = 0;
   Amount charged_;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "server/messages/field_error.h"
 #include "server/model/input.h"
 #include "server/model/scene.h"
 
@@ -56,6 +57,8 @@ class ColliderBudget {
   virtual double roomForHands() const = 0;
   // Room for all other colliders, next to these hands.
   virtual double roomForOthers(double hands) const = 0;
+  // Charges that participants move the joints of colliders of the scene, or returns why there is no room.
+  [[nodiscard]] virtual messages::Result<void> chargeJoints() { return {}; }
   // Charges what the participants have, also beyond the room.
   virtual void chargeColliders(const ColliderLoad& load) = 0;
   // Place of the cloth after the newest tick. Returns false if there was none.

@@ -10,9 +10,9 @@
 
 namespace clothstream::scene {
 
-// Maximum speed of a vertex that joints move by a message, m/s. A fist reaches 12. Bodies that follow faster
+// Maximum speed of a vertex that joints move by a message, m/s: that of a fist. Bodies that follow faster
 // messages reach their poses some ticks later.
-inline constexpr float kMaxBodySpeed = 20;
+inline constexpr float kMaxBodySpeed = 12;
 
 // Belongs to one mesh with a skin. Allocates nothing after the first call.
 class JointFollower {

@@ -172,6 +172,13 @@ double LiveScene::roomForOthers(double hands) const {
   return charge_.roomForOthers(definition_, hands);
 }
 
+messages::Result<void> LiveScene::chargeJoints() {
+  const std::lock_guard lock(mutex_);
+  auto charged = charge_.chargeJoints("colliderPoses.joints", definition_);
+  isDearer_ = charge_.exceedsStart(definition_);
+  return charged;
+}
+
 void LiveScene::chargeColliders(const ColliderLoad& load) {
   const std::lock_guard lock(mutex_);
   charge_.chargeColliders(definition_, load);
@@ -305,6 +312,7 @@ v1::ParameterChange LiveScene::restart() {
   inbox.dropChanges();
   definition_ = start_;
   restored_.reset();
+  charge_.forgetJoints();
   charge_.restore(definition_);
   definitionChanged();
   {

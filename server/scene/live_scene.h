@@ -165,6 +165,7 @@ class LiveScene : private ColliderBudget {
  private:
   double roomForHands() const override;
   double roomForOthers(double hands) const override;
+  messages::Result<void> chargeJoints() override;
   void chargeColliders(const ColliderLoad& load) override;
   bool boundsOfCloth(ClothBounds& bounds) const override;
   // The same; the caller holds the lock.

@@ -501,6 +501,8 @@ messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPo
   const auto entry = find(mailbox);
   if (entry == entries_.end()) return {};
   if (auto permitted = permit(entry->participant.role, message, permissions); !permitted) return permitted;
+  if (budget_ != nullptr && !poses.joints.empty())
+    if (auto charged = budget_->chargeJoints(); !charged) return charged;
   entry->posed = true;
   entry->poses = {.colliders = poses.colliders,
                   .grabs = poses.grabs,

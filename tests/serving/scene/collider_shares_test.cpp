@@ -15,6 +15,7 @@
 
 #include "server/messages/hands.h"
 #include "server/scene/budget.h"
+#include "tests/model/solids.h"
 #include "tests/serving/scene/roster_test.h"
 #include "tests/serving/small_scene.h"
 
@@ -193,6 +194,31 @@ TEST(ColliderShares, HandsAlwaysHaveRoom) {
   EXPECT_EQ(charge.roomForOthers(scene, 0), 0);
   charge.chargeColliders(scene, {.hands = 16, .others = 0});
   EXPECT_EQ(budget->usage().load, 0);
+}
+
+TEST(ColliderShares, MovingJointsHasAPrice) {
+  model::Scene scene = tests::smallScene();
+  model::ClosedMesh mesh = *model::boxMesh(Vec3(0.2f, 1, 0.2f));
+  mesh.skin.emplace().joints.push_back({"arm", std::nullopt, {}});
+  mesh.skin->vertices.resize(mesh.vertices.size(), {.joints = {}, .weights = {1, 0, 0, 0}});
+  scene.colliders[0].shape = std::make_shared<const model::ClosedMesh>(std::move(mesh));
+  const auto chargeWith = [&](double most, double& load) {
+    const auto budget =
+        std::make_shared<Budget>(BudgetLimits{.sceneLoad = most, .load = most, .tickSeconds = 0});
+    budget->setSpeed({.nodeStepSeconds = 1e-6, .dispatchSeconds = 0, .workgroupFactor = 1});
+    Charge charge(budget, scene, true);
+    const double before = charge.work(scene, 1).nodeSteps;
+    const messages::Result<void> charged = charge.chargeJoints("colliderPoses.joints", scene);
+    load = budget->usage().load;
+    EXPECT_EQ(charge.work(scene, 1).nodeSteps > before, charged.has_value());
+    EXPECT_EQ(charge.exceedsStart(scene), charged.has_value());
+    return charged ? std::string() : charged.error().text;
+  };
+  double load = 0;
+  EXPECT_EQ(chargeWith(1e9, load), "");
+  EXPECT_GT(load, 0);
+  EXPECT_THAT(chargeWith(load / 2, load), HasSubstr("colliderPoses.joints: would take"));
+  EXPECT_EQ(load, 0);
 }
 
 TEST(ColliderShares, AScenesCollidersLeaveHalfOfTheFreeLoadToTheNext) {
