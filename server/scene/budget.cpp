@@ -90,7 +90,7 @@ Charge::~Charge() {
 
 double Charge::load(const model::Scene& scene) const {
   const double colliders = static_cast<double>(scene.colliders.size()) + colliders_.hands + colliders_.others;
-  return work(scene, colliders).seconds(budget_->speed()) * scene.simulationRate;
+  return workWith(scene, colliders).seconds(budget_->speed()) * scene.simulationRate;
 }
 
 void Charge::release() {
@@ -106,11 +106,11 @@ Charge::Amount Charge::priceOf(const model::Scene& scene) const {
 
 double Charge::loadWith(const model::Scene& scene, double colliders) const {
   const double all = static_cast<double>(scene.colliders.size()) + colliders;
-  const double seconds = work(scene, all).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
+  const double seconds = workWith(scene, all).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
   return seconds * scene.simulationRate;
 }
 
-model::Work Charge::work(const model::Scene& scene, double colliders) const {
+model::Work Charge::workWith(const model::Scene& scene, double colliders) const {
   model::Work work = model_.work(scene, colliders);
   if (movesJoints_) work += model_.movedJointsWork(scene);
   return work;

@@ -88,14 +88,14 @@ class Charge {
   double load(const model::Scene& scene) const;
   // Work of a tick of the charged scene with this number of colliders.
   model::Work work(const model::Scene& scene, std::size_t colliders) const {
-    return work(scene, static_cast<double>(colliders));
+    return workWith(scene, static_cast<double>(colliders));
   }
 
  private:
   struct Amount {
     double load = 0, megabytes = 0;
   };
-  model::Work work(const model::Scene& scene, double colliders) const;
+  model::Work workWith(const model::Scene& scene, double colliders) const;
   Amount priceOf(const model::Scene& scene) const;  // the budget's mutex is held
   // Load that the scene adds to what it is free of, with these colliders of participants; negative if it is
   // cheaper. The budget's mutex is held.
