@@ -160,7 +160,7 @@ cycle=$(tsort <<<"$edges" 2>&1 >/dev/null | sed -n 's/^tsort: \(.*\.h\)$/\1/p' |
 [ -z "$cycle" ] || complain "these headers include each other: $cycle"
 
 # Commands print text of servers and files. print.h escapes what could control a terminal.
-printing=$(grep -nE 'fmt::print\(|std::(cout|cerr|clog)|\b(printf|puts|putchar)\(' clients/cli/*.cpp clients/cli/*.h || true)
+printing=$(grep -nE 'fmt::print\(|std::(cout|cerr|clog)|\b(printf|puts|putchar)\(' clients/cli/*.cpp clients/cli/*.h | grep -v '^clients/cli/print\.h:' || true)
 [ -z "$printing" ] || complain "print through clients/cli/print.h: $printing"
 
 exit $failed

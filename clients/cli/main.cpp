@@ -331,7 +331,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
-    print(stderr, "clothstream: {}\n", error.what());
+    std::fprintf(stderr, "clothstream: %s\n", printable(error.what()).c_str());
     return kFailed;
   }
 }

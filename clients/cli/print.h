@@ -14,10 +14,10 @@
 
 namespace clothstream::cli {
 
-// Writes lines. What could control a terminal is escaped (printable.h), except the ends of lines.
+// Writes lines. What could control a terminal is escaped (printable.h), except the ends of lines. Throws
+// std::system_error if they cannot be written, as do all functions here.
 inline void put(std::FILE* stream, std::string_view lines) {
-  const std::string safe = printableLines(lines);
-  std::fwrite(safe.data(), 1, safe.size(), stream);
+  fmt::print(stream, "{}", printableLines(lines));
 }
 inline void put(std::string_view lines) {
   put(stdout, lines);
@@ -25,8 +25,7 @@ inline void put(std::string_view lines) {
 
 // Replaces the last line on a terminal. An empty line removes it.
 inline void showStatus(std::FILE* stream, std::string_view line) {
-  std::fputs("\r\033[K", stream);
-  put(stream, printable(line));
+  fmt::print(stream, "\r\033[K{}", printable(line));
   std::fflush(stream);
 }
 
