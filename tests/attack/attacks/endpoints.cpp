@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -25,6 +26,7 @@
 #include "clients/grpc/channel.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
+#include "proto/codec/packet_header.h"
 #include "tests/attack/attacks/attacker.h"
 
 namespace clothstream::attack {
@@ -275,9 +277,11 @@ std::string changeMaterials(const Target& target) {
     while (viewer->Read(&message)) {
       if (message.has_frame()) {
         ++framesSeen;
-        v1::ClientMessage acknowledge;
-        acknowledge.mutable_frame_ack()->set_tick(message.frame().tick());
-        viewer->Write(acknowledge);
+        const auto packet = codec::parsePacket(std::as_bytes(std::span(message.frame().packet())));
+        if (!packet) continue;
+        v1::ClientMessage acknowledgement;
+        acknowledgement.mutable_frame_ack()->set_tick(packet->header.tick);
+        viewer->Write(acknowledgement);
       }
       if (!message.has_parameter_changed()) continue;
       ++changes;
