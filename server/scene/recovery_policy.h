@@ -29,15 +29,15 @@ class RecoveryPolicy {
   void changed(std::uint64_t tick) { changed_ = tick; }
   // Returns whether the present parameters have just been proven, by a valid `tick`.
   bool valid(std::uint64_t tick) {
-    const std::uint64_t since = std::max(changed_.value_or(tick), newest_.value_or(0));
+    const std::uint64_t since = std::max(changed_.value_or(tick), newest_);
     if (!changed_ || tick - since < second_) return false;
     changed_.reset();
     return true;
   }
   // Cure for the state of `tick`, which is not valid. `touched`: participants act on the cloth.
   Cure invalid(std::uint64_t tick, bool touched) {
-    const bool again = newest_ && tick - *newest_ <= second_;
-    newest_ = tick;
+    const bool again = hasFailed_ && tick - newest_ <= second_;
+    restore(tick);
     if (!again) return Cure::rollback;
     if (touched && !ignores(tick)) {
       ignoredUntil_ = tick + second_;
@@ -51,13 +51,17 @@ class RecoveryPolicy {
   bool ignores(std::uint64_t tick) const { return tick < ignoredUntil_; }
 
   // Newest tick whose state was not valid.
-  std::optional<std::uint64_t> newest() const { return newest_; }
-  void restore(std::optional<std::uint64_t> newest) { newest_ = newest; }
+  std::optional<std::uint64_t> newest() const { return hasFailed_ ? std::optional(newest_) : std::nullopt; }
+  void restore(std::optional<std::uint64_t> newest) {
+    hasFailed_ = newest.has_value();
+    newest_ = newest.value_or(0);
+  }
 
  private:
   const std::uint64_t second_;            // ticks
   std::optional<std::uint64_t> changed_;  // the parameters are not proven yet
-  std::optional<std::uint64_t> newest_;
+  bool hasFailed_ = false;
+  std::uint64_t newest_ = 0;  // tick of the newest failure
   std::uint64_t ignoredUntil_ = 0;
 };
 
