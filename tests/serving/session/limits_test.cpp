@@ -183,7 +183,7 @@ TEST_F(PeerLimitsTest, CollidersOfParticipantsHaveAPrice) {
   constexpr model::DeviceSpeed kSpeed{.nodeStepSeconds = 1e-6, .dispatchSeconds = 0, .workgroupFactor = 1};
   const model::PriceModel price(scene);
   const auto loadOf = [&](std::size_t count) {
-    return price.work(scene, scene.colliders.size() + count).seconds(kSpeed) * scene.simulationRate;
+    return price.work(scene, static_cast<double>(scene.colliders.size() + count)).seconds(kSpeed) * scene.simulationRate;
   };
   START({}, {}, {.sceneLoad = (loadOf(30) - loadOf(0)) * 1.001, .load = 1e9, .tickSeconds = 0});
   server().state().budget->setSpeed(kSpeed);
