@@ -126,6 +126,7 @@ TEST(HostilePacket, RefusedIfOfAnotherLayout) {
 
 TEST(HostilePacket, MissingReferenceIsReported) {
   for (const GoldenStream& stream : readGoldenStreams()) {
+    if (stream.packets.size() < 3) continue;
     Victim victim(stream);
     victim.receiveUpTo(0);
     EXPECT_EQ(victim.receive(stream.packets[1].bytes), DecodeResult::missingReference);
@@ -140,6 +141,7 @@ TEST(HostilePacket, MissingReferenceIsReported) {
 
 TEST(HostilePacket, StaleIfNotNewer) {
   for (const GoldenStream& stream : readGoldenStreams()) {
+    if (stream.packets.size() < 3) continue;
     Victim victim(stream);
     victim.receiveUpTo(2);
     EXPECT_EQ(victim.receive(stream.packets[1].bytes), DecodeResult::stale);
