@@ -27,11 +27,11 @@ target_precompile_headers(clothstream_test_header PRIVATE <gmock/gmock.h> <gtest
 # of a later tier has its label. The target quick_tests is what the first tier needs, `all` what all need.
 add_custom_target(quick_tests)
 
-# clothstream_test(NAME LABELS label... SOURCES file... LIBRARIES target...): adds a GoogleTest program. Each of its suites
-# is one ctest test with these labels (cmake/add_suites.cmake); the label `gpu` switches Vulkan validation on. A suite whose
-# name begins with `Thorough` has the label `thorough`, too.
+# clothstream_test(NAME LABELS label... SOURCES file... LIBRARIES target... THOROUGH suite...): adds a GoogleTest program. Each of its suites
+# is one ctest test with these labels (cmake/add_suites.cmake); the label `gpu` switches Vulkan validation on. Suites after
+# THOROUGH take long, and have the label `thorough`, too.
 function(clothstream_test name)
-  cmake_parse_arguments(ARG "" "" "LABELS;SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "LABELS;SOURCES;LIBRARIES;THOROUGH" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE clothstream_options ${ARG_LIBRARIES} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_options(${name} PRIVATE -pthread $<$<CONFIG:Release>:-O1>)
@@ -50,6 +50,7 @@ function(clothstream_test name)
 set(program $<TARGET_FILE:${name}>)
 set(directory ${PROJECT_SOURCE_DIR})
 set(labels \"${ARG_LABELS}\")
+set(thorough \"${ARG_THOROUGH}\")
 set(environment \"${environment}\")
 include(${PROJECT_SOURCE_DIR}/cmake/add_suites.cmake)
 ")
