@@ -51,8 +51,8 @@ version=$(inside dpkg-query -W -f '${Version}' clothstream-server)
 version=${version%+deb*} # the rest names the release of Debian
 inside clothstream-server --version | grep -qF "$version"
 inside clothstream --version | grep -qF "$version"
-[ -s "$root/lib/systemd/system/clothstream-server.service" ]
-grep -q 'ExecStart=/usr/bin/clothstream-server' "$root/lib/systemd/system/clothstream-server.service"
+[ -s "$root/usr/lib/systemd/system/clothstream-server.service" ]
+grep -q 'ExecStart=/usr/bin/clothstream-server' "$root/usr/lib/systemd/system/clothstream-server.service"
 zgrep -q 'clothstream-server' "$root/usr/share/man/man1/clothstream-server.1.gz"
 # Without a shell between, which would take the signal.
 chroot "$root" env CLOTHSTREAM_CACHE_DIR=/tmp/cache clothstream-server --config /etc/clothstream/server.toml --port 0 --grpc-port 0 >"$work/server.log" 2>&1 &
