@@ -344,13 +344,15 @@ model::Scene sceneOfManyCloths(int cloths) {
   for (int i = 1; i < cloths; ++i) {
     v1::Cloth& cloth = *scene.add_cloths();
     cloth = scene.cloths(0);
-    cloth.set_name("sheet " + std::to_string(i));
+    cloth.set_name("sheet-" + std::to_string(i));
     cloth.mutable_grid()->set_width(2.0f + static_cast<float>(i % 3));
     cloth.set_material(kMaterials[i % 3]);
     cloth.set_drag(0.1f * static_cast<float>(i));
     if (i % 4 == 0) cloth.mutable_solver()->mutable_implicit_euler()->set_iterations(5 + i);
   }
-  return *toScene(scene);
+  Result<model::Scene> converted = toScene(scene);
+  if (!converted) throw std::runtime_error(converted.error().text);
+  return std::move(*converted);
 }
 
 v1::ParameterChange allParametersOf(const model::Scene& scene) {
@@ -375,14 +377,14 @@ TEST_F(ToParameterChange, AnnouncedMaterialsLeadClientsToTheParametersOfTheScene
     message_.Clear();
     message_.add_cloths()->set_material(std::string(material.name));
     announced(scene);
-    message_.mutable_cloths(0)->set_name("sheet 3");
+    message_.mutable_cloths(0)->set_name("sheet-3");
     announced(scene);
     message_.add_cloths()->set_material("silk");
     message_.mutable_cloths(1)->set_drag(0.3f);
     message_.mutable_cloths(1)->mutable_bend();
     announced(scene);
     v1::ClothChange& last = *message_.add_cloths();
-    last.set_name("sheet 1");
+    last.set_name("sheet-1");
     last.set_friction(2);
     announced(scene);
     last.set_material("wool");
@@ -395,7 +397,7 @@ TEST_F(ToParameterChange, AnnouncementsOfMaterialsDoNotGrowWithTheScene) {
   const model::Cloth cloth = scene.cloths[0];
   for (int i = 1; i < 256; ++i) {
     scene.cloths.push_back(cloth);
-    scene.cloths.back().name = "sheet " + std::to_string(i);
+    scene.cloths.back().name = "sheet-" + std::to_string(i);
   }
   message_.add_cloths()->set_material("denim");
   model::Scene changed = scene;
