@@ -156,11 +156,11 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
                {.min = 1, .max = hosting::kMaxParticipants},
                "Participants per scene. When the scene is full, the participant that has been disconnected "
                "longest is evicted");
-  table.number(
-      "--max-participants-per-address", options.server.maxParticipantsPerAddress,
-      {.min = 0, .max = hosting::kMaxParticipants},
-      "Participants per scene from one address. 0 means half of --max-participants. Programs on this "
-      "machine have no such limit");
+  CLI::Option* ofAddress =
+      table.number("--max-participants-per-address", options.server.maxParticipantsPerAddress,
+                   {.min = 0, .max = hosting::kMaxParticipants},
+                   "Participants per scene from one address. Programs on this machine have no such limit");
+  table.showDefault(ofAddress, "half of --max-participants");
   CLI::Option* changeable = table.list(
       "--participants-change", parsed.changeable, "LIST",
       "Parameters that participants may change in a scene that another participant owns: a comma-separated "

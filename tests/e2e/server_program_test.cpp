@@ -420,6 +420,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--hold=0.000001",
                                        "--hold-page=3",
                                        "--max-participants=12",
+                                       "--max-participants-per-address=6",
                                        "--participants-change=cloths,colliders",
                                        "--participants-may=create,own",
                                        "--owners-alone",
