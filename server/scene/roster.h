@@ -256,7 +256,7 @@ class Roster {
   // Tells the observer that the participant left.
   void reportLeft(const Entry& entry, Clock::time_point now);
   void removePoses(Entry& entry, Clock::time_point now);
-  // What each participant's colliders may weigh.
+  // Largest weight that the colliders of one participant may have.
   ColliderLoad shareOfEach() const;
   // Removes colliders beyond the participant's share, and charges the others.
   void limit(Entry& entry, std::vector<model::ParticipantCollider>& colliders);

@@ -118,8 +118,8 @@ class ClothSimulation {
   // complete. Ticks without a report cost nothing. Stage "report".
   void recordReport(vulkan::Recorder& recorder, const TickInputs& inputs);
   std::vector<ClothReport> report() const;
-  // Of each cloth with ACAD: the ends of its active constraints in the last solve of the tick, two nodes of
-  // the cloth for each spring. At most kMostNamedConstraints springs, the first cloth's first. Empty if the
+  // Ends of the active constraints of each cloth with ACAD in the last solve of the tick, two nodes of the
+  // cloth for each spring. At most kMostNamedConstraints springs, the first cloth's first. Empty if the
   // recorded report should not name them.
   std::vector<std::vector<std::uint32_t>> constraintEnds() const;
 

@@ -40,9 +40,8 @@ struct BranchRecord {
 
 // A list of pairs is worked on in parts of this many pairs, a dispatch each, so that no dispatch is long.
 const uint32_t kPartPairs = 32768;
-// What a list of pairs has at its start: the number of pairs, and, of the pairs of triangles, how many
-// kVisitBlock boxes of the tree the searches have visited. Then the dispatch sizes of its parts follow: x, y,
-// z each.
+// Header of a list of pairs: the number of pairs, and, for triangles, how many kVisitBlock boxes of the tree
+// the searches have visited. Then the dispatch sizes of its parts follow: x, y, z each.
 struct PairCounts {
   uint32_t count;
   uint32_t visits;

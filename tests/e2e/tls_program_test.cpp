@@ -118,7 +118,7 @@ TEST_F(TlsProgram, ReadsItsCertificateAgainWithoutEndingStreams) {
   server_.reset();
 }
 
-TEST_F(TlsProgram, EndsAlthoughNobodyWritesIntoTheFifoOfItsCertificate) {
+TEST_F(TlsProgram, EndsWhileItsCertificateIsAFifoWithoutAWriter) {
   use("first");
   startWith({"--tls-certificate", chain(), "--tls-key", key()});
   if (IsSkipped()) return;
