@@ -1,6 +1,6 @@
-# Run by ctest: adds each GoogleTest suite of `program` as one test with `labels` and `environment`. A process for each suite
-# starts the device once, where a process for each test would take twice the time. Tests whose names match a pattern of the
-# environment variable LEAVE_OUT_TESTS (separated by colons, with wildcards) are not run.
+# Run by ctest: adds each GoogleTest suite of `program` as one test with `labels` and `environment`. A process for each
+# suite starts the device once, where a process for each test would take twice the time. Tests whose names match
+# `except` or the environment variable LEAVE_OUT_TESTS (patterns with wildcards, separated by colons) are not run.
 if(NOT EXISTS ${program})
   add_test(${name}_is_not_built ${program})
   set_tests_properties(${name}_is_not_built PROPERTIES LABELS "${labels}")
@@ -16,9 +16,9 @@ foreach(suite IN LISTS thorough)
     message(FATAL_ERROR "${program} has no suite ${suite}, which is listed as thorough")
   endif()
 endforeach()
-set(leftOut "")
-if(DEFINED ENV{LEAVE_OUT_TESTS})
-  set(leftOut "-$ENV{LEAVE_OUT_TESTS}")
+set(leftOut ${except} $ENV{LEAVE_OUT_TESTS})
+if(leftOut)
+  string(REPLACE ";" ":" leftOut "-${leftOut}")
 endif()
 # A suite's line is its name and a dot; a comment follows for parametrised and typed suites.
 string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+\\." suites "${listing}")

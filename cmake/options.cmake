@@ -45,12 +45,9 @@ function(clothstream_compile_lightly target)
   endif()
   if(TARGET clothstream_header)
     target_precompile_headers(${target} REUSE_FROM clothstream_header)
-    # The header is only valid with the options and macros with which it was compiled. gRPC and Avahi require -pthread.
+    # The header is only valid with the options with which it was compiled. gRPC and Avahi require -pthread.
     target_compile_options(${target} PRIVATE -pthread $<$<STREQUAL:$<TARGET_PROPERTY:${target},TYPE>,EXECUTABLE>:-fPIC>)
-    target_compile_definitions(${target} PRIVATE
-      $<TARGET_PROPERTY:clothstream_network,INTERFACE_COMPILE_DEFINITIONS>)
-    # Asio's headers refer to its error categories wherever they are included.
-    target_link_libraries(${target} PRIVATE $<LINK_ONLY:clothstream_network> $<LINK_ONLY:clothstream_openssl>)
+    target_link_libraries(${target} PRIVATE clothstream_header_use)
   endif()
 endfunction()
 

@@ -15,10 +15,19 @@ import xml.etree.ElementTree
 # node:test says this of tests that --test-name-pattern leaves to another suite.
 NOT_CHOSEN = "test name does not match pattern"
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# Number of single tests that a runner reports as passed: GoogleTest, unittest, node:test, Vitest, pytest.
+# Number of single tests that a runner reports as passed, and as failed: GoogleTest, node:test, Vitest, pytest.
 PASSED = [re.compile(pattern, re.MULTILINE) for pattern in (
-    r"^\[  PASSED  \] (\d+) tests?\.", r"^Ran (\d+) tests? in", r"^(?:#|ℹ) pass (\d+)", r"^ +Tests .*?(\d+) passed",
+    r"^\[  PASSED  \] (\d+) tests?\.", r"^(?:#|ℹ) pass (\d+)", r"^ +Tests .*?(\d+) passed",
     r"^(?:=+ )?(?:\d+ failed, )?(\d+) passed")]
+FAILED = [re.compile(pattern, re.MULTILINE) for pattern in (
+    r"^\[  FAILED  \] (\d+) tests?, listed below:", r"^(?:#|ℹ) fail (\d+)", r"^ +Tests .*?(\d+) failed",
+    r"^(?:=+ )?(\d+) failed")]
+# unittest reports the number of tests that it ran, which includes those that failed or were skipped. Tests of a class or
+# module that is skipped as a whole in its setUp are not run.
+UNITTEST_RAN = re.compile(r"^Ran (\d+) tests? in", re.MULTILINE)
+UNITTEST_FAILED = re.compile(r"^FAILED \(.+\)$", re.MULTILINE)
+UNITTEST_FAILURES = re.compile(r"(?:\(|, )(?:failures|errors|unexpected successes)=(\d+)")
+UNITTEST_SKIPPED = re.compile(r"^(?! |setUpClass |setUpModule ).*\.\.\. skipped ['\"].+['\"]$", re.MULTILINE)
 # Reason of a single test that was skipped: GoogleTest (on the line after `Skipped`), unittest, node:test as TAP and in
 # its other format, the scripts of this project.
 REASONS = [re.compile(pattern, re.MULTILINE) for pattern in (
@@ -31,19 +40,30 @@ def accepted():
     return [re.compile(line) for line in lines if line and not line.startswith("#")]
 
 
+def count(patterns, output):
+    """Sum of the numbers that these patterns find; None if they find none."""
+    counts = [int(number) for pattern in patterns for number in pattern.findall(output)]
+    return sum(counts) if counts else None
+
+
 def read(suite):
     """Returns the number of single tests that passed and failed in a suite, and the reasons of those that were skipped."""
     output = suite.findtext("system-out") or ""
     reasons = [reason.strip() for pattern in REASONS for reason in pattern.findall(output)]
     reasons = [reason for reason in reasons if reason != NOT_CHOSEN]
-    if suite.find("skipped") is not None or suite.get("status") in ("notrun", "disabled"):
+    skipped = suite.find("skipped")
+    if suite.get("status") == "notrun" and not (skipped is not None and skipped.get("message", "").startswith("SKIP_")):
+        return 0, 1, reasons  # such as a program that is not built, or a fixture that failed
+    if suite.get("status") in ("notrun", "disabled"):
         return 0, 0, reasons or ["the suite gives no reason"]
+    passed, failed, ran = count(PASSED, output), count(FAILED, output) or 0, count([UNITTEST_RAN], output)
+    if ran is not None:
+        failures = count([UNITTEST_FAILURES], "\n".join(UNITTEST_FAILED.findall(output))) or 0
+        passed = (passed or 0) + max(0, ran - failures - len(UNITTEST_SKIPPED.findall(output)))
+        failed += failures
     if suite.get("status") == "fail":
-        return 0, 1, reasons
-    counts = [int(count) for pattern in PASSED for count in pattern.findall(output)]
-    # unittest counts the skipped tests as run.
-    unittest = len(re.findall(REASONS[1], output))
-    return (sum(counts) - unittest if counts else 1), 0, reasons
+        return passed or 0, failed or 1, reasons
+    return 1 if passed is None else passed, 0, reasons
 
 
 def main():

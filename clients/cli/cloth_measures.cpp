@@ -8,6 +8,7 @@
 #include "clients/cli/signals.h"
 #include "clients/measure/energy.h"
 #include "clients/measure/intersections.h"
+#include "proto/codec/reach.h"
 
 namespace clothstream::cli {
 namespace {
@@ -31,7 +32,8 @@ class Measurer {
 
   // Everything except the kinetic energy.
   FrameMeasures measure(const MotionFrame& frame, std::span<const measure::Solid> solids) {
-    FrameMeasures measures{frame.tick, frame.seconds, std::vector<ClothMeasures>(ranges_.size())};
+    FrameMeasures measures{frame.tick, frame.seconds, codec::farthestOf(frame.positions),
+                           std::vector<ClothMeasures>(ranges_.size())};
     std::vector<std::size_t> counts(ranges_.size(), 0);
     if (settings_.intersections) counts = intersections_.count(frame.positions, ranges_);
     for (std::size_t i = 0; i < ranges_.size(); ++i) {

@@ -25,6 +25,7 @@ struct ClothMeasures {
 struct FrameMeasures {
   std::uint64_t tick = 0;
   double seconds = 0;
+  float farthest = 0;  // largest magnitude of a coordinate, metres
   std::vector<ClothMeasures> cloths;
 };
 

@@ -13,6 +13,7 @@
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
 #include "clients/recording/played_recording.h"
+#include "proto/codec/reach.h"
 #include "proto/recording/recorded_description.h"
 
 namespace clothstream::cli {
@@ -153,6 +154,9 @@ class Comparison {
     const Distances distances = distancesOf(a.client(), b.client());
     sum_ += distances.sum;
     vertices_ = cs_vertex_count(a.client());
+    for (const auto& [farthest, client] :
+         {std::pair(&result_.farthest[0], a.client()), std::pair(&result_.farthest[1], b.client())})
+      *farthest = std::max(*farthest, codec::farthestOf({cs_positions(client), 3 * vertices_}));
     if (distances.largest > result_.largest.metres) result_.largest = placeOf(a, distances);
     if (distances.largest > 0 || statesDiffer(a.frame(), b.frame())) {
       ++result_.different;
@@ -184,7 +188,7 @@ class Comparison {
 
   ComparedFrames& result_;
   double sum_ = 0;
-  std::uint32_t vertices_ = 0;
+  std::size_t vertices_ = 0;
 };
 
 }  // namespace

@@ -36,7 +36,8 @@ struct ComparedFrames {
   // First tick with other colliders, and what differs in them.
   std::optional<std::uint64_t> firstCollider;
   std::string collider;
-  std::array<double, 2> maxError{};                   // of the streams along each axis, metres
+  std::array<double, 2> maxError{};  // of the streams along each axis, metres
+  std::array<float, 2> farthest{};   // largest magnitudes of a coordinate in common frames, metres
   std::array<std::vector<std::string>, 2> damaged{};  // parts that could not be read or decoded
 };
 

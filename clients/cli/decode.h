@@ -6,13 +6,14 @@
 #include <string>
 
 #include "clients/cli/exit_code.h"
+#include "proto/codec/stream_layout.h"
 
 namespace clothstream::cli {
 
 struct DecodeOptions {
   std::string recording, out;
   // Larger recordings are refused. A vertex needs about 400 bytes of memory.
-  std::uint32_t maxVertices = 1u << 20;
+  std::uint32_t maxVertices = codec::kDefaultMaxVertices;
 };
 
 // Writes positions as a client decodes them and normals computed from them. SIGINT and SIGTERM must be

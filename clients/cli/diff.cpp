@@ -47,11 +47,6 @@ std::string lengthOf(double metres) {
   return metres < 0.1 ? fmt::format("{:.4g} mm", 1000 * metres) : fmt::format("{:.4g} m", metres);
 }
 
-// Largest distance of a vertex from its place, for a max error.
-std::string precisionOf(double maxError) {
-  return lengthOf(codec::promisedDistance(static_cast<float>(maxError), 0));
-}
-
 std::string placeOf(const VertexDistance& place) {
   return fmt::format("{} at vertex {} of {}", lengthOf(place.metres), place.vertex, printable(place.cloth));
 }
@@ -95,8 +90,12 @@ std::string toText(const Difference& difference, const DiffOptions& options) {
           frames.first.metres > 0 ? "by at most " + placeOf(frames.first) : "only in its exact state");
     text += fmt::format("\ndistance  largest {}, tick {}; mean {}\n", placeOf(frames.largest),
                         frames.largest.tick, lengthOf(frames.mean));
+    const auto precisionOf = [&](std::size_t file) {
+      return lengthOf(
+          codec::promisedDistance(static_cast<float>(frames.maxError[file]), frames.farthest[file]));
+    };
     text += fmt::format("precision vertices of A are within {} of the simulation, of B within {}\n",
-                        precisionOf(frames.maxError[0]), precisionOf(frames.maxError[1]));
+                        precisionOf(0), precisionOf(1));
   }
   const bool tolerates = difference.verdict() == Verdict::equal && difference.firstTick();
   return text + fmt::format("{}{}\n", nameOf(difference.verdict()), tolerates ? " within the tolerance" : "");

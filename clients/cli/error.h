@@ -12,7 +12,6 @@
 
 #include "clients/cli/exit_code.h"
 #include "clients/cli/print.h"
-#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 
@@ -49,7 +48,7 @@ inline tl::expected<void, Error> areDifferent(const std::string& in, const std::
 
 // Prints to standard error and returns the code.
 inline ExitCode printError(ExitCode code, const std::string& text) {
-  print(stderr, "clothstream: {}\n", printable(text));
+  print(stderr, "clothstream: {}\n", text);
   return code;
 }
 inline ExitCode printError(const Error& error) {

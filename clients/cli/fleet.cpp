@@ -20,7 +20,6 @@
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
 #include "clothstream/v1/fleet.pb.h"
-#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -171,8 +170,8 @@ void printTables(const Directory& directory) {
   print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}\n", "SERVER", "VERSION", "NAME", "PARTICIPANTS", "CREATED",
         "LOAD");
   for (const auto& [origin, server] : directory.servers)
-    print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}{}\n", idOf(origin), printable(server.server_name()),
-          server.public_name().empty() ? "-" : printable(server.public_name()), server.participants(),
+    print("{:<17} {:<24} {:<24} {:>12} {:>10} {:>12}{}\n", idOf(origin), server.server_name(),
+          server.public_name().empty() ? "-" : server.public_name(), server.participants(),
           fmt::format("{} of {}", server.created_scenes(), server.max_created_scenes()),
           fmt::format("{:.2f} of {:.0f}", server.load(), server.max_load()),
           !directory.isAlive(origin) ? "  gone"
@@ -180,7 +179,7 @@ void printTables(const Directory& directory) {
                                      : "");
   print("\n{:<32} {:<17} {}\n", "SCENE", "SERVER", "CREATED");
   for (const auto& [name, scene] : directory.scenes)
-    print("{:<32} {:<17} {}{}\n", printable(name), idOf(scene.origin()), scene.created() ? "yes" : "no",
+    print("{:<32} {:<17} {}{}\n", name, idOf(scene.origin()), scene.created() ? "yes" : "no",
           directory.isAlive(scene.origin()) ? "" : "  (its server is gone)");
 }
 
@@ -265,7 +264,7 @@ ExitCode FleetCommands::move() const {
   if (!response.ParseFromArray(natsMsg_GetData(answered), natsMsg_GetDataLength(answered)))
     return printError(kLost, "the answer is not one");
   if (!response.error().empty()) return printError(kRefused, fmt::format("{}: {}", scene_, response.error()));
-  print("{} is at server {} now; it stood still for {:.0f} ms\n", printable(scene_), idOf(response.to()),
+  print("{} is at server {} now; it stood still for {:.0f} ms\n", scene_, idOf(response.to()),
         response.gap() * 1000);
   return kOk;
 }

@@ -16,7 +16,6 @@
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
 #include "clients/cli/signals.h"
-#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -144,8 +143,7 @@ Verdict worstOf(const std::vector<Checked>& checked) {
 void printVerdicts(const std::vector<Checked>& checked, const GoldenOptions& options) {
   const Verdict worst = worstOf(checked);
   if (!options.json) {
-    for (const Checked& one : checked)
-      print("{:<14}{}: {}\n", nameOf(one.verdict), printable(one.name), printable(one.text));
+    for (const Checked& one : checked) print("{:<14}{}: {}\n", nameOf(one.verdict), one.name, one.text);
     print("{} recordings: {}\n", checked.size(), nameOf(worst));
     return;
   }

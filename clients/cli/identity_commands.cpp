@@ -7,7 +7,6 @@
 #include "clients/cli/presence.h"
 #include "clients/cli/print.h"
 #include "clients/grpc/identity.h"
-#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -49,15 +48,14 @@ ExitCode IdentityCommands::run(const ServerAddress& address) const {
 ExitCode IdentityCommands::makeCode(const ServerAddress& address) const {
   const auto made = createPairingCode(address, roleNamed(role_).value_or(CS_ROLE_PARTICIPANT));
   if (!made) return refused(made.error());
-  print("{} makes a client {} of this server; valid for {} s\n", printable(made->code), role_,
-        made->validSeconds);
+  print("{} makes a client {} of this server; valid for {} s\n", made->code, role_, made->validSeconds);
   return kOk;
 }
 
 ExitCode IdentityCommands::listBans(const ServerAddress& address) const {
   const auto bans = clothstream::listBans(address, scene_);
   if (!bans) return refused(bans.error());
-  for (const Ban& ban : *bans) print("{}  {}\n", printable(ban.subject), printable(ban.displayName));
+  for (const Ban& ban : *bans) print("{}  {}\n", ban.subject, ban.displayName);
   return kOk;
 }
 

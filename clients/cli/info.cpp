@@ -143,9 +143,11 @@ std::string toText(const RecordingReader& reader, const RecordingFigures& figure
                    const InfoOptions& options) {
   const auto value = [&](const char* name) { return printable(reader.metadata(name)); };
   std::string text = fmt::format(
-      "file      {}, {}, {} chunks\nscene     {}, started {}, {:.1f} s, {} vertices\nserver    {}\ndevice    "
-      "{}; {}; "
-      "processor {}\nstream    {} ticks/s, {} frames/s, codec {}, max error {} m\n",
+      "file      {}, {}, {} chunks\n"
+      "scene     {}, started {}, {:.1f} s, {} vertices\n"
+      "server    {}\n"
+      "device    {}; {}; processor {}\n"
+      "stream    {} ticks/s, {} frames/s, codec {}, max error {} m\n",
       options.recording, mebibytes(reader.mcap().bytes()), reader.mcap().chunks().size(), value("scene"),
       value("started"), seconds(reader), value("vertices"), value("server"), value("device"), value("driver"),
       value("processor"), value("simulation_rate"), value("stream_rate"), value("codec"), value("max_error"));
@@ -159,8 +161,7 @@ std::string toText(const RecordingReader& reader, const RecordingFigures& figure
   if (figures.stream)
     text += fmt::format(
         "frames    {} decoded, {} of them key frames, {:.2f} bits a vertex; {} cannot be decoded; {} differ "
-        "from "
-        "the server's\n",
+        "from the server's\n",
         figures.stream->frames, figures.stream->key_frames, figures.stream->bits_per_vertex,
         figures.faults.undecodable(), figures.faults.different());
   text += qualityText(reader, figures, options);

@@ -17,7 +17,6 @@
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
 #include "clients/grpc/grpc_client.h"
-#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -68,7 +67,7 @@ class Listener {
  private:
   void say(const std::string& text) const {
     line_.clear();
-    print(stderr, "clothstream: {}\n", printable(text));
+    print(stderr, "clothstream: {}\n", text);
   }
 
   void sayParticipants(cs_client* client) const {

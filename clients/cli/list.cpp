@@ -9,7 +9,6 @@
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
 #include "clients/grpc/scene_list.h"
-#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -33,8 +32,8 @@ std::string json(const std::vector<SceneSummary>& scenes) {
 void printTable(const std::vector<SceneSummary>& scenes) {
   print("{:<20} {:>9} {:>7} {:>13}  {}\n", "SCENE", "VERTICES", "CLOTHS", "PARTICIPANTS", "DESCRIPTION");
   for (const SceneSummary& scene : scenes)
-    print("{:<20} {:>9} {:>7} {:>13}  {}\n", printable(scene.name), scene.vertexCount, scene.clothCount,
-          fmt::format("{} of {}", scene.participants, scene.maxParticipants), printable(scene.description));
+    print("{:<20} {:>9} {:>7} {:>13}  {}\n", scene.name, scene.vertexCount, scene.clothCount,
+          fmt::format("{} of {}", scene.participants, scene.maxParticipants), scene.description);
 }
 
 }  // namespace

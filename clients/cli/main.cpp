@@ -27,6 +27,7 @@
 #include "clients/cli/presence.h"
 #include "clients/cli/print.h"
 #include "clients/cli/recording_commands.h"
+#include "clients/cli/recording_limits.h"
 #include "clients/cli/saved_token.h"
 #include "clients/cli/scene.h"
 #include "clients/cli/set.h"
@@ -202,10 +203,7 @@ int run(int argc, char** argv) {
       .add_option("--layers", joinOptions.temporalLayers,
                   "Most temporal layers to receive; fewer layers mean fewer frames a second. Default: all")
       ->check(CLI::Range(1, 3));
-  joinCommand
-      .add_option("--max-vertices", joinOptions.maxVertices,
-                  "Most vertices to accept from the server; twice as many triangles. Default: 1048576")
-      ->check(CLI::Range(1, 67'108'864));
+  addStreamLimit(joinCommand, joinOptions.maxVertices);
   joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
                        "End when the connection is lost. Default: try to reconnect for a minute");
   joinCommand

@@ -14,7 +14,6 @@
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
 #include "proto/codec/reach.h"
-#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -24,11 +23,6 @@ using Json = nlohmann::ordered_json;
 // Default of cloths without a material (scene.proto).
 constexpr double kDefaultArealMass = 0.2;
 constexpr measure::Point kDefaultGravity{0, -9.81, 0};
-
-// Largest distance of a vertex from its place, for a max error. Metres.
-double distanceOf(double maxError) {
-  return codec::promisedDistance(static_cast<float>(maxError), 0);
-}
 
 // One quantity of a cloth, with its name in tables and in JSON.
 struct Quantity {
@@ -81,6 +75,7 @@ class Output {
 
   void take(const FrameMeasures& frame) {
     ++frames_;
+    farthest_ = std::max(farthest_, frame.farthest);
     for (std::size_t i = 0; i < frame.cloths.size(); ++i)
       for (std::size_t k = 0; k < kQuantities.size(); ++k)
         if (const auto value = kQuantities[k].of(frame.cloths[i])) summaries_[i][k].add(*value, frame.tick);
@@ -107,9 +102,9 @@ class Output {
     }
   }
 
-  // Names of files from elsewhere may have any character.
+  // Names of files from elsewhere may have any character; print() escapes those of a terminal.
   static std::string csvName(const std::string& name) {
-    std::string quoted = printable(name);
+    std::string quoted = name;
     if (quoted.find_first_of(",\"") == quoted.npos) return quoted;
     for (std::size_t at = quoted.find('"'); at != quoted.npos; at = quoted.find('"', at + 2))
       quoted.insert(at, 1, '"');
@@ -131,12 +126,12 @@ class Output {
   void printTable() const {
     print("{}: {} frames, {} ticks/s; coordinates {}\n", options_.file, frames_, motion_.rate(),
           motion_.maxError() > 0
-              ? fmt::format("within {:.3g} m of the simulation", distanceOf(motion_.maxError()))
+              ? fmt::format("within {:.3g} m of the simulation",
+                            codec::promisedDistance(static_cast<float>(motion_.maxError()), farthest_))
               : "as in the file");
     for (std::size_t i = 0; i < summaries_.size(); ++i) {
-      print("\n{}, {} vertices, {:.4g} kg/m^2\n{:<20}{:>12}{:>12}{:>12}{:>12}{:>10}\n",
-            printable(cloth(i).name), cloth(i).vertexCount, settings_.arealMass[i], "", "first", "last",
-            "mean", "largest", "at tick");
+      print("\n{}, {} vertices, {:.4g} kg/m^2\n{:<20}{:>12}{:>12}{:>12}{:>12}{:>10}\n", cloth(i).name,
+            cloth(i).vertexCount, settings_.arealMass[i], "", "first", "last", "mean", "largest", "at tick");
       for (std::size_t k = 0; k < kQuantities.size(); ++k) {
         const Summary& summary = summaries_[i][k];
         if (summary.count == 0) continue;
@@ -176,6 +171,7 @@ class Output {
   const MeasureSettings& settings_;
   std::vector<std::array<Summary, kQuantities.size()>> summaries_;  // by cloth
   std::uint64_t frames_ = 0;
+  float farthest_ = 0;  // largest magnitude of a coordinate so far, metres
   Json json_{{"frames", Json::array()}};
 };
 

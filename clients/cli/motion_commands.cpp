@@ -50,8 +50,7 @@ void MotionCommands::add(CLI::App& app) {
   decode_
       ->add_option("FRAMES", decodeOptions_.out,
                    "Motion file to write, in the format that encode reads: decoded positions, and normals "
-                   "computed from "
-                   "them")
+                   "computed from them")
       ->required();
   decode_
       ->add_option("--max-vertices", decodeOptions_.maxVertices,

@@ -14,7 +14,6 @@
 #include "clients/cli/presence.h"
 #include "clients/cli/print.h"
 #include "clients/grpc/grpc_client.h"
-#include "proto/text/printable.h"
 
 namespace clothstream::cli {
 namespace {
@@ -121,7 +120,7 @@ ExitCode ParticipantCommands::list(const ServerAddress& address) const {
   for (const auto& participant : array)
     print("{:>6}  {:<12}  {}{}\n", participant["id"].get<std::uint64_t>(),
           participant["role"].get<std::string>(),
-          printable(participant[participant["name"] == "" ? "client" : "name"].get<std::string>()),
+          participant[participant["name"] == "" ? "client" : "name"].get<std::string>(),
           participant["away"].get<bool>() ? ", currently disconnected" : "");
   return kOk;
 }

@@ -244,8 +244,8 @@ ExitCode record(const RecordOptions& options) {
   }
   if (isatty(STDERR_FILENO) != 0) showStatus(stderr, "");
   if (auto finished = file.finish(); !finished && !problem) problem = Error{kNotWritten, finished.error()};
-  print("{}: {}, {} frames in {:.1f} s, {:.1f} MiB; {} frames were lost\n", options.output,
-        printable(report.scene), file.frames(), report.seconds, static_cast<double>(file.bytes()) / (1 << 20),
+  print("{}: {}, {} frames in {:.1f} s, {:.1f} MiB; {} frames were lost\n", options.output, report.scene,
+        file.frames(), report.seconds, static_cast<double>(file.bytes()) / (1 << 20),
         report.statistics.dropped);
   if (const std::string coarse = file.coarseFrames(); !coarse.empty()) print("{}\n", coarse);
   return problem ? printError(*problem) : kOk;

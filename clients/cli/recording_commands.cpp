@@ -17,10 +17,7 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
       ->add_option("--seconds", recordOptions_.seconds,
                    "Stop after this time; default: at an interrupt (Ctrl-C)")
       ->check(CLI::PositiveNumber);
-  record_
-      ->add_option("--max-vertices", recordOptions_.maxVertices,
-                   "Most vertices to accept from the server; twice as many triangles. Default: 1048576")
-      ->check(CLI::Range(1u, codec::kMaxVertices));
+  addStreamLimit(*record_, recordOptions_.maxVertices);
   record_->add_flag(
       "--full-quality", recordOptions_.fullQuality,
       "End the recording with an error before the first frame that the server sends in a coarser "

@@ -34,8 +34,7 @@ std::string text(const ClothFigures& figures) {
   const cs_cloth_report& now = figures.report;
   std::string line = fmt::format(
       "{} ({}), tick {}: strain {:.2f} % at most, {:.2f} % p99, {:.2f} % mean; energy {:.4g} J kinetic, "
-      "{:.4g} J "
-      "elastic, {:.4g} J gravity",
+      "{:.4g} J elastic, {:.4g} J gravity",
       printable(figures.name), figures.solver, now.tick, 100 * now.strain_max, 100 * now.strain_p99,
       100 * now.strain_mean, now.kinetic_energy, now.elastic_energy, now.gravity_energy);
   if (now.iterations > 0 || now.active_constraints > 0)
@@ -137,7 +136,7 @@ void StatusLine::show(const Report& report) const {
   if (!shown_) return;
   const cs_statistics& now = report.statistics;
   showStatus(stdout, fmt::format("{}  tick {}  {:.0f} fps{}  {:.0f} kbit/s  {:.1f} ms round trip  {} dropped",
-                                 printable(report.scene), now.tick, now.frames_per_second,
+                                 report.scene, now.tick, now.frames_per_second,
                                  report.frameDivisor > 1
                                      ? fmt::format(" of {}: the server is overloaded", report.streamRate)
                                      : "",

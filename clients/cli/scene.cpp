@@ -139,8 +139,8 @@ ExitCode SceneCommands::create() const {
   if (!created) return printError(created.error());
   for (const v1::MeshRepair& repair : created->repairs())
     for (const std::string& sentence : repair.sentences())
-      cli::print(stderr, "{}: {}\n", printable(repair.cloth()), printable(sentence));
-  cli::print("{}\n", printable(created->scene().name()));
+      cli::print(stderr, "{}: {}\n", repair.cloth(), sentence);
+  cli::print("{}\n", created->scene().name());
   return kOk;
 }
 
@@ -156,7 +156,7 @@ ExitCode SceneCommands::control(const ServerAddress& address) const {
   if (!scene) return printError(scene.error());
   if (!scene->has_playback()) return kOk;
   const v1::Playback& playback = scene->playback();
-  cli::print("{}: at {:.2f} s of {:.2f} s, speed {}{}{}\n", printable(scene->name()), playback.position(),
+  cli::print("{}: at {:.2f} s of {:.2f} s, speed {}{}{}\n", scene->name(), playback.position(),
              playback.length(), playback.speed(), playback.loop() ? ", in a loop" : "",
              scene->paused() ? ", paused" : "");
   return kOk;
@@ -166,13 +166,12 @@ ExitCode SceneCommands::record(const ServerAddress& address) const {
   if (startRecording_->parsed()) {
     const auto file = startRecording(address, options_.name, options_.recording);
     if (!file) return printError(file.error());
-    cli::print("{}\n", printable(*file));
+    cli::print("{}\n", *file);
     return kOk;
   }
   const auto stopped = stopRecording(address, options_.name);
   if (!stopped) return printError(stopped.error());
-  cli::print("{}: {:.1f} MiB\n", printable(stopped->file()),
-             static_cast<double>(stopped->bytes()) / (1 << 20));
+  cli::print("{}: {:.1f} MiB\n", stopped->file(), static_cast<double>(stopped->bytes()) / (1 << 20));
   return kOk;
 }
 

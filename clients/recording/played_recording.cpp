@@ -180,15 +180,17 @@ bool PlayedRecording::applyJournal(const RecordedMessage& message, PlayedMessage
 }
 
 PlayedRecording::Played PlayedRecording::applyFrame(const RecordedMessage& message, PlayedMessage played) {
-  played.events = give(field::ServerMessage::kFrame, message.bytes, message.time);
-  if (cs_get_state(client()) == CS_STATE_FAILED) return tl::unexpected(std::string(cs_error_text(client())));
   if (!readFrame(bytesOf(message.bytes), frame_)) frame_ = {};
   const double seconds = secondsOf(message.time);
   const auto header = headerOf(frame_.packet);
   const auto tick = header ? std::optional(header->tick) : std::nullopt;
   const std::string name = "the frame of " + recording::FrameFaults::nameOf(tick, seconds);
+  played.key = header && header->kind == codec::PacketKind::key;
+  const bool mayFollow = faults_.mayFollow(played.key);
+  if (mayFollow) played.events = give(field::ServerMessage::kFrame, message.bytes, message.time);
+  if (cs_get_state(client()) == CS_STATE_FAILED) return tl::unexpected(std::string(cs_error_text(client())));
   if ((played.events & CS_EVENT_FRAME) == 0) {
-    const bool repeats = newestFrame_ && tick == newestFrame_->tick &&
+    const bool repeats = mayFollow && newestFrame_ && tick == newestFrame_->tick &&
                          frame_.reconstructionHash == newestFrame_->reconstructionHash;
     if (repeats) {
       faults_.addGood();
@@ -204,7 +206,6 @@ PlayedRecording::Played PlayedRecording::applyFrame(const RecordedMessage& messa
   faults_.addGood();
   isLost_ = false;
   played.tick = *tick;
-  played.key = header->kind == codec::PacketKind::key;
   played.reconstructionHash = frame_.reconstructionHash;
   played.stateHash = frame_.stateHash;
   frameTime_ = message.time;

@@ -12,7 +12,7 @@
  *
  * Errors: no function throws or aborts because of the bytes that it reads. A file that is cut is read up to
  * the cut. Memory and time are bounded before a chunk is decompressed: a chunk of the file has at most
- * 128 MiB, its index at most 256 MiB, all chunks together expand to at most 64 times the file plus 512 MiB,
+ * 128 MiB, its index at most 256 MiB, all chunks together expand to at most 1024 times the file plus 512 MiB,
  * and the client has the default cs_limits. A larger max_vertices raises these limits. If memory runs out,
  * the native library ends the program and WebAssembly traps.
  *
@@ -154,7 +154,7 @@ int cs_recording_seek_tick(cs_recording* recording, uint64_t tick, cs_recorded* 
 typedef struct cs_recording_faults {
   uint32_t version;     /* CS_RECORDING_FAULTS_VERSION */
   uint64_t frames;      /* all frames */
-  uint64_t undecodable; /* frames that the decoder refused */
+  uint64_t undecodable; /* frames that the decoder refused, or that refer to one that differs */
   uint64_t different;   /* frames that were decoded, but differ from their recorded hash */
   /* The first of the last two: its tick, 0 if its header cannot be read, and its time since the start. */
   uint64_t first_tick;

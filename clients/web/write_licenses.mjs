@@ -6,6 +6,10 @@ import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 const kDebian = "/usr/share/doc";
 // Its name has the version of LLVM. Debian installs one of them at most.
 const libcxx = readdirSync(kDebian).find((name) => /^libc\+\+-\d+-dev-wasm32$/.test(name));
+if (!libcxx) {
+  console.error(`write_licenses.mjs: ${kDebian} has no licence of libc++ for wasm32; install Debian's libc++-dev-wasm32`);
+  process.exit(1);
+}
 const kCore = [
   ["libc++, libc++abi and compiler-rt of LLVM", `${kDebian}/${libcxx}/copyright`],
   ["wasi-libc", "/usr/share/doc/wasi-libc/copyright"],

@@ -44,4 +44,10 @@ double promisedDistance(float maxError, float coordinate) {
   return std::sqrt(3.0) * (double{maxError} + rounding);
 }
 
+float farthestOf(std::span<const float> positions) {
+  float farthest = 0;
+  for (const float coordinate : positions) farthest = std::max(farthest, std::abs(coordinate));
+  return farthest;
+}
+
 }  // namespace clothstream::codec

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 namespace clothstream::codec {
 
@@ -17,5 +18,7 @@ float maxErrorFor(float coordinate);
 // Largest distance of a decoded vertex from its true position, in metres, if no coordinate of it is beyond
 // `coordinate`: sqrt(3) max errors. Beyond 16 m the rounding of decoded floats is added.
 double promisedDistance(float maxError, float coordinate);
+// Largest magnitude of a coordinate; 0 without positions.
+float farthestOf(std::span<const float> positions);
 
 }  // namespace clothstream::codec

@@ -22,16 +22,15 @@ FrameCheck::Outcome FrameCheck::take(std::string_view bytes, double seconds) {
     reason_ = "the frame of " + FrameFaults::nameOf(tick, seconds) + " " + what;
     return Outcome::faulty;
   };
+  const bool isKey = packet && packet->header.kind == codec::PacketKind::key;
   const codec::DecodeResult result =
-      packet ? decoder_->decode(frame->packet) : codec::DecodeResult::malformed;
+      packet && faults_.mayFollow(isKey) ? decoder_->decode(frame->packet) : codec::DecodeResult::malformed;
   if (result == codec::DecodeResult::ok) {
     if (decoder_->reconstructionHash() == frame->reconstructionHash) {
       faults_.addGood();
       return Outcome::decoded;
     }
     faults_.addDifferent(*tick, seconds);
-    // No later frame may refer to it.
-    decoder_->restart();
     return faulty("differs from its recorded hash");
   }
   if (result == codec::DecodeResult::stale && *tick == decoder_->tick() &&

@@ -12,8 +12,12 @@ namespace clothstream::recording {
 class FrameFaults {
  public:
   // Counts a frame that was decoded, or that repeats the frame before it.
-  void addGood() { ++frames_; }
-  // Counts a frame that the decoder refused. `tick` is that of its header, if it has one.
+  void addGood() {
+    ++frames_;
+    isBroken_ = false;
+  }
+  // Counts a frame that the decoder refused, or that may not follow. `tick` is that of its header, if it has
+  // one.
   void addUndecodable(std::optional<std::uint64_t> tick, double seconds) {
     ++undecodable_;
     add(tick, seconds);
@@ -22,7 +26,11 @@ class FrameFaults {
   void addDifferent(std::uint64_t tick, double seconds) {
     ++different_;
     add(tick, seconds);
+    isBroken_ = true;
   }
+  // Returns false for the frames after one that differs, up to the next key frame, because they refer to it.
+  // The caller does not decode such a frame and counts it with addUndecodable().
+  bool mayFollow(bool isKey) const { return isKey || !isBroken_; }
 
   bool any() const { return undecodable_ + different_ > 0; }
   std::uint64_t frames() const { return frames_; }
@@ -61,6 +69,7 @@ class FrameFaults {
   std::uint64_t frames_ = 0, undecodable_ = 0, different_ = 0;
   std::optional<std::uint64_t> firstTick_;
   double firstSeconds_ = 0;
+  bool isBroken_ = false;  // a frame differed, and none was good since then
 };
 
 }  // namespace clothstream::recording

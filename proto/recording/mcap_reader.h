@@ -36,8 +36,8 @@ struct McapLimits {
   // usual chunk: the description of a large mesh.
   std::uint64_t chunkBytes = std::uint64_t{128} << 20;
   // All chunks together may expand to `expansion` times the size of the file, and to `freeChunks` largest
-  // chunks in addition.
-  std::uint64_t expansion = 64, freeChunks = 4;
+  // chunks in addition. A server's recording of joints that stand still expands to 600 times its size.
+  std::uint64_t expansion = 1024, freeChunks = 4;
 };
 
 // Place of a chunk in the file, and the times of its messages in ns.

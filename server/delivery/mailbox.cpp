@@ -302,7 +302,9 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
   }
   if (!streaming_) return std::nullopt;
   const bool hasFrame = !held_.empty() && hasRoom();
-  if (!announcements_.messages.empty() && !(hasFrame && announcedBytes_ >= kMaxAnnouncedBytes)) {
+  // In lockstep, the order must not depend on whether a frame waits already when the endpoint looks.
+  const bool frameFirst = hasFrame && !shape_.lockstep && announcedBytes_ >= kMaxAnnouncedBytes;
+  if (!announcements_.messages.empty() && !frameFirst) {
     SharedBytes message = pop(announcements_);
     announcedBytes_ += message->size();
     return message;

@@ -28,7 +28,8 @@ namespace clothstream::delivery {
 // kMaxHeld frames of at most kMaxHeldBytes in all (or one larger frame), and one description. Frames and
 // description are shared with the other subscribers.
 //
-// Announcements are sent before frames, but after kMaxAnnouncedBytes of them a frame that waits comes first.
+// Announcements are sent before frames, but after kMaxAnnouncedBytes of them a frame that waits comes first,
+// except in lockstep.
 //
 // Announcements come from other peers, so they never close a mailbox. Beyond kMaxControlBytes the waiting
 // ones are merged (merged_announcements.h): the subscriber then gets the newest state instead of every step.

@@ -69,7 +69,7 @@ std::string readSecret(const std::filesystem::path& file) {
     throw std::runtime_error(fmt::format("--events-secret-file: {} {}", file.string(), why));
   };
   auto text = files::readRegularFile(file, kMaxFileBytes);
-  if (!text) fail(text.error());
+  if (!text) fail(text.error().text);
   tl::expected<std::string, std::string> key = parseSecret(*text);
   OPENSSL_cleanse(text->data(), text->size());
   if (!key) fail(key.error());

@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::size_t kPieceBytes = 64 * 1024;
 
-tl::unexpected<std::string> unreadable(int error) {
-  return tl::unexpected(fmt::format("cannot be read: {}", std::strerror(error)));
+tl::unexpected<FileError> unreadable(int error) {
+  return tl::unexpected(FileError{fmt::format("cannot be read: {}", std::strerror(error))});
 }
 
 // Reads one byte more than `most` if there is one, so that the caller notices it.
@@ -36,8 +36,7 @@ int readAll(int descriptor, std::uint64_t most, std::string& content) {
 
 }  // namespace
 
-tl::expected<std::string, std::string> readRegularFile(const std::filesystem::path& path,
-                                                       std::uint64_t most) {
+tl::expected<std::string, FileError> readRegularFile(const std::filesystem::path& path, std::uint64_t most) {
   // Without O_NONBLOCK, opening a FIFO waits for its writer.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   if (descriptor < 0) return unreadable(errno);
@@ -53,9 +52,9 @@ tl::expected<std::string, std::string> readRegularFile(const std::filesystem::pa
   ::close(descriptor);
   if (error != 0) return unreadable(error);
   if (!isRegular)
-    return tl::unexpected(std::string("is not a regular file: folders, devices and FIFOs cannot be used"));
+    return tl::unexpected(FileError{"is not a regular file: folders, devices and FIFOs cannot be used"});
   if (content.size() > most)
-    return tl::unexpected(fmt::format("is too large: at most {} bytes are allowed", most));
+    return tl::unexpected(FileError{fmt::format("is too large: at most {} bytes are allowed", most), true});
   return content;
 }
 

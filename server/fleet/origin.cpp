@@ -500,15 +500,16 @@ void Origin::receiveScene(std::uint64_t move) {
   auto arriving = server_.state().prepareArrival(std::move(*saved));
   if (!arriving) return refuse(arriving.error());
   const std::shared_ptr<scene::LiveScene> scene = *arriving;
-  const SharedStream stream = prepareStream(scene, asked->prepare().stream());
+  SharedStream stream;
   const auto giveUp = [&](const std::string& why) {
-    dropStream(stream);
+    if (stream) dropStream(stream);
     server_.state().abandonArrival(scene);
     directory_->expectNoMore(name);
     refuse(why);
   };
   bool isOurs = false;
   try {
+    stream = prepareStream(scene, asked->prepare().stream());
     offer();
     std::this_thread::sleep_for(kEdgeTime);
     v1::MoveMessage message;

@@ -96,7 +96,13 @@ void SceneServer::State::startArrived(const std::shared_ptr<scene::LiveScene>& s
 }
 
 void SceneServer::State::abandonArrival(const std::shared_ptr<scene::LiveScene>& scene) {
+  bool hasPlace = false;
+  {
+    const std::lock_guard lock(mutex);
+    hasPlace = std::ranges::find(scenes, scene) == scenes.end();  // else insert() has ended it
+  }
   removeCreated(scene, nullptr);
+  if (!hasPlace) return;  // a place of this name would be that of another scene
   const std::lock_guard lock(mutex);
   std::erase_if(places, [&](const Place& place) { return place.name == scene->name(); });
 }

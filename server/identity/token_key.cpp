@@ -54,7 +54,7 @@ using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
 
 std::string readFile(const fs::path& file) {
   auto text = files::readRegularFile(file, kMaxFileBytes);
-  if (!text) fail(file, text.error());
+  if (!text) fail(file, text.error().text);
   return std::move(*text);
 }
 

@@ -13,7 +13,7 @@
 #include <fmt/format.h>
 #include <tiny_gltf.h>
 
-#include "server/meshes/file_bytes.h"
+#include "server/files/regular_file.h"
 #include "server/meshes/gltf_container.h"
 #include "server/meshes/gltf_primitive.h"
 #include "server/meshes/gltf_skeleton.h"
@@ -226,12 +226,12 @@ class NeighbourFiles {
   }
 
   bool read(const std::filesystem::path& path, std::vector<unsigned char>& bytes, std::string& error) {
-    const auto content = readBytes(path, left_);
+    const auto content = files::readRegularFile(path, left_);
     if (content) {
       left_ -= content->size();
       bytes.assign(content->begin(), content->end());
     } else {
-      error = content.error();
+      error = content.error().text;
     }
     return content.has_value();
   }

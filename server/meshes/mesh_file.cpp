@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "server/meshes/file_bytes.h"
+#include "server/files/regular_file.h"
 #include "server/meshes/gltf_file.h"
 
 namespace clothstream::meshes {
@@ -22,8 +22,8 @@ std::string ending(const std::filesystem::path& path) {
 
 tl::expected<MeshSource, std::string> read(const std::filesystem::path& path, const FileLimits& limits,
                                            const JointRequest* joints) {
-  auto content = readBytes(path, limits.bytes);
-  if (!content) return tl::unexpected(std::move(content.error()));
+  auto content = files::readRegularFile(path, limits.bytes);
+  if (!content) return tl::unexpected(std::move(content.error().text));
   const std::string kindOfFile = ending(path);
   if (kindOfFile != ".obj" && kindOfFile != ".gltf" && kindOfFile != ".glb")
     return tl::unexpected(

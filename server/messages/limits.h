@@ -19,6 +19,8 @@ namespace limits {
 inline constexpr std::uint32_t kMaxRate = 1000;  // ticks/s
 inline constexpr std::uint32_t kMaxSubsteps = model::kMaxSubsteps;
 inline constexpr std::size_t kMaxCloths = 256;
+// Cloths that the elements of one ParameterChange address together.
+inline constexpr std::size_t kMaxAddressedCloths = 16 * kMaxCloths;
 inline constexpr std::size_t kMaxColliders = 64;
 inline constexpr std::size_t kMaxPins = 4096;                    // ranges per cloth
 inline constexpr std::uint64_t kMaxSelectionTests = 67'108'864;  // per scene, of a node and a range or region

@@ -31,6 +31,18 @@ std::vector<const model::Cloth*> addressed(const model::Scene& scene, const std:
   return cloths;
 }
 
+// Checking, applying and announcing a change takes time for each element and each cloth that it addresses.
+void checkAddressed(Checks& checks, const Path& path, const v1::ParameterChange& message,
+                    const model::Scene& scene) {
+  std::size_t addressed = 0;
+  for (const v1::ClothChange& cloth : message.cloths())
+    addressed += cloth.name().empty() ? scene.cloths.size() : 1;
+  if (addressed > limits::kMaxAddressedCloths)
+    checks.fail(path, "",
+                fmt::format("address {} cloths together; must be at most {}: set every value of a cloth once",
+                            addressed, limits::kMaxAddressedCloths));
+}
+
 model::ClothChange toClothChange(Checks& checks, const Path& path, const v1::ClothChange& message,
                                  const model::Scene& scene) {
   model::ClothChange change;
@@ -168,6 +180,26 @@ void addField(const google::protobuf::FieldDescriptor* field,
     if (values[i] != usual) exceptions[i].MergeFromString(values[i]);
 }
 
+using Addressed = std::vector<const v1::ClothChange*>;
+
+// For each element of `changes`, the elements of `all` for which it has the last material. A later material
+// sets everything that an earlier one sets, so only the last one has to be announced with its numbers.
+std::vector<Addressed> clothsOfLastMaterials(
+    const google::protobuf::RepeatedPtrField<v1::ClothChange>& changes, const v1::ParameterChange& all) {
+  Addressed rest;
+  for (const v1::ClothChange& cloth : all.cloths()) rest.push_back(&cloth);
+  std::vector<Addressed> cloths(static_cast<std::size_t>(changes.size()));
+  for (int i = changes.size() - 1; i >= 0; --i) {
+    if (!changes[i].has_material()) continue;
+    const auto first = std::stable_partition(rest.begin(), rest.end(), [&](const v1::ClothChange* cloth) {
+      return !parameters::isFor(changes[i].name(), cloth->name());
+    });
+    cloths[static_cast<std::size_t>(i)].assign(first, rest.end());
+    rest.erase(first, rest.end());
+  }
+  return cloths;
+}
+
 // Overwrites the element with the same name, or adds one.
 template <typename Element>
 void overwriteNamed(const Element& with, google::protobuf::RepeatedPtrField<Element>& all) {
@@ -198,6 +230,7 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
   checks.count(path / "cloths", static_cast<std::size_t>(message.cloths_size()), 0, limits::kMaxCloths);
   checks.count(path / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
                limits::kMaxColliders);
+  checkAddressed(checks, path / "cloths", message, scene);
   for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i)
     change.cloths.push_back(toClothChange(checks, path.at("cloths", i), message.cloths(i), scene));
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
@@ -225,15 +258,11 @@ v1::ParameterChange withMaterials(v1::ParameterChange change, const model::Scene
   const v1::ParameterChange all = allParameters(toMessageWithoutMeshes(changed), areas);
   google::protobuf::RepeatedPtrField<v1::ClothChange> cloths;
   cloths.Swap(change.mutable_cloths());
-  for (v1::ClothChange& each : cloths) {
-    std::vector<const v1::ClothChange*> addressed;
-    std::vector<v1::ClothChange> exceptions;
-    if (each.has_material())
-      for (const v1::ClothChange& cloth : all.cloths())
-        if (parameters::isFor(each.name(), cloth.name())) {
-          addressed.push_back(&cloth);
-          exceptions.emplace_back();
-        }
+  const std::vector<Addressed> lastMaterials = clothsOfLastMaterials(cloths, all);
+  for (int index = 0; index < cloths.size(); ++index) {
+    v1::ClothChange& each = cloths[index];
+    const Addressed& addressed = lastMaterials[static_cast<std::size_t>(index)];
+    std::vector<v1::ClothChange> exceptions(addressed.size());
     if (!addressed.empty())
       for (const int number : kOfMaterials) {
         const auto* field = v1::ClothChange::descriptor()->FindFieldByNumber(number);
@@ -246,7 +275,10 @@ v1::ParameterChange withMaterials(v1::ParameterChange change, const model::Scene
       change.add_cloths()->Swap(&exceptions[i]);
     }
   }
-  return change;
+  if (static_cast<std::size_t>(change.cloths_size()) <= limits::kMaxCloths) return change;
+  v1::ParameterChange merged;  // clients refuse a longer list
+  mergeChange(change, merged);
+  return merged;
 }
 
 void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all) {

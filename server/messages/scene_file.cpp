@@ -56,11 +56,11 @@ Result<model::Scene> readSceneFile(const std::filesystem::path& path, std::vecto
     return refuse(v1::ERROR_CODE_NOT_FOUND, source, "there is no such file");
   if (kind == std::filesystem::file_type::directory)
     return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source, "is a directory; must be a file");
-  const auto text = files::readRegularFile(path, limits::kMaxSceneFileBytes + 1);
-  if (!text) return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source, text.error());
-  if (text->size() > limits::kMaxSceneFileBytes)
-    return refuse(v1::ERROR_CODE_RESOURCE_EXHAUSTED, source,
-                  fmt::format("is too large: must have at most {} bytes", limits::kMaxSceneFileBytes));
+  const auto text = files::readRegularFile(path, limits::kMaxSceneFileBytes);
+  if (!text)
+    return refuse(
+        text.error().isTooLarge ? v1::ERROR_CODE_RESOURCE_EXHAUSTED : v1::ERROR_CODE_INVALID_ARGUMENT, source,
+        text.error().text);
   const auto readMesh = [&](const std::string& mesh, const meshes::JointRequest* joints) {
     return meshes::readMeshFile(path.parent_path() / mesh,
                                 {.bytes = limits::kMaxMeshFileBytes, .vertices = limits::kMaxNodes}, joints);

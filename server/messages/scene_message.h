@@ -39,7 +39,8 @@ v1::Normals toMessage(model::Normals normals);
 // with a missing area or 0 gets no areal mass.
 v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double> areas);
 // `change` with everything that its materials set, as it is in `changed`, the scene after the change: clients
-// do not know the numbers of materials. Names single cloths only where they differ from the others.
+// do not know the numbers of materials. Names single cloths only where they differ from the others. If that
+// would make more than limits::kMaxCloths elements, each cloth is named once.
 v1::ParameterChange withMaterials(v1::ParameterChange change, const model::Scene& changed);
 // Applies a change to the result of allParameters(), as model::applyChange() applies it to a scene. Safe for
 // any messages: fields that this release does not know are kept, and changes of unknown cloths and of
@@ -66,7 +67,7 @@ std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::C
 // scene before any change of its parameters.
 std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound);
 
-// Says that cloth is where the stream cannot hold it, and which max error would.
+// Says that cloth is where the stream cannot hold it.
 std::string outOfReach(const model::StreamSettings& stream);
 
 }  // namespace clothstream::messages

@@ -12,6 +12,7 @@ namespace {
 
 // Makes up for the rounding of the vertices' distances.
 constexpr float kReachRounding = 1.000001f;
+constexpr std::size_t kCrowdingSamples = 256;
 
 // A directed edge of a triangle.
 struct HalfEdge {
@@ -102,6 +103,28 @@ double arcCosine(double x) {
   return x < 0 ? 3.14159265358979 - angle : angle;
 }
 
+double crowdingOf(const ClosedMesh& mesh) {
+  struct Box {
+    Vec3 low, high;
+  };
+  std::vector<Box> boxes;
+  boxes.reserve(mesh.triangles.size());
+  for (const TriangleCorners& triangle : mesh.triangles) {
+    const Vec3 &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]], &c = mesh.vertices[triangle[2]];
+    boxes.push_back({a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)});
+  }
+  const std::size_t stride = (mesh.vertices.size() + kCrowdingSamples - 1) / kCrowdingSamples;
+  double squares = 0, samples = 0;
+  for (std::size_t i = 0; i < mesh.vertices.size(); i += stride, ++samples) {
+    const Eigen::Array3f at = mesh.vertices[i].array();
+    const auto around = static_cast<double>(std::ranges::count_if(boxes, [&](const Box& box) {
+      return (box.low.array() <= at).all() && (at <= box.high.array()).all();
+    }));
+    squares += around * around;
+  }
+  return std::sqrt(squares / samples);
+}
+
 }  // namespace
 
 std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> vertices,
@@ -130,6 +153,7 @@ std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> ver
     volume += areaVector(mesh.vertices, triangle).dot(mesh.vertices[triangle[0]].cast<double>()) / 3;
   if (volume <= 0) return wholeProblem("is inside out: its triangles must be counter-clockwise from outside");
   for (const Vec3& vertex : mesh.vertices) mesh.reach = std::max(mesh.reach, kReachRounding * vertex.norm());
+  mesh.crowding = crowdingOf(mesh);
   return mesh;
 }
 

@@ -32,6 +32,9 @@ constexpr double kCorrection = 0.45;  // of a spring, with xpbd
 // Each node costs kCoarseNode in a coarse correction, and each of about four links of a coarse node
 // kCoarseLink in a sweep.
 constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
+// A search in a triangle mesh costs each node kSearch, and more if more triangles lie in one place than
+// kFewAround (ClosedMesh::crowding). Distances that are sampled cost it kGridWork.
+constexpr double kSearch = 6, kFewAround = 16, kGridWork = 3;
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
 constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
@@ -109,9 +112,13 @@ bool isSystem(SolverKind kind) {
 
 }  // namespace
 
+double searchWork(const ClosedMesh& mesh) {
+  return kSearch * std::max(1.0, mesh.crowding / kFewAround);
+}
+
 double colliderWork(const Shape& shape) {
   if (const auto* solid = std::get_if<Solid>(&shape))
-    return (*solid)->distanceCell > 0 ? kGridWork : kSolidWork;
+    return (*solid)->distanceCell > 0 ? kGridWork : searchWork(**solid);
   const double planes =
       std::visit(ShapeVisitor{[](const Sphere&) { return 0.0; }, [](const Capsule&) { return 0.0; },
                               [](const Plane&) { return 1.0; }, [](const Box&) { return kBoxPlanes; },
@@ -242,14 +249,14 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
 
 // The path of a node that is near a fast body is followed in strides.
 Work PriceModel::movedJointsWork(const Scene& scene) const {
-  double nodes = 0, bodies = 0;
+  double nodes = 0, searches = 0;
   for (const ClothCounts& counts : cloths_) nodes += static_cast<double>(counts.nodes);
   for (const Collider& collider : scene.colliders) {
     const auto* solid = std::get_if<Solid>(&collider.shape);
-    if (solid != nullptr && (*solid)->skin) ++bodies;
+    if (solid != nullptr && (*solid)->skin) searches += searchWork(**solid);
   }
   Work work;
-  work.nodeSteps = bodies * nodes * scene.substeps * kSolidWork * (kStrides - 1);
+  work.nodeSteps = searches * nodes * scene.substeps * (kStrides - 1);
   return work;
 }
 

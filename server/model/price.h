@@ -56,10 +56,8 @@ struct Work {
   }
 };
 
-// Work of a triangle mesh for each node and substep, in node-steps.
-inline constexpr double kSolidWork = 6;
-// The same with sampled distances instead of triangles.
-inline constexpr double kGridWork = 3;
+// Work of a search for the nearest point of a triangle mesh, in node-steps.
+double searchWork(const ClosedMesh& mesh);
 
 // Work of a collider with this shape for each node and substep, in node-steps. A third of the nodes are
 // assumed to be near each collider.

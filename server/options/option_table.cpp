@@ -228,7 +228,8 @@ void OptionTable::applyEnvironment(const char* const* environment, std::vector<s
 
 void OptionTable::applyFile(const std::string& file) {
   const auto text = files::readRegularFile(file, kMaxFileBytes);
-  if (!text) throw OptionError(fmt::format("--config: {} {}; name a readable TOML file", file, text.error()));
+  if (!text)
+    throw OptionError(fmt::format("--config: {} {}; name a readable TOML file", file, text.error().text));
   for (const FileEntry& entry : parseOptionFile(*text, file)) {
     const std::string place = fmt::format("{}:{}: ", file, entry.line);
     const auto matches = [&](const Row& row) { return isConfigurable(row) && row.name == entry.key; };

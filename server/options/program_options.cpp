@@ -159,7 +159,8 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   CLI::Option* ofAddress =
       table.number("--max-participants-per-address", options.server.maxParticipantsPerAddress,
                    {.min = 0, .max = hosting::kMaxParticipants},
-                   "Participants per scene from one address. Programs on this machine have no such limit");
+                   "Participants per scene from one address. 0 means half of --max-participants. Programs on "
+                   "this machine have no such limit");
   table.showDefault(ofAddress, "half of --max-participants");
   CLI::Option* changeable = table.list(
       "--participants-change", parsed.changeable, "LIST",

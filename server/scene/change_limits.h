@@ -2,7 +2,6 @@
 // Limits the parameter changes of a scene, because each is announced to all of its participants.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -31,12 +30,11 @@ class ChangeLimits {
     if (!buckets_[participant].changes.take(now)) return Exceeded::byParticipant;
     return all_.changes.take(now) ? Exceeded::nothing : Exceeded::byAll;
   }
-  // Counts the bytes of its announcement. Call it after count().
+  // Counts the bytes of its announcement, at most kOfParticipantBurstBytes. Call it after count().
   Exceeded countBytes(std::uint64_t participant, std::size_t bytes, schedule::Clock::time_point now) {
     const auto cost = static_cast<double>(bytes);
-    if (!buckets_[participant].bytes.take(now, std::min(cost, kOfParticipantBurstBytes)))
-      return Exceeded::byParticipant;
-    return all_.bytes.take(now, std::min(cost, kBurstBytes)) ? Exceeded::nothing : Exceeded::byAll;
+    if (!buckets_[participant].bytes.take(now, cost)) return Exceeded::byParticipant;
+    return all_.bytes.take(now, cost) ? Exceeded::nothing : Exceeded::byAll;
   }
 
  private:

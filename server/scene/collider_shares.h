@@ -45,7 +45,7 @@ ColliderLoad loadOf(std::span<const model::ParticipantCollider> colliders, const
 // the others. Infinite if there is room for all.
 double fairShare(std::span<const double> needs, double room);
 
-// Removes colliders beyond a share, from the end. Returns whether any was removed.
+// Removes each collider that no longer fits into a share, in their order. Returns whether any was removed.
 bool trim(std::vector<model::ParticipantCollider>& colliders, const ColliderLoad& share,
           const ClothBounds* cloth);
 

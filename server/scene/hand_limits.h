@@ -8,7 +8,7 @@
 
 namespace clothstream::scene {
 
-// Maximum speed of a collider, a grab or a body part that a participant moves, m/s.
+// Maximum speed of a collider or a grab that a participant moves, m/s.
 inline constexpr float kMaxHandSpeed = 30;
 // Maximum rotation in one tick, as the cosine of half the angle (120 degrees).
 inline constexpr float kMaxHandTurn = 0.5f;

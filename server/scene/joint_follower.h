@@ -20,7 +20,8 @@ class JointFollower {
   explicit JointFollower(model::Solid solid);
 
   // Writes poses to `end` that are on the way from `now` to `target`: all of the way if no vertex moves
-  // farther than `most` metres. All have one pose for each joint, relative to its parent.
+  // farther than `most` metres, else the part in which the fastest vertex moves about that far. All have one
+  // pose for each joint, relative to its parent.
   void follow(std::span<const model::Pose> now, std::span<const model::Pose> target, float most,
               std::vector<model::Pose>& end);
 

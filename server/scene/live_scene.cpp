@@ -38,6 +38,19 @@ model::Scene nameAndRates(std::string name, const v1::StreamDescription& descrip
   return scene;
 }
 
+// Refuses a change that the limits of announcements never allow.
+messages::Result<void> checkAnnouncement(const v1::ParameterChange& change, std::size_t bytes) {
+  const auto cloths = static_cast<std::size_t>(change.cloths_size());
+  constexpr auto kMost = static_cast<std::size_t>(ChangeLimits::kOfParticipantBurstBytes);
+  if (bytes <= kMost && cloths <= messages::limits::kMaxCloths) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_INVALID_ARGUMENT,
+      fmt::format(
+          "parameterChange: its announcement would have {} bytes and {} elements in `cloths`; at most "
+          "{} bytes and {} elements are allowed: change fewer cloths at once",
+          bytes, cloths, kMost, messages::limits::kMaxCloths)});
+}
+
 // Copies everything that subscribers are sent into the journal.
 std::function<void(const delivery::SharedBytes&)> tapOf(const std::shared_ptr<Journal>& journal) {
   if (!journal) return {};
@@ -266,8 +279,10 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   model::Scene changed = definition_;
   model::applyChange(changed, *change);
   AcceptedChange accepted{participant, *change, messages::withMaterials(message, changed)};
-  if (auto counted = tooMany(changes_.countBytes(participant, accepted.message.ByteSizeLong(), Clock::now()),
-                             "parameterChange", "bytes of changes");
+  const std::size_t bytes = accepted.message.ByteSizeLong();
+  if (const auto fits = checkAnnouncement(accepted.message, bytes); !fits) return fits;
+  if (auto counted = tooMany(changes_.countBytes(participant, bytes, Clock::now()), "parameterChange",
+                             "bytes of changes");
       !counted)
     return counted;
   if (const auto charged = charge_.charge("parameterChange", changed); !charged)

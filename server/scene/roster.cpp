@@ -501,8 +501,12 @@ messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPo
   const auto entry = find(mailbox);
   if (entry == entries_.end()) return {};
   if (auto permitted = permit(entry->participant.role, message, permissions); !permitted) return permitted;
-  if (budget_ != nullptr && !poses.joints.empty())
-    if (auto charged = budget_->chargeJoints(); !charged) return charged;
+  messages::Result<void> joints;
+  if (budget_ != nullptr && !poses.joints.empty()) {
+    joints = budget_->chargeJoints();
+    if (!joints) poses.joints.clear();
+    if (std::exchange(entry->jointsRefused, !joints)) joints = {};  // it has the error already
+  }
   entry->posed = true;
   entry->poses = {.colliders = poses.colliders,
                   .grabs = poses.grabs,
@@ -510,8 +514,9 @@ messages::Result<void> Roster::post(const Mailbox& mailbox, const v1::ColliderPo
                   .wantsConstraints = poses.wantsConstraints};
   const std::size_t sent = poses.colliders.size();
   limit(*entry, poses.colliders);
-  const bool begins = !std::exchange(entry->limited, entry->acting < sent) && entry->limited;
   inbox_.postPoses(entry->participant.id, std::move(poses), arrival, poseTime(message, arrival));
+  if (!joints) return joints;  // the next message may have the other error
+  const bool begins = !std::exchange(entry->limited, entry->acting < sent) && entry->limited;
   if (!begins) return {};
   return tl::unexpected(messages::FieldError{
       v1::ERROR_CODE_RESOURCE_EXHAUSTED,

@@ -179,7 +179,8 @@ class Roster {
 
   // Puts the participant's poses into the inbox. `poses` is the content of `message`. Returns an error if the
   // role is too low. Participants share the budget of colliders evenly, hands and heads first: colliders
-  // beyond the participant's share do not act, and an error says so when that begins.
+  // beyond the participant's share do not act, and an error says so when that begins. The same holds for
+  // joints that the budget refuses.
   [[nodiscard]] messages::Result<void> post(const delivery::Mailbox& mailbox,
                                             const v1::ColliderPoses& message, model::ParticipantPoses poses,
                                             const Permissions& permissions, Clock::time_point arrival);
@@ -218,6 +219,7 @@ class Roster {
     ColliderLoad needs, uses;                         // of the colliders in `poses`, while posed
     std::size_t acting = 0;                           // number of them that the scene has
     bool limited = false;                             // the newest message had more
+    bool jointsRefused = false;                       // those of the newest message with joints
     Clock::time_point posesExpire{}, placeExpires{};  // while it is away
     Clock::time_point connectedSince{};               // while it is not away
     Clock::duration connected{};                      // before

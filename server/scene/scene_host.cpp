@@ -47,13 +47,12 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
       work_(wantedWork_),
       leastSubsteps_(scene.leastSubsteps(scene_)),
       recoveries_(rate_),
+      proven_(parametersOf(scene_)),
       onDevice_(std::move(loaded)) {
   live_.work = work_;
   newestState_ = onDevice_->start;
   const std::shared_ptr<const LiveScene::Restored> restored = live_.restored();
   if (restored) continueFrom(*restored);
-  provenEnvironment_ = scene_.environment;
-  provenCloths_ = scene_.cloths;
   const bool atStart = tick_ == 0;
   const double seconds = static_cast<double>(tick_) * scene_.tickSeconds();
   if (live_.journal && live_.journal->due())
@@ -88,11 +87,11 @@ void SceneHost::continueFrom(const LiveScene::Restored& restored) {
   }
   if (restored.accepted) {
     model::Scene changed = *restored.accepted;
-    easeSolverChanges(changed);
+    easeSolverChanges(scene_, changed, easeUntil_);
     setCloths(changed.cloths);
     scene_ = std::move(changed);
   }
-  parametersChanged_ = true;
+  noteChange();
 }
 
 Checkpoint SceneHost::checkpoint() const {
@@ -267,33 +266,45 @@ void SceneHost::applyInputs() {
 void SceneHost::applyChanges() {
   const std::span<AcceptedChange> changes = inputs_.changes;
   if (changes.empty()) return;
-  model::Scene changed = scene_;
-  for (const AcceptedChange& accepted : changes) model::applyChange(changed, accepted.change);
-  if (onDevice_->simulation.makesStages(changed.cloths) && !making_.allows(tickStart_))
-    return live_.inbox.putBack(changes);
   std::string problem;
-  if (apply(changes, problem)) return;
-  // One of them has room, or is the problem.
-  if (changes.size() > 1 && apply(changes.first(1), problem)) return live_.inbox.putBack(changes.subspan(1));
+  std::size_t applied = 0;
+  try {
+    applied = applySome(changes, problem);
+  } catch (...) {
+    // The device was lost, or memory ran out. The scene is rebuilt before the next tick.
+    live_.inbox.putBack(changes);
+    throw;
+  }
+  if (applied == changes.size()) return;
+  if (applied > 0 || problem.empty()) return live_.inbox.putBack(changes.subspan(applied));
   live_.inbox.putBack(changes.subspan(1));
   revertChanges(problem);
 }
 
+std::size_t SceneHost::applySome(std::span<const AcceptedChange> changes, std::string& problem) {
+  model::Scene changed = scene_;
+  for (const AcceptedChange& accepted : changes) model::applyChange(changed, accepted.change);
+  if (onDevice_->simulation.makesStages(changed.cloths) && !making_.allows(tickStart_)) return 0;
+  if (apply(changes, problem)) return changes.size();
+  // One of them has room, or is the problem.
+  return changes.size() > 1 && apply(changes.first(1), problem) ? 1 : 0;
+}
+
 bool SceneHost::apply(std::span<const AcceptedChange> changes, std::string& problem) {
-  const model::Scene before = scene_;
-  const std::vector<std::uint64_t> easedBefore = easeUntil_;
+  model::Scene next = scene_;
+  std::vector<std::uint64_t> easeUntil = easeUntil_;
   const std::uint64_t made = onDevice_->simulation.stagesMade();
   const Clock::duration madeIn = makingTime_;
   bool hasRoom = true;
   for (const AcceptedChange& accepted : changes) {
-    model::Scene changed = scene_;
+    model::Scene changed = next;
     model::applyChange(changed, accepted.change);
-    easeSolverChanges(changed);
-    scene_ = std::move(changed);
+    easeSolverChanges(next, changed, easeUntil);
+    next = std::move(changed);
   }
   if (std::ranges::any_of(changes, [](const AcceptedChange& each) { return !each.change.cloths.empty(); })) {
     try {
-      setCloths(scene_.cloths);
+      setCloths(next.cloths);
     } catch (const vulkan::DeviceLost&) {
       throw;
     } catch (const std::runtime_error& noRoom) {
@@ -303,26 +314,36 @@ bool SceneHost::apply(std::span<const AcceptedChange> changes, std::string& prob
   }
   if (onDevice_->simulation.stagesMade() > made)
     making_.pay(tickStart_, schedule::seconds(makingTime_ - madeIn));
-  if (!hasRoom) {
-    scene_ = before;
-    easeUntil_ = easedBefore;
-    return false;
-  }
-  parametersChanged_ = true;
-  recoveries_.changed(tick_);
+  if (!hasRoom) return false;
+  scene_ = std::move(next);
+  easeUntil_ = std::move(easeUntil);
+  noteChange();
   for (const AcceptedChange& accepted : changes)
     live_.subscribers.announce(
         delivery::parametersChanged(accepted.message, tick_ + 1, accepted.participant));
   return true;
 }
 
-void SceneHost::easeSolverChanges(model::Scene& changed) {
+void SceneHost::noteChange() {
+  parametersChanged_ = true;
+  if (!recoveries_.hasCandidate()) candidate_ = parametersOf(scene_);
+  recoveries_.changed(tick_);
+}
+
+SceneHost::Parameters SceneHost::parametersOf(const model::Scene& scene) {
+  Parameters parameters{.environment = scene.environment, .cloths = scene.cloths};
+  for (model::Cloth& cloth : parameters.cloths) cloth.solver.correctionFraction.reset();
+  return parameters;
+}
+
+void SceneHost::easeSolverChanges(const model::Scene& before, model::Scene& changed,
+                                  std::vector<std::uint64_t>& easeUntil) const {
   const auto part = static_cast<float>(changed.substepSeconds() / kEaseTime);
   for (std::size_t i = 0; i < changed.cloths.size(); ++i) {
     model::Solver& solver = changed.cloths[i].solver;
-    if (solver.kind != scene_.cloths[i].solver.kind)
-      easeUntil_[i] = tick_ + static_cast<std::uint64_t>(std::ceil(kEaseSeconds * rate_));
-    if (easeUntil_[i] > tick_) solver.correctionFraction = std::min(part, model::correctionFraction(solver));
+    if (solver.kind != before.cloths[i].solver.kind)
+      easeUntil[i] = tick_ + static_cast<std::uint64_t>(std::ceil(kEaseSeconds * rate_));
+    if (easeUntil[i] > tick_) solver.correctionFraction = std::min(part, model::correctionFraction(solver));
   }
 }
 
@@ -485,8 +506,8 @@ void SceneHost::finish() {
     live_.tick = tick_;
     live_.setClothBounds({status_.low, status_.high});
     if (recoveries_.valid(tick_)) {
-      provenEnvironment_ = scene_.environment;
-      provenCloths_ = scene_.cloths;
+      Parameters next = recoveries_.hasCandidate() ? parametersOf(scene_) : Parameters();
+      proven_ = std::exchange(candidate_, std::move(next));
     }
     if (savesState_) {
       newestState_ = on.simulation.collectState(tick_);
@@ -623,11 +644,12 @@ void SceneHost::letGo() {
 }
 
 void SceneHost::undoChanges() {
-  scene_.environment = provenEnvironment_;
-  scene_.cloths = provenCloths_;
-  setCloths(scene_.cloths);
-  parametersChanged_ = true;
+  scene_.environment = proven_.environment;
+  scene_.cloths = proven_.cloths;
+  parametersChanged_ = clothsChanged_ = true;
   live_.subscribers.announce(delivery::parametersChanged(live_.revertTo(scene_), tick_ + 1));
+  // Last, because a device that is lost here gets them when it is rebuilt.
+  setCloths(scene_.cloths);
 }
 
 void SceneHost::releaseCoarseEncoders() {

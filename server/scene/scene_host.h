@@ -134,17 +134,24 @@ class SceneHost {
   void announceRecording();
   void applyInputs();
   // Applies the changes of the inbox, or lets all of them wait for a later tick, if they would make stages
-  // and earlier ones are not paid for (schedule::MakingLimit).
+  // and earlier ones are not paid for (schedule::MakingLimit). All of them also wait after an exception.
   void applyChanges();
+  // Returns how many of them, from the first on, it has applied. If `problem` is still empty, the others
+  // wait.
+  std::size_t applySome(std::span<const AcceptedChange> changes, std::string& problem);
   // Applies these changes together, or changes nothing and returns false, because the device has no room for
-  // them; `problem` says why.
+  // them; `problem` says why. After an exception the scene is as before, but not the device.
   bool apply(std::span<const AcceptedChange> changes, std::string& problem);
+  // The scene has other parameters.
+  void noteChange();
   // Begins the work that setWork() asks for.
   void applyWork();
   // Announces that changes were undone.
   void revertChanges(const std::string& reason);
   // Limits the correction of cloths whose solver changed: springs that are too long shrink over kEaseSeconds.
-  void easeSolverChanges(model::Scene& changed);
+  // `easeUntil` is as the member.
+  void easeSolverChanges(const model::Scene& before, model::Scene& changed,
+                         std::vector<std::uint64_t>& easeUntil) const;
   void endEasing();
   void setCloths(const std::vector<model::Cloth>& cloths);
   void recordRecovery();
@@ -202,8 +209,13 @@ class SceneHost {
   bool recorded_ = false;                // announced to the subscribers
   bool clothsChanged_ = false;           // since the newest complete tick
   RecoveryPolicy recoveries_;
-  model::Environment provenEnvironment_;  // a second of valid ticks has proven them
-  std::vector<model::Cloth> provenCloths_;
+  struct Parameters {
+    model::Environment environment;
+    std::vector<model::Cloth> cloths;
+  };
+  // Those of the scene, without eased corrections.
+  static Parameters parametersOf(const model::Scene& scene);
+  Parameters proven_, candidate_;   // as RecoveryPolicy has them; the start is proven
   std::uint64_t sinceHealthy_ = 0;  // healthy ticks since the start or the newest recovery
   schedule::TokenBucket recoveryNotices_{1, 5};
 

@@ -31,7 +31,7 @@ class PriceWatch {
   // isExcessive().
   bool addSlice(double seconds) {
     tick_ += std::min(seconds, kMostOfSlice);
-    return excess(1) > kMostExcess;
+    return isTooMuch();
   }
 
   // The tick has ended. `device`: seconds that the device worked on it, if that is known; the rest of its
@@ -40,23 +40,27 @@ class PriceWatch {
     seconds_ += device ? std::min(*device, tick_) : tick_;
     allowed_ += tickAllowed_;
     tick_ = tickAllowed_ = 0;
-    if (seconds_ <= allowed_) seconds_ = allowed_ = 0;
-    return excess(1) > kMostExcess;
+    if (seconds_ <= allowed_) {
+      seconds_ = allowed_ = 0;
+      slowdown_ = 1;
+    }
+    return isTooMuch();
   }
 
   // Returns whether the excess is too large on a device that is `slowdown` times as slow as the price
-  // assumes. Otherwise counting starts again.
+  // assumes. Until the scene is within what is allowed, that is the measure: a later excess is reported
+  // only when it is too large for such a device.
   bool isExcessive(double slowdown) {
-    if (excess(std::max(1.0, slowdown)) > kMostExcess) return true;
-    seconds_ = allowed_ = tick_ = 0;
-    return false;
+    slowdown_ = std::max(1.0, slowdown);
+    return isTooMuch();
   }
 
  private:
-  double excess(double slowdown) const { return seconds_ + tick_ - slowdown * (allowed_ + tickAllowed_); }
+  bool isTooMuch() const { return seconds_ + tick_ - slowdown_ * (allowed_ + tickAllowed_) > kMostExcess; }
 
   double seconds_ = 0, allowed_ = 0;   // of complete ticks
   double tick_ = 0, tickAllowed_ = 0;  // of the present one
+  double slowdown_ = 1;                // of the device, when it was measured last
 };
 
 }  // namespace clothstream::schedule

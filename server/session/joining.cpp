@@ -213,6 +213,9 @@ void Session::hello(const v1::Hello& message) {
   if (!admission) return failToJoin(admission.error(), *scene);
   scene_ = scene;
   participant_ = admission->id;
+  // A scene that was stopped since sceneOf() may have dismissed its participants before this one joined.
+  if (std::string why = scene->quarantined(); !why.empty())
+    return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED, std::move(why));
   scene->metrics.joins.add();
   if (continues_ && !admission->resumed)
     return fail(v1::ERROR_CODE_CUT_OFF, "the scene has moved to another server: join again");

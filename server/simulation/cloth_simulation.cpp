@@ -143,11 +143,16 @@ struct ClothSimulation::Pipeline {
   void prepare(float airDensity);
   std::unique_ptr<XpbdStage> makeXpbd(std::span<const model::Cloth> cloths);
   std::unique_ptr<AssembledStage> makeAssembled(std::span<const model::Cloth> cloths);
-  void makeBending(std::span<const model::Cloth> cloths);
+  // Returns null if the present stage serves these cloths, or if none of them bends.
+  std::unique_ptr<BendingStage> makeBending(std::span<const model::Cloth> cloths) const;
+  // `stage` replaces the present stage unless it is null.
+  void setBending(std::unique_ptr<BendingStage> stage, std::span<const model::Cloth> cloths);
   void makeAttachments(const AttachmentTables& tables);
   // Returns whether makeBending() and setSolvers() need more than what there is.
   bool makes(std::span<const model::Cloth> cloths) const;
   SolverStages makeSolvers(std::span<const model::Cloth> cloths);
+  // Makes these stages current, and returns the former ones.
+  SolverStages exchangeSolvers(SolverStages next);
   void setSolvers(std::span<const model::Cloth> cloths);
   void makeMassStage();
   void setMasses(std::span<const model::Cloth> cloths);
@@ -232,8 +237,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
              .workgroupSize = workgroupSize,
              .advanceKernel = options.advanceKernel}),
       hash(makeHash(on, buffers, workgroupSize)),
-      solves(on, scene.cloths, stateOf(buffers, collision), options.workgroupSize, options.solveWholeNodes),
-      solvers(solversOf(scene.cloths)),
+      solves(on, stateOf(buffers, collision), options.workgroupSize, options.solveWholeNodes),
       stiffness(springStiffness(scene.cloths)),
       asked(options) {
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
@@ -244,9 +248,9 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
                                          integrator, workgroupSize);
   if (integrator == model::Integrator::rungeKutta4)
     rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
-  xpbd = makeXpbd(scene.cloths);
-  assembled = makeAssembled(scene.cloths);
-  makeBending(scene.cloths);
+  exchangeSolvers(makeSolvers(scene.cloths));
+  bending = makeBending(scene.cloths);
+  bends = bending != nullptr;
   if (CoarseStage::isIn(scene.cloths))
     coarse = std::make_unique<CoarseStage>(on, scene.cloths, stateOf(buffers, collision), workgroupSize);
   if (SelfCollisionStage::isIn(scene))
@@ -299,17 +303,23 @@ std::unique_ptr<AssembledStage> ClothSimulation::Pipeline::makeAssembled(
 }
 
 // Cloths that bent once stay in the tables, so that each cloth needs new ones at most once.
-void ClothSimulation::Pipeline::makeBending(std::span<const model::Cloth> cloths) {
-  const bool wanted = BendingStage::isIn(cloths);
-  if (wanted && !(bending && bending->serves(cloths))) {
-    std::vector<model::Cloth> all(cloths.begin(), cloths.end());
-    for (std::size_t i = 0; bending && i < all.size(); ++i)
-      if (bending->bends(i)) all[i].dihedralBending = 1;
-    bending = std::make_unique<BendingStage>(device, all, stateOf(buffers, collision), workgroupSize);
+std::unique_ptr<BendingStage> ClothSimulation::Pipeline::makeBending(
+    std::span<const model::Cloth> cloths) const {
+  if (!BendingStage::isIn(cloths) || (bending && bending->serves(cloths))) return nullptr;
+  std::vector<model::Cloth> all(cloths.begin(), cloths.end());
+  for (std::size_t i = 0; bending && i < all.size(); ++i)
+    if (bending->bends(i)) all[i].dihedralBending = 1;
+  return std::make_unique<BendingStage>(device, all, stateOf(buffers, collision), workgroupSize);
+}
+
+void ClothSimulation::Pipeline::setBending(std::unique_ptr<BendingStage> stage,
+                                           std::span<const model::Cloth> cloths) {
+  if (stage) {
+    bending = std::move(stage);
     ++made;
     tabled = false;
   }
-  bends = wanted;
+  bends = BendingStage::isIn(cloths);
 }
 
 bool ClothSimulation::Pipeline::makes(std::span<const model::Cloth> cloths) const {
@@ -319,15 +329,21 @@ bool ClothSimulation::Pipeline::makes(std::span<const model::Cloth> cloths) cons
 }
 
 SolverStages ClothSimulation::Pipeline::makeSolvers(std::span<const model::Cloth> cloths) {
-  ++made;
-  const std::uint64_t before = device.allocatedBytes();
+  const std::uint64_t before = Buffer::bytesOfThread();
   SolverStages stages{.solvers = solversOf(cloths),
                       .systems = solves.makeSystems(cloths),
                       .xpbd = makeXpbd(cloths),
                       .assembled = makeAssembled(cloths)};
-  const std::uint64_t after = device.allocatedBytes();
-  stages.bytes = after > before ? after - before : 0;
+  stages.bytes = Buffer::bytesOfThread() - before;
   return stages;
+}
+
+SolverStages ClothSimulation::Pipeline::exchangeSolvers(SolverStages next) {
+  return {.solvers = std::exchange(solvers, std::move(next.solvers)),
+          .systems = solves.exchange(std::move(next.systems)),
+          .xpbd = std::exchange(xpbd, std::move(next.xpbd)),
+          .assembled = std::exchange(assembled, std::move(next.assembled)),
+          .bytes = std::exchange(solverBytes, next.bytes)};
 }
 
 void ClothSimulation::Pipeline::setSolvers(std::span<const model::Cloth> cloths) {
@@ -335,12 +351,11 @@ void ClothSimulation::Pipeline::setSolvers(std::span<const model::Cloth> cloths)
   if (std::ranges::equal(wanted, solvers, sameTables)) return;
   // Memory is allocated before anything changes, because that may fail.
   std::optional<SolverStages> known = kept.take(wanted);
-  SolverStages next = known ? std::move(*known) : makeSolvers(cloths);
-  kept.keep({.solvers = std::exchange(solvers, std::move(next.solvers)),
-             .systems = solves.exchange(std::move(next.systems)),
-             .xpbd = std::exchange(xpbd, std::move(next.xpbd)),
-             .assembled = std::exchange(assembled, std::move(next.assembled)),
-             .bytes = std::exchange(solverBytes, next.bytes)});
+  if (!known) {
+    known = makeSolvers(cloths);
+    ++made;
+  }
+  kept.keep(exchangeSolvers(std::move(*known)));
   grids.setTiles(cloths);
   if (meshes) meshes->setTiles(meshTiles(cloths, workgroupSize));
   tabled = false;
@@ -519,8 +534,9 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
                     }));
   const bool heavier = massesOf(cloths) != pipeline_->clothMasses;
   if (heavier) pipeline_->makeMassStage();
-  pipeline_->makeBending(cloths);
+  std::unique_ptr<BendingStage> bending = pipeline_->makeBending(cloths);
   pipeline_->setSolvers(cloths);
+  pipeline_->setBending(std::move(bending), cloths);
   if (heavier) pipeline_->setMasses(cloths);
   if (pipeline_->selfCollision) pipeline_->selfCollision->setCloths(cloths);
   if (pipeline_->motionBound) pipeline_->motionBound->setCloths(cloths);
@@ -571,7 +587,10 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
                     on.collision.push(on.substeps - 1, on.substeps, on.tickRate), on.collision.solidCount());
   on.namesConstraints = inputs.namesConstraints && on.solves.active();
-  if (on.namesConstraints) on.solves.recordActiveSprings(recorder);
+  if (!on.namesConstraints) return;
+  const std::uint64_t before = Buffer::bytesOfThread();
+  on.solves.recordActiveSprings(recorder);
+  on.solverBytes += Buffer::bytesOfThread() - before;
 }
 
 std::vector<ContactStatus> ClothSimulation::contacts() const {

@@ -100,7 +100,7 @@ WholeLimits wholeLimits(const vulkan::Device& device, const SolveCut& cut) {
   return {.nodes = cut.wholeNodes,
           .workgroup = cut.iterationWorkgroup,
           .spread = cut.spread,
-          .mostLoops = device.isSoftware() ? 65'535 : ~0u};
+          .mostLoops = device.isSoftware() ? 65'535 : kUnlimitedLoops};
 }
 
 std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGroup& group,
@@ -340,17 +340,14 @@ struct SolveStage::Systems {
   bool onlyStretched = false;
 };
 
-SolveStage::SolveStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
-                       const StateBuffers& state, std::uint32_t workgroupSize,
+SolveStage::SolveStage(const vulkan::Device& device, const StateBuffers& state, std::uint32_t workgroupSize,
                        std::optional<std::uint32_t> wholeNodes)
     : device_(device),
       state_(state),
       kernels_(std::make_unique<Kernels>(
           device, cutSolves(device, workgroupSize, wholeNodes),
           stretchedLimits(device, workgroupSize,
-                          wholeNodes.value_or(CLOTHSTREAM_STRETCHED_CHUNKS * kChunkNodes)))) {
-  systems_ = makeSystems(cloths);
-}
+                          wholeNodes.value_or(CLOTHSTREAM_STRETCHED_CHUNKS * kChunkNodes)))) {}
 
 SolveStage::~SolveStage() = default;
 

@@ -25,16 +25,16 @@ namespace clothstream::simulation {
 // by one workgroup.
 class SolveStage {
  public:
-  // `workgroupSize` 0 and `wholeNodes` absent (nodes of the largest cloth that one workgroup solves) mean the
-  // measured best for the device. Throws std::runtime_error if the device cannot take the systems.
-  SolveStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
-             std::uint32_t workgroupSize, std::optional<std::uint32_t> wholeNodes);
+  // Starts without systems. `workgroupSize` 0 and `wholeNodes` absent (nodes of the largest cloth that one
+  // workgroup solves) mean the measured best for the device.
+  SolveStage(const vulkan::Device& device, const StateBuffers& state, std::uint32_t workgroupSize,
+             std::optional<std::uint32_t> wholeNodes);
   ~SolveStage();
 
   // Everything whose size follows from the cloths.
   struct Systems;
-  // Makes the systems of other cloths; null if there are none. Kernels are kept. Throws std::runtime_error
-  // like the constructor, and then changes nothing.
+  // Makes the systems of these cloths; null if there are none. Kernels are kept. Throws std::runtime_error
+  // and changes nothing if the device cannot take the systems.
   std::shared_ptr<Systems> makeSystems(std::span<const model::Cloth> cloths);
   // Makes them current, and returns the former ones. No work of this stage may be in flight.
   std::shared_ptr<Systems> exchange(std::shared_ptr<Systems> systems);

@@ -80,9 +80,9 @@ bool isOf(const model::Cloth& cloth, const SolveGroup& group) {
 }
 
 // Upper bound of the loop rounds of an invocation: in a chunk, and in one iteration of a solve by one
-// workgroup.
+// workgroup. Zero if nothing limits them.
 struct Loops {
-  std::uint64_t chunk, iteration;
+  std::uint64_t chunk = 0, iteration = 0;
 };
 
 Loops loopsOf(const model::Cloth& cloth, const WholeLimits& whole) {
@@ -92,15 +92,24 @@ Loops loopsOf(const model::Cloth& cloth, const WholeLimits& whole) {
   const std::uint64_t tree = 3 * kLanes / whole.workgroup + 17;
   std::uint64_t walk = 1;
   if (cloth.mesh) {
-    const model::SpringAdjacency adjacency =
-        model::springAdjacency(model::systemLinks(cloth), cloth.nodeCount());
-    std::uint64_t most = 0;
-    for (std::uint32_t node = 0; node < cloth.nodeCount(); ++node)
-      most = std::max<std::uint64_t>(most, adjacency.of(node).size());
+    std::vector<std::uint32_t> springs(cloth.nodeCount());  // at each node
+    for (const model::SpringLink& link : model::systemLinks(cloth))
+      for (const std::uint32_t node : {link.a, link.b}) ++springs[node];
+    const std::uint64_t most = *std::ranges::max_element(springs);
     walk = rows * ((most + 1) / 2 + 2) + 2;
   }
   const std::uint64_t chunk = walks * (walk + 2) + tree, chunks = chunksOf(cloth);
   return {chunk, chunks * (chunk + 2) + tree + chunks};
+}
+
+// Loops of the cloths of a group. Those of other cloths are zero.
+std::vector<Loops> loopsOf(std::span<const model::Cloth> cloths, const SolveGroup& group,
+                           const WholeLimits& whole) {
+  std::vector<Loops> loops(cloths.size());
+  if (group.stretched || whole.mostLoops == kUnlimitedLoops) return loops;
+  for (std::size_t i = 0; i < cloths.size(); ++i)
+    if (isOf(cloths[i], group)) loops[i] = loopsOf(cloths[i], whole);
+  return loops;
 }
 
 // True if one workgroup solves the system of a cloth.
@@ -111,16 +120,14 @@ bool isSmall(const model::Cloth& cloth, const SolveGroup& group, const Loops& lo
 }
 
 // Appends the small or the large cloths of a group.
-void appendCloths(std::span<const model::Cloth> cloths, SolveGroup& group, bool large,
-                  const WholeLimits& whole, SolveTables& tables) {
+void appendCloths(std::span<const model::Cloth> cloths, std::span<const Loops> loopsOfCloths,
+                  SolveGroup& group, bool large, const WholeLimits& whole, SolveTables& tables) {
   std::uint32_t firstNode = 0;
   for (std::size_t i = 0; i < cloths.size(); firstNode += cloths[i++].nodeCount()) {
     const model::Cloth& cloth = cloths[i];
-    if (!isOf(cloth, group) || (group.stretched && large)) continue;
-    if (!group.stretched && !large && cloth.nodeCount() > whole.nodes) continue;
-    const Loops loops = group.stretched ? Loops{} : loopsOf(cloth, whole);
-    if (isSmall(cloth, group, loops, whole) == large) continue;
-    if (!group.stretched && loops.chunk > whole.mostLoops)
+    const Loops& loops = loopsOfCloths[i];
+    if (!isOf(cloth, group) || isSmall(cloth, group, loops, whole) == large) continue;
+    if (loops.chunk > whole.mostLoops)
       throw std::runtime_error(
           fmt::format("cloth '{}': so many springs meet at a vertex that a solve takes {} rounds of loops, "
                       "and this device allows {}; connect fewer triangles to one vertex, or use another "
@@ -192,9 +199,10 @@ SolveTables solveTables(std::span<const model::Cloth> cloths, const WholeLimits&
       group.firstChunk = count(tables.chunks);
       group.firstSpring = count(tables.springs);
       chooseStretched(cloths, group, stretched);
-      appendCloths(cloths, group, false, whole, tables);
+      const std::vector<Loops> loops = loopsOf(cloths, group, whole);
+      appendCloths(cloths, loops, group, false, whole, tables);
       group.firstLargeChunk = count(tables.chunks);
-      appendCloths(cloths, group, true, whole, tables);
+      appendCloths(cloths, loops, group, true, whole, tables);
       group.endChunk = count(tables.chunks);
       group.endSpring = count(tables.springs);
       group.endSystem = count(tables.systems);

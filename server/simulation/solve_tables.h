@@ -23,7 +23,8 @@ struct SolveGroup {
   std::uint32_t firstSpring = 0, endSpring = 0;  // of meshes
   std::uint32_t iterations = 0;                  // of one solve: the largest of any cloth
   std::uint32_t smallChunks = 0;                 // of the largest small system
-  // Largest number of loop rounds of an invocation in one iteration of a small system.
+  // Largest number of loop rounds of an invocation in one iteration of a small system; 0 if they are not
+  // limited.
   std::uint32_t smallLoops = 0;
   // One workgroup per system solves for the ends of stretched springs only (StretchedSystems).
   bool stretched = false;
@@ -49,6 +50,9 @@ struct StretchedLimits {
   std::uint32_t workgroup, widestWorkgroup;
   std::uint32_t mostLoops;  // rounds of loops of an invocation
 };
+
+// WholeLimits::mostLoops of a device without a limit.
+inline constexpr std::uint32_t kUnlimitedLoops = ~0u;
 
 // Limits of a workgroup that solves for all springs of a cloth. Results do not depend on them.
 struct WholeLimits {

@@ -93,7 +93,7 @@ Key keyOf(const std::string& pem) {
 
 std::string readFile(const fs::path& file) {
   auto text = files::readRegularFile(file, kMaxFileBytes);
-  if (!text) throw std::runtime_error(fmt::format("{}: {}", file.string(), text.error()));
+  if (!text) throw std::runtime_error(fmt::format("{}: {}", file.string(), text.error().text));
   return std::move(*text);
 }
 

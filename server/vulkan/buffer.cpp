@@ -57,6 +57,10 @@ std::uint32_t memoryType(const Device& device, std::uint32_t typeBits, const Tra
 
 }  // namespace
 
+std::uint64_t Buffer::bytesOfThread() {
+  return bufferBytesOfThread;
+}
+
 Buffer::Buffer() = default;
 Buffer::~Buffer() = default;
 Buffer::Buffer(Buffer&&) noexcept = default;
@@ -99,6 +103,7 @@ Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
                                        .memoryTypeIndex = memoryType(device, needs.memoryTypeBits, traits)});
     handles_->bytes = needs.size;
     handles_->device.allocatedBytes += needs.size;
+    bufferBytesOfThread += needs.size;
     handles_->buffer.bindMemory(*handles_->memory, 0);
     if (mapped) mapped_ = handles_->memory.mapMemory(0, VK_WHOLE_SIZE);
     if (texels)

@@ -31,6 +31,10 @@ class Buffer {
 
   std::size_t bytes() const { return bytes_; }
 
+  // Memory on all devices of the buffers that the calling thread has made, less that of the buffers that it
+  // has destroyed, in bytes modulo 2^64. The difference of two calls is what the work between them has added.
+  static std::uint64_t bytesOfThread();
+
   // The whole buffer, for upload and readback; empty for the other purposes. Host-coherent. Writes of kernels
   // are visible once the submission's timeline value is reached (Recorder ends every recording with the
   // necessary barrier).

@@ -53,10 +53,13 @@ struct Device::Handles {
   bool validates() const { return *messenger != vk::DebugUtilsMessengerEXT{}; }
 };
 
+inline thread_local std::uint64_t bufferBytesOfThread = 0;  // Buffer::bytesOfThread()
+
 struct Buffer::Handles {
   explicit Handles(const Device& of) : device(of.handles()) {}
   ~Handles() {
     device.allocatedBytes -= bytes;
+    bufferBytesOfThread -= bytes;
     if (counted) --device.allocations;
   }
   Handles(const Handles&) = delete;

@@ -118,6 +118,8 @@ struct SamplePush {
 
 // Nodes deeper inside a mesh than this are found only if their way in the substep is as long, m.
 const float kSolidDepth = 0.03f;
+// Nodes of the tree that the searches for one contact may visit, a quarter of those of the largest mesh.
+const uint32_t kMostSolidVisits = 4096u;
 
 struct SolidPush {
   CollisionPush collision;

@@ -42,7 +42,8 @@ SolidContact leaveAt(Nearest entry, Nearest end, vec3 to, float left, float thic
 // Seen from a node, the distance from the mesh changes at most by the length of its path and the motion of
 // the mesh, together `way`. So a path whose ends are far enough outside cannot cross the surface. Any other
 // path is followed in strides of the distance from the mesh, or of kLeastStride of the path if that is
-// longer. The substep begins and ends at shares of the tick. No vertex moves farther in the tick than
+// longer. All its searches together visit at most kMostSolidVisits nodes of the tree. The substep begins and
+// ends at shares of the tick. No vertex moves farther in the tick than
 // `motion`.
 SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, float ends, float motion,
                         float thickness) {
@@ -55,6 +56,7 @@ SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, flo
   SolidContact none = SolidContact(kNoContact, vec3(0.0));
   Nearest entry = Nearest(false, 0.0, vec3(0.0), vec3(0.0), vec3(0.0));
   Nearest end = entry;
+  visitsLeft = kMostSolidVisits;
   bool entered = false;
   float part = 0.0, entryPart = 0.0;
   uint queries = kStrides + 2u;

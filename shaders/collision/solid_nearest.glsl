@@ -15,6 +15,10 @@ layout(binding = kSolidBinding) uniform samplerBuffer solids;
 // too few digits. Metres.
 const float kTouching = 1e-4;
 
+// Nodes of trees that searches may still visit. A search that is cut short finds the nearest of the triangles
+// that it has seen, so that a mesh whose triangles lie in a heap cannot hold the device up.
+uint visitsLeft = kMostSolidVisits;
+
 // Parts of a triangle. Corner k is kCorner + k; the edge from corner k to the next one is kEdge + k.
 const uint kFace = 0u;
 const uint kCorner = 1u;
@@ -170,7 +174,7 @@ uint nodeAfter(uint node) {
 }
 
 // The nearest point nearer than `bound`, at a share of the tick. Of points at the same distance, the one of
-// the first triangle.
+// the first triangle. Takes its visits from those that are left.
 Nearest nearestOnSolid(SolidRecord solid, float progress, vec3 p, float bound) {
   uint leaves = uint(solid.leafCount), triangles = uint(solid.triangleCount);
   uint shift = uint(findMSB(leaves));
@@ -178,8 +182,9 @@ Nearest nearestOnSolid(SolidRecord solid, float progress, vec3 p, float bound) {
   bool found = false;
   uint triangle = 0u;
   TrianglePoint at = TrianglePoint(0.0, 0.0, kFace);
-  uint node = 1u;
+  uint node = visitsLeft == 0u ? 0u : 1u;
   while (node != 0u) {
+    --visitsLeft;
     bool near = squaredFromBox(p, solid, node, progress) < best;
     if (near && node >= leaves) {
       uint leaf = node - leaves;
@@ -198,6 +203,7 @@ Nearest nearestOnSolid(SolidRecord solid, float progress, vec3 p, float bound) {
       }
     }
     node = near && node < leaves ? 2u * node : nodeAfter(node);
+    node = visitsLeft == 0u ? 0u : node;
   }
   if (!found) {
     return Nearest(false, bound, vec3(0.0), vec3(0.0, 1.0, 0.0), vec3(0.0));

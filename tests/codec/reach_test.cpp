@@ -76,6 +76,14 @@ TEST(Reach, CoordinatesBeyondItBecomeItsEnd) {
   EXPECT_NEAR(decoder->positions()[1], -reachOf(0.0005f), 0.001);
 }
 
+TEST(Reach, FarthestCoordinateDecidesThePromise) {
+  EXPECT_EQ(farthestOf({}), 0);
+  const std::vector<float> positions{1, -20, 3, 4, 15, 0};
+  EXPECT_EQ(farthestOf(positions), 20);
+  EXPECT_GT(promisedDistance(0.0001f, farthestOf(positions)), promisedDistance(0.0001f, 16));
+  EXPECT_EQ(promisedDistance(0.0001f, 16), promisedDistance(0.0001f, 0));
+}
+
 TEST(Reach, StreamHasThatOfItsNarrowestQuality) {
   // Quality 0 has four bits in a step and reaches 71 m; quality 1 has six and reaches 49 m.
   const float error = 0.00000726f;

@@ -97,7 +97,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfMeshes) {
     encoding.tick(tick, tick % 10 == 0);
 }
 
-// Frames are recorded on a motion that lasts, so that weights are sent and matter.
+// Encodes frames of a moving cloth, and discards some of them.
 class Discarding {
  public:
   explicit Discarding(const Sort& sort)

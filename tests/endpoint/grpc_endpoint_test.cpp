@@ -299,7 +299,7 @@ TEST_F(GrpcEndpoint, RefusesCompressedMessages) {
 }
 
 // A client whose machine or network has failed does not answer pings, and its socket stays open.
-TEST_F(GrpcEndpoint, ClosesConnectionThatDoesNotAnswerPingsWithinFiveSeconds) {
+TEST_F(GrpcEndpoint, ClosesConnectionThatDoesNotAnswerPingsWithinTenSeconds) {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -316,7 +316,7 @@ TEST_F(GrpcEndpoint, ClosesConnectionThatDoesNotAnswerPingsWithinFiveSeconds) {
   ssize_t received = 1;
   while (received > 0 && ::poll(&readable, 1, 10'000) == 1) received = ::recv(socket, bytes, sizeof bytes, 0);
   EXPECT_LE(received, 0) << "still open";
-  EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(5));
+  EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(10));
   ::close(socket);
 }
 

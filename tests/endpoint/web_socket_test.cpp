@@ -103,10 +103,10 @@ TEST_F(WebSocketEndpoint, SurvivesUnmaskedFrame) {
 TEST_F(WebSocketEndpoint, ClosesAfterTooManyFramesOfAnyKind) {
   Joined other = join();
   const std::string kinds[] = {
-      std::string("\x8a\x80mask", 6),                         // pongs
-      std::string("\x89\x80mask", 6),                         // pings
-      std::string("\x00\x80mask", 6),                         // empty fragments
-      std::string("\x8a\x9emask", 6) + std::string(30, 'x'),  // pongs with payload
+      std::string("\x8a\x80mask", 6),   // pongs
+      std::string("\x89\x80mask", 6),   // pings
+      std::string("\x00\x80mask", 6),   // empty fragments
+      std::string("\x8a\x81maskx", 7),  // pongs with payload
   };
   for (const std::string& kind : kinds) {
     HttpClient raw(port());
@@ -116,7 +116,9 @@ TEST_F(WebSocketEndpoint, ClosesAfterTooManyFramesOfAnyKind) {
                 "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n");
     ASSERT_EQ(upgraded.result(), http::status::switching_protocols);
     std::string flood = kind[0] == 0 ? std::string("\x02\x80mask", 6) : "";  // the message of the fragments
-    for (int i = 0; i < 8000; ++i) flood += kind;
+    // Too many even if reading them takes some seconds. The server does not read all of them, so the rest
+    // must fit into the buffers of the connection.
+    for (int i = 0; i < 20'000; ++i) flood += kind;
     raw.send(flood);
     EXPECT_TRUE(raw.receives("\x03\xf0too many WebSocket frames")) << kind;
   }
@@ -153,7 +155,7 @@ TEST_F(WebSocketEndpoint, KeepsPlaceOfClosedPage) {
 }
 
 // A client whose machine or network has failed neither reads nor answers pings, and its socket stays open.
-TEST_F(WebSocketEndpoint, DetectsVanishedClientWithinFiveSeconds) {
+TEST_F(WebSocketEndpoint, DetectsVanishedClientWithinTenSeconds) {
   Joined watcher = join();
   Joined vanished = join();
   const std::uint64_t id = vanished.viewer.welcome.participant_id();
@@ -164,7 +166,7 @@ TEST_F(WebSocketEndpoint, DetectsVanishedClientWithinFiveSeconds) {
     const v1::Presence& presence = watcher.viewer.last.presence();
     return presence.kind() == v1::PRESENCE_KIND_DISCONNECTED && presence.participant().id() == id;
   }));
-  EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(5));
+  EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(10));
   // The participant keeps its place, but its collider goes.
   EXPECT_TRUE(watcher.seeUntil([&] { return !watcher.viewer.colliderOf(id).has_value(); }));
 }

@@ -459,4 +459,4 @@ class Measure(Arrays):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    unittest.main(verbosity=2)

@@ -146,4 +146,4 @@ if __name__ == "__main__":
     if devices.returncode != 0 or not devices.stdout.strip():
         print("skipped: no Vulkan device")
         sys.exit(NO_DEVICE)
-    unittest.main()
+    unittest.main(verbosity=2)

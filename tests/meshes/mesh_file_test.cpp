@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 namespace clothstream::meshes {
 namespace {
@@ -227,7 +228,7 @@ TEST_F(MeshFile, GltfReadsOnlyFilesOfItsFolderWithinTheLimit) {
     EXPECT_THAT(read(uri).error(), HasSubstr("File not found")) << uri;
   const std::size_t json = replaced(kGltf, "sheet.bin", "parts/sheet.bin").size();
   EXPECT_THAT(read("parts/sheet.bin", {.bytes = json + 40, .vertices = 100}).error(),
-              HasSubstr("has 92 bytes; at most 40 are allowed"));
+              HasSubstr("is too large: at most 40 bytes are allowed"));
 }
 
 TEST_F(MeshFile, NamesFormatsThatAreNotSupported) {
@@ -311,10 +312,13 @@ TEST_F(MeshFile, NamesFilesThatAreNotMeshes) {
     ASSERT_FALSE(source) << path;
     EXPECT_THAT(source.error(), AllOf(StartsWith(path.string()), HasSubstr(says)));
   };
-  expectRefused(folder_ / "none.obj", "there is no such file");
-  expectRefused(folder_, "is not a file");
+  expectRefused(folder_ / "none.obj", "cannot be read: No such file");
+  expectRefused(folder_, "is not a regular file");
+  const std::filesystem::path pipe = folder_ / "pipe.obj";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  expectRefused(pipe, "is not a regular file");
   expectRefused(write("cloth.fbx", "x"), ".obj, .gltf or .glb");
-  expectRefused(write("large.obj", std::string(101, ' ')), "has 101 bytes; at most 100");
+  expectRefused(write("large.obj", std::string(101, ' ')), "is too large: at most 100 bytes");
 }
 
 }  // namespace

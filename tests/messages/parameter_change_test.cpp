@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Parameter changes of clients.
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -389,7 +390,64 @@ TEST_F(ToParameterChange, AnnouncedMaterialsLeadClientsToTheParametersOfTheScene
     announced(scene);
     last.set_material("wool");
     announced(scene);
+    // Numbers between two materials, and after them.
+    message_.add_cloths()->mutable_structural()->set_stiffness(3);
+    *message_.add_cloths() = message_.cloths(1);
+    message_.add_cloths()->set_lift(0.2f);
+    announced(scene);
+    message_.mutable_cloths(4)->set_name("sheet-2");
+    announced(scene);
   }
+}
+
+TEST_F(ToParameterChange, AnnouncementsGiveTheNumbersOfEachClothOnce) {
+  model::Scene scene = sceneOfManyCloths(9);
+  for (int i = 0; i < 16; ++i) {
+    message_.add_cloths()->set_material(i % 2 == 0 ? "denim" : "silk");
+    message_.add_cloths()->set_name("sheet-" + std::to_string(i % 8 + 1));
+    message_.mutable_cloths(2 * i + 1)->set_material("wool");
+  }
+  model::applyChange(scene, *toParameterChange(message_, scene, model::StabilityBound(scene)));
+  const v1::ParameterChange announced = withMaterials(message_, scene);
+  const auto withNumbers =
+      std::ranges::count_if(announced.cloths(), [](const v1::ClothChange& each) { return each.has_drag(); });
+  EXPECT_LE(withNumbers, 9 + 1);
+}
+
+// Clients refuse longer lists of cloths.
+TEST_F(ToParameterChange, AnnouncementsHaveAtMostAsManyElementsAsAScene) {
+  model::Scene before = *toScene(smallScene());
+  const model::Cloth cloth = before.cloths[0];
+  message_.add_cloths()->set_material("denim");
+  for (int i = 1; i <= 200; ++i) {
+    before.cloths.push_back(cloth);
+    before.cloths.back().name = "sheet-" + std::to_string(i);
+    v1::ClothChange& change = *message_.add_cloths();
+    change.set_name(before.cloths.back().name);
+    change.set_drag(0.001f * static_cast<float>(i));
+  }
+  model::Scene after = before;
+  model::applyChange(after, *toParameterChange(message_, before, model::StabilityBound(before)));
+  const v1::ParameterChange announced = withMaterials(message_, after);
+  EXPECT_LE(announced.cloths_size(), 256);
+  v1::ParameterChange all = allParametersOf(before);
+  applyChange(announced, all);
+  EXPECT_EQ(all.DebugString(), allParametersOf(after).DebugString());
+}
+
+TEST_F(ToParameterChange, RefusesElementsThatAddressTooManyCloths) {
+  const model::Cloth cloth = scene_.cloths[0];
+  for (int i = 1; i < 256; ++i) {
+    scene_.cloths.push_back(cloth);
+    scene_.cloths.back().name = "sheet-" + std::to_string(i);
+  }
+  for (int i = 0; i < 16; ++i) message_.add_cloths()->set_material("silk");
+  EXPECT_EQ(error(), "no error");
+  message_.add_cloths()->set_name("sheet-1");
+  EXPECT_EQ(
+      error(),
+      "parameterChange.cloths: address 4097 cloths together; must be at most 4096: set every value of a "
+      "cloth once");
 }
 
 TEST_F(ToParameterChange, AnnouncementsOfMaterialsDoNotGrowWithTheScene) {

@@ -18,7 +18,7 @@ import { writeHangingSheet } from "./scenes.mjs";
 import { startServer } from "./server.mjs";
 
 if (!existsSync(kChromium)) {
-  console.log("Skipped: chromium is not installed");
+  console.log("skipped: chromium is not installed");
   process.exit(77);
 }
 

@@ -7,7 +7,7 @@ python=$1 packages=$2
 export CLOTHSTREAM_INCLUDE=$3 CLOTHSTREAM_SERVER=$4 CLOTHSTREAM_PROGRAM=$5
 unset PYTHONPATH CLOTHSTREAM_LIBRARY
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-"$python" -c 'import numpy, venv, ensurepip' 2>/dev/null || { echo "Skipped: $python has no numpy or no venv" && exit 77; }
+"$python" -c 'import numpy, venv, ensurepip' 2>/dev/null || { echo "skipped: $python has no numpy or no venv" && exit 77; }
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 

@@ -432,7 +432,11 @@ TEST(ClientRecording, ReportsAFrameThatDiffersFromItsHash) {
   const Read read = readFrames(opened);
   ASSERT_EQ(read.errors.size(), 1u);
   EXPECT_EQ(read.errors[0], "the frame of tick 31 at 0.500 s differs from its recorded hash");
-  EXPECT_EQ(faultsOf(opened).different, 1u);
+  EXPECT_EQ(read.ticks.size(), kSampleFrames - 18u) << "frames 31 to 47 depend on it";
+  const cs_recording_faults faults = faultsOf(opened);
+  EXPECT_EQ(faults.frames, kSampleFrames);
+  EXPECT_EQ(faults.different, 1u);
+  EXPECT_EQ(faults.undecodable, 17u);
 }
 
 // A wrong tick in a key frame makes all later frames look old.

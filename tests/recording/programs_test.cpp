@@ -249,16 +249,24 @@ TEST_F(RecordingPrograms, EveryReaderFailsAtFramesThatCannotBeDecoded) {
   const std::string whole = sampleRecording(kSampleFrames);
   std::filesystem::create_directory(pathOf("golden"));
   const std::string good = pathOf("good.mcap"), out = pathOf("out.mcap"),
-                    garbage = pathOf("golden/garbage.mcap"), holes = pathOf("holes.mcap");
+                    garbage = pathOf("golden/garbage.mcap"), holes = pathOf("holes.mcap"),
+                    different = pathOf("different.mcap");
   std::ofstream(good, std::ios::binary) << whole;
   std::ofstream(garbage, std::ios::binary) << withGarbage(whole);
   std::ofstream(holes, std::ios::binary) << withFrames(whole, [](std::size_t frame, v1::Frame& changed) {
     if (frame == 30) changed.set_packet("garbage");
   });
+  std::ofstream(different, std::ios::binary) << withFrames(whole, [](std::size_t frame, v1::Frame& changed) {
+    if (frame == 30) changed.set_reconstruction_hash(changed.reconstruction_hash() ^ 1);
+  });
   const char* const all =
       "of 150 frames 150 cannot be decoded, the first is that of an unknown tick at 0.000 s";
   const char* const some = "of 150 frames 18 cannot be decoded, the first is that of";
-  for (const auto& [path, faults] : {std::pair(garbage, all), std::pair(holes, some)}) {
+  const char* const wrong =
+      "of 150 frames 17 cannot be decoded and 1 differ from their recorded hash, the first is that of tick "
+      "31";
+  for (const auto& [path, faults] :
+       {std::pair(garbage, all), std::pair(holes, some), std::pair(different, wrong)}) {
     const Ended info = clothstream({"info", path});
     EXPECT_EQ(info.code, 7);
     EXPECT_THAT(info.output, HasSubstr(faults));
@@ -319,16 +327,28 @@ TEST_F(RecordingPrograms, SayWhichQualityARecordingHolds) {
   std::ofstream(source, std::ios::binary) << withCoarseFrames(sampleRecording(kSampleFrames), 48);
   EXPECT_THAT(clothstream({"info", source}).output,
               HasSubstr("48 frames of quality 0, 102 frames of quality 1"));
-  const auto record = [&](std::vector<std::string> options) {
+  // Interrupts the recording when the file has this many frames; 0: waits for its end.
+  const auto record = [&](const std::string& path, std::size_t frames, const char* option) -> Ended {
     Process server({CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "play", source, "--lockstep",
                     "--speed", "max"});
     const auto line = server.waitForLine("gRPC ", kPatience);
-    EXPECT_TRUE(line) << server.errors();
-    options.insert(options.begin(),
-                   {"record", "--seconds", "1", "--server", line->substr(line->find_first_not_of(' '))});
-    return clothstream(options);
+    if (!line) return {-1, server.output(), server.errors()};
+    std::vector<std::string> command{CLOTHSTREAM, "record",   "-o",
+                                     path,        "--server", line->substr(line->find_first_not_of(' '))};
+    if (option != nullptr) command.emplace_back(option);
+    Process process(command);
+    const auto inFile = [&]() -> std::size_t {
+      auto reader = RecordingReader::open(path, CutFiles::read);
+      return reader ? countMessages(*reader, Topic::frames) : 0;
+    };
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    while (inFile() < frames && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::sleep_for(20ms);
+    if (frames > 0) process.signal(SIGINT);
+    const std::optional<int> code = process.waitForEnd(kPatience);
+    return {code.value_or(-1), process.output(), process.errors()};
   };
-  const Ended recorded = record({"-o", kept});
+  const Ended recorded = record(kept, kSampleFrames, nullptr);
   EXPECT_EQ(recorded.code, 0) << recorded.errors;
   EXPECT_THAT(recorded.output, HasSubstr("102 of 150 frames are coarser than quality 0"));
   EXPECT_THAT(recorded.output, HasSubstr("102 of quality 1"));
@@ -337,7 +357,7 @@ TEST_F(RecordingPrograms, SayWhichQualityARecordingHolds) {
   EXPECT_THAT(clothstream({"info", "--json", kept}).output,
               HasSubstr("\"frames_of_quality\": \"48, 102, 0, 0\""));
 
-  const Ended insisted = record({"-o", full, "--full-quality"});
+  const Ended insisted = record(full, 0, "--full-quality");
   EXPECT_EQ(insisted.code, 5);
   EXPECT_THAT(insisted.errors, HasSubstr("the server lowered the quality after 48 frames"));
   const Ended info = clothstream({"info", full});
@@ -373,11 +393,14 @@ TEST_F(RecordingPrograms, EscapeControlCharactersInLinesOfEvents) {
   const auto line = server.waitForLine("gRPC ", kPatience);
   ASSERT_TRUE(line) << server.errors();
   const std::string address = line->substr(line->find_first_not_of(' '));
-  const Ended joined = clothstream({"join", address, "--events", "--seconds", "0.5"});
+  Process joined({CLOTHSTREAM, "join", address, "--events"});
+  EXPECT_TRUE(joined.waitForOutput("\\u001b[2J\\u009b1m\\u202eb\\u200b", kPatience)) << joined.output();
+  joined.signal(SIGINT);
+  EXPECT_EQ(joined.waitForEnd(kPatience), 0) << joined.errors();
+  EXPECT_THAT(joined.errors(), HasSubstr("\\x1b[2J\\xc2\\x9b1m\\xe2\\x80\\xaeb"));
   const Ended shown = clothstream({"join", address, "--seconds", "0.5"});
-  EXPECT_THAT(joined.output, HasSubstr("\\u001b[2J\\u009b1m\\u202eb\\u200b"));
-  EXPECT_THAT(joined.errors, HasSubstr("\\x1b[2J\\xc2\\x9b1m\\xe2\\x80\\xaeb"));
-  for (const std::string& text : {joined.output, joined.errors, shown.output, shown.errors, server.output()})
+  for (const std::string& text :
+       {joined.output(), joined.errors(), shown.output, shown.errors, server.output()})
     for (const char* control : {"\x1b", "\xc2\x9b", "\xe2\x80\xae", "\xe2\x80\x8b"})
       EXPECT_THAT(text, ::testing::Not(HasSubstr(control)));
 }

@@ -223,6 +223,34 @@ TEST(Recording, RefusesChunksThatExpandTooMuchBeforeReadingThem) {
   EXPECT_THAT(cut.error(), HasSubstr("would expand"));
 }
 
+// A tick has the joints of eight meshes, and repeats them while they stand still.
+TEST(Recording, ReadsTicksOfJointsThatStandStill) {
+  constexpr std::uint32_t kMeshes = 8, kJoints = 128;
+  const std::vector<float> joints(std::size_t{7} * kJoints);
+  std::string file;
+  McapWriter writer([&](std::string_view more) {
+    file += more;
+    return Written();
+  });
+  ASSERT_TRUE(writer.begin("test"));
+  const auto channel = writer.addChannel("/ticks", {"RecordedTick", ""});
+  std::mt19937_64 random(3);
+  v1::RecordedTick tick;
+  for (std::uint32_t i = 0; i < kMeshes; ++i) {
+    v1::AppliedCollider& collider = *tick.add_colliders();
+    collider.mutable_joints_start()->Add(joints.begin(), joints.end());
+    collider.mutable_joints_end()->Add(joints.begin(), joints.end());
+  }
+  for (std::uint64_t i = 1; i <= 1000; ++i) {
+    tick.set_tick(i);
+    tick.set_state_hash(random());
+    ASSERT_TRUE(writer.write(*channel, i * 1'000'000, tick.SerializeAsString()));
+  }
+  ASSERT_TRUE(writer.finish());
+  const auto reader = McapReader::open(std::make_unique<MemorySource>(file), {.freeChunks = 0});
+  EXPECT_TRUE(reader.has_value()) << reader.error();
+}
+
 TEST(Recording, ReadsTheOthersIfAChunkIsTooLarge) {
   auto reader = McapReader::open(std::make_unique<MemorySource>(zeros(3, 90'000)), {.chunkBytes = 80'000});
   ASSERT_TRUE(reader.has_value()) << reader.error();

@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
-# Makes a root with a release of Debian, and runs there what a new user runs first: `./dev run` until it serves its page, and
-# `./dev test`. Then it simulates the recordings of all built-in scenes, whose states must have the same bits. Packages come
-# from Debian and npm.
+# Makes a root with a release of Debian, and runs there what a new user runs first: `./dev run` until it serves its page,
+# and `./dev test`. Packages come from Debian and npm.
 # Usage: first_commands.sh RELEASE SOURCE CACHE. RELEASE is a codename; CACHE keeps what was compiled.
 set -euo pipefail
 release=$1 source=$2 cache=$3
@@ -47,9 +46,6 @@ kill -INT -- -$run
 wait $run || { tail -100 /tmp/run.log && exit 1; }
 echo "./dev test"
 ./dev test
-echo "Recordings of all built-in scenes"
-cmake --build build/release --target test_recording
-build/release/bin/test_recording --gtest_filter='Versions/Replay.*' --gtest_brief=1
 INSIDE
 # The namespaces end with the test: nothing stays mounted and nothing goes on running.
 unshare --mount --pid --fork --kill-child bash -euc '

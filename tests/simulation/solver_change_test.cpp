@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -100,6 +101,35 @@ TEST_F(SolverChange, ToAndFroMakesNothing) {
   EXPECT_EQ(made, 2 + simulation::KeptStages::kMost + 1);
   changeTo(xpbd);
   EXPECT_EQ(changing.stagesMade(), made + 1);
+}
+
+// The systems of this many nodes take more than what is kept, also those that the scene starts with.
+TEST_F(SolverChange, LargeStagesAreNotKept) {
+  model::Scene scene = sceneOf({calmCloth(400, 400)});
+  scene.cloths[0].solver.kind = SolverKind::constraint;
+  Running running(scene);
+  for (const SolverKind kind : {SolverKind::massSpring, SolverKind::constraint}) {
+    scene.cloths[0].solver.kind = kind;
+    running.setCloths(scene.cloths);
+  }
+  EXPECT_EQ(running.stagesMade(), 2u);
+}
+
+// A device that has room for the stage of bending, and not for the systems of a solver.
+TEST_F(SolverChange, WithoutMemoryNothingChanges) {
+  const model::Scene scene = softScene();
+  model::Scene bent = scene;
+  bent.cloths[0].dihedralBending = 1e-5f;
+  const std::uint32_t before = device().allocations();
+  Running plenty(scene);
+  plenty.setCloths(bent.cloths);
+  vulkan::Device few({.maxAllocations = device().allocations() - before + 1});
+  Running running(scene, {}, few);
+  EXPECT_THROW(running.setCloths(withSolvers(bent, SolverKind::constraint, SolverKind::xpbd).cloths),
+               std::runtime_error);
+  EXPECT_EQ(running.stagesMade(), 0u);
+  running.setCloths(bent.cloths);
+  EXPECT_EQ(running.stagesMade(), 1u);
 }
 
 // Cloths whose dihedral bending alternates need tables once each.

@@ -6,7 +6,7 @@ set -euo pipefail
 clang=$1 library=$2
 shift 2
 if ! command -v aarch64-linux-gnu-objdump >/dev/null || ! [ -d /usr/aarch64-linux-gnu/include ]; then
-  echo "Skipped: no cross compiler; ./dev test --long installs Debian's g++-aarch64-linux-gnu"
+  echo "skipped: no cross compiler; ./dev test --long installs Debian's g++-aarch64-linux-gnu"
   exit 77
 fi
 object=$(mktemp)

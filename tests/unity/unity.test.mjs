@@ -24,7 +24,7 @@ for (const tool of ["mcs", "mono"]) {
   try {
     execFileSync("sh", ["-c", `command -v ${tool}`]);
   } catch {
-    console.log(`Skipped: ${tool} is not installed; ./dev test installs Debian's mono-mcs and mono-runtime`);
+    console.log(`skipped: ${tool} is not installed; ./dev test installs Debian's mono-mcs and mono-runtime`);
     process.exit(77);
   }
 }

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -454,6 +455,18 @@ TEST_F(ComputeTest, ABufferBeyondTheDevicesAllocationsIsRefused) {
   EXPECT_EQ(few.allocations(), 3u);
   buffers.pop_back();
   EXPECT_NO_THROW(Buffer(few, BufferPurpose::state, 16));
+}
+
+TEST_F(ComputeTest, BytesOfAThreadAreThoseOfItsOwnBuffers) {
+  const std::uint64_t before = Buffer::bytesOfThread();
+  std::optional<Buffer> own(std::in_place, tests::device(), BufferPurpose::state, 1 << 20);
+  std::optional<Buffer> others;
+  std::thread([&] { others.emplace(tests::device(), BufferPurpose::state, 4 << 20); }).join();
+  const std::uint64_t added = Buffer::bytesOfThread() - before;
+  EXPECT_GE(added, 1u << 20);
+  EXPECT_LT(added, 4u << 20);
+  own.reset();
+  EXPECT_EQ(Buffer::bytesOfThread(), before);
 }
 
 TEST_F(ComputeTest, TooLargeADispatchIsRefusedNamingTheKernel) {

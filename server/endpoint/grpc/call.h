@@ -13,10 +13,13 @@
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/status.h>
 #include <spdlog/spdlog.h>
+#include <tl/expected.hpp>
 
 #include "server/endpoint/grpc/answer_budget.h"
 #include "server/endpoint/grpc/call_rate.h"
+#include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/completion_loop.h"
+#include "server/endpoint/grpc/status.h"
 #include "server/endpoint/listen/admission.h"
 #include "server/schedule/retry.h"
 #include "server/telemetry/metrics.h"
@@ -109,6 +112,14 @@ class Call : public std::enable_shared_from_this<Call> {
   void made() {
     isMade_ = true;
     ++endpoint_.callsMade;
+  }
+  // Admits a stream. The error is the status that refuses it.
+  tl::expected<Admission::Ticket, grpc::Status> admit(Admission& admission) {
+    return admission.admit(addressOf(context_.peer()), schedule::Clock::now())
+        .map_error([&](telemetry::Refusal reason) {
+          endpoint_.metrics.refuse(reason);
+          return statusOf(reason);
+        });
   }
   // Call it when no operation will begin any more.
   void over() { isOver_ = true; }

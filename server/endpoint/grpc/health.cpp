@@ -53,11 +53,8 @@ class HealthWatch final : public Call {
     begin(ended_);
     endpoint::await<HealthWatch>(endpoint_, service_);
     if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
-    auto ticket = endpoint_.watches.admit(addressOf(context_.peer()), schedule::Clock::now());
-    if (!ticket) {
-      endpoint_.metrics.refuse(ticket.error());
-      return finish(statusOf(ticket.error()));
-    }
+    auto ticket = admit(endpoint_.watches);
+    if (!ticket) return finish(ticket.error());
     ticket_.emplace(std::move(*ticket));
     write(HealthCheckResponse::SERVING);
   }

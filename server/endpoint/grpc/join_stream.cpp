@@ -42,11 +42,8 @@ void JoinStream::onBegun(bool ok) {
   begin(ended_);
   endpoint::await<JoinStream>(endpoint_, service_);
   if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
-  auto ticket = endpoint_.streams.admit(addressOf(context_.peer()), schedule::Clock::now());
-  if (!ticket) {
-    endpoint_.metrics.refuse(ticket.error());
-    return finish(statusOf(ticket.error()));
-  }
+  auto ticket = admit(endpoint_.streams);
+  if (!ticket) return finish(ticket.error());
   ticket_.emplace(std::move(*ticket));
   // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
   // would deadlock: the release of the session waits for that wake to return.

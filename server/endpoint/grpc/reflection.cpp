@@ -95,11 +95,8 @@ class ReflectionStream final : public Call {
     address_ = addressKeyOf(context_.peer());
     const auto identity = endpoint_.server.state().identify(tokenIn(context_), address_.empty());
     if (!identity) return finish(statusOf(hosting::toMessage(identity.error())));
-    auto ticket = endpoint_.watches.admit(addressOf(context_.peer()), schedule::Clock::now());
-    if (!ticket) {
-      endpoint_.metrics.refuse(ticket.error());
-      return finish(statusOf(ticket.error()));
-    }
+    auto ticket = admit(endpoint_.watches);
+    if (!ticket) return finish(ticket.error());
     ticket_.emplace(std::move(*ticket));
     late_.Set(&endpoint_.loop->queue(), std::chrono::system_clock::now() + endpoint_.answerTimeout,
               begin(expired_));

@@ -14,6 +14,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/endpoint/listen/address_rate.h"
+#include "server/endpoint/web/frame_meter.h"
 #include "server/hosting/server_state.h"
 #include "server/session/closing.h"
 
@@ -136,7 +137,9 @@ void WebSocketStream::refuseFrames() {
   telemetry::ServerMetrics& metrics = endpoint_.server.state().metrics;
   metrics.refuse(telemetry::Refusal::messageRate);
   metrics.droppedConnections.add();
-  close({ws::close_code::policy_error, "too many WebSocket frames: send at most 2000 small ones per second"});
+  close({ws::close_code::policy_error,
+         fmt::format("too many WebSocket frames: send at most {:.0f} small ones per second",
+                     FrameMeter::kSmallFramesPerSecond)});
 }
 
 void WebSocketStream::read() {

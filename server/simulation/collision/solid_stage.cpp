@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "server/simulation/collision/solid_stage.h"
 
+#include <algorithm>
+
 #include "kernels/collide_solids.h"
 #include "kernels/sample_distances.h"
 #include "server/model/distance_grid.h"
@@ -13,8 +15,10 @@ using vulkan::kTexels;
 
 namespace {
 
-// Work of a sample, in moves of a node by its springs: a search from far away visits many triangles.
-constexpr std::uint64_t kSampleWork = 50;
+// Work of a sample, in searches near the surface: a search from far away visits many triangles.
+constexpr double kSampleWork = 8;
+// Work of a visit, in moves of a node by its springs.
+constexpr std::uint64_t kVisitWork = 1;
 
 }  // namespace
 
@@ -38,9 +42,14 @@ SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
                 state.velocities[0], &state.contactImpulses, &state.colliders}) {
   for (std::size_t i = 0; i < tables.solids.size(); ++i) {
     const model::ClosedMesh& mesh = *tables.solids[i];
-    if (mesh.distanceCell == 0) continue;
+    workOfSolid_ = std::max(workOfSolid_, static_cast<std::uint64_t>(model::colliderWork(tables.solids[i])));
+    if (mesh.distanceCell == 0) {
+      mostOfSolid_ = kVisitWork * shared::kMostSolidVisits;
+      continue;
+    }
     sampled_.push_back({{.solid = tables.places[i], .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
-                        model::distanceGridOf(mesh, mesh.distanceCell).points()});
+                        model::distanceGridOf(mesh, mesh.distanceCell).points(),
+                        static_cast<std::uint64_t>(kSampleWork * model::searchWork(mesh))});
   }
   if (sampled_.empty()) return;
   sample_.emplace(device, vulkan::KernelDescription{.name = "sample_distances",
@@ -57,7 +66,7 @@ void SolidStage::recordTables(vulkan::Recorder& recorder) const {
   tiles_.recordUpload(recorder);
   for (const Sampled& sampled : sampled_) {
     recorder.barrier();
-    recorder.dispatch(*sampleIn_, sampled.push, sampled.points, kSampleWork);
+    recorder.dispatch(*sampleIn_, sampled.push, sampled.points, sampled.work, kVisitWork * shared::kMostSolidVisits);
   }
 }
 
@@ -69,7 +78,7 @@ void SolidStage::record(vulkan::Recorder& recorder, std::uint32_t present,
       shared::SolidPush{
           .collision = collision, .solidCount = solidCount, .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
       std::uint64_t{tileCount_} * workgroupSize_,
-      1 + solidCount * static_cast<std::uint64_t>(model::kSolidWork));
+      1 + solidCount * workOfSolid_, solidCount * mostOfSolid_);
 }
 
 }  // namespace clothstream::simulation

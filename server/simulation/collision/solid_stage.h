@@ -37,12 +37,15 @@ class SolidStage {
  private:
   std::uint32_t workgroupSize_;
   std::uint32_t tileCount_;
+  std::uint64_t workOfSolid_ = 0;  // of the costliest mesh, for each node, in node-steps
+  std::uint64_t mostOfSolid_ = 0;  // that its search may take
   DeviceTable solids_, tiles_;
   Stage collide_;
   // A mesh whose distances are sampled.
   struct Sampled {
     shared::SamplePush push;
     std::uint64_t points = 0;
+    std::uint64_t work = 0;  // of a point, in node-steps
   };
   std::vector<Sampled> sampled_;
   std::optional<vulkan::Kernel> sample_;  // absent if no mesh is

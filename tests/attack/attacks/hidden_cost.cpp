@@ -133,6 +133,58 @@ std::string flipBending(const Target& target) {
   return answer + (error.empty() ? "" : "; " + brief(error));
 }
 
+// A closed mesh of 5,000 needles, all of which run from one corner of a cube of 10 m to the other: the box
+// around each of them contains the whole cube.
+void addNeedles(v1::ColliderMesh& mesh) {
+  constexpr std::uint32_t kNeedles = 5000;
+  for (std::uint32_t needle = 0; needle < kNeedles; ++needle) {
+    const float aside = 1e-3f * static_cast<float>(needle % 100),
+                up = 1e-3f * static_cast<float>(needle / 100);
+    const auto add = [&](float x, float y, float z) {
+      for (const float number : {x + aside, y + up, z}) mesh.add_positions(number);
+    };
+    add(-5, -5, -5);
+    add(-5, -5, -4.999f);
+    add(-5, -4.999f, -5);
+    add(5, 5, 5);
+    for (const std::uint32_t corner : {0, 1, 2, 1, 0, 3, 2, 1, 3, 0, 2, 3})
+      mesh.add_triangles(4 * needle + corner);
+  }
+}
+
+// Creates the largest cloth in a heap of needles that the server accepts, and joins it.
+std::string joinNeedles(const Target& target, float distanceCell) {
+  const auto stub = stubOf(target);
+  const auto end = Clock::now() + target.time;
+  std::string first;
+  std::uint32_t size = 64;
+  for (; size > 1; size /= 2) {
+    v1::Scene scene = sheet("needles", size, 4);
+    scene.set_simulation_rate(10);
+    scene.mutable_cloths(0)->add_pins()->set_last_column(size - 1);
+    v1::Collider& collider = *scene.add_colliders();
+    collider.set_name("needles");
+    addNeedles(*collider.mutable_mesh());
+    if (distanceCell > 0) collider.mutable_mesh()->set_distance_cell(distanceCell);
+    const grpc::Status status = create(*stub, scene);
+    if (first.empty()) first = answerOf(status);
+    if (status.ok()) break;
+  }
+  Joined joined(*stub, "needles");
+  std::this_thread::sleep_until(end);
+  const std::string error = joined.lastError();
+  return fmt::format("{}; accepted with {} nodes a side, {}", first, size,
+                     error.empty() ? "runs" : "stopped: " + brief(error));
+}
+
+std::string joinTriangles(const Target& target) {
+  return joinNeedles(target, 0);
+}
+
+std::string joinSampledTriangles(const Target& target) {
+  return joinNeedles(target, 0.2f);
+}
+
 constexpr Attack kAttacksHiddenCost[] = {
     {"crowd", "create and join 256 cloths that nothing passes through, in one place, at 1 tick a second",
      &joinCrowd, "refused: .*--max-.*; accepted with [1-9][0-9]* cloths, .*"},
@@ -140,6 +192,10 @@ constexpr Attack kAttacksHiddenCost[] = {
      "refused: .*--max-.*; accepted with [1-9][0-9]* cloths, .*"},
     {"falling_crowd", "256 such cloths that fall onto each other", &joinFallingCrowd,
      "(accepted|refused: .*--max-.*); accepted with [1-9][0-9]* cloths, .*"},
+    {"needles", "create and join a cloth in a collider of 20,000 triangles that all lie in one place",
+     &joinTriangles, "(accepted|refused: .*--max-.*); accepted with [1-9][0-9]* nodes a side, .*"},
+    {"sampled_needles", "the same with sampled distances", &joinSampledTriangles,
+     "(accepted|refused: .*--max-.*); accepted with [1-9][0-9]* nodes a side, .*"},
     {"flip_solver", "change the solver of the victim's scene to and fro 30 times a second", &flipTwoSolvers,
      "[0-9]+ changes; the stream is open"},
     {"flip_solvers", "the same between 24 settings", &flipManySolvers, "[0-9]+ changes; the stream is open"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Modules of the packages and the page do not import each other.
+// Imports between modules of the packages, and of the page, have no cycle.
 import { readdirSync, readFileSync } from "node:fs";
 import { dirname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -8,7 +8,7 @@ import { expect, test } from "vitest";
 const kRoot = fileURLToPath(new URL("../../../clients/web", import.meta.url));
 const kImport = /(?:^|\n)(?:import|export)\b[^;"]*"(\.[^"]+)"/g;
 
-// Relative imports of each module, as paths without extension. Types count.
+// Relative imports of each module, as paths without extension. Imports of types count, too.
 function importsOf(folder: string): Map<string, string[]> {
   const imports = new Map<string, string[]>();
   for (const file of readdirSync(folder, { recursive: true, encoding: "utf8" })) {
@@ -40,7 +40,7 @@ function circleIn(imports: Map<string, string[]>): string[] {
   return [];
 }
 
-test.each(["client/src", "three/src", "page/src"])("no modules of %s import each other", (folder) => {
+test.each(["client/src", "three/src", "page/src"])("imports of %s have no cycle", (folder) => {
   const imports = importsOf(join(kRoot, folder));
   expect(imports.size).toBeGreaterThan(5);
   expect(circleIn(imports)).toEqual([]);

@@ -98,6 +98,22 @@ TEST_F(MailboxTest, FramesComeBetweenManyAnnouncements) {
   EXPECT_EQ(rest, 10) << "without a frame they are sent at once";
 }
 
+// Whether the frame waits already when the announcements are taken changes nothing.
+TEST_F(MailboxTest, AnnouncementsComeBeforeTheFrameInLockstep) {
+  shape.lockstep = true;
+  join();
+  for (const bool early : {false, true}) {
+    for (int i = 0; i < 4; ++i) mailbox.announce(bytes(Mailbox::kMaxAnnouncedBytes));
+    const PublishedFrame next = frame(early ? 2 : 1, !early);
+    if (early) mailbox.deliver(next);
+    for (int i = 0; i < 4; ++i)
+      EXPECT_EQ((*mailbox.next(now))->size(), Mailbox::kMaxAnnouncedBytes) << early << i;
+    if (!early) mailbox.deliver(next);
+    EXPECT_EQ(mailbox.next(now), next.message) << early;
+    EXPECT_TRUE(mailbox.acknowledge(next.tick, now));
+  }
+}
+
 TEST_F(MailboxTest, StartsWithAKeyFrame) {
   join();
   mailbox.deliver(frame(5));

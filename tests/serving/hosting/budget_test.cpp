@@ -86,7 +86,7 @@ TEST(BudgetTest, RefusesSceneWithALongTickAndNamesIterationsThatFit) {
   EXPECT_THAT(refused.error().text, HasSubstr("s of the device's time a tick"));
   EXPECT_THAT(refused.error().text, HasSubstr("(--max-tick-time): at most 17 iterations would fit"));
   EXPECT_TRUE(charge.charge("createScene.scene", small));
-  EXPECT_LT(charge.roomForOthers(small, 0), 50) << "of colliders";
+  EXPECT_LT(charge.roomForOthers(small, 0), 50) << "50 colliders do not fit";
   Charge unlimited(budgetOf({.sceneLoad = loadOf(large) * 2, .load = 1e9}), large, false);
   EXPECT_TRUE(unlimited.charge("createScene.scene", large));
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -15,6 +16,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/delivery/mailbox.h"
+#include "server/scene/checkpoint.h"
 #include "server/scene/live_scene.h"
 
 namespace clothstream::hosting {
@@ -106,6 +109,23 @@ TEST_F(ScenesTest, ASceneThatIsBeingMadeHasItsNameAndItsPlace) {
               HasSubstr("the server has 2 created scenes"));
   arrives.reset();
   EXPECT_TRUE(createNamed(peer, "small", "arrives").has_create_scene());
+}
+
+TEST_F(ScenesTest, AnAbandonedArrivalEndsNoPlaceOfAnotherScene) {
+  START();
+  SceneServer::State& state = server().state();
+  const scene::SavedScene saved{.start = tests::smallScene("arrives"), .maxParticipants = 8};
+  const auto arrived = state.prepareArrival(saved);
+  ASSERT_TRUE(arrived) << arrived.error();
+  state.startArrived(*arrived, saved);
+  // The name is free as soon as the scene is not listed any more. Another scene takes it at once.
+  std::optional<tl::expected<SceneServer::State::HeldPlace, v1::Error>> other;
+  (*arrived)->subscribers.add(std::make_shared<delivery::Mailbox>([&] {
+    if (!other) other.emplace(state.takePlace("arrives", "", false));
+  }));
+  state.abandonArrival(*arrived);
+  ASSERT_TRUE(other && *other);
+  EXPECT_FALSE(state.takePlace("arrives", "", true));
 }
 
 TEST_F(ScenesTest, SceneHasItsOwnParticipantLimit) {

@@ -90,12 +90,18 @@ class Room : public ColliderBudget {
  public:
   double roomForHands() const override { return 16; }
   double roomForOthers(double) const override { return 12; }
+  messages::Result<void> chargeJoints() override {
+    if (hasRoomForJoints) return {};
+    return tl::unexpected(
+        messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, "no room for joints", std::nullopt});
+  }
   void chargeColliders(const ColliderLoad& load) override { charged = load; }
   bool boundsOfCloth(ClothBounds& bounds) const override {
     bounds = kCurtain;
     return true;
   }
   ColliderLoad charged;
+  bool hasRoomForJoints = true;
 };
 
 class SharingTest : public ::testing::Test {
@@ -182,6 +188,37 @@ TEST_F(SharingTest, SaysOnceThatCollidersDoNotAct) {
   EXPECT_EQ(send(greedy, large), "");
   large.push_back(boxAt(99, 0, 3));
   EXPECT_NE(send(greedy, large), "");
+}
+
+TEST_F(SharingTest, HandsActWithoutTheJointsThatHaveNoRoom) {
+  Member member;
+  join(member);
+  Inputs inputs;
+  const auto move = [&](std::vector<model::ParticipantCollider> colliders) {
+    model::ParticipantPoses poses{.colliders = std::move(colliders)};
+    poses.joints = {{.collider = 0, .joints = {model::Pose{}}}};
+    const auto posted = roster.post(*member.mailbox, {}, std::move(poses), {}, now);
+    inbox.drain(inputs);
+    return posted ? std::string() : posted.error().text;
+  };
+  const auto moved = [&] { return inputs.poses.at(0).now.poses; };
+  room.hasRoomForJoints = false;
+  EXPECT_EQ(move(hand()), "no room for joints");
+  EXPECT_EQ(moved().colliders.size(), hand().size());
+  EXPECT_TRUE(moved().joints.empty());
+  EXPECT_EQ(move(hand()), "") << "said once";
+  EXPECT_EQ(moved().colliders.size(), hand().size());
+  EXPECT_TRUE(moved().joints.empty());
+  room.hasRoomForJoints = true;
+  EXPECT_EQ(move(hand()), "");
+  EXPECT_EQ(moved().joints.size(), 1u);
+  // Both begin at the same time: one error after the other.
+  room.hasRoomForJoints = false;
+  std::vector<model::ParticipantCollider> large;
+  for (std::uint32_t id = 1; id <= 13; ++id) large.push_back(boxAt(id, 0, 3));
+  EXPECT_EQ(move(large), "no room for joints");
+  EXPECT_THAT(move(large), HasSubstr("12 of 13 colliders act"));
+  EXPECT_EQ(move(large), "");
 }
 
 // Parameters, other scenes and boxes cannot use up the room for hands.

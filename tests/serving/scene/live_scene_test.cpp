@@ -8,6 +8,8 @@
 #include <utility>
 
 #include <gmock/gmock.h>
+#include <google/protobuf/message.h>
+#include <google/protobuf/unknown_field_set.h>
 #include <gtest/gtest.h>
 
 #include "tests/serving/small_scene.h"
@@ -134,6 +136,22 @@ TEST(LiveScene, LimitsTheBytesOfChangesPerSecond) {
   EXPECT_TRUE(live.change(2, change)) << "others have their share";
 }
 
+// Fields that this release does not know are announced, too.
+TEST(LiveScene, RefusesAChangeWhoseAnnouncementIsTooLarge) {
+  LiveScene live(smallScene());
+  v1::ParameterChange change;
+  change.mutable_wind()->mutable_value()->set_x(3);
+  const auto most = static_cast<std::size_t>(ChangeLimits::kOfParticipantBurstBytes);
+  change.GetReflection()->MutableUnknownFields(&change)->AddLengthDelimited(1000, std::string(most, 'x'));
+  const messages::Result<void> refused = live.change(1, change);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("change fewer cloths at once"));
+  EXPECT_EQ(live.definition().environment.wind.x(), 0);
+  change.GetReflection()->MutableUnknownFields(&change)->Clear();
+  EXPECT_TRUE(live.change(1, change)) << "nothing was charged";
+}
+
 TEST(ChangeLimits, CountsNumberAndBytesOfEachParticipantAndOfAll) {
   using Exceeded = ChangeLimits::Exceeded;
   ChangeLimits limits;
@@ -152,7 +170,7 @@ TEST(ChangeLimits, CountsNumberAndBytesOfEachParticipantAndOfAll) {
   EXPECT_EQ(limits.countBytes(1, perSecond, now), Exceeded::nothing);
   EXPECT_EQ(limits.countBytes(1, 100, now), Exceeded::byParticipant);
   now += std::chrono::hours(1);
-  EXPECT_EQ(limits.countBytes(1, 100 * bytes, now), Exceeded::nothing) << "one change is never too large";
+  EXPECT_EQ(limits.countBytes(1, bytes, now), Exceeded::nothing);
 }
 
 TEST(LiveScene, BecomesAGuestWhileItCostsMoreThanAtItsStart) {

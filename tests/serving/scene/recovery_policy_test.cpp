@@ -2,6 +2,9 @@
 // What a scene gives up after ticks whose states are not valid.
 #include "server/scene/recovery_policy.h"
 
+#include <cstdint>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 namespace clothstream::scene {
@@ -50,6 +53,33 @@ TEST(RecoveryPolicy, AnInvalidStateStartsTheProofAgain) {
   EXPECT_EQ(policy.invalid(30, false), Cure::rollback);
   EXPECT_FALSE(policy.valid(69));
   EXPECT_TRUE(policy.valid(70));
+}
+
+// A slider that changes the parameters twice a second for three seconds.
+TEST(RecoveryPolicy, ProvesParametersWhileTheyChangeAllTheTime) {
+  RecoveryPolicy policy(kSecond);
+  std::vector<std::uint64_t> proven;
+  for (std::uint64_t tick = 1; tick <= 3 * kSecond; ++tick) {
+    if (tick % (kSecond / 2) == 1) policy.changed(tick - 1);
+    if (policy.valid(tick)) proven.push_back(tick);
+  }
+  EXPECT_EQ(proven, (std::vector<std::uint64_t>{kSecond, 2 * kSecond, 3 * kSecond}));
+  EXPECT_TRUE(policy.hasCandidate()) << "the newest parameters";
+  EXPECT_TRUE(policy.valid(4 * kSecond));
+  EXPECT_FALSE(policy.hasCandidate());
+}
+
+TEST(RecoveryPolicy, UndoneChangesLeaveNoCandidate) {
+  RecoveryPolicy policy(kSecond);
+  policy.changed(90);
+  policy.changed(95);
+  EXPECT_EQ(policy.invalid(100, false), Cure::rollback);
+  EXPECT_EQ(policy.invalid(101, false), Cure::resetAndUndo);
+  EXPECT_FALSE(policy.hasCandidate());
+  EXPECT_FALSE(policy.valid(141));
+  policy.changed(150);
+  EXPECT_TRUE(policy.valid(190));
+  EXPECT_FALSE(policy.hasCandidate());
 }
 
 TEST(RecoveryPolicy, ContinuesFromACheckpoint) {

@@ -219,6 +219,27 @@ model::ParameterChange constraints(std::uint32_t iterations) {
 }
 
 TEST_F(SceneHostTest, ChangesOfOneTickMakeStagesOnce) {
+  const model::Scene scene = smallScene();
+  LiveScene live(scene);
+  delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
+  auto loaded = std::make_unique<SceneOnDevice>(tests::device(), scene, publisher.workers());
+  const auto& simulation = loaded->simulation;
+  SceneHost host(std::move(loaded), live, publisher, 0);
+  const auto tick = [&] {
+    host.begin(Clock::now());
+    host.finish();
+    publisher.drain();
+  };
+  tick();
+  const std::uint64_t made = simulation.stagesMade();
+  for (const std::uint32_t iterations : {3u, 4u, 5u})
+    ASSERT_TRUE(live.inbox.postChange({.participant = 5, .change = constraints(iterations)}));
+  tick();
+  EXPECT_EQ(live.inbox.depth().changes, 0u);
+  EXPECT_EQ(simulation.stagesMade(), made + 1);
+}
+
+TEST_F(SceneHostTest, ChangesOfOneTickActTogether) {
   HostedScene hosted;
   hosted.tick();
   hosted.announced.clear();
@@ -233,7 +254,7 @@ TEST_F(SceneHostTest, ChangesOfOneTickMakeStagesOnce) {
   EXPECT_EQ(ticks, std::vector<std::uint64_t>(4, 2u));
 }
 
-// Stands still in time, so that nothing is paid for, until the changes of a second wait.
+// The clock stands still, so the budget does not refill. Changes are sent until one has to wait.
 TEST_F(SceneHostTest, ChangesThatMakeStagesWaitUntilEarlierOnesArePaidFor) {
   HostedScene hosted;
   hosted.tick();
@@ -509,6 +530,52 @@ TEST_F(SceneHostTest, SecondUnhealthyStateResetsTheClothsAndUndoesNewChanges) {
   EXPECT_EQ(reset.parameter_changed().participant_id(), 0u);
   EXPECT_NEAR(reset.parameter_changed().change().gravity().value().y(), -9.81, 1e-6);
   EXPECT_EQ(hosted.announced.back().notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
+}
+
+// The wind changes twice a second. Only changes of the newest two seconds are undone.
+TEST_F(SceneHostTest, UndoesOnlyNewChangesOfParametersThatChangeAllTheTime) {
+  HostedScene hosted;
+  for (int i = 1; i <= 6; ++i) {
+    hosted.change(wind(static_cast<float>(i)));
+    hosted.ticks(20);
+  }
+  hosted.change(gravity(-1e30f));
+  hosted.ticks(2);
+  EXPECT_EQ(hosted.live.metrics.resets.value(), 1u);
+  const model::Environment undone = hosted.live.definition().environment;
+  EXPECT_GE(undone.wind.x(), 4);
+  EXPECT_NEAR(undone.gravity.y(), -9.81f, 1e-5f);
+  hosted.tick();
+  EXPECT_TRUE(hosted.host.status().healthy);
+}
+
+// An earlier run of the server ended before a second had passed since the changes.
+TEST_F(SceneHostTest, ParametersOfARestoredSceneAreNotProven) {
+  HostedScene hosted(smallScene(), 1, [](LiveScene& live) {
+    SavedScene saved{.start = smallScene(), .accepted = smallScene()};
+    saved.accepted->environment.gravity.y() = -1e30f;
+    live.restore(std::move(saved), {}, Clock::now());
+  });
+  hosted.ticks(2);
+  EXPECT_EQ(hosted.live.metrics.resets.value(), 1u);
+  EXPECT_NEAR(hosted.live.definition().environment.gravity.y(), -9.81f, 1e-5f);
+  hosted.tick();
+  EXPECT_TRUE(hosted.host.status().healthy);
+}
+
+TEST_F(SceneHostTest, UndoneChangesBringNoEasedCorrectionBack) {
+  HostedScene hosted(smallScene(), 1, [](LiveScene& live) {
+    SavedScene saved{.start = smallScene(), .accepted = smallScene()};
+    saved.accepted->cloths[0].solver.kind = model::SolverKind::constraint;
+    live.restore(std::move(saved), {}, Clock::now());
+  });
+  hosted.ticks(60);
+  hosted.change(gravity(-1e30f));
+  hosted.ticks(2);
+  EXPECT_EQ(hosted.live.metrics.resets.value(), 1u);
+  const model::Solver undone = hosted.live.definition().cloths[0].solver;
+  EXPECT_EQ(undone.kind, model::SolverKind::constraint);
+  EXPECT_FALSE(undone.correctionFraction);
 }
 
 TEST_F(SceneHostTest, HandsThatMakeTheStateUnhealthyCostNoParameter) {

@@ -8,7 +8,8 @@
 namespace clothstream::schedule {
 namespace {
 
-// Runs a tick of equal slices. Returns the slice at which it is reported, or 0 for its end.
+// Runs a tick of equal slices. Returns the slice at which it is reported, 0 for its end, or nullopt if it is
+// not reported.
 std::optional<int> reportedAt(PriceWatch& watch, double price, int slices, double slice,
                               std::optional<double> device = std::nullopt) {
   watch.begin(price);
@@ -61,8 +62,29 @@ TEST(PriceWatchTest, ExcusesTicksOnASlowDevice) {
   PriceWatch watch;
   EXPECT_EQ(reportedAt(watch, 0.02, 100, 0.1), 13);
   EXPECT_FALSE(watch.isExcessive(2));  // 1.3 s are less than 1 s above twice 0.2 s
-  EXPECT_EQ(reportedAt(watch, 0.02, 100, 0.1), 13);
+  EXPECT_FALSE(watch.end(std::nullopt));
+  EXPECT_FALSE(reportedAt(watch, 0.02, 2, 0.1));
   EXPECT_TRUE(watch.isExcessive(1));
+}
+
+// A slow device does not hide a tick that is far too long for it, however it was excused before.
+TEST(PriceWatchTest, ReportsATickThatIsVeryLongForASlowDevice) {
+  PriceWatch watch;
+  EXPECT_EQ(reportedAt(watch, 0.02, 100, 0.1), 13);
+  EXPECT_FALSE(watch.isExcessive(5.2));
+  int slices = 14;
+  while (!watch.addSlice(0.1)) ASSERT_LT(++slices, 100);
+  EXPECT_EQ(slices, 21);  // 2.1 s are more than 1 s above 5.2 times 0.2 s
+  EXPECT_TRUE(watch.isExcessive(5.2));
+}
+
+TEST(PriceWatchTest, ATickWithinThePriceEndsTheExcuse) {
+  PriceWatch watch;
+  EXPECT_EQ(reportedAt(watch, 0.02, 100, 0.1), 13);
+  EXPECT_FALSE(watch.isExcessive(5));
+  EXPECT_FALSE(watch.end(std::nullopt));
+  EXPECT_FALSE(reportedAt(watch, 0.2, 1, 0.1));  // 2 s are allowed
+  EXPECT_EQ(reportedAt(watch, 0.02, 100, 0.1), 13);
 }
 
 // A tick that was dropped, because its scene was reset or rebuilt, is forgotten.

@@ -18,6 +18,8 @@
 #include <spdlog/spdlog.h>
 
 #include "server/model/material.h"
+#include "server/scene/live_scene.h"
+#include "server/scene/scene_observer.h"
 #include "tests/serving/server_test.h"
 
 namespace clothstream::session {
@@ -134,6 +136,44 @@ TEST_F(JoinTest, AnswersQueriesBeforeAndAfterJoining) {
     EXPECT_GT(answer.pong().server_time_us(), 0u);
     if (round == 0) peer.join();
   }
+}
+
+// Calls a function when a participant joins a scene.
+class JoinObserver final : public scene::Observer {
+ public:
+  std::unique_ptr<scene::SceneObserver> observe(const scene::LiveScene&) override {
+    return std::make_unique<OfScene>(whenJoined);
+  }
+  scene::ObserverStatus status() const override { return {}; }
+
+  const std::shared_ptr<std::function<void()>> whenJoined = std::make_shared<std::function<void()>>();
+
+ private:
+  struct OfScene final : scene::SceneObserver {
+    explicit OfScene(std::shared_ptr<std::function<void()>> function) : whenJoined(std::move(function)) {}
+    void joined(const scene::Participant&, const scene::Subject&) override {
+      if (*whenJoined) (*whenJoined)();
+    }
+    void left(const scene::Participant&, const scene::Subject&, Clock::duration) override {}
+    const std::shared_ptr<std::function<void()>> whenJoined;
+  };
+};
+
+TEST_F(JoinTest, ASceneThatIsStoppedWhileAPeerJoinsRefusesIt) {
+  const auto observer = std::make_shared<JoinObserver>();
+  ServerOptions options;
+  options.observer = observer;
+  START(std::move(options));
+  const std::shared_ptr<scene::LiveScene> other = server().state().find("other");
+  *observer->whenJoined = [&] {
+    other->refuseUntil(Clock::now() + std::chrono::seconds(60), "it is stopped");
+  };
+  TestPeer peer(server());
+  peer.hello("other");
+  const v1::ServerMessage last = peer.readToTheEnd();
+  EXPECT_EQ(last.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(last.error().text(), HasSubstr("it is stopped; join again in"));
+  EXPECT_EQ(other->roster.size(), 0u);
 }
 
 TEST_F(JoinTest, SceneSleepsWithoutSubscribersAndContinues) {

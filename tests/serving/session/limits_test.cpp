@@ -166,8 +166,7 @@ TEST_F(PeerLimitsTest, PeerThatSendsTooFastMustWait) {
   EXPECT_GE(pause, 1.04 - schedule::seconds(Clock::now() - start));
 }
 
-// Poses with this many colliders.
-// Balls so large that each may be near all of the cloth.
+// Poses of `count` colliders: balls so large that each may be near all of the cloth.
 v1::ClientMessage colliders(std::uint32_t count) {
   v1::ClientMessage message;
   for (std::uint32_t id = 1; id <= count; ++id) {

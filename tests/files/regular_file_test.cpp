@@ -28,7 +28,7 @@ class RegularFile : public testing::Test {
   }
   static std::string errorOf(const std::string& path, std::uint64_t most = 10) {
     const auto content = readRegularFile(path, most);
-    return content ? "read" : content.error();
+    return content ? "read" : content.error().text;
   }
 
   e2e::TemporaryDirectory directory_;
@@ -38,6 +38,8 @@ TEST_F(RegularFile, IsReadUpToItsLimit) {
   for (const std::size_t size : {0, 1, 10})
     EXPECT_EQ(readRegularFile(file("small", std::string(size, 'x')), 10).value(), std::string(size, 'x'));
   EXPECT_THAT(errorOf(file("large", std::string(11, 'x'))), HasSubstr("at most 10 bytes"));
+  EXPECT_TRUE(readRegularFile(in("large"), 10).error().isTooLarge);
+  EXPECT_FALSE(readRegularFile(in("none"), 10).error().isTooLarge);
   const std::string pieces(300'000, 'y');
   EXPECT_EQ(readRegularFile(file("pieces", pieces), pieces.size()).value(), pieces);
 }
