@@ -205,7 +205,7 @@ bool readParameterChange(Bytes message, ParameterChange& change) {
       case F::kAirDensity.tag:
         return setFinite(change.airDensity, reader);
       case F::kCloths.tag:
-        return change.cloths.size() < kMaxCloths &&
+        return change.cloths.size() < kMaxClothChanges &&
                readClothChange(reader.get_view(), change.cloths.emplace_back());
       case F::kGust.tag:
         return readGust(reader.get_view(), change.gust.emplace());

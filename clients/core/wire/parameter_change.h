@@ -68,7 +68,7 @@ struct ParameterChange {
 
 // The functions below return false if the message is not well formed or a number is not finite.
 
-// Returns false also if there are more than kMaxCloths cloths.
+// Returns false also if there are more than kMaxClothChanges elements.
 [[nodiscard]] bool readParameterChange(Bytes message, ParameterChange& change);
 // Reads the parameters of a Scene's Cloth, and its name.
 [[nodiscard]] bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters);
@@ -84,5 +84,7 @@ void writeFields(protozero::pbf_writer& message, const ParameterChange& change);
 void apply(const ClothChange& change, ClothParameters& cloth);
 
 inline constexpr std::size_t kMaxCloths = 256;
+// One for each cloth, and one for all of them: announcements that have waited are merged.
+inline constexpr std::size_t kMaxClothChanges = kMaxCloths + 1;
 
 }  // namespace clothstream::client
