@@ -24,12 +24,13 @@ target_precompile_headers(clothstream_test_header PRIVATE <gmock/gmock.h> <gtest
 # tests_of_LABEL builds all test programs with a label.
 add_custom_target(quick_tests)
 
-# clothstream_test(NAME LABELS label... SOURCES file... LIBRARIES target... THOROUGH suite... EXCEPT pattern): adds a
-# GoogleTest program. Each of its suites is one ctest test with these labels (cmake/add_suites.cmake); the label `gpu`
-# switches Vulkan validation on. Suites after THOROUGH take long, and have the label `thorough`, too. Suites leave out
+# clothstream_test(NAME LABELS label... SOURCES file... LIBRARIES target... THOROUGH pattern... QUICK pattern...
+# EXCEPT pattern): adds a GoogleTest program. Each of its suites is one ctest test with these labels
+# (cmake/add_suites.cmake); the label `gpu` switches Vulkan validation on. Suites and single tests (SUITE.TEST, with
+# wildcards) after THOROUGH take long, and have the label `thorough`, too; those after QUICK have not. Suites leave out
 # the single tests whose names match EXCEPT.
 function(clothstream_test name)
-  cmake_parse_arguments(ARG "" "EXCEPT" "LABELS;SOURCES;LIBRARIES;THOROUGH" ${ARGN})
+  cmake_parse_arguments(ARG "" "EXCEPT" "LABELS;SOURCES;LIBRARIES;THOROUGH;QUICK" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE clothstream_options ${ARG_LIBRARIES} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_options(${name} PRIVATE -pthread $<$<CONFIG:Release>:-O1>)
@@ -54,6 +55,7 @@ set(program $<TARGET_FILE:${name}>)
 set(directory ${PROJECT_SOURCE_DIR})
 set(labels \"${ARG_LABELS}\")
 set(thorough \"${ARG_THOROUGH}\")
+set(quick \"${ARG_QUICK}\")
 set(except \"${ARG_EXCEPT}\")
 set(environment \"${environment}\")
 include(${PROJECT_SOURCE_DIR}/cmake/add_suites.cmake)
