@@ -60,6 +60,8 @@ set(unused ${thorough} ${quick})
 # A line is the name of a suite and a dot, or two spaces and the name of one of its tests. A comment may follow.
 string(REGEX MATCHALL "(^|\n)(  [A-Za-z0-9_/]+|[A-Za-z0-9_/]+\\.)" lines "${listing}")
 set(suite "")
+set(first "")
+set(later "")
 foreach(line IN LISTS lines)
   string(STRIP "${line}" line)
   if(line MATCHES "\\.$")
