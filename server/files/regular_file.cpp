@@ -34,28 +34,39 @@ int readAll(int descriptor, std::uint64_t most, std::string& content) {
   return 0;
 }
 
-}  // namespace
-
-tl::expected<std::string, FileError> readRegularFile(const std::filesystem::path& path, std::uint64_t most) {
+tl::expected<std::string, FileError> read(const std::filesystem::path& path, std::uint64_t most,
+                                          bool mayBeFifo) {
   // Without O_NONBLOCK, opening a FIFO waits for its writer.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | (mayBeFifo ? 0 : O_NONBLOCK));
   if (descriptor < 0) return unreadable(errno);
   struct stat status {};
   int error = ::fstat(descriptor, &status) == 0 ? 0 : errno;
-  const bool isRegular = error == 0 && S_ISREG(status.st_mode);
+  const bool isAllowed = error == 0 && (S_ISREG(status.st_mode) || (mayBeFifo && S_ISFIFO(status.st_mode)));
   std::string content;
-  if (isRegular) {
+  if (isAllowed) {
     content.reserve(static_cast<std::size_t>(
         std::min<std::uint64_t>(static_cast<std::uint64_t>(status.st_size), most) + 1));
     error = readAll(descriptor, most, content);
   }
   ::close(descriptor);
   if (error != 0) return unreadable(error);
-  if (!isRegular)
-    return tl::unexpected(FileError{"is not a regular file: folders, devices and FIFOs cannot be used"});
+  if (!isAllowed)
+    return tl::unexpected(FileError{
+        fmt::format("is not a regular file{}", mayBeFifo ? " or FIFO: folders and devices cannot be used"
+                                                         : ": folders, devices and FIFOs cannot be used")});
   if (content.size() > most)
     return tl::unexpected(FileError{fmt::format("is too large: at most {} bytes are allowed", most), true});
   return content;
+}
+
+}  // namespace
+
+tl::expected<std::string, FileError> readRegularFile(const std::filesystem::path& path, std::uint64_t most) {
+  return read(path, most, false);
+}
+
+tl::expected<std::string, FileError> readFileOrFifo(const std::filesystem::path& path, std::uint64_t most) {
+  return read(path, most, true);
 }
 
 }  // namespace clothstream::files

@@ -21,5 +21,8 @@ struct FileError {
 // answer still blocks the calling thread.
 [[nodiscard]] tl::expected<std::string, FileError> readRegularFile(const std::filesystem::path& path,
                                                                    std::uint64_t most);
+// The same of a regular file or a FIFO, whose writers it waits for: what `--scene-file <(program)` names.
+[[nodiscard]] tl::expected<std::string, FileError> readFileOrFifo(const std::filesystem::path& path,
+                                                                  std::uint64_t most);
 
 }  // namespace clothstream::files

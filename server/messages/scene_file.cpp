@@ -56,7 +56,7 @@ Result<model::Scene> readSceneFile(const std::filesystem::path& path, std::vecto
     return refuse(v1::ERROR_CODE_NOT_FOUND, source, "there is no such file");
   if (kind == std::filesystem::file_type::directory)
     return refuse(v1::ERROR_CODE_INVALID_ARGUMENT, source, "is a directory; must be a file");
-  const auto text = files::readRegularFile(path, limits::kMaxSceneFileBytes);
+  const auto text = files::readFileOrFifo(path, limits::kMaxSceneFileBytes);
   if (!text)
     return refuse(
         text.error().isTooLarge ? v1::ERROR_CODE_RESOURCE_EXHAUSTED : v1::ERROR_CODE_INVALID_ARGUMENT, source,

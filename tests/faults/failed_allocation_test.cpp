@@ -144,7 +144,7 @@ TEST_F(FailedAllocationInTick, LosesNoChangeOfParameters) {
 #if defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "the sanitizer replaces operator new itself";
 #endif
-  constexpr std::uint64_t kAllocations = 60;
+  constexpr std::uint64_t kAllocations = 40;
   for (std::uint64_t from = 0; from < kAllocations; ++from) {
     HostedScene hosted;
     hosted.tick();

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -59,6 +60,21 @@ TEST_F(RegularFile, NothingElseIsRead) {
   EXPECT_THAT(errorOf(in("link")), HasSubstr("not a regular file"));
   for (const char* device : {"/dev/zero", "/dev/null", "/dev/tty"})
     EXPECT_NE(errorOf(device), "read") << device;
+}
+
+TEST_F(RegularFile, AFifoIsReadToItsEndWhereOneIsAllowed) {
+  ASSERT_EQ(::mkfifo(in("fifo").c_str(), S_IRUSR | S_IWUSR), 0);
+  for (const std::uint64_t most : {7, 3}) {
+    const std::jthread writer([&] { std::ofstream(in("fifo")) << "content"; });
+    const auto content = readFileOrFifo(in("fifo"), most);
+    if (most == 7)
+      EXPECT_EQ(content.value_or(""), "content");
+    else
+      EXPECT_TRUE(!content && content.error().isTooLarge);
+  }
+  EXPECT_EQ(readFileOrFifo(file("regular", "x"), 10).value_or(""), "x");
+  EXPECT_FALSE(readFileOrFifo(directory_.path(), 10));
+  EXPECT_FALSE(readFileOrFifo("/dev/zero", 10));
 }
 
 }  // namespace

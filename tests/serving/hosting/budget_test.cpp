@@ -213,7 +213,7 @@ TEST_F(BudgetOfServerTest, SceneThatTakesFarMoreThanItsPriceIsStopped) {
   TestPeer honest(server());
   honest.join("small");
   TestPeer peer(server());
-  peer.join("heavy");
+  peer.hello("heavy");
   // A scene of the server starts again first, with its own parameters.
   EXPECT_THAT(peer.readToTheEnd().error().text(),
               HasSubstr("join again to start it with its own parameters"));

@@ -59,7 +59,7 @@ class HostedScene {
         ASSERT_TRUE(parsed.ParseFromArray((*message)->data(), static_cast<int>((*message)->size())));
         if (parsed.has_frame()) {
           if (mailbox == mailboxes.front()) see(parsed.frame());
-          ASSERT_TRUE(mailbox->acknowledge(host.tick(), now));
+          ASSERT_TRUE(mailbox->acknowledge(parsed.frame().tick(), now));
         } else if (mailbox == mailboxes.front()) {
           announced.push_back(parsed);
         }
