@@ -168,7 +168,7 @@ TEST_F(FailedAllocationInTick, LosesNoChangeOfParameters) {
           std::make_unique<scene::SceneOnDevice>(device(), hosted.live.start(), hosted.publisher.workers()),
           "memory ran out");
     } else {
-      hosted.host.finish();
+      hosted.finish();
     }
     hosted.tick();
     EXPECT_TRUE(std::ranges::any_of(hosted.announced, &v1::ServerMessage::has_parameter_changed)) << from;
