@@ -423,13 +423,18 @@ void DeviceThread::adaptToLoad(Run& run, Clock::time_point now) {
        .own = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(own)),
        .share = schedule::shareOf(run, schedules()),
        .idle = idle_,
-       .disturbed = isDisturbed() || run.host->makingTime() > Clock::duration::zero()},
+       .disturbed = isDisturbed() || isMaking()},
       leastSubsteps);
   if (changed) run.host->setWork(run.overload.level());
 }
 
 bool DeviceThread::isDisturbed() const {
   return std::ranges::any_of(runs_, [](const auto& run) { return run->loading.valid(); });
+}
+
+bool DeviceThread::isMaking() const {
+  return std::ranges::any_of(
+      runs_, [](const auto& run) { return run->host && run->host->makingTime() > Clock::duration::zero(); });
 }
 
 void DeviceThread::checkPrice(Run& run, bool isLate) {

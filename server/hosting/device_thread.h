@@ -214,6 +214,8 @@ class DeviceThread {
   void checkPrice(Run& run, bool isLate);
   // Returns whether the device works for anything but ticks.
   bool isDisturbed() const;
+  // Whether a change of any scene has held this thread up in that scene's present tick.
+  bool isMaking() const;
   // Gives the time of this thread at the start of a tick to the scene, other than its commands.
   void chargeMaking(Run& run, Clock::time_point& deviceFree);
   // Stops a scene that takes far more than its price. A scene of the server comes back.

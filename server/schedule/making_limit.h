@@ -13,7 +13,7 @@ namespace clothstream::schedule {
 class MakingLimit {
  public:
   // Seconds of making in a second, and at once.
-  static constexpr double kShare = 0.05, kBurst = 0.5;
+  static constexpr double kShare = 0.05, kBurst = 0.1;
 
   // A tick begins.
   void beginTick() { made_ = false; }
