@@ -110,7 +110,8 @@ double crowdingOf(const ClosedMesh& mesh) {
   std::vector<Box> boxes;
   boxes.reserve(mesh.triangles.size());
   for (const TriangleCorners& triangle : mesh.triangles) {
-    const Vec3 &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]], &c = mesh.vertices[triangle[2]];
+    const Vec3 &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]],
+               &c = mesh.vertices[triangle[2]];
     boxes.push_back({a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)});
   }
   const std::size_t stride = (mesh.vertices.size() + kCrowdingSamples - 1) / kCrowdingSamples;

@@ -66,7 +66,8 @@ void SolidStage::recordTables(vulkan::Recorder& recorder) const {
   tiles_.recordUpload(recorder);
   for (const Sampled& sampled : sampled_) {
     recorder.barrier();
-    recorder.dispatch(*sampleIn_, sampled.push, sampled.points, sampled.work, kVisitWork * shared::kMostSolidVisits);
+    recorder.dispatch(*sampleIn_, sampled.push, sampled.points, sampled.work,
+                      kVisitWork * shared::kMostSolidVisits);
   }
 }
 
@@ -77,8 +78,7 @@ void SolidStage::record(vulkan::Recorder& recorder, std::uint32_t present,
       collide_.from[present],
       shared::SolidPush{
           .collision = collision, .solidCount = solidCount, .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
-      std::uint64_t{tileCount_} * workgroupSize_,
-      1 + solidCount * workOfSolid_, solidCount * mostOfSolid_);
+      std::uint64_t{tileCount_} * workgroupSize_, 1 + solidCount * workOfSolid_, solidCount * mostOfSolid_);
 }
 
 }  // namespace clothstream::simulation
