@@ -213,7 +213,7 @@ class SceneHost {
     model::Environment environment;
     std::vector<model::Cloth> cloths;
   };
-  // Those of the scene, without eased corrections.
+  // Returns the parameters of a scene without eased corrections.
   static Parameters parametersOf(const model::Scene& scene);
   Parameters proven_, candidate_;   // as RecoveryPolicy has them; the start is proven
   std::uint64_t sinceHealthy_ = 0;  // healthy ticks since the start or the newest recovery

@@ -157,7 +157,7 @@ test("with TLS the key of the server and the token are checked", async () => {
   });
 });
 
-// What a client says of a program that answers with these bytes and then ends the connection.
+// Returns what a client says of a program that answers with these bytes and then ends the connection.
 async function problemWith(answer) {
   const server = createServer((socket) => {
     socket.on("error", () => {});
