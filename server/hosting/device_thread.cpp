@@ -251,7 +251,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       measureSpeed();
       for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
       scene::LiveScene& first = *runs_.front()->scene;
-      runs_.front()->host = std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_);
+      runs_.front()->host = std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_, &loader_);
       continueOverload(*runs_.front());
       runs_.front()->host->setWork(runs_.front()->overload.level());
       info_ = device_->info();
@@ -346,6 +346,7 @@ void DeviceThread::abandonLoading() {
     run->stopLoading.request_stop();
     run->loading = {};
     run->prepared.reset();
+    if (run->host) run->host->endRehearsal();
   }
   loader_.wait();
 }
@@ -385,7 +386,7 @@ void DeviceThread::begin(Run& run, std::unique_ptr<scene::SceneOnDevice> loaded)
   if (run.host) {
     run.host->rebuild(std::move(loaded), run.rebuiltAfter);
   } else {
-    run.host = std::make_unique<scene::SceneHost>(std::move(loaded), *run.scene, publisher_, reportRate_);
+    run.host = std::make_unique<scene::SceneHost>(std::move(loaded), *run.scene, publisher_, reportRate_, &loader_);
     continueOverload(run);
   }
   run.host->setWork(run.overload.level());
@@ -433,8 +434,9 @@ bool DeviceThread::isDisturbed() const {
 }
 
 bool DeviceThread::isMaking() const {
-  return std::ranges::any_of(
-      runs_, [](const auto& run) { return run->host && run->host->makingTime() > Clock::duration::zero(); });
+  return std::ranges::any_of(runs_, [](const auto& run) {
+    return run->host && (run->host->isRehearsing() || run->host->makingTime() > Clock::duration::zero());
+  });
 }
 
 void DeviceThread::checkPrice(Run& run, bool isLate) {

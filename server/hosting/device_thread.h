@@ -214,7 +214,7 @@ class DeviceThread {
   void checkPrice(Run& run, bool isLate);
   // Returns whether the device works for anything but ticks.
   bool isDisturbed() const;
-  // Whether a change of any scene has held this thread up in that scene's present tick.
+  // Whether a change of any scene is rehearsed, or has held this thread up in that scene's present tick.
   bool isMaking() const;
   // Gives the time of this thread at the start of a tick to the scene, other than its commands.
   void chargeMaking(Run& run, Clock::time_point& deviceFree);

@@ -15,6 +15,12 @@ constexpr double kMegabyte = 1e6;
 // Least room for the hands of a scene, as a sum of weights: about four pairs of hands at a cloth of one
 // metre.
 constexpr double kLeastHands = 16;
+// Participants must not make a scene late: with their other colliders and with parameters that one of them
+// changes, its price is at most kInTime, in seconds of the device's time a second. A scene that costs more
+// without such colliders has room for kLeastOthers: one that is near all cloth and a small one.
+constexpr double kInTime = 0.7, kLeastOthers = 4;
+// A scene that the server started with may cost this much of its first price instead, if that is more.
+constexpr double kMostOfStart = 1.25;
 
 // Largest number from 1 to `most` that fits, or 0. A larger number never fits if a smaller one does not.
 std::uint32_t largest(std::uint32_t most, const std::function<bool(std::uint32_t)>& fits) {
@@ -104,10 +110,13 @@ Charge::Amount Charge::priceOf(const model::Scene& scene) const {
           .megabytes = std::max(0.0, model_.bytes(scene) / kMegabyte - freeMegabytes_)};
 }
 
-double Charge::loadWith(const model::Scene& scene, double colliders) const {
+double Charge::secondsOf(const model::Scene& scene, double colliders) const {
   const double all = static_cast<double>(scene.colliders.size()) + colliders;
-  const double seconds = workWith(scene, all).seconds(budget_->speed_) - freeWork_.seconds(budget_->speed_);
-  return seconds * scene.simulationRate;
+  return workWith(scene, all).seconds(budget_->speed_) * scene.simulationRate;
+}
+
+double Charge::loadWith(const model::Scene& scene, double colliders) const {
+  return secondsOf(scene, colliders) - freeWork_.seconds(budget_->speed_) * scene.simulationRate;
 }
 
 model::Work Charge::workWith(const model::Scene& scene, double colliders) const {
@@ -143,7 +152,9 @@ double Charge::roomForOthers(const model::Scene& scene, double hands) const {
   const double none = loadWith(scene, 0), each = loadWith(scene, 1) - none;
   if (each <= 0) return std::numeric_limits<double>::infinity();
   const double free = budget_->limits_.load - (budget_->load_ - charged_.load) - std::max(0.0, none);
-  return std::max(0.0, std::min((mostLoad(scene) - none) / each - hands, free / 2 / each));
+  const double inTime = (kInTime - secondsOf(scene, 0)) / each;
+  return std::max(0.0, std::min({(mostLoad(scene) - none) / each - hands, free / 2 / each,
+                                 std::max(kLeastOthers, inTime - hands)}));
 }
 
 void Charge::chargeColliders(const model::Scene& scene, const ColliderLoad& colliders) {
@@ -191,7 +202,7 @@ void Charge::restore(const model::Scene& scene) {
   replace(priceOf(scene));
 }
 
-messages::Result<void> Charge::charge(const std::string& path, const model::Scene& scene) {
+messages::Result<void> Charge::charge(const std::string& path, const model::Scene& scene, Pace pace) {
   const std::lock_guard lock(budget_->mutex_);
   const BudgetLimits& limits = budget_->limits_;
   const Amount price = priceOf(scene);
@@ -200,13 +211,19 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
                                                path.empty() ? std::move(text) : path + ": " + std::move(text),
                                                telemetry::Refusal::budget});
   };
-  // A price that is no higher than before is always allowed.
   const Room roomForLoad = roomFor(scene);
   if (price.load > charged_.load && price.load > roomForLoad.load) {
     const auto loadOf = [&](const model::Scene& other) { return priceOf(other).load; };
     return refuse(excessOf(scene, price.load, roomForLoad) + ": " +
                   whatFits(scene, made_, price.load, roomForLoad.load, loadOf));
   }
+  const auto secondsWith = [&](const model::Scene& other) { return secondsOf(other, colliders_.others); };
+  const double seconds = secondsWith(scene), start = freeWork_.seconds(budget_->speed_) * scene.simulationRate;
+  if (const double most = std::max(kInTime, kMostOfStart * start);
+      pace == Pace::inTime && price.load > charged_.load && seconds > most)
+    return refuse(fmt::format("would take {:.2f} s of the device's time a second, by estimate; only an owner of the "
+                              "scene may let it take more than {:.2f} s, and so slow it down: {}",
+                              seconds, most, whatFits(scene, made_, seconds, most, secondsWith)));
   const double free = std::max(0.0, limits.megabytes - (budget_->megabytes_ - charged_.megabytes));
   const double room = std::min(limits.sceneMegabytes, free);
   if (price.megabytes > charged_.megabytes && price.megabytes > room)

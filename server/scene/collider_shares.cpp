@@ -11,8 +11,6 @@ namespace {
 
 // Way that a collider and cloth move while a tick lasts, m; added to the size of a collider.
 constexpr float kReach = 0.1f;
-// The price of a collider assumes that this share of the nodes is near it.
-constexpr double kNearShare = 1.0 / 3;
 // Sums of weights that differ by less are equal.
 constexpr double kRounding = 1e-9;
 
@@ -28,7 +26,7 @@ double weightOf(const model::ParticipantCollider& collider, const ClothBounds* c
   const double size = (cloth->high - cloth->low).norm() / 2;
   const double reach = radius + kReach;
   const double share = size > 0 ? reach * reach / (size * size) : 1;
-  return std::clamp(share / kNearShare, kLeastWeight, 1.0);
+  return std::clamp(share * kMostWeight, kLeastWeight, kMostWeight);
 }
 
 bool isHandOrHead(const model::ParticipantCollider& collider) {

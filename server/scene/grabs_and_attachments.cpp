@@ -6,6 +6,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/model/mesh.h"
+#include "server/scene/collider_shares.h"
 #include "server/scene/hand_limits.h"
 
 namespace clothstream::scene {
@@ -83,6 +84,15 @@ void GrabsAndAttachments::letGo() {
   std::ranges::fill(state_.moved, std::nullopt);
 }
 
+float GrabsAndAttachments::forceOfEach(float most) const {
+  std::vector<double> wanted;
+  for (const Slot& slot : state_.slots)
+    if (slot.phase == Slot::Phase::takes || slot.phase == Slot::Phase::holds)
+      wanted.push_back(std::min(slot.now.maxForce, most));
+  const double together = std::max(double{most}, double{kLeastMaxForce} * static_cast<double>(wanted.size()));
+  return static_cast<float>(std::min(double{most}, fairShare(wanted, together)));
+}
+
 void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
                                   simulation::TickInputs& inputs) {
   inputs.attachments.clear();
@@ -94,7 +104,7 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
   while (!state_.slots.empty() && state_.slots.back().phase == Slot::Phase::empty) state_.slots.pop_back();
   inputs.grabs.clear();
   released_.clear();
-  const float mostForce = maxGrabForce(scene);
+  const float mostForce = forceOfEach(maxGrabForce(scene));
   const float mostWay = kMaxHandSpeed * static_cast<float>(scene.tickSeconds());
   for (Slot& slot : state_.slots) {
     simulation::Grab& grab = inputs.grabs.emplace_back();

@@ -16,7 +16,7 @@
 namespace clothstream::scene {
 
 // Belongs to the device's thread. Grabs follow their participants at most at kMaxHandSpeed, with at most
-// maxGrabForce() (hand_limits.h).
+// maxGrabForce() (hand_limits.h), which they share evenly.
 class GrabsAndAttachments {
  public:
   explicit GrabsAndAttachments(const model::Scene& scene);
@@ -66,6 +66,8 @@ class GrabsAndAttachments {
  private:
   Slot* find(std::uint64_t participant, std::uint32_t id);
   static void release(Slot& slot);
+  // Largest force of each grab that holds cloth, N. `most` is maxGrabForce().
+  float forceOfEach(float most) const;
 
   State state_;
   std::uint64_t newest_ = 0;                                       // number of the newest grab

@@ -265,7 +265,8 @@ messages::Result<void> LiveScene::countChangeLocked(std::uint64_t participant, c
   return tooMany(changes_.count(participant, Clock::now()), call, "changes");
 }
 
-messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message) {
+messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::ParameterChange& message,
+                                         Role role) {
   if (source)
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_INVALID_ARGUMENT,
@@ -285,7 +286,8 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
                              "bytes of changes");
       !counted)
     return counted;
-  if (const auto charged = charge_.charge("parameterChange", changed); !charged)
+  const auto pace = role == Role::owner ? Charge::Pace::any : Charge::Pace::inTime;
+  if (const auto charged = charge_.charge("parameterChange", changed, pace); !charged)
     return tl::unexpected(charged.error());
   bool posted = false;
   try {

@@ -110,8 +110,10 @@ class LiveScene : private ColliderBudget {
   // empty.
   std::string quarantined(Clock::time_point now = Clock::now()) const;
 
-  // Puts the change into the inbox, or returns what is wrong with it.
-  messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message);
+  // Puts the change into the inbox, or returns what is wrong with it. Only an owner may make the scene dearer
+  // than what lets it keep its rate (Charge).
+  messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message,
+                                Role role = Role::owner);
   // Resets everything to the start, because a new simulation begins; drops all waiting changes. Returns the
   // change that announces it.
   v1::ParameterChange restart();

@@ -184,6 +184,8 @@ class Roster {
   [[nodiscard]] messages::Result<void> post(const delivery::Mailbox& mailbox,
                                             const v1::ColliderPoses& message, model::ParticipantPoses poses,
                                             const Permissions& permissions, Clock::time_point arrival);
+  // Role::none if the mailbox is not of a participant.
+  Role roleOf(const delivery::Mailbox& mailbox) const;
   // Calls permit() with the participant's role. `What` is an Action or a message.
   template <typename What>
   [[nodiscard]] messages::Result<void> permits(const delivery::Mailbox& mailbox, const What& what,
@@ -234,7 +236,6 @@ class Roster {
   bool isRefused(const std::string& token) const;
   // Ends the participant's session and refuses its resume token from now on. Returns the next entry.
   Entries::iterator expel(Entries::iterator entry, const char* why, std::uint64_t by, Clock::time_point now);
-  Role roleOf(const delivery::Mailbox& mailbox) const;
   bool isDemoted(const Subject& subject) const;
   void rememberRole(const Subject& subject, Role role);
   // Sets the rights, lowers a role that no owner gave to what they permit, and gives the scene an owner if it

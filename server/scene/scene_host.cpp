@@ -21,6 +21,9 @@ namespace {
 
 // After a change of solver, the excess length of springs shrinks as exp(-t / kEaseTime) for kEaseSeconds.
 constexpr double kEaseSeconds = 0.5, kEaseTime = 0.1;
+// Price of a second of a rehearsal, in seconds of schedule::MakingLimit: it takes a processor, and other scenes
+// go on.
+constexpr double kRehearsalCost = 0.2;
 constexpr std::uint32_t kCheckpointSeconds = 1, kSnapshotSeconds = 5;
 // Maximum number of poses whose latency one frame measures; one for each participant and tick.
 constexpr std::size_t kMaxPoseArrivals = 256;
@@ -28,12 +31,12 @@ constexpr std::size_t kMaxPoseArrivals = 256;
 }  // namespace
 
 SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, delivery::FramePublisher& publisher,
-                     double reportRate)
+                     double reportRate, SceneLoader* loader)
     : SceneHost(std::make_unique<SceneOnDevice>(device, scene.start(), publisher.workers()), scene, publisher,
-                reportRate) {}
+                reportRate, loader) {}
 
 SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
-                     delivery::FramePublisher& publisher, double reportRate)
+                     delivery::FramePublisher& publisher, double reportRate, SceneLoader* loader)
     : live_(scene),
       publisher_(publisher),
       rate_(scene.start().simulationRate),
@@ -48,7 +51,8 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
       leastSubsteps_(scene.leastSubsteps(scene_)),
       recoveries_(rate_),
       proven_(parametersOf(scene_)),
-      onDevice_(std::move(loaded)) {
+      onDevice_(std::move(loaded)),
+      rehearsal_(loader) {
   live_.work = work_;
   newestState_ = onDevice_->start;
   const std::shared_ptr<const LiveScene::Restored> restored = live_.restored();
@@ -160,6 +164,7 @@ void SceneHost::begin(Clock::time_point now) {
   keepsState_ = sinceHealthy_ > 0 && (journalBegan_ || every(kCheckpointSeconds));
   if (keepsState_) on.simulation.recordCheckpoint(on.recorder);
   on.simulation.recordTick(on.recorder, tickInputs_);
+  rehearsal_.release();
   hasFrame_ = (tick_ + 1) % (std::uint64_t{ticksPerFrame_} * work_.frameDivisor) == 0;
   if (hasFrame_) {
     owesFrame_ = false;
@@ -284,7 +289,13 @@ void SceneHost::applyChanges() {
 std::size_t SceneHost::applySome(std::span<const AcceptedChange> changes, std::string& problem) {
   model::Scene changed = scene_;
   for (const AcceptedChange& accepted : changes) model::applyChange(changed, accepted.change);
-  if (onDevice_->simulation.makesStages(changed.cloths) && !making_.allows(tickStart_)) return 0;
+  if (onDevice_->simulation.makesStages(changed.cloths)) {
+    if (!making_.allows(tickStart_)) return 0;
+    changes = changes.first(rehearsal_.rehearsed(*onDevice_, scene_, changes));
+    if (const double seconds = rehearsal_.takeSeconds(); seconds > 0)
+      making_.pay(tickStart_, kRehearsalCost * seconds);
+    if (changes.empty()) return 0;
+  }
   if (apply(changes, problem)) return changes.size();
   // One of them has room, or is the problem.
   return changes.size() > 1 && apply(changes.first(1), problem) ? 1 : 0;
@@ -658,6 +669,7 @@ void SceneHost::releaseCoarseEncoders() {
 }
 
 void SceneHost::release() {
+  rehearsal_.end();
   onDevice_.reset();
 }
 

@@ -20,7 +20,9 @@
 #include "server/scene/live_scene.h"
 #include "server/scene/pose_history.h"
 #include "server/scene/recovery_policy.h"
+#include "server/scene/rehearsal.h"
 #include "server/scene/requests.h"
+#include "server/scene/scene_loader.h"
 #include "server/scene/scene_on_device.h"
 #include "server/schedule/making_limit.h"
 #include "server/schedule/token_bucket.h"
@@ -53,13 +55,14 @@ class SceneHost {
   // While the scene is recorded, at least one of this many frames is a key frame.
   static constexpr std::uint32_t kMaxKeyFrameDistance = 24;
 
-  // All arguments must outlive the host. With `reportRate` 0 no frame carries a report. Throws
+  // All arguments must outlive the host. With `reportRate` 0 no frame carries a report. Changes of parameters
+  // that need new kernels act as soon as `loader` has compiled them; at once if it is null. Throws
   // std::runtime_error if the device has no room for the scene.
   SceneHost(vulkan::Device& device, LiveScene& scene, delivery::FramePublisher& publisher,
-            double reportRate = kDefaultReportRate);
+            double reportRate = kDefaultReportRate, SceneLoader* loader = nullptr);
   // `loaded` holds the scene's start.
   SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene, delivery::FramePublisher& publisher,
-            double reportRate);
+            double reportRate, SceneLoader* loader = nullptr);
   ~SceneHost();
 
   // Sets the work from the next tick on. Substeps are raised to leastSubsteps(). A change is announced.
@@ -102,6 +105,10 @@ class SceneHost {
   std::optional<double> deviceSeconds() const { return deviceSeconds_; }
   // Time of this thread that changes of cloths took at the start of the newest tick.
   Clock::duration makingTime() const { return makingTime_; }
+  // Returns whether changes wait for their kernels.
+  bool isRehearsing() const { return rehearsal_.isUnderWay(); }
+  // Stops the rehearsal of such changes. They go on waiting.
+  void endRehearsal() { rehearsal_.end(); }
 
   // Gives the state after the newest complete tick to the keeper, because the server ends. No tick may have
   // begun. Throws vulkan::DeviceLost.
@@ -133,8 +140,9 @@ class SceneHost {
   // Announces that a recording started or stopped.
   void announceRecording();
   void applyInputs();
-  // Applies the changes of the inbox, or lets all of them wait for a later tick, if they would make stages
-  // and earlier ones are not paid for (schedule::MakingLimit). All of them also wait after an exception.
+  // Applies the changes of the inbox. Those that would make stages wait for a later tick until earlier ones are
+  // paid for (schedule::MakingLimit) and their kernels are compiled (Rehearsal), and so do all after them. All
+  // of them also wait after an exception.
   void applyChanges();
   // Returns how many of them, from the first on, it has applied. If `problem` is still empty, the others
   // wait.
@@ -239,6 +247,7 @@ class SceneHost {
   delivery::CompleteFrame frame_;
 
   std::unique_ptr<SceneOnDevice> onDevice_;
+  Rehearsal rehearsal_;
 };
 
 }  // namespace clothstream::scene

@@ -27,24 +27,25 @@ SceneLoader::SceneLoader(codec::Workers& workers, std::function<void()> done)
 
 SceneLoader::Future SceneLoader::load(vulkan::Device& device, const model::Scene& scene,
                                       std::stop_token stop) {
-  // Shared, because the destructor of a task that a future waits for allocates memory, and post() may have
-  // found none.
-  using Task = std::packaged_task<std::unique_ptr<SceneOnDevice>()>;
-  const auto task = std::make_shared<Task>([this, &device, scene, stop = std::move(stop)] {
-    if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
-    const schedule::Clock::time_point before = schedule::Clock::now();
-    auto loaded = std::make_unique<SceneOnDevice>(device, scene, workers_, stop);
-    telemetry::log({scene.name}, spdlog::level::debug, "loaded in {:.2f} s",
-                   schedule::seconds(schedule::Clock::now() - before));
-    return loaded;
-  });
-  Future loaded = task->get_future();
-  boost::asio::post(thread_, [this, task] {
-    (*task)();
+  return run([this, &device, scene, stop = std::move(stop)] { return loadNow(device, scene, stop); });
+}
+
+std::unique_ptr<SceneOnDevice> SceneLoader::loadNow(vulkan::Device& device, const model::Scene& scene,
+                                                    const std::stop_token& stop) {
+  if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
+  const schedule::Clock::time_point before = schedule::Clock::now();
+  auto loaded = std::make_unique<SceneOnDevice>(device, scene, workers_, stop);
+  telemetry::log({scene.name}, spdlog::level::debug, "loaded in {:.2f} s",
+                 schedule::seconds(schedule::Clock::now() - before));
+  return loaded;
+}
+
+void SceneLoader::post(std::function<void()> task) {
+  boost::asio::post(thread_, [this, task = std::move(task)] {
+    task();
     done_();
     giveMemoryBack();
   });
-  return loaded;
 }
 
 void SceneLoader::wait() {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Loads scenes onto the device while other scenes run on it.
+// Loads scenes onto the device while other scenes run on it, and prepares their changes.
 #pragma once
 
 #include <functional>
 #include <future>
 #include <memory>
 #include <stop_token>
+#include <type_traits>
+#include <utility>
 
 #include <boost/asio/thread_pool.hpp>
 
@@ -15,7 +17,7 @@
 
 namespace clothstream::scene {
 
-// Loads one scene at a time, on a worker thread. Belongs to the device's thread.
+// Does one thing at a time, on a worker thread. Belongs to the device's thread.
 class SceneLoader {
  public:
   using Future = std::future<std::unique_ptr<SceneOnDevice>>;
@@ -32,10 +34,26 @@ class SceneLoader {
   // constructor of SceneOnDevice throws, and std::runtime_error soon after a request to stop.
   Future load(vulkan::Device& device, const model::Scene& scene, std::stop_token stop);
 
+  // What load() does on the worker thread.
+  std::unique_ptr<SceneOnDevice> loadNow(vulkan::Device& device, const model::Scene& scene,
+                                         const std::stop_token& stop);
+  // Runs `work` on the worker thread. The future throws what it throws.
+  template <typename Work>
+  std::future<std::invoke_result_t<Work>> run(Work work) {
+    // Shared, because the destructor of a task that a future waits for allocates memory, and post() may have
+    // found none.
+    const auto task = std::make_shared<std::packaged_task<std::invoke_result_t<Work>()>>(std::move(work));
+    std::future<std::invoke_result_t<Work>> result = task->get_future();
+    post([task] { (*task)(); });
+    return result;
+  }
+
   // Returns when the worker thread is idle.
   void wait();
 
  private:
+  void post(std::function<void()> task);
+
   codec::Workers& workers_;
   const std::function<void()> done_;
   boost::asio::thread_pool thread_{1};

@@ -130,7 +130,10 @@ void Session::dispatchInScene(const v1::ClientMessage& message, Clock::time_poin
       if (!allowed(changeRate_, "parameter changes")) return;
       return refuseUnless(
           scene_->roster.permits(*mailbox_, message.parameter_change(), server_.options.participantsMay)
-              .and_then([&] { return scene_->change(participant_, message.parameter_change()); }));
+              .and_then([&] {
+                return scene_->change(participant_, message.parameter_change(),
+                                      scene_->roster.roleOf(*mailbox_));
+              }));
     case Body::kSetRole:
       if (!allowed(controlRate_, "requests about participants")) return;
       return refuseUnless(scene_->roster.setRole(*mailbox_, message.set_role(), now));

@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cstring>
 #include <iterator>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -143,13 +144,18 @@ struct ClothSimulation::Pipeline {
   void prepare(float airDensity);
   std::unique_ptr<XpbdStage> makeXpbd(std::span<const model::Cloth> cloths);
   std::unique_ptr<AssembledStage> makeAssembled(std::span<const model::Cloth> cloths);
-  // Returns null if the present stage serves these cloths, or if none of them bends.
+  // Cloths of the stage that these cloths need to bend. Empty if the present one serves them, or if none bends.
+  std::vector<model::Cloth> bendingCloths(std::span<const model::Cloth> cloths) const;
+  // Null without cloths.
   std::unique_ptr<BendingStage> makeBending(std::span<const model::Cloth> cloths) const;
+  // Returns null if the present stage serves these cloths, or if none of them bends.
+  std::unique_ptr<BendingStage> nextBending(std::span<const model::Cloth> cloths);
   // `stage` replaces the present stage unless it is null.
   void setBending(std::unique_ptr<BendingStage> stage, std::span<const model::Cloth> cloths);
   void makeAttachments(const AttachmentTables& tables);
-  // Returns whether makeBending() and setSolvers() need more than what there is.
-  bool makes(std::span<const model::Cloth> cloths) const;
+  // What setCloths() needs more than what there is.
+  bool needsSolvers(std::span<const model::Solver> wanted) const;
+  bool needsBending(std::span<const model::Cloth> cloths) const;
   SolverStages makeSolvers(std::span<const model::Cloth> cloths);
   // Makes these stages current, and returns the former ones.
   SolverStages exchangeSolvers(SolverStages next);
@@ -195,6 +201,8 @@ struct ClothSimulation::Pipeline {
   std::vector<model::Solver> solvers;                 // of the cloths in the tables
   std::uint64_t solverBytes = 0;                      // SolverStages::bytes of the present stages
   KeptStages kept;                                    // stages of earlier solvers
+  std::shared_ptr<NewStages> taken;                   // ClothSimulation::takeStages(); may be null
+  std::mutex making;                                  // of makeSolvers()
   std::uint64_t made = 0;                             // ClothSimulation::stagesMade()
   std::vector<SpringStiffness> stiffness;             // of the cloths' springs
   std::unique_ptr<SolidStage> solids;                 // null if no collider is a triangle mesh
@@ -249,7 +257,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
   if (integrator == model::Integrator::rungeKutta4)
     rungeKutta = std::make_unique<RungeKuttaStage>(on, stateOf(buffers, collision), offsets);
   exchangeSolvers(makeSolvers(scene.cloths));
-  bending = makeBending(scene.cloths);
+  bending = makeBending(bendingCloths(scene.cloths));
   bends = bending != nullptr;
   if (CoarseStage::isIn(scene.cloths))
     coarse = std::make_unique<CoarseStage>(on, scene.cloths, stateOf(buffers, collision), workgroupSize);
@@ -303,13 +311,25 @@ std::unique_ptr<AssembledStage> ClothSimulation::Pipeline::makeAssembled(
 }
 
 // Cloths that bent once stay in the tables, so that each cloth needs new ones at most once.
-std::unique_ptr<BendingStage> ClothSimulation::Pipeline::makeBending(
+std::vector<model::Cloth> ClothSimulation::Pipeline::bendingCloths(
     std::span<const model::Cloth> cloths) const {
-  if (!BendingStage::isIn(cloths) || (bending && bending->serves(cloths))) return nullptr;
+  if (!BendingStage::isIn(cloths) || (bending && bending->serves(cloths))) return {};
   std::vector<model::Cloth> all(cloths.begin(), cloths.end());
   for (std::size_t i = 0; bending && i < all.size(); ++i)
     if (bending->bends(i)) all[i].dihedralBending = 1;
-  return std::make_unique<BendingStage>(device, all, stateOf(buffers, collision), workgroupSize);
+  return all;
+}
+
+std::unique_ptr<BendingStage> ClothSimulation::Pipeline::makeBending(
+    std::span<const model::Cloth> cloths) const {
+  if (cloths.empty()) return nullptr;
+  return std::make_unique<BendingStage>(device, cloths, stateOf(buffers, collision), workgroupSize);
+}
+
+std::unique_ptr<BendingStage> ClothSimulation::Pipeline::nextBending(std::span<const model::Cloth> cloths) {
+  const std::vector<model::Cloth> all = bendingCloths(cloths);
+  if (!all.empty() && !needsBending(cloths)) return std::move(taken->bending);
+  return makeBending(all);
 }
 
 void ClothSimulation::Pipeline::setBending(std::unique_ptr<BendingStage> stage,
@@ -322,13 +342,19 @@ void ClothSimulation::Pipeline::setBending(std::unique_ptr<BendingStage> stage,
   bends = BendingStage::isIn(cloths);
 }
 
-bool ClothSimulation::Pipeline::makes(std::span<const model::Cloth> cloths) const {
-  if (BendingStage::isIn(cloths) && !(bending && bending->serves(cloths))) return true;
-  const std::vector<model::Solver> wanted = solversOf(cloths);
-  return !std::ranges::equal(wanted, solvers, sameTables) && !kept.has(wanted);
+bool ClothSimulation::Pipeline::needsSolvers(std::span<const model::Solver> wanted) const {
+  const bool has = haveSameTables(wanted, solvers) || kept.has(wanted) ||
+                   (taken && taken->solvers && haveSameTables(wanted, taken->solvers->solvers));
+  return !has;
+}
+
+bool ClothSimulation::Pipeline::needsBending(std::span<const model::Cloth> cloths) const {
+  const bool isTaken = taken && taken->bending && taken->bending->serves(cloths);
+  return !isTaken && !bendingCloths(cloths).empty();
 }
 
 SolverStages ClothSimulation::Pipeline::makeSolvers(std::span<const model::Cloth> cloths) {
+  const std::lock_guard lock(making);
   const std::uint64_t before = Buffer::bytesOfThread();
   SolverStages stages{.solvers = solversOf(cloths),
                       .systems = solves.makeSystems(cloths),
@@ -348,9 +374,10 @@ SolverStages ClothSimulation::Pipeline::exchangeSolvers(SolverStages next) {
 
 void ClothSimulation::Pipeline::setSolvers(std::span<const model::Cloth> cloths) {
   const std::vector<model::Solver> wanted = solversOf(cloths);
-  if (std::ranges::equal(wanted, solvers, sameTables)) return;
+  if (haveSameTables(wanted, solvers)) return;
   // Memory is allocated before anything changes, because that may fail.
   std::optional<SolverStages> known = kept.take(wanted);
+  if (!known && !needsSolvers(wanted)) known = std::exchange(taken->solvers, std::nullopt);
   if (!known) {
     known = makeSolvers(cloths);
     ++made;
@@ -534,9 +561,10 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
                     }));
   const bool heavier = massesOf(cloths) != pipeline_->clothMasses;
   if (heavier) pipeline_->makeMassStage();
-  std::unique_ptr<BendingStage> bending = pipeline_->makeBending(cloths);
+  std::unique_ptr<BendingStage> bending = pipeline_->nextBending(cloths);
   pipeline_->setSolvers(cloths);
   pipeline_->setBending(std::move(bending), cloths);
+  pipeline_->taken.reset();
   if (heavier) pipeline_->setMasses(cloths);
   if (pipeline_->selfCollision) pipeline_->selfCollision->setCloths(cloths);
   if (pipeline_->motionBound) pipeline_->motionBound->setCloths(cloths);
@@ -546,7 +574,24 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
 }
 
 bool ClothSimulation::makesStages(std::span<const model::Cloth> cloths) const {
-  return pipeline_->makes(cloths);
+  return pipeline_->needsSolvers(solversOf(cloths)) || pipeline_->needsBending(cloths);
+}
+
+StagePlan ClothSimulation::planStages(std::span<const model::Cloth> cloths) const {
+  StagePlan plan{.solvers = {}, .bending = pipeline_->bendingCloths(cloths)};
+  if (pipeline_->needsSolvers(solversOf(cloths))) plan.solvers.assign(cloths.begin(), cloths.end());
+  return plan;
+}
+
+std::shared_ptr<NewStages> ClothSimulation::makeStages(const StagePlan& plan) {
+  auto stages = std::make_shared<NewStages>();
+  if (!plan.solvers.empty()) stages->solvers = pipeline_->makeSolvers(plan.solvers);
+  stages->bending = pipeline_->makeBending(plan.bending);
+  return stages;
+}
+
+void ClothSimulation::takeStages(std::shared_ptr<NewStages> stages) {
+  pipeline_->taken = std::move(stages);
 }
 
 std::uint64_t ClothSimulation::stagesMade() const {

@@ -61,6 +61,13 @@ struct SimulationOptions {
   std::span<const std::uint32_t> advanceKernel = {};
 };
 
+// What cloths need that a simulation does not have.
+struct StagePlan {
+  std::vector<model::Cloth> solvers;  // cloths whose solvers need stages; empty: none do
+  std::vector<model::Cloth> bending;  // cloths of the tables of bending; empty: they need no new ones
+};
+struct NewStages;  // kept_stages.h
+
 class ClothSimulation {
  public:
   // The scene must be valid (server/messages). Throws std::runtime_error if the device has too little
@@ -76,8 +83,15 @@ class ClothSimulation {
   // Kernels are created when a cloth first needs them and are kept, and so are the stages of the newest
   // combinations of solvers (KeptStages).
   void setCloths(std::span<const model::Cloth> cloths);
-  // Returns whether setCloths() would make stages, which takes milliseconds to tenths of a second.
+  // Returns whether setCloths() would make stages, which takes milliseconds to seconds.
   bool makesStages(std::span<const model::Cloth> cloths) const;
+  // What setCloths() would make.
+  StagePlan planStages(std::span<const model::Cloth> cloths) const;
+  // Makes that. Another thread may call it, also while this simulation works. Throws std::runtime_error if the
+  // device has too little memory.
+  std::shared_ptr<NewStages> makeStages(const StagePlan& plan);
+  // The next setCloths() uses these stages, as far as its cloths need them.
+  void takeStages(std::shared_ptr<NewStages> stages);
   // Number of times that setCloths() has made stages.
   std::uint64_t stagesMade() const;
 

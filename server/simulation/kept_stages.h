@@ -13,6 +13,7 @@
 
 #include "server/model/scene.h"
 #include "server/simulation/assembled/assembled_stage.h"
+#include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/solve_stage.h"
 #include "server/simulation/xpbd_stage.h"
 
@@ -33,6 +34,16 @@ struct SolverStages {
   std::unique_ptr<AssembledStage> assembled;     // null if no cloth uses it
   std::uint64_t bytes = 0;                       // of their buffers
 };
+
+// Stages that cloths will need (ClothSimulation::makeStages). Each is absent if they need no new one.
+struct NewStages {
+  std::optional<SolverStages> solvers;
+  std::unique_ptr<BendingStage> bending;
+};
+
+inline bool haveSameTables(std::span<const model::Solver> a, std::span<const model::Solver> b) {
+  return std::ranges::equal(a, b, sameTables);
+}
 
 // Keeps stages that are not in use, so that a change to and fro makes nothing. Belongs to the device's
 // thread.
@@ -69,7 +80,7 @@ class KeptStages {
  private:
   std::vector<SolverStages>::const_iterator find(std::span<const model::Solver> solvers) const {
     return std::ranges::find_if(kept_, [&](const SolverStages& stages) {
-      return std::ranges::equal(stages.solvers, solvers, sameTables);
+      return haveSameTables(stages.solvers, solvers);
     });
   }
 

@@ -28,6 +28,7 @@ struct Case {
   bool air = false, bending = false, selfCollision = false;
   std::uint32_t colliders = 0;
   model::Shape shape = model::Sphere{.radius = 0.3f};
+  bool covers = false;  // all cloth is near each collider, and has to leave most of them
 };
 
 // A prism of radius 0.3 m and length 0.5 m. It has two faces more than `sides`.
@@ -81,6 +82,7 @@ std::vector<Case> cases() {
       {.method = "64 colliders", .colliders = 64},
       {.method = "8 capsules", .colliders = 8, .shape = model::Capsule{.radius = 0.3f}},
       {.method = "8 boxes", .colliders = 8, .shape = model::Box{.size = {0.5, 0.5, 0.5}}},
+      {.method = "60 large boxes", .colliders = 60, .shape = model::Box{.size = {2, 2, 0.1f}}, .covers = true},
       {.method = "8 hulls of 32 faces", .colliders = 8, .shape = prism(30)},
       {.method = "8 hulls of 128 faces", .colliders = 8, .shape = prism(126)},
       {.method = "mesh of 1,848 triangles", .colliders = 1, .shape = ball(22, false)},
@@ -125,6 +127,7 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
     collider.name = std::to_string(i);
     collider.shape = experiment.shape;
     collider.pose.position = model::Vec3(0, -0.5f, 0.3f);
+    if (experiment.covers) collider.pose.position.z() = 0.001f * static_cast<float>(i + 1);
     scene.colliders.push_back(collider);
   }
   return scene;

@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -18,6 +19,7 @@
 
 #include <fmt/format.h>
 #include <grpcpp/client_context.h>
+#include <grpcpp/support/client_callback.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -32,6 +34,8 @@
 namespace clothstream::attack {
 namespace {
 
+using grpc::health::v1::HealthCheckRequest;
+using grpc::health::v1::HealthCheckResponse;
 using grpc::reflection::v1alpha::ServerReflection;
 using grpc::reflection::v1alpha::ServerReflectionRequest;
 using grpc::reflection::v1alpha::ServerReflectionResponse;
@@ -156,24 +160,56 @@ std::string floodReflection(const Target& target) {
                      ends.text());
 }
 
+// Counts the watches that have got an answer and not ended yet.
+class HealthWatch final : public grpc::ClientReadReactor<HealthCheckResponse> {
+ public:
+  HealthWatch(grpc::health::v1::Health::Stub& stub, std::atomic<int>& open) : open_(open) {
+    stub.async()->Watch(&context_, &request_, this);
+    StartRead(&response_);
+    StartCall();
+  }
+  void OnReadDone(bool ok) override {
+    if (!ok) return;
+    ++open_;
+    isOpen_ = true;
+    StartRead(&response_);
+  }
+  void OnDone(const grpc::Status&) override {
+    if (isOpen_) --open_;
+    ended_.set_value();
+  }
+  void end() {
+    context_.TryCancel();
+    ended_.get_future().wait();
+  }
+
+ private:
+  grpc::ClientContext context_;
+  HealthCheckRequest request_;
+  HealthCheckResponse response_;
+  bool isOpen_ = false;
+  std::atomic<int>& open_;
+  std::promise<void> ended_;
+};
+
 std::string watchHealth(const Target& target) {
-  const auto stub = grpc::health::v1::Health::NewStub(makeChannel(target.grpc));
-  struct Watch {
-    grpc::ClientContext context;
-    std::unique_ptr<grpc::ClientReader<grpc::health::v1::HealthCheckResponse>> stream;
-  };
-  std::vector<std::unique_ptr<Watch>> watches;
-  for (int i = 0; i < 400; ++i) {
-    watches.push_back(std::make_unique<Watch>());
-    watches.back()->stream = stub->Watch(&watches.back()->context, {});
+  constexpr int kConnections = 8, kWatchesOfEach = 50;
+  std::vector<std::unique_ptr<grpc::health::v1::Health::Stub>> stubs;
+  std::vector<std::unique_ptr<HealthWatch>> watches;
+  std::atomic<int> open = 0;
+  for (int i = 0; i < kConnections; ++i) {
+    stubs.push_back(grpc::health::v1::Health::NewStub(makeChannel(target.grpc)));
+    for (int j = 0; j < kWatchesOfEach; ++j)
+      watches.push_back(std::make_unique<HealthWatch>(*stubs.back(), open));
   }
   std::this_thread::sleep_for(target.time);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + 5s);
   v1::ListScenesResponse scenes;
   const std::string answer = answerOf(stubOf(target)->ListScenes(&context, {}, &scenes));
-  for (const auto& each : watches) each->context.TryCancel();
-  return "another call: " + answer;
+  const int held = open;
+  for (const auto& each : watches) each->end();
+  return fmt::format("{} of {} watches are open; another call: {}", held, watches.size(), answer);
 }
 
 // Connections to the port for operators that are opened again and again, while a probe asks for its health.
@@ -311,7 +347,8 @@ constexpr Attack kAttacksEndpoint[] = {
      &floodReflection, "less than 10 MB a second; streams: [0-9]+ refused with code .*", "--reflection"},
     {"reflection_off", "the same of a server that does not", &floodReflection,
      "less than 10 MB a second; streams: [0-9]+ refused with code 12"},
-    {"watches", "hold 400 health watches", &watchHealth, "another call: accepted"},
+    {"watches", "hold 400 health watches", &watchHealth,
+     "(1?[0-9]{2}|2[0-4][0-9]|25[0-6]) of 400 watches are open; another call: accepted"},
     {"probes", "hold all connections to the port for operators", &holdProbes, "all [0-9]+ probes answered",
      "--metrics-port 0"},
     {"smuggling", "send requests behind a transfer encoding that does not exist", &smuggleRequest,

@@ -108,6 +108,15 @@ std::string flipSolversOfOwnScene(const Target& target) {
   return answer + "; " + flipSolvers(target, "small", 24);
 }
 
+// Its tables take long to make.
+std::string flipSolversOfLargeScene(const Target& target) {
+  v1::Scene scene = sheet("large", 192, 1);
+  scene.set_simulation_rate(20);
+  scene.set_stream_rate(20);
+  const std::string answer = answerOf(create(*stubOf(target), scene));
+  return answer + "; " + flipSolvers(target, "large", 24);
+}
+
 // Bending, whose tables depend on which cloths bend.
 std::string flipBending(const Target& target) {
   const auto stub = stubOf(target);
@@ -200,6 +209,8 @@ constexpr Attack kAttacksHiddenCost[] = {
      "[0-9]+ changes; the stream is open"},
     {"flip_solvers", "the same between 24 settings", &flipManySolvers, "[0-9]+ changes; the stream is open"},
     {"flip_own_solver", "the same in a created scene of 64 nodes", &flipSolversOfOwnScene,
+     "accepted; [0-9]+ changes; the stream is open"},
+    {"flip_large_solver", "the same in a created scene of 36,864 nodes", &flipSolversOfLargeScene,
      "accepted; [0-9]+ changes; the stream is open"},
     {"flip_bending", "change which of two cloths bends 30 times a second", &flipBending, "accepted"},
 };

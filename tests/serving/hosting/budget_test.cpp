@@ -23,6 +23,7 @@ namespace clothstream::scene {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 using ::testing::StartsWith;
 using tests::TestPeer;
 
@@ -89,6 +90,36 @@ TEST(BudgetTest, RefusesSceneWithALongTickAndNamesIterationsThatFit) {
   EXPECT_LT(charge.roomForOthers(small, 0), 50) << "50 colliders do not fit";
   Charge unlimited(budgetOf({.sceneLoad = loadOf(large) * 2, .load = 1e9}), large, false);
   EXPECT_TRUE(unlimited.charge("createScene.scene", large));
+}
+
+// Only an owner may slow a scene down.
+TEST(BudgetTest, AParticipantKeepsASceneInTime) {
+  using enum Charge::Pace;
+  const auto sceneOf = [](std::uint32_t iterations) {
+    model::Scene scene = constrained(iterations);
+    scene.simulationRate = scene.streamRate = 20;
+    return scene;
+  };
+  const model::Scene start = sceneOf(1), slow = sceneOf(1000);
+  const auto budget = budgetOf({.sceneLoad = 1e9, .load = 1e9});
+  ASSERT_LT(loadOf(sceneOf(2)), 0.5);
+  ASSERT_GT(loadOf(slow), 1.5);
+  Charge charge(budget, start, true);
+  const auto refused = charge.charge("parameterChange", slow, inTime);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error().text, MatchesRegex("parameterChange: would take .* only an owner of the scene may "
+                                                 "let it take more than 0.70 s, .* [0-9]* iterations would fit"));
+  EXPECT_TRUE(charge.charge("parameterChange", sceneOf(2), inTime));
+  ASSERT_TRUE(charge.charge("parameterChange", slow, any)) << "by an owner";
+  EXPECT_TRUE(charge.charge("parameterChange", sceneOf(999), inTime)) << "cheaper than now";
+  // A scene that is slow by itself can still be changed a little.
+  Charge slowly(budget, slow, true);
+  model::Scene windy = slow;
+  windy.environment.airDensity = 1;
+  windy.cloths[0].drag = 1;
+  EXPECT_TRUE(slowly.charge("parameterChange", windy, inTime));
+  EXPECT_FALSE(slowly.charge("parameterChange", sceneOf(1500), inTime));
 }
 
 TEST(BudgetTest, ScenesShareOneBudgetAndGiveItBack) {

@@ -52,7 +52,7 @@ std::vector<model::ParticipantCollider> hand() {
 
 TEST(ColliderShares, CollidersThatCanTouchNothingWeighNextToNothing) {
   EXPECT_EQ(weightOf(boxAt(1, 990), &kCurtain), kFarWeight);
-  EXPECT_EQ(weightOf(boxAt(1, 0, 3), &kCurtain), 1);
+  EXPECT_EQ(weightOf(boxAt(1, 0, 3), &kCurtain), kMostWeight);
   EXPECT_EQ(weightOf(boxAt(1, 990), nullptr), 1) << "nothing is known about the cloth";
   EXPECT_LT(loadOf(boxes(60, 990), &kCurtain).others, 1);
   EXPECT_EQ(loadOf(boxes(60, 990), &kCurtain).hands, 0);
@@ -89,7 +89,7 @@ TEST(ColliderShares, TrimmingKeepsHands) {
 class Room : public ColliderBudget {
  public:
   double roomForHands() const override { return 16; }
-  double roomForOthers(double) const override { return 12; }
+  double roomForOthers(double) const override { return 12 * kMostWeight; }
   messages::Result<void> chargeJoints() override {
     if (hasRoomForJoints) return {};
     return tl::unexpected(
@@ -149,7 +149,7 @@ TEST_F(SharingTest, OneParticipantTakesNothingFromOthers) {
   EXPECT_EQ(acting(2), 4u);
   roster.expire(now);
   EXPECT_EQ(acting(1), 8u);
-  EXPECT_LE(room.charged.others, 12.001);
+  EXPECT_LE(room.charged.others, 12 * kMostWeight + 1e-3);
   // A participant that leaves gives its share back.
   roster.leave(*other.mailbox, LeaveReason::left, now);
   roster.expire(now);
@@ -268,6 +268,24 @@ TEST(ColliderShares, AScenesCollidersLeaveHalfOfTheFreeLoadToTheNext) {
   EXPECT_NEAR(budget->usage().load, 0.5, 1e-6);
   EXPECT_NEAR(second.roomForOthers(scene, 0), room / 2, 1e-6 * room);
   EXPECT_NEAR(first.roomForOthers(scene, 0), room, 1e-6 * room) << "its own colliders count once";
+}
+
+TEST(ColliderShares, CollidersDoNotMakeASceneLate) {
+  const model::Scene scene = tests::smallScene();
+  const auto budget =
+      std::make_shared<Budget>(BudgetLimits{.sceneLoad = 1e9, .load = 1e9, .tickSeconds = 0});
+  const auto chargeAt = [&](double nodeStepSeconds, const ColliderLoad& colliders) {
+    budget->setSpeed({.nodeStepSeconds = nodeStepSeconds, .dispatchSeconds = 0, .workgroupFactor = 1});
+    Charge charge(budget, scene, true);
+    charge.chargeColliders(scene, {.hands = colliders.hands, .others = charge.roomForOthers(scene, colliders.hands)});
+    return charge.load(scene);
+  };
+  EXPECT_NEAR(chargeAt(1e-6, {}), 0.7, 1e-6);
+  EXPECT_NEAR(chargeAt(1e-6, {.hands = 2, .others = 0}), 0.7, 1e-6) << "hands first";
+  // A scene that is late already has some room.
+  Charge slow(budget, scene, true);
+  budget->setSpeed({.nodeStepSeconds = 1e-3, .dispatchSeconds = 0, .workgroupFactor = 1});
+  EXPECT_DOUBLE_EQ(slow.roomForOthers(scene, 0), 4);
 }
 
 }  // namespace

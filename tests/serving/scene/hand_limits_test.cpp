@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/session.pb.h"
@@ -19,6 +20,8 @@
 namespace clothstream::scene {
 namespace {
 
+using ::testing::Each;
+using ::testing::ElementsAre;
 using model::Vec3;
 using simulation::MovingCollider;
 using tests::handAt;
@@ -112,6 +115,27 @@ TEST_F(HandLimits, AGrabFollowsAtTheSpeedOfAHandWithABoundedForce) {
   EXPECT_FLOAT_EQ(grabAt(9, 20).end.position.x(), 0.5f + kMaxHandSpeed * kTick);
   EXPECT_EQ(inputs.grabs[0].start.position.x(), 0.5f);
   EXPECT_FLOAT_EQ(grabAt(9, 20).start.position.x(), 0.5f + kMaxHandSpeed * kTick);
+}
+
+TEST_F(HandLimits, GrabsShareTheForceOfOne) {
+  scene.cloths[0].mass = 1;
+  GrabsAndAttachments grabs(scene);
+  simulation::TickInputs inputs;
+  const auto forcesOf = [&](std::vector<float> wanted) {
+    std::vector<model::Grab> all;
+    for (const float force : wanted)
+      all.push_back({.id = static_cast<std::uint32_t>(all.size() + 1), .maxForce = force});
+    grabs.place(7, all, {});
+    grabs.advance(scene, ++tick * scene.tickSeconds(), inputs);
+    std::vector<float> given;
+    for (const simulation::Grab& grab : inputs.grabs) given.push_back(grab.maxForce);
+    return given;
+  };
+  EXPECT_EQ(maxGrabForce(scene), 300);
+  EXPECT_THAT(forcesOf({100, 100, 100}), ElementsAre(100, 100, 100));
+  EXPECT_THAT(forcesOf({100, 1e6f, 1e6f}), ElementsAre(100, 100, 100));
+  EXPECT_THAT(forcesOf({20, 1e6f, 1e6f}), ElementsAre(20, 140, 140)) << "one that needs less leaves the rest";
+  EXPECT_THAT(forcesOf(std::vector<float>(20, 1e6f)), Each(kLeastMaxForce)) << "as much as every grab may have";
 }
 
 TEST_F(HandLimits, LightClothMayBeHeldAsBefore) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -17,6 +18,7 @@
 #include <unistd.h>
 
 #include "server/recording/scene_journal.h"
+#include "server/scene/scene_loader.h"
 #include "server/step/step.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/serving/scene/busy_scene.h"
@@ -273,6 +275,63 @@ TEST_F(SceneHostTest, ChangesThatMakeStagesWaitUntilEarlierOnesArePaidFor) {
   EXPECT_EQ(hosted.live.inbox.depth().changes, 2u) << "later changes keep their place";
   hosted.now += std::chrono::minutes(10);
   hosted.tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 0u);
+}
+
+// A change of a solver waits for its kernels, which are compiled beside the ticks.
+TEST_F(SceneHostTest, ChangesThatMakeStagesAreRehearsed) {
+  HostedScene hosted;
+  std::promise<void> gate;
+  std::shared_future<void> opened = gate.get_future().share();
+  SceneLoader loader(hosted.publisher.workers(), [opened] { opened.wait(); });
+  SceneHost host(std::make_unique<SceneOnDevice>(tests::device(), smallScene(), hosted.publisher.workers()), hosted.live,
+                 hosted.publisher, 0, &loader);
+  const auto tick = [&] {
+    host.begin(hosted.now += std::chrono::seconds(1));
+    host.finish();
+    hosted.publisher.drain();
+  };
+  // The loader's thread is busy until the gate opens.
+  const SceneLoader::Future other = loader.load(tests::device(), smallScene(), {});
+  hosted.change(wind(1));
+  tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 0u) << "it needs no kernels";
+  hosted.change(constraints(3));
+  for (int i = 0; i < 3; ++i) tick();
+  hosted.change(wind(2));
+  tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 2u);
+  EXPECT_TRUE(host.isRehearsing());
+  gate.set_value();
+  loader.wait();
+  tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 1u) << "the rehearsed one has acted";
+  EXPECT_FALSE(host.isRehearsing());
+  tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 0u);
+}
+
+// The scene that the rehearsal was for does not come.
+TEST_F(SceneHostTest, AnotherChangeThanTheRehearsedOneIsRehearsedToo) {
+  HostedScene hosted;
+  SceneLoader loader(hosted.publisher.workers(), [] {});
+  SceneHost host(std::make_unique<SceneOnDevice>(tests::device(), smallScene(), hosted.publisher.workers()), hosted.live,
+                 hosted.publisher, 0, &loader);
+  const auto tick = [&] {
+    host.begin(hosted.now += std::chrono::seconds(1));
+    host.finish();
+    hosted.publisher.drain();
+    loader.wait();
+  };
+  hosted.change(constraints(3));
+  tick();
+  EXPECT_TRUE(host.isRehearsing());
+  hosted.live.inbox.dropChanges();
+  hosted.change(constraints(4));
+  tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 1u);
+  EXPECT_TRUE(host.isRehearsing());
+  tick();
   EXPECT_EQ(hosted.live.inbox.depth().changes, 0u);
 }
 
