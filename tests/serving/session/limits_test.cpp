@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "server/messages/scene_message.h"
+#include "server/scene/collider_shares.h"
 #include "tests/model/meshes.h"
 #include "tests/serving/server_test.h"
 
@@ -180,13 +181,15 @@ v1::ClientMessage colliders(std::uint32_t count) {
 
 TEST_F(PeerLimitsTest, CollidersOfParticipantsHaveAPrice) {
   const model::Scene scene = tests::smallScene("small");
-  constexpr model::DeviceSpeed kSpeed{.nodeStepSeconds = 1e-6, .dispatchSeconds = 0, .workgroupFactor = 1};
+  constexpr model::DeviceSpeed kSpeed{.nodeStepSeconds = 1e-7, .dispatchSeconds = 0, .workgroupFactor = 1};
   const model::PriceModel price(scene);
-  const auto loadOf = [&](std::size_t count) {
-    return price.work(scene, static_cast<double>(scene.colliders.size() + count)).seconds(kSpeed) *
+  const auto loadOf = [&](double weight) {
+    return price.work(scene, static_cast<double>(scene.colliders.size()) + weight).seconds(kSpeed) *
            scene.simulationRate;
   };
-  START({}, {}, {.sceneLoad = (loadOf(30) - loadOf(0)) * 1.001, .load = 1e9, .tickSeconds = 0});
+  // Each is near all cloth.
+  const double all = loadOf(30 * scene::kMostWeight);
+  START({}, {}, {.sceneLoad = (all - loadOf(0)) * 1.001, .load = 1e9, .tickSeconds = 0});
   server().state().budget->setSpeed(kSpeed);
   TestPeer first(server()), second(server());
   first.join();
