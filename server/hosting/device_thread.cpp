@@ -430,13 +430,12 @@ void DeviceThread::adaptToLoad(Run& run, Clock::time_point now) {
 }
 
 bool DeviceThread::isDisturbed() const {
-  return std::ranges::any_of(runs_, [](const auto& run) { return run->loading.valid(); });
+  return std::ranges::any_of(runs_, [](const auto& run) { return run->loads(); });
 }
 
 bool DeviceThread::isMaking() const {
-  return std::ranges::any_of(runs_, [](const auto& run) {
-    return run->host && (run->host->isRehearsing() || run->host->makingTime() > Clock::duration::zero());
-  });
+  return std::ranges::any_of(
+      runs_, [](const auto& run) { return run->host && run->host->makingTime() > Clock::duration::zero(); });
 }
 
 void DeviceThread::checkPrice(Run& run, bool isLate) {
@@ -520,7 +519,10 @@ void DeviceThread::startAndStopScenes() {
       run->overload.restart();
     }
     const bool paused = ready && inUse && !wanted;
-    if (ready && !wanted && (run->running || (run->paused && !paused))) run->host->releaseCoarseEncoders();
+    if (ready && !wanted && (run->running || (run->paused && !paused))) {
+      run->host->releaseCoarseEncoders();
+      run->host->endRehearsal();
+    }
     run->running = wanted && !waits(*run);
     run->paused = paused && !waits(*run);
     run->scene->running = wanted;
@@ -634,7 +636,7 @@ void DeviceThread::countLoss(const Run& noticed) {
   const Clock::time_point now = Clock::now();
   std::vector<Run*> suspects;
   for (const auto& run : runs_)
-    if (run.get() == &noticed || run->inFlight || run->loading.valid()) suspects.push_back(run.get());
+    if (run.get() == &noticed || run->inFlight || run->loads()) suspects.push_back(run.get());
   for (Run* suspect : suspects) {
     const bool again = suspect->lostDevice && now - *suspect->lostDevice < kLossWindow;
     if (again && suspects.size() == 1) suspect->lostDeviceTwice = true;

@@ -136,6 +136,8 @@ class DeviceThread {
       return static_cast<std::uint64_t>(whole);
     }
 
+    // Returns whether the loader works for the scene.
+    bool loads() const { return loading.valid() || (host && host->isRehearsing()); }
     // Returns whether the scene is to be loaded.
     bool needsDevice() const {
       const bool wanted = scene->subscribers.receivers(Clock::now()) > 0 || host || whenAdded || waits;
@@ -214,7 +216,7 @@ class DeviceThread {
   void checkPrice(Run& run, bool isLate);
   // Returns whether the device works for anything but ticks.
   bool isDisturbed() const;
-  // Whether a change of any scene is rehearsed, or has held this thread up in that scene's present tick.
+  // Whether a change of any scene has held this thread up in that scene's present tick.
   bool isMaking() const;
   // Gives the time of this thread at the start of a tick to the scene, other than its commands.
   void chargeMaking(Run& run, Clock::time_point& deviceFree);

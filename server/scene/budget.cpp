@@ -16,8 +16,8 @@ constexpr double kMegabyte = 1e6;
 // metre.
 constexpr double kLeastHands = 16;
 // Participants must not make a scene late: with their other colliders and with parameters that one of them
-// changes, its price is at most kInTime, in seconds of the device's time a second. A scene that costs more
-// without such colliders has room for kLeastOthers: one that is near all cloth and a small one.
+// changes, its price is at most kInTime, in seconds of the device's time a second. There is always room for
+// kLeastOthers: a collider that is near all cloth, and a small one.
 constexpr double kInTime = 0.7, kLeastOthers = 4;
 // A scene that the server started with may cost this much of its first price instead, if that is more.
 constexpr double kMostOfStart = 1.25;
@@ -116,7 +116,11 @@ double Charge::secondsOf(const model::Scene& scene, double colliders) const {
 }
 
 double Charge::loadWith(const model::Scene& scene, double colliders) const {
-  return secondsOf(scene, colliders) - freeWork_.seconds(budget_->speed_) * scene.simulationRate;
+  return secondsOf(scene, colliders) - startSeconds(scene);
+}
+
+double Charge::startSeconds(const model::Scene& scene) const {
+  return freeWork_.seconds(budget_->speed_) * scene.simulationRate;
 }
 
 model::Work Charge::workWith(const model::Scene& scene, double colliders) const {
@@ -218,7 +222,7 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
                   whatFits(scene, made_, price.load, roomForLoad.load, loadOf));
   }
   const auto secondsWith = [&](const model::Scene& other) { return secondsOf(other, colliders_.others); };
-  const double seconds = secondsWith(scene), start = freeWork_.seconds(budget_->speed_) * scene.simulationRate;
+  const double seconds = secondsWith(scene), start = startSeconds(scene);
   if (const double most = std::max(kInTime, kMostOfStart * start);
       pace == Pace::inTime && price.load > charged_.load && seconds > most)
     return refuse(fmt::format("would take {:.2f} s of the device's time a second, by estimate; only an owner of the "

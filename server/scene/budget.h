@@ -102,8 +102,11 @@ class Charge {
   };
   model::Work workWith(const model::Scene& scene, double colliders) const;
   Amount priceOf(const model::Scene& scene) const;  // the budget's mutex is held
-  // Price of the scene with these colliders of participants, as load(). The budget's mutex is held.
+  // Price of the scene with these colliders of participants, in seconds of the device's time a second. The
+  // budget's mutex is held.
   double secondsOf(const model::Scene& scene, double colliders) const;
+  // The part of it that is free. The budget's mutex is held.
+  double startSeconds(const model::Scene& scene) const;
   // Load that the scene adds to what it is free of, with these colliders of participants; negative if it is
   // cheaper. The budget's mutex is held.
   double loadWith(const model::Scene& scene, double colliders) const;

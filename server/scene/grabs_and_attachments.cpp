@@ -87,7 +87,7 @@ void GrabsAndAttachments::letGo() {
 float GrabsAndAttachments::forceOfEach(float most) const {
   std::vector<double> wanted;
   for (const Slot& slot : state_.slots)
-    if (slot.phase == Slot::Phase::takes || slot.phase == Slot::Phase::holds)
+    if ((slot.phase == Slot::Phase::takes || slot.phase == Slot::Phase::holds) && slot.vertices != 0u)
       wanted.push_back(std::min(slot.now.maxForce, most));
   const double together = std::max(double{most}, double{kLeastMaxForce} * static_cast<double>(wanted.size()));
   return static_cast<float>(std::min(double{most}, fairShare(wanted, together)));

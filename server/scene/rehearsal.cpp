@@ -20,22 +20,23 @@ model::Scene after(const model::Scene& scene, std::span<const AcceptedChange> ch
 
 }  // namespace
 
-std::size_t Rehearsal::rehearsed(SceneOnDevice& on, const model::Scene& scene,
+std::size_t Rehearsal::rehearsed(const std::shared_ptr<SceneOnDevice>& on, const model::Scene& scene,
                                  std::span<const AcceptedChange> changes) {
   if (loader_ == nullptr) return changes.size();
+  if (isUnderWay()) return 0;
   if (making_.valid()) {
-    if (making_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return 0;
     const std::size_t ready = std::min(count_, changes.size());
     try {
       Made made = making_.get();
-      seconds_ += made.seconds;
+      seconds_ += *took_;
       loaded_ = std::move(made.loaded);
-      on.simulation.takeStages(std::move(made.stages));
+      on->simulation.takeStages(std::move(made.stages));
       // Others may wait instead, after a restart of the scene.
-      if (!on.simulation.makesStages(after(scene, changes.first(ready)).cloths)) return ready;
+      if (!on->simulation.makesStages(after(scene, changes.first(ready)).cloths)) return ready;
     } catch (const vulkan::DeviceLost&) {
       throw;
     } catch (const std::exception& failure) {  // the changes will say so, if they have no room either
+      seconds_ += *took_;
       telemetry::log({scene.name}, spdlog::level::debug, "a change was not rehearsed: {}", failure.what());
       return ready;
     }
@@ -45,29 +46,35 @@ std::size_t Rehearsal::rehearsed(SceneOnDevice& on, const model::Scene& scene,
   return 0;
 }
 
-void Rehearsal::begin(SceneOnDevice& on, model::Scene changed) {
-  use_ = std::make_shared<Use>();
+void Rehearsal::begin(const std::shared_ptr<SceneOnDevice>& on, model::Scene changed) {
   stop_ = std::stop_source();
-  // `on` may have ended before its turn comes, but the loader and the device live.
-  making_ = loader_->run([&loader = *loader_, &device = on.device, &on, use = use_, stop = stop_.get_token(),
-                          plan = on.simulation.planStages(changed.cloths), scene = std::move(changed)] {
-    Made made;
-    const schedule::Clock::time_point before = schedule::Clock::now();
-    made.loaded = loader.loadNow(device, scene, stop);
-    const std::lock_guard lock(use->mutex);
-    if (use->ended) throw std::runtime_error("the scene has ended");
-    made.stages = on.simulation.makeStages(plan);
-    made.seconds = schedule::seconds(schedule::Clock::now() - before);
+  took_ = std::make_shared<double>(0);
+  making_ = loader_->run([&loader = *loader_, on, took = took_, stop = stop_.get_token(),
+                          plan = on->simulation.planStages(changed.cloths), scene = std::move(changed)] {
+    const struct Measure {
+      double& seconds;
+      schedule::Clock::time_point began = schedule::Clock::now();
+      ~Measure() { seconds = schedule::seconds(schedule::Clock::now() - began); }
+    } measure{*took};
+    Made made{.on = on, .loaded = loader.loadNow(on->device, scene, stop), .stages = nullptr};
+    if (stop.stop_requested()) throw std::runtime_error("the rehearsal was stopped");
+    made.stages = on->simulation.makeStages(plan);
     return made;
   });
 }
 
+bool Rehearsal::isUnderWay() const {
+  return making_.valid() && making_.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+}
+
+void Rehearsal::dropFinished() {
+  if (!making_.valid() || isUnderWay()) return;
+  seconds_ += *took_;
+  making_ = {};
+}
+
 void Rehearsal::end() {
   stop_.request_stop();
-  if (use_) {
-    const std::lock_guard lock(use_->mutex);
-    use_->ended = true;
-  }
   making_ = {};
   loaded_.reset();
 }

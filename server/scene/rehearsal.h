@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <stop_token>
 #include <utility>
@@ -31,34 +30,32 @@ class Rehearsal {
 
   // `changes` wait to be applied to `scene`, which runs as `on`. Returns how many of them, from the first on, may
   // act now: `on` has their stages. If there are none, begins to rehearse all of them unless a rehearsal is under
-  // way. `on` must live until end(). Throws vulkan::DeviceLost.
-  std::size_t rehearsed(SceneOnDevice& on, const model::Scene& scene, std::span<const AcceptedChange> changes);
-  bool isUnderWay() const { return making_.valid(); }
+  // way. Throws vulkan::DeviceLost.
+  std::size_t rehearsed(const std::shared_ptr<SceneOnDevice>& on, const model::Scene& scene,
+                        std::span<const AcceptedChange> changes);
+  // No change waits for a rehearsal any more: drops what a finished one has made.
+  void dropFinished();
+  bool isUnderWay() const;
   // Seconds of the loader's thread that rehearsals took since the last call.
   double takeSeconds() { return std::exchange(seconds_, 0); }
   // A tick that needs the kernels of the changes is recorded.
   void release() { loaded_.reset(); }
-  // Stops what is under way. Waits while stages are made.
+  // Stops what is under way. The loader's thread may use the device until SceneLoader::wait() has returned.
   void end();
 
  private:
   struct Made {
+    std::shared_ptr<SceneOnDevice> on;  // outlives its stages
     std::unique_ptr<SceneOnDevice> loaded;
     std::shared_ptr<simulation::NewStages> stages;
-    double seconds = 0;
-  };
-  // Lets end() wait until the loader's thread does not use the scene any more.
-  struct Use {
-    std::mutex mutex;
-    bool ended = false;
   };
 
-  void begin(SceneOnDevice& on, model::Scene changed);
+  void begin(const std::shared_ptr<SceneOnDevice>& on, model::Scene changed);
 
   SceneLoader* const loader_;
   std::future<Made> making_;
   std::stop_source stop_;
-  std::shared_ptr<Use> use_;
+  std::shared_ptr<double> took_;           // seconds of the loader's thread, once making_ is ready
   std::size_t count_ = 0;                  // of changes that it rehearses
   std::unique_ptr<SceneOnDevice> loaded_;  // keeps the kernels
   double seconds_ = 0;

@@ -270,7 +270,7 @@ void SceneHost::applyInputs() {
 
 void SceneHost::applyChanges() {
   const std::span<AcceptedChange> changes = inputs_.changes;
-  if (changes.empty()) return;
+  if (changes.empty()) return rehearsal_.dropFinished();
   std::string problem;
   std::size_t applied = 0;
   try {
@@ -291,10 +291,12 @@ std::size_t SceneHost::applySome(std::span<const AcceptedChange> changes, std::s
   for (const AcceptedChange& accepted : changes) model::applyChange(changed, accepted.change);
   if (onDevice_->simulation.makesStages(changed.cloths)) {
     if (!making_.allows(tickStart_)) return 0;
-    changes = changes.first(rehearsal_.rehearsed(*onDevice_, scene_, changes));
+    changes = changes.first(rehearsal_.rehearsed(onDevice_, scene_, changes));
     if (const double seconds = rehearsal_.takeSeconds(); seconds > 0)
       making_.pay(tickStart_, kRehearsalCost * seconds);
     if (changes.empty()) return 0;
+  } else {
+    rehearsal_.dropFinished();
   }
   if (apply(changes, problem)) return changes.size();
   // One of them has room, or is the problem.

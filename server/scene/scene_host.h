@@ -246,7 +246,7 @@ class SceneHost {
   std::uint64_t nextReport_ = 0;  // tick
   delivery::CompleteFrame frame_;
 
-  std::unique_ptr<SceneOnDevice> onDevice_;
+  std::shared_ptr<SceneOnDevice> onDevice_;  // shared with a rehearsal
   Rehearsal rehearsal_;
 };
 

@@ -22,8 +22,7 @@ class SceneLoader {
  public:
   using Future = std::future<std::unique_ptr<SceneOnDevice>>;
 
-  // `done` is called on the worker thread when a scene is loaded or has failed. `workers` must outlive the
-  // loader.
+  // `done` is called on the worker thread after everything that it does. `workers` must outlive the loader.
   SceneLoader(codec::Workers& workers, std::function<void()> done);
   // Waits for the worker thread.
   ~SceneLoader() = default;

@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "server/scene/live_scene.h"
+#include "server/schedule/clock.h"
 
 namespace clothstream::scene {
 namespace {
@@ -21,6 +23,9 @@ constexpr double kGpuFactor = 64;
 // Most work of a slice, in slices: work that depends on the state, such as the pairs of a heap, can be that
 // much more than in the ticks before. It is limited by the first slice, because slices of calm ticks grow.
 constexpr double kMostFactor = 16;
+// The same while a scene is loaded. The work of its first recordings is not known yet, and other scenes wait for
+// it without a scheduler.
+constexpr double kMostFactorOfLoading = 1;
 
 }  // namespace
 
@@ -37,27 +42,34 @@ SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene,
         fmt::format("its buffers would leave fewer than {} of the {} allocations of memory that {} allows: "
                     "delete a scene first",
                     kSpareAllocations, most, device.info().name));
-  sliceRecordings();
+  sliceRecordings(kMostFactorOfLoading);
   recorder.begin();
   simulation.recordSaveState(recorder);
-  submitAndWait();
+  submitAndWait(stop);
   start = simulation.collectState(0);
   warmUp(scene, stop);
+  sliceRecordings(kMostFactor);
 }
 
 void SceneOnDevice::scaleSlices(double factor) {
   sliceInvocations_ = std::clamp(sliceInvocations_ * std::clamp(factor, 0.25, 1.25), kMinSlice, kMaxSlice);
-  sliceRecordings();
+  sliceRecordings(kMostFactor);
 }
 
-void SceneOnDevice::sliceRecordings() {
+void SceneOnDevice::sliceRecordings(double mostFactor) {
   const double first = device.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice;
   recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_),
-                      static_cast<std::uint64_t>(kMostFactor * std::min(sliceInvocations_, first)));
+                      static_cast<std::uint64_t>(mostFactor * std::min(sliceInvocations_, first)));
 }
 
-void SceneOnDevice::submitAndWait() {
-  device.wait(device.submit(recorder));
+// Other scenes have half of the device between two slices.
+void SceneOnDevice::submitAndWait(const std::stop_token& stop) {
+  for (std::uint32_t slice = 0; slice < recorder.sliceCount(); ++slice) {
+    if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
+    const schedule::Clock::time_point before = schedule::Clock::now();
+    device.wait(device.submitSlice(recorder, slice));
+    if (slice + 1 < recorder.sliceCount()) std::this_thread::sleep_for(schedule::Clock::now() - before);
+  }
 }
 
 void SceneOnDevice::warmUp(const model::Scene& scene, const std::stop_token& stop) {
@@ -70,13 +82,12 @@ void SceneOnDevice::warmUp(const model::Scene& scene, const std::stop_token& sto
     inputs.colliders.emplace_back();
     inputs.grabs.emplace_back();
   }
-  submitAndWait();
+  submitAndWait(stop);
   // One submission for each kernel, so that other scenes can use the device between two of them.
   for (const vulkan::RehearsedKernel& kernel : recorder.rehearsed()) {
-    if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
     recorder.begin();
     recorder.touch(*kernel.bindings);
-    submitAndWait();
+    submitAndWait(stop);
   }
 
   encode::FrameEncoder& encoder = encoders.finest();
@@ -84,13 +95,13 @@ void SceneOnDevice::warmUp(const model::Scene& scene, const std::stop_token& sto
   for (std::uint64_t tick = 1; tick <= 2; ++tick) {
     recorder.begin();
     const encode::RecordedFrame frame = encoder.record(recorder, tick, false);
-    submitAndWait();
+    submitAndWait(stop);
     encoder.entropyCode(frame, packet);
   }
   encoder.forgetHistory();
   recorder.begin();
   simulation.recordRestoreState(recorder, start);
-  submitAndWait();
+  submitAndWait(stop);
 }
 
 }  // namespace clothstream::scene

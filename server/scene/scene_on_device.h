@@ -37,8 +37,9 @@ struct SceneOnDevice {
 
  private:
   double sliceInvocations_;
-  void sliceRecordings();
-  void submitAndWait();
+  void sliceRecordings(double mostFactor);
+  // Throws std::runtime_error after a request to stop.
+  void submitAndWait(const std::stop_token& stop);
   // Runs everything that a tick and a frame may need. Software devices compile a kernel when it first runs,
   // which takes up to tenths of a second. Leaves the start state.
   void warmUp(const model::Scene& scene, const std::stop_token& stop);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Limits the time that changes of a scene take on the device's thread.
+// Limits the time that changes of a scene take.
 #pragma once
 
 #include "server/schedule/clock.h"
@@ -7,8 +7,7 @@
 
 namespace clothstream::schedule {
 
-// A change of a solver may need new tables, buffers and kernels, which take milliseconds to tenths of a
-// second to make. Such a change is paid for by the time that it took, so that its cost need not be known
+// A change of a solver may need new tables, buffers and kernels, which take milliseconds to seconds to make. Such a change is paid for by the time that it took, so that its cost need not be known
 // before. Changes that make nothing are not limited. Takes its time as an argument. Not thread-safe.
 class MakingLimit {
  public:

@@ -141,7 +141,8 @@ Stage makeHash(const vulkan::Device& device, const Buffers& b, std::uint32_t wor
 struct ClothSimulation::Pipeline {
   Pipeline(const vulkan::Device& on, const model::Scene& scene, const SimulationOptions& options);
 
-  void prepare(float airDensity);
+  // Creates the kernels that the present cloths need, and those that they need as soon as a collider appears.
+  void prepare();
   std::unique_ptr<XpbdStage> makeXpbd(std::span<const model::Cloth> cloths);
   std::unique_ptr<AssembledStage> makeAssembled(std::span<const model::Cloth> cloths);
   // Cloths of the stage that these cloths need to bend. Empty if the present one serves them, or if none bends.
@@ -153,7 +154,7 @@ struct ClothSimulation::Pipeline {
   // `stage` replaces the present stage unless it is null.
   void setBending(std::unique_ptr<BendingStage> stage, std::span<const model::Cloth> cloths);
   void makeAttachments(const AttachmentTables& tables);
-  // What setCloths() needs more than what there is.
+  // Whether setCloths() has to make these.
   bool needsSolvers(std::span<const model::Solver> wanted) const;
   bool needsBending(std::span<const model::Cloth> cloths) const;
   SolverStages makeSolvers(std::span<const model::Cloth> cloths);
@@ -179,6 +180,7 @@ struct ClothSimulation::Pipeline {
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
   std::uint32_t reach;  // HashPush::reach
+  float airDensity;     // kg/m^3, of the newest tick
   std::vector<shared::ClothRecord> records;
   std::vector<float> masses;       // 1/kg, by node
   std::vector<float> clothMasses;  // kg
@@ -202,7 +204,7 @@ struct ClothSimulation::Pipeline {
   std::uint64_t solverBytes = 0;                      // SolverStages::bytes of the present stages
   KeptStages kept;                                    // stages of earlier solvers
   std::shared_ptr<NewStages> taken;                   // ClothSimulation::takeStages(); may be null
-  std::mutex making;                                  // of makeSolvers()
+  std::mutex making;                                  // of makeSolvers(): guards the kernels of `solves`
   std::uint64_t made = 0;                             // ClothSimulation::stagesMade()
   std::vector<SpringStiffness> stiffness;             // of the cloths' springs
   std::unique_ptr<SolidStage> solids;                 // null if no collider is a triangle mesh
@@ -231,6 +233,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       offsets(simulation::clothOffsets(scene.cloths)),
       nodes(offsets.back()),
       reach(std::bit_cast<std::uint32_t>(model::reachOf(scene.stream))),
+      airDensity(scene.environment.airDensity),
       records(clothRecords(scene.cloths, substepSeconds)),
       masses(inverseMasses(scene.cloths)),
       clothMasses(massesOf(scene.cloths)),
@@ -275,7 +278,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
     makeAttachments(tables);
     attachments->setSlack(scene.cloths);
   }
-  prepare(scene.environment.airDensity);
+  prepare();
 }
 
 void ClothSimulation::Pipeline::makeAttachments(const AttachmentTables& tables) {
@@ -283,8 +286,7 @@ void ClothSimulation::Pipeline::makeAttachments(const AttachmentTables& tables) 
       std::make_unique<AttachmentStage>(device, tables, stateOf(buffers, collision), nodes, workgroupSize);
 }
 
-// Creates the kernels that the scene starts with, and those that it needs as soon as a collider appears.
-void ClothSimulation::Pipeline::prepare(float airDensity) {
+void ClothSimulation::Pipeline::prepare() {
   for (const bool colliders : {false, true}) {
     for (const Follow follow : kFollows) {
       const AdvanceVariant variant = variantOf(records, airDensity, colliders, follow);
@@ -571,6 +573,7 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
   if (pipeline_->attachments) pipeline_->attachments->setSlack(cloths);
   pipeline_->stiffness = springStiffness(cloths);
   pipeline_->records = std::move(records);
+  pipeline_->prepare();
 }
 
 bool ClothSimulation::makesStages(std::span<const model::Cloth> cloths) const {
@@ -609,6 +612,7 @@ void ClothSimulation::setSubsteps(std::uint32_t substeps, std::span<const model:
 
 void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inputs) {
   assert(inputs.colliders.size() <= kMaxColliders);
+  pipeline_->airDensity = inputs.environment.airDensity;
   pipeline_->start(recorder);
   pipeline_->recordInputs(recorder, inputs);
   pipeline_->recordSubsteps(recorder, inputs);

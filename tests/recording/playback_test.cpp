@@ -406,7 +406,7 @@ TEST_F(PlaybackTest, RefusesImpossibleRequests) {
     EXPECT_FALSE(control([&](auto& request) { request.set_speed(wrong); })) << wrong;
   v1::ParameterChange change;
   change.set_air_density(1);
-  const auto refused = scene->change(1, change);
+  const auto refused = scene->change(1, change, scene::Role::owner);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text, HasSubstr("a recording that is played"));
 }

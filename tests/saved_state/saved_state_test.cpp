@@ -230,7 +230,7 @@ TEST_F(SavedStateTest, AScenePausedBeforeItsFirstTickKeepsChanges) {
   live("mine")->paused = true;
   v1::ParameterChange change;
   change.mutable_gravity()->mutable_value()->set_y(-3);
-  ASSERT_TRUE(live("mine")->change(1, change));
+  ASSERT_TRUE(live("mine")->change(1, change, scene::Role::owner));
   ASSERT_TRUE(store_->flush(10s));
   end();
   run();

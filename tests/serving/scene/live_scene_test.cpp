@@ -28,7 +28,7 @@ TEST(LiveScene, RestartRestoresTheStart) {
   v1::ColliderChange& ball = *change.add_colliders();
   ball.set_name("ball");
   ball.mutable_position()->set_y(7);
-  ASSERT_TRUE(live.change(1, change));
+  ASSERT_TRUE(live.change(1, change, Role::owner));
   live.tick = 50;
   live.resetRequested = true;
   EXPECT_EQ(live.restart().wind().value().x(), 0);
@@ -77,7 +77,7 @@ Changes changeUntilRefused(LiveScene& live, std::uint64_t participant) {
   Changes changes;
   messages::Result<void> result;
   Inputs applied;
-  while (changes.accepted < 10'000 && (result = live.change(participant, change))) {
+  while (changes.accepted < 10'000 && (result = live.change(participant, change, Role::owner))) {
     ++changes.accepted;
     live.inbox.drain(applied);
   }
@@ -125,7 +125,7 @@ TEST(LiveScene, LimitsTheBytesOfChangesPerSecond) {
   int accepted = 0;
   messages::Result<void> result;
   Inputs applied;
-  while (accepted < 1000 && (result = live.change(1, change))) {
+  while (accepted < 1000 && (result = live.change(1, change, Role::owner))) {
     ++accepted;
     live.inbox.drain(applied);
   }
@@ -133,7 +133,7 @@ TEST(LiveScene, LimitsTheBytesOfChangesPerSecond) {
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   EXPECT_THAT(result.error().text, testing::HasSubstr("too many bytes of changes of 'small' by one"));
-  EXPECT_TRUE(live.change(2, change)) << "others have their share";
+  EXPECT_TRUE(live.change(2, change, Role::owner)) << "others have their share";
 }
 
 // Fields that this release does not know are announced, too.
@@ -143,13 +143,13 @@ TEST(LiveScene, RefusesAChangeWhoseAnnouncementIsTooLarge) {
   change.mutable_wind()->mutable_value()->set_x(3);
   const auto most = static_cast<std::size_t>(ChangeLimits::kOfParticipantBurstBytes);
   change.GetReflection()->MutableUnknownFields(&change)->AddLengthDelimited(1000, std::string(most, 'x'));
-  const messages::Result<void> refused = live.change(1, change);
+  const messages::Result<void> refused = live.change(1, change, Role::owner);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, v1::ERROR_CODE_INVALID_ARGUMENT);
   EXPECT_THAT(refused.error().text, testing::HasSubstr("change fewer cloths at once"));
   EXPECT_EQ(live.definition().environment.wind.x(), 0);
   change.GetReflection()->MutableUnknownFields(&change)->Clear();
-  EXPECT_TRUE(live.change(1, change)) << "nothing was charged";
+  EXPECT_TRUE(live.change(1, change, Role::owner)) << "nothing was charged";
 }
 
 TEST(ChangeLimits, CountsNumberAndBytesOfEachParticipantAndOfAll) {
@@ -186,7 +186,7 @@ TEST(LiveScene, BecomesAGuestWhileItCostsMoreThanAtItsStart) {
   v1::ClothChange& cloth = *change.add_cloths();
   cloth.set_name("sheet");
   cloth.mutable_solver()->mutable_constraint()->set_iterations(100);
-  ASSERT_TRUE(live.change(1, change));
+  ASSERT_TRUE(live.change(1, change, Role::owner));
   EXPECT_TRUE(live.isGuest());
   Inputs applied;
   live.inbox.drain(applied);  // revertTo() keeps waiting changes
@@ -198,7 +198,7 @@ TEST(LiveScene, RevertKeepsAppliedAndWaitingChanges) {
   LiveScene live(smallScene());
   v1::ParameterChange waiting;
   waiting.mutable_wind()->mutable_value()->set_x(3);
-  ASSERT_TRUE(live.change(1, waiting));
+  ASSERT_TRUE(live.change(1, waiting, Role::owner));
   model::Scene now = smallScene();
   now.cloths[0].thickness = 0.02f;
   const v1::ParameterChange said = live.revertTo(now);

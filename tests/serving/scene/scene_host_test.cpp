@@ -335,6 +335,29 @@ TEST_F(SceneHostTest, AnotherChangeThanTheRehearsedOneIsRehearsedToo) {
   EXPECT_EQ(hosted.live.inbox.depth().changes, 0u);
 }
 
+TEST_F(SceneHostTest, ARehearsalThatNobodyNeedsLeavesNothingOnTheDevice) {
+  HostedScene hosted;
+  SceneLoader loader(hosted.publisher.workers(), [] {});
+  SceneHost host(std::make_unique<SceneOnDevice>(tests::device(), smallScene(), hosted.publisher.workers()), hosted.live,
+                 hosted.publisher, 0, &loader);
+  const auto tick = [&] {
+    host.begin(hosted.now += std::chrono::seconds(1));
+    host.finish();
+    hosted.publisher.drain();
+  };
+  tick();
+  const std::uint64_t before = tests::device().allocatedBytes();
+  hosted.change(constraints(3));
+  tick();
+  hosted.change({.cloths = {{.solver = smallScene().cloths[0].solver}}});
+  tick();
+  EXPECT_EQ(hosted.live.inbox.depth().changes, 0u) << "both together need nothing";
+  loader.wait();
+  tick();
+  EXPECT_FALSE(host.isRehearsing());
+  EXPECT_EQ(tests::device().allocatedBytes(), before);
+}
+
 TEST_F(SceneHostTest, ChangesOfSolversToAndFroDoNotWait) {
   HostedScene hosted;
   for (std::uint32_t i = 0; i < 20; ++i) {
@@ -367,7 +390,7 @@ TEST_F(SceneHostTest, ChangeActsAndIsAnnouncedAtTheNextTick) {
   unchanged.ticks(5);
   v1::ParameterChange message;
   message.mutable_gravity()->mutable_value()->set_y(-2);
-  ASSERT_TRUE(changed.live.change(42, message));
+  ASSERT_TRUE(changed.live.change(42, message, Role::owner));
   EXPECT_EQ(changed.live.definition().environment.gravity.y(), -2);
   changed.tick();
   unchanged.tick();
