@@ -251,7 +251,8 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
       measureSpeed();
       for (const auto& scene : scenes) runs_.push_back(std::make_unique<Run>(scene));
       scene::LiveScene& first = *runs_.front()->scene;
-      runs_.front()->host = std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_, &loader_);
+      runs_.front()->host =
+          std::make_unique<scene::SceneHost>(*device_, first, publisher_, reportRate_, &loader_);
       continueOverload(*runs_.front());
       runs_.front()->host->setWork(runs_.front()->overload.level());
       info_ = device_->info();
@@ -386,7 +387,8 @@ void DeviceThread::begin(Run& run, std::unique_ptr<scene::SceneOnDevice> loaded)
   if (run.host) {
     run.host->rebuild(std::move(loaded), run.rebuiltAfter);
   } else {
-    run.host = std::make_unique<scene::SceneHost>(std::move(loaded), *run.scene, publisher_, reportRate_, &loader_);
+    run.host =
+        std::make_unique<scene::SceneHost>(std::move(loaded), *run.scene, publisher_, reportRate_, &loader_);
     continueOverload(run);
   }
   run.host->setWork(run.overload.level());

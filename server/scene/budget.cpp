@@ -225,9 +225,10 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   const double seconds = secondsWith(scene), start = startSeconds(scene);
   if (const double most = std::max(kInTime, kMostOfStart * start);
       pace == Pace::inTime && price.load > charged_.load && seconds > most)
-    return refuse(fmt::format("would take {:.2f} s of the device's time a second, by estimate; only an owner of the "
-                              "scene may let it take more than {:.2f} s, and so slow it down: {}",
-                              seconds, most, whatFits(scene, made_, seconds, most, secondsWith)));
+    return refuse(
+        fmt::format("would take {:.2f} s of the device's time a second, by estimate; only an owner of the "
+                    "scene may let it take more than {:.2f} s, and so slow it down: {}",
+                    seconds, most, whatFits(scene, made_, seconds, most, secondsWith)));
   const double free = std::max(0.0, limits.megabytes - (budget_->megabytes_ - charged_.megabytes));
   const double room = std::min(limits.sceneMegabytes, free);
   if (price.megabytes > charged_.megabytes && price.megabytes > room)

@@ -60,8 +60,8 @@ class Charge {
   Charge(const Charge&) = delete;
   Charge& operator=(const Charge&) = delete;
 
-  // Whether the price may be higher than what lets a scene keep its rate, alone on the device. A scene that the
-  // server started with may always cost a quarter more than at its start.
+  // Whether the price may be higher than what lets a scene keep its rate, alone on the device. A scene that
+  // the server started with may always cost a quarter more than at its start.
   enum class Pace : std::uint8_t { any, inTime };
   // Charges the scene as it will be. If that exceeds the budget, changes nothing and returns an error that
   // names price, budget and what would fit. `path` begins its text. A price that is no higher than before is
@@ -70,8 +70,8 @@ class Charge {
   // Room for the hands of participants, and for their other colliders next to these hands, as sums of weights
   // (collider_shares.h). Hands only need room in their scene, and always have some: they are no part of the
   // server's load, so that nobody else can use up their room. Other colliders have half of the load that is
-  // free, so that the other half is there for those of the next scene, and no more than lets the scene keep its
-  // rate. Infinite until the speed is known.
+  // free, so that the other half is there for those of the next scene, and no more than lets the scene keep
+  // its rate. Infinite until the speed is known.
   double roomForHands(const model::Scene& scene) const;
   double roomForOthers(const model::Scene& scene, double hands) const;
   // Charges the scene with these colliders of its participants, also beyond the budget.

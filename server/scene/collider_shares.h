@@ -17,11 +17,11 @@ struct ClothBounds {
   model::Vec3 low, high;
 };
 
-// Weight of a collider: its price as a share of that of one that a third of the nodes are near. `cloth` is null
-// if nothing is known about the place of the cloth.
+// Weight of a collider: its price as a share of that of one that a third of the nodes are near. `cloth` is
+// null if nothing is known about the place of the cloth.
 //
-// The share of nodes that a collider can be near follows from its size: a large one may be near all. A collider
-// that is farther from all cloth than kFarAway weighs next to nothing.
+// The share of nodes that a collider can be near follows from its size: a large one may be near all. A
+// collider that is farther from all cloth than kFarAway weighs next to nothing.
 inline constexpr double kFarWeight = 0.01, kLeastWeight = 0.05, kMostWeight = 3;
 inline constexpr float kFarAway = 2;  // m
 double weightOf(const model::ParticipantCollider& collider, const ClothBounds* cloth);

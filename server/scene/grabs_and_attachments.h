@@ -66,7 +66,8 @@ class GrabsAndAttachments {
  private:
   Slot* find(std::uint64_t participant, std::uint32_t id);
   static void release(Slot& slot);
-  // Largest force of each grab, N: those that hold something, or may do so, share it. `most` is maxGrabForce().
+  // Largest force of each grab, N: those that hold something, or may do so, share it. `most` is
+  // maxGrabForce().
   float forceOfEach(float most) const;
 
   State state_;

@@ -16,8 +16,8 @@ inline constexpr float kMaxHandTurn = 0.5f;
 // kGrowth, m/s.
 inline constexpr float kMaxAppearance = 0.1f;
 inline constexpr float kGrowth = 3;
-// Force that every grab may have, N. Heavier cloth may be held more strongly, by all grabs together: all of it
-// gets kMaxHandSpeed in kPullSeconds, or in one tick if that is longer.
+// Force that every grab may have, N. Heavier cloth may be held more strongly, by all grabs together: all of
+// it gets kMaxHandSpeed in kPullSeconds, or in one tick if that is longer.
 inline constexpr float kLeastMaxForce = 20;
 inline constexpr float kPullSeconds = 0.1f;
 
@@ -33,8 +33,8 @@ float wayOf(float radius, const model::Pose& from, const model::Pose& to);
 // The pose on the way from `from` to `to`, after at most `step` metres of such a point.
 model::Pose towards(float radius, const model::Pose& from, const model::Pose& to, float step);
 
-// Maximum force of a grab on the cloth of this scene, N. All grabs together may have as much, or kLeastMaxForce
-// each if that is more.
+// Maximum force of a grab on the cloth of this scene, N. All grabs together may have as much, or
+// kLeastMaxForce each if that is more.
 float maxGrabForce(const model::Scene& scene);
 
 }  // namespace clothstream::scene

@@ -112,8 +112,7 @@ class LiveScene : private ColliderBudget {
 
   // Puts the change into the inbox, or returns what is wrong with it. Only an owner may make the scene dearer
   // than what lets it keep its rate (Charge).
-  messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message,
-                                Role role);
+  messages::Result<void> change(std::uint64_t participant, const v1::ParameterChange& message, Role role);
   // Resets everything to the start, because a new simulation begins; drops all waiting changes. Returns the
   // change that announces it.
   v1::ParameterChange restart();

@@ -17,9 +17,9 @@
 namespace clothstream::scene {
 
 // A change of a solver may need kernels that no scene uses yet, and tables. They take up to seconds, which no
-// other scene may wait for. So the changed scene is loaded a second time meanwhile, on the loader's thread, which
-// compiles all kernels: those of one device share what is compiled. Then the loader's thread makes the stages.
-// Belongs to the device's thread.
+// other scene may wait for. So the changed scene is loaded a second time meanwhile, on the loader's thread,
+// which compiles all kernels: those of one device share what is compiled. Then the loader's thread makes the
+// stages. Belongs to the device's thread.
 class Rehearsal {
  public:
   // `loader` is null if changes make what they need themselves. It must outlive this object.
@@ -28,9 +28,9 @@ class Rehearsal {
   Rehearsal(const Rehearsal&) = delete;
   Rehearsal& operator=(const Rehearsal&) = delete;
 
-  // `changes` wait to be applied to `scene`, which runs as `on`. Returns how many of them, from the first on, may
-  // act now: `on` has their stages. If there are none, begins to rehearse all of them unless a rehearsal is under
-  // way. Throws vulkan::DeviceLost.
+  // `changes` wait to be applied to `scene`, which runs as `on`. Returns how many of them, from the first on,
+  // may act now: `on` has their stages. If there are none, begins to rehearse all of them unless a rehearsal
+  // is under way. Throws vulkan::DeviceLost.
   std::size_t rehearsed(const std::shared_ptr<SceneOnDevice>& on, const model::Scene& scene,
                         std::span<const AcceptedChange> changes);
   // No change waits for a rehearsal any more: drops what a finished one has made.

@@ -21,8 +21,8 @@ namespace {
 
 // After a change of solver, the excess length of springs shrinks as exp(-t / kEaseTime) for kEaseSeconds.
 constexpr double kEaseSeconds = 0.5, kEaseTime = 0.1;
-// Price of a second of a rehearsal, in seconds of schedule::MakingLimit: it takes a processor, and other scenes
-// go on.
+// Price of a second of a rehearsal, in seconds of schedule::MakingLimit: it takes a processor, and other
+// scenes go on.
 constexpr double kRehearsalCost = 0.2;
 constexpr std::uint32_t kCheckpointSeconds = 1, kSnapshotSeconds = 5;
 // Maximum number of poses whose latency one frame measures; one for each participant and tick.

@@ -140,9 +140,9 @@ class SceneHost {
   // Announces that a recording started or stopped.
   void announceRecording();
   void applyInputs();
-  // Applies the changes of the inbox. Those that would make stages wait for a later tick until earlier ones are
-  // paid for (schedule::MakingLimit) and their kernels are compiled (Rehearsal), and so do all after them. All
-  // of them also wait after an exception.
+  // Applies the changes of the inbox. Those that would make stages wait for a later tick until earlier ones
+  // are paid for (schedule::MakingLimit) and their kernels are compiled (Rehearsal), and so do all after
+  // them. All of them also wait after an exception.
   void applyChanges();
   // Returns how many of them, from the first on, it has applied. If `problem` is still empty, the others
   // wait.

@@ -23,8 +23,8 @@ constexpr double kGpuFactor = 64;
 // Most work of a slice, in slices: work that depends on the state, such as the pairs of a heap, can be that
 // much more than in the ticks before. It is limited by the first slice, because slices of calm ticks grow.
 constexpr double kMostFactor = 16;
-// The same while a scene is loaded. The work of its first recordings is not known yet, and other scenes wait for
-// it without a scheduler.
+// The same while a scene is loaded. The work of its first recordings is not known yet, and other scenes wait
+// for it without a scheduler.
 constexpr double kMostFactorOfLoading = 1;
 
 }  // namespace

@@ -7,8 +7,9 @@
 
 namespace clothstream::schedule {
 
-// A change of a solver may need new tables, buffers and kernels, which take milliseconds to seconds to make. Such a change is paid for by the time that it took, so that its cost need not be known
-// before. Changes that make nothing are not limited. Takes its time as an argument. Not thread-safe.
+// A change of a solver may need new tables, buffers and kernels, which take milliseconds to seconds to make.
+// Such a change is paid for by the time that it took, so that its cost need not be known before. Changes that
+// make nothing are not limited. Takes its time as an argument. Not thread-safe.
 class MakingLimit {
  public:
   // Seconds of making in a second, and at once.

@@ -145,7 +145,8 @@ struct ClothSimulation::Pipeline {
   void prepare();
   std::unique_ptr<XpbdStage> makeXpbd(std::span<const model::Cloth> cloths);
   std::unique_ptr<AssembledStage> makeAssembled(std::span<const model::Cloth> cloths);
-  // Cloths of the stage that these cloths need to bend. Empty if the present one serves them, or if none bends.
+  // Cloths of the stage that these cloths need to bend. Empty if the present one serves them, or if none
+  // bends.
   std::vector<model::Cloth> bendingCloths(std::span<const model::Cloth> cloths) const;
   // Null without cloths.
   std::unique_ptr<BendingStage> makeBending(std::span<const model::Cloth> cloths) const;

@@ -87,8 +87,8 @@ class ClothSimulation {
   bool makesStages(std::span<const model::Cloth> cloths) const;
   // What setCloths() would make.
   StagePlan planStages(std::span<const model::Cloth> cloths) const;
-  // Makes that. Another thread may call it, also while this simulation works. Throws std::runtime_error if the
-  // device has too little memory.
+  // Makes that. Another thread may call it, also while this simulation works. Throws std::runtime_error if
+  // the device has too little memory.
   std::shared_ptr<NewStages> makeStages(const StagePlan& plan);
   // The next setCloths() uses these stages, as far as its cloths need them.
   void takeStages(std::shared_ptr<NewStages> stages);

@@ -79,9 +79,8 @@ class KeptStages {
 
  private:
   std::vector<SolverStages>::const_iterator find(std::span<const model::Solver> solvers) const {
-    return std::ranges::find_if(kept_, [&](const SolverStages& stages) {
-      return haveSameTables(stages.solvers, solvers);
-    });
+    return std::ranges::find_if(
+        kept_, [&](const SolverStages& stages) { return haveSameTables(stages.solvers, solvers); });
   }
 
   std::vector<SolverStages> kept_;

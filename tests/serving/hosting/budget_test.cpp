@@ -108,8 +108,9 @@ TEST(BudgetTest, AParticipantKeepsASceneInTime) {
   const auto refused = charge.charge("parameterChange", slow, inTime);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
-  EXPECT_THAT(refused.error().text, MatchesRegex("parameterChange: would take .* only an owner of the scene may "
-                                                 "let it take more than 0.70 s, .* [0-9]* iterations would fit"));
+  EXPECT_THAT(refused.error().text,
+              MatchesRegex("parameterChange: would take .* only an owner of the scene may "
+                           "let it take more than 0.70 s, .* [0-9]* iterations would fit"));
   EXPECT_TRUE(charge.charge("parameterChange", sceneOf(2), inTime));
   ASSERT_TRUE(charge.charge("parameterChange", slow, any)) << "by an owner";
   EXPECT_TRUE(charge.charge("parameterChange", sceneOf(999), inTime)) << "cheaper than now";

@@ -272,12 +272,12 @@ TEST(ColliderShares, AScenesCollidersLeaveHalfOfTheFreeLoadToTheNext) {
 
 TEST(ColliderShares, CollidersDoNotMakeASceneLate) {
   const model::Scene scene = tests::smallScene();
-  const auto budget =
-      std::make_shared<Budget>(BudgetLimits{.sceneLoad = 1e9, .load = 1e9, .tickSeconds = 0});
+  const auto budget = std::make_shared<Budget>(BudgetLimits{.sceneLoad = 1e9, .load = 1e9, .tickSeconds = 0});
   const auto chargeAt = [&](double nodeStepSeconds, const ColliderLoad& colliders) {
     budget->setSpeed({.nodeStepSeconds = nodeStepSeconds, .dispatchSeconds = 0, .workgroupFactor = 1});
     Charge charge(budget, scene, true);
-    charge.chargeColliders(scene, {.hands = colliders.hands, .others = charge.roomForOthers(scene, colliders.hands)});
+    charge.chargeColliders(
+        scene, {.hands = colliders.hands, .others = charge.roomForOthers(scene, colliders.hands)});
     return charge.load(scene);
   };
   EXPECT_NEAR(chargeAt(1e-6, {}), 0.7, 1e-6);

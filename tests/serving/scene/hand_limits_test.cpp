@@ -20,10 +20,10 @@
 namespace clothstream::scene {
 namespace {
 
-using ::testing::Each;
-using ::testing::ElementsAre;
 using model::Vec3;
 using simulation::MovingCollider;
+using ::testing::Each;
+using ::testing::ElementsAre;
 using tests::handAt;
 using tests::smallScene;
 
@@ -135,7 +135,8 @@ TEST_F(HandLimits, GrabsShareTheForceOfOne) {
   EXPECT_THAT(forcesOf({100, 100, 100}), ElementsAre(100, 100, 100));
   EXPECT_THAT(forcesOf({100, 1e6f, 1e6f}), ElementsAre(100, 100, 100));
   EXPECT_THAT(forcesOf({20, 1e6f, 1e6f}), ElementsAre(20, 140, 140)) << "one that needs less leaves the rest";
-  EXPECT_THAT(forcesOf(std::vector<float>(20, 1e6f)), Each(kLeastMaxForce)) << "as much as every grab may have";
+  EXPECT_THAT(forcesOf(std::vector<float>(20, 1e6f)), Each(kLeastMaxForce))
+      << "as much as every grab may have";
 }
 
 TEST_F(HandLimits, LightClothMayBeHeldAsBefore) {
