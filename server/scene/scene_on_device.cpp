@@ -26,6 +26,8 @@ constexpr double kMostFactor = 16;
 // The same while a scene is loaded. The work of its first recordings is not known yet, and other scenes wait
 // for it without a scheduler.
 constexpr double kMostFactorOfLoading = 1;
+// Pause after a slice of loading, as a multiple of its time.
+constexpr int kPause = 2;
 
 }  // namespace
 
@@ -62,13 +64,13 @@ void SceneOnDevice::sliceRecordings(double mostFactor) {
                       static_cast<std::uint64_t>(mostFactor * std::min(sliceInvocations_, first)));
 }
 
-// Other scenes have half of the device between two slices.
 void SceneOnDevice::submitAndWait(const std::stop_token& stop) {
   for (std::uint32_t slice = 0; slice < recorder.sliceCount(); ++slice) {
     if (stop.stop_requested()) throw std::runtime_error("loading was stopped");
     const schedule::Clock::time_point before = schedule::Clock::now();
     device.wait(device.submitSlice(recorder, slice));
-    if (slice + 1 < recorder.sliceCount()) std::this_thread::sleep_for(schedule::Clock::now() - before);
+    const schedule::Clock::duration used = schedule::Clock::now() - before;
+    if (slice + 1 < recorder.sliceCount()) std::this_thread::sleep_for(kPause * used);
   }
 }
 
