@@ -33,7 +33,7 @@ class SceneLoader {
   // constructor of SceneOnDevice throws, and std::runtime_error soon after a request to stop.
   Future load(vulkan::Device& device, const model::Scene& scene, std::stop_token stop);
 
-  // What load() does on the worker thread.
+  // Loads a scene on the calling thread, as load() does on the worker thread.
   std::unique_ptr<SceneOnDevice> loadNow(vulkan::Device& device, const model::Scene& scene,
                                          const std::stop_token& stop);
   // Runs `work` on the worker thread. The future throws what it throws.

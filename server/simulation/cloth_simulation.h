@@ -61,7 +61,7 @@ struct SimulationOptions {
   std::span<const std::uint32_t> advanceKernel = {};
 };
 
-// What cloths need that a simulation does not have.
+// Lists the cloths for which a simulation lacks stages.
 struct StagePlan {
   std::vector<model::Cloth> solvers;  // cloths whose solvers need stages; empty: none do
   std::vector<model::Cloth> bending;  // cloths of the tables of bending; empty: they need no new ones
@@ -85,7 +85,7 @@ class ClothSimulation {
   void setCloths(std::span<const model::Cloth> cloths);
   // Returns whether setCloths() would make stages, which takes milliseconds to seconds.
   bool makesStages(std::span<const model::Cloth> cloths) const;
-  // What setCloths() would make.
+  // Returns what setCloths() would make.
   StagePlan planStages(std::span<const model::Cloth> cloths) const;
   // Makes that. Another thread may call it, also while this simulation works. Throws std::runtime_error if
   // the device has too little memory.

@@ -334,7 +334,7 @@ TEST_F(SceneHostTest, AnotherChangeThanTheRehearsedOneIsRehearsedToo) {
   EXPECT_EQ(hosted.live.inbox.depth().changes, 0u);
 }
 
-TEST_F(SceneHostTest, ARehearsalThatNobodyNeedsLeavesNothingOnTheDevice) {
+TEST_F(SceneHostTest, UnneededRehearsalFreesItsDeviceMemory) {
   HostedScene hosted;
   SceneLoader loader(hosted.publisher.workers(), [] {});
   SceneHost host(std::make_unique<SceneOnDevice>(tests::device(), smallScene(), hosted.publisher.workers()),
