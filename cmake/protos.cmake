@@ -28,6 +28,9 @@ target_link_libraries(clothstream_protos PUBLIC
 
 if(CLOTHSTREAM_RPC)
   find_package(gRPC CONFIG REQUIRED)
+  # In Debian 13 the options of RE2, which gRPC links, are those of Abseil on Windows: -DNOMINMAX. Precompiled headers are not
+  # valid with it.
+  set_property(TARGET re2::re2 PROPERTY INTERFACE_COMPILE_OPTIONS)
   if(gRPC_VERSION VERSION_LESS 1.60)
     message(STATUS "gRPC ${gRPC_VERSION} has published weaknesses (SECURITY.md): do not let the server's gRPC port face the open "
       "internet")

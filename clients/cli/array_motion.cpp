@@ -2,6 +2,7 @@
 // Motion of a .npz file: positions per frame, and the cloth at rest from arrays or an OBJ file.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 
@@ -11,7 +12,6 @@
 #include "clients/cli/motion.h"
 #include "clients/files/npz_reader.h"
 #include "clients/files/obj_surface.h"
-#include "proto/codec/stream_layout.h"
 
 namespace clothstream::cli {
 namespace {
@@ -20,7 +20,6 @@ using files::NpzArray;
 using files::NpzReader;
 
 constexpr std::uint64_t kMaxFrames = 10'000'000;
-constexpr std::uint64_t kMaxTriangles = 2 * std::uint64_t{codec::kMaxVertices};
 constexpr std::uint64_t kMaxCloths = 256;
 constexpr double kMaxRate = 100'000;
 
@@ -56,8 +55,11 @@ Expected<std::vector<T>> readAll(const NpzReader& file, const std::string& path,
 
 class ArrayMotion : public Motion {
  public:
-  ArrayMotion(std::string path, NpzReader file, NpzArray positions)
-      : path_(std::move(path)), file_(std::move(file)), array_(std::move(positions)) {}
+  ArrayMotion(std::string path, NpzReader file, NpzArray positions, std::uint32_t maxVertices)
+      : path_(std::move(path)),
+        file_(std::move(file)),
+        array_(std::move(positions)),
+        maxVertices_(maxVertices) {}
 
   Expected<void> open(const ArrayOptions& options) {
     return checkPositions()
@@ -96,12 +98,12 @@ class ArrayMotion : public Motion {
   Expected<void> checkPositions() {
     const std::vector<std::uint64_t>& shape = array_.header().shape;
     if (shape.size() != 3 || shape[0] < 1 || shape[0] > kMaxFrames || shape[1] < 1 ||
-        shape[1] > codec::kMaxVertices || shape[2] != 3)
+        shape[1] > maxVertices_ || shape[2] != 3)
       return makeError(
           kUnreadable,
           "{}: array positions has the shape ({}); it must be (frames, vertices, 3) with 1 to {} "
-          "frames and 1 to {} vertices",
-          path_, fmt::join(shape, ", "), kMaxFrames, codec::kMaxVertices);
+          "frames and 1 to {} vertices (--max-vertices)",
+          path_, fmt::join(shape, ", "), kMaxFrames, maxVertices_);
     frames_ = shape[0];
     return {};
   }
@@ -121,13 +123,13 @@ class ArrayMotion : public Motion {
         return makeError(kUsage,
                          "{} has no arrays triangles and rest_positions; give the cloth at rest with --mesh",
                          path_);
-      auto rest = readAll<float>(file_, path_, "rest_positions", {3}, codec::kMaxVertices);
+      auto rest = readAll<float>(file_, path_, "rest_positions", {3}, maxVertices_);
       if (!rest) return tl::unexpected(rest.error());
       surface_.rest = std::move(*rest);
       if (surface_.vertexCount() != vertices)
         return makeError(kUnreadable, "{}: rest_positions has {} vertices, positions {}", path_,
                          surface_.vertexCount(), vertices);
-      auto triangles = readAll<std::uint64_t>(file_, path_, "triangles", {3}, kMaxTriangles);
+      auto triangles = readAll<std::uint64_t>(file_, path_, "triangles", {3}, 2 * std::uint64_t{maxVertices_});
       if (!triangles) return tl::unexpected(triangles.error());
       const std::uint64_t largest = triangles->empty() ? 0 : std::ranges::max(*triangles);
       if (largest >= vertices)
@@ -242,6 +244,7 @@ class ArrayMotion : public Motion {
   std::string path_;
   NpzReader file_;
   NpzArray array_;  // positions
+  const std::uint32_t maxVertices_;
   measure::Surface surface_;
   std::vector<std::uint64_t> ticks_;
   std::vector<float> positions_;
@@ -252,13 +255,13 @@ class ArrayMotion : public Motion {
 
 }  // namespace
 
-tl::expected<std::unique_ptr<Motion>, Error> openArrays(const std::string& path,
-                                                        const ArrayOptions& options) {
+tl::expected<std::unique_ptr<Motion>, Error> openArrays(const std::string& path, const ArrayOptions& options,
+                                                        std::uint32_t maxVertices) {
   auto file = orError(kUnreadable, NpzReader::open(path));
   if (!file) return tl::unexpected(file.error());
   auto positions = orError(kUnreadable, file->array("positions"));
   if (!positions) return tl::unexpected(positions.error());
-  auto motion = std::make_unique<ArrayMotion>(path, std::move(*file), std::move(*positions));
+  auto motion = std::make_unique<ArrayMotion>(path, std::move(*file), std::move(*positions), maxVertices);
   if (auto opened = motion->open(options); !opened) return tl::unexpected(opened.error());
   return motion;
 }

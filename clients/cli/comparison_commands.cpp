@@ -103,6 +103,7 @@ void ComparisonCommands::addImport(CLI::App& app) {
                    "sqrt(3) times that away from its place. Default: 10um")
       ->transform(length())
       ->check(CLI::Range(5e-6, 1.0));
+  addLimits(*import_, importOptions_.limits);
 }
 
 void ComparisonCommands::addGolden(CLI::App& app) {

@@ -166,7 +166,7 @@ class Import {
 }  // namespace
 
 ExitCode importStates(const ImportOptions& options) {
-  auto motion = openArrays(options.states, options.arrays);
+  auto motion = openArrays(options.states, options.arrays, options.limits.vertices);
   if (!motion) return printError(motion.error());
   Import importing(options, **motion);
   const auto frames = importing.run();

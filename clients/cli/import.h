@@ -12,6 +12,7 @@ namespace clothstream::cli {
 struct ImportOptions {
   std::string states;  // .npz
   ArrayOptions arrays;
+  recording::ReadLimits limits{};
   std::string output;      // recording; must not exist
   std::string scene;       // name of the scene in the recording
   double maxError = 1e-5;  // metres; a vertex is at most sqrt(3) times that away from its place

@@ -196,7 +196,7 @@ std::string toJson(const RecordingReader& reader, const RecordingFigures& figure
                                             : nlohmann::ordered_json(nullptr)},
         {"seconds", figures.faults.firstSeconds()}};
   json["unreadableMessages"] = figures.unreadable;
-  json["whole"] = damage.empty();
+  if (!options.quick || !damage.empty()) json["whole"] = damage.empty();
   if (!damage.empty()) json["damage"] = damage;
   return jsonText(json, 1) + '\n';
 }

@@ -13,6 +13,7 @@
 #include "clients/cli/error.h"
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
+#include "clients/cli/recording_limits.h"
 #include "clients/cli/signals.h"
 #include "clients/native/address.h"
 
@@ -174,6 +175,7 @@ void LoadCommand::add(CLI::App& app) {
   command_->add_option("--seconds", options_.seconds, "Seconds to measure after all have joined")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  addStreamLimit(*command_, options_.maxVertices);
   command_->add_flag("--web", web_, "Use WebSocket, as the page does, instead of gRPC");
   command_->add_option("--server-pid", serverPid_,
                        "Process id of the server on this machine; adds its CPU time to the report");

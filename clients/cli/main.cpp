@@ -246,6 +246,7 @@ int run(int argc, char** argv) {
   SetOptions setOptions;
   CLI::App& setCommand = *app.add_subcommand("set", "Change parameters of a running scene");
   addSetOptions(setCommand, setOptions);
+  addStreamLimit(setCommand, setOptions.maxVertices);
   setCommand.add_option("ADDRESS", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
       ->capture_default_str();
 

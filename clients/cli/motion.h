@@ -54,8 +54,10 @@ struct ArrayOptions {
 
 [[nodiscard]] tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(
     const std::string& path, const recording::ReadLimits& limits);
+// Refuses more than `maxVertices` vertices, or twice as many triangles, before it reads them.
 [[nodiscard]] tl::expected<std::unique_ptr<Motion>, Error> openArrays(const std::string& path,
-                                                                      const ArrayOptions& options);
+                                                                      const ArrayOptions& options,
+                                                                      std::uint32_t maxVertices);
 // Chooses by the name: .npz is a file of arrays, any other one a recording.
 [[nodiscard]] tl::expected<std::unique_ptr<Motion>, Error> openMotion(const std::string& path,
                                                                       const ArrayOptions& options,

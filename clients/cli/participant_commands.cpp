@@ -13,6 +13,7 @@
 #include "clients/cli/json_text.h"
 #include "clients/cli/presence.h"
 #include "clients/cli/print.h"
+#include "clients/cli/recording_limits.h"
 #include "clients/grpc/grpc_client.h"
 
 namespace clothstream::cli {
@@ -51,15 +52,6 @@ class Answer {
   std::optional<std::string> text_;
 };
 
-NativeClientOptions optionsFor(const std::string& scene, cs_role role) {
-  NativeClientOptions options;
-  options.scene = scene;
-  options.clientName = "clothstream participants";
-  options.role = role;
-  options.reconnectFor = std::chrono::milliseconds(0);
-  return options;
-}
-
 std::optional<cs_participant> find(const cs_client* client, std::uint64_t id) {
   cs_participant participant;
   for (std::uint32_t i = 0; cs_get_participant(client, i, &participant) != 0; ++i)
@@ -79,6 +71,7 @@ void ParticipantCommands::add(CLI::App& app, std::string& address) {
     command->add_option("--server", address, "HOST or HOST:PORT of the server; https:// before it means TLS")
         ->capture_default_str();
     command->add_option("SCENE", scene_, "Name of the scene")->required();
+    addStreamLimit(*command, maxVertices_);
     if (command != participants_)
       command
           ->add_option("PARTICIPANT", participant_,
@@ -88,6 +81,16 @@ void ParticipantCommands::add(CLI::App& app, std::string& address) {
   setRole_->add_option("ROLE", role_, "viewer, participant or owner")
       ->check(CLI::IsMember({"viewer", "participant", "owner"}))
       ->required();
+}
+
+NativeClientOptions ParticipantCommands::clientOptions(cs_role role) const {
+  NativeClientOptions options;
+  options.scene = scene_;
+  options.clientName = "clothstream participants";
+  options.role = role;
+  options.maxVertices = maxVertices_;
+  options.reconnectFor = std::chrono::milliseconds(0);
+  return options;
 }
 
 bool ParticipantCommands::parsed() const {
@@ -100,7 +103,7 @@ ExitCode ParticipantCommands::run(const ServerAddress& address) const {
 
 ExitCode ParticipantCommands::list(const ServerAddress& address) const {
   const auto joined =
-      joinByGrpc(address, optionsFor(scene_, CS_ROLE_VIEWER), [](cs_client*, std::uint32_t) {});
+      joinByGrpc(address, clientOptions(CS_ROLE_VIEWER), [](cs_client*, std::uint32_t) {});
   if (!joined) return printError(joined.error());
   auto array = nlohmann::ordered_json::array();
   (*joined)->visit([&](cs_client* client) {
@@ -128,7 +131,7 @@ ExitCode ParticipantCommands::list(const ServerAddress& address) const {
 ExitCode ParticipantCommands::change(const ServerAddress& address) const {
   Answer answer(participant_, setRole_->parsed() ? CS_PRESENCE_ROLE_CHANGED : CS_PRESENCE_LEFT);
   const auto joined =
-      joinByGrpc(address, optionsFor(scene_, CS_ROLE_UNSPECIFIED),
+      joinByGrpc(address, clientOptions(CS_ROLE_UNSPECIFIED),
                  [&](cs_client* client, std::uint32_t events) { answer.heard(client, events); });
   if (!joined) return printError(joined.error());
   bool hasRole = false;

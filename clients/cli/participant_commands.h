@@ -8,7 +8,9 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/exit_code.h"
+#include "clients/core/core.h"
 #include "clients/native/address.h"
+#include "clients/native/native_client.h"
 
 namespace clothstream::cli {
 
@@ -21,12 +23,14 @@ class ParticipantCommands {
   ExitCode run(const ServerAddress& address) const;
 
  private:
+  NativeClientOptions clientOptions(cs_role role) const;
   ExitCode list(const ServerAddress& address) const;
   // Asks for the change and waits for its effect or the server's refusal.
   ExitCode change(const ServerAddress& address) const;
 
   std::string scene_, role_;
   std::uint64_t participant_ = 0;
+  std::uint32_t maxVertices_ = 0;  // 0: the default of cs_limits
   bool json_ = false;
   CLI::App *participants_ = nullptr, *setRole_ = nullptr, *remove_ = nullptr, *ban_ = nullptr;
 };

@@ -87,7 +87,7 @@ tl::expected<std::unique_ptr<Motion>, Error> openRecordedMotion(const std::strin
 
 tl::expected<std::unique_ptr<Motion>, Error> openMotion(const std::string& path, const ArrayOptions& options,
                                                         const recording::ReadLimits& limits) {
-  if (path.ends_with(".npz")) return openArrays(path, options);
+  if (path.ends_with(".npz")) return openArrays(path, options, limits.vertices);
   if (!options.mesh.empty() || options.rate || options.first)
     return makeError(kUsage, "--mesh, --rate and --first-tick belong to .npz files; {} is a recording", path);
   return openRecordedMotion(path, limits);

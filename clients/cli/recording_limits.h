@@ -20,8 +20,8 @@ namespace clothstream::cli {
 inline void addLimits(CLI::App& command, recording::ReadLimits& limits) {
   command
       .add_option("--max-vertices", limits.vertices,
-                  "Most vertices of a recording, and half of its most triangles, since the file decides how "
-                  "much memory is needed")
+                  "Most vertices of a file, and half of its most triangles, since the file decides how much "
+                  "memory is needed")
       ->check(CLI::Range(1u, codec::kMaxVertices))
       ->capture_default_str();
 }

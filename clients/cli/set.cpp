@@ -81,6 +81,7 @@ ExitCode set(const SetOptions& options) {
   NativeClientOptions clientOptions;
   clientOptions.scene = options.scene;
   clientOptions.clientName = "clothstream set";
+  clientOptions.maxVertices = options.maxVertices;
   clientOptions.reconnectFor = std::chrono::milliseconds(0);
   auto joined = joinByGrpc(options.address, clientOptions,
                            [&](cs_client* client, std::uint32_t events) { answers.heard(client, events); });

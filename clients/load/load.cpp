@@ -70,7 +70,8 @@ class Load {
                     .decodes = number < options_.decoders,
                     .moves = number + options_.viewers < options_.participants,
                     .phase = number * std::numbers::phi,
-                    .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond});
+                    .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond,
+                    .maxVertices = options_.maxVertices});
   }
 
   // Returns false if the test was ended early or a participant was lost.

@@ -24,6 +24,7 @@ struct LoadOptions {
   double joinsPerSecond = 100;       // until all have joined
   double leavesPerSecond = 0;        // after all have joined; each is replaced
   double seconds = 10;               // after all have joined
+  std::uint32_t maxVertices = 0;     // as in limitVertices
 };
 
 struct LoadReport {

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include "clients/native/vertex_limit.h"
+
 namespace clothstream::load {
 namespace {
 
@@ -42,6 +44,7 @@ Participant::Participant(Links& links, const ParticipantOptions& options)
             &cs_destroy) {
   cs_set_token(core_.get(), options.token.c_str());
   cs_set_clock(core_.get(), &nowUs);
+  limitVertices(core_.get(), options.maxVertices);
   if (timesPoses()) {
     cs_play_out_options playOut;
     cs_default_play_out(&playOut);
@@ -100,6 +103,7 @@ void Participant::step(Clock::time_point now) {
 }
 
 void Participant::received(std::span<const std::byte> message) {
+  bool fails = false;
   {
     const std::lock_guard lock(mutex_);
     const std::uint64_t now = nowUs();
@@ -111,6 +115,8 @@ void Participant::received(std::span<const std::byte> message) {
       events =
           cs_receive(core_.get(), reinterpret_cast<const std::uint8_t*>(message.data()), message.size(), now);
     if (isFrame && timesPoses() && (events & CS_EVENT_FRAME) != 0) frameDecoded(message_.frame());
+    fails = !ended_ && cs_get_state(core_.get()) == CS_STATE_FAILED;
+    if (fails) ended_ = refusal();
     flush();
     if (options_.bytesPerSecond > 0) {
       const std::chrono::duration<double> time(static_cast<double>(message.size()) / options_.bytesPerSecond);
@@ -120,14 +126,19 @@ void Participant::received(std::span<const std::byte> message) {
       return;
     }
   }
+  if (fails) link_->leave();
   link_->read();
+}
+
+Failure Participant::refusal() const {
+  return {Failure::Kind::refused, cs_error_text(core_.get())};
 }
 
 void Participant::closed(const std::string& why) {
   const std::lock_guard lock(mutex_);
   const cs_state state = cs_get_state(core_.get());
   if (state == CS_STATE_FAILED)
-    ended_ = {Failure::Kind::refused, cs_error_text(core_.get())};
+    ended_ = refusal();
   else
     ended_ = {state == CS_STATE_JOINED ? Failure::Kind::lost : Failure::Kind::unreachable, why};
 }

@@ -31,6 +31,7 @@ struct ParticipantOptions {
   double phase = 0;     // start of the orbit, revolutions
   // Reading rate; 0: unlimited.
   double bytesPerSecond = 0;
+  std::uint32_t maxVertices = 0;  // as in limitVertices
 };
 
 // Figures of one participant since the last take(), or sums over several participants.
@@ -68,6 +69,8 @@ class Participant final : private LinkListener {
  private:
   void received(std::span<const std::byte> message) override;
   void closed(const std::string& why) override;
+  // Why the core has ended the stream.
+  Failure refusal() const;
   bool timesPoses() const { return options_.moves && options_.decodes; }
   void frameReceived(const v1::Frame& frame, std::uint64_t nowUs);
   // Measures poses after the core has decoded the frame.

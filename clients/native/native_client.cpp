@@ -12,6 +12,8 @@
 #include <thread>
 #include <utility>
 
+#include "clients/native/vertex_limit.h"
+
 namespace clothstream {
 namespace {
 
@@ -53,13 +55,7 @@ class NativeClient::Stream {
     cs_want(core_.get(), options.quality, options.temporalLayers);
     cs_set_clock(core_.get(), &NativeClient::nowUs);
     cs_hold_acknowledgements(core_.get(), options.acknowledgesSeen ? 1 : 0);
-    if (options.maxVertices > 0) {
-      cs_limits limits;
-      cs_default_limits(&limits);
-      limits.max_vertices = options.maxVertices;
-      limits.max_triangles = 2 * options.maxVertices;
-      cs_set_limits(core_.get(), &limits);
-    }
+    limitVertices(core_.get(), options.maxVertices);
     thread_ = std::thread([this] { run(); });
   }
 

@@ -4,6 +4,8 @@
 # Usage: make_repository.sh BUILD APT
 set -euo pipefail
 build=$(realpath "$1") apt=$2
+exec 9>"$build/.lock" # as ./dev does: one build in a folder at a time
+flock 9
 
 cmake --build "$build" --target clothstream_manuals >/dev/null
 rm -rf "$build/debian" "$apt"

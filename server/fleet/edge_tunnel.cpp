@@ -226,11 +226,15 @@ void EdgeTunnel::tell(SharedBytes message) {
 
 std::shared_ptr<scene::RemoteSession> EdgeTunnels::connect(const scene::RemotePeer& peer,
                                                            std::function<void()> wake) {
-  if (!hasRoom_ && (peer.resumeToken.empty() || strangers_->contains(peer.resumeToken))) return nullptr;
   const std::lock_guard lock(mutex_);
+  if (!last_ && !hasRoom_ && (peer.resumeToken.empty() || strangers_->contains(peer.resumeToken)))
+    return nullptr;
   const TunnelId id{edge_, randomId()};
   auto tunnel = std::make_shared<EdgeTunnel>(nats_, stream_, id, peer, strangers_, std::move(wake));
-  tunnels_.emplace(id.peer, tunnel);
+  if (last_)
+    tunnel->close(*last_);
+  else
+    tunnels_.emplace(id.peer, tunnel);
   return tunnel;
 }
 
@@ -271,7 +275,10 @@ void EdgeTunnels::moveTo(const std::string& stream) {
 }
 
 void EdgeTunnels::close(const SharedBytes& last) {
-  hasRoom_ = false;
+  {
+    const std::lock_guard lock(mutex_);
+    last_ = last;
+  }
   for (const auto& tunnel : all()) tunnel->close(last);
 }
 

@@ -108,7 +108,8 @@ class EdgeTunnels {
   EdgeTunnels(Nats& nats, std::uint64_t edge, std::string stream)
       : nats_(nats), edge_(edge), stream_(std::move(stream)) {}
 
-  // Null if the scene has no room for another participant, unless the peer may have a place in it.
+  // Null if the scene has no room for another participant, unless the peer may have a place in it. After
+  // close(), the session has only the last message.
   std::shared_ptr<scene::RemoteSession> connect(const scene::RemotePeer& peer, std::function<void()> wake);
   // Whether the scene has room for participants, as its origin says.
   void setRoom(bool hasRoom) { hasRoom_ = hasRoom; }
@@ -127,8 +128,9 @@ class EdgeTunnels {
   const std::shared_ptr<Strangers> strangers_ = std::make_shared<Strangers>();
   std::atomic<bool> hasRoom_{false};
 
-  mutable std::mutex mutex_;  // protects the next two
+  mutable std::mutex mutex_;  // protects all below
   std::string stream_;
+  std::optional<delivery::SharedBytes> last_;  // of close()
   std::map<std::uint64_t, std::shared_ptr<EdgeTunnel>> tunnels_;  // by peer
 };
 

@@ -159,6 +159,7 @@ void Origin::endOffers() {
 }
 
 Origin::~Origin() {
+  tunnels_.deliverEnds();
   server_.state().setOtherServers(nullptr);
   requests_.reset();
   endOffers();

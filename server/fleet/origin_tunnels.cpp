@@ -5,6 +5,7 @@
 #include <chrono>
 #include <exception>
 #include <optional>
+#include <thread>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -26,6 +27,8 @@ constexpr auto kPollPeriod = 20ms;
 constexpr auto kEndTime = 5s;
 // An edge that has ended a tunnel learns for this long that this is known here.
 constexpr auto kFarewellTime = 200ms;
+// Longest wait for edges that learn the end of sessions when this server ends.
+constexpr auto kLastWords = 1s;
 // Tunnels that may be expected at a time.
 constexpr std::size_t kMaxExpected = 65536;
 // Address of a peer of an edge's own machine, so that it is not taken for one of this machine.
@@ -240,6 +243,16 @@ void OriginTunnels::end(const std::string& stream) {
   }
   const std::lock_guard lock(mutex_);
   std::erase_if(expected_, [&](const auto& known) { return known.first.first == stream; });
+}
+
+void OriginTunnels::deliverEnds() const {
+  const auto ending = [](const auto& tunnel) {
+    const std::lock_guard lock(tunnel->mutex);
+    return tunnel->session && tunnel->session->finished();
+  };
+  const Clock::time_point end = Clock::now() + kLastWords;
+  while (nats_.connected() && Clock::now() < end && std::ranges::any_of(all(), ending))
+    std::this_thread::sleep_for(kPollPeriod / 4);
 }
 
 std::vector<v1::MovedTunnel> OriginTunnels::freeze(const std::string& stream) {

@@ -35,6 +35,8 @@ class OriginTunnels {
   void receive(const std::string& stream, const std::string& subject, std::span<const std::byte> bytes);
   // The stream ends, or its scene has left this server: its sessions end without a further message.
   void end(const std::string& stream);
+  // Waits until the edges have the last messages of sessions that have ended, but at most a second.
+  void deliverEnds() const;
 
   // For a scene that moves. After freeze() the sessions of the stream use no message any more; the result
   // says which ones they have used. thaw() ends that.

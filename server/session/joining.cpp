@@ -185,6 +185,7 @@ bool Session::joinRemotely(const v1::Hello& message, const messages::Joining& jo
     const std::lock_guard lock(remoteMutex_);
     remote_ = std::move(remote);
   }
+  mailbox_->wake();  // its first messages may be there already
   telemetry::log({scene->name()}, spdlog::level::info, "{} takes part through this server", peer_);
   return true;
 }

@@ -41,7 +41,10 @@ Messages& messages() {
   return instance;
 }
 
-void onMessage(const char* text) {
+// `id` is that of the rule, such as SYNC-HAZARD-READ-AFTER-WRITE. Old layers repeat it in the message.
+void onMessage(std::string_view id, std::string_view message) {
+  const std::string text =
+      message.find(id) == std::string_view::npos ? fmt::format("{}: {}", id, message) : std::string(message);
   Messages& all = messages();
   {
     const std::lock_guard lock(all.mutex);
@@ -58,7 +61,7 @@ vk::DebugUtilsMessengerCreateInfoEXT messengerInfo() {
           .messageType = vk::DebugUtilsMessageTypeFlagBitsEXT::eValidation,
           // Vulkan's headers declare the callback with types of C before 1.4.304, and of C++ since then.
           .pfnUserCallback = [](auto, auto, const auto* data, void*) -> VkBool32 {
-            onMessage(data->pMessage);
+            onMessage(data->pMessageIdName == nullptr ? "" : data->pMessageIdName, data->pMessage);
             return VK_FALSE;
           }};
 }
@@ -191,6 +194,8 @@ vk::raii::Instance makeInstance(const vk::raii::Context& context, bool validate)
            "VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT:"
            "VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT",
            0);
+    // And newer layers, such as that of Debian 13, look at what shaders read and write only with this one.
+    setenv("VK_LAYER_SYNCVAL_SHADER_ACCESSES_HEURISTIC", "true", 0);
     info.pNext = &features;
     info.enabledLayerCount = 1;
     info.ppEnabledLayerNames = &kValidationLayer;

@@ -141,6 +141,24 @@ TEST_F(JoinLines, EventsSayThatAColliderYields) {
       << "the plate followed before it was lifted: " << client->output();
 }
 
+TEST_F(JoinLines, CommandsAcceptAsManyVerticesAsAllowed) {
+  startServer();
+  if (IsSkipped()) return;
+  const std::vector<Arguments> commands{{"join", address_, "--seconds", "0.1"},
+                                        {"set", address_, "--gravity", "0,-5,0"},
+                                        {"participants", "small", "--server", address_},
+                                        {"load", address_, "--participants", "1", "--seconds", "0.1"}};
+  for (Arguments arguments : commands) {
+    arguments.insert(arguments.end(), {"--max-vertices", "9"});
+    const auto refused = clothstream(arguments);
+    EXPECT_NE(refused->waitForEnd(kPatience), 0) << arguments[0];
+    EXPECT_THAT(refused->errors(), HasSubstr("vertices")) << arguments[0];
+    arguments.back() = "16777216";
+    const auto accepted = clothstream(arguments);
+    EXPECT_EQ(accepted->waitForEnd(kPatience), 0) << arguments[0] << ": " << accepted->errors();
+  }
+}
+
 TEST_F(JoinLines, EventsReportJoinsChangesAndLeaves) {
   startServer();
   if (IsSkipped()) return;

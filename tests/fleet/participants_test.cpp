@@ -237,5 +237,24 @@ TEST_F(EdgeParticipantsTest, AnOriginThatIsLostCutsThemOff) {
   EXPECT_THAT(peer.readToTheEnd().notice().text(), HasSubstr("stopping"));
 }
 
+// A scene is replaced at an edge while somebody joins it there.
+TEST_F(EdgeParticipantsTest, WhoJoinsASceneThatHasJustEndedLearnsThat) {
+  telemetry::NatsMetrics metrics;
+  Nats nats(natsOptions(), metrics);
+  EdgeTunnels tunnels(nats, 1, "stream");
+  const auto last = delivery::error(v1::ERROR_CODE_CUT_OFF, "was replaced", true);
+  tunnels.close(last);
+  for (const char* resumeToken : {"", "known"}) {
+    bool woken = false;
+    const auto late = tunnels.connect({.name = "peer", .address = "", .token = "", .resumeToken = resumeToken},
+                                      [&] { woken = true; });
+    ASSERT_NE(late, nullptr);
+    EXPECT_TRUE(woken);
+    EXPECT_TRUE(late->send({}));
+    EXPECT_EQ(late->next(), last);
+    EXPECT_TRUE(late->ended());
+  }
+}
+
 }  // namespace
 }  // namespace clothstream::fleet

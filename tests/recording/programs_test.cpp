@@ -128,6 +128,7 @@ TEST_F(RecordingPrograms, RecordAStreamCompletelyWithKeyFrames) {
   const std::string quick = clothstream({"info", "--quick", path}).output;
   EXPECT_THAT(quick, HasSubstr("index     complete"));
   EXPECT_THAT(quick, HasSubstr("frames of quality 0, 1, 2, 3"));
+  EXPECT_THAT(clothstream({"info", "--quick", "--json", path}).output, Not(HasSubstr("whole")));
   EXPECT_THAT(clothstream({"info", "--json", path}).output, HasSubstr("\"whole\": true"));
 
   auto reader = RecordingReader::open(path);
@@ -175,6 +176,16 @@ TEST_F(RecordingPrograms, InterruptCompletesRecordings) {
   const Ended again = run({CLOTHSTREAM_SERVER, "resimulate", serversRecording()});
   EXPECT_EQ(again.code, 0) << again.output << again.errors;
   EXPECT_THAT(again.output, HasSubstr("all bit-identical"));
+
+  const std::string holes = pathOf("holes.mcap");
+  std::ifstream file(serversRecording(), std::ios::binary);
+  std::ofstream(holes, std::ios::binary)
+      << withFrames({std::istreambuf_iterator<char>(file), {}}, [](std::size_t frame, v1::Frame& changed) {
+           if (frame == 3) changed.set_packet("garbage");
+         });
+  const Ended missing = run({CLOTHSTREAM_SERVER, "resimulate", holes});
+  EXPECT_EQ(missing.code, 10) << missing.output << missing.errors;
+  EXPECT_THAT(missing.output, HasSubstr("cannot be decoded, the first is that of an unknown tick"));
 }
 
 // A killed server can lose only the chunk that is not closed. So no chunk may be longer than promised, and a
@@ -296,6 +307,14 @@ TEST_F(RecordingPrograms, EveryReaderFailsAtFramesThatCannotBeDecoded) {
     EXPECT_EQ(result.code, 0) << result.output;
     std::filesystem::remove(out);
   }
+  Process player({CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "play", holes, "--speed", "8"});
+  const auto line = player.waitForLine("gRPC ", kPatience);
+  ASSERT_TRUE(line) << player.errors();
+  const Ended joined = clothstream({"join", line->substr(line->find_first_not_of(' ')), "--seconds", "1"});
+  EXPECT_EQ(joined.code, 0) << joined.errors;
+  player.signal(SIGINT);
+  EXPECT_EQ(player.waitForEnd(kPatience), 7);
+  EXPECT_THAT(player.errors(), HasSubstr("frames 18 cannot be decoded, the first is that of"));
   EXPECT_EQ(clothstream({"golden", pathOf("golden"), "--update"}).code, 7);
   EXPECT_THAT(run({CLOTHSTREAM_SERVER, "--port", "0", "--grpc-port", "0", "play", garbage}).errors,
               HasSubstr(all));
@@ -307,15 +326,21 @@ TEST_F(RecordingPrograms, RefuseMoreVerticesThanAllowed) {
   const std::vector<std::vector<std::string>> commands{{"info", path},
                                                        {"export", path, pathOf("frames.npz")},
                                                        {"measure", path},
+                                                       {"measure", pathOf("frames.npz")},
+                                                       {"import", pathOf("frames.npz"), "-o", pathOf("in.mcap")},
                                                        {"recover", path, pathOf("out.mcap")},
                                                        {"diff", path, path}};
   for (std::vector<std::string> command : commands) {
     command.insert(command.end(), {"--max-vertices", "41"});
     const Ended refused = clothstream(command);
-    EXPECT_EQ(refused.code, 7) << command[0];
-    EXPECT_THAT(refused.output + refused.errors, HasSubstr("42 vertices")) << command[0];
+    const std::string& file = command[1];
+    EXPECT_EQ(refused.code, 7) << command[0] << ' ' << file;
+    EXPECT_THAT(refused.output + refused.errors,
+                HasSubstr(file.ends_with(".npz") ? "1 to 41 vertices (--max-vertices)" : "42 vertices"))
+        << command[0] << ' ' << file;
     command.back() = "42";
-    EXPECT_EQ(clothstream(command).code, 0) << command[0];
+    const Ended accepted = clothstream(command);
+    EXPECT_EQ(accepted.code, 0) << command[0] << ' ' << file << ": " << accepted.errors;
   }
   EXPECT_THAT(run({CLOTHSTREAM_SERVER, "play", path, "--max-vertices", "41"}).errors,
               HasSubstr("42 vertices; at most 41"));

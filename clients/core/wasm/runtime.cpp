@@ -19,7 +19,22 @@ extern "C" {
   __builtin_trap();
 }
 
+// libc++ calls this for errors that cannot be reported otherwise.
+[[noreturn]] void abort_message(const char*, ...) {
+  __builtin_trap();
+}
+
 }  // extern "C"
+
+// And this since its release 15, for those of its own checks.
+#ifndef _LIBCPP_VERBOSE_ABORT_NOEXCEPT  // since release 20
+#define _LIBCPP_VERBOSE_ABORT_NOEXCEPT
+#endif
+_LIBCPP_BEGIN_NAMESPACE_STD
+[[noreturn]] void __libcpp_verbose_abort(const char*, ...) _LIBCPP_VERBOSE_ABORT_NOEXCEPT {
+  __builtin_trap();
+}
+_LIBCPP_END_NAMESPACE_STD
 // NOLINTEND(bugprone-reserved-identifier)
 
 void* operator new(std::size_t bytes) {
