@@ -129,7 +129,8 @@ class ArrayMotion : public Motion {
       if (surface_.vertexCount() != vertices)
         return makeError(kUnreadable, "{}: rest_positions has {} vertices, positions {}", path_,
                          surface_.vertexCount(), vertices);
-      auto triangles = readAll<std::uint64_t>(file_, path_, "triangles", {3}, 2 * std::uint64_t{maxVertices_});
+      auto triangles =
+          readAll<std::uint64_t>(file_, path_, "triangles", {3}, 2 * std::uint64_t{maxVertices_});
       if (!triangles) return tl::unexpected(triangles.error());
       const std::uint64_t largest = triangles->empty() ? 0 : std::ranges::max(*triangles);
       if (largest >= vertices)

@@ -102,8 +102,7 @@ ExitCode ParticipantCommands::run(const ServerAddress& address) const {
 }
 
 ExitCode ParticipantCommands::list(const ServerAddress& address) const {
-  const auto joined =
-      joinByGrpc(address, clientOptions(CS_ROLE_VIEWER), [](cs_client*, std::uint32_t) {});
+  const auto joined = joinByGrpc(address, clientOptions(CS_ROLE_VIEWER), [](cs_client*, std::uint32_t) {});
   if (!joined) return printError(joined.error());
   auto array = nlohmann::ordered_json::array();
   (*joined)->visit([&](cs_client* client) {

@@ -16,7 +16,7 @@ namespace clothstream::cli {
 struct SetOptions {
   ServerAddress address = std::string(kDefaultAddress);
   std::string scene;
-  std::uint32_t maxVertices = 0;  // 0: the default of cs_limits
+  std::uint32_t maxVertices = 0;     // 0: the default of cs_limits
   std::string cloth;                 // empty: every cloth
   cs_cloth_settings settings;        // values that are not given stay as cs_keep_cloth_settings sets them
   std::vector<float> gravity, wind;  // three numbers; empty: no change

@@ -63,15 +63,15 @@ class Load {
 
   std::unique_ptr<Participant> make(std::uint32_t number) {
     return std::make_unique<Participant>(
-        links_, ParticipantOptions{
-                    .scene = options_.scene,
-                    .name = "load " + std::to_string(++names_),
-                    .token = options_.token,
-                    .decodes = number < options_.decoders,
-                    .moves = number + options_.viewers < options_.participants,
-                    .phase = number * std::numbers::phi,
-                    .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond,
-                    .maxVertices = options_.maxVertices});
+        links_,
+        ParticipantOptions{.scene = options_.scene,
+                           .name = "load " + std::to_string(++names_),
+                           .token = options_.token,
+                           .decodes = number < options_.decoders,
+                           .moves = number + options_.viewers < options_.participants,
+                           .phase = number * std::numbers::phi,
+                           .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond,
+                           .maxVertices = options_.maxVertices});
   }
 
   // Returns false if the test was ended early or a participant was lost.

@@ -423,10 +423,11 @@ void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scene
     // Another server may have it by now.
     const auto present = buckets.scenes.get(name);
     if (!present || present->revision != known.revision) continue;
-    buckets.scenes.remove(name);
+    // The parts go first: without the entry nobody would look for them again.
     const v1::StoredCheckpoint& stored = known.entry.checkpoint();
     for (std::uint32_t slot = 0; slot < 2; ++slot)
       purgeParts(buckets.checkpoints, name, slot, 0, slot == stored.slot() ? stored.parts() : 0);
+    buckets.scenes.remove(name);
     saved_.erase(name);
   }
 }

@@ -130,7 +130,7 @@ class EdgeTunnels {
 
   mutable std::mutex mutex_;  // protects all below
   std::string stream_;
-  std::optional<delivery::SharedBytes> last_;  // of close()
+  std::optional<delivery::SharedBytes> last_;                     // of close()
   std::map<std::uint64_t, std::shared_ptr<EdgeTunnel>> tunnels_;  // by peer
 };
 

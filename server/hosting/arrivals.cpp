@@ -63,7 +63,7 @@ void SceneServer::State::leavePlace(std::uint64_t number) {
 }
 
 tl::expected<std::shared_ptr<scene::LiveScene>, std::string> SceneServer::State::prepareArrival(
-    scene::SavedScene saved) {
+    scene::SavedScene saved) try {
   auto place = takePlace(saved.start.name, saved.tenant, false);
   if (!place) return tl::unexpected(place.error().text());
   const auto scene = std::make_shared<scene::LiveScene>(
@@ -82,6 +82,8 @@ tl::expected<std::shared_ptr<scene::LiveScene>, std::string> SceneServer::State:
   }
   place->keep();
   return scene;
+} catch (const std::exception& failure) {  // such as a journal that cannot be made
+  return tl::unexpected(std::string(failure.what()));
 }
 
 void SceneServer::State::startArrived(const std::shared_ptr<scene::LiveScene>& scene,

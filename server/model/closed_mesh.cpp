@@ -114,15 +114,20 @@ double crowdingOf(const ClosedMesh& mesh) {
                &c = mesh.vertices[triangle[2]];
     boxes.push_back({a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)});
   }
-  const std::size_t stride = (mesh.vertices.size() + kCrowdingSamples - 1) / kCrowdingSamples;
   double squares = 0, samples = 0;
-  for (std::size_t i = 0; i < mesh.vertices.size(); i += stride, ++samples) {
-    const Eigen::Array3f at = mesh.vertices[i].array();
+  const auto sample = [&](const Vec3& point) {
+    const Eigen::Array3f at = point.array();
     const auto around = static_cast<double>(std::ranges::count_if(boxes, [&](const Box& box) {
       return (box.low.array() <= at).all() && (at <= box.high.array()).all();
     }));
     squares += around * around;
-  }
+    ++samples;
+  };
+  const auto strideOf = [](const auto& list) {
+    return (list.size() + kCrowdingSamples - 1) / kCrowdingSamples;
+  };
+  for (std::size_t i = 0; i < mesh.vertices.size(); i += strideOf(mesh.vertices)) sample(mesh.vertices[i]);
+  for (std::size_t i = 0; i < boxes.size(); i += strideOf(boxes)) sample((boxes[i].low + boxes[i].high) / 2);
   return std::sqrt(squares / samples);
 }
 

@@ -36,8 +36,9 @@ struct ClosedMesh {
   // Distance of the points at which signed distances are sampled, m; contact is with the distances between
   // them (distance_grid.h). 0: contact is with the triangles. A mesh with a skin has none.
   float distanceCell = 0;
-  // How many of its triangles lie in one place, at rest: of the boxes around triangles, those that contain a
-  // vertex. Root mean square over at most 256 vertices. A search of the nearest point visits them all.
+  // How many triangles lie in one place, at rest: of the boxes around them, those that contain a vertex or
+  // the middle of a box. Root mean square over at most 256 of each. A search of the nearest point visits them
+  // all.
   double crowding = 0;
 };
 

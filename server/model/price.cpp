@@ -32,9 +32,10 @@ constexpr double kCorrection = 0.45;  // of a spring, with xpbd
 // Each node costs kCoarseNode in a coarse correction, and each of about four links of a coarse node
 // kCoarseLink in a sweep.
 constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
-// A search in a triangle mesh costs each node kSearch, and more if more triangles lie in one place than
-// kFewAround (ClosedMesh::crowding). Distances that are sampled cost it kGridWork.
-constexpr double kSearch = 6, kFewAround = 16, kGridWork = 3;
+// A search in a triangle mesh costs each node kSearch, and kCrowdedSearch more for each triangle beyond
+// kFewAround that lies in one place (ClosedMesh::crowding), at most kMostSearch, as the device limits it
+// (kMostSolidVisits). Distances that are sampled cost it kGridWork.
+constexpr double kSearch = 6, kFewAround = 16, kCrowdedSearch = 1.2, kMostSearch = 4096, kGridWork = 3;
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
 constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
@@ -113,7 +114,7 @@ bool isSystem(SolverKind kind) {
 }  // namespace
 
 double searchWork(const ClosedMesh& mesh) {
-  return kSearch * std::max(1.0, mesh.crowding / kFewAround);
+  return std::min(kSearch + kCrowdedSearch * std::max(mesh.crowding - kFewAround, 0.0), kMostSearch);
 }
 
 double colliderWork(const Shape& shape) {

@@ -22,10 +22,8 @@ constexpr double kFirstSlice = 1 << 19, kMinSlice = 1 << 12, kMaxSlice = 1e15;
 constexpr double kGpuFactor = 64;
 // Most work of a slice, in slices: work that depends on the state, such as the pairs of a heap, can be that
 // much more than in the ticks before. It is limited by the first slice, because slices of calm ticks grow.
+// At first it is one slice, since such work is not known yet, and it grows while slices are short.
 constexpr double kMostFactor = 16;
-// The same while a scene is loaded. The work of its first recordings is not known yet, and other scenes wait
-// for it without a scheduler.
-constexpr double kMostFactorOfLoading = 1;
 // Pause after a slice of loading, as a multiple of its time.
 constexpr int kPause = 2;
 
@@ -44,24 +42,25 @@ SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene,
         fmt::format("its buffers would leave fewer than {} of the {} allocations of memory that {} allows: "
                     "delete a scene first",
                     kSpareAllocations, most, device.info().name));
-  sliceRecordings(kMostFactorOfLoading);
+  sliceRecordings();
   recorder.begin();
   simulation.recordSaveState(recorder);
   submitAndWait(stop);
   start = simulation.collectState(0);
   warmUp(scene, stop);
-  sliceRecordings(kMostFactor);
 }
 
 void SceneOnDevice::scaleSlices(double factor) {
-  sliceInvocations_ = std::clamp(sliceInvocations_ * std::clamp(factor, 0.25, 1.25), kMinSlice, kMaxSlice);
-  sliceRecordings(kMostFactor);
+  const double bounded = std::clamp(factor, 0.25, 1.25);
+  sliceInvocations_ = std::clamp(sliceInvocations_ * bounded, kMinSlice, kMaxSlice);
+  mostFactor_ = std::clamp(mostFactor_ * bounded, 1.0, kMostFactor);
+  sliceRecordings();
 }
 
-void SceneOnDevice::sliceRecordings(double mostFactor) {
+void SceneOnDevice::sliceRecordings() {
   const double first = device.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice;
   recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_),
-                      static_cast<std::uint64_t>(mostFactor * std::min(sliceInvocations_, first)));
+                      static_cast<std::uint64_t>(mostFactor_ * std::min(sliceInvocations_, first)));
 }
 
 void SceneOnDevice::submitAndWait(const std::stop_token& stop) {

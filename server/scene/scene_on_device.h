@@ -37,7 +37,8 @@ struct SceneOnDevice {
 
  private:
   double sliceInvocations_;
-  void sliceRecordings(double mostFactor);
+  double mostFactor_ = 1;  // most work of a slice, in slices
+  void sliceRecordings();
   // Throws std::runtime_error after a request to stop.
   void submitAndWait(const std::stop_token& stop);
   // Runs everything that a tick and a frame may need. Software devices compile a kernel when it first runs,

@@ -72,8 +72,8 @@ Clock::duration shareOf(const TickSchedule& schedule, std::span<const TickSchedu
   std::int64_t own = 0, guests = 0;
   for (const TickSchedule* other : schedules)
     if (other->running) ++(other->guest ? guests : own);
-  const std::int64_t shares = std::max<std::int64_t>(own + (guests > 0 ? 1 : 0), 1);
-  return schedule.pacer.period() / (schedule.guest ? shares * std::max<std::int64_t>(guests, 1) : shares);
+  if (!schedule.guest) return schedule.pacer.period() / std::max<std::int64_t>(own, 1);
+  return schedule.pacer.period() / ((own + 1) * std::max<std::int64_t>(guests, 1));
 }
 
 void TickScheduler::choose(std::span<TickSchedule* const> schedules, Clock::time_point now,
@@ -99,7 +99,7 @@ Clock::time_point TickScheduler::guestsFrom(std::span<TickSchedule* const> sched
     if (!schedule->running) continue;
     if (schedule->guest) {
       const bool isShort = schedule->cost > Clock::duration::zero() && schedule->cost < slice_;
-      gap = std::max(gap, isShort ? schedule->cost : slice_);
+      gap = std::max(gap, isShort ? schedule->cost : std::max(slice_, longest_));
     } else {
       ++others;
       nextDue = std::min(nextDue, schedule->begun ? now : schedule->pacer.due());
@@ -111,7 +111,9 @@ Clock::time_point TickScheduler::guestsFrom(std::span<TickSchedule* const> sched
 }
 
 void TickScheduler::used(const TickSchedule& schedule, Clock::duration time) {
-  if (schedule.guest) excess_ += time;
+  if (!schedule.guest) return;
+  excess_ += time;
+  longest_ = std::max(time, longest_ - longest_ / kAveragedTicks);
 }
 
 // Guests may save at most one slice of their share.

@@ -13,7 +13,7 @@ namespace clothstream::schedule {
 
 // Due times and cost of one scene's ticks.
 struct TickSchedule {
-  // `isGuest`: all guests together get the share of one other scene.
+  // `isGuest`: all guests together get the share of one scene.
   explicit TickSchedule(std::uint32_t ticksPerSecond, bool isGuest = false)
       : pacer(ticksPerSecond), guest(isGuest) {}
 
@@ -30,7 +30,7 @@ struct TickSchedule {
 };
 
 // Share of the device for one tick of a running scene: its part of the tick's period if every running scene
-// needed the device all the time. `schedules` has all scenes.
+// needed the device all the time. Guests take nothing of the others' shares. `schedules` has all scenes.
 Clock::duration shareOf(const TickSchedule& schedule, std::span<const TickSchedule* const> schedules);
 
 // Longest lateness, in addition to one period, that other scenes may cause and that a scene catches up.
@@ -46,7 +46,8 @@ inline constexpr std::chrono::milliseconds kMaxCatchUp{250};
 // Not thread-safe.
 class TickScheduler {
  public:
-  // `slice`: longest time for which a tick of a guest occupies the device without interruption.
+  // `slice`: time for which a tick of a guest occupies the device without interruption, at most if its work
+  // is as expected.
   explicit TickScheduler(Clock::duration slice) : slice_(slice) {}
 
   // Puts the schedules whose tick begins now into `chosen`, in the order in which they begin. Sets `catchUp`
@@ -62,7 +63,8 @@ class TickScheduler {
   void grant(Clock::time_point now, std::int64_t others);
 
   const Clock::duration slice_;
-  Clock::duration excess_{};  // device time that guests used beyond their share
+  Clock::duration excess_{};   // device time that guests used beyond their share
+  Clock::duration longest_{};  // of the newest uses of a guest; falls slowly
   Clock::time_point granted_{};
 };
 

@@ -246,8 +246,8 @@ TEST_F(EdgeParticipantsTest, WhoJoinsASceneThatHasJustEndedLearnsThat) {
   tunnels.close(last);
   for (const char* resumeToken : {"", "known"}) {
     bool woken = false;
-    const auto late = tunnels.connect({.name = "peer", .address = "", .token = "", .resumeToken = resumeToken},
-                                      [&] { woken = true; });
+    const auto late = tunnels.connect(
+        {.name = "peer", .address = "", .token = "", .resumeToken = resumeToken}, [&] { woken = true; });
     ASSERT_NE(late, nullptr);
     EXPECT_TRUE(woken);
     EXPECT_TRUE(late->send({}));

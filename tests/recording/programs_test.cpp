@@ -323,13 +323,14 @@ TEST_F(RecordingPrograms, EveryReaderFailsAtFramesThatCannotBeDecoded) {
 TEST_F(RecordingPrograms, RefuseMoreVerticesThanAllowed) {
   const std::string path = pathOf("sample.mcap");
   std::ofstream(path, std::ios::binary) << sampleRecording(3);
-  const std::vector<std::vector<std::string>> commands{{"info", path},
-                                                       {"export", path, pathOf("frames.npz")},
-                                                       {"measure", path},
-                                                       {"measure", pathOf("frames.npz")},
-                                                       {"import", pathOf("frames.npz"), "-o", pathOf("in.mcap")},
-                                                       {"recover", path, pathOf("out.mcap")},
-                                                       {"diff", path, path}};
+  const std::vector<std::vector<std::string>> commands{
+      {"info", path},
+      {"export", path, pathOf("frames.npz")},
+      {"measure", path},
+      {"measure", pathOf("frames.npz")},
+      {"import", pathOf("frames.npz"), "-o", pathOf("in.mcap")},
+      {"recover", path, pathOf("out.mcap")},
+      {"diff", path, path}};
   for (std::vector<std::string> command : commands) {
     command.insert(command.end(), {"--max-vertices", "41"});
     const Ended refused = clothstream(command);

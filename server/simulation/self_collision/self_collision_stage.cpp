@@ -31,6 +31,8 @@ constexpr std::uint32_t kListsATick = 3;
 constexpr std::uint32_t kGatherWork = 8, kContactWork = 4;
 // The most of the former: a search passes over kMaxInRow balls in each of nine rows, twice.
 constexpr std::uint32_t kMostGatherWork = 2 * 9 * shared::kMaxInRow / 8;
+// The most work of a ball when its cell is sorted.
+constexpr std::uint32_t kMostSortWork = shared::kMaxInRow / 8;
 // Factor of the time until the next search, because velocities change in it.
 constexpr float kAhead = 1.25f;
 
@@ -253,7 +255,8 @@ void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint3
   dispatch(countCells_, nodeCount_);
   dispatch(startCells_, cellCount_ / shared::kCellBlock);
   dispatch(fillCells_, nodeCount_);
-  dispatch(sortCells_, nodeCount_);
+  recorder.barrier();
+  recorder.dispatch(sortCells_.on[state], push, nodeCount_, 1, kMostSortWork);
   recorder.barrier();
   recorder.dispatch(gather_.on[state], push, nodeCount_, kGatherWork, kMostGatherWork);
 }

@@ -13,6 +13,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
+constexpr Clock::duration kSlice = 10ms;
+
 struct SimulatedScene {
   SimulatedScene(std::uint32_t rate, Clock::duration tick, bool guest) : turn(rate, guest), cost(tick) {
     turn.running = true;
@@ -20,17 +22,16 @@ struct SimulatedScene {
   }
   TickSchedule turn;
   Clock::duration cost, used{};
+  Clock::duration slice = kSlice;  // of a guest
   Clock::time_point served{};
   int ticks = 0;
   double slipped = 0;
   Clock::duration worstLateness{};
 };
 
-constexpr Clock::duration kSlice = 10ms;
-
 class TickSchedulerTest : public ::testing::Test {
  protected:
-  // A tick of a guest takes slices of kSlice, other ticks are not interrupted.
+  // A tick of a guest is done in slices, other ticks are not interrupted.
   SimulatedScene& add(std::uint32_t rate, Clock::duration cost, bool guest = false) {
     return *scenes_.emplace_back(std::make_unique<SimulatedScene>(rate, cost, guest));
   }
@@ -43,7 +44,7 @@ class TickSchedulerTest : public ::testing::Test {
     Clock::time_point now{};
     const auto runSlice = [&](SimulatedScene& scene) {
       const Clock::duration left = scene.cost - scene.used;
-      const Clock::duration slice = scene.turn.guest ? std::min(left, kSlice) : left;
+      const Clock::duration slice = scene.turn.guest ? std::min(left, scene.slice) : left;
       now += slice;
       scene.used += slice;
       scene.served = now;
@@ -96,7 +97,7 @@ TEST(ShareOf, DividesThePeriodAmongRunningScenesAndOnceAmongAllGuests) {
   EXPECT_EQ(shareOf(one, all), 10ms);
   EXPECT_EQ(shareOf(two, all), 5ms);
   firstGuest.running = secondGuest.running = true;
-  EXPECT_EQ(shareOf(two, all), Clock::duration(10ms) / 3);
+  EXPECT_EQ(shareOf(two, all), 5ms);
   EXPECT_EQ(shareOf(firstGuest, all), Clock::duration(20ms) / 6);
   one.running = two.running = false;
   EXPECT_EQ(shareOf(firstGuest, all), 10ms);
@@ -183,6 +184,14 @@ TEST_F(TickSchedulerTest, GuestsUseTheTimeThatOtherScenesLeave) {
   SimulatedScene& guest = add(1000, 2ms, true);
   run(10s);
   EXPECT_GE(guest.ticks * guest.cost, 0.6 * 10s) << "its share is 0.25";
+}
+
+TEST_F(TickSchedulerTest, SlicesThatDoNotFitIntoGapsStayWithinTheShareOfGuests) {
+  SimulatedScene &own = add(72, 3ms), &guest = add(10, 600ms, true);
+  guest.slice = 12ms;  // own leaves gaps of 10.9 ms
+  run(10s);
+  EXPECT_GE(own.ticks, 0.99 * 720);
+  EXPECT_NEAR(guest.ticks * seconds(guest.cost), 0.5 * 10, 0.6);
 }
 
 TEST_F(TickSchedulerTest, GuestsHaveTheWholeDeviceWithoutOtherScenes) {
