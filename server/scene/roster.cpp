@@ -179,6 +179,7 @@ Roster::Admission Roster::resume(Entry& entry, const JoinRequest& request,
   }
   const bool wasAway = std::exchange(entry.participant.away, false);
   if (wasAway) entry.connectedSince = now;
+  entry.address = request.address;  // not known after a restart, and it may have changed
   if (wasAway) announce(Presence::returned, entry.participant);
   // Announced before the participant subscribes, because its Welcome already contains its role.
   limitRole(entry, request.rights, now);

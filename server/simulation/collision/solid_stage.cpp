@@ -19,6 +19,8 @@ namespace {
 constexpr double kSampleWork = 8;
 // Work of a visit, in moves of a node by its springs.
 constexpr std::uint64_t kVisitWork = 1;
+// The most work of a contact, or of a sample.
+constexpr std::uint64_t kMostWork = kVisitWork * shared::kMostSolidVisits;
 
 }  // namespace
 
@@ -44,12 +46,13 @@ SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
     const model::ClosedMesh& mesh = *tables.solids[i];
     workOfSolid_ = std::max(workOfSolid_, static_cast<std::uint64_t>(model::colliderWork(tables.solids[i])));
     if (mesh.distanceCell == 0) {
-      mostOfSolid_ = kVisitWork * shared::kMostSolidVisits;
+      mostOfSolid_ = kMostWork;
       continue;
     }
-    sampled_.push_back({{.solid = tables.places[i], .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
-                        model::distanceGridOf(mesh, mesh.distanceCell).points(),
-                        static_cast<std::uint64_t>(kSampleWork * model::searchWork(mesh))});
+    sampled_.push_back(
+        {{.solid = tables.places[i], .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
+         model::distanceGridOf(mesh, mesh.distanceCell).points(),
+         std::min(static_cast<std::uint64_t>(kSampleWork * model::searchWork(mesh)), kMostWork)});
   }
   if (sampled_.empty()) return;
   sample_.emplace(device, vulkan::KernelDescription{.name = "sample_distances",
@@ -66,8 +69,7 @@ void SolidStage::recordTables(vulkan::Recorder& recorder) const {
   tiles_.recordUpload(recorder);
   for (const Sampled& sampled : sampled_) {
     recorder.barrier();
-    recorder.dispatch(*sampleIn_, sampled.push, sampled.points, sampled.work,
-                      kVisitWork * shared::kMostSolidVisits);
+    recorder.dispatch(*sampleIn_, sampled.push, sampled.points, sampled.work, kMostWork);
   }
 }
 

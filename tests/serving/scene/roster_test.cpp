@@ -242,6 +242,22 @@ TEST_F(RosterTest, OneAddressCannotHoldAllPlaces) {
   EXPECT_EQ(from(5, "").error(), Roster::Refusal::full);
 }
 
+TEST_F(RosterTest, APlaceBelongsToTheAddressFromWhichItsParticipantCameBack) {
+  std::vector<Member> members(4);
+  const auto from = [&](std::size_t member, const char* address, const std::string& token = "") {
+    return roster.join({.token = token, .address = address, .placesOfAddress = 1}, members[member].mailbox,
+                       ids, limit, now);
+  };
+  const auto first = from(0, "192.0.2.1");
+  ASSERT_TRUE(first);
+  lose(members[0]);
+  const auto back = from(1, "192.0.2.2", first->token);
+  ASSERT_TRUE(back);
+  EXPECT_TRUE(back->resumed);
+  EXPECT_EQ(from(2, "192.0.2.2").error(), Roster::Refusal::addressHasMany);
+  EXPECT_TRUE(from(3, "192.0.2.1"));
+}
+
 TEST_F(RosterTest, WithoutGracePeriodDisconnectRemovesAtOnce) {
   Member watcher = join(), lost = join();
   ASSERT_TRUE(pose(lost, 1).has_value());
