@@ -238,7 +238,7 @@ TEST_F(EdgeParticipantsTest, AnOriginThatIsLostCutsThemOff) {
 }
 
 // A scene is replaced at an edge while somebody joins it there.
-TEST_F(EdgeParticipantsTest, WhoJoinsASceneThatHasJustEndedLearnsThat) {
+TEST_F(EdgeParticipantsTest, ASessionAfterTheEndOfASceneHasOnlyTheLastMessage) {
   telemetry::NatsMetrics metrics;
   Nats nats(natsOptions(), metrics);
   EdgeTunnels tunnels(nats, 1, "stream");

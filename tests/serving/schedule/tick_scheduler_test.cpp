@@ -186,7 +186,7 @@ TEST_F(TickSchedulerTest, GuestsUseTheTimeThatOtherScenesLeave) {
   EXPECT_GE(guest.ticks * guest.cost, 0.6 * 10s) << "its share is 0.25";
 }
 
-TEST_F(TickSchedulerTest, SlicesThatDoNotFitIntoGapsStayWithinTheShareOfGuests) {
+TEST_F(TickSchedulerTest, LongSlicesStayWithinTheShareOfGuests) {
   SimulatedScene &own = add(72, 3ms), &guest = add(10, 600ms, true);
   guest.slice = 12ms;  // own leaves gaps of 10.9 ms
   run(10s);
