@@ -16,8 +16,8 @@ using Eigen::Vector3d;
 
 // Minimum height of a compressed triangle, as a fraction of its height at rest.
 constexpr double kLeastPart = 0.25;
-// Faces with |n1 + n2|^2 of their unit normals below this are folded onto each other.
-constexpr double kFolded = 1e-6;
+// Minimum of (2 cos(delta / 2))^2. Opposite to the rest angle, both ways back are as short.
+constexpr double kOpposite = 1e-6;
 
 // Weight of a quad's diagonals relative to an edge of a triangle mesh. It makes alternately twisted quads
 // resist.
@@ -70,8 +70,9 @@ Hinge hingeOf(const std::vector<Vec3>& rest, const std::array<std::uint32_t, 4>&
   const double first = (a - c).cross(b - c).squaredNorm(), second = (b - d).cross(a - d).squaredNorm();
   const double area = (std::sqrt(first) + std::sqrt(second)) / 2;
   const double least = kLeastPart * std::min(first, second);
+  const HingeShape shape = hingeShape({a, b, c, d}, least);
   return {nodes, static_cast<float>((b - a).squaredNorm() / area),
-          static_cast<float>(hingeShape({a, b, c, d}, least).bent), static_cast<float>(least)};
+          static_cast<float>(std::atan2(shape.sine, shape.cosine)), static_cast<float>(least)};
 }
 
 }  // namespace
@@ -87,10 +88,17 @@ HingeShape hingeShape(const std::array<Vector3d, 4>& positions, double leastSqua
   // Normals divided by the heights of c and d above the edge.
   const Vector3d h1 = first / std::max(first.squaredNorm(), leastSquare);
   const Vector3d h2 = second / std::max(second.squaredNorm(), leastSquare);
-  const double cosine2 = std::sqrt(std::max((n1 + n2).squaredNorm(), kFolded));  // 2 cos(theta / 2)
-  return {2 * n2.cross(n1).dot(along) / cosine2,
+  return {n2.cross(n1).dot(along),
+          n1.dot(n2),
           {-(b - c).dot(along) * h1 - (b - d).dot(along) * h2,
            (a - c).dot(along) * h1 + (a - d).dot(along) * h2, length * h1, length * h2}};
+}
+
+double bentFromRest(const HingeShape& shape, double restAngle) {
+  const double restSine = std::sin(restAngle), restCosine = std::cos(restAngle);
+  const double sine = shape.sine * restCosine - shape.cosine * restSine;
+  const double cosine = shape.cosine * restCosine + shape.sine * restSine;
+  return 2 * sine / std::sqrt(std::max(2 + 2 * cosine, kOpposite));
 }
 
 std::vector<Hinge> hinges(const Cloth& cloth) {

@@ -18,20 +18,26 @@ inline constexpr std::uint32_t kMaxBendingNodes = 1'048'576;
 struct Hinge {
   std::array<std::uint32_t, 4> nodes;  // a, b, c, d
   float weight;                        // squared edge length over the area of both triangles, at rest
-  float bent;                          // HingeShape::bent at rest
+  float restAngle;                     // rad, -pi to pi; positive if the front is concave
   float leastSquare;  // m^4, minimum squared length of a triangle's area normal; smaller ones count as this
                       // large
 };
 
-// Angle of a hinge. [BMF03] Bridson, Marino, Fedkiw, "Simulation of Clothing with Folds and Wrinkles", SCA
-// 2003, 3: a hinge with angle theta acts on node i with the force -B weight (2 sin(theta / 2) - bent) grad_i
-// theta. A sheet of equilateral triangles bent to a cylinder then has the energy of a plate with flexural
-// rigidity B (N m): B / 2 times squared curvature times area.
+// The angle theta of a hinge, positive if the front is concave. sine and cosine are less than those of theta
+// if a triangle is compressed.
 struct HingeShape {
-  double bent;                               // 2 sin(theta / 2); positive if the front is concave
+  double sine, cosine;
   std::array<Eigen::Vector3d, 4> gradients;  // gradients of theta, 1/m
 };
 HingeShape hingeShape(const std::array<Eigen::Vector3d, 4>& positions, double leastSquare);
+
+// 2 sin(delta / 2), where delta, from -pi to pi, is how far the angle is from that at rest. A hinge acts on
+// node i with the force -B weight 2 sin(delta / 2) grad_i theta: [BMF03] Bridson, Marino, Fedkiw, "Simulation
+// of Clothing with Folds and Wrinkles", SCA 2003, 3, for rest angles other than zero, too. The energy, B weight
+// 4 (1 - cos(delta / 2)), has its only minimum at rest and no jump: a hinge may be folded at rest and pass 180
+// degrees. A sheet of equilateral triangles bent to a cylinder has the energy of a plate with flexural rigidity
+// B (N m): B / 2 times squared curvature times area.
+double bentFromRest(const HingeShape& shape, double restAngle);
 
 // Hinges of every edge between two faces. An edge of a quad has one hinge of half weight for each way to
 // split the quad. The two diagonals of a quad together have an eighth of the weight. A sheet of squares then

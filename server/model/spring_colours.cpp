@@ -14,28 +14,32 @@ namespace {
 
 // Spring by the positions of its ends within a block.
 struct BlockSpring {
-  std::uint32_t rowA, columnA, rowB, columnB;
+  std::int32_t rowA, columnA, rowB, columnB;
   SpringKind kind;
 };
 
-void addQuad(std::uint32_t row, std::uint32_t column, std::vector<BlockSpring>& springs) {
+void addQuad(std::int32_t row, std::int32_t column, std::vector<BlockSpring>& springs) {
   springs.push_back({row, column, row + 1, column + 1, SpringKind::shear});
   springs.push_back({row, column + 1, row + 1, column, SpringKind::shear});
 }
 
+// A part of springs that are mirror images of each other comes before the next part.
 std::vector<BlockSpring> allOfBlock() {
   std::vector<BlockSpring> springs;
-  const auto addAlong = [&](std::uint32_t step, SpringKind kind) {
-    for (std::uint32_t row = 0; row < kBlock; ++row)
-      for (std::uint32_t column = 0; column + step < kBlock; ++column)
-        springs.push_back({row, column, row, column + step, kind});
-    for (std::uint32_t row = 0; row + step < kBlock; ++row)
-      for (std::uint32_t column = 0; column < kBlock; ++column)
-        springs.push_back({row, column, row + step, column, kind});
+  const auto addAlong = [&](std::int32_t step, SpringKind kind) {
+    for (std::int32_t part = 0; part < 2; ++part)
+      for (std::int32_t row = 0; row < kBlock; ++row)
+        for (std::int32_t column = part; column + step < kBlock; column += 2)
+          springs.push_back({row, column, row, column + step, kind});
+    for (std::int32_t part = 0; part < 2; ++part)
+      for (std::int32_t row = part; row + step < kBlock; row += 2)
+        for (std::int32_t column = 0; column < kBlock; ++column)
+          springs.push_back({row, column, row + step, column, kind});
   };
   addAlong(2, SpringKind::bend);
-  for (std::uint32_t row = 0; row + 1 < kBlock; ++row)
-    for (std::uint32_t column = 0; column + 1 < kBlock; ++column) addQuad(row, column, springs);
+  for (std::int32_t part = 0; part < 4; ++part)
+    for (std::int32_t row = part / 2; row + 1 < kBlock; row += 2)
+      for (std::int32_t column = part % 2; column + 1 < kBlock; column += 2) addQuad(row, column, springs);
   addAlong(1, SpringKind::structural);
   return springs;
 }
@@ -43,7 +47,7 @@ std::vector<BlockSpring> allOfBlock() {
 // True if the spring of a shifted block crosses a seam. Seams run through the middle of the block in both
 // directions.
 bool crossesSeam(const BlockSpring& spring) {
-  const auto beyond = [](std::uint32_t index) { return index >= kBlock / 2; };
+  const auto beyond = [](std::int32_t index) { return index >= kBlock / 2; };
   return beyond(spring.rowA) != beyond(spring.rowB) || beyond(spring.columnA) != beyond(spring.columnB);
 }
 
@@ -58,27 +62,30 @@ class GridColours {
     std::ranges::copy_if(insides, std::back_inserter(seams), &crossesSeam);
     assert(corners.size() == kCornerColours && seams.size() == kSeamColours &&
            insides.size() == kInsideColours);
-    addPass(corners, 0);
-    addPass(seams, kBlock / 2);
-    addPass(insides, 0);
+    addPass(corners, false);
+    addPass(seams, true);
+    addPass(insides, false);
     return std::move(colours_);
   }
 
  private:
-  // Adds blocks that start `shift` rows and columns before a multiple of kBlock.
-  void addPass(const std::vector<BlockSpring>& springs, std::uint32_t shift) {
+  void addPass(const std::vector<BlockSpring>& springs, bool shifted) {
+    const BlockLine rows = blockLine(grid_.rows, shifted), columns = blockLine(grid_.columns, shifted);
     for (const BlockSpring& spring : springs) {
-      for (std::uint32_t row = 0; row < grid_.rows + shift; row += kBlock)
-        for (std::uint32_t column = 0; column < grid_.columns + shift; column += kBlock)
-          addSpring(spring, row, column, shift);
+      for (std::uint32_t i = 0; i < rows.count; ++i)
+        for (std::uint32_t k = 0; k < columns.count; ++k)
+          addSpring(spring, rows.first + kBlock * static_cast<std::int32_t>(i),
+                    columns.first + kBlock * static_cast<std::int32_t>(k));
       colours_.ends.push_back(static_cast<std::uint32_t>(colours_.links.size()));
     }
   }
 
-  void addSpring(const BlockSpring& spring, std::uint32_t row, std::uint32_t column, std::uint32_t shift) {
+  void addSpring(const BlockSpring& spring, std::int32_t row, std::int32_t column) {
     // Indices before the first row or column wrap around to very large values.
-    const std::uint32_t rowA = row + spring.rowA - shift, rowB = row + spring.rowB - shift;
-    const std::uint32_t columnA = column + spring.columnA - shift, columnB = column + spring.columnB - shift;
+    const auto rowA = static_cast<std::uint32_t>(row + spring.rowA),
+               rowB = static_cast<std::uint32_t>(row + spring.rowB),
+               columnA = static_cast<std::uint32_t>(column + spring.columnA),
+               columnB = static_cast<std::uint32_t>(column + spring.columnB);
     if (std::max(rowA, rowB) >= grid_.rows || std::max(columnA, columnB) >= grid_.columns) return;
     const std::uint32_t a = rowA * grid_.columns + columnA, b = rowB * grid_.columns + columnB;
     const float step = rowA == rowB ? lengths_.column : lengths_.row;
@@ -142,6 +149,12 @@ SpringColours meshColours(const Mesh& mesh) {
 }
 
 }  // namespace
+
+// Rows before the first block are as many as behind the last one, unless the number of rows is odd.
+BlockLine blockLine(std::uint32_t nodes, bool seams) {
+  const std::int32_t start = (nodes % kBlock == 2 ? -1 : 0) - (seams ? kBlock / 2 : 0);
+  return {start, static_cast<std::uint32_t>((static_cast<std::int32_t>(nodes) - start + kBlock - 1) / kBlock)};
+}
 
 SpringColours springColours(const Cloth& cloth) {
   return cloth.mesh ? meshColours(*cloth.mesh) : GridColours(cloth.grid).make();

@@ -28,9 +28,19 @@ struct SpringColours {
 //   seams:   all other springs across a seam; blocks are shifted by two nodes up and left, 34 colours
 //   insides: springs inside a block, 58 colours
 // Within a block bend springs come first and structural springs last, because the last ones are satisfied
-// best.
-inline constexpr std::uint32_t kBlock = 4;
+// best. A spring and its mirror image follow each other without a spring between them that shares a node with
+// either, and blocks lie symmetrically in grids with an even number of rows and of columns. A sweep over such
+// a grid therefore keeps the symmetry of the cloth.
+inline constexpr std::int32_t kBlock = 4;
 inline constexpr std::uint32_t kCornerColours = 4, kSeamColours = 34, kInsideColours = 58;
+
+// Blocks along the rows or the columns of a grid. The first and the last one may reach beyond the grid.
+struct BlockLine {
+  std::int32_t first;  // row or column where the first block starts, negative if it reaches beyond
+  std::uint32_t count;
+};
+// Blocks of the pass "seams", or of the other two, along `nodes` rows or columns.
+BlockLine blockLine(std::uint32_t nodes, bool seams);
 
 // Colours of a cloth. For a mesh each spring, in the order of its list, gets the first colour that is free at
 // both nodes. The number of colours is less than twice the maximum number of springs at a node.

@@ -110,22 +110,20 @@ std::array<Vec3, 4> cornersOf(const model::Hinge& hinge, std::span<const Vec3> p
 void ReferenceCloth::accumulateBendingForces(std::span<Vec3> forces) const {
   for (const model::Hinge& hinge : hinges_) {
     const model::HingeShape shape = model::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare);
-    const double strength = double{cloth_.dihedralBending} * hinge.weight * (hinge.bent - shape.bent);
+    const double bent = model::bentFromRest(shape, double{hinge.restAngle});
+    const double strength = -double{cloth_.dihedralBending} * hinge.weight * bent;
     for (std::size_t i = 0; i < hinge.nodes.size(); ++i)
       forces[hinge.nodes[i]] += strength * shape.gradients[i];
   }
 }
 
-// Integral of 2 sin(theta / 2) - bent, from the rest shape on.
+// 4 (1 - cos(delta / 2)) for each hinge.
 double ReferenceCloth::bendingEnergy() const {
   double sum = 0;
   for (const model::Hinge& hinge : hinges_) {
-    const double now = model::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare).bent;
-    const auto integral = [&](double bent) {
-      const double half = std::asin(std::clamp(bent / 2, -1.0, 1.0));
-      return -4 * std::cos(half) - 2 * hinge.bent * half;
-    };
-    sum += hinge.weight * (integral(now) - integral(hinge.bent));
+    const model::HingeShape shape = model::hingeShape(cornersOf(hinge, positions_), hinge.leastSquare);
+    const double sine = std::clamp(model::bentFromRest(shape, double{hinge.restAngle}) / 2, -1.0, 1.0);
+    sum += hinge.weight * 4 * (1 - std::sqrt(1 - sine * sine));
   }
   return cloth_.dihedralBending * sum;
 }
@@ -241,13 +239,16 @@ void ReferenceCloth::correctSprings(double h) {
       const Vec3 d = positions_[link.b] - positions_[link.a];
       const double length = std::sqrt(std::max(d.squaredNorm(), kTinyLengthSquared));
       const Vec3 direction = d / length;
-      const double growth = direction.dot(d - (start_[link.b] - start_[link.a]));
+      const Vec3 begun = start_[link.b] - start_[link.a];
+      const double growth = direction.dot(d - begun);
       const double excess = length - double{link.restLength};
       const double step =
           -(excess + scaled * multipliers[i] + gamma * growth) / ((1 + gamma) * weight + scaled);
       multipliers[i] += step;
-      positions_[link.a] -= inverseMasses_[link.a] * step * direction;
-      positions_[link.b] += inverseMasses_[link.b] * step * direction;
+      const double gain = begun.dot(d) / (length * length);
+      const Vec3 way = gain > 0.5 && gain < 1.5 ? Vec3((2 - gain) / length * begun) : direction;
+      positions_[link.a] -= inverseMasses_[link.a] * step * way;
+      positions_[link.b] += inverseMasses_[link.b] * step * way;
     }
   for (std::size_t i = 0; i < positions_.size(); ++i)
     if (inverseMasses_[i] > 0) velocities_[i] = (positions_[i] - start_[i]) / h;
@@ -310,11 +311,16 @@ void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step
         step.velocity + contact->velocity + step.spin.cross(positions_[i] - step.after.position);
     const Vec3 relative = velocities_[i] - carried;
     const double approach = relative.dot(contact->normal);
-    if (approach >= 0) continue;
-    const Vec3 tangent = relative - approach * contact->normal;
-    const double speed = tangent.norm();
-    const double kept = speed > 0 ? std::max(0.0, 1 - mu * -approach / speed) : 0;
-    velocities_[i] = carried + kept * tangent;
+    const auto heldOf = [&](const Vec3& motion, double most) {
+      const Vec3 along = motion - motion.dot(contact->normal) * contact->normal;
+      const double length = along.norm();
+      return length > 0 ? Vec3(std::min(1.0, most / length) * along) : Vec3(Vec3::Zero());
+    };
+    velocities_[i] -= std::min(approach, 0.0) * contact->normal;
+    if (mu == 0) continue;
+    const double most = mu * std::max(-approach, contact->depth / step.seconds);
+    velocities_[i] -= heldOf(relative, most);
+    positions_[i] -= heldOf(positions_[i] - from[i] - step.seconds * carried, step.seconds * most);
   }
 }
 

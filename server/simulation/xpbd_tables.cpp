@@ -18,15 +18,12 @@ struct Parts {
   float low, high;
 };
 
-std::uint32_t blocksAlong(std::uint32_t nodes) {
-  return (nodes + model::kBlock - 1) / model::kBlock;
-}
-
 // Number of blocks of each pass over a grid.
 std::array<std::uint32_t, kGridPasses> blocksOf(const model::Grid& grid) {
-  constexpr std::uint32_t kShift = model::kBlock / 2;
-  const std::uint32_t unshifted = blocksAlong(grid.rows) * blocksAlong(grid.columns);
-  return {unshifted, blocksAlong(grid.rows + kShift) * blocksAlong(grid.columns + kShift), unshifted};
+  const auto blocks = [&](bool seams) {
+    return model::blockLine(grid.rows, seams).count * model::blockLine(grid.columns, seams).count;
+  };
+  return {blocks(false), blocks(true), blocks(false)};
 }
 
 std::uint32_t multipliersOf(const model::Grid& grid) {

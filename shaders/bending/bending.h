@@ -17,7 +17,7 @@ struct HingeRecord {
   float secondOpposite;
 
   float weight;
-  float restBent;
+  float restQuarter;  // tan of a quarter of the angle at rest
   float leastSquare;  // m^4, lower bound of a normal's square
   float cloth;
 };

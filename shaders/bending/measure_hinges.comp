@@ -20,8 +20,8 @@ layout(push_constant) uniform Push {
   BendingPush push;
 };
 
-// Least |n1 + n2|^2 of the unit normals; below it the faces lie on each other.
-const float kFolded = 1e-6;
+// Minimum of (2 cos(delta / 2))^2, where delta is the angle from rest.
+const float kOpposite = 1e-6;
 
 void main() {
   uint hinge = gl_GlobalInvocationID.x;
@@ -49,12 +49,22 @@ void main() {
   float inverse2 = reciprocalSquareRoot(max(dotProduct(second, second), record.leastSquare));
   precise vec3 n1 = inverse1 * first;
   precise vec3 n2 = inverse2 * second;
-  precise vec3 sum = n1 + n2;
   precise vec3 h1 = inverse1 * n1;
   precise vec3 h2 = inverse2 * n2;
   precise float sine = dotProduct(crossProduct(n2, n1), along);
-  precise float bent = (2.0 * sine) * reciprocalSquareRoot(max(dotProduct(sum, sum), kFolded));
-  precise float strength = (rigidity * record.weight) * (record.restBent - bent);
+  float cosine = dotProduct(n1, n2);
+  // The sine and cosine of half of the angle at rest, then of the whole.
+  precise float square = record.restQuarter * record.restQuarter;
+  float inverse = reciprocal(1.0 + square);
+  precise float halfSine = (2.0 * record.restQuarter) * inverse;
+  precise float halfCosine = (1.0 - square) * inverse;
+  precise float restSine = 2.0 * halfSine * halfCosine;
+  precise float restCosine = halfCosine * halfCosine - halfSine * halfSine;
+  precise float fromRestSine = sine * restCosine - cosine * restSine;
+  precise float fromRestCosine = cosine * restCosine + sine * restSine;
+  precise float twice = 2.0 + 2.0 * fromRestCosine;
+  precise float bent = (2.0 * fromRestSine) * reciprocalSquareRoot(max(twice, kOpposite));
+  precise float strength = -((rigidity * record.weight) * bent);
   precise vec3 onA = -dotProduct(bc, along) * h1 - dotProduct(bd, along) * h2;
   precise vec3 onB = dotProduct(ac, along) * h1 + dotProduct(ad, along) * h2;
   precise float length_ = squared * inverseLength;

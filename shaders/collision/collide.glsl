@@ -149,27 +149,38 @@ void reportContact(uint contact, vec3 gained, float inverseMass) {
   atomicAdd(contactImpulses[contact], uint(units) + 1);
 }
 
-// Moves a free node out of the collider. Its velocity relative to the surface, which moves with
-// `surfaceVelocity` and spins, loses the part into the surface. The part along the surface loses at most
-// friction times that.
+// The share of a motion along a surface that friction takes. It takes at most `most` of its length.
+float heldShare(vec3 along, float most) {
+  precise float share = most * reciprocalSquareRoot(max(dotProduct(along, along), 1e-30));
+  return min(share, 1.0);
+}
+
+vec3 alongSurface(vec3 v, vec3 normal) {
+  precise vec3 along = v - dotProduct(v, normal) * normal;
+  return along;
+}
+
+// Moves a free node, which was at `from` at the substep's start, out of the collider. Its velocity relative to
+// the surface, which moves with `surfaceVelocity` and spins, loses the part into the surface. Friction takes at
+// most its coefficient times the speed at which the collider pushes: that of the approach, or that of the way
+// out if something pressed the node into the collider. It acts on the velocity, and on the way since the
+// substep's start, which other colliders may have caused.
 void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity, vec3 spin,
-           CollisionPush push, CollidingNode node, inout vec3 position, inout vec3 velocity) {
+           CollisionPush push, CollidingNode node, vec3 from, inout vec3 position, inout vec3 velocity) {
   precise vec3 surface = position + contact.depth * contact.normal;
-  position = surface;
   precise vec3 arm = surface - collider.after;
   precise vec3 carried = surfaceVelocity + crossProduct(spin, arm);
   precise vec3 relative = velocity - carried;
   precise float approach = dotProduct(relative, contact.normal);
-  vec3 gained = vec3(0.0);
-  if (approach < 0.0) {
-    precise vec3 slip = relative - approach * contact.normal;
-    precise float inverseSlip = reciprocalSquareRoot(max(dotProduct(slip, slip), 1e-30));
-    precise float kept = max(1.0 + collider.friction * approach * inverseSlip, 0.0);
-    precise vec3 after = carried + kept * slip;
-    precise vec3 difference = after - velocity;
-    gained = difference;
-    velocity = after;
-  }
+  precise float most = collider.friction * max(-approach, contact.depth * push.substepRate);
+  vec3 slip = alongSurface(relative, contact.normal);
+  precise vec3 after = carried + (1.0 - heldShare(slip, most)) * slip + max(approach, 0.0) * contact.normal;
+  precise vec3 gained = after - velocity;
+  velocity = after;
+  precise vec3 way = surface - from - push.substepSeconds * carried;
+  vec3 slid = alongSurface(way, contact.normal);
+  precise vec3 stayed = surface - heldShare(slid, push.substepSeconds * most) * slid;
+  position = stayed;
   if (push.contactClothCount > 0 && node.inverseMass > 0.0) {
     reportContact(index * push.contactClothCount + node.cloth, gained, node.inverseMass);
   }
@@ -182,7 +193,7 @@ void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush p
   if (contact.depth <= 0.0) {
     return;
   }
-  leave(index, collider, contact, collider.velocity, frame.spin, push, node, position, velocity);
+  leave(index, collider, contact, collider.velocity, frame.spin, push, node, from, position, velocity);
 }
 
 // Collides a node with every collider that it may touch, in ascending order. A node that is pushed out of the

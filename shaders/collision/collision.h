@@ -65,7 +65,7 @@ struct CollisionPush {
   float substepRate;
   uint32_t contactClothCount;  // cloths in the scene if contacts are reported, else 0
   uint32_t nodeWork;           // for the host: work of a node that collides (vulkan::Recorder::dispatch)
-  uint32_t reserved;
+  float substepSeconds;
 };
 
 // The effect of a collider on a cloth in a tick is one number, at (collider times cloths plus cloth): the

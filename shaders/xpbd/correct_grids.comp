@@ -112,7 +112,7 @@ void load(uint at, uint placeRow, uint placeColumn, int row, int column) {
   int index = rowStarts[placeRow] + columns[placeColumn];
   vec4 node = kWhole ? positions[index] : texelFetch(currentPositions, index);
   nodes[at] = vec4(node.xyz, inside ? node.w : kAbsent);
-  if (kDamped && keepsBegun) {
+  if (keepsBegun) {
     begun[at] = texelFetch(startPositions, index).xyz;
   }
 }
@@ -135,10 +135,7 @@ vec3 begunAt(uint at, uint colour) {
 
 void correct(uint a, uint b, Rule rule, uint colour) {
   precise vec3 d = nodes[b].xyz - nodes[a].xyz;
-  precise vec3 before = vec3(0.0);
-  if (kDamped) {
-    before = begunAt(b, colour) - begunAt(a, colour);
-  }
+  precise vec3 before = begunAt(b, colour) - begunAt(a, colour);
   precise float inverseMasses = nodes[a].w + nodes[b].w;
   precise float nearlyBoth = 1.5 * grid.inverseMass;
   float inverse = inverseMasses > nearlyBoth ? rule.both : (inverseMasses > 0.0 ? rule.one : 0.0);
@@ -147,7 +144,7 @@ void correct(uint a, uint b, Rule rule, uint colour) {
   if (kIterated && again) {
     multiplier = multipliers[at];
   }
-  vec3 pull = pullOf(d, before, rule.spring, inverse, multiplier);
+  vec3 pull = pullOf(d, before, nodes[a].xyz, rule.spring, inverse, multiplier);
   if (kIterated && exists) {
     multipliers[at] = multiplier;
   }
@@ -163,23 +160,48 @@ void correctShear(uint a, uint b, uint e, uint f, uint colour) {
   correct(b, e, grid.shear, colour + 1);
 }
 
-void placeBlock(uint block, uint perRow, float inversePerRow, uint count, uint firstMultiplier, int shift,
-                out int row, out int column) {
-  // A software device divides one lane at a time, so that this multiplies. It is exact below a million
-  // blocks.
-  precise float quotient = (float(block) + 0.5) * inversePerRow;
-  uint blockRow = uint(quotient);
-  row = int(kSize * blockRow) - shift;
-  column = int(kSize * (block - blockRow * perRow)) - shift;
-  locate(row, column);
-  exists = block < count;
-  multiplierAt = firstMultiplier + (exists ? block : 0);
-  multiplierStride = count;
+// Blocks of a pass: model::blockLine() along the columns and along the rows.
+struct Blocks {
+  int firstRow;
+  int firstColumn;
+  uint perRow;
+  float inversePerRow;
+  uint count;
+  uint firstMultiplier;
+};
+
+int firstOfLine(int nodes, bool seams) {
+  return ((nodes & 3) == 2 ? -1 : 0) - (seams ? 2 : 0);
 }
 
-void correctCorners(uint block, uint perRow, float inversePerRow, uint count, uint firstMultiplier) {
+uint countOfLine(int nodes, int first) {
+  return uint(nodes - first + 3) / 4;
+}
+
+Blocks blocksOf(bool seams, uint firstMultiplier) {
+  int firstRow = firstOfLine(grid.rows, seams);
+  int firstColumn = firstOfLine(grid.columns, seams);
+  uint perRow = countOfLine(grid.columns, firstColumn);
+  return Blocks(firstRow, firstColumn, perRow, reciprocal(float(perRow)),
+                perRow * countOfLine(grid.rows, firstRow), firstMultiplier);
+}
+
+void placeBlock(uint block, Blocks blocks, out int row, out int column) {
+  // A software device divides one lane at a time, so that this multiplies. It is exact below a million
+  // blocks.
+  precise float quotient = (float(block) + 0.5) * blocks.inversePerRow;
+  uint blockRow = uint(quotient);
+  row = blocks.firstRow + int(kSize * blockRow);
+  column = blocks.firstColumn + int(kSize * (block - blockRow * blocks.perRow));
+  locate(row, column);
+  exists = block < blocks.count;
+  multiplierAt = blocks.firstMultiplier + (exists ? block : 0);
+  multiplierStride = blocks.count;
+}
+
+void correctCorners(uint block, Blocks blocks) {
   int row, column;
-  placeBlock(block, perRow, inversePerRow, count, firstMultiplier, 0, row, column);
+  placeBlock(block, blocks, row, column);
   keepsBegun = true;
   [[unroll]] for (uint k = 0; k < 4; ++k) {
     load(k, 1 + k / 2, 3 + k % 2, row, column);
@@ -199,10 +221,9 @@ bool crosses(uint a, uint b) {
 }
 
 // Corrects all springs of an inside, or those that cross a seam.
-void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint firstMultiplier,
-                  bool seams) {
+void correctBlock(uint block, Blocks blocks, bool seams) {
   int row, column;
-  placeBlock(block, perRow, inversePerRow, count, firstMultiplier, seams ? 2 : 0, row, column);
+  placeBlock(block, blocks, row, column);
   keepsBegun = !kFewRegisters;
   [[unroll]] for (uint k = 0; k < kSize * kSize; ++k) {
     load(k, k / kSize, k % kSize, row, column);
@@ -210,7 +231,7 @@ void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint
   uint colour = 0;
   if (kBend) {
     [[unroll]] for (uint k = 0; k < 8; ++k) {
-      uint a = k / 2 * kSize + k % 2;
+      uint a = k % 4 * kSize + k / 4;
       if (!seams || crosses(a, a + 2)) {
         correct(a, a + 2, grid.bendRow, colour);
         ++colour;
@@ -223,21 +244,23 @@ void correctBlock(uint block, uint perRow, float inversePerRow, uint count, uint
       }
     }
   }
+  // Springs that are mirror images of each other come before the others, as in the list of the model.
   [[unroll]] for (uint k = 0; k < 9; ++k) {
-    uint a = k / 3 * kSize + k % 3;
+    uint a = k < 4 ? k / 2 * 2 * kSize + k % 2 * 2 : k < 6 ? (k - 4) * 2 * kSize + 1 : k < 8 ? kSize + (k - 6) * 2 : kSize + 1;
     if (!seams || crosses(a, a + kSize + 1)) {
       correctShear(a, a + 1, a + kSize, a + kSize + 1, colour);
       colour += 2;
     }
   }
   [[unroll]] for (uint k = 0; k < 12; ++k) {
-    uint a = k / 3 * kSize + k % 3;
+    uint a = k < 8 ? k / 2 * kSize + k % 2 * 2 : (k - 8) * kSize + 1;
     if (!seams || crosses(a, a + 1)) {
       correct(a, a + 1, grid.alongRow, colour);
       ++colour;
     }
   }
-  [[unroll]] for (uint a = 0; a < 12; ++a) {
+  [[unroll]] for (uint k = 0; k < 12; ++k) {
+    uint a = k < 8 ? k / 4 * 2 * kSize + k % 4 : kSize + k - 8;
     if (!seams || crosses(a, a + kSize)) {
       correct(a, a + kSize, grid.alongColumn, colour);
       ++colour;
@@ -273,28 +296,22 @@ void main() {
     return;
   }
   uint firstBlock = uint(tile.firstBlock);
-  // Blocks per row and in total, without and with a shift.
-  uint perRow = (uint(grid.columns) + 3) / 4;
-  uint count = perRow * ((uint(grid.rows) + 3) / 4);
-  uint shiftedPerRow = (uint(grid.columns) + 5) / 4;
-  uint shiftedCount = shiftedPerRow * ((uint(grid.rows) + 5) / 4);
-  float inversePerRow = reciprocal(float(perRow));
-  float inverseShiftedPerRow = reciprocal(float(shiftedPerRow));
-  uint seamMultipliers = grid.firstMultiplier + kCornerColours * count;
-  uint insideMultipliers = seamMultipliers + kSeamColours * shiftedCount;
+  Blocks corners = blocksOf(false, grid.firstMultiplier);
+  Blocks seams = blocksOf(true, grid.firstMultiplier + kCornerColours * corners.count);
+  Blocks insides = corners;
+  insides.firstMultiplier = seams.firstMultiplier + kSeamColours * seams.count;
 
   uint iteration = push.firstIteration;
   do {
     again = iteration > 0;
     if ((kPasses & kCorners) != 0) {
-      PASS(correctCorners(block, perRow, inversePerRow, count, grid.firstMultiplier), count)
+      PASS(correctCorners(block, corners), corners.count)
     }
     if ((kPasses & kSeams) != 0) {
-      PASS(correctBlock(block, shiftedPerRow, inverseShiftedPerRow, shiftedCount, seamMultipliers, true),
-           shiftedCount)
+      PASS(correctBlock(block, seams, true), seams.count)
     }
     if ((kPasses & kInsides) != 0) {
-      PASS(correctBlock(block, perRow, inversePerRow, count, insideMultipliers, false), count)
+      PASS(correctBlock(block, insides, false), insides.count)
     }
     ++iteration;
   } while (kWhole && iteration < endIteration);

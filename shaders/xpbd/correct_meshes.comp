@@ -40,16 +40,13 @@ void correct(uint link, uint cloth, bool again) {
   vec4 nodeA = fetchNode(a);
   vec4 nodeB = fetchNode(b);
   precise vec3 d = nodeB.xyz - nodeA.xyz;
-  precise vec3 begun = vec3(0.0);
-  if (kDamped) {
-    begun = texelFetch(startPositions, b).xyz - texelFetch(startPositions, a).xyz;
-  }
+  precise vec3 begun = texelFetch(startPositions, b).xyz - texelFetch(startPositions, a).xyz;
   precise float inverseMasses = nodeA.w + nodeB.w;
   float multiplier = 0.0;
   if (kIterated && again) {
     multiplier = multipliers[push.firstMultiplier + link];
   }
-  vec3 pull = pullOf(d, begun, spring, inverseResistance(spring, inverseMasses), multiplier);
+  vec3 pull = pullOf(d, begun, nodeA.xyz, spring, inverseResistance(spring, inverseMasses), multiplier);
   if (kIterated) {
     multipliers[push.firstMultiplier + link] = multiplier;
   }

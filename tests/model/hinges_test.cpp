@@ -31,7 +31,7 @@ TEST(Hinges, HaveTheRightAngleAndGradient) {
     const Corners at = {Vector3d(0.1, 0, 0.2), Vector3d(0, 1, 0), Vector3d(-1, 0.3, lift),
                         Vector3d(0.8, 0.6, 0.1)};
     const HingeShape shape = hingeShape(at, 0);
-    EXPECT_NEAR(shape.bent, 2 * std::sin(angleOf(at) / 2), 1e-12);
+    EXPECT_NEAR(bentFromRest(shape, 0), 2 * std::sin(angleOf(at) / 2), 1e-12);
     Vector3d sum = Vector3d::Zero(), moment = Vector3d::Zero();
     for (std::size_t i = 0; i < 4; ++i) {
       sum += shape.gradients[i];
@@ -50,11 +50,32 @@ TEST(Hinges, HaveTheRightAngleAndGradient) {
   }
 }
 
+// Two triangles of 1 m at an edge along X, opened by `angle` from lying flat.
+Corners openedBy(double angle) {
+  return {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0.5, 1, 0),
+          Vector3d(0.5, -std::cos(angle), std::sin(angle))};
+}
+
+// The force on the angle is -2 sin(delta / 2), whatever the rest angle is, also where the faces pass through
+// each other at 180 degrees. There is one place with a jump: opposite to the rest angle.
+TEST(Hinges, PullTowardsTheirRestAngleOnTheShorterWay) {
+  const double pi = std::acos(-1.0);
+  for (const double rest : {0.0, 1.0, -2.5, 3.0, 3.14159, -3.1415}) {
+    for (int step = -31; step <= 31; ++step) {
+      const double delta = 0.1 * step;
+      SCOPED_TRACE(testing::Message() << "rest " << rest << ", from rest by " << delta);
+      const Corners at = openedBy(rest + delta);
+      EXPECT_NEAR(std::remainder(angleOf(at) - rest - delta, 2 * pi), 0, 1e-12);
+      EXPECT_NEAR(bentFromRest(hingeShape(at, 0), rest), 2 * std::sin(delta / 2), 1e-12);
+    }
+  }
+}
+
 TEST(Hinges, IncludeDiagonalsAndInnerEdgesOfQuads) {
   Cloth cloth;
   cloth.grid = {.rows = 4, .columns = 6, .width = 0.5f, .height = 0.3f};
   EXPECT_EQ(hinges(cloth).size(), 2u * (3 * 5 + 3 * 4 + 2 * 5));
-  for (const Hinge& hinge : hinges(cloth)) EXPECT_EQ(hinge.bent, 0);
+  for (const Hinge& hinge : hinges(cloth)) EXPECT_EQ(hinge.restAngle, 0);
   EXPECT_EQ(hinges(asMesh(cloth)).size(), hinges(cloth).size());
 }
 
@@ -64,7 +85,7 @@ double plateEnergy(const std::vector<Hinge>& hinges, const std::vector<Vector3d>
   for (const Hinge& hinge : hinges) {
     Corners at;
     for (std::size_t i = 0; i < 4; ++i) at[i] = bent[hinge.nodes[i]];
-    const double now = hingeShape(at, 0).bent;
+    const double now = bentFromRest(hingeShape(at, 0), 0);
     sum += 0.5 * hinge.weight * now * now;
   }
   return sum;

@@ -63,14 +63,15 @@ TEST(SpringColours, MeetOnlyInsideABlockInEachPass) {
   const Cloth cloth = grid(18, 15);
   const SpringColours colours = springColours(cloth);
   ASSERT_EQ(colours.count(), kCornerColours + kSeamColours + kInsideColours);
-  const auto blockOf = [&](std::uint32_t node, std::uint32_t shift) {
-    const std::uint32_t row = node / 15 + shift, column = node % 15 + shift;
-    return std::pair(row / kBlock, column / kBlock);
+  const auto blockOf = [&](std::uint32_t node, bool seams) {
+    const auto row = static_cast<std::int32_t>(node / 15), column = static_cast<std::int32_t>(node % 15);
+    return std::pair((row - blockLine(18, seams).first) / kBlock,
+                     (column - blockLine(15, seams).first) / kBlock);
   };
   for (std::size_t colour = kCornerColours; colour < colours.count(); ++colour) {
-    const std::uint32_t shift = colour < kCornerColours + kSeamColours ? kBlock / 2 : 0;
+    const bool seams = colour < kCornerColours + kSeamColours;
     for (const SpringLink& link : colours.of(colour))
-      EXPECT_EQ(blockOf(link.a, shift), blockOf(link.b, shift)) << link.a << " " << link.b;
+      EXPECT_EQ(blockOf(link.a, seams), blockOf(link.b, seams)) << link.a << " " << link.b;
   }
   // Quads of the corner pass share no node, so a node has at most two springs.
   std::vector<int> springs(cloth.nodeCount(), 0);
@@ -78,6 +79,34 @@ TEST(SpringColours, MeetOnlyInsideABlockInEachPass) {
     for (const SpringLink& link : colours.of(colour))
       for (const std::uint32_t node : {link.a, link.b}) ++springs[node];
   EXPECT_EQ(std::ranges::max(springs), 1);
+}
+
+// The order of a sweep over a grid with even numbers of rows and columns is its own mirror image: each colour
+// has the mirror image of a colour with no spring between both that shares a node with either.
+TEST(SpringColours, KeepTheSymmetryOfEvenGrids) {
+  for (const auto& [rows, columns] : {std::pair{2u, 4u}, {8u, 12u}, {10u, 14u}, {18u, 6u}}) {
+    SCOPED_TRACE(testing::Message() << rows << " x " << columns);
+    const SpringColours colours = springColours(grid(rows, columns));
+    const auto mirrored = [&](std::uint32_t node, bool upright) {
+      const std::uint32_t row = node / columns, column = node % columns;
+      return upright ? (rows - 1 - row) * columns + column : row * columns + columns - 1 - column;
+    };
+    for (const bool upright : {false, true}) {
+      // Nodes keep their values if the sweep of the mirror image visits them with the same neighbours in the
+      // same order.
+      const auto visits = [&](bool mirror) {
+        std::vector<std::vector<std::uint32_t>> neighbours(std::size_t{rows} * columns);
+        for (const SpringLink& link : colours.links) {
+          const std::uint32_t a = mirror ? mirrored(link.a, upright) : link.a,
+                              b = mirror ? mirrored(link.b, upright) : link.b;
+          neighbours[a].push_back(b);
+          neighbours[b].push_back(a);
+        }
+        return neighbours;
+      };
+      EXPECT_EQ(visits(true), visits(false)) << (upright ? "upright" : "sideways");
+    }
+  }
 }
 
 TEST(SpringColours, AreFewAndDeterministicForMeshes) {

@@ -53,8 +53,9 @@ double errorOf(const model::Cloth& cloth, const NodeState& state, std::uint32_t 
     const model::HingeShape shape = model::hingeShape(at, hinge.leastSquare);
     double steepest = 0;
     for (const Eigen::Vector3d& gradient : shape.gradients) steepest = std::max(steepest, gradient.norm());
-    const double placed = 4 * steepest * 0.5 * kRounding + 5 * 7e-7 * (1 + std::abs(shape.bent));
-    const double pull = std::abs(shape.bent - hinge.bent) + 2;
+    const double bent = std::abs(model::bentFromRest(shape, double{hinge.restAngle}));
+    const double placed = 4 * steepest * 0.5 * kRounding + 5 * 7e-7 * (1 + bent);
+    const double pull = bent + 2;
     for (std::size_t i = 0; i < 4; ++i)
       errors[hinge.nodes[i]] += double{cloth.dihedralBending} * hinge.weight * steepest * placed * pull;
   }

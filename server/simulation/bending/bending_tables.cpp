@@ -2,6 +2,8 @@
 // Tables of the hinges of a scene.
 #include "server/simulation/bending/bending_tables.h"
 
+#include <cmath>
+
 #include "server/model/hinges.h"
 
 namespace clothstream::simulation {
@@ -35,7 +37,7 @@ BendingTables bendingTables(std::span<const model::Cloth> cloths) {
                                .firstOpposite = node(2),
                                .secondOpposite = node(3),
                                .weight = hinge.weight,
-                               .restBent = hinge.bent,
+                               .restQuarter = static_cast<float>(std::tan(double{hinge.restAngle} / 4)),
                                .leastSquare = hinge.leastSquare,
                                .cloth = static_cast<float>(i)});
       for (std::uint32_t place = 0; place < 4; ++place)

@@ -125,7 +125,7 @@ bool CoarseStage::record(vulkan::Recorder& recorder, std::uint32_t present, cons
                       .substepRate = 0,
                       .contactClothCount = 0,
                       .nodeWork = collision.nodeWork,
-                      .reserved = 0};
+                      .substepSeconds = 0};
     if (any) recorder.barrier();
     recordLevel(recorder, present, push);
     any = true;

@@ -133,7 +133,7 @@ shared::CollisionPush CollisionStage::push(std::uint32_t substep, std::uint32_t 
           .substepRate = tickRate * static_cast<float>(substeps),
           .contactClothCount = reportsContacts_ ? clothCount_ : 0,
           .nodeWork = nodeWork_,
-          .reserved = 0};
+          .substepSeconds = 1 / (tickRate * static_cast<float>(substeps))};
 }
 
 }  // namespace clothstream::simulation

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+// Momentum and symmetry: forces between nodes of a cloth make neither linear nor angular momentum, and no
+// order of work prefers a side. docs/mechanics.md has the figures.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/mechanics/rows.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::mechanics {
+namespace {
+
+using Eigen::Vector3d;
+using simulation::NodeState;
+
+// A solver with its name in the page.
+struct Way {
+  std::string name;
+  model::Solver solver;
+  // Whether every correction acts along the line between two nodes at the start of the substep. Angular
+  // momentum then stays except for rounding.
+  bool alongLines = true;
+  // Whether the work has a mirror image, and no threshold that rounding decides. Sums of conjugate gradients
+  // have an order.
+  bool mirrored = true;
+};
+
+model::Solver acad(model::AcadMode mode) {
+  model::Solver solver;
+  solver.kind = model::SolverKind::acad;
+  solver.acadMode = mode;
+  return solver;
+}
+
+model::Solver plain(model::SolverKind kind) {
+  model::Solver solver;
+  solver.kind = kind;
+  return solver;
+}
+
+std::vector<Way> ways() {
+  model::Solver assembled = plain(model::SolverKind::constraint);
+  assembled.path = model::ConstraintPath::assembled;
+  model::Solver sweeps = plain(model::SolverKind::xpbd);
+  sweeps.iterations = 4;
+  return {{"`massSpring`", plain(model::SolverKind::massSpring)},
+          {"`acad`", acad(model::AcadMode::hold), true, false},
+          {"`acad`, `ACAD_MODE_LIMIT`", acad(model::AcadMode::limit), false},
+          {"`constraint`", plain(model::SolverKind::constraint), true, false},
+          {"`constraint`, assembled", assembled, true, false},
+          {"`implicitEuler`", plain(model::SolverKind::implicitEuler), false, false},
+          {"`xpbd`", plain(model::SolverKind::xpbd)},
+          {"`xpbd`, 4 sweeps", sweeps}};
+}
+
+// 8x8 nodes, 40 cm, 50 g. Four substeps of 1/288 s bear springs of 8 N/m as forces.
+model::Cloth clothOf(const Way& way) {
+  const bool forces =
+      way.solver.kind == model::SolverKind::massSpring || way.solver.kind == model::SolverKind::acad;
+  model::Cloth cloth;
+  cloth.name = "cloth";
+  cloth.grid = {.rows = 8, .columns = 8, .width = 0.4f, .height = 0.4f};
+  cloth.grid.pose.orientation = tests::turned(50, model::Vec3::UnitX());
+  cloth.mass = 0.05f;
+  cloth.structural = {forces ? 8.0f : 500.0f, 0.001f};
+  cloth.shear = {cloth.structural.stiffness / 4, 0.001f};
+  cloth.bend = {cloth.structural.stiffness / 10, 0.0005f};
+  cloth.damping = cloth.drag = cloth.lift = 0;
+  cloth.solver = way.solver;
+  return cloth;
+}
+
+model::Scene sceneOf(const model::Cloth& cloth) {
+  model::Scene scene = tests::sceneOf({cloth});
+  scene.substeps = 4;
+  return scene;
+}
+
+NodeState after(tests::Running& running, const model::Scene& scene, double seconds) {
+  const int ticks = static_cast<int>(std::lround(seconds * scene.simulationRate));
+  for (int tick = 0; tick < ticks; ++tick) EXPECT_TRUE(running.tick(tests::inputsOf(scene)).healthy);
+  return running.state();
+}
+
+// Sums over the nodes that can move, about `about`.
+struct Momentum {
+  double mass = 0;
+  Vector3d moment = Vector3d::Zero();   // of mass
+  Vector3d angular = Vector3d::Zero();  // N m s
+  double moving = 0;            // sum of |x| m |v|
+  double inertia = 0;           // about the vertical
+};
+
+Momentum momentumOf(const model::Scene& scene, const NodeState& state, const Vector3d& about) {
+  const model::Cloth& cloth = scene.cloths[0];
+  const std::vector<double> masses = model::nodeMasses(cloth);
+  const std::vector<std::uint8_t> pinned = model::pinnedNodes(cloth);
+  Momentum sum;
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    if (pinned[i] != 0) continue;
+    const Vector3d arm = state.positions[i].cast<double>() - about, v = state.velocities[i].cast<double>();
+    sum.mass += masses[i];
+    sum.moment += masses[i] * arm;
+    sum.angular += masses[i] * arm.cross(v);
+    sum.moving += masses[i] * arm.norm() * v.norm();
+    sum.inertia += masses[i] * (arm.x() * arm.x() + arm.z() * arm.z());
+  }
+  return sum;
+}
+
+// Hung at its first node and released: gravity has no torque about the vertical through that node, so the
+// cloth swings, but does not turn.
+double spinAfter20Seconds(const Way& way, bool mesh) {
+  model::Cloth cloth = clothOf(way);
+  cloth.damping = 1;
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 0}};
+  const model::Scene scene = sceneOf(mesh ? model::asMesh(cloth) : cloth);
+  tests::Running running(scene);
+  const NodeState state = after(running, scene, 20);
+  const Momentum momentum = momentumOf(scene, state, state.positions[0].cast<double>());
+  return std::abs(momentum.angular.y()) / momentum.inertia;
+}
+
+// The same without damping, for two seconds of swinging: angular momentum about the vertical, as a share of
+// what moves.
+double angularMomentumMade(const Way& way) {
+  model::Cloth cloth = clothOf(way);
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 0}};
+  const model::Scene scene = sceneOf(cloth);
+  tests::Running running(scene);
+  const NodeState state = after(running, scene, 2);
+  const Momentum momentum = momentumOf(scene, state, state.positions[0].cast<double>());
+  return std::abs(momentum.angular.y()) / momentum.moving;
+}
+
+// Crumpled by 3 mm, released without gravity: metres that its centre moves in a minute.
+double driftInAMinute(const Way& way) {
+  model::Scene scene = sceneOf(clothOf(way));
+  scene.environment.gravity = model::Vec3::Zero();
+  std::mt19937 random(5);
+  const NodeState start = tests::randomState(scene, random, 0.003f, 0);
+  tests::Running running(scene);
+  running.restore(start);
+  const auto centre = [&](const NodeState& state) {
+    const Momentum sum = momentumOf(scene, state, Vector3d::Zero());
+    return Vector3d(sum.moment / sum.mass);
+  };
+  return (centre(after(running, scene, 60)) - centre(start)).norm();
+}
+
+// Hung at both upper corners and released: largest distance of a node from the mirror image of its partner
+// after a second.
+double asymmetryAfterASecond(const Way& way) {
+  model::Cloth cloth = clothOf(way);
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 7, .columnStep = 7}};
+  const model::Scene scene = sceneOf(cloth);
+  tests::Running running(scene);
+  const NodeState state = after(running, scene, 1);
+  double largest = 0;
+  for (std::size_t row = 0; row < 8; ++row)
+    for (std::size_t column = 0; column < 8; ++column) {
+      model::Vec3 mirrored = state.positions[8 * row + 7 - column];
+      mirrored.x() = -mirrored.x();
+      largest = std::max(largest, double{(state.positions[8 * row + column] - mirrored).norm()});
+    }
+  return largest;
+}
+
+class MomentumLaws : public tests::GpuTest, public testing::WithParamInterface<Way> {};
+
+TEST_P(MomentumLaws, Hold) {
+  const Way& way = GetParam();
+  const double grid = spinAfter20Seconds(way, false), mesh = spinAfter20Seconds(way, true);
+  const double made = angularMomentumMade(way);
+  const double drift = driftInAMinute(way), asymmetry = asymmetryAfterASecond(way);
+  EXPECT_LT(grid, 0.001);
+  EXPECT_LT(mesh, 0.001);
+  EXPECT_LT(made, way.alongLines ? 1e-4 : 0.05);
+  EXPECT_LT(drift, 0.001);
+  if (way.mirrored) {
+    EXPECT_LT(asymmetry, 1e-4);
+  }
+  expectRow({way.name, figure(grid), figure(mesh), figure(made), figure(1000 * drift),
+             figure(1000 * asymmetry)});
+}
+
+INSTANTIATE_TEST_SUITE_P(Solvers, MomentumLaws, testing::ValuesIn(ways()), [](const auto& way) {
+  std::string name;
+  for (const char c : way.param.name)
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) name += c;
+  return name;
+});
+
+}  // namespace
+}  // namespace clothstream::mechanics
