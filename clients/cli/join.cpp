@@ -16,6 +16,7 @@
 #include "clients/cli/print.h"
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
+#include "clients/cli/stream_time.h"
 #include "clients/grpc/grpc_client.h"
 
 namespace clothstream::cli {
@@ -113,20 +114,14 @@ Report reportOf(NativeClient& client) {
 // the input is wrong.
 std::optional<Error> follow(NativeClient& client, const JoinOptions& options, InputLines* input,
                             const StatusLine& line) {
-  const auto start = SteadyClock::now();
-  auto nextLine = start;  // of the terminal
+  StreamTime time(options.seconds);
+  auto nextLine = SteadyClock::now();  // of the terminal
   for (;;) {
     if (input != nullptr)
       if (auto sent = sendLines(client, *input); !sent) return std::move(sent).error();
-    auto wait = input != nullptr && !input->atEnd() ? kInputInterval : kLineInterval;
-    if (options.seconds) {
-      const auto end = start + std::chrono::duration_cast<SteadyClock::duration>(
-                                   std::chrono::duration<double>(*options.seconds));
-      const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - SteadyClock::now());
-      if (left.count() <= 0) return std::nullopt;
-      wait = std::min(wait, left);
-    }
-    if (interrupted(wait)) return std::nullopt;
+    const auto wait = time.next(input != nullptr && !input->atEnd() ? kInputInterval : kLineInterval,
+                                reportOf(client).statistics.frames);
+    if (!wait || interrupted(*wait)) return std::nullopt;
     if (const std::optional<Failure> failure = client.ended())
       return Error{exitCodeOf(failure->kind), failure->text};
     if (!line.shown() || SteadyClock::now() < nextLine) continue;

@@ -208,7 +208,7 @@ int run(int argc, char** argv) {
                        "End when the connection is lost. Default: try to reconnect for a minute");
   joinCommand
       .add_option("--seconds", joinOptions.seconds,
-                  "Leave after this time; default: at an interrupt (Ctrl-C)")
+                  "Leave this long after the first frame; default: at an interrupt (Ctrl-C)")
       ->check(CLI::PositiveNumber);
   joinCommand.add_option("--obj", joinOptions.objPath, "Write the last frame to this Wavefront OBJ file");
   joinCommand.add_flag("--json", joinOptions.json, "Print only the summary, as one JSON object");

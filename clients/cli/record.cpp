@@ -18,6 +18,7 @@
 #include "clients/cli/print.h"
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
+#include "clients/cli/stream_time.h"
 #include "clients/grpc/grpc_client.h"
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
@@ -179,17 +180,11 @@ class StreamFile {
 // Waits for the end of the time, a signal, the end of the stream or a write error.
 std::optional<Error> follow(NativeClient& client, StreamFile& file, const RecordOptions& options) {
   const auto start = SteadyClock::now();
+  StreamTime time(options.seconds);
   const bool terminal = isatty(STDERR_FILENO) != 0;
   for (;;) {
-    auto wait = kInterval;
-    const std::chrono::duration<double> passed = SteadyClock::now() - start;
-    if (options.seconds) {
-      const auto left = std::chrono::ceil<std::chrono::milliseconds>(
-          std::chrono::duration<double>(*options.seconds) - passed);
-      if (left.count() <= 0) return std::nullopt;
-      wait = std::min(wait, left);
-    }
-    if (interrupted(wait)) return std::nullopt;
+    const auto wait = time.next(kInterval, file.frames());
+    if (!wait || interrupted(*wait)) return std::nullopt;
     if (auto written = file.flush(); !written) return Error{kNotWritten, written.error()};
     if (file.broken())
       return Error{
@@ -203,9 +198,11 @@ std::optional<Error> follow(NativeClient& client, StreamFile& file, const Record
                                "--full-quality it goes on",
                                file.frames())};
     if (const auto failure = client.ended()) return Error{exitCodeOf(failure->kind), failure->text};
-    if (terminal)
+    if (terminal) {
+      const std::chrono::duration<double> passed = SteadyClock::now() - start;
       showStatus(stderr, fmt::format("{:.0f} s, {} frames, {:.1f} MiB", passed.count(), file.frames(),
                                      static_cast<double>(file.bytes()) / (1 << 20)));
+    }
   }
 }
 

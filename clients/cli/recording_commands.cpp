@@ -15,7 +15,7 @@ void RecordingCommands::add(CLI::App& app, std::string& address) {
       ->required();
   record_
       ->add_option("--seconds", recordOptions_.seconds,
-                   "Stop after this time; default: at an interrupt (Ctrl-C)")
+                   "Stop this long after the first frame; default: at an interrupt (Ctrl-C)")
       ->check(CLI::PositiveNumber);
   addStreamLimit(*record_, recordOptions_.maxVertices);
   record_->add_flag(

@@ -47,11 +47,13 @@ wait $run || { tail -100 /tmp/run.log && exit 1; }
 echo "./dev test"
 ./dev test
 INSIDE
-# The namespaces end with the test: nothing stays mounted and nothing goes on running.
+# The namespaces end with the test: nothing stays mounted and nothing goes on running. Without /sys, malloc() may set
+# errno, and gRPC, which reads the result of connect() there after other calls, fails to connect.
 unshare --mount --pid --fork --kill-child bash -euc '
   root=$1 cache=$2
   mount -t proc proc "$root/proc"
   mount --rbind /dev "$root/dev"
+  mount --rbind /sys "$root/sys"
   mount --bind "$cache" "$root/ccache"
   exec chroot "$root" env -i HOME=/root LC_ALL=C.UTF-8 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
     CCACHE_DIR=/ccache NODE_EXTRA_CA_CERTS=/etc/ssl/certs/ca-certificates.crt bash /first_commands
