@@ -183,7 +183,7 @@ TEST_F(ReplayHere, OlderRecordingIsNamedAsOneOfOtherKernels) {
                                              .progress = {},
                                              .states = {}});
   ASSERT_TRUE(result) << result.error();
-  EXPECT_EQ(result->kernels, recording::Kernels::different);
+  EXPECT_EQ(result->kernels, recording::Kernels::other);
   EXPECT_TRUE(result->missing.empty());
 }
 
