@@ -33,10 +33,10 @@ HingeShape hingeShape(const std::array<Eigen::Vector3d, 4>& positions, double le
 
 // 2 sin(delta / 2), where delta, from -pi to pi, is how far the angle is from that at rest. A hinge acts on
 // node i with the force -B weight 2 sin(delta / 2) grad_i theta: [BMF03] Bridson, Marino, Fedkiw, "Simulation
-// of Clothing with Folds and Wrinkles", SCA 2003, 3, for rest angles other than zero, too. The energy, B weight
-// 4 (1 - cos(delta / 2)), has its only minimum at rest and no jump: a hinge may be folded at rest and pass 180
-// degrees. A sheet of equilateral triangles bent to a cylinder has the energy of a plate with flexural rigidity
-// B (N m): B / 2 times squared curvature times area.
+// of Clothing with Folds and Wrinkles", SCA 2003, 3, for rest angles other than zero, too. The energy, B
+// weight 4 (1 - cos(delta / 2)), has its only minimum at rest and no jump: a hinge may be folded at rest and
+// pass 180 degrees. A sheet of equilateral triangles bent to a cylinder has the energy of a plate with
+// flexural rigidity B (N m): B / 2 times squared curvature times area.
 double bentFromRest(const HingeShape& shape, double restAngle);
 
 // Hinges of every edge between two faces. An edge of a quad has one hinge of half weight for each way to

@@ -153,7 +153,8 @@ SpringColours meshColours(const Mesh& mesh) {
 // Rows before the first block are as many as behind the last one, unless the number of rows is odd.
 BlockLine blockLine(std::uint32_t nodes, bool seams) {
   const std::int32_t start = (nodes % kBlock == 2 ? -1 : 0) - (seams ? kBlock / 2 : 0);
-  return {start, static_cast<std::uint32_t>((static_cast<std::int32_t>(nodes) - start + kBlock - 1) / kBlock)};
+  return {start,
+          static_cast<std::uint32_t>((static_cast<std::int32_t>(nodes) - start + kBlock - 1) / kBlock)};
 }
 
 SpringColours springColours(const Cloth& cloth) {

@@ -160,11 +160,11 @@ vec3 alongSurface(vec3 v, vec3 normal) {
   return along;
 }
 
-// Moves a free node, which was at `from` at the substep's start, out of the collider. Its velocity relative to
-// the surface, which moves with `surfaceVelocity` and spins, loses the part into the surface. Friction takes at
-// most its coefficient times the speed at which the collider pushes: that of the approach, or that of the way
-// out if something pressed the node into the collider. It acts on the velocity, and on the way since the
-// substep's start, which other colliders may have caused.
+// Moves a free node, which was at `from` at the substep's start, out of the collider. Its velocity relative
+// to the surface, which moves with `surfaceVelocity` and spins, loses the part into the surface. Friction
+// takes at most its coefficient times the speed at which the collider pushes: that of the approach, or that
+// of the way out if something pressed the node into the collider. It acts on the velocity, and on the way
+// since the substep's start, which other colliders may have caused.
 void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity, vec3 spin,
            CollisionPush push, CollidingNode node, vec3 from, inout vec3 position, inout vec3 velocity) {
   precise vec3 surface = position + contact.depth * contact.normal;

@@ -43,7 +43,8 @@ void collideWithSolid(uint number, CollidingNode node, vec3 from, inout vec3 pos
   if (touch.contact.depth > 0.0) {
     touch.contact.normal = rotate(frame.after, touch.contact.normal);
     precise vec3 surface = collider.velocity + push.collision.tickRate * rotate(frame.after, touch.motion);
-    leave(number, collider, touch.contact, surface, frame.spin, push.collision, node, from, position, velocity);
+    leave(number, collider, touch.contact, surface, frame.spin, push.collision, node, from, position,
+          velocity);
   }
 }
 

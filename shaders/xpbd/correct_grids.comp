@@ -246,7 +246,10 @@ void correctBlock(uint block, Blocks blocks, bool seams) {
   }
   // Springs that are mirror images of each other come before the others, as in the list of the model.
   [[unroll]] for (uint k = 0; k < 9; ++k) {
-    uint a = k < 4 ? k / 2 * 2 * kSize + k % 2 * 2 : k < 6 ? (k - 4) * 2 * kSize + 1 : k < 8 ? kSize + (k - 6) * 2 : kSize + 1;
+    uint a = k < 4   ? k / 2 * 2 * kSize + k % 2 * 2
+             : k < 6 ? (k - 4) * 2 * kSize + 1
+             : k < 8 ? kSize + (k - 6) * 2
+                     : kSize + 1;
     if (!seams || crosses(a, a + kSize + 1)) {
       correctShear(a, a + 1, a + kSize, a + kSize + 1, colour);
       colour += 2;

@@ -37,15 +37,14 @@ float inverseResistance(Spring spring, float inverseMasses) {
 // Correction of b divided by its inverse mass; that of a is the negative. `d` leads from a to b; `begun` is
 // the same at the substep's start.
 //
-// The ends move along `begun`, so that the correction leaves the angular momentum as it is, which follows from
-// positions at the start and at the end: docs/simulation.md. Along it, the correction acts `gain` times as much
-// as along d; the factor (2 - gain) corrects this to second order and never too far. A spring that turns by
-// more than about 60 degrees or changes its length by half in one substep is corrected along d.
+// The ends move along `begun`, so that the correction leaves the angular momentum as it is, which follows
+// from positions at the start and at the end: docs/simulation.md. Along it, the correction acts `gain` times
+// as much as along d; the factor (2 - gain) corrects this to second order and never too far. A spring that
+// turns by more than about 60 degrees or changes its length by half in one substep is corrected along d.
 //
-// `place` is where one end is. A difference of lengths below the rounding of such a coordinate counts as none:
-// at rest, cloth would otherwise gain energy from the rounding of its positions.
-vec3 pullOf(vec3 d, vec3 begun, vec3 place, Spring spring, float inverseResistance,
-            inout float multiplier) {
+// `place` is where one end is. A difference of lengths below the rounding of such a coordinate counts as
+// none: at rest, cloth would otherwise gain energy from the rounding of its positions.
+vec3 pullOf(vec3 d, vec3 begun, vec3 place, Spring spring, float inverseResistance, inout float multiplier) {
   precise float squared = max(dotProduct(d, d), 1e-12);
   float inverseLength = reciprocalSquareRoot(squared);
   precise float length_ = squared * inverseLength;

@@ -54,8 +54,8 @@ model::Scene sheetOn(const NamedShape& shape, double slope) {
   model::Scene scene = tests::sceneOf({cloth});
   scene.colliders = {{.name = "ground", .shape = shape.shape}};
   // Gravity leans instead of the ground.
-  scene.environment.gravity =
-      Vec3(static_cast<float>(kGravity * std::sin(slope)), static_cast<float>(-kGravity * std::cos(slope)), 0);
+  scene.environment.gravity = Vec3(static_cast<float>(kGravity * std::sin(slope)),
+                                   static_cast<float>(-kGravity * std::cos(slope)), 0);
   return scene;
 }
 
@@ -110,8 +110,8 @@ double lowered(const NodeState& start, const NodeState& end) {
   return sum / static_cast<double>(start.positions.size());
 }
 
-// Two shapes close on a towel to 4 mm of interference. A normal force above W / (2 mu) = 0.1 N holds its weight.
-// After a quarter of a second they rise by 30 cm in a second, and the towel with them.
+// Two shapes close on a towel to 4 mm of interference. A normal force above W / (2 mu) = 0.1 N holds its
+// weight. After a quarter of a second they rise by 30 cm in a second, and the towel with them.
 double slipInAPinch(model::Scene scene, const model::Shape& shape, float half, float friction) {
   scene.colliders = {{.name = "thumb", .shape = shape}, {.name = "finger", .shape = shape}};
   Running running(scene);
@@ -143,7 +143,8 @@ TEST_F(ContactLaws, APinchLiftsATowel) {
     SCOPED_TRACE(name);
     const double slip = slipInAPinch(towel(model::SolverKind::xpbd), shape, 0.025f, 1);
     EXPECT_LT(std::abs(slip), 0.05);
-    expectRow({"slip of a towel that two " + name + " pinch and lift, m", "0", "0.05", figure(std::abs(slip))});
+    expectRow(
+        {"slip of a towel that two " + name + " pinch and lift, m", "0", "0.05", figure(std::abs(slip))});
   }
   const model::Shape fingers = model::Sphere{0.025f};
   const double byForces = slipInAPinch(towel(model::SolverKind::massSpring), fingers, 0.025f, 1);
@@ -166,8 +167,8 @@ TEST_F(ContactLaws, PressedClothStaysOnATable) {
     for (int tick = 0; tick < 144; ++tick) running.tick(tests::inputsOf(scene, colliders));
     const double way = double{(running.state().positions[2] - start.positions[2]).norm()};
     EXPECT_LT(way, 0.05);
-    expectRow({std::string("way of cloth on a table, a third of it over the edge") + (pressed ? ", pressed by a plate" : "") +
-                   ", m",
+    expectRow({std::string("way of cloth on a table, a third of it over the edge") +
+                   (pressed ? ", pressed by a plate" : "") + ", m",
                "0", "0.05", figure(way)});
   }
 }
@@ -188,8 +189,8 @@ model::Cloth wrappedStrip() {
   model::MeshShape shape = model::shapeOf(model::grid(kRows, 2));
   for (std::uint32_t row = 0; row < kRows; ++row)
     for (std::uint32_t column = 0; column < 2; ++column)
-      shape.positions[2 * row + column] = place(kLength * static_cast<float>(row) / (kRows - 1),
-                                                0.02f * static_cast<float>(column));
+      shape.positions[2 * row + column] =
+          place(kLength * static_cast<float>(row) / (kRows - 1), 0.02f * static_cast<float>(column));
   model::Cloth cloth;
   cloth.name = "strip";
   cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(shape));

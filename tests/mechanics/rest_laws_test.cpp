@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// Cloth whose energy is at its minimum stays there. docs/mechanics.md has the figures.
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/mechanics/rows.h"
+#include "tests/simulation/scenes.h"
+
+namespace clothstream::mechanics {
+namespace {
+
+// Layers 2 cm wide, 0.5 mm apart, folded to and fro: hinges of nearly 180 degrees at every second edge.
+model::Cloth pleats(model::SolverKind solver) {
+  constexpr std::uint32_t kRows = 9, kColumns = 3;
+  model::MeshShape shape = model::shapeOf(model::grid(kRows, kColumns));
+  for (std::uint32_t row = 0; row < kRows; ++row)
+    for (std::uint32_t column = 0; column < kColumns; ++column)
+      shape.positions[kColumns * row + column] =
+          model::Vec3(0.02f * static_cast<float>(column), 1.5f + (row % 2 == 0 ? 0.0f : 0.02f),
+                      0.0005f * static_cast<float>(row));
+  model::Cloth cloth;
+  cloth.name = "pleats";
+  cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(shape));
+  cloth.mass = 0.01f;
+  cloth.structural = {30, 0.0005f};
+  cloth.shear = {10, 0.0002f};
+  cloth.dihedralBending = 8e-6f;
+  cloth.damping = cloth.drag = cloth.lift = 0;
+  cloth.solver.kind = solver;
+  return cloth;
+}
+
+class RestLaws : public tests::GpuTest {};
+
+TEST_F(RestLaws, PleatsAtRestStayAtRest) {
+  using enum model::SolverKind;
+  const std::vector<std::pair<std::string, model::SolverKind>> solvers{{"`massSpring`", massSpring},
+                                                                       {"`acad`", acad},
+                                                                       {"`constraint`", constraint},
+                                                                       {"`implicitEuler`", implicitEuler},
+                                                                       {"`xpbd`", xpbd}};
+  for (const auto& [name, solver] : solvers) {
+    SCOPED_TRACE(name);
+    model::Scene scene = tests::sceneOf({pleats(solver)});
+    scene.simulationRate = scene.streamRate = 20;
+    scene.substeps = 16;
+    scene.environment.gravity = model::Vec3::Zero();
+    tests::Running running(scene);
+    for (int tick = 0; tick < 20 * 20; ++tick) ASSERT_TRUE(running.tick(tests::inputsOf(scene)).healthy);
+    const simulation::NodeState state = running.state();
+    const std::vector<double> masses = model::nodeMasses(scene.cloths[0]);
+    double energy = 0;
+    for (std::size_t i = 0; i < masses.size(); ++i)
+      energy += masses[i] / 2 * state.velocities[i].cast<double>().squaredNorm();
+    energy /= static_cast<double>(masses.size());
+    EXPECT_LT(energy, 1e-9);
+    expectRow({name, figure(energy)});
+  }
+}
+
+}  // namespace
+}  // namespace clothstream::mechanics
