@@ -8,6 +8,7 @@
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
 
+#include "proto/text/lines.h"
 #include "server/files/regular_file.h"
 #include "server/meshes/mesh_file.h"
 #include "server/messages/limits.h"
@@ -36,6 +37,10 @@ std::optional<std::string> syntaxError(std::string_view json) {
 
 Result<model::Scene> parseScene(std::string_view json, std::string_view source, const MeshReader& readMesh,
                                 std::uint64_t maxNodes, std::vector<v1::MeshRepair>* repairs) {
+  if (isWideText(json))
+    return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source,
+                  "is text in UTF-16 or UTF-32, which is not supported: save it as UTF-8");
+  json = withoutByteOrderMark(json);
   if (const auto error = syntaxError(json)) return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source, *error);
   v1::Scene message;
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &message);
