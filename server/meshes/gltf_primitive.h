@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,10 +39,17 @@ struct PrimitiveLimits {
   std::uint64_t vertices = 0, triangles = 0;
 };
 
-// Reads the triangles of a primitive, which may be compressed with Draco. Larger ones are refused before
-// anything is allocated for them.
+// Reads the triangles of a primitive, which may be a strip or a fan, or compressed with Draco. Larger ones
+// are refused before anything is allocated for them.
 [[nodiscard]] tl::expected<GltfPrimitive, std::string> readPrimitive(const tinygltf::Model& model,
                                                                      const tinygltf::Primitive& primitive,
                                                                      const PrimitiveLimits& limits);
+
+// Adds the morph targets of the primitive to its positions, each times its weight. Targets without a weight,
+// or with the weight 0, change nothing.
+[[nodiscard]] tl::expected<void, std::string> addTargets(const tinygltf::Model& model,
+                                                         const tinygltf::Primitive& primitive,
+                                                         std::span<const double> weights,
+                                                         std::span<model::Vec3> positions);
 
 }  // namespace clothstream::meshes

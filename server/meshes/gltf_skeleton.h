@@ -29,8 +29,8 @@ struct GltfSkeleton {
 [[nodiscard]] tl::expected<GltfSkeleton, std::string> readSkeleton(const tinygltf::Model& model, int skin,
                                                                    const JointRequest& request);
 
-// Joints and weights of the vertices of a primitive with that skeleton. Weights are scaled so that the sum of
-// each vertex is 1.
+// Joints and weights of the vertices of a primitive with that skeleton, at most four of each vertex. Weights
+// are scaled so that the sum of each vertex is 1.
 [[nodiscard]] tl::expected<std::vector<model::VertexJoints>, std::string> readVertexJoints(
     const tinygltf::Model& model, const tinygltf::Primitive& primitive, std::size_t vertices,
     const GltfSkeleton& skeleton);
