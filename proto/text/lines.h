@@ -13,8 +13,8 @@ constexpr std::string_view withoutByteOrderMark(std::string_view text) {
   return text.starts_with("\xef\xbb\xbf") ? text.substr(3) : text;
 }
 
-// Returns whether the bytes start with a byte-order mark of UTF-16 or of UTF-32, or have a zero among the
-// first four, which such text has at its start and UTF-8 does not have.
+// Returns whether the bytes look like UTF-16 or UTF-32: they start with its byte-order mark, or a zero is
+// among the first four.
 constexpr bool isWideText(std::string_view bytes) {
   return bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff") ||
          bytes.substr(0, 4).find('\0') != std::string_view::npos;

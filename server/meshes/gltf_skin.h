@@ -2,7 +2,6 @@
 // Skins of a glTF file: where joints place the vertices of a mesh.
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -14,6 +13,7 @@
 #include <tl/expected.hpp>
 
 #include "server/meshes/gltf_accessor.h"
+#include "server/model/pose.h"
 
 namespace clothstream::meshes {
 

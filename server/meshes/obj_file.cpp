@@ -73,8 +73,8 @@ bool hasOnlyCorners(std::string_view words) {
   return true;
 }
 
-// What is wrong with a line that the loader would read as something else; null if nothing is. The loader
-// takes text that is not a number for 0.
+// Problem of a line that the loader would read as something else, or null. The loader takes text that is not
+// a number for 0.
 const char* problemOf(std::string_view line) {
   const std::string_view keyword = firstWord(line);
   if (keyword.empty()) return nullptr;
