@@ -73,6 +73,7 @@ class NeediestCloth {
     find();
   }
 
+  std::size_t index() const { return at_; }
   const Cloth& cloth() const { return scene_.cloths[at_]; }
 
   // More than limits::kMaxSubsteps if these are not enough.
@@ -186,10 +187,11 @@ const Cause& mainCause(const NeediestCloth& cloth, std::uint32_t substeps) {
                                    [&](const Cause& cause) { return cloth.neededWith(cause, 0); });
 }
 
-// Values with which these substeps are enough.
-std::string remedy(const NeediestCloth& cloth, const Cause& cause, std::uint32_t substeps) {
+// Values with which these substeps are enough. `area` is that of the cloth in m^2.
+std::string remedy(const NeediestCloth& cloth, const Cause& cause, double area, std::uint32_t substeps) {
   std::string found;
-  if (const auto mass = cloth.leastMass()) found = fmt::format("with a mass of at least {:.3g} kg", *mass);
+  if (const auto mass = cloth.leastMass())
+    found = fmt::format("with a mass of at least {:.3g} kg ({:.3g} kg/m^2)", *mass, *mass / area);
   if (const auto limits = cloth.limitsOf(cause))
     found += fmt::format("{}with {}", found.empty() ? "" : ", or ", *limits);
   if (found.empty()) return "use more substeps or a higher simulationRate";
@@ -203,9 +205,10 @@ std::optional<std::string> instability(const model::Scene& scene, const model::S
   if (needed != 0 && needed <= scene.substeps) return std::nullopt;
   const NeediestCloth cloth(scene, bound);
   const Cause& cause = mainCause(cloth, scene.substeps);
+  const double area = model::areaOf(scene.cloths[cloth.index()]);
   const std::string why =
       fmt::format("because of {} \"{}\", whose mass is {:.3g} kg; {}", cause.what, cloth.cloth().name,
-                  cloth.cloth().mass, remedy(cloth, cause, scene.substeps));
+                  cloth.cloth().mass, remedy(cloth, cause, area, scene.substeps));
   if (needed != 0) return fmt::format("this scene needs at least {}, {}", needed, why);
   const bool isExplicit = scene.integrator == model::Integrator::explicitEuler;
   return fmt::format("no number up to {} keeps this scene stable, {}{}", limits::kMaxSubsteps, why,

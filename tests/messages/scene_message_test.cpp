@@ -627,11 +627,12 @@ TEST(Instability, NamesTheForcesThatBoundTheStepAndValuesThatFit) {
     light(s).set_drag(2);
     light(s).set_lift(1);
   };
-  EXPECT_THAT(errorOf(air),
-              testing::MatchesRegex(
-                  "substeps = 10: this scene needs at least [0-9]+, because of the drag and lift of "
-                  "\"light\", whose mass is 0.01 kg; 10 would do with a mass of at least [0-9.]+ "
-                  "kg, or with a drag of at most [0-9.]+ and a lift of at most [0-9.]+"));
+  EXPECT_THAT(
+      errorOf(air),
+      testing::MatchesRegex(
+          "substeps = 10: this scene needs at least [0-9]+, because of the drag and lift of "
+          "\"light\", whose mass is 0.01 kg; 10 would do with a mass of at least [0-9.]+ "
+          "kg [(][0-9.]+ kg/m.2[)], or with a drag of at most [0-9.]+ and a lift of at most [0-9.]+"));
   EXPECT_THAT(errorOf([&](v1::Scene& s) {
                 light(s).set_damping(1000);
                 s.set_substeps(2);
