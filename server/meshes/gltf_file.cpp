@@ -144,7 +144,7 @@ class Gatherer {
         {.vertices = maxVertices_ - firstVertex, .triangles = 2 * maxVertices_ - source_.faces.size()});
     if (!read) return tl::unexpected(read.error());
     if (auto done = addTargets(model_, primitive, placement.weights, read->positions); !done) return done;
-    const auto isMirrored = place(primitive, placement, read->positions);
+    const auto isMirrored = place(primitive, placement, *read);
     if (!isMirrored) return tl::unexpected(isMirrored.error());
     source_.vertices.insert(source_.vertices.end(), read->positions.begin(), read->positions.end());
     everyPartHasUvs_ = everyPartHasUvs_ && !read->uvs.empty();
@@ -161,16 +161,17 @@ class Gatherer {
   // Moves positions of a primitive to their place in the scene. Returns whether that mirrors them. Joints
   // replace the transform of the node (glTF 2.0, 3.7.3.3).
   Expected<bool> place(const tinygltf::Primitive& primitive, const Placement& placement,
-                       std::vector<model::Vec3>& positions) {
+                       GltfPrimitive& read) {
     if (placement.joints) {
-      if (auto done = placeByJoints(model_, primitive, *placement.joints, positions); !done)
+      if (auto done = placeByJoints(model_, primitive, *placement.joints, read); !done)
         return tl::unexpected(std::move(done.error()));
       return placement.joints->front().linear().determinant() < 0;
     }
     const Affine transform = skeleton_ ? Affine(Eigen::Scaling(skeleton_->scale)) : placement.transform;
-    for (model::Vec3& position : positions) position = (transform * position.cast<double>()).cast<float>();
+    for (model::Vec3& position : read.positions)
+      position = (transform * position.cast<double>()).cast<float>();
     if (skeleton_) {
-      const auto vertices = readVertexJoints(model_, primitive, positions.size(), *skeleton_);
+      const auto vertices = readVertexJoints(model_, primitive, read, *skeleton_);
       if (!vertices) return tl::unexpected(vertices.error());
       skeleton_->skin.vertices.insert(skeleton_->skin.vertices.end(), vertices->begin(), vertices->end());
     }

@@ -156,6 +156,16 @@ int numberIn(const tinygltf::Value& object, const std::string& name) {
   return isThere ? object.Get(name).GetNumberAsInt() : -1;
 }
 
+// Names of the compressed attributes for skins.
+std::vector<std::string> influencesIn(const tinygltf::Value& attributes) {
+  std::vector<std::string> names;
+  for (const std::string& name : attributes.Keys())
+    if ((name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_")) && numberIn(attributes, name) >= 0)
+      names.push_back(name);
+  if (names.size() > kMaxDracoAttributes) names.resize(kMaxDracoAttributes);
+  return names;
+}
+
 Expected<GltfPrimitive> readDraco(const tinygltf::Model& model, const tinygltf::Value& extension,
                                   std::size_t vertices, std::size_t indices, std::size_t triangles) {
   const auto refuse = [](std::string_view what) {
@@ -181,10 +191,15 @@ Expected<GltfPrimitive> readDraco(const tinygltf::Model& model, const tinygltf::
                        .maxPoints = vertices,
                        .maxFaces = triangles};
   if (uv >= 0) request.uvs = static_cast<std::uint32_t>(uv);
+  const std::vector<std::string> names = influencesIn(extension.Get("attributes"));
+  for (const std::string& name : names)
+    request.vectors.push_back(static_cast<std::uint32_t>(numberIn(extension.Get("attributes"), name)));
   auto decoded = decodeDraco(
       std::as_bytes(std::span(buffer->data).subspan(view->byteOffset, view->byteLength)), request);
   if (!decoded) return refuse(decoded.error());
-  return GltfPrimitive{std::move(decoded->positions), std::move(decoded->uvs), std::move(decoded->indices)};
+  GltfPrimitive read{std::move(decoded->positions), std::move(decoded->uvs), std::move(decoded->indices)};
+  for (std::size_t i = 0; i < names.size(); ++i) read.influences[names[i]] = std::move(decoded->vectors[i]);
+  return read;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,6 +34,8 @@ struct GltfPrimitive {
   std::vector<model::Vec3> positions;  // without the transform of a node
   std::vector<model::Uv> uvs;  // TEXCOORD_0, as many as positions, v downwards; empty if there are none
   std::vector<std::uint32_t> indices;  // three per triangle; of any vertices
+  // JOINTS_n and WEIGHTS_n that are compressed, by their names. Others stay in their accessors.
+  std::map<std::string, std::vector<Eigen::Vector4f>> influences = {};
 };
 
 struct PrimitiveLimits {

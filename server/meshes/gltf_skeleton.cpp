@@ -339,12 +339,12 @@ Expected<GltfSkeleton> readSkeleton(const tinygltf::Model& model, int skin, cons
 
 Expected<std::vector<model::VertexJoints>> readVertexJoints(const tinygltf::Model& model,
                                                             const tinygltf::Primitive& primitive,
-                                                            std::size_t vertices,
+                                                            const GltfPrimitive& read,
                                                             const GltfSkeleton& skeleton) {
-  auto influences = VertexInfluences::read(model, primitive, vertices, skeleton.numberOf.size());
+  auto influences = VertexInfluences::read(model, primitive, read, skeleton.numberOf.size());
   if (!influences) return tl::unexpected(std::move(influences.error()));
-  std::vector<model::VertexJoints> result(vertices);
-  for (std::size_t i = 0; i < vertices; ++i) {
+  std::vector<model::VertexJoints> result(read.positions.size());
+  for (std::size_t i = 0; i < result.size(); ++i) {
     const auto joints = influences->of(i);
     if (!joints) return tl::unexpected(joints.error());
     if (joints->size() > model::kVertexJoints)

@@ -19,27 +19,40 @@ using Expected = tl::expected<T, std::string>;
 constexpr int kRoot = -1, kTwoParents = -2;
 // Joints are numbered by unsigned shorts at most.
 constexpr std::size_t kMostJoints = std::numeric_limits<std::uint16_t>::max() + std::size_t{1};
-constexpr std::size_t kMostSets = 8;  // of four joints
+constexpr std::size_t kMostSets = 8;   // of four joints
+constexpr float kMostWeight = 1.001f;  // quantised weights may be a little above 1
 
 bool isUnsigned(int componentType) {
   return componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
          componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT;
 }
 
+// Compressed numbers are decoded to floats. One that is no joint becomes too large.
 std::uint32_t jointAt(const GltfElements& joints, std::size_t vertex, std::size_t k) {
-  return joints.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ? joints.at<std::uint8_t>(vertex, k)
-                                                                       : joints.at<std::uint16_t>(vertex, k);
+  if (joints.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE)
+    return joints.at<std::uint8_t>(vertex, k);
+  if (joints.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)
+    return joints.at<std::uint16_t>(vertex, k);
+  const auto number = joints.at<float>(vertex, k);
+  return number >= 0 && number < static_cast<float>(kMostJoints) ? static_cast<std::uint32_t>(number)
+                                                                 : static_cast<std::uint32_t>(kMostJoints);
 }
 
 // Four numbers for each vertex.
 Expected<GltfElements> attributeOf(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
-                                   const std::string& name, std::size_t vertices) {
+                                   const GltfPrimitive& read, const std::string& name) {
+  if (const auto decoded = read.influences.find(name); decoded != read.influences.end())
+    return GltfElements{reinterpret_cast<const unsigned char*>(decoded->second.data()),
+                        sizeof(Eigen::Vector4f), decoded->second.size(), TINYGLTF_COMPONENT_TYPE_FLOAT,
+                        false};
   const auto found = primitive.attributes.find(name);
   if (found == primitive.attributes.end()) return tl::unexpected(fmt::format("has a skin, but no {}", name));
   auto elements = elementsOf(model, found->second, TINYGLTF_TYPE_VEC4);
-  if (elements && elements->count != vertices)
+  if (elements && elements->count != read.positions.size())
     return tl::unexpected(
-        fmt::format("has {} elements of {} for {} vertices", elements->count, name, vertices));
+        fmt::format("has {} elements of {} for {} vertices", elements->count, name, read.positions.size()));
+  if (elements && name.starts_with("JOINTS_") && !isUnsigned(elements->componentType))
+    return tl::unexpected(std::string("has joints that are not unsigned bytes or shorts"));
   return elements;
 }
 
@@ -121,23 +134,18 @@ Expected<std::vector<Affine3d>> jointMatrices(const tinygltf::Model& model, int 
 }
 
 Expected<VertexInfluences> VertexInfluences::read(const tinygltf::Model& model,
-                                                  const tinygltf::Primitive& primitive, std::size_t vertices,
-                                                  std::size_t joints) {
-  if (primitive.extensions.contains(kDracoExtension))
-    return tl::unexpected(
-        std::string("has joints and is compressed with Draco: export it without compression"));
+                                                  const tinygltf::Primitive& primitive,
+                                                  const GltfPrimitive& read, std::size_t joints) {
   VertexInfluences influences;
   influences.joints_ = joints;
   for (std::size_t i = 0; i == 0 || primitive.attributes.contains(fmt::format("JOINTS_{}", i)); ++i) {
     if (i == kMostSets)
       return tl::unexpected(
           fmt::format("has more than {} joints for a vertex: export it with at most four", 4 * kMostSets));
-    auto numbers = attributeOf(model, primitive, fmt::format("JOINTS_{}", i), vertices);
+    auto numbers = attributeOf(model, primitive, read, fmt::format("JOINTS_{}", i));
     if (!numbers) return tl::unexpected(std::move(numbers.error()));
-    auto weights = attributeOf(model, primitive, fmt::format("WEIGHTS_{}", i), vertices);
+    auto weights = attributeOf(model, primitive, read, fmt::format("WEIGHTS_{}", i));
     if (!weights) return tl::unexpected(std::move(weights.error()));
-    if (!isUnsigned(numbers->componentType))
-      return tl::unexpected(std::string("has joints that are not unsigned bytes or shorts"));
     if (!component(*weights, 0, 0))
       return tl::unexpected(std::string("has weights of a type that glTF does not have"));
     influences.sets_.push_back({*numbers, *weights});
@@ -151,7 +159,7 @@ Expected<std::span<const Influence>> VertexInfluences::of(std::size_t vertex) {
   for (const Set& set : sets_)
     for (std::size_t k = 0; k < 4; ++k) {
       const float weight = component(set.weights, vertex, k).value_or(0);
-      if (!(weight >= 0 && weight <= 1))
+      if (!(weight >= 0 && weight <= kMostWeight))
         return tl::unexpected(fmt::format("vertex {} has the weight {}; must be 0 to 1", vertex, weight));
       if (weight == 0) continue;
       const std::uint32_t joint = jointAt(set.joints, vertex, k);
@@ -167,17 +175,17 @@ Expected<std::span<const Influence>> VertexInfluences::of(std::size_t vertex) {
 }
 
 Expected<void> placeByJoints(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
-                             std::span<const Affine3d> matrices, std::span<Eigen::Vector3f> positions) {
-  auto influences = VertexInfluences::read(model, primitive, positions.size(), matrices.size());
+                             std::span<const Affine3d> matrices, GltfPrimitive& read) {
+  auto influences = VertexInfluences::read(model, primitive, read, matrices.size());
   if (!influences) return tl::unexpected(std::move(influences.error()));
-  for (std::size_t i = 0; i < positions.size(); ++i) {
+  for (std::size_t i = 0; i < read.positions.size(); ++i) {
     const auto joints = influences->of(i);
     if (!joints) return tl::unexpected(joints.error());
-    const Eigen::Vector3d bound = positions[i].cast<double>();
+    const Eigen::Vector3d bound = read.positions[i].cast<double>();
     Eigen::Vector3d placed = Eigen::Vector3d::Zero();
     for (const Influence& influence : *joints)
       placed += double{influence.weight} * (matrices[influence.joint] * bound);
-    positions[i] = placed.cast<float>();
+    read.positions[i] = placed.cast<float>();
   }
   return {};
 }

@@ -13,6 +13,7 @@
 #include <tl/expected.hpp>
 
 #include "server/meshes/gltf_accessor.h"
+#include "server/meshes/gltf_primitive.h"
 #include "server/model/pose.h"
 
 namespace clothstream::meshes {
@@ -46,10 +47,11 @@ struct Influence {
 // Joints and weights of the vertices of a primitive, in as many pairs of JOINTS_n and WEIGHTS_n as it has.
 class VertexInfluences {
  public:
-  // `joints` is the number of joints of the skin.
+  // `read` has the vertices of the primitive, and must outlive the result. `joints` is the number of joints
+  // of the skin.
   [[nodiscard]] static tl::expected<VertexInfluences, std::string> read(const tinygltf::Model& model,
                                                                         const tinygltf::Primitive& primitive,
-                                                                        std::size_t vertices,
+                                                                        const GltfPrimitive& read,
                                                                         std::size_t joints);
 
   // Joints of the vertex with weights above 0. The sum of the weights is 1. The result is valid until the
@@ -65,11 +67,11 @@ class VertexInfluences {
   std::vector<Influence> found_;
 };
 
-// Moves positions of a primitive to where the joints place them: the mean of the matrices by the weights of
-// the vertex.
+// Moves the positions of a primitive to where the joints place them: the mean of the matrices by the weights
+// of the vertex.
 [[nodiscard]] tl::expected<void, std::string> placeByJoints(const tinygltf::Model& model,
                                                             const tinygltf::Primitive& primitive,
                                                             std::span<const Eigen::Affine3d> matrices,
-                                                            std::span<Eigen::Vector3f> positions);
+                                                            GltfPrimitive& read);
 
 }  // namespace clothstream::meshes
