@@ -41,11 +41,7 @@ struct Placement {
 class Gatherer {
  public:
   Gatherer(const tinygltf::Model& model, std::uint64_t maxVertices, const JointRequest* joints)
-      : model_(model),
-        maxVertices_(maxVertices),
-        joints_(joints),
-        nodes_(model),
-        visited_(model.nodes.size(), false) {}
+      : model_(model), maxVertices_(maxVertices), joints_(joints), visited_(model.nodes.size(), false) {}
 
   Expected<MeshSource> gather() {
     const tinygltf::Scene* scene = elementAt(model_.scenes, std::max(0, model_.defaultScene));
@@ -124,7 +120,8 @@ class Gatherer {
     if (joints_ || node.skin < 0) return nullptr;
     const auto known = matrices_.find(node.skin);
     if (known != matrices_.end()) return &known->second;
-    auto read = jointMatrices(model_, node.skin, nodes_);
+    if (!nodes_) nodes_.emplace(model_);
+    auto read = jointMatrices(model_, node.skin, *nodes_);
     if (!read) return tl::unexpected(std::move(read.error()));
     return &matrices_.emplace(node.skin, std::move(*read)).first->second;
   }
@@ -195,8 +192,8 @@ class Gatherer {
 
   const tinygltf::Model& model_;
   std::uint64_t maxVertices_;
-  const JointRequest* joints_;  // null: joints place the vertices once, and the result has no skin
-  NodeTransforms nodes_;
+  const JointRequest* joints_;           // null: joints place the vertices once, and the result has no skin
+  std::optional<NodeTransforms> nodes_;  // made for the first skin
   std::unordered_map<int, std::vector<Affine>> matrices_;  // of the joints of each skin
   std::optional<GltfSkeleton> skeleton_;
   int skinIndex_ = -1;
