@@ -229,6 +229,12 @@ TEST(SceneFile, IsUtf8WithOrWithoutAByteOrderMark) {
   }
 }
 
+TEST(SceneFile, NamesThePlaceOfTextInAnotherEncoding) {
+  const std::string error = parseScene("{\"name\":\n\"\x83V\"}", "sjis.json").error().text;
+  EXPECT_THAT(error, AllOf(StartsWith("sjis.json: parse error at line 2"), HasSubstr("\\x83"),
+                           HasSubstr("save the file as UTF-8")));
+}
+
 TEST(SceneFile, RefusesUnknownFieldsAndWrongTypes) {
   EXPECT_THAT(errorOf("{\"subteps\": 3}"), AllOf(StartsWith("my.json: "), HasSubstr("subteps")));
   EXPECT_THAT(errorOf("{\"cloths\": [{\"mas\": 1}]}"), AllOf(HasSubstr("cloths[0]"), HasSubstr("mas")));
