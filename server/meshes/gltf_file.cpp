@@ -18,6 +18,7 @@
 
 #include "proto/text/excerpt.h"
 #include "proto/text/lines.h"
+#include "proto/text/utf8.h"
 #include "server/files/regular_file.h"
 #include "server/meshes/gltf_container.h"
 #include "server/meshes/gltf_primitive.h"
@@ -316,7 +317,9 @@ tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::fil
   if (!read)
     if (auto missing = missingFile(*prepared, binary, exists)) return tl::unexpected(std::move(*missing));
   if (!read)
-    return tl::unexpected(fmt::format("is not glTF 2.0: {}", error.empty() ? "cannot be parsed" : error));
+    return tl::unexpected(isUtf8(error)
+                              ? fmt::format("is not glTF 2.0: {}", error.empty() ? "cannot be parsed" : error)
+                              : fmt::format("is not glTF 2.0: {}: save it as UTF-8", excerpt(error, 300)));
   for (const std::string& extension : model.extensionsRequired)
     if (auto problem = unsupportedExtension(extension)) return tl::unexpected(std::move(*problem));
   return Gatherer(model, limits.vertices, joints).gather();

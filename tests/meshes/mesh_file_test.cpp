@@ -237,6 +237,7 @@ TEST_F(MeshFile, RefusesInvalidGltf) {
   write("sheet.bin", sheetBuffer());
   for (const auto& [from, to, says] : {
            std::tuple("\"version\": \"2.0\"", "\"version\": ", "is not glTF 2.0"),
+           std::tuple("\"linen\"", "\"\x83V\"", ": save it as UTF-8"),
            std::tuple("\"sheet.bin\"", "\"missing.bin\"", "missing.bin"),
            std::tuple("\"indices\": 2", "\"indices\": 9", "accessor out of bounds"),
            std::tuple("\"count\": 6", "\"count\": 7", "accessor 2 has 7 elements"),
