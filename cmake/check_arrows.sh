@@ -20,7 +20,7 @@ proto/recording    | proto/codec proto/wire clothstream
 server/reference   | server/model
 server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
-server/meshes      | server/files server/model
+server/meshes      | server/files server/model proto/text
 server/messages    | server/files server/model server/meshes server/telemetry proto/hands proto/parameters proto/text clothstream
 server/encode      | server/model server/simulation server/vulkan proto/codec shaders
 server/schedule    |
@@ -56,7 +56,7 @@ clients/websocket  | clients/native proto/text proto/tls
 clients/websocket/winhttp | clients/websocket clients/native proto/text proto/tls
 clients/library    | clients/native clients/grpc clients/websocket proto/tls
 clients/testing    |
-clients/files      | proto/codec clothstream
+clients/files      | proto/codec proto/text clothstream
 clients/measure    | clients/core
 clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
 clients/cli        | proto/text proto/discovery clients/core clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream clients/measure

@@ -81,7 +81,10 @@ tl::expected<std::uint32_t, Error> writeGltf(const ExportOptions& options) {
   if (!frames) return frames;
   const bool text = std::filesystem::path(options.out).extension() == ".gltf";
   const std::string gltf = animation.finish(!text);
-  if (gltf.empty()) return makeError(kUsage, "{} would exceed 4 GiB; export fewer frames", options.out);
+  if (gltf.empty())
+    return makeError(
+        kUsage, "{} would exceed 4 GiB, or {} morph targets of all parts of the cloths; export fewer frames",
+        options.out, kMaxGltfTargets);
   auto file = orError(kNotWritten, recording::OutputFile::create(options.out));
   if (!file) return tl::unexpected(file.error());
   if (auto written = orError(kNotWritten, file->write(gltf)); !written) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <sstream>
 #include <utility>
 
@@ -60,20 +61,64 @@ int GltfAnimation::addBoundedFloats(std::span<const float> values, int type) {
   return index;
 }
 
+// Gives the corners of a cloth vertices that have their texture coordinates.
+void GltfAnimation::divideVertices(const cs_client* client, std::uint32_t index, const cs_cloth& cloth) {
+  constexpr std::uint32_t kNone = ~0u;
+  const std::span<std::uint32_t> corners = std::span(indices_).subspan(cloth.first_index, cloth.index_count);
+  std::uint32_t count = 0;
+  const float* uvs = cs_uvs(client, index, &count);
+  const std::uint32_t* uvIndices = cs_uv_indices(client, index, &count);
+  std::vector<std::uint32_t> firstUvs(cloth.vertex_count, kNone);
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> further;  // by vertex and coordinate
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const std::uint32_t vertex = corners[i], uv = uvIndices[i];
+    std::uint32_t& firstUv = firstUvs[vertex - cloth.first_vertex];
+    if (firstUv == kNone) firstUv = uv;
+    if (firstUv != uv) {
+      const auto [found, isNew] =
+          further.emplace(std::pair(vertex, uv), static_cast<std::uint32_t>(sources_.size()));
+      if (isNew) {
+        sources_.push_back(vertex);
+        uvs_.resize(2 * sources_.size());
+      }
+      corners[i] = found->second;
+    }
+    uvs_[2 * std::size_t{corners[i]}] = uvs[2 * uv];
+    uvs_[2 * std::size_t{corners[i]} + 1] = 1 - uvs[2 * uv + 1];
+  }
+}
+
+void GltfAnimation::takeShape(const cs_client* client) {
+  parts_ = partsOf(client);
+  std::uint32_t count = 0;
+  const std::uint32_t* indices = cs_triangles(client, &count);
+  indices_.assign(indices, indices + count);
+  sources_.resize(cs_vertex_count(client));
+  std::iota(sources_.begin(), sources_.end(), 0u);
+  cs_cloth cloth;
+  for (std::uint32_t i = 0; cs_get_cloth(client, i, &cloth) != 0; ++i) {
+    hasUvs_.push_back(cs_uvs(client, i, &count) != nullptr);
+    if (hasUvs_.back() == 0) continue;
+    uvs_.resize(2 * sources_.size());
+    divideVertices(client, i, cloth);
+  }
+}
+
+std::vector<float> GltfAnimation::gathered(const float* vectors) const {
+  std::vector<float> values;
+  values.reserve(3 * sources_.size());
+  for (const std::uint32_t source : sources_)
+    values.insert(values.end(), vectors + 3 * std::size_t{source}, vectors + 3 * std::size_t{source} + 3);
+  return values;
+}
+
 void GltfAnimation::add(const cs_client* client, double seconds) {
-  const std::size_t numbers = 3 * std::size_t{cs_vertex_count(client)};
-  std::vector<float> positions(cs_positions(client), cs_positions(client) + numbers);
-  std::vector<float> normals(cs_normals(client), cs_normals(client) + numbers);
+  if (seconds_.empty()) takeShape(client);
+  std::vector<float> positions = gathered(cs_positions(client)), normals = gathered(cs_normals(client));
   if (seconds_.empty()) {
     model_.buffers.resize(1);
     positions_ = positions;
     normals_ = normals;
-    std::uint32_t count = 0;
-    const std::uint32_t* indices = cs_triangles(client, &count);
-    indices_.assign(indices, indices + count);
-    cs_cloth cloth;
-    for (std::uint32_t i = 0; cs_get_cloth(client, i, &cloth) != 0; ++i)
-      cloths_.push_back({cloth.name, cloth.first_index, cloth.index_count});
   } else {
     // A morph target holds the difference from the first frame.
     std::ranges::transform(positions, positions_, positions.begin(), std::minus<>());
@@ -102,21 +147,37 @@ void GltfAnimation::addAnimation(tinygltf::Mesh& mesh) {
   model_.animations.push_back(animation);
 }
 
+// Parts of several cloths with one name have the same material.
+int GltfAnimation::materialOf(const std::string& name) {
+  const std::string written = validUtf8(name);
+  const auto [found, isNew] = materials_.emplace(written, static_cast<int>(model_.materials.size()));
+  if (isNew) {
+    tinygltf::Material& material = model_.materials.emplace_back();
+    material.name = written;
+    material.doubleSided = true;
+  }
+  return found->second;
+}
+
 std::string GltfAnimation::finish(bool binary) {
   model_.asset.generator = "clothstream export";
-  model_.materials.resize(1);
-  model_.materials[0].doubleSided = true;
+  if (parts_.size() * seconds_.size() > kMaxGltfTargets) return {};
+  Attributes withUvs = attributes_[0];
+  if (!uvs_.empty()) {
+    uvs_.resize(2 * sources_.size());
+    withUvs["TEXCOORD_0"] = addFloats(uvs_, TINYGLTF_TYPE_VEC2);
+  }
   tinygltf::Mesh mesh;
-  for (const Cloth& cloth : cloths_) {
+  for (const Part& part : parts_) {
     tinygltf::Primitive primitive;
     primitive.mode = TINYGLTF_MODE_TRIANGLES;
-    primitive.material = 0;
-    primitive.attributes = attributes_[0];
+    primitive.material = materialOf(part.material);
+    primitive.attributes = hasUvs_[part.cloth] != 0 ? withUvs : attributes_[0];
     primitive.targets.assign(attributes_.begin() + 1, attributes_.end());
-    const auto indices = std::span(indices_).subspan(cloth.firstIndex, cloth.indexCount);
+    const auto indices = std::span(indices_).subspan(part.firstIndex, part.indexCount);
     primitive.indices =
         addAccessor(std::as_bytes(indices), TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR);
-    primitive.extras = tinygltf::Value({{"cloth", tinygltf::Value(validUtf8(cloth.name))}});
+    primitive.extras = tinygltf::Value({{"cloth", tinygltf::Value(validUtf8(part.clothName))}});
     mesh.primitives.push_back(std::move(primitive));
   }
   if (frames() > 1) addAnimation(mesh);

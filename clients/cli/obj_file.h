@@ -11,8 +11,9 @@
 
 namespace clothstream::cli {
 
-// Writes positions and normals of the newest frame with one group per cloth, and finishes the file. Errors as
-// in NewFile.
+// Writes positions and normals of the newest frame with one group per cloth, and finishes the file. Parts of
+// meshes are materials (usemtl), without a material file, and texture coordinates are written where the
+// stream has them. Errors as in NewFile.
 [[nodiscard]] tl::expected<void, std::string> writeObj(const cs_client* client, files::NewFile& file);
 
 }  // namespace clothstream::cli

@@ -12,6 +12,7 @@
 #include "clients/cli/error.h"
 #include "clients/cli/print.h"
 #include "clients/grpc/scene_control.h"
+#include "proto/text/lines.h"
 
 namespace clothstream::cli {
 namespace {
@@ -20,8 +21,12 @@ tl::expected<v1::Scene, std::string> readScene(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string json{std::istreambuf_iterator<char>(file), {}};
   if (!file) return tl::unexpected(fmt::format("cannot read {}", path));
+  if (isWideText(json))
+    return tl::unexpected(
+        fmt::format("{}: is text in UTF-16 or UTF-32, which is not supported: save it as UTF-8", path));
   v1::Scene scene;
-  const auto status = google::protobuf::util::JsonStringToMessage(json, &scene);
+  const std::string_view text = withoutByteOrderMark(json);
+  const auto status = google::protobuf::util::JsonStringToMessage({text.data(), text.size()}, &scene);
   if (!status.ok()) return tl::unexpected(fmt::format("{}: {}", path, std::string(status.message())));
   const auto refuse = [&](std::string_view what, const std::string& name, const std::string& mesh) {
     return tl::unexpected(

@@ -5,17 +5,18 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <string_view>
 
 #include <fmt/format.h>
 
 #include "clients/files/regular_file.h"
 #include "proto/codec/stream_layout.h"
+#include "proto/text/excerpt.h"
+#include "proto/text/lines.h"
 
 namespace clothstream::files {
 namespace {
-
-constexpr std::size_t kShownBytes = 60;
 
 // Removes and returns the next word; "" at the end of the line.
 std::string_view takeWord(std::string_view& line) {
@@ -83,12 +84,15 @@ class ObjParser {
 tl::expected<ObjSurface, std::string> readObjSurface(const std::string& path) {
   auto file = openRegularFile(path);
   if (!file) return tl::unexpected(file.error());
+  const std::string content(std::istreambuf_iterator<char>(file->stream), {});
+  if (isWideText(content))
+    return tl::unexpected(
+        fmt::format("{} is text in UTF-16 or UTF-32, which is not supported: save it as UTF-8", path));
   ObjParser parser;
-  std::size_t number = 1;
-  for (std::string line; std::getline(file->stream, line); ++number)
-    if (const std::string wrong = parser.take(line); !wrong.empty())
+  for (ContinuedLines lines(withoutByteOrderMark(content)); lines.next();)
+    if (const std::string wrong = parser.take(lines.text()); !wrong.empty())
       return tl::unexpected(
-          fmt::format("{}: line {} is \"{}\": {}", path, number, line.substr(0, kShownBytes), wrong));
+          fmt::format("{}: line {} is \"{}\": {}", path, lines.number(), excerpt(lines.text()), wrong));
   if (parser.surface.positions.empty() || parser.surface.triangles.empty())
     return tl::unexpected(fmt::format("{} is not an OBJ file with vertices and faces", path));
   return std::move(parser.surface);

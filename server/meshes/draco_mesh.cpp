@@ -204,6 +204,9 @@ tl::expected<DracoMesh, std::string> decodeWith(draco::DecoderBuffer& buffer, co
     return tl::unexpected(fmt::format("has no positions in its attribute {}", request.positions));
   if (request.uvs && !readAttribute<2>(mesh, *request.uvs, decoded.uvs))
     return tl::unexpected(fmt::format("has no texture coordinates in its attribute {}", *request.uvs));
+  for (const std::uint32_t id : request.vectors)
+    if (!readAttribute<4>(mesh, id, decoded.vectors.emplace_back()))
+      return tl::unexpected(fmt::format("has no four numbers for each point in its attribute {}", id));
   decoded.indices.reserve(std::size_t{3} * mesh.num_faces());
   for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
     for (const draco::PointIndex& point : mesh.face(f)) {

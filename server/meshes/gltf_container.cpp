@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "proto/text/excerpt.h"
 #include "server/meshes/gltf_primitive.h"
 
 namespace clothstream::meshes {
@@ -77,6 +78,66 @@ void addView(const json& primitive, json& accessors) {
   accessors[index].emplace("bufferView", view);
 }
 
+bool isData(std::string_view uri) {
+  return uri.starts_with("data:");
+}
+
+// Whether the JSON has a URI that tinygltf reads in another way than RFC 3986 defines it, or an image in a
+// format that it does not know.
+bool hasUnusualUri(std::string_view text) {
+  constexpr std::string_view kKey = "\"uri\"";
+  constexpr std::string_view kImages[] = {"jpeg;base64,", "png;base64,", "bmp;base64,", "gif;base64,"};
+  for (std::size_t at = text.find(kKey); at != text.npos; at = text.find(kKey, at + 1)) {
+    std::string_view uri = text.substr(at + kKey.size());
+    uri.remove_prefix(std::min(uri.find_first_not_of(" \t\r\n:"), uri.size()));
+    if (!uri.starts_with('"')) continue;
+    uri.remove_prefix(1);
+    constexpr std::string_view kImage = "data:image/";
+    if (uri.starts_with(kImage)) {
+      const auto isKind = [&](std::string_view kind) { return uri.substr(kImage.size()).starts_with(kind); };
+      if (!std::ranges::any_of(kImages, isKind)) return true;
+    } else if (!isData(uri) && uri.substr(0, uri.find('"')).find_first_of("%+\\") != uri.npos) {
+      return true;
+    }
+  }
+  return false;
+}
+
+int hexValue(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+}
+
+// Replaces %HH by the byte that it means. A percent sign without two hexadecimal digits stays.
+std::string percentDecoded(std::string_view uri) {
+  std::string text;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    const int high = uri[i] == '%' && i + 2 < uri.size() ? hexValue(uri[i + 1]) : -1;
+    const int low = high >= 0 ? hexValue(uri[i + 2]) : -1;
+    text += low >= 0 ? static_cast<char>(16 * high + low) : uri[i];
+    if (low >= 0) i += 2;
+  }
+  return text;
+}
+
+// Gives the buffer a URI that tinygltf reads as the name of its file. If there is no file with the name that
+// the URI means, but one that is named like the URI itself, that one is meant.
+void setFileName(json& buffer, const FileExists& exists) {
+  const json& uri = member(buffer, "uri");
+  if (!uri.is_string() || isData(uri.get_ref<const std::string&>())) return;
+  const std::string& written = uri.get_ref<const std::string&>();
+  const std::string decoded = percentDecoded(written);
+  std::string encoded;
+  for (const char c : !exists(decoded) && exists(written) ? written : decoded) {
+    if (c == '%' || c == '+')
+      encoded += c == '%' ? "%25" : "%2B";
+    else
+      encoded += c;
+  }
+  buffer["uri"] = encoded;
+}
+
 std::string withJson(const std::string& bytes, bool binary, std::string text) {
   if (!binary) return text;
   text.resize((text.size() + 3) / 4 * 4, ' ');
@@ -106,17 +167,41 @@ std::optional<std::string> unsupportedGltf(const std::string& bytes, bool binary
   return std::nullopt;
 }
 
-tl::expected<std::string, std::string> prepareGltf(std::string bytes, bool binary) {
+std::optional<std::string> missingFile(const std::string& bytes, bool binary, const FileExists& exists) {
+  const json root = parsed(jsonOf(bytes, binary));
+  const json& buffers = member(root, "buffers");
+  for (std::size_t i = 0; buffers.is_array() && i < buffers.size(); ++i) {
+    const json& uri = member(buffers[i], "uri");
+    if (!uri.is_string() || isData(uri.get_ref<const std::string&>())) continue;
+    const std::string name = percentDecoded(uri.get_ref<const std::string&>());
+    if (!exists(name))
+      return fmt::format(
+          "buffer {} is the file \"{}\", which is not a file in the folder of this one or below: copy it "
+          "there",
+          i, excerpt(name, 200));
+  }
+  return std::nullopt;
+}
+
+tl::expected<std::string, std::string> prepareGltf(std::string bytes, bool binary, const FileExists& exists) {
   const std::string_view text = jsonOf(bytes, binary);
-  if (text.find(kDracoExtension) == text.npos) return bytes;
+  const bool isCompressed = text.find(kDracoExtension) != text.npos, hasUris = hasUnusualUri(text);
+  if (!isCompressed && !hasUris) return bytes;
   json root = parsed(text);
   if (root.is_discarded())
     return tl::unexpected(
         fmt::format("is not glTF 2.0: its JSON is broken, or nested more than {} levels deep", kMaxDepth));
-  if (!root.is_object() || !root.contains("accessors")) return bytes;
-  json& accessors = root["accessors"];
-  for (const json& mesh : member(root, "meshes"))
-    for (const json& primitive : member(mesh, "primitives")) addView(primitive, accessors);
+  if (!root.is_object()) return bytes;
+  if (isCompressed && root.contains("accessors")) {
+    json& accessors = root["accessors"];
+    for (const json& mesh : member(root, "meshes"))
+      for (const json& primitive : member(mesh, "primitives")) addView(primitive, accessors);
+  }
+  if (hasUris) {
+    root.erase("images");  // they are not needed
+    if (root.contains("buffers"))
+      for (json& buffer : root["buffers"]) setFileName(buffer, exists);
+  }
   return withJson(bytes, binary, root.dump(-1, ' ', false, json::error_handler_t::replace));
 }
 

@@ -2,6 +2,7 @@
 // The JSON of .gltf and .glb files, before tinygltf reads it.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -13,9 +14,17 @@ namespace clothstream::meshes {
 // nothing if it cannot be read for another reason. `bytes` is the whole file; `binary` means .glb.
 std::optional<std::string> unsupportedGltf(const std::string& bytes, bool binary);
 
-// The bytes of a file with compressed primitives as tinygltf accepts them: it refuses accessors of indices
-// without a buffer view, so these get the one with the compressed data. Files without such primitives are
-// returned unchanged.
-[[nodiscard]] tl::expected<std::string, std::string> prepareGltf(std::string bytes, bool binary);
+// Whether a file that the JSON names exists and may be read.
+using FileExists = std::function<bool(const std::string& name)>;
+
+// Names the first file of a buffer that does not exist. Nothing if all exist.
+std::optional<std::string> missingFile(const std::string& bytes, bool binary, const FileExists& exists);
+
+// The bytes of a file as tinygltf accepts them. It refuses accessors of indices without a buffer view, so
+// those of compressed primitives get the one with the compressed data. It reads some names of files in
+// another way than URIs are defined, so these are written differently, and images, which are not needed, are
+// left out. Other files are returned unchanged.
+[[nodiscard]] tl::expected<std::string, std::string> prepareGltf(std::string bytes, bool binary,
+                                                                 const FileExists& exists);
 
 }  // namespace clothstream::meshes

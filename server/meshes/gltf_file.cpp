@@ -7,16 +7,23 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
 #include <tiny_gltf.h>
 
+#include "proto/text/excerpt.h"
+#include "proto/text/lines.h"
+#include "proto/text/utf8.h"
 #include "server/files/regular_file.h"
 #include "server/meshes/gltf_container.h"
 #include "server/meshes/gltf_primitive.h"
 #include "server/meshes/gltf_skeleton.h"
+#include "server/meshes/gltf_skin.h"
 
 namespace clothstream::meshes {
 namespace {
@@ -25,20 +32,12 @@ using Affine = Eigen::Affine3d;
 template <typename T>
 using Expected = tl::expected<T, std::string>;
 
-Affine localTransform(const tinygltf::Node& node) {
-  Affine transform = Affine::Identity();
-  if (node.matrix.size() == 16) {
-    transform.matrix() = Eigen::Map<const Eigen::Matrix4d>(node.matrix.data());
-    return transform;
-  }
-  if (node.translation.size() == 3)
-    transform.translate(Eigen::Vector3d(node.translation[0], node.translation[1], node.translation[2]));
-  if (node.rotation.size() == 4)
-    transform.rotate(
-        Eigen::Quaterniond(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]));
-  if (node.scale.size() == 3) transform.scale(Eigen::Vector3d(node.scale[0], node.scale[1], node.scale[2]));
-  return transform;
-}
+// Where a mesh is in the scene.
+struct Placement {
+  Affine transform = Affine::Identity();        // of its node
+  const std::vector<Affine>* joints = nullptr;  // matrices of the joints of its skin, which replace it
+  std::span<const double> weights = {};         // of its morph targets
+};
 
 class Gatherer {
  public:
@@ -52,7 +51,7 @@ class Gatherer {
         if (auto done = addTree(node); !done) return tl::unexpected(done.error());
     } else {
       for (const tinygltf::Mesh& mesh : model_.meshes)
-        if (auto done = addMesh(mesh, Affine::Identity()); !done) return tl::unexpected(done.error());
+        if (auto done = addMesh(mesh, {.weights = mesh.weights}); !done) return tl::unexpected(done.error());
     }
     if (!everyPartHasUvs_) {
       source_.uvs.clear();
@@ -84,7 +83,12 @@ class Gatherer {
         const tinygltf::Mesh* mesh = elementAt(model_.meshes, node->mesh);
         if (!mesh) return tl::unexpected(fmt::format("mesh {} does not exist", node->mesh));
         if (auto done = takeSkin(*node, *mesh); !done) return done;
-        if (auto done = addMesh(*mesh, transform); !done) return done;
+        const auto matrices = matricesOf(*node);
+        if (!matrices) return tl::unexpected(matrices.error());
+        const Placement placement{.transform = transform,
+                                  .joints = *matrices,
+                                  .weights = node->weights.empty() ? mesh->weights : node->weights};
+        if (auto done = addMesh(*mesh, placement); !done) return done;
       }
       // NOLINTNEXTLINE(modernize-loop-convert): backwards
       for (auto child = node->children.rbegin(); child != node->children.rend(); ++child)
@@ -111,29 +115,36 @@ class Gatherer {
     return {};
   }
 
-  Expected<void> addMesh(const tinygltf::Mesh& mesh, const Affine& transform) {
+  // Matrices of the joints that place a mesh. Null for a mesh without a skin, and if the skin is requested,
+  // whose joints then move.
+  Expected<const std::vector<Affine>*> matricesOf(const tinygltf::Node& node) {
+    if (joints_ || node.skin < 0) return nullptr;
+    const auto known = matrices_.find(node.skin);
+    if (known != matrices_.end()) return &known->second;
+    if (!nodes_) nodes_.emplace(model_);
+    auto read = jointMatrices(model_, node.skin, *nodes_);
+    if (!read) return tl::unexpected(std::move(read.error()));
+    return &matrices_.emplace(node.skin, std::move(*read)).first->second;
+  }
+
+  Expected<void> addMesh(const tinygltf::Mesh& mesh, const Placement& placement) {
     for (std::size_t i = 0; i < mesh.primitives.size(); ++i)
-      if (auto done = addPrimitive(mesh, mesh.primitives[i], transform); !done)
+      if (auto done = addPrimitive(mesh, mesh.primitives[i], placement); !done)
         return tl::unexpected(fmt::format("mesh \"{}\", primitive {}: {}", mesh.name, i, done.error()));
     return {};
   }
 
   Expected<void> addPrimitive(const tinygltf::Mesh& mesh, const tinygltf::Primitive& primitive,
-                              const Affine& ofNode) {
+                              const Placement& placement) {
     const std::size_t firstVertex = source_.vertices.size(), firstUv = source_.uvs.size();
-    const Expected<GltfPrimitive> read = readPrimitive(
+    Expected<GltfPrimitive> read = readPrimitive(
         model_, primitive,
         {.vertices = maxVertices_ - firstVertex, .triangles = 2 * maxVertices_ - source_.faces.size()});
     if (!read) return tl::unexpected(read.error());
-    // Joints replace the transform of the node.
-    const Affine transform = skeleton_ ? Affine(Eigen::Scaling(skeleton_->scale)) : ofNode;
-    for (const model::Vec3& vertex : read->positions)
-      source_.vertices.push_back((transform * vertex.cast<double>()).cast<float>());
-    if (skeleton_) {
-      const auto vertices = readVertexJoints(model_, primitive, read->positions.size(), *skeleton_);
-      if (!vertices) return tl::unexpected(vertices.error());
-      skeleton_->skin.vertices.insert(skeleton_->skin.vertices.end(), vertices->begin(), vertices->end());
-    }
+    if (auto done = addTargets(model_, primitive, placement.weights, read->positions); !done) return done;
+    const auto isMirrored = place(primitive, placement, *read);
+    if (!isMirrored) return tl::unexpected(isMirrored.error());
+    source_.vertices.insert(source_.vertices.end(), read->positions.begin(), read->positions.end());
     everyPartHasUvs_ = everyPartHasUvs_ && !read->uvs.empty();
     // v runs downwards in glTF and upwards here.
     for (const model::Uv& uv : read->uvs) source_.uvs.emplace_back(uv.x(), 1 - uv.y());
@@ -141,8 +152,28 @@ class Gatherer {
     source_.parts.push_back(
         {material && !material->name.empty() ? material->name : mesh.name, source_.faces.size()});
     addFaces(read->indices, static_cast<std::uint32_t>(firstVertex), static_cast<std::uint32_t>(firstUv),
-             transform.linear().determinant() < 0);
+             *isMirrored);
     return {};
+  }
+
+  // Moves positions of a primitive to their place in the scene. Returns whether that mirrors them. Joints
+  // replace the transform of the node (glTF 2.0, 3.7.3.3).
+  Expected<bool> place(const tinygltf::Primitive& primitive, const Placement& placement,
+                       GltfPrimitive& read) {
+    if (placement.joints) {
+      if (auto done = placeByJoints(model_, primitive, *placement.joints, read); !done)
+        return tl::unexpected(std::move(done.error()));
+      return placement.joints->front().linear().determinant() < 0;
+    }
+    const Affine transform = skeleton_ ? Affine(Eigen::Scaling(skeleton_->scale)) : placement.transform;
+    for (model::Vec3& position : read.positions)
+      position = (transform * position.cast<double>()).cast<float>();
+    if (skeleton_) {
+      const auto vertices = readVertexJoints(model_, primitive, read, *skeleton_);
+      if (!vertices) return tl::unexpected(vertices.error());
+      skeleton_->skin.vertices.insert(skeleton_->skin.vertices.end(), vertices->begin(), vertices->end());
+    }
+    return transform.linear().determinant() < 0;
   }
 
   // A mirrored mesh shows its back. The specification requires that its triangles are reversed.
@@ -162,7 +193,9 @@ class Gatherer {
 
   const tinygltf::Model& model_;
   std::uint64_t maxVertices_;
-  const JointRequest* joints_;  // null: skins are ignored
+  const JointRequest* joints_;           // null: joints place the vertices once, and the result has no skin
+  std::optional<NodeTransforms> nodes_;  // made for the first skin
+  std::unordered_map<int, std::vector<Affine>> matrices_;  // of the joints of each skin
   std::optional<GltfSkeleton> skeleton_;
   int skinIndex_ = -1;
   std::string rigidMesh_;  // a mesh without a skin
@@ -171,13 +204,21 @@ class Gatherer {
   bool everyPartHasUvs_ = true;
 };
 
+// Whether an extension, of any vendor, only says how a mesh looks or what it means.
+bool leavesGeometry(std::string_view name) {
+  constexpr std::string_view kKinds[] = {"materials", "texture_",      "lights_",
+                                         "xmp",       "mesh_features", "structural_metadata"};
+  const std::size_t vendor = std::min(name.find('_'), name.size() - 1);
+  return std::ranges::any_of(
+      kKinds, [&](std::string_view kind) { return name.substr(vendor + 1).starts_with(kind); });
+}
+
 std::optional<std::string> unsupportedExtension(const std::string& name) {
   if (name == kMeshoptExtension) return meshoptError();
-  if (name == kDracoExtension || name == kQuantizationExtension || name == "KHR_texture_transform" ||
-      name.starts_with("KHR_materials") || name.starts_with("KHR_texture_") || name.starts_with("KHR_lights"))
-    return std::nullopt;
+  if (name == kDracoExtension || name == kQuantizationExtension) return std::nullopt;
+  if (!name.empty() && leavesGeometry(name)) return std::nullopt;
   return fmt::format("needs the extension {}, which is not supported: export it without that extension",
-                     name);
+                     excerpt(name));
 }
 
 // Files that a .gltf file refers to, for the callbacks of tinygltf. They are in its folder, and have a limit
@@ -205,6 +246,12 @@ class NeighbourFiles {
     return calls;
   }
 
+  bool holds(const std::filesystem::path& path) const {
+    const auto inFolder = std::filesystem::absolute(path).lexically_normal().lexically_relative(folder_);
+    std::error_code ignored;
+    return !inFolder.empty() && *inFolder.begin() != ".." && std::filesystem::is_regular_file(path, ignored);
+  }
+
  private:
   // Versions of tinygltf that know this callback ignore all callbacks if it is missing, and then read any
   // file.
@@ -217,12 +264,6 @@ class NeighbourFiles {
         if (problem) *error = problem.message();
         return !problem;
       };
-  }
-
-  bool holds(const std::filesystem::path& path) const {
-    const auto inFolder = std::filesystem::absolute(path).lexically_normal().lexically_relative(folder_);
-    std::error_code ignored;
-    return !inFolder.empty() && *inFolder.begin() != ".." && std::filesystem::is_regular_file(path, ignored);
   }
 
   bool read(const std::filesystem::path& path, std::vector<unsigned char>& bytes, std::string& error) {
@@ -249,6 +290,9 @@ std::string noJointsError() {
 tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::filesystem::path& folder,
                                                bool binary, const FileLimits& limits,
                                                const JointRequest* joints) {
+  if (!binary && isWideText(bytes))
+    return tl::unexpected(
+        std::string("is text in UTF-16 or UTF-32, which glTF does not allow: save it as UTF-8"));
   tinygltf::TinyGLTF loader;
   NeighbourFiles files(folder, limits.bytes - std::min<std::uint64_t>(limits.bytes, bytes.size()));
   loader.SetFsCallbacks(files.callbacks());
@@ -256,7 +300,8 @@ tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::fil
   loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
                            int, void*) { return true; },
                         nullptr);
-  const Expected<std::string> prepared = prepareGltf(std::move(bytes), binary);
+  const FileExists exists = [&](const std::string& name) { return files.holds(folder / name); };
+  const Expected<std::string> prepared = prepareGltf(std::move(bytes), binary, exists);
   if (!prepared) return tl::unexpected(prepared.error());
   tinygltf::Model model;
   std::string error, warning;
@@ -270,7 +315,11 @@ tl::expected<MeshSource, std::string> readGltf(std::string bytes, const std::fil
   if (!read || !model.asset.version.starts_with("2."))
     if (auto unsupported = unsupportedGltf(*prepared, binary)) return tl::unexpected(std::move(*unsupported));
   if (!read)
-    return tl::unexpected(fmt::format("is not glTF 2.0: {}", error.empty() ? "cannot be parsed" : error));
+    if (auto missing = missingFile(*prepared, binary, exists)) return tl::unexpected(std::move(*missing));
+  if (!read)
+    return tl::unexpected(isUtf8(error)
+                              ? fmt::format("is not glTF 2.0: {}", error.empty() ? "cannot be parsed" : error)
+                              : fmt::format("is not glTF 2.0: {}: save it as UTF-8", excerpt(error, 300)));
   for (const std::string& extension : model.extensionsRequired)
     if (auto problem = unsupportedExtension(extension)) return tl::unexpected(std::move(*problem));
   return Gatherer(model, limits.vertices, joints).gather();

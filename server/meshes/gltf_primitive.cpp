@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/meshes/gltf_primitive.h"
 
+#include <algorithm>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -55,16 +56,61 @@ Expected<std::vector<std::uint32_t>> readIndices(const GltfElements& elements) {
   return indices;
 }
 
-std::optional<std::string> checkCounts(std::size_t vertices, std::size_t indices,
+int modeOf(const tinygltf::Primitive& primitive) {
+  return primitive.mode == -1 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+}
+
+std::optional<std::string> checkMode(int mode) {
+  switch (mode) {
+    case TINYGLTF_MODE_TRIANGLES:
+    case TINYGLTF_MODE_TRIANGLE_STRIP:
+    case TINYGLTF_MODE_TRIANGLE_FAN:
+      return std::nullopt;
+    case TINYGLTF_MODE_POINTS:
+      return "is made of points, which have no surface: remove them, or export triangles";
+    case TINYGLTF_MODE_LINE:
+    case TINYGLTF_MODE_LINE_LOOP:
+    case TINYGLTF_MODE_LINE_STRIP:
+      return "is made of lines, which have no surface: remove them, or export triangles";
+    default:
+      return fmt::format("has the mode {}, which glTF does not have: export it as triangles", mode);
+  }
+}
+
+// Number of triangles of this number of indices.
+std::size_t trianglesOf(int mode, std::size_t indices) {
+  if (mode == TINYGLTF_MODE_TRIANGLES) return indices / 3;
+  return indices < 3 ? 0 : indices - 2;
+}
+
+std::optional<std::string> checkCounts(int mode, std::size_t vertices, std::size_t indices,
                                        const PrimitiveLimits& limits) {
-  if (indices % 3 != 0) return fmt::format("has {} indices, which is not a multiple of three", indices);
+  if (mode == TINYGLTF_MODE_TRIANGLES && indices % 3 != 0)
+    return fmt::format("has {} indices, which is not a multiple of three", indices);
+  if (indices < 3) return fmt::format("has {} indices; a triangle has three", indices);
   if (vertices > limits.vertices)
     return fmt::format("has {} vertices; at most {} more are allowed: simplify it", vertices,
                        limits.vertices);
-  if (indices / 3 > limits.triangles)
-    return fmt::format("has {} triangles; at most {} more are allowed: simplify it", indices / 3,
-                       limits.triangles);
+  if (trianglesOf(mode, indices) > limits.triangles)
+    return fmt::format("has {} triangles; at most {} more are allowed: simplify it",
+                       trianglesOf(mode, indices), limits.triangles);
   return std::nullopt;
+}
+
+// Indices of single triangles. Triangles of a strip that name a vertex twice only join its pieces, and are
+// left out.
+std::vector<std::uint32_t> separated(int mode, std::vector<std::uint32_t> indices) {
+  if (mode == TINYGLTF_MODE_TRIANGLES) return indices;
+  std::vector<std::uint32_t> triangles;
+  triangles.reserve(3 * trianglesOf(mode, indices.size()));
+  for (std::size_t i = 0; i + 2 < indices.size(); ++i) {
+    const bool isFan = mode == TINYGLTF_MODE_TRIANGLE_FAN;
+    const std::uint32_t a = isFan ? indices[i + 1] : indices[i],
+                        b = isFan ? indices[i + 2] : indices[i + 1 + i % 2],
+                        c = isFan ? indices[0] : indices[i + 2 - i % 2];
+    if (a != b && b != c && c != a) triangles.insert(triangles.end(), {a, b, c});
+  }
+  return triangles;
 }
 
 Expected<GltfPrimitive> readPlain(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
@@ -77,7 +123,8 @@ Expected<GltfPrimitive> readPlain(const tinygltf::Model& model, const tinygltf::
     if (!elements) return tl::unexpected(elements.error());
     corners = *elements;
   }
-  if (auto problem = checkCounts(vertices->count, corners ? corners->count : vertices->count, limits))
+  if (auto problem =
+          checkCounts(modeOf(primitive), vertices->count, corners ? corners->count : vertices->count, limits))
     return tl::unexpected(std::move(*problem));
   auto positions = readVectors<Vec3>(*vertices, "positions");
   if (!positions) return tl::unexpected(std::move(positions.error()));
@@ -90,6 +137,7 @@ Expected<GltfPrimitive> readPlain(const tinygltf::Model& model, const tinygltf::
     read.indices.resize(vertices->count);
     std::iota(read.indices.begin(), read.indices.end(), 0u);
   }
+  read.indices = separated(modeOf(primitive), std::move(read.indices));
   const auto attribute = primitive.attributes.find("TEXCOORD_0");
   if (attribute == primitive.attributes.end()) return read;
   const auto elements = elementsOf(model, attribute->second, TINYGLTF_TYPE_VEC2);
@@ -108,8 +156,18 @@ int numberIn(const tinygltf::Value& object, const std::string& name) {
   return isThere ? object.Get(name).GetNumberAsInt() : -1;
 }
 
+// Names of the compressed attributes for skins.
+std::vector<std::string> influencesIn(const tinygltf::Value& attributes) {
+  std::vector<std::string> names;
+  for (const std::string& name : attributes.Keys())
+    if ((name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_")) && numberIn(attributes, name) >= 0)
+      names.push_back(name);
+  if (names.size() > kMaxDracoAttributes) names.resize(kMaxDracoAttributes);
+  return names;
+}
+
 Expected<GltfPrimitive> readDraco(const tinygltf::Model& model, const tinygltf::Value& extension,
-                                  std::size_t vertices, std::size_t indices) {
+                                  std::size_t vertices, std::size_t indices, std::size_t triangles) {
   const auto refuse = [](std::string_view what) {
     return tl::unexpected(fmt::format("its compressed data ({}) {}", kDracoExtension, what));
   };
@@ -131,12 +189,17 @@ Expected<GltfPrimitive> readDraco(const tinygltf::Model& model, const tinygltf::
   DracoRequest request{.positions = static_cast<std::uint32_t>(position),
                        .uvs = std::nullopt,
                        .maxPoints = vertices,
-                       .maxFaces = indices / 3};
+                       .maxFaces = triangles};
   if (uv >= 0) request.uvs = static_cast<std::uint32_t>(uv);
+  const std::vector<std::string> names = influencesIn(extension.Get("attributes"));
+  for (const std::string& name : names)
+    request.vectors.push_back(static_cast<std::uint32_t>(numberIn(extension.Get("attributes"), name)));
   auto decoded = decodeDraco(
       std::as_bytes(std::span(buffer->data).subspan(view->byteOffset, view->byteLength)), request);
   if (!decoded) return refuse(decoded.error());
-  return GltfPrimitive{std::move(decoded->positions), std::move(decoded->uvs), std::move(decoded->indices)};
+  GltfPrimitive read{std::move(decoded->positions), std::move(decoded->uvs), std::move(decoded->indices)};
+  for (std::size_t i = 0; i < names.size(); ++i) read.influences[names[i]] = std::move(decoded->vectors[i]);
+  return read;
 }
 
 }  // namespace
@@ -151,8 +214,8 @@ std::string meshoptError() {
 
 Expected<GltfPrimitive> readPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
                                       const PrimitiveLimits& limits) {
-  if (primitive.mode != TINYGLTF_MODE_TRIANGLES && primitive.mode != -1)
-    return tl::unexpected(std::string("is not made of triangles: export it as triangles"));
+  const int mode = modeOf(primitive);
+  if (auto problem = checkMode(mode)) return tl::unexpected(std::move(*problem));
   const auto position = primitive.attributes.find("POSITION");
   if (position == primitive.attributes.end()) return tl::unexpected(std::string("has no POSITION"));
   const auto draco = primitive.extensions.find(kDracoExtension);
@@ -161,9 +224,33 @@ Expected<GltfPrimitive> readPrimitive(const tinygltf::Model& model, const tinygl
   const tinygltf::Accessor* corners = elementAt(model.accessors, primitive.indices);
   if (!vertices || !corners)
     return tl::unexpected(std::string("has no accessors for its POSITION and indices"));
-  if (auto problem = checkCounts(vertices->count, corners->count, limits))
+  if (auto problem = checkCounts(mode, vertices->count, corners->count, limits))
     return tl::unexpected(std::move(*problem));
-  return readDraco(model, draco->second, vertices->count, corners->count);
+  return readDraco(model, draco->second, vertices->count, corners->count, trianglesOf(mode, corners->count));
+}
+
+Expected<void> addTargets(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
+                          std::span<const double> weights, std::span<Vec3> positions) {
+  constexpr std::ptrdiff_t kMost = 256;
+  if (std::ranges::count_if(weights, [](double weight) { return weight != 0; }) > kMost)
+    return tl::unexpected(
+        fmt::format("has more than {} morph targets with a weight: apply them when you export it", kMost));
+  for (std::size_t i = 0; i < std::min(weights.size(), primitive.targets.size()); ++i) {
+    const auto target = primitive.targets[i].find("POSITION");
+    if (weights[i] == 0 || target == primitive.targets[i].end()) continue;
+    const auto refuse = [&](const std::string& text) {
+      return tl::unexpected(fmt::format("morph target {}: {}", i, text));
+    };
+    const auto moves = elementsOf(model, target->second, TINYGLTF_TYPE_VEC3);
+    if (!moves) return refuse(moves.error());
+    if (moves->count != positions.size())
+      return refuse(fmt::format("has {} elements for {} vertices", moves->count, positions.size()));
+    const auto values = readVectors<Vec3>(*moves, "positions");
+    if (!values) return refuse(values.error());
+    for (std::size_t k = 0; k < positions.size(); ++k)
+      positions[k] += static_cast<float>(weights[i]) * (*values)[k];
+  }
+  return {};
 }
 
 }  // namespace clothstream::meshes

@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,16 +34,25 @@ struct GltfPrimitive {
   std::vector<model::Vec3> positions;  // without the transform of a node
   std::vector<model::Uv> uvs;  // TEXCOORD_0, as many as positions, v downwards; empty if there are none
   std::vector<std::uint32_t> indices;  // three per triangle; of any vertices
+  // JOINTS_n and WEIGHTS_n that are compressed, by their names. Others stay in their accessors.
+  std::map<std::string, std::vector<Eigen::Vector4f>> influences = {};
 };
 
 struct PrimitiveLimits {
   std::uint64_t vertices = 0, triangles = 0;
 };
 
-// Reads the triangles of a primitive, which may be compressed with Draco. Larger ones are refused before
-// anything is allocated for them.
+// Reads the triangles of a primitive, which may be a strip or a fan, or compressed with Draco. Larger ones
+// are refused before anything is allocated for them.
 [[nodiscard]] tl::expected<GltfPrimitive, std::string> readPrimitive(const tinygltf::Model& model,
                                                                      const tinygltf::Primitive& primitive,
                                                                      const PrimitiveLimits& limits);
+
+// Adds the morph targets of the primitive to its positions, each times its weight. Targets without a weight,
+// or with the weight 0, change nothing.
+[[nodiscard]] tl::expected<void, std::string> addTargets(const tinygltf::Model& model,
+                                                         const tinygltf::Primitive& primitive,
+                                                         std::span<const double> weights,
+                                                         std::span<model::Vec3> positions);
 
 }  // namespace clothstream::meshes

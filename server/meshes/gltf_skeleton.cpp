@@ -12,6 +12,7 @@
 #include "server/meshes/gltf_accessor.h"
 #include "server/meshes/gltf_channels.h"
 #include "server/meshes/gltf_primitive.h"
+#include "server/meshes/gltf_skin.h"
 
 namespace clothstream::meshes {
 namespace {
@@ -338,44 +339,21 @@ Expected<GltfSkeleton> readSkeleton(const tinygltf::Model& model, int skin, cons
 
 Expected<std::vector<model::VertexJoints>> readVertexJoints(const tinygltf::Model& model,
                                                             const tinygltf::Primitive& primitive,
-                                                            std::size_t vertices,
+                                                            const GltfPrimitive& read,
                                                             const GltfSkeleton& skeleton) {
-  const auto& attributes = primitive.attributes;
-  if (attributes.contains("JOINTS_1"))
-    return tl::unexpected(std::string("has more than four joints for a vertex: export it with at most four"));
-  if (primitive.extensions.contains(kDracoExtension))
-    return tl::unexpected(
-        std::string("has joints and is compressed with Draco: export it without compression"));
-  const auto jointsAt = attributes.find("JOINTS_0"), weightsAt = attributes.find("WEIGHTS_0");
-  if (jointsAt == attributes.end() || weightsAt == attributes.end())
-    return tl::unexpected(std::string("has a skin, but no JOINTS_0 and WEIGHTS_0"));
-  const auto joints = elementsOf(model, jointsAt->second, TINYGLTF_TYPE_VEC4);
-  if (!joints) return tl::unexpected(joints.error());
-  const auto weights = readFloats(model, weightsAt->second, TINYGLTF_TYPE_VEC4, vertices, "weights");
-  if (!weights) return tl::unexpected(weights.error());
-  if (joints->count != vertices || weights->size() != model::kVertexJoints * vertices)
-    return tl::unexpected(fmt::format("has {} joints and {} weights for {} vertices", joints->count,
-                                      weights->size() / model::kVertexJoints, vertices));
-  const bool isByte = joints->componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
-  if (!isByte && joints->componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)
-    return tl::unexpected(std::string("has joints that are not unsigned bytes or shorts"));
-  std::vector<model::VertexJoints> result(vertices);
-  for (std::size_t i = 0; i < vertices; ++i) {
-    double sum = 0;
-    for (std::size_t k = 0; k < model::kVertexJoints; ++k) {
-      const float weight = (*weights)[model::kVertexJoints * i + k];
-      const std::uint32_t joint = isByte ? joints->at<std::uint8_t>(i, k) : joints->at<std::uint16_t>(i, k);
-      if (weight < 0 || weight > 1)
-        return tl::unexpected(fmt::format("vertex {} has the weight {}; must be 0 to 1", i, weight));
-      if (weight > 0 && joint >= skeleton.numberOf.size())
-        return tl::unexpected(fmt::format("vertex {} has joint {}; the skin has {} joints", i, joint,
-                                          skeleton.numberOf.size()));
-      result[i].joints[k] = weight > 0 ? skeleton.numberOf[joint] : 0;
-      result[i].weights[k] = weight;
-      sum += double{weight};
+  auto influences = VertexInfluences::read(model, primitive, read, skeleton.numberOf.size());
+  if (!influences) return tl::unexpected(std::move(influences.error()));
+  std::vector<model::VertexJoints> result(read.positions.size());
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const auto joints = influences->of(i);
+    if (!joints) return tl::unexpected(joints.error());
+    if (joints->size() > model::kVertexJoints)
+      return tl::unexpected(fmt::format("vertex {} has {} joints with a weight: export it with at most {}", i,
+                                        joints->size(), model::kVertexJoints));
+    for (std::size_t k = 0; k < joints->size(); ++k) {
+      result[i].joints[k] = skeleton.numberOf[(*joints)[k].joint];
+      result[i].weights[k] = (*joints)[k].weight;
     }
-    if (!(sum > 0)) return tl::unexpected(fmt::format("vertex {} has no weight", i));
-    for (float& weight : result[i].weights) weight = static_cast<float>(double{weight} / sum);
   }
   return result;
 }

@@ -9,6 +9,7 @@
 #include <tiny_gltf.h>
 #include <tl/expected.hpp>
 
+#include "server/meshes/gltf_primitive.h"
 #include "server/meshes/mesh_file.h"
 #include "server/model/skin.h"
 
@@ -29,10 +30,10 @@ struct GltfSkeleton {
 [[nodiscard]] tl::expected<GltfSkeleton, std::string> readSkeleton(const tinygltf::Model& model, int skin,
                                                                    const JointRequest& request);
 
-// Joints and weights of the vertices of a primitive with that skeleton. Weights are scaled so that the sum of
-// each vertex is 1.
+// Joints and weights of the vertices of a primitive, which `read` has, with that skeleton, at most four of
+// each vertex. Weights are scaled so that the sum of each vertex is 1.
 [[nodiscard]] tl::expected<std::vector<model::VertexJoints>, std::string> readVertexJoints(
-    const tinygltf::Model& model, const tinygltf::Primitive& primitive, std::size_t vertices,
+    const tinygltf::Model& model, const tinygltf::Primitive& primitive, const GltfPrimitive& read,
     const GltfSkeleton& skeleton);
 
 }  // namespace clothstream::meshes

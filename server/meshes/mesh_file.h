@@ -35,7 +35,8 @@ struct JointRequest {
 //
 // With `joints`, the vertices of a file with a skin are where the skin binds them, and the result has the
 // skin. All meshes of the scene must have that skin then. A file without a skin is read as usual, and refused
-// if an animation is named. Without `joints`, skins are ignored.
+// if an animation is named. Without `joints`, the vertices of a mesh with a skin are where its joints place
+// them in the poses of their nodes, and the result has no skin.
 //
 // The error starts with the path.
 [[nodiscard]] tl::expected<MeshSource, std::string> readMeshFile(const std::filesystem::path& path,

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Reads Wavefront OBJ with tinyobjloader.
+#include <algorithm>
 #include <istream>
+#include <span>
 #include <streambuf>
 
 #include <fmt/format.h>
 #include <tiny_obj_loader.h>
 
+#include "proto/text/excerpt.h"
+#include "proto/text/lines.h"
+#include "proto/text/utf8.h"
 #include "server/meshes/mesh_file.h"
 
 namespace clothstream::meshes {
@@ -32,24 +37,76 @@ bool hasLongExponent(std::string_view text) {
   return false;
 }
 
-// The loader silently reads text that is not a number as 0.
-tl::expected<void, std::string> checkVertexLines(std::string_view text) {
-  std::size_t line = 1;
-  for (std::size_t start = 0; start < text.size(); ++line) {
-    const std::size_t end = std::min(text.find('\n', start), text.size());
-    const std::string_view content = text.substr(start, end - start);
-    const std::size_t word = std::min(content.find_first_not_of(" \t"), content.size());
-    const bool isVertex = content.substr(word, 2) == "v " || content.substr(word, 2) == "v\t";
-    if (isVertex && content.find_first_not_of("0123456789+-.eE \t\r", word + 2) != content.npos)
-      return tl::unexpected(fmt::format("line {} is \"{}\": a vertex's coordinates must be finite numbers",
-                                        line, content.substr(0, 60)));
-    const bool hasNumbers = content.substr(word, 1) == "v";  // v, vt, vn
-    if (hasNumbers && hasLongExponent(content))
-      return tl::unexpected(fmt::format("line {} is \"{}\": an exponent must have at most eight digits", line,
-                                        content.substr(0, 60)));
-    start = end + 1;
+constexpr std::string_view kSpace = " \t\r";
+
+std::string_view firstWord(std::string_view line) {
+  line.remove_prefix(std::min(line.find_first_not_of(kSpace), line.size()));
+  return line.substr(0, line.find_first_of(kSpace));
+}
+
+// Removes a whole number, as short as one that an int holds, from the start of the text. A corner has no
+// element 0.
+bool takeIndex(std::string_view& text) {
+  constexpr std::size_t kMaxDigits = 9;
+  if (text.starts_with('-') || text.starts_with('+')) text.remove_prefix(1);
+  const std::size_t digits = std::min(text.find_first_not_of("0123456789"), text.size());
+  const bool isZero = text.substr(0, digits).find_first_not_of('0') == text.npos;
+  text.remove_prefix(digits);
+  return digits > 0 && digits <= kMaxDigits && !isZero;
+}
+
+// Whether the word is V, V/VT, V//VN or V/VT/VN.
+bool isCorner(std::string_view word) {
+  if (!takeIndex(word)) return false;
+  for (int more = 0; more < 2 && word.starts_with('/'); ++more) {
+    word.remove_prefix(1);
+    if (!word.empty() && !word.starts_with('/') && !takeIndex(word)) return false;
   }
-  return {};
+  return word.empty();
+}
+
+bool hasOnlyCorners(std::string_view words) {
+  for (std::string_view word = firstWord(words); !word.empty(); word = firstWord(words)) {
+    if (!isCorner(word)) return false;
+    words.remove_prefix(static_cast<std::size_t>(word.data() - words.data()) + word.size());
+  }
+  return true;
+}
+
+// Problem of a line that the loader would read as something else, or null. The loader takes text that is not
+// a number for 0.
+const char* problemOf(std::string_view line) {
+  const std::string_view keyword = firstWord(line);
+  if (keyword.empty()) return nullptr;
+  const std::string_view values =
+      line.substr(static_cast<std::size_t>(keyword.data() - line.data()) + keyword.size());
+  const bool isVertex = keyword == "v", isCoordinate = keyword == "vt";
+  if ((isVertex || isCoordinate) && values.find_first_not_of("0123456789+-.eE \t\r") != values.npos)
+    return isVertex ? "a vertex's coordinates must be finite numbers"
+                    : "texture coordinates must be finite numbers";
+  if ((isVertex || isCoordinate || keyword == "vn") && hasLongExponent(values))
+    return "an exponent must have at most eight digits";
+  if (keyword == "f" && !hasOnlyCorners(values))
+    return "a corner of a face must be V, V/VT, V//VN or V/VT/VN, with whole numbers that count from 1, or "
+           "from -1 backwards";
+  if ((keyword == "usemtl" || keyword == "o" || keyword == "g") && !isUtf8(values))
+    return "a name must be UTF-8, and this one has another encoding: save the file as UTF-8, or rename it";
+  return nullptr;
+}
+
+// Text for the loader, which knows no continued lines. `storage` holds the result if it is another text.
+tl::expected<std::string_view, std::string> checkedText(std::string_view text, std::string& storage) {
+  const bool mayContinue = text.find('\\') != text.npos;
+  for (ContinuedLines lines(text); lines.next();) {
+    if (lines.text().find('\0') != text.npos)
+      return tl::unexpected(
+          fmt::format("line {} has a zero byte, which no OBJ file has: export it again", lines.number()));
+    if (const char* problem = problemOf(lines.text()))
+      return tl::unexpected(
+          fmt::format("line {} is \"{}\": {}", lines.number(), excerpt(lines.text()), problem));
+    if (mayContinue) storage.append(lines.text()) += '\n';
+  }
+  return mayContinue ? std::string_view(storage) : text;
 }
 
 // Callbacks of the loader, one for each kind of statement.
@@ -74,6 +131,7 @@ class ObjReader {
     std::string warning, error;
     const bool read = tinyobj::LoadObjWithCallback(stream, callbacks, this, nullptr, &warning, &error);
     if (!read) return tl::unexpected(fmt::format("is not OBJ: {}", error));
+    if (!problem_.empty()) return tl::unexpected(std::move(problem_));
     if (!everyCornerHasUv_) source_.uvs.clear();
     return std::move(source_);
   }
@@ -85,6 +143,7 @@ class ObjReader {
 
   void enter(std::string& name, const char* value) {
     name = value;
+    name.erase(name.find_last_not_of(kSpace) + 1);
     partOpen_ = false;
   }
 
@@ -95,8 +154,9 @@ class ObjReader {
     face.cornerCount = static_cast<std::uint32_t>(corners.size());
     if (!face.isInline()) face.vertices[0] = static_cast<std::uint32_t>(source_.corners.size());
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      const SourceCorner corner{absolute(corners[i].vertex_index, source_.vertices.size()),
-                                absolute(corners[i].texcoord_index, source_.uvs.size())};
+      const SourceCorner corner{
+          absolute("vertex", corners[i].vertex_index, source_.vertices.size()),
+          absolute("texture coordinate", corners[i].texcoord_index, source_.uvs.size())};
       if (face.isInline())
         face.vertices[i] = corner.vertex, face.uvs[i] = corner.uv;
       else
@@ -105,24 +165,32 @@ class ObjReader {
     }
   }
 
-  // Indices count from 1, or backwards from the newest element if negative. Any other index becomes too
-  // large, and buildMesh() refuses it.
-  static std::uint32_t absolute(int index, std::size_t count) {
-    return static_cast<std::uint32_t>(index > 0    ? index - 1
-                                      : index == 0 ? -1
-                                                   : static_cast<int>(count) + index);
+  // Indices count from 1, or backwards from the newest element if negative. No index (0) becomes too large.
+  std::uint32_t absolute(std::string_view what, int index, std::size_t count) {
+    if (index >= 0) return static_cast<std::uint32_t>(index - 1);
+    const std::int64_t element = static_cast<std::int64_t>(count) + index;
+    if (element < 0 && problem_.empty())
+      problem_ = fmt::format("face {} names {} {}, but only {} come before it", source_.faces.size() - 1,
+                             what, index, count);
+    return static_cast<std::uint32_t>(element);
   }
 
   MeshSource source_;
   std::string object_, material_;
+  std::string problem_;  // first face that names nothing
   bool partOpen_ = false, everyCornerHasUv_ = true;
 };
 
 }  // namespace
 
 tl::expected<MeshSource, std::string> parseObj(std::string_view text) {
-  if (const auto checked = checkVertexLines(text); !checked) return tl::unexpected(checked.error());
-  return ObjReader().read(text);
+  if (isWideText(text))
+    return tl::unexpected(
+        std::string("is text in UTF-16 or UTF-32, which is not supported: save it as UTF-8"));
+  std::string storage;
+  const auto checked = checkedText(withoutByteOrderMark(text), storage);
+  if (!checked) return tl::unexpected(checked.error());
+  return ObjReader().read(*checked);
 }
 
 }  // namespace clothstream::meshes

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "proto/text/excerpt.h"
 #include "server/messages/limits.h"
 #include "server/messages/vectors.h"
 
@@ -75,6 +76,21 @@ meshes::MeshSource toSource(Checks& checks, const Path& path, const v1::Mesh& me
   return source;
 }
 
+// Names of parts reach clients, so those of a file have the rules of those in a message.
+void checkPartNames(Checks& checks, const Path& path, std::string_view shown,
+                    const meshes::MeshSource& source) {
+  for (const auto& part : source.parts) {
+    Checks ofName;
+    ofName.text(Path(), part.name);
+    if (ofName.failed())
+      checks.fail(
+          path, shown,
+          fmt::format("has a material or object named \"{}\", whose name must be one line of at most {} "
+                      "bytes of UTF-8 without control characters: rename it",
+                      excerpt(part.name), limits::kMaxTextBytes));
+  }
+}
+
 meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& message,
                               const MeshReader& readMesh) {
   const std::string shown = '"' + message.file() + '"';
@@ -88,6 +104,7 @@ meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& 
     return {};
   }
   auto source = readMesh(message.file(), nullptr);
+  if (source) checkPartNames(checks, path / "file", shown, *source);
   if (source) return std::move(*source);
   checks.fail(path / "file", shown, source.error());
   return {};

@@ -8,6 +8,9 @@
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
 
+#include "proto/text/excerpt.h"
+#include "proto/text/lines.h"
+#include "proto/text/utf8.h"
 #include "server/files/regular_file.h"
 #include "server/meshes/mesh_file.h"
 #include "server/messages/limits.h"
@@ -19,6 +22,9 @@ namespace {
 tl::unexpected<FieldError> refuse(v1::ErrorCode code, std::string_view source, std::string_view text) {
   return tl::unexpected(FieldError{code, fmt::format("{}: {}", source, text)});
 }
+
+// Bytes of an error that quotes text in another encoding.
+constexpr std::size_t kShownError = 300;
 
 // Line and column where the text is not JSON. The parser of protobuf does not report them.
 std::optional<std::string> syntaxError(std::string_view json) {
@@ -36,7 +42,13 @@ std::optional<std::string> syntaxError(std::string_view json) {
 
 Result<model::Scene> parseScene(std::string_view json, std::string_view source, const MeshReader& readMesh,
                                 std::uint64_t maxNodes, std::vector<v1::MeshRepair>* repairs) {
-  if (const auto error = syntaxError(json)) return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source, *error);
+  if (isWideText(json))
+    return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source,
+                  "is text in UTF-16 or UTF-32, which is not supported: save it as UTF-8");
+  json = withoutByteOrderMark(json);
+  if (const auto error = syntaxError(json))
+    return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source,
+                  isUtf8(json) ? *error : excerpt(*error, kShownError) + ": save the file as UTF-8");
   v1::Scene message;
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &message);
   if (!status.ok())

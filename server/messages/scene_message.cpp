@@ -172,6 +172,19 @@ void checkMotionBound(Checks& checks, const model::Scene& scene) {
   }
 }
 
+// Clients refuse descriptions with more parts.
+void checkParts(Checks& checks, const model::Scene& scene) {
+  constexpr std::size_t kMost = 65'536;
+  std::size_t parts = 0;
+  for (const model::Cloth& cloth : scene.cloths) parts += cloth.mesh ? cloth.mesh->shape.submeshes.size() : 0;
+  if (parts > kMost)
+    checks.fail(
+        Path("cloths"), "",
+        fmt::format("have meshes with {} parts in all; must have at most {}: join parts with the same "
+                    "material",
+                    parts, kMost));
+}
+
 // Selecting nodes takes time for every node of a range, and for every node and region. Checked before any
 // node is selected.
 void checkSelections(Checks& checks, const model::Scene& scene) {
@@ -351,23 +364,6 @@ std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::C
       least);
 }
 
-std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound) {
-  const std::uint32_t needed = bound.substeps(scene);
-  if (needed != 0 && needed <= scene.substeps) return std::nullopt;
-  if (needed != 0)
-    return fmt::format("this scene needs at least {} with its springs, masses and rate", needed);
-  if (scene.integrator == model::Integrator::explicitEuler)
-    return fmt::format(
-        "no number up to {} keeps this scene stable: INTEGRATOR_EXPLICIT_EULER needs springs with a damping "
-        "of at least their stiffness times the step, and also a cloth damping; or use "
-        "INTEGRATOR_SEMI_IMPLICIT_EULER",
-        limits::kMaxSubsteps);
-  return fmt::format(
-      "no number up to {} keeps this scene stable: lower stiffness or damping, or raise mass or "
-      "simulationRate",
-      limits::kMaxSubsteps);
-}
-
 std::string outOfReach(const model::StreamSettings& stream) {
   return fmt::format(
       "cloth left the range that the stream holds, {:.4g} m from the origin along each axis at a "
@@ -427,6 +423,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkSolvers(checks, scene);
   checkSelfCollision(checks, scene);
   checkMotionBound(checks, scene);
+  checkParts(checks, scene);
   checkCoarse(checks, scene);
   if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
   most.cancellation.check();

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "proto/text/printable.h"
+#include "proto/text/utf8.h"
 
 namespace clothstream::messages {
 namespace {
@@ -69,15 +70,15 @@ const std::string& Checks::name(const Path& path, const std::string& value) {
 }
 
 const std::string& Checks::text(const Path& path, const std::string& value) {
-  if (value.size() > limits::kMaxTextBytes || hasControlCharacters(value))
+  if (value.size() > limits::kMaxTextBytes || !isUtf8(value) || hasControlCharacters(value))
     fail(path, inQuotes(value),
-         fmt::format("must be one line of at most {} bytes without control characters",
+         fmt::format("must be one line of at most {} bytes of UTF-8 without control characters",
                      limits::kMaxTextBytes));
   return value;
 }
 
 const std::string& Checks::label(const Path& path, const std::string& value) {
-  if (value.size() > limits::kMaxLabelBytes || hasControlCharacters(value))
+  if (value.size() > limits::kMaxLabelBytes || !isUtf8(value) || hasControlCharacters(value))
     fail(path, inQuotes(value),
          fmt::format("must be at most {} bytes of UTF-8 without control characters", limits::kMaxLabelBytes));
   return value;

@@ -212,6 +212,17 @@ class Import(Arrays):
         numpy.testing.assert_array_equal(out["triangles"], [[0, 1, 2], [0, 2, 3]])
         numpy.testing.assert_array_equal(out["ticks"], [1, 2])
 
+    def test_reads_obj_files_with_any_ends_of_lines(self):
+        text = "# \u00e4\\\nv 0 0 0\nv 1 \\\n0 0\nv 1 1 0\nv 0 1 0\nf 1 2 \\\n3 4\n"
+        positions = numpy.zeros((2, 4, 3), numpy.float32)
+        for number, (mark, end) in enumerate([("", "\r"), ("", "\r\n"), ("\ufeff", "\n")]):
+            with open(self.path("mesh.obj"), "w", encoding="utf-8", newline="") as obj:
+                obj.write(mark + text.replace("\n", end))
+            recording = self.imported(f"quad_{number}", {"positions": positions}, "--mesh", self.path("mesh.obj"),
+                                      "--rate", "30")
+            out = self.exported(recording, f"out_{number}.npz")
+            numpy.testing.assert_array_equal(out["triangles"], [[0, 1, 2], [0, 2, 3]])
+
     def refuse(self, arguments, code, text):
         out = self.path("refused.mcap")
         ended = self.run_program("import", "-o", out, *arguments)
@@ -288,6 +299,8 @@ class Import(Arrays):
         for text, expected in [
             ("", "is not an OBJ file with vertices and faces"),
             (triangle, "is not an OBJ file with vertices and faces"),
+            ("\0v\0 \0000\0", "is text in UTF-16 or UTF-32"),
+            (triangle.replace("\n", "\r") + "f 1 2 4\r", 'line 4 is "f 1 2 4": a face has vertex 4'),
             (triangle + "f 1 2 4\n", "a face has vertex 4, but 3 vertices come before it"),
             (triangle + "f 1 2 -4\n", "a face has vertex -4"),
             (triangle + "f 1 2 0\n", "a face has vertex 0"),

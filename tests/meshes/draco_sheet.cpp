@@ -27,11 +27,17 @@ Vec3 wave(int x, int y, int side) {
          static_cast<float>(side);
 }
 
-std::string compressedSheet(const DracoCoding& coding, int side, bool hasMetadata) {
+std::string compressedSheet(const DracoCoding& coding, int side, bool hasMetadata, bool hasSkin) {
   draco::TriangleSoupMeshBuilder builder;
   builder.Start(2 * side * side);
   const int positions = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
   const int uvs = builder.AddAttribute(draco::GeometryAttribute::TEX_COORD, 2, draco::DT_FLOAT32);
+  int joints = -1, weights = -1;
+  if (hasSkin) {
+    joints = builder.AddAttribute(draco::GeometryAttribute::GENERIC, 4, draco::DT_UINT8);
+    weights = builder.AddAttribute(draco::GeometryAttribute::GENERIC, 4, draco::DT_FLOAT32);
+  }
+  constexpr std::array<std::uint8_t, 4> kJoints{0, 1, 0, 0};
   draco::FaceIndex face(0);
   for (int y = 0; y < side; ++y)
     for (int x = 0; x < side; ++x)
@@ -45,6 +51,12 @@ std::string compressedSheet(const DracoCoding& coding, int side, bool hasMetadat
         }
         builder.SetAttributeValuesForFace(positions, face, p[0].data(), p[1].data(), p[2].data());
         builder.SetAttributeValuesForFace(uvs, face, uv[0].data(), uv[1].data(), uv[2].data());
+        if (hasSkin) {
+          Eigen::Vector4f w[3];
+          for (std::size_t i = 0; i < 3; ++i) w[i] = Eigen::Vector4f(p[i].x(), 1 - p[i].x(), 0, 0);
+          builder.SetAttributeValuesForFace(joints, face, kJoints.data(), kJoints.data(), kJoints.data());
+          builder.SetAttributeValuesForFace(weights, face, w[0].data(), w[1].data(), w[2].data());
+        }
         ++face;
       }
   const std::unique_ptr<draco::Mesh> mesh = builder.Finalize();
@@ -67,7 +79,7 @@ std::string compressedSheet(const DracoCoding& coding, int side, bool hasMetadat
 }
 
 // A .glb file. `points` and `indices` are the counts of its accessors.
-std::string glbOf(const std::string& compressed, std::size_t points, std::size_t indices) {
+std::string glbOf(const std::string& compressed, std::size_t points, std::size_t indices, bool hasSkin) {
   std::string json = R"({"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_draco_mesh_compression"],
     "extensionsRequired": ["KHR_draco_mesh_compression"], "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
     "meshes": [{"name": "sheet", "primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2,
@@ -75,6 +87,20 @@ std::string glbOf(const std::string& compressed, std::size_t points, std::size_t
     "accessors": [{"componentType": 5126, "count": POINTS, "type": "VEC3"},
       {"componentType": 5126, "count": POINTS, "type": "VEC2"}, {"componentType": 5125, "count": INDICES, "type": "SCALAR"}],
     "bufferViews": [{"buffer": 0, "byteLength": BYTES}], "buffers": [{"byteLength": BYTES}]})";
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    json.replace(json.find(from), from.size(), to);
+  };
+  if (hasSkin) {
+    replace(R"("nodes": [{"mesh": 0}])",
+            R"("nodes": [{"mesh": 0, "skin": 0, "translation": [9, 9, 9]},
+      {"translation": [1, 0, 0]}, {"translation": [3, 0, 0]}], "skins": [{"joints": [1, 2]}])");
+    replace(R"("TEXCOORD_0": 1}, "indices")",
+            R"("TEXCOORD_0": 1, "JOINTS_0": 3, "WEIGHTS_0": 4}, "indices")");
+    replace(R"("TEXCOORD_0": 1}}}}])", R"("TEXCOORD_0": 1, "JOINTS_0": 2, "WEIGHTS_0": 3}}}}])");
+    replace(R"("type": "SCALAR"}])",
+            R"("type": "SCALAR"}, {"componentType": 5121, "count": POINTS, "type": "VEC4"},
+      {"componentType": 5126, "count": POINTS, "type": "VEC4"}])");
+  }
   for (const auto& [name, number] :
        {std::pair("POINTS", points), std::pair("INDICES", indices), std::pair("BYTES", compressed.size())})
     for (std::size_t at = json.find(name); at != json.npos; at = json.find(name))

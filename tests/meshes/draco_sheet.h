@@ -23,11 +23,15 @@ inline constexpr DracoCoding kDracoCodings[] = {
 // Point of a sheet of `side` x `side` quads with edges of 1 m.
 model::Vec3 wave(int x, int y, int side);
 
-// The attributes are 0: positions, and 1: texture coordinates. Throws std::runtime_error if the encoder
+// The attributes are 0: positions, 1: texture coordinates, and with a skin 2: joints 0 and 1, and 3: their
+// weights, which are x and 1 - x of the position. Throws std::runtime_error if the encoder
 // fails.
-std::string compressedSheet(const DracoCoding& coding, int side, bool hasMetadata = false);
+std::string compressedSheet(const DracoCoding& coding, int side, bool hasMetadata = false,
+                            bool hasSkin = false);
 
-// A .glb file. `points` and `indices` are the counts of its accessors.
-std::string glbOf(const std::string& compressed, std::size_t points, std::size_t indices);
+// A .glb file. `points` and `indices` are the counts of its accessors. With a skin, joint 0 moves vertices by
+// 1 m along X, and joint 1 by 3 m.
+std::string glbOf(const std::string& compressed, std::size_t points, std::size_t indices,
+                  bool hasSkin = false);
 
 }  // namespace clothstream::meshes

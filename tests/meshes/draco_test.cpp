@@ -72,6 +72,27 @@ TEST(Draco, IsReadWithEveryEncoding) {
   }
 }
 
+TEST(Draco, HasJointsAndWeights) {
+  for (const DracoCoding& coding : kDracoCodings) {
+    const std::string bytes = compressedSheet(coding, kSide, false, true);
+    const auto bound = read(glbOf(bytes, kPoints, 3 * kFaces)),
+               placed = read(glbOf(bytes, kPoints, 3 * kFaces, true));
+    ASSERT_TRUE(bound) << bound.error();
+    ASSERT_TRUE(placed) << placed.error();
+    ASSERT_EQ(placed->vertices.size(), bound->vertices.size());
+    for (std::size_t i = 0; i < bound->vertices.size(); ++i) {
+      const Vec3& p = bound->vertices[i];
+      EXPECT_LT((placed->vertices[i] - Vec3(3 - p.x(), p.y(), p.z())).cwiseAbs().maxCoeff(), 0.01f);
+    }
+  }
+}
+
+TEST(Draco, RefusesJointsThatTheCompressedDataDoesNotHave) {
+  const std::string bytes = compressed(kDracoCodings[0]);
+  EXPECT_THAT(refusal(glbOf(bytes, kPoints, 3 * kFaces, true)),
+              HasSubstr("(KHR_draco_mesh_compression) has no four numbers for each point in its attribute"));
+}
+
 TEST(Draco, RefusesSizesThatTheFileDoesNotState) {
   for (const DracoCoding& coding : kDracoCodings) {
     const std::string bytes = compressed(coding);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Joints and animations of glTF files.
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -81,10 +82,52 @@ TEST(GltfSkin, ReadsTheNamedAnimationAndRestsWithoutOne) {
   EXPECT_NEAR(still->skin->joints[1].rest.orientation.w(), 1, 1e-6);
 }
 
-TEST(GltfSkin, IsIgnoredUnlessItIsRequested) {
-  const auto source = read(SkinnedGlb(), nullptr);
+void expectPosed(const SkinnedGlb& glb, double seconds) {
+  const auto source = read(glb, nullptr);
   ASSERT_TRUE(source) << source.error();
   EXPECT_FALSE(source->skin);
+  for (std::size_t i = 0; i < source->vertices.size(); ++i)
+    ASSERT_LT((source->vertices[i].cast<double>() - glb.posed(i, seconds)).norm(), 1e-5) << "vertex " << i;
+}
+
+// The node of the mesh has a translation, which does not count (glTF 2.0, 3.7.3.3).
+TEST(GltfSkin, PlacesVerticesWhereTheNodesOfTheJointsAre) {
+  SkinnedGlb glb;
+  expectPosed(glb, 0);
+  const double half = std::sqrt(0.5);
+  glb.root["nodes"][kUpper]["rotation"] = {0, 0, half, half};
+  expectPosed(glb, 1);
+}
+
+TEST(GltfSkin, PlacesVerticesByJointsThatScaleDifferentlyAlongTheAxes) {
+  SkinnedGlb glb;
+  glb.root["nodes"][kArmature] = {{"children", {kLower, 3}}, {"scale", {2, 3, -4}}};
+  const auto scaled = read(glb, nullptr);
+  ASSERT_TRUE(scaled) << scaled.error();
+  glb.root["nodes"][kArmature]["scale"] = {1, 1, 1};
+  const auto whole = read(glb, nullptr);
+  for (std::size_t i = 0; i < whole->vertices.size(); ++i)
+    ASSERT_LT((scaled->vertices[i] - whole->vertices[i].cwiseProduct(model::Vec3(2, 3, -4))).norm(), 1e-4f);
+  EXPECT_EQ(scaled->faces[0].vertices[0], whole->faces[0].vertices[2]) << "a mirrored face is turned";
+}
+
+TEST(GltfSkin, SumsAllSetsOfJoints) {
+  SkinnedGlb glb;
+  json& attributes = glb.root["meshes"][0]["primitives"][0]["attributes"];
+  attributes["JOINTS_1"] = attributes["JOINTS_0"];
+  attributes["WEIGHTS_1"] = glb.add(std::vector<float>(424, 0), "VEC4");
+  expectPosed(glb, 0);
+  JointRequest joints = request();
+  const auto none = read(glb, &joints);
+  ASSERT_TRUE(none) << none.error();
+  EXPECT_NEAR(none->skin->vertices[0].weights[0], 1, 1e-6);
+  // Each vertex gets the same two weights a second time.
+  attributes["WEIGHTS_1"] = attributes["WEIGHTS_0"];
+  expectPosed(glb, 0);
+  attributes["WEIGHTS_0"] = glb.add(std::vector<float>(424, 0.125f), "VEC4");
+  attributes["WEIGHTS_1"] = attributes["WEIGHTS_0"];
+  EXPECT_THAT(read(glb, &joints).error(),
+              HasSubstr("vertex 0 has 8 joints with a weight: export it with at most 4"));
 }
 
 TEST(GltfSkin, AFileWithoutSkinIsRigidUnlessAnAnimationIsNamed) {
@@ -127,6 +170,24 @@ TEST(GltfSkin, NormalisedBytesAndShortsAreWeightsAndRotations) {
   ASSERT_TRUE(read2) << read2.error();
   EXPECT_THAT(read2->skin->vertices[3].weights, ElementsAre(1, 0, 0, 0));
   EXPECT_EQ(read2->skin->vertices[3].joints[0], 0) << "the file's joint 1 is the lower one";
+}
+
+TEST(GltfSkin, RefusesJointsThatCannotPlaceVertices) {
+  const auto errorOf = [](const std::function<void(json&)>& spoil) {
+    SkinnedGlb glb;
+    spoil(glb.root);
+    const auto source = read(glb, nullptr);
+    return source ? std::string("no error") : source.error();
+  };
+  EXPECT_THAT(errorOf([](json& root) { root["nodes"][3]["skin"] = 5; }), HasSubstr("skin 5 does not exist"));
+  EXPECT_THAT(errorOf([](json& root) {
+                root["skins"][0]["joints"] = {kUpper, 99};
+              }),
+              HasSubstr("skin \"bones\": node 99 does not exist"));
+  EXPECT_THAT(errorOf([](json& root) { root["nodes"][kUpper]["children"] = {kLower}; }),
+              HasSubstr("has two parents or is its own ancestor"));
+  EXPECT_THAT(errorOf([](json& root) { root["meshes"][0]["primitives"][0]["attributes"].erase("JOINTS_0"); }),
+              HasSubstr("has a skin, but no JOINTS_0"));
 }
 
 TEST(GltfSkin, RefusesWhatIsNotSupportedWithTheReason) {
@@ -205,12 +266,13 @@ TEST(GltfSkin, RefusesWhatIsNotSupportedWithTheReason) {
               }),
               HasSubstr("inverse bind matrix 0 mirrors"));
   EXPECT_THAT(errorOf([](G& g) { g.root["nodes"][3]["skin"] = 5; }), HasSubstr("skin 5 does not exist"));
-  EXPECT_THAT(errorOf([&](G& g) { attributes(g)["JOINTS_1"] = 0; }), HasSubstr("more than four joints"));
+  EXPECT_THAT(errorOf([&](G& g) { attributes(g)["JOINTS_1"] = attributes(g)["JOINTS_0"]; }),
+              HasSubstr("has a skin, but no WEIGHTS_1"));
   EXPECT_THAT(errorOf([&](G& g) { attributes(g).erase("WEIGHTS_0"); }),
-              HasSubstr("mesh \"rod\", primitive 0: has a skin, but no JOINTS_0 and WEIGHTS_0"));
+              HasSubstr("mesh \"rod\", primitive 0: has a skin, but no WEIGHTS_0"));
   EXPECT_THAT(
       errorOf([&](G& g) { attributes(g)["WEIGHTS_0"] = g.add(std::vector<float>(8, 0.25f), "VEC4"); }),
-      HasSubstr("2 weights for 106 vertices"));
+      HasSubstr("has 2 elements of WEIGHTS_0 for 106 vertices"));
   EXPECT_THAT(errorOf([&](G& g) { attributes(g)["WEIGHTS_0"] = g.add(std::vector<float>(424, 0), "VEC4"); }),
               HasSubstr("vertex 0 has no weight"));
   EXPECT_THAT(errorOf([&](G& g) { attributes(g)["WEIGHTS_0"] = g.add(std::vector<float>(424, -1), "VEC4"); }),

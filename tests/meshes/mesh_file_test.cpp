@@ -92,8 +92,7 @@ TEST_F(MeshFile, RefusesInvalidObjHereOrInBuildMesh) {
   }
   constexpr const char* kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   for (const auto& [face, says] :
-       {std::pair("f 1 2 4\n", "face 0 names vertex"), std::pair("f 0 1 2\n", "face 0 names vertex"),
-        std::pair("f 1 2 -9\n", "face 0 names vertex"), std::pair("f a b c\n", "face 0 names vertex"),
+       {std::pair("f 1 2 4\n", "face 0 names vertex"),
         std::pair("f 1 2\n",
                   "face 0 has 2 corners; faces must have 3 or 4: triangulate it when you export, or set"),
         std::pair("f 1 2 3\nf 1 1 1 1 1\n", "face 1 has 5 corners; faces must have 3 or 4"),
@@ -103,6 +102,53 @@ TEST_F(MeshFile, RefusesInvalidObjHereOrInBuildMesh) {
     const auto built = buildMesh(*source, {}, {.maxVertices = 10, .maxCoordinate = 10, .minEdge = 0.001f});
     ASSERT_FALSE(built) << face;
     EXPECT_THAT(built.error().text, HasSubstr(says)) << face;
+  }
+}
+
+TEST_F(MeshFile, NamesTheLineOfAnObjThatIsReadAsSomethingElse) {
+  constexpr const char* kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (const auto& [line, says] : {
+           std::pair("f 0 1 2", "line 4 is \"f 0 1 2\": a corner of a face must be V, V/VT"),
+           std::pair("f a b c", "line 4 is \"f a b c\": a corner"),
+           std::pair("f 1 2 3x", "line 4 is \"f 1 2 3x\": a corner"),
+           std::pair("f 1/1/1/1 2 3", "line 4"),
+           std::pair("f 99999999999 2 3", "line 4"),
+           std::pair("f 1 2 -9", "face 0 names vertex -9, but only 3 come before it"),
+           std::pair("vt 0 x", "line 4 is \"vt 0 x\": texture coordinates must be finite numbers"),
+           std::pair("usemtl \x83V\x83\x83", "line 4 is \"usemtl \\x83V\\x83\\x83\": a name must be UTF-8"),
+           std::pair("o \xc4rmel", "line 4 is \"o \\xc4rmel\": a name must be UTF-8"),
+           std::pair("g \xff", "save the file as UTF-8, or rename it"),
+       }) {
+    const auto source = parseObj(std::string(kTriangle) + line + "\nf 1 2 3\n");
+    ASSERT_FALSE(source) << line;
+    EXPECT_THAT(source.error(), HasSubstr(says)) << line;
+  }
+  const std::string zero("v 0 0 0\nv 1 \0 0\n", 16);
+  EXPECT_THAT(parseObj(zero).error(), HasSubstr("line 2"));
+}
+
+TEST_F(MeshFile, ReadsObjWithAnyEndOfLinesAndEncoding) {
+  const std::string lines =
+      "# R\xe4nder\\\nv 0 0 0\nv 1 \\\n 0 0\nv 0 1 0\nusemtl L\xc3\xb6we \nf 1 \\\n2 \\\n3\n";
+  for (const std::string end : {"\n", "\r\n", "\r"})
+    for (const std::string mark : {"", "\xef\xbb\xbf"}) {
+      std::string text = mark;
+      for (const char c : lines) text += c == '\n' ? end : std::string(1, c);
+      const auto source = parseObj(text);
+      ASSERT_TRUE(source) << source.error();
+      ASSERT_EQ(source->vertices.size(), 3u);
+      EXPECT_EQ(source->vertices[1], Vec3(1, 0, 0));
+      ASSERT_EQ(source->faces.size(), 1u);
+      EXPECT_THAT(source->faces[0].vertices, testing::ElementsAre(0, 1, 2, 0));
+      EXPECT_EQ(source->parts[0].name, "L\xc3\xb6we");
+      const auto broken = parseObj(text + "v 0 0" + end + "v 0 nan" + end);
+      EXPECT_THAT(broken.error(), HasSubstr("line 11 is \"v 0 nan\""));
+    }
+  for (const std::string mark : {"\xff\xfe", "\xfe\xff"}) {
+    std::string wide = mark;
+    for (const char c : lines) (wide += c) += '\0';
+    EXPECT_THAT(parseObj(wide).error(), HasSubstr("is text in UTF-16 or UTF-32"));
+    EXPECT_THAT(parseObj(wide.substr(2)).error(), HasSubstr("save it as UTF-8"));
   }
 }
 
@@ -191,6 +237,7 @@ TEST_F(MeshFile, RefusesInvalidGltf) {
   write("sheet.bin", sheetBuffer());
   for (const auto& [from, to, says] : {
            std::tuple("\"version\": \"2.0\"", "\"version\": ", "is not glTF 2.0"),
+           std::tuple("\"linen\"", "\"\x83V\"", ": save it as UTF-8"),
            std::tuple("\"sheet.bin\"", "\"missing.bin\"", "missing.bin"),
            std::tuple("\"indices\": 2", "\"indices\": 9", "accessor out of bounds"),
            std::tuple("\"count\": 6", "\"count\": 7", "accessor 2 has 7 elements"),
@@ -199,7 +246,11 @@ TEST_F(MeshFile, RefusesInvalidGltf) {
            std::tuple("\"byteOffset\": 80,", "\"byteOffset\": 90,", "accessor 2"),
            std::tuple("\"children\": [1]", "\"children\": [0, 1]", "node 0 has two parents"),
            std::tuple("\"children\": [1]", "\"children\": [7]", "node 7 does not exist"),
-           std::tuple("\"indices\": 2,", "\"indices\": 2, \"mode\": 1,", "not made of triangles"),
+           std::tuple("\"indices\": 2,", "\"indices\": 2, \"mode\": 0,", "is made of points"),
+           std::tuple("\"indices\": 2,", "\"indices\": 2, \"mode\": 3,",
+                      "mesh \"sheet\", primitive 0: is made of lines, which have no surface"),
+           std::tuple("\"indices\": 2,", "\"indices\": 2, \"mode\": 9,", "has the mode 9"),
+
            std::tuple("\"count\": 6", "\"count\": 5", "not a multiple of three"),
            std::tuple("\"POSITION\": 0", "\"NORMAL\": 0", "has no POSITION"),
            std::tuple("\"asset\"", "\"extensionsRequired\": [\"VENDOR_own\"], \"asset\"",
@@ -225,10 +276,103 @@ TEST_F(MeshFile, GltfReadsOnlyFilesOfItsFolderWithinTheLimit) {
   EXPECT_TRUE(read("parts/../parts/sheet.bin"));
   for (const std::string& uri : {std::string("../sheet.bin"), (folder_ / "sheet.bin").string(),
                                  std::string("parts"), std::string("/dev/zero")})
-    EXPECT_THAT(read(uri).error(), HasSubstr("File not found")) << uri;
+    EXPECT_THAT(read(uri).error(), HasSubstr("buffer 0 is the file \"" + uri +
+                                             "\", which is not a file in the folder of this one or below"));
   const std::size_t json = replaced(kGltf, "sheet.bin", "parts/sheet.bin").size();
   EXPECT_THAT(read("parts/sheet.bin", {.bytes = json + 40, .vertices = 100}).error(),
               HasSubstr("is too large: at most 40 bytes are allowed"));
+}
+
+TEST_F(MeshFile, GltfReadsFilesWithAnyName) {
+  for (const std::string name : {"a 10%.bin", "a%20b.bin", "a+b.bin", "a b.bin", "\xc3\xa4.bin"})
+    write(name, sheetBuffer());
+  for (const std::string uri :
+       {"a 10%.bin", "a%2010%25.bin", "a%20b.bin", "a%2520b.bin", "a+b.bin", "a%2Bb.bin", "a b.bin",
+        "\xc3\xa4.bin", "%C3%A4.bin", "%c3%a4.bin", "\\u00e4.bin"})
+    expectSheet(readMeshFile(write("a.gltf", replaced(kGltf, "sheet.bin", uri)), kFileLimits));
+  std::filesystem::remove(folder_ / "a b.bin");
+  expectSheet(readMeshFile(write("a.gltf", replaced(kGltf, "sheet.bin", "a%20b.bin")), kFileLimits));
+  for (const std::string uri : {"10%.bin", "%41%.bin", "%2e%2e/a%2Bb.bin"})
+    EXPECT_THAT(readMeshFile(write("a.gltf", replaced(kGltf, "sheet.bin", uri)), kFileLimits).error(),
+                HasSubstr("which is not a file in the folder of this one or below"))
+        << uri;
+  EXPECT_THAT(readMeshFile(write("a.gltf", replaced(kGltf, "sheet.bin", "%41 10%.bin")), kFileLimits).error(),
+              HasSubstr("buffer 0 is the file \"A 10%.bin\""));
+}
+
+TEST_F(MeshFile, ReadsStripsAndFansOfGltf) {
+  for (const auto& [mode, indices, faces] :
+       {std::tuple(5, std::vector{0, 1, 2, 3, 3, 3}, std::vector{0, 1, 2, 1, 3, 2}),
+        std::tuple(6, std::vector{0, 1, 2, 3, 3, 0}, std::vector{1, 2, 0, 2, 3, 0}),
+        std::tuple(5, std::vector{3, 3, 3, 0, 1, 2}, std::vector{3, 0, 1, 0, 2, 1})}) {
+    std::string bytes = sheetBuffer().substr(0, 80);
+    for (const int index : indices) {
+      bytes += static_cast<char>(index);
+      bytes += '\0';
+    }
+    write("sheet.bin", bytes);
+    std::string json =
+        replaced(kGltf, "\"indices\": 2,", "\"indices\": 2, \"mode\": " + std::to_string(mode) + ",");
+    json = replaced(json, "\"scale\": [-2, 1, 1], ", "");
+    const auto source = readMeshFile(write("sheet.gltf", json), kFileLimits);
+    ASSERT_TRUE(source) << source.error();
+    std::vector<int> found;
+    for (const SourceFace& face : source->faces)
+      for (int corner = 0; corner < 3; ++corner)
+        found.push_back(static_cast<int>(face.vertices[static_cast<std::size_t>(corner)]));
+    EXPECT_EQ(found, faces) << mode;
+  }
+  write("sheet.bin", sheetBuffer());
+  const std::string two = replaced(replaced(kGltf, "\"indices\": 2,", "\"indices\": 2, \"mode\": 5,"),
+                                   "\"count\": 6", "\"count\": 2");
+  EXPECT_THAT(readMeshFile(write("two.gltf", two), kFileLimits).error(),
+              HasSubstr("has 2 indices; a triangle has three"));
+}
+
+TEST_F(MeshFile, AppliesMorphTargetsOfGltfWithTheirDefaultWeights) {
+  write("sheet.bin", sheetBuffer());
+  // The target adds to each vertex its own place.
+  std::string json = replaced(kGltf, "\"indices\": 2,", "\"targets\": [{\"POSITION\": 0}], \"indices\": 2,");
+  json = replaced(json, "\"scale\": [-2, 1, 1], ", "");
+  const auto secondVertex = [&](const std::string& text) {
+    const auto source = readMeshFile(write("sheet.gltf", text), kFileLimits);
+    EXPECT_TRUE(source) << source.error();
+    return source ? source->vertices[2] : Vec3::Zero();
+  };
+  EXPECT_EQ(secondVertex(json), Vec3(2, 3, 3)) << "the weight is 0 by default";
+  json = replaced(json, "\"name\": \"sheet\"", "\"name\": \"sheet\", \"weights\": [0.5]");
+  EXPECT_EQ(secondVertex(json), Vec3(2.5f, 3.5f, 3));
+  EXPECT_EQ(secondVertex(replaced(json, "\"mesh\": 0", "\"mesh\": 0, \"weights\": [2]")), Vec3(4, 5, 3))
+      << "weights of the node replace those of the mesh";
+  const std::string other = replaced(json, "[{\"POSITION\": 0}]", "[{\"POSITION\": 1}]");
+  EXPECT_THAT(readMeshFile(write("sheet.gltf", other), kFileLimits).error(),
+              HasSubstr("mesh \"sheet\", primitive 0: morph target 0: accessor 1 has the wrong number"));
+}
+
+TEST_F(MeshFile, IgnoresExtensionsAndImagesThatLeaveTheGeometry) {
+  write("sheet.bin", sheetBuffer());
+  for (const std::string name : {"EXT_texture_webp", "EXT_texture_avif", "KHR_texture_basisu",
+                                 "MSFT_texture_dds", "KHR_texture_transform", "KHR_xmp_json_ld",
+                                 "KHR_materials_unlit", "VRMC_materials_mtoon", "KHR_lights_punctual"})
+    expectSheet(readMeshFile(
+        write("sheet.gltf",
+              replaced(kGltf, "\"asset\"", "\"extensionsRequired\": [\"" + name + "\"], \"asset\"")),
+        kFileLimits));
+  for (const std::string image :
+       {"data:image/webp;base64,UklGRg==", "data:image/avif;base64,AAAA", "none.webp"})
+    expectSheet(readMeshFile(
+        write("sheet.gltf",
+              replaced(kGltf, "\"asset\"",
+                       R"("images": [{"uri": ")" + image + R"("}], "textures": [{"source": 0}], "asset")")),
+        kFileLimits));
+  for (const std::string name : {"EXT_mesh_gpu_instancing", "KHR_gaussian_splatting", "VENDOR", "_", ""}) {
+    const auto source = readMeshFile(
+        write("bad.gltf",
+              replaced(kGltf, "\"asset\"", "\"extensionsRequired\": [\"" + name + "\"], \"asset\"")),
+        kFileLimits);
+    ASSERT_FALSE(source) << name;
+    EXPECT_THAT(source.error(), HasSubstr("needs the extension " + name + ", which is not supported"));
+  }
 }
 
 TEST_F(MeshFile, NamesFormatsThatAreNotSupported) {

@@ -54,6 +54,45 @@ TEST(MeshMessage, BecomesAMesh) {
   for (const model::Vec3& p : cloth.mesh->shape.positions) EXPECT_GE(p.y(), 2);
 }
 
+// Names of parts reach clients in messages, whose texts must be UTF-8.
+TEST(MeshMessage, RefusesNamesOfPartsInFilesThatNoMessageHolds) {
+  v1::Scene message = smallScene();
+  message.mutable_cloths(0)->mutable_mesh()->set_file("sheet.obj");
+  const auto errorOf = [&](const std::string& name) {
+    const MeshReader reader = [&](const std::string&, const meshes::JointRequest*) {
+      meshes::MeshSource source;
+      source.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+      source.faces = {{.cornerCount = 3, .vertices = {0, 1, 2, 0}, .uvs = {}}};
+      source.parts = {{name, 0}};
+      return tl::expected<meshes::MeshSource, std::string>(std::move(source));
+    };
+    const auto scene = toScene(message, reader);
+    return scene ? std::string("no error") : scene.error().text;
+  };
+  EXPECT_EQ(errorOf(""), "no error");
+  EXPECT_EQ(errorOf("L\xc3\xb6we 2"), "no error");
+  EXPECT_THAT(
+      errorOf("\x83V\x83"),
+      HasSubstr("cloths[0].mesh.file = \"sheet.obj\": has a material or object named \"\\x83V\\x83\""));
+  EXPECT_THAT(errorOf("two\nlines"), HasSubstr("named \"two\\x0alines\", whose name must be one line"));
+  EXPECT_THAT(errorOf(std::string(1025, 'a')), HasSubstr("rename it"));
+}
+
+TEST(MeshMessage, RefusesMorePartsThanClientsRead) {
+  v1::Scene message = smallScene();
+  v1::Mesh& mesh = *message.mutable_cloths(0)->mutable_mesh();
+  constexpr std::uint32_t kTriangles = 65'537;
+  for (std::uint32_t i = 0; i < kTriangles; ++i) {
+    const auto x = 0.01f * static_cast<float>(i % 1000), y = 0.01f * static_cast<float>(i / 1000);
+    for (const float value : {x, y, 0.0f, x + 0.005f, y, 0.0f, x, y + 0.005f, 0.0f})
+      mesh.add_positions(value);
+    for (std::uint32_t k = 0; k < 3; ++k) mesh.add_triangles(3 * i + k);
+    mesh.add_submeshes()->set_triangle_count(1);
+  }
+  message.mutable_cloths(0)->mutable_structural()->set_stiffness(0);
+  EXPECT_THAT(toScene(message).error().text, HasSubstr("cloths: have meshes with 65537 parts in all"));
+}
+
 TEST(MeshMessage, SurvivesTheWayThroughAMessage) {
   v1::Scene message = meshScene();
   message.mutable_cloths(0)->add_pinned_vertices(5);

@@ -218,6 +218,23 @@ TEST(SceneFile, ReportsLineAndColumnOfMalformedJson) {
   EXPECT_THAT(errorOf("{\"name\": \"\xff\"}"), HasSubstr("UTF-8"));
 }
 
+TEST(SceneFile, IsUtf8WithOrWithoutAByteOrderMark) {
+  const std::string text = kEveryField;
+  EXPECT_TRUE(parseScene("\xef\xbb\xbf" + text, "marked.json"));
+  for (const std::string mark : {"", "\xff\xfe"}) {
+    std::string wide = mark;
+    for (const char c : text) (wide += c) += '\0';
+    EXPECT_THAT(parseScene(wide, "wide.json").error().text,
+                AllOf(StartsWith("wide.json: is text in UTF-16"), HasSubstr("save it as UTF-8")));
+  }
+}
+
+TEST(SceneFile, NamesThePlaceOfTextInAnotherEncoding) {
+  const std::string error = parseScene("{\"name\":\n\"\x83V\"}", "sjis.json").error().text;
+  EXPECT_THAT(error, AllOf(StartsWith("sjis.json: parse error at line 2"), HasSubstr("\\x83"),
+                           HasSubstr("save the file as UTF-8")));
+}
+
 TEST(SceneFile, RefusesUnknownFieldsAndWrongTypes) {
   EXPECT_THAT(errorOf("{\"subteps\": 3}"), AllOf(StartsWith("my.json: "), HasSubstr("subteps")));
   EXPECT_THAT(errorOf("{\"cloths\": [{\"mas\": 1}]}"), AllOf(HasSubstr("cloths[0]"), HasSubstr("mas")));

@@ -592,7 +592,7 @@ const BadScene kBadScenes[] = {
        cloth(s).mutable_structural()->set_stiffness(4000);
        s.set_substeps(2);
      },
-     "springs"},
+     "because of the springs of \"sheet\", whose mass is 0.6 kg; 2 would do with a mass of at least"},
     {"cloths[0]: has a node with a coordinate of 801 m",
      [](v1::Scene& s) { grid(s).mutable_pose()->mutable_position()->set_x(800); },
      "set stream.maxError to 0.000778 or more"},
@@ -604,10 +604,82 @@ const BadScene kBadScenes[] = {
        cloth(s).mutable_bend()->set_stiffness(1e6f);
        cloth(s).set_mass(0.001f);
      },
-     "raise"},
+     "because of the springs of \"sheet\", whose mass is 0.001 kg; 10 would do with a mass of at least"},
     {"substeps = 10: no number up to 256",
      [](v1::Scene& s) { s.set_integrator(v1::INTEGRATOR_EXPLICIT_EULER); }, "INTEGRATOR_SEMI_IMPLICIT_EULER"},
 };
+
+// The parts of an error of instability(): forces, cloth and values.
+TEST(Instability, NamesTheForcesThatBoundTheStepAndValuesThatFit) {
+  const auto errorOf = [](const std::function<void(v1::Scene&)>& spoil) {
+    v1::Scene message = smallScene();
+    *message.add_cloths() = message.cloths(0);
+    message.mutable_cloths(1)->set_name("light");
+    spoil(message);
+    const auto scene = toScene(message);
+    return scene ? std::string("no error") : scene.error().text;
+  };
+  const auto light = [](v1::Scene& s) -> v1::Cloth& { return *s.mutable_cloths(1); };
+  ASSERT_EQ(errorOf([](v1::Scene&) {}), "no error");
+  const auto air = [&](v1::Scene& s) {
+    light(s).set_mass(0.01f);
+    light(s).mutable_structural()->set_stiffness(0.01f);
+    light(s).set_drag(2);
+    light(s).set_lift(1);
+  };
+  EXPECT_THAT(
+      errorOf(air),
+      testing::MatchesRegex(
+          "substeps = 10: this scene needs at least [0-9]+, because of the drag and lift of "
+          "\"light\", whose mass is 0.01 kg; 10 would do with a mass of at least [0-9.]+ "
+          "kg [(][0-9.]+ kg/m.2[)], or with a drag of at most [0-9.]+ and a lift of at most [0-9.]+"));
+  EXPECT_THAT(errorOf([&](v1::Scene& s) {
+                light(s).set_damping(1000);
+                s.set_substeps(2);
+              }),
+              HasSubstr("because of the damping of \"light\""));
+  EXPECT_THAT(errorOf([&](v1::Scene& s) {
+                light(s).set_mass(1e-4f);
+                light(s).mutable_structural()->set_stiffness(0);
+                light(s).set_dihedral_bending(1);
+              }),
+              HasSubstr("because of the dihedralBending of \"light\""));
+  EXPECT_THAT(errorOf([&](v1::Scene& s) {
+                light(s).set_mass(0.2f);
+                light(s).set_drag(2);
+                s.mutable_environment()->mutable_wind()->set_x(100);
+              }),
+              HasSubstr("because of the wind on \"light\""));
+  EXPECT_THAT(errorOf([&](v1::Scene& s) { s.mutable_cloths(0)->mutable_shear()->set_damping(1000); }),
+              HasSubstr("because of the springs of \"sheet\""));
+}
+
+// Takes the values out of the error and gives them to the scene.
+TEST(Instability, NamesValuesThatAreEnough) {
+  v1::Scene message = smallScene();
+  v1::Cloth& cloth = *message.mutable_cloths(0);
+  cloth.set_mass(0.01f);
+  cloth.mutable_structural()->set_stiffness(0.01f);
+  cloth.set_drag(2);
+  const std::string error = toScene(message).error().text;
+  const auto numberAfter = [&](const std::string& text) {
+    const std::size_t at = error.find(text);
+    EXPECT_NE(at, error.npos) << error;
+    return at == error.npos ? 0.0f : std::stof(error.substr(at + text.size()));
+  };
+  const auto accepts = [&](const std::function<void(v1::Scene&)>& change) {
+    v1::Scene changed = message;
+    change(changed);
+    return toScene(changed).has_value();
+  };
+  const float mass = numberAfter("a mass of at least "), drag = numberAfter("a drag of at most "),
+              substeps = numberAfter("needs at least ");
+  EXPECT_TRUE(accepts([&](v1::Scene& s) { s.mutable_cloths(0)->set_mass(mass); }));
+  EXPECT_FALSE(accepts([&](v1::Scene& s) { s.mutable_cloths(0)->set_mass(0.95f * mass); }));
+  EXPECT_TRUE(accepts([&](v1::Scene& s) { s.mutable_cloths(0)->set_drag(drag); }));
+  EXPECT_FALSE(accepts([&](v1::Scene& s) { s.mutable_cloths(0)->set_drag(1.05f * drag); }));
+  EXPECT_TRUE(accepts([&](v1::Scene& s) { s.set_substeps(static_cast<std::uint32_t>(substeps)); }));
+}
 
 // Letters and digits of the error. CTest cannot handle brackets and quotes in names.
 std::string nameOf(const BadScene& bad) {
