@@ -20,6 +20,7 @@ namespace {
 constexpr double kTinyLengthSquared = 1e-12;  // m^2, of a spring
 constexpr double kTinyAirSquared = 1e-20;     // of |u||N|, m^6/s^2
 constexpr double kTinyNormalSquared = 1e-30;  // m^4
+constexpr double kDepthRounding = 2.4e-7;     // of the kernels' contacts, relative to coordinates
 
 // `u` is the velocity of the air relative to the triangle, `N` its area vector.
 Vec3 airForce(const Vec3& u, const Vec3& N, double density, double drag, double lift) {
@@ -318,7 +319,10 @@ void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step
     };
     velocities_[i] -= std::min(approach, 0.0) * contact->normal;
     if (mu == 0) continue;
-    const double most = mu * std::max(-approach, contact->depth / step.seconds);
+    const double extents = (positions_[i] - step.after.position).lpNorm<1>() + positions_[i].lpNorm<1>();
+    const double wayOut =
+        (contact->depth - kDepthRounding * extents) / step.seconds - std::max(approach, 0.0);
+    const double most = mu * std::max({-approach, wayOut, 0.0});
     velocities_[i] -= heldOf(relative, most);
     positions_[i] -= heldOf(positions_[i] - from[i] - step.seconds * carried, step.seconds * most);
   }

@@ -163,8 +163,8 @@ vec3 alongSurface(vec3 v, vec3 normal) {
 // Moves a free node, which was at `from` at the substep's start, out of the collider. Its velocity relative
 // to the surface, which moves with `surfaceVelocity` and spins, loses the part into the surface. Friction
 // takes at most its coefficient times the speed at which the collider pushes: that of the approach, or that
-// of the way out if something pressed the node into the collider. It acts on the velocity, and on the way
-// since the substep's start, which other colliders may have caused.
+// of the way out, less its rounding and a speed away from the surface. It acts on the velocity, and on the
+// way since the substep's start, which other colliders may have caused.
 void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity, vec3 spin,
            CollisionPush push, CollidingNode node, vec3 from, inout vec3 position, inout vec3 velocity) {
   precise vec3 surface = position + contact.depth * contact.normal;
@@ -172,7 +172,10 @@ void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity,
   precise vec3 carried = surfaceVelocity + crossProduct(spin, arm);
   precise vec3 relative = velocity - carried;
   precise float approach = dotProduct(relative, contact.normal);
-  precise float most = collider.friction * max(-approach, contact.depth * push.substepRate);
+  precise vec3 extents = abs(arm) + abs(surface);
+  precise float pressed = contact.depth - kDepthRounding * (extents.x + extents.y + extents.z);
+  precise float wayOut = pressed * push.substepRate - max(approach, 0.0);
+  precise float most = collider.friction * max(max(-approach, wayOut), 0.0);
   vec3 slip = alongSurface(relative, contact.normal);
   precise vec3 after = carried + (1.0 - heldShare(slip, most)) * slip + max(approach, 0.0) * contact.normal;
   precise vec3 gained = after - velocity;

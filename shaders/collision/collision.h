@@ -56,6 +56,9 @@ const uint32_t kNearStride = 8 + 56;
 // The thickness of a cloth adds at most this multiple of itself to a shape's reach (at the corner of a box).
 const float kThicknessReach = 1.75;
 
+// Rounding error of a contact's depth, relative to coordinates.
+const float kDepthRounding = 2.4e-7f;
+
 // One substep.
 struct CollisionPush {
   uint32_t colliderCount;

@@ -68,17 +68,19 @@ model::Cloth clothOf(const Way& way) {
   cloth.mass = 0.05f;
   cloth.structural = {forces ? 8.0f : 500.0f, 0.001f};
   cloth.shear = {cloth.structural.stiffness / 4, 0.001f};
-  cloth.bend = {cloth.structural.stiffness / 10, 0.0005f};
+  // Bend springs stay forces in `constraint`.
+  const bool softBend = way.solver.kind == model::SolverKind::constraint;
+  cloth.bend = {softBend ? 1 : cloth.structural.stiffness / 10, 0.0005f};
   cloth.damping = cloth.drag = cloth.lift = 0;
   cloth.solver = way.solver;
   return cloth;
 }
 
-// Substeps of 1/288 s bear springs of 8 N/m as forces. The other solvers have four times as long ones.
+// Substeps of 1/288 s bear springs of 8 N/m as forces, those of 1/144 s bend springs of 1 N/m.
 model::Scene sceneOf(const model::Cloth& cloth) {
   model::Scene scene = tests::sceneOf({cloth});
   scene.simulationRate = scene.streamRate = 18;
-  scene.substeps = hasForces(cloth.solver) ? 16 : 4;
+  scene.substeps = hasForces(cloth.solver) ? 16 : cloth.solver.kind == model::SolverKind::xpbd ? 4 : 8;
   return scene;
 }
 
@@ -181,7 +183,7 @@ TEST_P(MomentumLaws, Hold) {
   const double drift = driftInAMinute(way), asymmetry = asymmetryAfterASecond(way);
   EXPECT_LT(grid, 0.001);
   EXPECT_LT(mesh, 0.001);
-  EXPECT_LT(made, way.alongLines ? 1e-4 : 0.05);
+  EXPECT_LT(made, way.alongLines ? 1e-4 : 0.2);
   // A solve of implicit Euler that ends at its tolerance leaves a part of the impulses between nodes
   // unbalanced.
   EXPECT_LT(drift, way.solver.kind == model::SolverKind::implicitEuler ? 0.1 : 0.001);
