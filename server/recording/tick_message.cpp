@@ -219,6 +219,12 @@ void write(const scene::AppliedTick& tick, v1::RecordedTick& message) {
   message.set_air_density(tick.inputs.environment.airDensity);
   writeColliders(tick, message);
   for (const model::Pose& pose : tick.inputs.attachments) messages::write(pose, *message.add_attachments());
+  for (const model::Carry& carry : tick.inputs.carries) {
+    v1::AppliedCarry& to = *message.add_carries();
+    to.set_cloth(carry.cloth);
+    messages::write(carry.from, *to.mutable_from());
+    messages::write(carry.to, *to.mutable_to());
+  }
   for (const simulation::Grab& grab : tick.inputs.grabs) writeGrab(grab, *message.add_grips());
 }
 
@@ -250,6 +256,12 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
                                 jointsOf(numbers, collider.joints_end(), jointCountOf(shape))});
   }
   for (const v1::Pose& pose : message.attachments()) inputs.attachments.push_back(numbers.pose(pose));
+  if (static_cast<std::size_t>(message.carries_size()) > scene.cloths.size())
+    return wrong("it carries more cloths than the scene has");
+  for (const v1::AppliedCarry& carry : message.carries())
+    inputs.carries.push_back(
+        {numbers.integer(carry.cloth(), static_cast<std::uint32_t>(scene.cloths.size())),
+         numbers.pose(carry.from()), numbers.pose(carry.to())});
   for (const v1::AppliedGrip& grab : message.grips())
     inputs.grabs.push_back(grabOf(numbers, grab, scene.nodeCount()));
   if (!numbers.good()) return wrong("one of its numbers is out of range");

@@ -27,6 +27,13 @@ void tie(ReferenceCloth& cloth, std::size_t node, const model::Tether& tether, d
 
 }  // namespace
 
+void carryAlong(ReferenceCloth& cloth, const Carry& carry) {
+  const Quaternion turn = carry.to.orientation * carry.from.orientation.conjugate();
+  for (Vec3& position : cloth.positions())
+    position = carry.to.position + turn * (position - carry.from.position);
+  for (Vec3& velocity : cloth.velocities()) velocity = turn * velocity;
+}
+
 Attachments::Attachments(const model::Scene& scene) {
   for (std::size_t c = 0; c < scene.cloths.size(); ++c) {
     const model::Cloth& cloth = scene.cloths[c];

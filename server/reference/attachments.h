@@ -33,6 +33,14 @@ struct Grab {
   double leftAtStart = 0, leftAtEnd = 0;
 };
 
+// Rigid motion of a whole cloth at the start of a tick, as model::Carry.
+struct Carry {
+  std::size_t cloth = 0;
+  Pose from, to;
+};
+
+void carryAlong(ReferenceCloth& cloth, const Carry& carry);
+
 class Attachments {
  public:
   explicit Attachments(const model::Scene& scene);

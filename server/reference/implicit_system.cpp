@@ -12,6 +12,10 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+// A spring that is longer than kOverlong rest lengths has an additional dashpot: its stiffness times this
+// time, in seconds, for each further rest length.
+constexpr double kOverlong = 1.1, kCalmSeconds = 0.1;
+
 Eigen::Index row(std::uint32_t node) {
   return 3 * static_cast<Eigen::Index>(node);
 }
@@ -40,7 +44,9 @@ ImplicitSystem::ImplicitSystem(std::span<const ImplicitSpring> springs, std::spa
     const double tension = std::max(0.0, 1 - spring.restLength / length);
     const Matrix3d elastic = h * h * spring.stiffness * (along + tension * (Matrix3d::Identity() - along));
     const Matrix3d viscous = h * spring.damping * along;
-    const Matrix3d block = elastic + viscous;
+    const double overlong = std::max(0.0, length / spring.restLength - kOverlong);
+    const Matrix3d calming = h * kCalmSeconds * spring.stiffness * overlong * along;
+    const Matrix3d block = elastic + viscous + calming;
     add(spring.a, spring.a, block);
     add(spring.b, spring.b, block);
     add(spring.a, spring.b, -block);

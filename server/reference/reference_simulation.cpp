@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "server/model/jump.h"
 #include "server/model/wind.h"
 #include "server/reference/solid.h"
 
@@ -15,9 +16,10 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const model::Collider& collider : scene.colliders) {
+    const model::Pose before = model::poseAt(collider, start), after = model::poseAt(collider, end);
+    const bool jumps = model::hasJumped(before, after, scene.tickSeconds());
     MovingCollider& to = inputs.colliders.emplace_back(
-        MovingCollider{collider.shape, toPose(model::poseAt(collider, start)),
-                       toPose(model::poseAt(collider, end)), collider.friction});
+        MovingCollider{collider.shape, toPose(jumps ? after : before), toPose(after), collider.friction});
     const auto* solid = std::get_if<model::Solid>(&collider.shape);
     if (solid == nullptr || !(*solid)->skin) continue;
     const auto jointsAt = [&](double seconds, std::vector<model::Pose>& poses) {
@@ -27,10 +29,17 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
     };
     jointsAt(start, to.jointsStart);
     jointsAt(end, to.jointsEnd);
+    if (model::hasJumped(to.jointsStart, to.jointsEnd, scene.tickSeconds())) to.jointsStart = to.jointsEnd;
   }
+  std::vector<model::Pose> before, after;
   for (const model::Cloth& cloth : scene.cloths)
-    for (const model::Attachment& attachment : cloth.attachments)
-      inputs.attachments.push_back(toPose(model::frameAt(scene, attachment, end)));
+    for (const model::Attachment& attachment : cloth.attachments) {
+      before.push_back(model::frameAt(scene, attachment, start));
+      after.push_back(model::frameAt(scene, attachment, end));
+      inputs.attachments.push_back(toPose(after.back()));
+    }
+  for (const model::Carry& carry : model::carriesOf(scene, before, after))
+    inputs.carries.push_back({carry.cloth, toPose(carry.from), toPose(carry.to)});
   return inputs;
 }
 
@@ -58,6 +67,8 @@ void ReferenceSimulation::tick() {
 }
 
 void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index) {
+  if (index == 0)
+    for (const Carry& carry : inputs.carries) carryAlong(cloths_[carry.cloth], carry);
   if (index == 0) attachments_.begin(cloths_, inputs.attachments, inputs.grabs, scene_.tickSeconds());
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     ReferenceCloth& cloth = cloths_[i];

@@ -29,6 +29,7 @@ struct TickInputs {
   std::vector<MovingCollider> colliders;
   std::vector<Pose> attachments = {};  // at the tick's end, in the order of the cloths; empty: the start
   std::vector<Grab> grabs = {};
+  std::vector<Carry> carries = {};
 };
 
 // Environment, colliders and attachments of the scene itself in a tick: from tick * dt to (tick + 1) * dt.

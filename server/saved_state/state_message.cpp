@@ -172,6 +172,9 @@ bool readGrabs(const v1::SavedCheckpoint& message, const model::Scene& scene,
     state.moved[moved.attachment()] = toPose(moved.pose());
     if (!isFinite(*state.moved[moved.attachment()])) return false;
   }
+  for (const v1::Pose& frame : message.frames()) state.frames.push_back(toPose(frame));
+  if (!state.frames.empty() && state.frames.size() != attachments) return false;
+  if (!std::ranges::all_of(state.frames, isFinite)) return false;
   if (static_cast<std::size_t>(message.grabs_size()) > simulation::kMaxGrabs) return false;
   for (const v1::SavedGrab& grab : message.grabs()) {
     state.slots.push_back(toSlot(grab));
@@ -308,6 +311,7 @@ v1::SavedCheckpoint toMessage(const scene::Checkpoint& checkpoint) {
     messages::write(*checkpoint.grabs.moved[i], *to.mutable_pose());
   }
   for (const Slot& slot : checkpoint.grabs.slots) write(slot, *message.add_grabs());
+  for (const model::Pose& pose : checkpoint.grabs.frames) messages::write(pose, *message.add_frames());
   if (checkpoint.lastRecovery) message.set_last_recovery(*checkpoint.lastRecovery);
   message.set_frame_divisor(checkpoint.work.frameDivisor);
   message.set_substeps(checkpoint.work.substeps);

@@ -10,19 +10,11 @@
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/description.h"
 #include "server/messages/skin_message.h"
+#include "server/model/jump.h"
 #include "server/scene/hand_limits.h"
 
 namespace clothstream::scene {
 namespace {
-
-// Whether a collider that a message moved exceeds the limits of one tick. `radius` is that of its shape, 0 if
-// it is not limited.
-bool hasJumped(float radius, const model::Pose& before, const model::Pose& now, double tickSeconds) {
-  const float reach = kMaxHandSpeed * static_cast<float>(tickSeconds);
-  return (now.position - before.position).squaredNorm() > reach * reach ||
-         std::abs(now.orientation.dot(before.orientation)) < kMaxHandTurn ||
-         radius * now.orientation.angularDistance(before.orientation) > 2 * reach;
-}
 
 const model::Skin* skinOf(const model::Collider& collider) {
   const auto* solid = std::get_if<model::Solid>(&collider.shape);
@@ -87,6 +79,8 @@ void ColliderSet::advanceJoints(const model::Skin& skin, double endSeconds, doub
   }
   model::compose(skin, joints.now, collider.jointsStart);
   model::compose(skin, end_, collider.jointsEnd);
+  if (model::hasJumped(collider.jointsStart, collider.jointsEnd, tickSeconds))
+    collider.jointsStart = collider.jointsEnd;
   joints.now = end_;
 }
 
@@ -98,10 +92,9 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
   for (std::size_t i = 0; i < own; ++i) {
     const model::Collider& collider = scene.colliders[i];
     const model::Pose end = model::poseAt(collider, endSeconds);
-    const bool byItself = !collider.motion.keys.empty();
     simulation::MovingCollider& to = colliders[i];
     to.shape = collider.shape;
-    const bool jumped = !byItself && hasJumped(0, state_.scenePoses[i], end, scene.tickSeconds());
+    const bool jumped = model::hasJumped(state_.scenePoses[i], end, scene.tickSeconds());
     to.start = jumped ? end : state_.scenePoses[i];
     to.end = end;
     to.friction = collider.friction;
@@ -118,7 +111,7 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
       end = yield.refused ? yield.accepted : towards(radius, collider.before, end, yield.step);
       yield.stands = wayOf(radius, end, collider.now.pose) > 0;
     }
-    const bool jumped = hasJumped(radius, collider.before, end, scene.tickSeconds());
+    const bool jumped = model::hasJumped(collider.before, end, scene.tickSeconds(), radius);
     const float grown = jumped || collider.depth == 0
                             ? 0
                             : collider.depth + kGrowth * static_cast<float>(scene.tickSeconds());

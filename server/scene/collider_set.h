@@ -16,8 +16,8 @@
 
 namespace clothstream::scene {
 
-// A collider that a message moved and that exceeds the limits of hand_limits.h is not swept: it appears at
-// its new pose, at rest. A collider of a participant that appears is at most kMaxAppearance deep, and grows
+// A collider that jumps (model::hasJumped) is not swept: it appears at its new pose, at rest. So do the joints
+// of a mesh. A collider of a participant that appears is at most kMaxAppearance deep, and grows
 // from there by kGrowth.
 
 // A collider of a participant yields to cloth that nothing passes through. It yields if a node is deeper

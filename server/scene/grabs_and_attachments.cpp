@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/model/jump.h"
 #include "server/model/mesh.h"
 #include "server/scene/collider_shares.h"
 #include "server/scene/hand_limits.h"
@@ -33,6 +34,15 @@ GrabsAndAttachments::GrabsAndAttachments(const model::Scene& scene) {
   std::size_t attachments = 0;
   for (const model::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
   state_.moved.resize(attachments);
+  goBack(scene, true);
+}
+
+void GrabsAndAttachments::goBack(const model::Scene& scene, bool toStart) {
+  state_.frames.clear();
+  if (!toStart) return;
+  for (const model::Cloth& cloth : scene.cloths)
+    for (const model::Attachment& attachment : cloth.attachments)
+      state_.frames.push_back(model::frameAt(scene, attachment, 0));
 }
 
 GrabsAndAttachments::Slot* GrabsAndAttachments::find(std::uint64_t participant, std::uint32_t id) {
@@ -101,6 +111,9 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
       const std::optional<model::Pose>& moved = state_.moved[inputs.attachments.size()];
       inputs.attachments.push_back(moved ? *moved : model::frameAt(scene, attachment, endSeconds));
     }
+  inputs.carries.clear();
+  if (!state_.frames.empty()) inputs.carries = model::carriesOf(scene, state_.frames, inputs.attachments);
+  state_.frames = inputs.attachments;
   while (!state_.slots.empty() && state_.slots.back().phase == Slot::Phase::empty) state_.slots.pop_back();
   inputs.grabs.clear();
   released_.clear();
@@ -170,6 +183,7 @@ void GrabsAndAttachments::restore(State state) {
 }
 
 void GrabsAndAttachments::goBack(std::span<const Slot> then, simulation::HeldNodes& held) {
+  state_.frames.clear();
   std::vector<bool> kept(held.grabs.size(), false);
   for (std::size_t i = 0; i < state_.slots.size(); ++i) {
     Slot& slot = state_.slots[i];

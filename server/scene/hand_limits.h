@@ -8,10 +8,9 @@
 
 namespace clothstream::scene {
 
-// Maximum speed of a collider or a grab that a participant moves, m/s.
-inline constexpr float kMaxHandSpeed = 30;
-// Maximum rotation in one tick, as the cosine of half the angle (120 degrees).
-inline constexpr float kMaxHandTurn = 0.5f;
+// Maximum speed of a grab that a participant moves, m/s. A collider that is faster has jumped
+// (model::hasJumped).
+inline constexpr float kMaxHandSpeed = model::kMaxAttachmentSpeed;
 // Depth of a shape that appears, m: cloth inside it leaves by at most this way. Its depth then grows by
 // kGrowth, m/s.
 inline constexpr float kMaxAppearance = 0.1f;

@@ -18,7 +18,7 @@ model::Pose interpolate(const model::Pose& from, const model::Pose& to, float pa
   const float turn = from.orientation.dot(to.orientation);
   model::Pose pose{.position = from.position + part * (to.position - from.position),
                    .orientation = to.orientation};
-  if (std::abs(turn) < kMaxHandTurn && part > 1) return pose;
+  if (std::abs(turn) < model::kMaxTurn && part > 1) return pose;
   const Eigen::Vector4f other =
       turn < 0 ? Eigen::Vector4f(-to.orientation.coeffs()) : to.orientation.coeffs();
   const Eigen::Vector4f mean = (1 - part) * from.orientation.coeffs() + part * other;

@@ -481,6 +481,10 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
   if (attachments && attachments->aims()) {
     recorder.beginStage("attachments");
     recorder.barrier();
+    if (!inputs.carries.empty()) {
+      attachments->recordCarries(recorder, present, inputs.carries, offsets);
+      recorder.barrier();
+    }
     attachments->recordAim(recorder, present, tickRate);
   }
   if (collision.active()) {

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "server/model/jump.h"
 #include "server/model/scene.h"
 #include "server/simulation/attachment/grab.h"
 #include "server/simulation/cloth_report.h"
@@ -37,12 +38,15 @@ struct TickInputs {
   // Pose of each attachment at the tick's end, in the order of the scene's cloths. Empty: the poses at the
   // start.
   std::vector<model::Pose> attachments = {};
+  // Cloths that move as rigid bodies at the tick's start, because their attachments jump.
+  std::vector<model::Carry> carries = {};
   // At most kMaxGrabs. A grab keeps its index while it is active. An index must be free for one tick before
   // another grab uses it.
   std::vector<Grab> grabs = {};
 };
 
-// Inputs that the scene itself gives to a tick (from 0): its wind, its colliders and its attachments.
+// Inputs that the scene itself gives to a tick (from 0): its wind, its colliders and its attachments. A
+// collider that jumps is at its new pose from the tick's start.
 TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick);
 
 struct SimulationOptions {

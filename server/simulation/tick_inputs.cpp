@@ -10,8 +10,10 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const model::Collider& collider : scene.colliders) {
-    MovingCollider& to = inputs.colliders.emplace_back(MovingCollider{
-        collider.shape, model::poseAt(collider, start), model::poseAt(collider, end), collider.friction});
+    const model::Pose before = model::poseAt(collider, start), after = model::poseAt(collider, end);
+    const bool jumps = model::hasJumped(before, after, scene.tickSeconds());
+    MovingCollider& to = inputs.colliders.emplace_back(
+        MovingCollider{collider.shape, jumps ? after : before, after, collider.friction});
     const auto* solid = std::get_if<model::Solid>(&collider.shape);
     if (solid == nullptr || !(*solid)->skin) continue;
     const model::Skin& skin = *(*solid)->skin;
@@ -20,10 +22,15 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
     model::compose(skin, local, to.jointsStart);
     model::jointsAt(skin, end, local);
     model::compose(skin, local, to.jointsEnd);
+    if (model::hasJumped(to.jointsStart, to.jointsEnd, scene.tickSeconds())) to.jointsStart = to.jointsEnd;
   }
+  std::vector<model::Pose> before;
   for (const model::Cloth& cloth : scene.cloths)
-    for (const model::Attachment& attachment : cloth.attachments)
+    for (const model::Attachment& attachment : cloth.attachments) {
+      before.push_back(model::frameAt(scene, attachment, start));
       inputs.attachments.push_back(model::frameAt(scene, attachment, end));
+    }
+  inputs.carries = model::carriesOf(scene, before, inputs.attachments);
   return inputs;
 }
 

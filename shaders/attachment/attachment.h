@@ -77,6 +77,15 @@ struct GrabReport {
   float reserved1;
 };
 
+// The rigid motion of a cloth's nodes from one pose to another.
+struct CarryPush {
+  vec3 from;  // m
+  uint32_t firstNode;
+  vec3 to;  // m
+  uint32_t nodeCount;
+  vec4 fromOrientation, toOrientation;  // unit quaternions
+};
+
 struct AimPush {
   uint32_t count;
   float tickRate;  // 1/s

@@ -214,14 +214,12 @@ vec2 multiplyGrid(System system, Walk walk) {
 
 // Multiplies the matrix of a mesh by gathering the springs that meet at each node.
 vec2 multiplyMesh(System system, Walk walk) {
-  float compliance = clothAt(cloths, system.cloth).scaledCompliance;
+  float factor = massFactor(clothAt(cloths, system.cloth));
   precise vec2 sums = vec2(0.0);
   for (uint k = 0; k < kRows; ++k) {
     uint node = walk.first + min(k, max(walk.count, 1) - 1);
     Point here = pointAt(node);
-    float inverseMass = texelFetch(positions, int(node)).w;
-    precise vec3 sum =
-        kImplicit ? reciprocal(max(inverseMass, 1e-30)) * here.z : compliance * here.own.residual;
+    precise vec3 sum = factor * here.own.residual;
     TexelRange list = rangeOf(listAt(incidences, node));
     while (list.first < list.end) {
       SpringEndsRecord two = springEndsAt(lists, list.first);

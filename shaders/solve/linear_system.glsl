@@ -50,8 +50,12 @@ ResidualRecord residualFrom(vec4 texel) {
   return ResidualRecord(CLOTHSTREAM_VECTOR(texel));
 }
 
-// `along` or `across` of the springs of a grid's node, two texels. The texels of `along` also have the
-// preconditioner times c M.
+// c of a cloth's system.
+float massFactor(ClothRecord cloth) {
+  return kImplicit ? 1.0 : cloth.scaledCompliance;
+}
+
+// `along` or `across` of the springs of a grid's node, two texels. The texels of `along` also have c.
 struct SpringWeights {
   float right;
   float below;
@@ -59,7 +63,7 @@ struct SpringWeights {
   float rightToBelow;  // the spring from the right neighbour to the node below this one
   float secondRight;
   float secondBelow;
-  float mass;  // of `along`: the preconditioner times c M
+  float mass;  // of `along`: massFactor()
   float reserved;
 };
 

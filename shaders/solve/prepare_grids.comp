@@ -68,22 +68,19 @@ void prepareNode(Grid grid, int row, int column, bool stored, bool continued) {
   Weight above2 = springTo(grid, here, row - 2, column, grid.bendColumn, grid.hasBend);
 
   precise vec3 impulse = right.impulse + below.impulse + rightBelow.impulse + right2.impulse + below2.impulse;
-  precise float trace = right.trace + below.trace + rightBelow.trace + right2.trace + below2.trace;
   precise float all = right.along + below.along + rightBelow.along + right2.along + below2.along;
   [[unroll]] for (int i = 0; i < 6; ++i) {
     impulse = impulse + others[i].impulse;
-    trace = trace + others[i].trace;
     all = all + others[i].along;
   }
   impulse = impulse + above2.impulse;
-  trace = trace + above2.trace;
   all = all + above2.along;
 
   vec3 total = kLimit && continued ? vectors[kTotals * push.nodes + node].xyz : vec3(0.0);
-  Start start = startOf(here, impulse, trace, grid.cloth.scaledCompliance, total);
+  Start start = startOf(here, impulse, grid.cloth.scaledCompliance, total);
   if (stored) {
     SpringWeights weights = SpringWeights(right.along, below.along, rightBelow.along, fromRight.along,
-                                          right2.along, below2.along, start.mass, 0.0);
+                                          right2.along, below2.along, massFactor(grid.cloth), 0.0);
     along[2 * node] = firstTexelOf(weights);
     along[2 * node + 1] = secondTexelOf(weights);
     if (kImplicit) {

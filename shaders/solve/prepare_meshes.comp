@@ -16,7 +16,6 @@ layout(std430, binding = 14) buffer Vectors {
 
 void prepareNode(System system, uint node, float compliance, bool stored, bool continued) {
   precise vec3 impulse = vec3(0.0);
-  precise float trace = 0.0;
   uint active_ = 0;  // counted at the spring's first end
   bool any = false;
   TexelRange list = rangeOf(listAt(incidences, node));
@@ -29,14 +28,13 @@ void prepareNode(System system, uint node, float compliance, bool stored, bool c
       vec3 push_ = texelFetch(impulses, int(spring)).xyz;
       precise float square = dotProduct(weighted.row, weighted.row) + 3.0 * weighted.across;
       impulse = impulse + (number > 0.0 ? push_ : (number < 0.0 ? -push_ : vec3(0.0)));
-      trace = trace + (number == 0.0 ? 0.0 : square);
       any = any || (number != 0.0 && square > 0.0);
       active_ += number > 0.0 && square > 0.0 ? 1 : 0;
     }
     ++list.first;
   }
   vec3 total = kLimit && continued ? vectors[kTotals * push.nodes + node].xyz : vec3(0.0);
-  Start start = startOf(endAt(node), impulse, trace, compliance, total);
+  Start start = startOf(endAt(node), impulse, compliance, total);
   if (stored) {
     vectors[kResiduals * push.nodes + node] = start.residual;
     vectors[kCorrections * push.nodes + node] = vec4(start.correction, 0.0);

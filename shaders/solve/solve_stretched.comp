@@ -92,7 +92,7 @@ void prepareNode(uint place, uint round, bool exists) {
     impulse = impulse + impulses[kImpulseOrder[i]];
   }
   vec3 total = kLimit && round > 0 && isContinued(node) ? fetch(kTotals, node).xyz : vec3(0.0);
-  Start start = startOf(here, impulse, 0.0, cloth.scaledCompliance, total);
+  Start start = startOf(here, impulse, cloth.scaledCompliance, total);
   uint springTexelCount = max((number + 1) / 2, 1);
   if (exists) {
     vectors[vectorAt(kResiduals, place)] = start.residual;

@@ -27,6 +27,10 @@
 
 #include "shaders/solve/linear_system.glsl"
 
+// Implicit Euler: a spring that is longer than this many rest lengths has an additional dashpot. It grows by
+// kCalmSeconds times the stiffness for each further rest length.
+const float kOverlong = 1.1, kCalmSeconds = 0.1;
+
 bool isTooLong(vec3 a, vec3 b, float longest) {
   precise vec3 d = b - a;
   precise float squared = longest * longest;
@@ -46,19 +50,20 @@ struct SpringKind {
   float restLength;
   float elastic;  // h^2 k
   float viscous;  // h d
+  float calm;     // h kCalmSeconds k / r
 };
 
 SpringKind springKind(float restLength, float stiffness, float damping) {
   precise float elastic = push.substepSeconds * push.substepSeconds * stiffness;
   precise float viscous = push.substepSeconds * damping;
-  return SpringKind(restLength, elastic, viscous);
+  precise float calm = kCalmSeconds * push.substepSeconds * stiffness * reciprocal(max(restLength, 1e-6));
+  return SpringKind(restLength, elastic, viscous, calm);
 }
 
 struct Weight {
   float along;  // factor of d d^T
   float across;
   vec3 impulse;  // part of the right-hand side of `here`
-  float trace;
 };
 
 Weight weightOf(End here, End other, SpringKind kind, ClothRecord cloth, bool exists) {
@@ -69,13 +74,13 @@ Weight weightOf(End here, End other, SpringKind kind, ClothRecord cloth, bool ex
   if (kImplicit) {
     precise vec3 change = other.velocity - here.velocity;
     precise float across = kind.elastic * max(1.0 - kind.restLength * inverseLength, 0.0);
-    precise float difference = kind.elastic + kind.viscous - across;
+    precise float overlong = max(squared * inverseLength - kOverlong * kind.restLength, 0.0);
+    precise float stiff = kind.elastic + kind.calm * overlong;
+    precise float difference = stiff + kind.viscous - across;
     precise float along = difference > 1e-30 ? difference * inverseSquared : 0.0;
     precise vec3 impulse =
-        ((kind.elastic - across) * inverseSquared * dotProduct(d, change)) * d + across * change;
-    precise float trace = along * squared + 3.0 * across;
-    return Weight(exists ? along : 0.0, exists ? across : 0.0, exists ? impulse : vec3(0.0),
-                  exists ? trace : 0.0);
+        ((stiff - across) * inverseSquared * dotProduct(d, change)) * d + across * change;
+    return Weight(exists ? along : 0.0, exists ? across : 0.0, exists ? impulse : vec3(0.0));
   }
   precise vec3 relative = other.freeVelocity - here.freeVelocity;
   precise float longest = kind.restLength + cloth.activation * kind.restLength;
@@ -88,44 +93,40 @@ Weight weightOf(End here, End other, SpringKind kind, ClothRecord cloth, bool ex
     precise float half_ = 0.5 * cloth.correctionFraction * (squared - kind.restLength * kind.restLength);
     precise float paperSide = (push.substepRate * half_ + dotProduct(d, relative)) * inverseSquared;
     precise vec3 paperImpulse = paperSide * d;
-    return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? paperImpulse : vec3(0.0), 0.0);
+    return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? paperImpulse : vec3(0.0));
   }
   if (kLimit) {
     precise float limitSide = push.substepRate * (squared * inverseLength - longest);
     precise vec3 limitImpulse = (limitSide * inverseLength) * d;
-    return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? limitImpulse : vec3(0.0), 0.0);
+    return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? limitImpulse : vec3(0.0));
   }
   precise float excess = squared * inverseLength - longest;
   precise float corrected = excess > 0.0 || !kAdaptive ? cloth.correctionFraction * excess : excess;
   precise float side = push.substepRate * corrected + inverseLength * dotProduct(d, relative);
   precise vec3 impulse = (side * inverseLength) * d;
-  return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? impulse : vec3(0.0), 0.0);
+  return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? impulse : vec3(0.0));
 }
 
 // The start of a node's solve.
 struct Start {
   vec4 residual;  // ResidualRecord
   vec3 correction;
-  float mass;  // the preconditioner times c M
 };
 
-// `impulse` and `trace` are sums over the node's springs. A solve for implicit velocities starts from v' = v.
-// If it ends early, it leaves out motion instead of leaving forces without damping. `total` is the solution
-// of the rounds before.
-Start startOf(End here, vec3 impulse, float trace, float compliance, vec3 total) {
+// `impulse` is the sum over the node's springs. A solve for implicit velocities starts from v' = v. If it
+// ends early, it leaves out motion instead of leaving forces without damping. `total` is the solution of the
+// rounds before. The masses are the preconditioner, so that residuals of the forces between nodes add up to
+// nothing in every iteration: a solve that ends early makes no momentum.
+Start startOf(End here, vec3 impulse, float compliance, vec3 total) {
   float inverseMass = here.inverseMass;
   float mass = reciprocal(max(inverseMass, 1e-30));
   if (kImplicit) {
     precise vec3 gained = here.freeVelocity - here.velocity;
     precise vec3 residual = mass * gained + impulse;
-    precise float diagonal = mass + trace * 0.33333334;
-    float preconditioner = reciprocal(diagonal);
-    precise float share = mass * preconditioner;
-    bool pinned = inverseMass == 0.0;
-    return Start(pinned ? vec4(0.0) : vec4(residual, preconditioner), -gained, share);
+    return Start(inverseMass == 0.0 ? vec4(0.0) : vec4(residual, inverseMass), -gained);
   }
   precise vec3 residual = kLimit ? impulse - (compliance * mass) * total : impulse;
-  return Start(inverseMass == 0.0 ? vec4(0.0) : vec4(residual, inverseMass), vec3(0.0), compliance);
+  return Start(inverseMass == 0.0 ? vec4(0.0) : vec4(residual, inverseMass), vec3(0.0));
 }
 
 #endif

@@ -89,6 +89,8 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
                                 reference::toPose(collider.end), double{collider.friction},
                                 collider.jointsStart, collider.jointsEnd});
   for (const model::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
+  for (const model::Carry& carry : inputs.carries)
+    result.carries.push_back({carry.cloth, reference::toPose(carry.from), reference::toPose(carry.to)});
   for (const simulation::Grab& grab : inputs.grabs) {
     result.grabs.push_back({.state = static_cast<reference::Grab::State>(grab.state),
                             .start = reference::toPose(grab.start),

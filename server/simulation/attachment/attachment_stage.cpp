@@ -9,6 +9,7 @@
 
 #include "kernels/aim_attachments.h"
 #include "kernels/begin_grabs.h"
+#include "kernels/carry_nodes.h"
 #include "kernels/find_nearest_nodes.h"
 #include "kernels/pull_nodes.h"
 #include "server/simulation/texel.h"
@@ -89,6 +90,13 @@ AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentT
                Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes)},
       readbacks_{Buffer(device, BufferPurpose::readback, kReportBytes),
                  Buffer(device, BufferPurpose::readback, kReportBytes)},
+      carry_(device,
+             {.name = "carry_nodes",
+              .spirv = kernels::carry_nodes,
+              .bindings = {kStorage, kStorage},
+              .pushConstantBytes = sizeof(shared::CarryPush),
+              .workgroupSize = workgroupSize},
+             {state.positions[0], state.velocities[0]}, {state.positions[1], state.velocities[1]}),
       aim_(device,
            {.name = "aim_attachments",
             .spirv = kernels::aim_attachments,
@@ -184,6 +192,22 @@ void AttachmentStage::recordInputs(vulkan::Recorder& recorder, std::span<const m
                   report + offsetof(shared::GrabReport, grabbed));
   }
   recorder.copy(through, grabs_, grabs.size() * sizeof(shared::GrabRecord), frames_.bytes());
+}
+
+void AttachmentStage::recordCarries(vulkan::Recorder& recorder, std::uint32_t present,
+                                    std::span<const model::Carry> carries,
+                                    std::span<const std::uint32_t> clothOffsets) {
+  for (const model::Carry& carry : carries) {
+    const std::uint32_t first = clothOffsets[carry.cloth], count = clothOffsets[carry.cloth + 1] - first;
+    recorder.dispatch(carry_.from[present],
+                      shared::CarryPush{.from = vectorOf(carry.from.position),
+                                        .firstNode = first,
+                                        .to = vectorOf(carry.to.position),
+                                        .nodeCount = count,
+                                        .fromOrientation = texel(carry.from.orientation),
+                                        .toOrientation = texel(carry.to.orientation)},
+                      count);
+  }
 }
 
 void AttachmentStage::recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate) {

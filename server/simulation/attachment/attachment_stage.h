@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "server/model/jump.h"
 #include "server/model/pose.h"
 #include "server/model/scene.h"
 #include "server/simulation/attachment/attachment_tables.h"
@@ -24,7 +25,7 @@ GrabStatus statusOf(const shared::GrabReport& report);
 
 // Belongs to the device's thread.
 //
-// A tick:   recordInputs -> barrier -> recordAim -> substeps, each with recordSubstep at its end ->
+// A tick:   recordInputs -> barrier -> recordCarries -> barrier -> recordAim -> substeps, each with recordSubstep at its end ->
 // recordReport
 class AttachmentStage {
  public:
@@ -40,6 +41,9 @@ class AttachmentStage {
   // tick may be in flight.
   void recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
                     std::span<const Grab> grabs);
+  // Carries cloths along, each by another one of these. The state is in the buffers `present`.
+  void recordCarries(vulkan::Recorder& recorder, std::uint32_t present, std::span<const model::Carry> carries,
+                     std::span<const std::uint32_t> clothOffsets);
   // True if recordAim() has work in this tick.
   bool aims() const { return attachedCount_ > 0 || takes_; }
   // Gives attached nodes their velocities, and lets grabs begin. The state is in the buffers `present`.
@@ -87,7 +91,7 @@ class AttachmentStage {
   // Held nodes, then reports. Created when they are first needed.
   vulkan::Buffer heldReadback_, heldUpload_;
   std::uint32_t savedGrabs_ = 0;  // by the newest recordSave()
-  Stage aim_, findNearest_, beginGrabs_, tie_, pull_;
+  Stage carry_, aim_, findNearest_, beginGrabs_, tie_, pull_;
 };
 
 }  // namespace clothstream::simulation
