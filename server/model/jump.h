@@ -29,8 +29,8 @@ struct Carry {
 };
 
 // The cloths that attachments carry along in a tick. A cloth goes along if its first attachment jumps, if no
-// other attachment still jumps after that motion, and if it is not pinned. `before` and `now` are the poses of
-// all attachments at the tick's start and end, in the order of the cloths.
+// other attachment still jumps after that motion, and if it is not pinned. `before` and `now` are the poses
+// of all attachments at the tick's start and end, in the order of the cloths.
 std::vector<Carry> carriesOf(const Scene& scene, std::span<const Pose> before, std::span<const Pose> now);
 
 }  // namespace clothstream::model

@@ -259,9 +259,8 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
   if (static_cast<std::size_t>(message.carries_size()) > scene.cloths.size())
     return wrong("it carries more cloths than the scene has");
   for (const v1::AppliedCarry& carry : message.carries())
-    inputs.carries.push_back(
-        {numbers.integer(carry.cloth(), static_cast<std::uint32_t>(scene.cloths.size())),
-         numbers.pose(carry.from()), numbers.pose(carry.to())});
+    inputs.carries.push_back({numbers.integer(carry.cloth(), static_cast<std::uint32_t>(scene.cloths.size())),
+                              numbers.pose(carry.from()), numbers.pose(carry.to())});
   for (const v1::AppliedGrip& grab : message.grips())
     inputs.grabs.push_back(grabOf(numbers, grab, scene.nodeCount()));
   if (!numbers.good()) return wrong("one of its numbers is out of range");

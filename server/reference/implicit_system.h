@@ -19,8 +19,8 @@ struct ImplicitSpring {
 
 // The system of one substep for the velocities v_free + u:  (M + h D + h^2 K) u = -(h D (v_free - v) + h^2 K
 // v_free).  D and K are the springs' derivatives at the substep's start; K leaves out the part that pushes
-// across a compressed spring. The matrix also has h C and the right-hand side -h C v_free, with C the dashpots
-// of springs that are far too long. Nodes without inverse mass have u = 0.
+// across a compressed spring. The matrix also has h C and the right-hand side -h C v_free, with C the
+// dashpots of springs that are far too long. Nodes without inverse mass have u = 0.
 class ImplicitSystem {
  public:
   // `free` are the velocities that the forces alone give, starting from `velocities`.

@@ -16,9 +16,9 @@
 
 namespace clothstream::scene {
 
-// A collider that jumps (model::hasJumped) is not swept: it appears at its new pose, at rest. So do the joints
-// of a mesh. A collider of a participant that appears is at most kMaxAppearance deep, and grows
-// from there by kGrowth.
+// A collider that jumps (model::hasJumped) is not swept: it appears at its new pose, at rest. So do the
+// joints of a mesh. A collider of a participant that appears is at most kMaxAppearance deep, and grows from
+// there by kGrowth.
 
 // A collider of a participant yields to cloth that nothing passes through. It yields if a node is deeper
 // inside than kYieldDepth (m), or than kYieldShare of the shape's least radius. It then returns to its last

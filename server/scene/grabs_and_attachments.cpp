@@ -34,10 +34,10 @@ GrabsAndAttachments::GrabsAndAttachments(const model::Scene& scene) {
   std::size_t attachments = 0;
   for (const model::Cloth& cloth : scene.cloths) attachments += cloth.attachments.size();
   state_.moved.resize(attachments);
-  goBack(scene, true);
+  clothsWentBack(scene, true);
 }
 
-void GrabsAndAttachments::goBack(const model::Scene& scene, bool toStart) {
+void GrabsAndAttachments::clothsWentBack(const model::Scene& scene, bool toStart) {
   state_.frames.clear();
   if (!toStart) return;
   for (const model::Cloth& cloth : scene.cloths)

@@ -32,12 +32,12 @@ class GrabsAndAttachments {
   // Releases all grabs. Attachments that participants moved follow their own motion again.
   void letGo();
 
-  // The cloths went back: to their start, from where attachments that are elsewhere carry them along, or to an
-  // earlier state, from where they catch up.
-  void goBack(const model::Scene& scene, bool toStart);
+  // The cloths went back: to their start, from where attachments that are elsewhere carry them along, or to
+  // an earlier state, from where they catch up.
+  void clothsWentBack(const model::Scene& scene, bool toStart);
 
-  // Writes grabs, attachments and what they carry along in the next tick, which ends at this simulated time in
-  // seconds.
+  // Writes grabs, attachments and what they carry along in the next tick, which ends at this simulated time
+  // in seconds.
   void advance(const model::Scene& scene, double endSeconds, simulation::TickInputs& inputs);
 
   // Adds events for the grabs of tick `events.tick()`, which is the newest and complete. `grabs` is the
@@ -59,8 +59,8 @@ class GrabsAndAttachments {
   struct State {
     std::vector<std::optional<model::Pose>> moved;  // poses of attachments that were moved by a message
     std::vector<Slot> slots;
-    // Poses of the attachments at the end of the newest tick. Empty: the cloths are not where these took them,
-    // and catch up at kMaxAttachmentSpeed.
+    // Poses of the attachments at the end of the newest tick. Empty: the cloths are not where these took
+    // them, and catch up at kMaxAttachmentSpeed.
     std::vector<model::Pose> frames;
   };
   const State& state() const { return state_; }

@@ -152,7 +152,7 @@ void SceneHost::begin(Clock::time_point now) {
   applyWork();
   const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
   colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
-  if (recovery_ != Recovery::none) grabs_.goBack(scene_, recovery_ == Recovery::reset);
+  if (recovery_ != Recovery::none) grabs_.clothsWentBack(scene_, recovery_ == Recovery::reset);
   grabs_.advance(scene_, endSeconds, tickInputs_);
   tickInputs_.reportsContacts = contactRequests_.any();
   tickInputs_.namesConstraints = constraintRequests_.any();

@@ -78,8 +78,7 @@ Weight weightOf(End here, End other, SpringKind kind, ClothRecord cloth, bool ex
     precise float stiff = kind.elastic + kind.calm * overlong;
     precise float difference = stiff + kind.viscous - across;
     precise float along = difference > 1e-30 ? difference * inverseSquared : 0.0;
-    precise vec3 impulse =
-        ((stiff - across) * inverseSquared * dotProduct(d, change)) * d + across * change;
+    precise vec3 impulse = ((stiff - across) * inverseSquared * dotProduct(d, change)) * d + across * change;
     return Weight(exists ? along : 0.0, exists ? across : 0.0, exists ? impulse : vec3(0.0));
   }
   precise vec3 relative = other.freeVelocity - here.freeVelocity;

@@ -296,6 +296,20 @@ TEST_F(RecorderTest, RefusesBytesThatAreNoTickOfTheScene) {
       HasSubstr("tick 3: one of its colliders has no shape"));
   EXPECT_THAT(errorWith("attached", [](v1::RecordedTick& tick) { tick.add_attachments(); }),
               HasSubstr("tick 3: its attachments are not those of the scene"));
+  EXPECT_THAT(errorWith("carried",
+                        [](v1::RecordedTick& tick) {
+                          v1::AppliedCarry& carry = *tick.add_carries();
+                          carry.set_cloth(1);
+                          carry.mutable_from()->mutable_orientation()->set_w(1);
+                          *carry.mutable_to() = carry.from();
+                        }),
+              HasSubstr("tick 3: one of its numbers is out of range"));
+  EXPECT_THAT(errorWith("carried twice",
+                        [](v1::RecordedTick& tick) {
+                          tick.add_carries();
+                          tick.add_carries();
+                        }),
+              HasSubstr("tick 3: it carries more cloths than the scene has"));
   EXPECT_THAT(errorWith("cloths",
                         [](v1::RecordedTick& tick) {
                           tick.add_cloths();

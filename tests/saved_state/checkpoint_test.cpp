@@ -293,6 +293,8 @@ TEST_F(CheckpointTest, RefusesWhatDoesNotFitTheScene) {
   refuses("place", [](v1::SavedCheckpoint& m) { m.mutable_grabs(0)->mutable_place()->set_triangle(5000); });
   refuses("offsets", [](v1::SavedCheckpoint& m) { m.mutable_state()->mutable_held()->set_offsets("short"); });
   refuses("attachment", [](v1::SavedCheckpoint& m) { m.mutable_attachments(0)->set_attachment(1); });
+  refuses("frames", [](v1::SavedCheckpoint& m) { *m.add_frames() = m.frames(0); });
+  refuses("frame", [](v1::SavedCheckpoint& m) { m.mutable_frames(0)->mutable_position()->set_x(INFINITY); });
   refuses("pose", [](v1::SavedCheckpoint& m) { m.mutable_scene_colliders(0)->Clear(); });
   refuses("colliders", [](v1::SavedCheckpoint& m) { m.mutable_scene_colliders()->RemoveLast(); });
   refuses("shape", [](v1::SavedCheckpoint& m) { m.mutable_colliders(0)->clear_shape(); });

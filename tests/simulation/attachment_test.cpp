@@ -155,6 +155,36 @@ TEST_F(Attachments, KeepNodesAtTheirFrameAgainstEveryForce) {
   }
 }
 
+// Two cloths of three go along, each by its own motion.
+TEST_F(Attachments, CarryAlongAsTheReference) {
+  model::Scene scene = sceneOf({calmCloth(5, 4), calmCloth(3, 3), discCloth(3)});
+  scene.cloths[1].name = "stays";
+  scene.cloths[2].name = "disc";
+  scene.cloths[0].attachments = {leftColumn(scene.cloths[0])};
+  scene.substeps = 1;
+  scene.simulationRate = 720;
+  simulation::TickInputs inputs = inputsOf(scene);
+  inputs.attachments = {moved(Vec3(2, 0.5f, -1), 130, Vec3(1, 2, 3))};
+  inputs.carries = {{0, {}, inputs.attachments[0]},
+                    {2, moved(Vec3(0.3f, 0, 0), 20, Vec3(0, 1, 1)), moved(Vec3(1, 2, 3), -70)}};
+  std::mt19937 random(4);
+  const NodeState start = randomState(scene, random, 0.002f, 0.1f);
+  Running running(scene);
+  running.restore(start);
+  EXPECT_TRUE(running.tick(inputs).healthy);
+  reference::ReferenceSimulation reference(scene);
+  setState(reference, start);
+  reference.tick(referenceInputs(inputs));
+  // Places are rounded some ten times on their way. Springs feel that as a force, and attached nodes as a
+  // speed that takes them back in the tick.
+  const double h = scene.substepSeconds(), place = 10 * kRounding * kExtent;
+  const double force = 12 * scene.cloths[0].structural.stiffness * 2 * place;
+  const double speed = place / h + h / 0.01 * force;
+  EXPECT_LT(largestSpeedDifference(running.state(), reference), speed);
+  EXPECT_LT(largestDistance(running.state(), reference), place + h * speed);
+  EXPECT_GT((running.state().positions[7] - start.positions[7]).norm(), 1);
+}
+
 TEST_F(Attachments, FollowAJumpingFrameAtThirtyMetresPerSecond) {
   model::Scene scene = dust(3, 3);
   scene.cloths[0].attachments = {leftColumn(scene.cloths[0])};

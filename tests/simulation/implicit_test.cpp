@@ -41,9 +41,9 @@ model::Scene steps(std::vector<model::Cloth> cloths, std::uint32_t rate) {
 // Largest error that the solve may leave in velocities, m/s, if it starts with the residual `start`, kg m/s.
 // With the error e and the remaining residual rho = A e,
 //   m |e|^2 <= e A e = rho A^-1 rho <= rho M^-1 rho <= tolerance^2 start M^-1 start,
-// because M is the preconditioner. Therefore |e| <= tolerance |start| / m, where m is the lightest node. Float
-// arithmetic computes the right-hand side and products of A from rows with an error of 2e-6 (two reciprocal
-// roots). The residual has the same relative error. The free velocities are rounded in addition.
+// because M is the preconditioner. Therefore |e| <= tolerance |start| / m, where m is the lightest node.
+// Float arithmetic computes the right-hand side and products of A from rows with an error of 2e-6 (two
+// reciprocal roots). The residual has the same relative error. The free velocities are rounded in addition.
 double errorOfSolve(const reference::ImplicitSystem& system, double start, double lightest,
                     double tolerance) {
   return (tolerance + 2 * 2e-6) * (start + system.side().norm()) / lightest;

@@ -25,8 +25,8 @@ GrabStatus statusOf(const shared::GrabReport& report);
 
 // Belongs to the device's thread.
 //
-// A tick:   recordInputs -> barrier -> recordCarries -> barrier -> recordAim -> substeps, each with recordSubstep at its end ->
-// recordReport
+// A tick:   recordInputs -> barrier -> recordCarries -> barrier -> recordAim -> substeps, each with
+// recordSubstep at its end -> recordReport
 class AttachmentStage {
  public:
   // Throws std::runtime_error where the device has no room.

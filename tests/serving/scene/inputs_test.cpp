@@ -233,6 +233,52 @@ TEST(GrabsAndAttachments, AttachmentFollowsItsMotionUntilMoved) {
   }
 }
 
+// The cloth of the rod alone.
+model::Scene sceneWithRod() {
+  model::Scene scene = sceneWithAttachments();
+  scene.cloths.back().attachments.pop_back();
+  return scene;
+}
+
+TEST(GrabsAndAttachments, AJumpCarriesTheClothAlong) {
+  const model::Scene scene = sceneWithRod();
+  GrabsAndAttachments holds(scene);
+  simulation::TickInputs tick;
+  const auto put = [&](float x) {
+    holds.place(7, {}, std::vector{model::AttachmentPose{0, {Vec3(x, 0, 0), model::Quaternion::Identity()}}});
+    holds.advance(scene, 0.01, tick);
+  };
+  put(0.3f);
+  EXPECT_TRUE(tick.carries.empty());
+  put(5);
+  ASSERT_EQ(tick.carries.size(), 1u);
+  EXPECT_EQ(tick.carries[0].cloth, 1u);
+  EXPECT_EQ(tick.carries[0].from.position, Vec3(0.3f, 0, 0));
+  EXPECT_EQ(tick.carries[0].to.position, Vec3(5, 0, 0));
+  put(5.1f);
+  EXPECT_TRUE(tick.carries.empty());
+}
+
+// After a reset the cloth is at the rod's first place.
+TEST(GrabsAndAttachments, AResetClothGoesToItsAttachments) {
+  const model::Scene scene = sceneWithRod();
+  GrabsAndAttachments holds(scene);
+  simulation::TickInputs tick;
+  holds.place(7, {}, std::vector{model::AttachmentPose{0, {Vec3(5, 0, 0), model::Quaternion::Identity()}}});
+  for (int i = 0; i < 2; ++i) holds.advance(scene, 0.01, tick);
+  EXPECT_TRUE(tick.carries.empty());
+  holds.clothsWentBack(scene, true);
+  holds.advance(scene, 0.01, tick);
+  ASSERT_EQ(tick.carries.size(), 1u);
+  EXPECT_EQ(tick.carries[0].from.position, Vec3(0, 0, 0));
+  EXPECT_EQ(tick.carries[0].to.position, Vec3(5, 0, 0));
+  // Where an earlier state has the cloth is not known: it catches up.
+  holds.clothsWentBack(scene, false);
+  holds.place(7, {}, std::vector{model::AttachmentPose{0, {Vec3(9, 0, 0), model::Quaternion::Identity()}}});
+  holds.advance(scene, 0.01, tick);
+  EXPECT_TRUE(tick.carries.empty());
+}
+
 // Three grabs hold in the snapshot. Since then the first went on, the second ended and its place went to
 // another one, and the third ended.
 TEST(GrabsAndAttachments, GrabsThatStillHoldAfterGoingBackKeepWhatTheyHeld) {
