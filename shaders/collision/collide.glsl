@@ -175,7 +175,9 @@ void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity,
   precise vec3 extents = abs(arm) + abs(surface);
   precise float pressed = contact.depth - kDepthRounding * (extents.x + extents.y + extents.z);
   precise float wayOut = pressed * push.substepRate - max(approach, 0.0);
-  precise float most = collider.friction * max(max(-approach, wayOut), 0.0);
+  precise float met = max(-approach, 0.0);
+  precise float pushed = max(met, wayOut);
+  precise float most = collider.friction * pushed;
   vec3 slip = alongSurface(relative, contact.normal);
   precise vec3 after = carried + (1.0 - heldShare(slip, most)) * slip + max(approach, 0.0) * contact.normal;
   precise vec3 gained = after - velocity;
@@ -185,7 +187,8 @@ void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity,
   precise vec3 stayed = surface - heldShare(slid, push.substepSeconds * most) * slid;
   position = stayed;
   if (push.contactClothCount > 0 && node.inverseMass > 0.0) {
-    reportContact(index * push.contactClothCount + node.cloth, gained, node.inverseMass);
+    precise vec3 given = gained + (pushed - met) * contact.normal;
+    reportContact(index * push.contactClothCount + node.cloth, given, node.inverseMass);
   }
 }
 

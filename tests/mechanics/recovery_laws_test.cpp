@@ -121,7 +121,8 @@ TEST_P(RecoveryLaws, JumpsLeaveNothingBehind) {
   expectRow({GetParam().name, figure(1000 * jump), figure(usual), figure(glitch)});
 }
 
-INSTANTIATE_TEST_SUITE_P(Solvers, RecoveryLaws, testing::ValuesIn(ways()), nameOfWay);
+INSTANTIATE_TEST_SUITE_P(Solvers, RecoveryLaws, testing::ValuesIn(ways()),
+                         [](const auto& way) { return lettersOf(way.param.name); });
 
 }  // namespace
 }  // namespace clothstream::mechanics

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Cloth whose energy is at its minimum stays there. docs/mechanics.md has the figures.
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "server/model/material.h"
 #include "tests/mechanics/rows.h"
 #include "tests/simulation/scenes.h"
 
@@ -68,6 +70,60 @@ TEST_P(RestLaws, PleatsAtRestStayAtRest) {
   EXPECT_LT(energy, 1e-9);
   expectRow({'`' + nameOf(GetParam()) + '`', figure(energy)});
 }
+
+// A square of 12x12 nodes of cotton, 30 cm, 10 g.
+model::Cloth cotton() {
+  model::Cloth cloth;
+  cloth.name = "cloth";
+  cloth.grid = {.rows = 12, .columns = 12, .width = 0.3f, .height = 0.3f};
+  model::makeOf(*model::findMaterial("cotton"), cloth);
+  return cloth;
+}
+
+// Speed of the fastest node after five seconds.
+double restlessness(model::Scene scene) {
+  // As far as streams with a max error of 2 mm hold a coordinate.
+  scene.stream.maxError = 0.002f;
+  tests::Running running(scene);
+  simulation::TickInputs inputs = tests::inputsOf(scene);
+  inputs.colliders = simulation::inputsAt(scene, 0).colliders;
+  for (std::uint32_t tick = 0; tick < 5 * scene.simulationRate; ++tick)
+    EXPECT_TRUE(running.tick(inputs).healthy);
+  double fastest = 0;
+  for (const model::Vec3& velocity : running.state().velocities)
+    fastest = std::max(fastest, double{velocity.norm()});
+  return fastest;
+}
+
+model::Scene drapedAt(float x) {
+  model::Cloth cloth = cotton();
+  cloth.grid.pose = {model::Vec3(x, 1.15f, -0.15f), tests::turned(90, model::Vec3::UnitX())};
+  model::Scene scene = tests::sceneOf({cloth});
+  model::Collider& ball = scene.colliders.emplace_back();
+  ball.name = "ball";
+  ball.pose.position = model::Vec3(x, 1, 0);
+  return scene;
+}
+
+model::Scene hungAt(float x) {
+  model::Cloth cloth = cotton();
+  cloth.grid.pose.position = model::Vec3(x, 1, 0);
+  cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = 11, .columnStep = 11}};
+  return tests::sceneOf({cloth});
+}
+
+class FarLaws : public tests::GpuTest, public testing::WithParamInterface<int> {};
+
+TEST_P(FarLaws, ClothRestsFarFromTheOrigin) {
+  const auto x = static_cast<float>(GetParam());
+  const double draped = restlessness(drapedAt(x)), hung = restlessness(hungAt(x));
+  EXPECT_LT(draped, 0.001);
+  EXPECT_LT(hung, 0.1);
+  expectRow({std::to_string(GetParam()), figure(draped), figure(hung)});
+}
+
+INSTANTIATE_TEST_SUITE_P(Metres, FarLaws, testing::Values(0, 100, 500, 950),
+                         [](const auto& metres) { return std::to_string(metres.param); });
 
 INSTANTIATE_TEST_SUITE_P(Solvers, RestLaws,
                          testing::Values(model::SolverKind::massSpring, model::SolverKind::acad,

@@ -38,11 +38,11 @@ std::vector<Way> ways() {
           {"`xpbd`, 4 sweeps", sweeps}};
 }
 
-std::string nameOfWay(const testing::TestParamInfo<Way>& way) {
-  std::string name;
-  for (const char c : way.param.name)
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0) name += c;
-  return name;
+std::string lettersOf(const std::string& name) {
+  std::string letters;
+  for (const char c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) letters += c;
+  return letters;
 }
 
 model::Cloth clothOf(const Way& way) {

@@ -26,8 +26,8 @@ struct Way {
 
 std::vector<Way> ways();
 
-// Letters and digits of the name, for a test's name.
-std::string nameOfWay(const testing::TestParamInfo<Way>& way);
+// Letters and digits of a name in the page, for a test's name.
+std::string lettersOf(const std::string& name);
 
 // 8x8 nodes, 40 cm, 50 g, held 50 degrees from the vertical.
 model::Cloth clothOf(const Way& way);

@@ -69,9 +69,9 @@ TEST(Carry, LeavesAClothThatIsHeldElsewhere) {
   EXPECT_TRUE(carriesOf(scene, before, std::vector{at(5), at(1)}).empty());
   EXPECT_TRUE(carriesOf(scene, before, std::vector{at(0), at(6)}).empty());
   const std::vector together = {at(5), at(6)};
-  for (const auto& pin : std::vector<void (*)(Cloth&)>{[](Cloth& cloth) { cloth.pins.emplace_back(); },
-                                                       [](Cloth& cloth) { cloth.pinnedVertices = {3}; },
-                                                       [](Cloth& cloth) { cloth.pinnedRegions.emplace_back(); }}) {
+  for (const auto& pin : std::vector<void (*)(Cloth&)>{
+           [](Cloth& cloth) { cloth.pins.emplace_back(); }, [](Cloth& cloth) { cloth.pinnedVertices = {3}; },
+           [](Cloth& cloth) { cloth.pinnedRegions.emplace_back(); }}) {
     Scene pinned = scene;
     pin(pinned.cloths[1]);
     EXPECT_TRUE(carriesOf(pinned, before, together).empty());
