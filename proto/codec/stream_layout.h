@@ -52,6 +52,9 @@ struct StreamLayout {
   // it. A stream changes its quality at a key frame.
   std::uint8_t qualities = 1;
   std::vector<ClothLayout> cloths;
+  // Point to which the positions that an encoder gets are relative, in metres. Decoders know nothing of it:
+  // packets hold positions in the world.
+  std::array<float, 3> origin = {};
 
   std::uint32_t vertexCount() const {
     std::uint32_t sum = 0;

@@ -11,6 +11,7 @@
 #include "server/encode/device_predictor.h"
 #include "server/encode/encode_stage.h"
 #include "server/model/mesh.h"
+#include "server/model/origin.h"
 
 namespace clothstream::encode {
 namespace {
@@ -52,6 +53,8 @@ codec::StreamLayout streamLayout(const model::Scene& scene, std::uint32_t epoch)
                              .temporalLayers = scene.stream.temporalLayers,
                              .qualities = scene.stream.qualities,
                              .cloths = {}};
+  const model::Vec3 origin = model::originOf(scene);
+  std::ranges::copy(origin, layout.origin.begin());
   for (const model::Cloth& cloth : scene.cloths) {
     if (cloth.mesh)
       layout.cloths.push_back({.vertexCount = cloth.nodeCount(),

@@ -54,7 +54,7 @@ class States {
                       {"cloths", step::describeCloths(state.scene)},
                       {"scene", Json::parse(messages::toJson(state.scene))}};
     }
-    file_.append(state.snapshot.bytes);
+    file_.append(simulation::inWorld(state.snapshot).bytes);
     ticks_.push_back(state.snapshot.tick);
     hashes_.push_back(fmt::format("{:016x}", state.hash));
     if (!state.same) different_.push_back(state.snapshot.tick);

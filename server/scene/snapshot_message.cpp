@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "server/messages/vectors.h"
+
 namespace clothstream::scene {
 namespace {
 
@@ -70,6 +72,7 @@ tl::expected<HeldNodes, std::string> toHeldNodes(const v1::HeldNodes& message, s
 void write(const simulation::StateSnapshot& snapshot, v1::Checkpoint& message) {
   message.set_tick(snapshot.tick);
   message.set_state(snapshot.bytes.data(), snapshot.bytes.size());
+  if (!snapshot.origin.isZero(0)) messages::write(snapshot.origin, *message.mutable_origin());
   message.set_grips_hold(!snapshot.held.nodes.empty());
   if (!snapshot.held.grabs.empty()) write(snapshot.held, *message.mutable_held());
 }
@@ -80,6 +83,9 @@ tl::expected<simulation::StateSnapshot, std::string> toSnapshot(const v1::Checkp
     return tl::unexpected(fmt::format("does not fit the {} nodes of its scene", nodeCount));
   const auto state = std::as_bytes(std::span(message.state()));
   simulation::StateSnapshot snapshot{message.tick(), {state.begin(), state.end()}};
+  snapshot.origin = {message.origin().x(), message.origin().y(), message.origin().z()};
+  if (!(snapshot.origin.cwiseAbs().maxCoeff() <= simulation::kWorldExtent))
+    return tl::unexpected(std::string("has an origin outside of the world"));
   if (message.has_held()) {
     auto held = toHeldNodes(message.held(), nodeCount);
     if (!held) return tl::unexpected(std::move(held).error());

@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include "kernels/hash_state.h"
+#include "server/model/origin.h"
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/assembled/assembled_stage.h"
 #include "server/simulation/attachment/attachment_stage.h"
@@ -154,7 +155,9 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<BendingStage> nextBending(std::span<const model::Cloth> cloths);
   // `stage` replaces the present stage unless it is null.
   void setBending(std::unique_ptr<BendingStage> stage, std::span<const model::Cloth> cloths);
-  void makeAttachments(const AttachmentTables& tables);
+  void makeAttachments(AttachmentTables tables);
+  // Inputs relative to the origin.
+  const TickInputs& nearby(const TickInputs& inputs);
   // Whether setCloths() has to make these.
   bool needsSolvers(std::span<const model::Solver> wanted) const;
   bool needsBending(std::span<const model::Cloth> cloths) const;
@@ -181,6 +184,7 @@ struct ClothSimulation::Pipeline {
   std::vector<std::uint32_t> offsets;
   std::uint32_t nodes;
   std::uint32_t reach;  // HashPush::reach
+  model::Vec3 origin;
   float airDensity;     // kg/m^3, of the newest tick
   std::vector<shared::ClothRecord> records;
   std::vector<float> masses;       // 1/kg, by node
@@ -214,6 +218,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<ReportStage> report;                // created for the first report
   std::unique_ptr<MassStage> massChange;              // created when a mass first changes
   SimulationOptions asked;
+  TickInputs moved;  // by nearby(), of scenes with an origin elsewhere
 
   bool started = false;           // the start state is on the device
   bool tabled = false;            // the tables of the solvers are on the device
@@ -234,6 +239,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       offsets(simulation::clothOffsets(scene.cloths)),
       nodes(offsets.back()),
       reach(std::bit_cast<std::uint32_t>(model::reachOf(scene.stream))),
+      origin(model::originOf(scene)),
       airDensity(scene.environment.airDensity),
       records(clothRecords(scene.cloths, substepSeconds)),
       masses(inverseMasses(scene.cloths)),
@@ -253,7 +259,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       stiffness(springStiffness(scene.cloths)),
       asked(options) {
   std::memcpy(buffers.inputs[slot].mapped().data(), records.data(), buffers.cloths.bytes());
-  buffers.state.write(restState(scene.cloths), masses);
+  buffers.state.write(restState(scene.cloths, origin), masses);
   const MeshTables meshTables = simulation::meshTables(scene.cloths, workgroupSize);
   if (!meshTables.nodes.empty())
     meshes = std::make_unique<MeshStage>(on, meshTables, stateOf(buffers, collision), buffers.normals,
@@ -282,7 +288,12 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
   prepare();
 }
 
-void ClothSimulation::Pipeline::makeAttachments(const AttachmentTables& tables) {
+void ClothSimulation::Pipeline::makeAttachments(AttachmentTables tables) {
+  for (shared::FrameRecord& frame : tables.frames) {
+    frame.position.x -= origin.x();
+    frame.position.y -= origin.y();
+    frame.position.z -= origin.z();
+  }
   attachments =
       std::make_unique<AttachmentStage>(device, tables, stateOf(buffers, collision), nodes, workgroupSize);
 }
@@ -433,6 +444,19 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
   started = tabled = weighed = true;
 }
 
+const TickInputs& ClothSimulation::Pipeline::nearby(const TickInputs& inputs) {
+  if (origin.isZero(0)) return inputs;
+  moved = inputs;
+  for (MovingCollider& collider : moved.colliders)
+    for (model::Pose* pose : {&collider.start, &collider.end}) pose->position -= origin;
+  for (model::Pose& pose : moved.attachments) pose.position -= origin;
+  for (model::Carry& carry : moved.carries)
+    for (model::Pose* pose : {&carry.from, &carry.to}) pose->position -= origin;
+  for (Grab& grab : moved.grabs)
+    for (model::Pose* pose : {&grab.start, &grab.end}) pose->position -= origin;
+  return moved;
+}
+
 void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const TickInputs& inputs) {
   slot = 1 - slot;
   const Buffer& from = buffers.inputs[slot];
@@ -539,7 +563,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
 void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.beginStage("hash");
   recorder.barrier();
-  recorder.dispatch(hash.from[present], shared::HashPush{nodes, reach}, hashInvocations(device, nodes));
+  recorder.dispatch(hash.from[present], shared::HashPush{vectorOf(origin), nodes, reach}, hashInvocations(device, nodes));
   if (motionBound)
     motionBound->recordDepths(recorder, present, collision.push(substeps - 1, substeps, tickRate));
   recorder.barrier();
@@ -615,8 +639,9 @@ void ClothSimulation::setSubsteps(std::uint32_t substeps, std::span<const model:
   if (on.motionBound) on.motionBound->setSubstepSeconds(on.substepSeconds);
 }
 
-void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inputs) {
-  assert(inputs.colliders.size() <= kMaxColliders);
+void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& inWorld) {
+  assert(inWorld.colliders.size() <= kMaxColliders);
+  const TickInputs& inputs = pipeline_->nearby(inWorld);
   pipeline_->airDensity = inputs.environment.airDensity;
   pipeline_->start(recorder);
   pipeline_->recordInputs(recorder, inputs);
@@ -638,7 +663,7 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
                                               on.meshes ? on.meshes->springs() : MeshSprings{},
                                               on.solids.get(), on.asked.workgroupSize);
   recorder.beginStage("report");
-  on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity,
+  on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity, on.origin,
                     on.collision.push(on.substeps - 1, on.substeps, on.tickRate), on.collision.solidCount());
   on.namesConstraints = inputs.namesConstraints && on.solves.active();
   if (!on.namesConstraints) return;
@@ -726,6 +751,7 @@ void ClothSimulation::recordSaveState(vulkan::Recorder& recorder) {
 
 StateSnapshot ClothSimulation::collectState(std::uint64_t tick) const {
   StateSnapshot snapshot = pack(pipeline_->buffers.state.collect(), tick);
+  snapshot.origin = pipeline_->origin;
   if (pipeline_->attachments) snapshot.held = pipeline_->attachments->collect();
   return snapshot;
 }
@@ -737,7 +763,7 @@ void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const State
         fmt::format("a snapshot of {} bytes is of another scene: this one's {} nodes take {}",
                     snapshot.bytes.size(), pipeline_->nodes, expected));
   pipeline_->start(recorder);
-  pipeline_->buffers.state.write(unpack(snapshot), pipeline_->masses);
+  pipeline_->buffers.state.write(unpack(snapshot, pipeline_->origin), pipeline_->masses);
   recorder.beginStage("state");
   pipeline_->buffers.state.recordUpload(recorder, pipeline_->present);
 }
@@ -764,6 +790,9 @@ std::vector<shared::SolveRecord> ClothSimulation::solves() const {
   return solves;
 }
 
+const model::Vec3& ClothSimulation::origin() const {
+  return pipeline_->origin;
+}
 std::uint32_t ClothSimulation::nodeCount() const {
   return pipeline_->nodes;
 }

@@ -159,12 +159,15 @@ class ClothSimulation {
   // std::runtime_error if the device has too little memory. Stage "state".
   void recordRestoreGrabs(vulkan::Recorder& recorder, const HeldNodes& held);
 
+  // The point to which positions on the device are relative, in the world: model::originOf() of the scene.
+  // Inputs and results of this class are in the world, except for snapshots.
+  const model::Vec3& origin() const;
   std::uint32_t nodeCount() const;
   // First node of each cloth, then nodeCount(): clothCount + 1 numbers.
   std::span<const std::uint32_t> clothOffsets() const;
 
-  // Buffers that other stages read. Positions are RGBA32F texels: xyz = position, w = inverse mass (0 for
-  // pinned nodes). Normals are one vec4 per node with w = 0. Positions alternate between two buffers. Other
+  // Buffers that other stages read. Positions are RGBA32F texels: xyz = position relative to origin(), w =
+  // inverse mass (0 for pinned nodes). Normals are one vec4 per node with w = 0. Positions alternate between two buffers. Other
   // stages bind both and choose by presentIndex() when they record; they begin with their own barrier.
   const vulkan::Buffer& positions(std::uint32_t index) const;  // 0 or 1
   std::uint32_t presentIndex() const;

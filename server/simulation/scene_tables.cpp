@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "server/model/origin.h"
 #include "server/model/springs.h"
 #include "server/model/stability.h"
 #include "server/model/strain_limit.h"
@@ -138,10 +139,10 @@ std::vector<float> inverseMasses(std::span<const model::Cloth> cloths) {
   return all;
 }
 
-NodeState restState(std::span<const model::Cloth> cloths) {
+NodeState restState(std::span<const model::Cloth> cloths, const model::Vec3& origin) {
   NodeState state;
   for (const model::Cloth& cloth : cloths) {
-    const std::vector<model::Vec3> positions = model::restPositions(cloth);
+    const std::vector<model::Vec3> positions = model::restPositions(cloth, origin);
     std::transform(positions.begin(), positions.end(), std::back_inserter(state.positions),
                    [](const model::Vec3& p) { return model::Vec3(p.unaryExpr(&snapTiny)); });
   }

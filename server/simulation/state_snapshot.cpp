@@ -16,7 +16,7 @@ namespace clothstream::simulation {
 static_assert(std::endian::native == std::endian::little);
 static_assert(sizeof(model::Vec3) == 12);
 
-NodeState unpack(const StateSnapshot& snapshot) {
+NodeState unpack(const StateSnapshot& snapshot, const model::Vec3& origin) {
   assert(snapshot.bytes.size() % kSnapshotBytesPerNode == 0);
   const std::size_t nodes = snapshot.bytes.size() / kSnapshotBytesPerNode;
   NodeState state{std::vector<model::Vec3>(nodes), std::vector<model::Vec3>(nodes)};
@@ -25,6 +25,9 @@ NodeState unpack(const StateSnapshot& snapshot) {
     std::memcpy(state.positions[i].data(), from, 12);
     std::memcpy(state.velocities[i].data(), from + 12, 12);
   }
+  const model::Vec3 shift = snapshot.origin - origin;
+  if (!shift.isZero(0))
+    for (model::Vec3& position : state.positions) position += shift;
   return state;
 }
 
@@ -37,6 +40,12 @@ StateSnapshot pack(const NodeState& state, std::uint64_t tick) {
     std::memcpy(to + 12, state.velocities[i].data(), 12);
   }
   return snapshot;
+}
+
+StateSnapshot inWorld(const StateSnapshot& snapshot) {
+  StateSnapshot moved = pack(unpack(snapshot), snapshot.tick);
+  moved.held = snapshot.held;
+  return moved;
 }
 
 TickStatus statusOf(const StateSnapshot& snapshot, float reach) {
@@ -54,10 +63,12 @@ TickStatus statusOf(const StateSnapshot& snapshot, float reach) {
     sum.low += hash.low;
     sum.high += hash.high;
     for (const std::uint32_t word : words) isInWorld = isInWorld && !shared::isOutsideWorld(word);
-    for (const std::uint32_t word : std::span(words).first(3))
-      isInReach = isInReach && !shared::isBeyond(word, std::bit_cast<std::uint32_t>(reach));
-    const model::Vec3 place(std::bit_cast<float>(words[0]), std::bit_cast<float>(words[1]),
-                            std::bit_cast<float>(words[2]));
+    const model::Vec3 place(snapshot.origin.x() + std::bit_cast<float>(words[0]),
+                            snapshot.origin.y() + std::bit_cast<float>(words[1]),
+                            snapshot.origin.z() + std::bit_cast<float>(words[2]));
+    for (const float x : place)
+      isInReach = isInReach &&
+                  !shared::isBeyond(std::bit_cast<std::uint32_t>(x), std::bit_cast<std::uint32_t>(reach));
     low = low.cwiseMin(place);
     high = high.cwiseMax(place);
   }

@@ -27,11 +27,12 @@ struct HeldNodes {
 
 // Everything on the device that a later tick depends on: positions and velocities of all nodes, and what
 // grabs hold. Usable for another ClothSimulation of the same scene on any device. `bytes` has six
-// little-endian floats per node, in order: position, velocity.
+// little-endian floats per node, in order: position relative to `origin`, velocity.
 struct StateSnapshot {
   std::uint64_t tick = 0;  // chosen by the caller
   std::vector<std::byte> bytes;
   HeldNodes held = {};
+  model::Vec3 origin = model::Vec3::Zero();  // m
 };
 inline constexpr std::size_t kSnapshotBytesPerNode = 24;
 
@@ -39,9 +40,12 @@ inline constexpr std::size_t kSnapshotBytesPerNode = 24;
 struct NodeState {
   std::vector<model::Vec3> positions, velocities;
 };
-// A snapshot must have whole nodes, and a state as many velocities as positions.
-NodeState unpack(const StateSnapshot& snapshot);
+// A snapshot must have whole nodes, and a state as many velocities as positions. Positions of the result are
+// relative to `origin`, zero for those in the world.
+NodeState unpack(const StateSnapshot& snapshot, const model::Vec3& origin = model::Vec3::Zero());
 StateSnapshot pack(const NodeState& state, std::uint64_t tick);
+// The same snapshot with the positions in the world, rounded.
+StateSnapshot inWorld(const StateSnapshot& snapshot);
 
 // Status of a tick.
 struct TickStatus {
@@ -54,7 +58,8 @@ struct TickStatus {
   // Self-collision: number of lists of neighbours that were too long, plus number of balls that touched too
   // many others.
   std::uint32_t crowded = 0;
-  model::Vec3 low = model::Vec3::Zero(), high = model::Vec3::Zero();  // box of all nodes, if healthy
+  // Box of all nodes in the world, if healthy.
+  model::Vec3 low = model::Vec3::Zero(), high = model::Vec3::Zero();
 };
 inline constexpr float kWorldExtent = 8192;
 

@@ -88,7 +88,7 @@ Outcome run(vulkan::Device& device, const model::Scene& scene, const StepOptions
   Frames frames;
   submit([&] { simulation.recordSaveState(recorder); });
   const simulation::StateSnapshot start = simulation.collectState(0);
-  file.append(start.bytes);
+  file.append(simulation::inWorld(start).bytes);
   frames.add(0, simulation::statusOf(start).stateHash, nullptr);
 
   Outcome outcome = Outcome::complete;
@@ -110,7 +110,7 @@ Outcome run(vulkan::Device& device, const model::Scene& scene, const StepOptions
                                    : std::string("the state left the range of numbers"),
                  options.out.string(), file.frames());
     } else if (wanted) {
-      file.append(simulation.collectState(tick).bytes);
+      file.append(simulation::inWorld(simulation.collectState(tick)).bytes);
       frames.add(tick, status.stateHash, describe(simulation.report(), tickSeconds(recorder)));
     }
     progress.show(tick);

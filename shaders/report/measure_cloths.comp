@@ -127,7 +127,7 @@ void measureNode(vec3 here, float inverseMass, uint index) {
   float mass = reciprocal(inverseMass);
   vec3 velocity = texelFetch(velocities, int(index)).xyz;
   precise float kinetic = sums.kinetic + (0.5 * mass) * dotProduct(velocity, velocity);
-  precise float gravity = sums.gravity - mass * dotProduct(push.gravity.xyz, here);
+  precise float gravity = sums.gravity - mass * (dotProduct(push.gravity.xyz, here) + push.gravity.w);
   sums.kinetic = kinetic;
   sums.gravity = gravity;
 }

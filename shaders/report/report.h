@@ -55,7 +55,7 @@ struct ReportSums {
 };
 
 struct MeasurePush {
-  vec4 gravity;
+  vec4 gravity;  // w: gravity times the origin of the positions
   uint32_t blockCount;
   uint32_t reserved0, reserved1, reserved2;
 };

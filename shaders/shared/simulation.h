@@ -237,8 +237,9 @@ struct FinishPush {
 };
 
 struct HashPush {
+  vec3 origin;  // of the positions, m
   uint32_t nodeCount;
-  uint32_t reach;  // bits of the largest magnitude of a position's component, m
+  uint32_t reach;  // bits of the largest magnitude of a component of a position in the world, m
 };
 
 // A component is not finite or outside the world; a component of a position is beyond HashPush::reach.
@@ -273,7 +274,7 @@ static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, wind) == 16 &&
 static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 48 && sizeof(SolvePush) == 24 &&
               sizeof(ApplyPush) == 64 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&
               sizeof(FinishPush) == 48 && sizeof(StretchedPush) == 48 && sizeof(MarkPush) == 20 &&
-              sizeof(HashPush) == 8);
+              sizeof(HashPush) == 20);
 static_assert(sizeof(StatusRecord) == 48 && offsetof(StatusRecord, unhealthy) == 8 &&
               offsetof(StatusRecord, high) == 28);
 }  // namespace clothstream::shared

@@ -2,6 +2,7 @@
 // Definitions that encoder and decoder of codec 2 share, apart from the prediction.
 #include "proto/codec/hierarchical/frame_coder.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "proto/codec/reconstruction_hash.h"
@@ -20,6 +21,14 @@ double quantisationScale(float unit) {
   int exponent;
   const double mantissa = std::frexp(1 / static_cast<double>(unit), &exponent);
   return std::ldexp(std::round(std::ldexp(mantissa, kScaleBits)), exponent - kScaleBits);
+}
+
+std::array<std::int32_t, 3> originInUnits(const StreamLayout& layout, float unit) {
+  std::array<std::int32_t, 3> units;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    units[axis] = static_cast<std::int32_t>(
+        std::clamp(std::round(double{layout.origin[axis]} / double{unit}), -double{kMaxWanted}, double{kMaxWanted}));
+  return units;
 }
 
 Weights keyFrameWeights() {

@@ -22,9 +22,10 @@ layout(std430, binding = 4) buffer Status {
 shared uint moved;
 shared uint restWishes;
 
+const int kLimit = (1 << 27) - (4 << 8);
+
 // Multiplies by push.scale, exactly (53 bits). Rounds to the nearest integer, and to the even one of two.
 int quantise(float x) {
-  const int kLimit = (1 << 27) - (4 << 8);
   uint bits = floatBitsToUint(x);
   uint exponent = (bits >> 23) & 0xFFu;
   bool isNegative = (bits >> 31) != 0;
@@ -67,7 +68,8 @@ void main() {
   uint slot = gl_GlobalInvocationID.x;
   if (slot < push.vertexCount) {
     vec3 p = texelFetch(positions, int(slotTable[slot])).xyz;
-    ivec3 q = ivec3(quantise(p.x), quantise(p.y), quantise(p.z));
+    ivec3 nearby = ivec3(quantise(p.x), quantise(p.y), quantise(p.z));
+    ivec3 q = clamp(nearby + ivec3(uvec3(push.originX, push.originY, push.originZ)), -kLimit, kLimit);
     ivec4 before = wanted[slot];
     uint still = q == before.xyz ? min(uint(before.w) + 1, kMaxStillFrames) : 0;
     wanted[slot] = ivec4(q, int(still));
