@@ -185,7 +185,7 @@ struct ClothSimulation::Pipeline {
   std::uint32_t nodes;
   std::uint32_t reach;  // HashPush::reach
   model::Vec3 origin;
-  float airDensity;     // kg/m^3, of the newest tick
+  float airDensity;  // kg/m^3, of the newest tick
   std::vector<shared::ClothRecord> records;
   std::vector<float> masses;       // 1/kg, by node
   std::vector<float> clothMasses;  // kg
@@ -563,7 +563,8 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
 void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.beginStage("hash");
   recorder.barrier();
-  recorder.dispatch(hash.from[present], shared::HashPush{vectorOf(origin), nodes, reach}, hashInvocations(device, nodes));
+  recorder.dispatch(hash.from[present], shared::HashPush{vectorOf(origin), nodes, reach},
+                    hashInvocations(device, nodes));
   if (motionBound)
     motionBound->recordDepths(recorder, present, collision.push(substeps - 1, substeps, tickRate));
   recorder.barrier();

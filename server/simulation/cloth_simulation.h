@@ -167,8 +167,9 @@ class ClothSimulation {
   std::span<const std::uint32_t> clothOffsets() const;
 
   // Buffers that other stages read. Positions are RGBA32F texels: xyz = position relative to origin(), w =
-  // inverse mass (0 for pinned nodes). Normals are one vec4 per node with w = 0. Positions alternate between two buffers. Other
-  // stages bind both and choose by presentIndex() when they record; they begin with their own barrier.
+  // inverse mass (0 for pinned nodes). Normals are one vec4 per node with w = 0. Positions alternate between
+  // two buffers. Other stages bind both and choose by presentIndex() when they record; they begin with their
+  // own barrier.
   const vulkan::Buffer& positions(std::uint32_t index) const;  // 0 or 1
   std::uint32_t presentIndex() const;
   const vulkan::Buffer& normals() const;

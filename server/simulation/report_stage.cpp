@@ -147,7 +147,8 @@ Bindings ReportStage::penetrationsIn(const vulkan::Device& device, const StateBu
 
 void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
                          std::span<const SpringStiffness> stiffness, const model::Vec3& gravity,
-                         const model::Vec3& origin, const shared::CollisionPush& collision, std::uint32_t solidCount) {
+                         const model::Vec3& origin, const shared::CollisionPush& collision,
+                         std::uint32_t solidCount) {
   assert(stiffness.size() == of_.cloths.size());
   for (std::size_t i = 0; i < stiffness.size(); ++i) {
     of_.cloths[i].structuralStiffness = stiffness[i].structural;
@@ -163,13 +164,14 @@ void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
   recorder.fill(counts_, 0, counts_.bytes());
   recorder.barrier();
   const auto blocks = static_cast<std::uint32_t>(of_.records.size());
-  recorder.dispatch(measureIn_[present],
-                    shared::MeasurePush{.gravity = {gravity.x(), gravity.y(), gravity.z(), gravity.dot(origin)},
-                                        .blockCount = blocks,
-                                        .reserved0 = 0,
-                                        .reserved1 = 0,
-                                        .reserved2 = 0},
-                    std::uint64_t{blocks} * shared::kReportRuns);
+  recorder.dispatch(
+      measureIn_[present],
+      shared::MeasurePush{.gravity = {gravity.x(), gravity.y(), gravity.z(), gravity.dot(origin)},
+                          .blockCount = blocks,
+                          .reserved0 = 0,
+                          .reserved1 = 0,
+                          .reserved2 = 0},
+      std::uint64_t{blocks} * shared::kReportRuns);
   const shared::PenetrationPush penetration{
       .collision = collision, .blockCount = blocks, .solidCount = solidCount, .reserved0 = 0, .reserved1 = 0};
   const std::uint64_t depthThreads = std::uint64_t{blocks} * (shared::kReportBlock / shared::kReportDepths);

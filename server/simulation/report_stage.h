@@ -54,7 +54,8 @@ class ReportStage {
   // Measures the state in the buffers `present` against the colliders at the end of `collision`, and
   // `solidCount` meshes. Begins with a barrier. At most one such recording may be in flight.
   void record(vulkan::Recorder& recorder, std::uint32_t present, std::span<const SpringStiffness> stiffness,
-              const model::Vec3& gravity, const model::Vec3& origin, const shared::CollisionPush& collision, std::uint32_t solidCount);
+              const model::Vec3& gravity, const model::Vec3& origin, const shared::CollisionPush& collision,
+              std::uint32_t solidCount);
   // Reports of a complete recording, one per cloth, without the values of a solve.
   std::vector<ClothReport> collect() const;
 

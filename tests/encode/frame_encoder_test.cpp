@@ -89,6 +89,16 @@ TEST_P(FrameEncoder, KeepsTheErrorAtTheEdgesOfRounding) {
   }
 }
 
+// The simulation and the encoder work near an origin, and packets hold positions in the world.
+TEST_P(FrameEncoder, KeepsTheErrorFarFromTheOriginOfTheWorld) {
+  model::Scene scene = GetParam().cloths();
+  for (model::Cloth& cloth : scene.cloths) cloth.grid.pose.position += model::Vec3(700, -300, 90);
+  scene.stream.maxError = 0.002f;
+  Encoding encoding(scene, GetParam().prediction);
+  EXPECT_NE(encoding.simulation.origin(), model::Vec3::Zero());
+  for (std::uint64_t tick = 1; tick <= 30; ++tick) encoding.tick(tick, tick % 10 == 1, inputsOf(scene));
+}
+
 TEST_P(FrameEncoder, MakesThePacketsOfMeshes) {
   model::Scene scene = GetParam().cloths();
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));

@@ -42,8 +42,7 @@ simulation::TickInputs inputsAt(const model::Scene& scene, const Vec3& place, in
                    .start = hand,
                    .end = tick == 0 ? hand : up}};
   inputs.attachments = {{place + Vec3(0, 0, tick > 5 ? 2.0f : 0.0f), model::Quaternion::Identity()}};
-  if (tick == 6)
-    inputs.carries = {{0, {place, model::Quaternion::Identity()}, inputs.attachments[0]}};
+  if (tick == 6) inputs.carries = {{0, {place, model::Quaternion::Identity()}, inputs.attachments[0]}};
   return inputs;
 }
 

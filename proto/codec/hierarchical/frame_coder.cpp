@@ -26,8 +26,8 @@ double quantisationScale(float unit) {
 std::array<std::int32_t, 3> originInUnits(const StreamLayout& layout, float unit) {
   std::array<std::int32_t, 3> units;
   for (std::size_t axis = 0; axis < 3; ++axis)
-    units[axis] = static_cast<std::int32_t>(
-        std::clamp(std::round(double{layout.origin[axis]} / double{unit}), -double{kMaxWanted}, double{kMaxWanted}));
+    units[axis] = static_cast<std::int32_t>(std::clamp(std::round(double{layout.origin[axis]} / double{unit}),
+                                                       -double{kMaxWanted}, double{kMaxWanted}));
   return units;
 }
 
