@@ -153,7 +153,7 @@ TEST(HostilePacket, StaleIfNotNewer) {
 TEST(HostilePacket, RefusedIfOfAnotherCodec) {
   const std::vector<GoldenStream> streams = readGoldenStreams();
   std::vector<std::byte> bytes = streams[0].packets[0].bytes;
-  for (const std::byte codec : {std::byte{0}, std::byte{1}, std::byte{kCodecPacked}, std::byte{200}}) {
+  for (const std::byte codec : {std::byte{0}, std::byte{1}, std::byte{3}, std::byte{200}}) {
     bytes[1] = codec;
     EXPECT_EQ(Decoder::make(streams[0].layout)->decode(bytes), DecodeResult::malformed);
   }
