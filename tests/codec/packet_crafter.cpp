@@ -22,11 +22,10 @@ PacketCrafter::PacketCrafter(const StreamLayout& layout)
 
 std::vector<std::byte> PacketCrafter::craft(const FrameRole& role, std::uint32_t seed) {
   random_.seed(seed);
-  const bool key = role.kind == PacketKind::key;
   PacketAssembly packet(layout_);
   std::vector<std::byte> out(4096 + 64 * std::size_t{layout_.vertexCount()});
   BitWriter bits(packet.begin(role, out));
-  writeWeights(key, bits);
+  writeWeights(bits);
   std::byte* end = bits.finish();
   packet.endSection(end);
   packet.endSection(end);
@@ -36,7 +35,6 @@ std::vector<std::byte> PacketCrafter::craft(const FrameRole& role, std::uint32_t
   for (std::size_t phase = hierarchy_.coarsePhases; phase < hierarchy_.phases.size(); ++phase) bits.put(1, 1);
   packet.endSection(bits.finish());
   out.resize(packet.finish());
-  if (key) made_ = startingWeights();
   return out;
 }
 
@@ -47,13 +45,13 @@ std::vector<std::byte> PacketCrafter::craftWrong(const FrameRole& role, Fault fa
   return packet;
 }
 
-void PacketCrafter::writeWeights(bool key, BitWriter& out) {
-  made_ = key ? keyFrameWeights() : kept_;
+void PacketCrafter::writeWeights(BitWriter& out) {
+  made_ = kept_;
   out.put(0, 1);
   for (std::size_t c = 0; c < kWeightClasses; ++c) {
     out.put(1, 1);
-    for (std::size_t f = firstWeight(key); f < endWeight(key); ++f) {
-      if (fault_ == Fault::gammaNumberOf31Bits && c == 5 && f + 1 == endWeight(key)) {
+    for (std::size_t f = 0; f < kFeatures; ++f) {
+      if (fault_ == Fault::gammaNumberOf31Bits && c == 5 && f + 1 == kFeatures) {
         out.put(0, 31 - kWeightGammaBits);
         out.put(1, 1);
         out.put(0, 31);

@@ -16,8 +16,8 @@
 
 namespace clothstream::codec {
 
-// For streams with one temporal layer. Packets have weights of every size, and all residuals are 0.
-// Coordinates may become too large: a decoder then refuses the packet.
+// Predicted frames of streams with one temporal layer. They have weights of every size, and all residuals are
+// 0. Coordinates may become too large: a decoder then refuses the packet.
 class PacketCrafter {
  public:
   explicit PacketCrafter(const StreamLayout& layout);
@@ -34,7 +34,7 @@ class PacketCrafter {
   std::vector<std::byte> craftWrong(const FrameRole& role, Fault fault);
 
  private:
-  void writeWeights(bool key, hierarchical::BitWriter& out);
+  void writeWeights(hierarchical::BitWriter& out);
   std::uint32_t below(std::uint32_t bound) { return static_cast<std::uint32_t>(random_() % bound); }
 
   StreamLayout layout_;

@@ -252,17 +252,16 @@ int main() try {
                                         .maxError = 0.00002f,
                                         .normals = NormalMode::none,
                                         .cloths = {{.vertexCount = 150, .rows = 15, .columns = 10}}}),
-       makeLongStream("weighted",
-                      {.epoch = 9, .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
-       makeLongStream("layered", {.epoch = 9,
-                                  .temporalLayers = 3,
-                                  .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
+       makeLongStream("weighted", {.epoch = 9, .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
+       makeLongStream(
+           "layered",
+           {.epoch = 9, .temporalLayers = 3, .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
        makeStream("vertex", {.epoch = 0xffffffffu,
                              .maxError = 0.01f,
                              .normals = NormalMode::none,
                              .cloths = {{.vertexCount = 1, .rows = 0, .columns = 0}}}),
-       makeHeldStream(), makeQualityStream(), makeSmallStream(),
-       makeExtremeStream(), makeFarNormalsStream(), makeWrappedStream()});
+       makeHeldStream(), makeQualityStream(), makeSmallStream(), makeExtremeStream(), makeFarNormalsStream(),
+       makeWrappedStream()});
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

@@ -22,13 +22,13 @@ struct Sort {
 };
 
 class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {};
-INSTANTIATE_TEST_SUITE_P(
-    Sorts, FrameEncoder,
-    testing::Values(
-        Sort{"onHost", model::Normals::none}, Sort{"onHostWithNormals", model::Normals::octahedral},
-        Sort{"onDevice", model::Normals::none, encode::Prediction::onDevice},
-        Sort{"onDeviceWithNormals", model::Normals::octahedral, encode::Prediction::onDevice}),
-    [](const auto& chosen) { return chosen.param.name; });
+INSTANTIATE_TEST_SUITE_P(Sorts, FrameEncoder,
+                         testing::Values(Sort{"onHost", model::Normals::none},
+                                         Sort{"onHostWithNormals", model::Normals::octahedral},
+                                         Sort{"onDevice", model::Normals::none, encode::Prediction::onDevice},
+                                         Sort{"onDeviceWithNormals", model::Normals::octahedral,
+                                              encode::Prediction::onDevice}),
+                         [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
   Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);

@@ -443,7 +443,7 @@ void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
     sentNormals[vertex] = faceNormal(&normals[3 * vertex], predicted[vertex].top);
     const Octahedral& sent = sentNormals[vertex].octahedral;
     writer.addNormal(static_cast<std::int8_t>(sent.u - expected.u),
-                      static_cast<std::int8_t>(sent.v - expected.v));
+                     static_cast<std::int8_t>(sent.v - expected.v));
   }
 }
 

@@ -49,7 +49,8 @@ struct Variant {
   codec::NormalMode normals;
 };
 constexpr std::array kVariants{Variant{1, codec::NormalMode::none}, Variant{2, codec::NormalMode::none},
-                               Variant{3, codec::NormalMode::none}, Variant{1, codec::NormalMode::octahedral}};
+                               Variant{3, codec::NormalMode::none},
+                               Variant{1, codec::NormalMode::octahedral}};
 
 }  // namespace
 
