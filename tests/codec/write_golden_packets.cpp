@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <utility>
 
 #include "proto/codec/decoder.h"
 #include "proto/codec/encoder.h"
@@ -171,6 +172,9 @@ GoldenStream makeSmallStream() {
   const std::span<const std::byte> next = encode(5, PacketKind::predicted, 12);
   making.refuse("boundary_of_symbols", withBoundaryMoved(next, hierarchical::kCoarseSymbols, 2));
   making.refuse("boundary_of_bits", withBoundaryMoved(next, hierarchical::kCoarseBits, 1));
+  std::vector<std::byte> ofReservedCodec(next.begin(), next.end());
+  ofReservedCodec[1] = std::byte{3};
+  making.refuse("reserved_codec", std::move(ofReservedCodec));
   return making.take();
 }
 
