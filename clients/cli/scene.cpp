@@ -27,7 +27,11 @@ tl::expected<v1::Scene, std::string> readScene(const std::string& path) {
   v1::Scene scene;
   const std::string_view text = withoutByteOrderMark(json);
   const auto status = google::protobuf::util::JsonStringToMessage({text.data(), text.size()}, &scene);
-  if (!status.ok()) return tl::unexpected(fmt::format("{}: {}", path, std::string(status.message())));
+  if (!status.ok()) {
+    std::string what(status.message());
+    if (what.ends_with('.')) what.pop_back();
+    return tl::unexpected(fmt::format("{}: not a scene: {}; correct or remove it", path, what));
+  }
   const auto refuse = [&](std::string_view what, const std::string& name, const std::string& mesh) {
     return tl::unexpected(
         fmt::format("{}: the {} '{}' refers to the mesh file {}, which the server does not have; "

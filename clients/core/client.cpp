@@ -192,8 +192,8 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
                 "; this client uses version " + std::to_string(CS_PROTOCOL_VERSION) +
                 ". Use a client and a server of the same release.");
   if (!codec::isCodec(welcome->codec))
-    return fail("The server chose codec " + std::to_string(welcome->codec) + "; this client decodes " +
-                decodedCodecs() + ".");
+    return fail("The server chose codec " + std::to_string(welcome->codec) + "; this client decodes codec " +
+                std::to_string(codec::kCodecHierarchical) + ".");
   const bool returned = state_ == CS_STATE_RECONNECTING;
   // Whether this is the participant of an earlier client (resume).
   const bool inherited = !returned && welcome->resumed && !hello_.token.empty();

@@ -133,6 +133,9 @@ tl::expected<RecordingReader, std::string> RecordingReader::open(const std::stri
   if (!protobuf::util::ParseDelimitedFromZeroCopyStream(&description, &state->stream, nullptr))
     return broken("it has no description of its stream");
   state->head = {toLayout(description), description.stream_rate(), frames, static_cast<Side>(side)};
+  if (!codec::isCodec(state->head.layout.codec))
+    return tl::unexpected(fmt::format("{} has the unknown codec {}; this version decodes codec {}", path,
+                                      state->head.layout.codec, codec::kCodecHierarchical));
   if (!codec::isPossible(state->head.layout) || frames == 0 || frames > INT32_MAX || side > 1)
     return broken("its description of the stream is not valid");
   return RecordingReader(std::move(state));

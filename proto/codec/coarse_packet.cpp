@@ -18,27 +18,16 @@ namespace {
 constexpr std::size_t kLargestHeader = 256;
 
 // Sections of a packet that hold data of fine vertices.
-std::span<const std::uint8_t> fineSections(const PacketHeader& header) {
-  static constexpr std::array<std::uint8_t, 2> kOfSymbols{hierarchical::kFineSymbols,
-                                                          hierarchical::kFineBits};
-  static constexpr std::array<std::uint8_t, 1> kOfGroups{hierarchical::kFineGroups};
-  const bool isPacked = header.codec == kCodecPacked;
-  if (!isCodec(header.codec) ||
-      header.sectionCount != (isPacked ? hierarchical::kPackedSections : hierarchical::kSections))
-    return {};
-  if (isPacked) return kOfGroups;
-  return kOfSymbols;
-}
+constexpr std::array<std::uint8_t, 2> kFineSections{hierarchical::kFineSymbols, hierarchical::kFineBits};
 
 }  // namespace
 
 std::size_t makeCoarsePacket(std::span<const std::byte> packet, std::span<std::byte> out) {
   const std::optional<ParsedPacket> whole = parsePacket(packet);
   if (!whole || whole->header.rangeCount != 1) return 0;
-  const std::span<const std::uint8_t> fine = fineSections(whole->header);
-  if (fine.empty()) return 0;
+  if (!isCodec(whole->header.codec) || whole->header.sectionCount != hierarchical::kSections) return 0;
   PacketHeader header = whole->header;
-  for (const std::uint8_t section : fine) header.sectionBytes[section] = 0;
+  for (const std::uint8_t section : kFineSections) header.sectionBytes[section] = 0;
   // The coarse packet is no longer than the whole one, so nothing is overwritten before it is read.
   std::array<std::byte, kLargestHeader> small;
   assert(headerBound(header) <= small.size());

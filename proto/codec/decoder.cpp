@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Decoder: checks that apply to both codecs, and results that are computed on demand.
+// Decoder: checks of a packet's header, and results that are computed on demand.
 #include "proto/codec/decoder.h"
 
 #include <new>
@@ -28,7 +28,7 @@ struct Decoder::State {
     const PacketHeader& header = packet->header;
     if (header.epoch != layout.epoch) return DecodeResult::wrongEpoch;
     if (hasFrame && header.tick <= tick) return DecodeResult::stale;
-    // Packets of both codecs cover all cloths and refer to one frame.
+    // Packets cover all cloths and refer to one frame.
     const ClothRange& range = header.ranges[0];
     if (header.rangeCount != 1 || range.first != 0 || range.count != layout.cloths.size())
       return DecodeResult::malformed;

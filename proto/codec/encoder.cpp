@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Encoder: frame numbers, layers and references, which are the same in both codecs.
+// Encoder: frame numbers, layers and references.
 #include "proto/codec/encoder.h"
 
 #include <cassert>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Header of every packet of both codecs.
+// Header of every packet.
 #include "proto/codec/packet_header.h"
 
 #include <cassert>

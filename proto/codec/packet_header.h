@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Header of every packet of both codecs. FRAME_FORMAT.md defines the bytes.
+// Header of every packet. FRAME_FORMAT.md defines the bytes.
 #pragma once
 
 #include <array>

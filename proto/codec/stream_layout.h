@@ -24,10 +24,10 @@ struct ClothLayout {
   std::vector<float> restPositions = {};
 };
 
-// Codecs 2 and 3 differ only in the way residuals are written: with the fewest bits, or in blocks.
-inline constexpr std::uint8_t kCodecHierarchical = 2, kCodecPacked = 3;
+// Numbers 1 and 3 are reserved (FRAME_FORMAT.md).
+inline constexpr std::uint8_t kCodecHierarchical = 2;
 // All codecs, the preferred one first.
-inline constexpr std::array<std::uint32_t, 2> kCodecs{kCodecHierarchical, kCodecPacked};
+inline constexpr std::array<std::uint32_t, 1> kCodecs{kCodecHierarchical};
 
 constexpr bool isCodec(std::uint32_t id) {
   return std::find(kCodecs.begin(), kCodecs.end(), id) != kCodecs.end();

@@ -2,6 +2,7 @@
 #include "proto/recording/frame_check.h"
 
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "proto/recording/recording_reader.h"
@@ -9,6 +10,9 @@
 namespace clothstream::recording {
 
 tl::expected<FrameCheck, std::string> FrameCheck::make(const codec::StreamLayout& layout) {
+  if (!codec::isCodec(layout.codec))
+    return tl::unexpected("its stream has the unknown codec " + std::to_string(layout.codec) +
+                          "; this version decodes codec " + std::to_string(codec::kCodecHierarchical));
   auto decoder = codec::Decoder::make(layout);
   if (!decoder) return tl::unexpected(std::string("the description of its stream is not possible"));
   return FrameCheck(std::move(decoder));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recording and coding of a frame by a codec. Slots, kinds and references belong to FrameEncoder.
+// Recording and coding of a frame. Slots, kinds and references belong to FrameEncoder.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Encodes simulation states as frames: the part that all codecs share.
+// Encodes simulation states as frames: slots, kinds and references.
 #include "server/encode/frame_encoder.h"
 
 #include <algorithm>
@@ -40,14 +40,9 @@ struct Release {
 
 }  // namespace
 
-std::uint8_t codecOf(const model::Scene& scene) {
-  return scene.stream.coding == model::Coding::packed ? codec::kCodecPacked : codec::kCodecHierarchical;
-}
-
 codec::StreamLayout streamLayout(const model::Scene& scene, std::uint32_t epoch) {
   const bool normals = scene.stream.normals == model::Normals::octahedral;
   codec::StreamLayout layout{.epoch = epoch,
-                             .codec = codecOf(scene),
                              .maxError = scene.stream.maxError,
                              .normals = normals ? codec::NormalMode::octahedral : codec::NormalMode::none,
                              .temporalLayers = scene.stream.temporalLayers,

@@ -17,9 +17,6 @@
 
 namespace clothstream::encode {
 
-// The codec of a scene's stream, one of codec::kCodecs.
-std::uint8_t codecOf(const model::Scene& scene);
-
 // The layout of a scene's stream.
 codec::StreamLayout streamLayout(const model::Scene& scene, std::uint32_t epoch);
 

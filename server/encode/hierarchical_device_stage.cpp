@@ -29,9 +29,9 @@ class HierarchicalDeviceStage final : public EncodeStage {
       : predictor_(device, simulation, layout),
         fitted_(predictor_.hierarchy()),
         plan_(predictor_.hierarchy(), 1, kWeightLag),
-        writer_(codec::hierarchical::makeFrameWriter(layout)) {}
+        writer_(layout) {}
 
-  std::size_t packetBound() const override { return writer_->packetBound(); }
+  std::size_t packetBound() const override { return writer_.packetBound(); }
 
   void record(vulkan::Recorder& recorder, std::uint32_t slot, bool predicted) override {
     recordedSinceKey_ = predicted ? recordedSinceKey_ + 1 : 0;
@@ -62,7 +62,7 @@ class HierarchicalDeviceStage final : public EncodeStage {
   std::uint32_t recordedSinceKey_ = 0;
   // Belong to the thread that entropy-codes, but the device's thread reads the planned weights.
   WeightPlan plan_;
-  std::unique_ptr<codec::hierarchical::FrameWriter> writer_;
+  codec::hierarchical::FrameWriter writer_;
   codec::hierarchical::ChunkResiduals chunk_;
   std::uint32_t sinceKey_ = 0;
   std::array<std::byte, WeightPlan::kMaxBytes> weightBytes_{};
@@ -70,26 +70,26 @@ class HierarchicalDeviceStage final : public EncodeStage {
 
 bool HierarchicalDeviceStage::addResiduals(std::uint32_t slot) {
   bool any = false;
-  writer_->begin();
+  writer_.begin();
   const codec::hierarchical::Hierarchy& hierarchy = predictor_.hierarchy();
   for (std::size_t i = 0; i < hierarchy.phases.size(); ++i) {
     any = addPhase(slot, hierarchy.phases[i]) || any;
-    if (i + 1 == hierarchy.coarsePhases) writer_->endCoarse();
+    if (i + 1 == hierarchy.coarsePhases) writer_.endCoarse();
   }
   for (const std::uint32_t normal : predictor_.normalResiduals(slot))
-    writer_->addNormal(static_cast<std::int8_t>(normal), static_cast<std::int8_t>(normal >> 8));
+    writer_.addNormal(static_cast<std::int8_t>(normal), static_cast<std::int8_t>(normal >> 8));
   return any;
 }
 
 bool HierarchicalDeviceStage::addPhase(std::uint32_t slot, const Phase& phase) {
   bool any = false;
-  writer_->beginPhase();
+  writer_.beginPhase();
   for (std::uint32_t begin = phase.begin; begin < phase.end; begin += codec::hierarchical::kChunk) {
     const std::uint32_t count = std::min(codec::hierarchical::kChunk, phase.end - begin);
     any = predictor_.read(slot, begin, count, chunk_) || any;
-    writer_->add(chunk_, count);
+    writer_.add(chunk_, count);
   }
-  writer_->endPhase(any);
+  writer_.endPhase(any);
   return any;
 }
 
@@ -102,7 +102,7 @@ std::size_t HierarchicalDeviceStage::code(const RecordedFrame& frame, std::span<
   const std::size_t weightBytes = plan_.write(atRest, weightBytes_.data());
   const bool any = addResiduals(frame.slot);
   const std::size_t bytes =
-      out.empty() ? 0 : writer_->write(role, std::span(weightBytes_).first(weightBytes), out);
+      out.empty() ? 0 : writer_.write(role, std::span(weightBytes_).first(weightBytes), out);
   std::array<Phase, FitSchedule::kMaxChunks> chunks;
   const std::size_t count = fitted_.select(sinceKey_, chunks);
   for (std::size_t i = 0; i < count; ++i)

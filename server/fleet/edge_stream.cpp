@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/fleet/edge_stream.h"
 
-#include <algorithm>
 #include <chrono>
-#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -36,8 +34,9 @@ constexpr std::size_t kMaxEarlyEvents = 1024;
 
 // Empty if the stream can be shown.
 std::string problemOf(const v1::StreamDescription& description) {
-  if (std::ranges::find(codec::kCodecs, description.codec()) == std::end(codec::kCodecs))
-    return fmt::format("its codec {} is not known here: update this server", description.codec());
+  if (!codec::isCodec(description.codec()))
+    return fmt::format("its codec {} is not known here: use servers of the same release",
+                       description.codec());
   const auto isRate = [](std::uint32_t rate) { return rate >= 1 && rate <= 100'000; };
   if (!isRate(description.simulation_rate()) || !isRate(description.stream_rate()) ||
       description.qualities() > codec::kMaxQualities ||

@@ -51,10 +51,12 @@ Result<model::Scene> parseScene(std::string_view json, std::string_view source, 
                   isUtf8(json) ? *error : excerpt(*error, kShownError) + ": save the file as UTF-8");
   v1::Scene message;
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &message);
-  if (!status.ok())
-    return refuse(
-        v1::ERROR_CODE_MALFORMED_MESSAGE, source,
-        fmt::format("not a scene: {}", std::string_view(status.message().data(), status.message().size())));
+  if (!status.ok()) {
+    std::string_view what(status.message().data(), status.message().size());
+    if (what.ends_with('.')) what.remove_suffix(1);
+    return refuse(v1::ERROR_CODE_MALFORMED_MESSAGE, source,
+                  fmt::format("not a scene: {}; correct or remove it", what));
+  }
   return toScene(message, readMesh, {.nodes = maxNodes}, repairs).map_error([&](const FieldError& error) {
     return FieldError{error.code, fmt::format("{}: {}", source, error.text)};
   });

@@ -41,20 +41,6 @@ model::Integrator toIntegrator(Checks& checks, const Path& path, v1::Integrator 
   }
 }
 
-model::Coding toCoding(Checks& checks, const Path& path, v1::Coding message) {
-  switch (message) {
-    case v1::CODING_UNSPECIFIED:
-    case v1::CODING_ENTROPY:
-      return model::Coding::entropy;
-    case v1::CODING_PACKED:
-      return model::Coding::packed;
-    default:
-      checks.fail(path, fmt::format("{}", static_cast<int>(message)),
-                  "must be CODING_ENTROPY or CODING_PACKED");
-      return {};
-  }
-}
-
 model::Normals toNormals(Checks& checks, const Path& path, v1::Normals message) {
   switch (message) {
     case v1::NORMALS_UNSPECIFIED:
@@ -99,7 +85,6 @@ model::StreamSettings toStreamSettings(Checks& checks, const Path& path, const v
   if (message.has_max_error())
     settings.maxError = checks.number(path / "maxError", message.max_error(), limits::kMaxError);
   settings.normals = toNormals(checks, path / "normals", message.normals());
-  settings.coding = toCoding(checks, path / "coding", message.coding());
   if (message.has_temporal_layers())
     settings.temporalLayers = static_cast<std::uint8_t>(
         checks.integer(path / "temporalLayers", message.temporal_layers(), 1, limits::kMaxTemporalLayers));

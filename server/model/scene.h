@@ -235,12 +235,10 @@ struct Environment {
 
 enum class Integrator : std::uint8_t { semiImplicitEuler, explicitEuler, rungeKutta4 };
 enum class Normals : std::uint8_t { none, octahedral };
-enum class Coding : std::uint8_t { entropy, packed };
 
 struct StreamSettings {
   float maxError = 0.0005f;  // m, per axis
   Normals normals = Normals::none;
-  Coding coding = Coding::entropy;
   std::uint8_t temporalLayers = 1;  // 1 to 3
   std::uint8_t qualities = 3;       // 1 to 4; each has twice the maximum error of the previous one
 };

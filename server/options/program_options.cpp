@@ -80,11 +80,6 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                std::map<std::string, model::Normals>{{"none", model::Normals::none},
                                                      {"octahedral", model::Normals::octahedral}},
                "Normals of --scene: none (clients compute them) or octahedral");
-  table.choice(
-      "--coding", options.coding,
-      std::map<std::string, model::Coding>{{"entropy", model::Coding::entropy},
-                                           {"packed", model::Coding::packed}},
-      "Coding of the residuals of --scene: entropy (fewest bits) or packed (larger, no entropy coding)");
   table.number("--temporal-layers", options.temporalLayers, {.min = 1, .max = 3},
                "Temporal layers of --scene. Clients with slow links skip layers above the first");
   table.number("--qualities", options.qualities, {.min = 1, .max = 4},

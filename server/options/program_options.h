@@ -65,7 +65,6 @@ struct ProgramOptions {
   std::optional<std::uint32_t> rate, substeps;
   std::optional<float> maxError;
   std::optional<model::Normals> normals;
-  std::optional<model::Coding> coding;
   std::optional<std::uint32_t> temporalLayers, qualities;
   std::filesystem::path recordDirectory;  // empty: nothing is recorded
   bool recordsOnRequest = false;          // record only scenes that clients ask for

@@ -309,7 +309,7 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
 }
 
 std::uint32_t LiveScene::codec() const {
-  return source ? source->description().codec() : encode::codecOf(start_);
+  return source ? source->description().codec() : codec::kCodecHierarchical;
 }
 
 delivery::StreamShape LiveScene::shape() const {

@@ -47,7 +47,7 @@ constexpr std::array kSuites{
                  &bench::runColliders},
     bench::Suite{"self_collision", "a sheet with and without self-collision, flat and in folds",
                  &bench::runSelfCollision},
-    bench::Suite{"codec", "both codecs on the CPU over motions: bits, errors, flicker, times",
+    bench::Suite{"codec", "the codec on the CPU over motions: bits, errors, flicker, times",
                  &bench::runCodec},
     bench::Suite{"codec_device", "cost of key and predicted frames of a hung cloth on the device",
                  &bench::runCodecDevice},

@@ -73,26 +73,22 @@ void expectAllocationOnlyAtConstruction(const StreamLayout& layout, const Encode
   EXPECT_NE(sum, 0.0f);
 }
 
-TEST(Allocation, HappensOnlyAtConstructionInCodec2) {
-  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none, kCodecHierarchical));
+TEST(Allocation, HappensOnlyAtConstruction) {
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none));
 }
 
 TEST(Allocation, HappensOnlyAtConstructionWithNormals) {
-  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecHierarchical));
-}
-
-TEST(Allocation, HappensOnlyAtConstructionInCodec3) {
-  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral, kCodecPacked));
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral));
 }
 
 TEST(Allocation, HappensOnlyAtConstructionWithTemporalLayers) {
-  StreamLayout layout = mixedLayout(NormalMode::none, kCodecHierarchical);
+  StreamLayout layout = mixedLayout(NormalMode::none);
   layout.temporalLayers = 3;
   expectAllocationOnlyAtConstruction(layout);
 }
 
 TEST(Allocation, HappensOnlyAtConstructionWithAWeightLag) {
-  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none, kCodecHierarchical), {.weightLag = 3});
+  expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none), {.weightLag = 3});
 }
 
 }  // namespace

@@ -72,23 +72,14 @@ class Loop {
   std::vector<std::byte> packet_;
 };
 
-struct Sort {
-  const char* name;
-  std::uint8_t codec;
-  NormalMode normals;
-};
-
-class ClosedLoop : public testing::TestWithParam<Sort> {
+class ClosedLoop : public testing::TestWithParam<NormalMode> {
  protected:
-  static StreamLayout mixed() { return mixedLayout(GetParam().normals, GetParam().codec); }
+  static StreamLayout mixed() { return mixedLayout(GetParam()); }
 };
-INSTANTIATE_TEST_SUITE_P(Sorts, ClosedLoop,
-                         testing::Values(Sort{"hierarchical", kCodecHierarchical, NormalMode::none},
-                                         Sort{"hierarchicalWithNormals", kCodecHierarchical,
-                                              NormalMode::octahedral},
-                                         Sort{"packed", kCodecPacked, NormalMode::none},
-                                         Sort{"packedWithNormals", kCodecPacked, NormalMode::octahedral}),
-                         [](const auto& chosen) { return chosen.param.name; });
+INSTANTIATE_TEST_SUITE_P(Normals, ClosedLoop, testing::Values(NormalMode::none, NormalMode::octahedral),
+                         [](const auto& chosen) {
+                           return chosen.param == NormalMode::none ? "none" : "octahedral";
+                         });
 
 TEST_P(ClosedLoop, KeepsMaxErrorOverAMotion) {
   const StreamLayout layout = mixed();
@@ -153,16 +144,12 @@ TEST_P(ClosedLoop, SurvivesPositionsThatAreNotFinite) {
   }
 }
 
-StreamLayout square(std::uint32_t edge, std::uint8_t codec) {
-  return {
-      .epoch = 1, .codec = codec, .cloths = {{.vertexCount = edge * edge, .rows = edge, .columns = edge}}};
+StreamLayout square(std::uint32_t edge) {
+  return {.epoch = 1, .cloths = {{.vertexCount = edge * edge, .rows = edge, .columns = edge}}};
 }
 
-class EachCodec : public testing::TestWithParam<std::uint8_t> {};
-INSTANTIATE_TEST_SUITE_P(Codecs, EachCodec, testing::Values(kCodecHierarchical, kCodecPacked));
-
-TEST_P(EachCodec, SendsStillClothInATwentiethOfABitAVertex) {
-  const StreamLayout layout = square(100, GetParam());
+TEST(Hierarchical, SendsStillClothInATwentiethOfABitAVertex) {
+  const StreamLayout layout = square(100);
   Loop loop(layout);
   PacketHeader last;
   for (std::uint64_t tick = 1; tick <= 40; ++tick) {
@@ -175,7 +162,7 @@ TEST_P(EachCodec, SendsStillClothInATwentiethOfABitAVertex) {
 }
 
 StreamLayout cut(const CutGrid& mesh) {
-  return {.epoch = 1, .codec = kCodecHierarchical, .cloths = {mesh.cloth()}};
+  return {.epoch = 1, .cloths = {mesh.cloth()}};
 }
 
 std::size_t bodyBytes(const PacketHeader& header) {
@@ -192,7 +179,7 @@ TEST(Hierarchical, FindsMeshOrderFromTrianglesAndRestPositions) {
   noPositions.cloths[0].restPositions.clear();
   StreamLayout noTriangles = noPositions;
   noTriangles.cloths[0].triangles.clear();
-  const StreamLayout grid = square(64, kCodecHierarchical);
+  const StreamLayout grid = square(64);
   Loop gridLoop(grid);
   std::array<Loop, 3> loops{Loop(known), Loop(noPositions), Loop(noTriangles)};
   std::size_t gridBytes = 0;
@@ -210,10 +197,10 @@ TEST(Hierarchical, FindsMeshOrderFromTrianglesAndRestPositions) {
   EXPECT_LT(2 * bytes[1], bytes[2]);
 }
 
-TEST_P(EachCodec, CodesMeshesOfAnyShape) {
+TEST(Hierarchical, CodesMeshesOfAnyShape) {
   // A fan whose hub comes last, triangles without common vertices, a triangle that names one vertex three
   // times, and lone vertices.
-  StreamLayout layout{.epoch = 2, .codec = GetParam(), .cloths = {}};
+  StreamLayout layout{.epoch = 2, .cloths = {}};
   ClothLayout fan{.vertexCount = 3001}, apart{.vertexCount = 300}, odd{.vertexCount = 40};
   for (std::uint32_t i = 0; i + 1 < 3000; ++i) fan.triangles.insert(fan.triangles.end(), {i, i + 1, 3000});
   for (std::uint32_t i = 0; i < 300; ++i) apart.triangles.push_back(i);
@@ -225,8 +212,8 @@ TEST_P(EachCodec, CodesMeshesOfAnyShape) {
   }
 }
 
-TEST_P(EachCodec, KeepsPinsStillInMovingCloth) {
-  const StreamLayout layout = square(20, GetParam());
+TEST(Hierarchical, KeepsPinsStillInMovingCloth) {
+  const StreamLayout layout = square(20);
   Loop loop(layout);
   std::vector<float> before;
   for (std::uint64_t tick = 1; tick <= 40; ++tick) {
@@ -244,7 +231,7 @@ TEST_P(EachCodec, KeepsPinsStillInMovingCloth) {
 }
 
 TEST(Hierarchical, WeightLagCostsFewBits) {
-  const StreamLayout layout = square(64, kCodecHierarchical);
+  const StreamLayout layout = square(64);
   std::vector<std::size_t> bytes;
   for (const std::uint32_t lag : {0u, 1u, 3u}) {
     Loop loop(layout, {.weightLag = lag});
@@ -269,15 +256,15 @@ TEST(Hierarchical, WeightLagCostsFewBits) {
   EXPECT_LT(bytes[2], bytes[0] * 110 / 100);
 }
 
-TEST_P(EachCodec, SendsNextFrameOfStillClothInAFewBytes) {
-  const StreamLayout layout = mixedLayout(NormalMode::none, GetParam());
+TEST(Hierarchical, SendsNextFrameOfStillClothInAFewBytes) {
+  const StreamLayout layout = mixedLayout(NormalMode::none);
   Loop loop(layout);
   loop.send(1, PacketKind::key, sampleMotion(layout, 1, 0.1f));
   EXPECT_LT(bodyBytes(loop.send(2, PacketKind::predicted, sampleMotion(layout, 1, 0.1f))), 16u);
 }
 
-TEST_P(EachCodec, PredictionSavesBitsInSlowMotion) {
-  const StreamLayout layout = square(64, GetParam());
+TEST(Hierarchical, PredictionSavesBitsInSlowMotion) {
+  const StreamLayout layout = square(64);
   const auto predicted = Encoder::make(layout), keys = Encoder::make(layout);
   std::vector<std::byte> packet(keys->packetBound());
   std::size_t predictedBytes = 0, keyBytes = 0;
@@ -293,34 +280,9 @@ TEST_P(EachCodec, PredictionSavesBitsInSlowMotion) {
   EXPECT_LT(predictedBytes, keyBytes);
 }
 
-TEST(Packed, TakesAtMostAQuarterMoreThanEntropyCoding) {
-  std::array<std::size_t, kCodecs.size()> bytes{};
-  for (std::size_t i = 0; i < kCodecs.size(); ++i) {
-    const StreamLayout layout = square(64, static_cast<std::uint8_t>(kCodecs[i]));
-    Loop loop(layout);
-    for (std::uint64_t tick = 1; tick <= 30; ++tick)
-      bytes[i] += bodyBytes(loop.send(tick, PacketKind::predicted, sampleMotion(layout, tick, 0.02f)));
-  }
-  EXPECT_GT(bytes[1], bytes[0]);
-  EXPECT_LT(4 * bytes[1], 5 * bytes[0]);
-}
-
-// The codecs differ only in the way residuals are written.
-TEST(Packed, DecodesToThePositionsOfCodec2) {
-  const StreamLayout entropy = square(50, kCodecHierarchical), packed = square(50, kCodecPacked);
-  Loop one(entropy), other(packed);
-  for (std::uint32_t tick = 1; tick <= 20; ++tick) {
-    const MotionFrame frame =
-        tick % 7 == 0 ? scatter(packed, tick, 31.0f) : sampleMotion(packed, tick, 0.02f);
-    one.send(tick, PacketKind::predicted, frame);
-    other.send(tick, PacketKind::predicted, frame);
-    EXPECT_EQ(one.decoder().reconstructionHash(), other.decoder().reconstructionHash()) << tick;
-  }
-}
-
 // The same scene in three qualities. A reader changes its quality only at key frames.
-TEST_P(EachCodec, ChangesQualityAtAKeyFrame) {
-  StreamLayout layout = square(60, GetParam());
+TEST(Hierarchical, ChangesQualityAtAKeyFrame) {
+  StreamLayout layout = square(60);
   layout.qualities = 3;
   const auto decoder = Decoder::make(layout);
   std::vector<std::unique_ptr<Encoder>> encoders;
@@ -365,7 +327,7 @@ TEST_P(EachCodec, ChangesQualityAtAKeyFrame) {
 TEST(Layout, IsRefusedIfImpossible) {
   const StreamLayout good = mixedLayout(NormalMode::none);
   ASSERT_NE(Decoder::make(good), nullptr);
-  std::vector<StreamLayout> bad(17, good);
+  std::vector<StreamLayout> bad(18, good);
   bad[0].cloths.clear();
   bad[1].cloths[0].rows = 8;
   bad[2].cloths[0].rows = 0;
@@ -383,6 +345,7 @@ TEST(Layout, IsRefusedIfImpossible) {
   bad[14].temporalLayers = kMaxTemporalLayers + 1;
   bad[15].qualities = 0;
   bad[16].qualities = kMaxQualities + 1;
+  bad[17].codec = 3;
   for (std::size_t i = 0; i < bad.size(); ++i) {
     EXPECT_EQ(Decoder::make(bad[i]), nullptr) << i;
     EXPECT_EQ(Encoder::make(bad[i]), nullptr) << i;

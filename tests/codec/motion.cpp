@@ -54,9 +54,8 @@ MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent
   return frame;
 }
 
-StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec) {
+StreamLayout mixedLayout(NormalMode normals) {
   return {.epoch = 7,
-          .codec = codec,
           .maxError = 0.0005f,
           .normals = normals,
           .cloths = {{.vertexCount = 9 * 7, .rows = 9, .columns = 7},

@@ -22,7 +22,7 @@ MotionFrame sampleMotion(const StreamLayout& layout, std::uint64_t tick, float a
 MotionFrame scatter(const StreamLayout& layout, std::uint32_t seed, float extent);
 
 // Odd-sized grids, a grid of one row, a grid of one vertex and a cloth that is not a grid.
-StreamLayout mixedLayout(NormalMode normals, std::uint8_t codec = kCodecHierarchical);
+StreamLayout mixedLayout(NormalMode normals);
 
 // Angle between vectors of any length.
 double degreesBetween(const float* a, const float* b);

@@ -16,9 +16,8 @@
 
 namespace clothstream::codec {
 
-// For streams with one temporal layer. Packets have weights of every size. In codec 3 they also have
-// residuals of every size and vertices that stay; in codec 2 all residuals are 0. Coordinates may become too
-// large: a decoder then refuses the packet.
+// Predicted frames of streams with one temporal layer. They have weights of every size, and all residuals are
+// 0. Coordinates may become too large: a decoder then refuses the packet.
 class PacketCrafter {
  public:
   explicit PacketCrafter(const StreamLayout& layout);
@@ -30,21 +29,12 @@ class PacketCrafter {
   void keep() { kept_ = made_; }
 
   // Faults that make a packet wrong.
-  enum class Fault : std::uint8_t {
-    none,
-    weightBeyondTheLimit,
-    gammaNumberOf31Bits,
-    coordinateBeyondTheLimit
-  };
+  enum class Fault : std::uint8_t { none, weightBeyondTheLimit, gammaNumberOf31Bits };
   // A packet with this fault only.
   std::vector<std::byte> craftWrong(const FrameRole& role, Fault fault);
 
  private:
-  void writeWeights(bool key, hierarchical::BitWriter& out);
-  void writeGroups(std::size_t vertices, std::size_t components, hierarchical::BitWriter& out);
-  void writeBlock(std::size_t vertices, std::size_t components, std::span<std::uint32_t> modes,
-                  hierarchical::BitWriter& out);
-  void writeNumber(std::uint32_t low, std::uint32_t reserved, hierarchical::BitWriter& out);
+  void writeWeights(hierarchical::BitWriter& out);
   std::uint32_t below(std::uint32_t bound) { return static_cast<std::uint32_t>(random_() % bound); }
 
   StreamLayout layout_;
@@ -58,5 +48,9 @@ class PacketCrafter {
 // section become the first ones of the next section.
 std::vector<std::byte> withBoundaryMoved(std::span<const std::byte> packet, std::size_t section,
                                          std::uint32_t bytes);
+
+// A packet of a stream of one vertex, with a larger residual along the normal: its number beyond the symbols,
+// which there must be, grows by `by`.
+std::vector<std::byte> withNumberRaised(std::span<const std::byte> packet, std::uint32_t by);
 
 }  // namespace clothstream::codec

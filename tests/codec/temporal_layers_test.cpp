@@ -19,9 +19,8 @@ struct Sent {
   std::uint64_t hash = 0;
 };
 
-StreamLayout layered(std::uint8_t layers, std::uint8_t codec = kCodecHierarchical) {
+StreamLayout layered(std::uint8_t layers) {
   return {.epoch = 3,
-          .codec = codec,
           .temporalLayers = layers,
           .cloths = {{.vertexCount = 30 * 20, .rows = 30, .columns = 20}, {.vertexCount = 12}}};
 }
@@ -110,11 +109,8 @@ TEST(TemporalLayers, DecodeWithoutTheHighestLayers) {
   }
 }
 
-class TemporalLayersOf : public testing::TestWithParam<std::uint8_t> {};
-INSTANTIATE_TEST_SUITE_P(Codecs, TemporalLayersOf, testing::Values(kCodecHierarchical, kCodecPacked));
-
-TEST_P(TemporalLayersOf, DroppedFramesDoNotChangeOthers) {
-  const StreamLayout layout = layered(3, GetParam());
+TEST(TemporalLayers, DroppedFramesDoNotChangeOthers) {
+  const StreamLayout layout = layered(3);
   const std::vector<Sent> sent = send(layout, {1, 27}, 60);
   std::uint32_t random = 1;
   for (int round = 0; round < 50; ++round) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <utility>
 
 #include "proto/codec/decoder.h"
 #include "proto/codec/encoder.h"
@@ -57,9 +58,9 @@ class Making {
 
   std::uint64_t reconstructionHash() const { return decoder_->reconstructionHash(); }
   const GoldenStream& stream() const { return stream_; }
-  FrameRole next(PacketKind kind) const {
-    const std::uint64_t tick = decoder_->hasFrame() ? decoder_->tick() : 0;
-    return {.tick = tick + 1, .kind = kind, .referenceTick = tick};
+  // Role of a predicted frame after all packets.
+  FrameRole next() const {
+    return {.tick = decoder_->tick() + 1, .kind = PacketKind::predicted, .referenceTick = decoder_->tick()};
   }
   GoldenStream take() {
     stream_.normals = sampleNormals(decoder_->normals());
@@ -99,9 +100,9 @@ GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
 }
 
 // A motion that lasts until weights have been sent for each layer.
-GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout, std::uint64_t frames = 12) {
+GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout) {
   std::vector<Moment> moments;
-  for (std::uint64_t tick = 1; tick <= frames; ++tick) {
+  for (std::uint64_t tick = 1; tick <= 12; ++tick) {
     moments.push_back(
         {tick, tick == 1 ? PacketKind::key : PacketKind::predicted, sampleMotion(layout, tick, 0.02f)});
   }
@@ -109,8 +110,8 @@ GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout,
 }
 
 // Three qualities. The stream changes to the next one at each key frame.
-GoldenStream makeQualityStream(const std::string& name, std::uint8_t codec) {
-  StreamLayout layout = mixedLayout(NormalMode::octahedral, codec);
+GoldenStream makeQualityStream() {
+  StreamLayout layout = mixedLayout(NormalMode::octahedral);
   layout.qualities = 3;
   std::vector<Moment> moments;
   for (std::uint64_t tick = 1; tick <= 9; ++tick) {
@@ -118,13 +119,12 @@ GoldenStream makeQualityStream(const std::string& name, std::uint8_t codec) {
     moments.push_back({tick, sinceKey == 0 ? PacketKind::key : PacketKind::predicted,
                        sampleMotion(layout, tick, 0.03f), static_cast<std::uint8_t>((tick - 1) / 3)});
   }
-  return makeStream(name, layout, moments);
+  return makeStream("qualities", layout, moments);
 }
 
 // Half of the cloth is held still and starts to rest.
-GoldenStream makeHeldStream(const std::string& name, std::uint8_t codec) {
-  const StreamLayout layout{
-      .epoch = 9, .codec = codec, .cloths = {{.vertexCount = 144, .rows = 12, .columns = 12}}};
+GoldenStream makeHeldStream() {
+  const StreamLayout layout{.epoch = 9, .cloths = {{.vertexCount = 144, .rows = 12, .columns = 12}}};
   const MotionFrame start = sampleMotion(layout, 1, 0.02f);
   std::vector<Moment> moments;
   for (std::uint64_t tick = 1; tick <= 8; ++tick) {
@@ -132,11 +132,11 @@ GoldenStream makeHeldStream(const std::string& name, std::uint8_t codec) {
     std::copy_n(start.positions.begin(), frame.positions.size() / 2, frame.positions.begin());
     moments.push_back({tick, tick == 1 ? PacketKind::key : PacketKind::predicted, frame});
   }
-  return makeStream(name, layout, moments);
+  return makeStream("held", layout, moments);
 }
 
 // A mesh and a grid.
-GoldenStream makeMeshStream(const std::string& name, std::uint8_t codec) {
+GoldenStream makeMeshStream() {
   constexpr std::uint32_t kEdge = 14;
   const ClothLayout grid{.vertexCount = kEdge * kEdge, .rows = kEdge, .columns = kEdge};
   CutGrid mesh(kEdge);
@@ -148,14 +148,14 @@ GoldenStream makeMeshStream(const std::string& name, std::uint8_t codec) {
                       frame.positions.begin());
     moments.push_back({tick, tick == 1 ? PacketKind::key : PacketKind::predicted, frame});
   }
-  return makeStream(name, {.epoch = 9, .codec = codec, .cloths = {mesh.cloth(), grid}}, moments);
+  return makeStream("mesh", {.epoch = 9, .cloths = {mesh.cloth(), grid}}, moments);
 }
 
 // The smallest grid with all kinds of vertices. The page FRAME_FORMAT.md shows these packets.
-GoldenStream makeSmallStream(const std::string& name, std::uint8_t codec) {
+GoldenStream makeSmallStream() {
   const StreamLayout layout{
-      .epoch = 5, .codec = codec, .maxError = 0.01f, .cloths = {{.vertexCount = 9, .rows = 3, .columns = 3}}};
-  Making making(name, layout);
+      .epoch = 5, .maxError = 0.01f, .cloths = {{.vertexCount = 9, .rows = 3, .columns = 3}}};
+  Making making("small", layout);
   const auto encoder = Encoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound());
   const auto encode = [&](std::uint64_t tick, PacketKind kind, std::uint64_t moment) {
@@ -168,56 +168,67 @@ GoldenStream makeSmallStream(const std::string& name, std::uint8_t codec) {
   const bool isComplete =
       making.add(encode(1, PacketKind::key, 1)) && making.add(encode(2, PacketKind::predicted, 5)) &&
       making.add(encode(3, PacketKind::predicted, 5)) && making.add(encode(4, PacketKind::predicted, 5));
-  if (!isComplete) throw std::runtime_error(name + " cannot be decoded");
+  if (!isComplete) throw std::runtime_error("small cannot be decoded");
   const std::span<const std::byte> next = encode(5, PacketKind::predicted, 12);
-  if (codec == kCodecPacked) {
-    making.refuse("boundary_of_groups", withBoundaryMoved(next, hierarchical::kCoarseGroups, 1));
-  } else {
-    making.refuse("boundary_of_symbols", withBoundaryMoved(next, hierarchical::kCoarseSymbols, 2));
-    making.refuse("boundary_of_bits", withBoundaryMoved(next, hierarchical::kCoarseBits, 1));
-  }
+  making.refuse("boundary_of_symbols", withBoundaryMoved(next, hierarchical::kCoarseSymbols, 2));
+  making.refuse("boundary_of_bits", withBoundaryMoved(next, hierarchical::kCoarseBits, 1));
+  std::vector<std::byte> ofReservedCodec(next.begin(), next.end());
+  ofReservedCodec[1] = std::byte{3};
+  making.refuse("reserved_codec", std::move(ofReservedCodec));
   return making.take();
 }
 
 // A mesh with triangles that have equal corners, a grid with borders, and a vertex. Coordinates reach 60 m.
-StreamLayout extremeLayout(std::uint8_t codec, NormalMode normals) {
+StreamLayout extremeLayout() {
   ClothLayout mesh = CutGrid(6).cloth();
   mesh.triangles.insert(mesh.triangles.end(), {3, 3, 7, 5, 5, 5, 11, 30, 11});
-  return {.epoch = 5,
-          .codec = codec,
-          .maxError = 0.00001f,
-          .normals = normals,
-          .cloths = {std::move(mesh), {35, 5, 7}, {1, 1, 1}}};
+  return {.epoch = 5, .maxError = 0.00001f, .cloths = {std::move(mesh), {35, 5, 7}, {1, 1, 1}}};
 }
 
 // Weights and residuals of every size.
-GoldenStream makeExtremeStream(const std::string& name, std::uint8_t codec, NormalMode normals) {
-  const StreamLayout layout = extremeLayout(codec, normals);
-  Making making(name, layout);
-  if (codec == kCodecHierarchical) {
-    const auto encoder = Encoder::make(layout);
-    std::vector<std::byte> packet(encoder->packetBound());
-    for (std::uint64_t tick = 1; tick <= 3; ++tick) {
-      const MotionFrame frame = scatter(layout, static_cast<std::uint32_t>(tick), 30);
-      const std::size_t bytes = encoder->encode(tick, PacketKind::predicted, frame.positions, {}, packet);
-      if (!making.add(std::span(packet).first(bytes))) throw std::runtime_error(name + " cannot be decoded");
-    }
+GoldenStream makeExtremeStream() {
+  const StreamLayout layout = extremeLayout();
+  Making making("extreme", layout);
+  const auto encoder = Encoder::make(layout);
+  std::vector<std::byte> packet(encoder->packetBound());
+  for (std::uint64_t tick = 1; tick <= 3; ++tick) {
+    const MotionFrame frame = scatter(layout, static_cast<std::uint32_t>(tick), 30);
+    const std::size_t bytes = encoder->encode(tick, PacketKind::predicted, frame.positions, {}, packet);
+    if (!making.add(std::span(packet).first(bytes))) throw std::runtime_error("extreme cannot be decoded");
   }
   PacketCrafter crafter(layout);
   std::uint32_t seed = 0;
-  const auto craft = [&](PacketKind kind) {
-    while (!making.add(crafter.craft(making.next(kind), ++seed)))
-      if (seed == 100'000) throw std::runtime_error(name + " has no packet within the range");
+  for (int i = 0; i < 4; ++i) {
+    while (!making.add(crafter.craft(making.next(), ++seed)))
+      if (seed == 100'000) throw std::runtime_error("extreme has no packet within the range");
     crafter.keep();
-  };
-  if (codec == kCodecPacked) craft(PacketKind::key);
-  for (int i = 0; i < 4; ++i) craft(PacketKind::predicted);
+  }
   using Fault = PacketCrafter::Fault;
-  const FrameRole role = making.next(PacketKind::predicted);
+  const FrameRole role = making.next();
   making.refuse("weight", crafter.craftWrong(role, Fault::weightBeyondTheLimit));
   making.refuse("gamma_number", crafter.craftWrong(role, Fault::gammaNumberOf31Bits));
-  if (codec == kCodecPacked)
-    making.refuse("coordinate", crafter.craftWrong(role, Fault::coordinateBeyondTheLimit));
+  return making.take();
+}
+
+// A vertex that jumps. The number of its last residual along the normal has more than 32 bits, of which the
+// lowest 32 count.
+GoldenStream makeWrappedStream() {
+  const StreamLayout layout{.epoch = 5, .maxError = 0.00001f, .cloths = {{.vertexCount = 1}}};
+  Making making("wrapped", layout);
+  const auto encoder = Encoder::make(layout);
+  std::vector<std::byte> packet(encoder->packetBound());
+  const auto encode = [&](std::uint64_t tick) {
+    const MotionFrame frame = scatter(layout, static_cast<std::uint32_t>(tick), 30);
+    const std::size_t bytes = encoder->encode(tick, PacketKind::predicted, frame.positions, {}, packet);
+    return std::span<const std::byte>(packet).first(bytes);
+  };
+  // Four bits of the number are not part of its upper part.
+  constexpr std::uint32_t kBeyond32Bits = 1u << (32 - 4);
+  const bool isComplete = making.add(encode(1)) && making.add(encode(2)) &&
+                          making.add(withNumberRaised(encode(3), kBeyond32Bits));
+  if (!isComplete || making.reconstructionHash() != encoder->reconstructionHash())
+    throw std::runtime_error("wrapped cannot be decoded");
+  making.refuse("coordinate", withNumberRaised(encode(4), 1u << 20));
   return making.take();
 }
 
@@ -239,46 +250,22 @@ GoldenStream makeFarNormalsStream() {
 int main() try {
   using namespace clothstream::codec;
   writeGoldenStreams(
-      {makeStream("hierarchical", mixedLayout(NormalMode::none, kCodecHierarchical)),
-       makeStream("hierarchical_normals", mixedLayout(NormalMode::octahedral, kCodecHierarchical)),
-       makeMeshStream("mesh", kCodecHierarchical),
+      {makeStream("hierarchical", mixedLayout(NormalMode::none)),
+       makeStream("hierarchical_normals", mixedLayout(NormalMode::octahedral)), makeMeshStream(),
        makeStream("fine_hierarchical", {.epoch = 8,
-                                        .codec = kCodecHierarchical,
                                         .maxError = 0.00002f,
                                         .normals = NormalMode::none,
                                         .cloths = {{.vertexCount = 150, .rows = 15, .columns = 10}}}),
-       makeLongStream("weighted", {.epoch = 9,
-                                   .codec = kCodecHierarchical,
-                                   .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
-       makeLongStream("layered", {.epoch = 9,
-                                  .codec = kCodecHierarchical,
-                                  .temporalLayers = 3,
-                                  .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
+       makeLongStream("weighted", {.epoch = 9, .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
+       makeLongStream(
+           "layered",
+           {.epoch = 9, .temporalLayers = 3, .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
        makeStream("vertex", {.epoch = 0xffffffffu,
-                             .codec = kCodecHierarchical,
                              .maxError = 0.01f,
                              .normals = NormalMode::none,
                              .cloths = {{.vertexCount = 1, .rows = 0, .columns = 0}}}),
-       makeStream("packed", mixedLayout(NormalMode::none, kCodecPacked)),
-       makeStream("packed_normals", mixedLayout(NormalMode::octahedral, kCodecPacked)),
-       makeMeshStream("packed_mesh", kCodecPacked), makeHeldStream("held", kCodecHierarchical),
-       makeHeldStream("packed_held", kCodecPacked),
-       makeLongStream("packed_layered", {.epoch = 9,
-                                         .codec = kCodecPacked,
-                                         .temporalLayers = 3,
-                                         .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
-       // Enough vertices for several groups.
-       makeLongStream("packed_large",
-                      {.epoch = 9,
-                       .codec = kCodecPacked,
-                       .maxError = 0.01f,
-                       .cloths = {{.vertexCount = 2400, .rows = 60, .columns = 40}}},
-                      3),
-       makeQualityStream("qualities", kCodecHierarchical),
-       makeQualityStream("packed_qualities", kCodecPacked), makeSmallStream("small", kCodecHierarchical),
-       makeSmallStream("packed_small", kCodecPacked),
-       makeExtremeStream("extreme", kCodecHierarchical, NormalMode::none),
-       makeExtremeStream("packed_extreme", kCodecPacked, NormalMode::octahedral), makeFarNormalsStream()});
+       makeHeldStream(), makeQualityStream(), makeSmallStream(), makeExtremeStream(), makeFarNormalsStream(),
+       makeWrappedStream()});
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

@@ -49,7 +49,7 @@ TEST_P(DecodedFrames, AreWithinMaxErrorAndAcknowledged) {
     EXPECT_THAT(joined.acks(), ElementsAre(tick));
     const std::vector<float>& sent = joined.server.positions();
     const float* decoded = cs_positions(joined.client.get());
-    // Maximum error of both codecs, plus float rounding at about 2 m.
+    // Maximum error of the codec, plus float rounding at about 2 m.
     for (std::size_t i = 0; i < sent.size(); i += 3) {
       const float off =
           std::hypot(decoded[i] - sent[i], decoded[i + 1] - sent[i + 1], decoded[i + 2] - sent[i + 2]);

@@ -22,7 +22,7 @@ TEST(Joining, SendsOnlyHelloFirst) {
   ASSERT_THAT(messages, SizeIs(1));
   ASSERT_TRUE(messages[0].has_hello());
   EXPECT_EQ(messages[0].hello().protocol_version(), CS_PROTOCOL_VERSION);
-  EXPECT_THAT(messages[0].hello().codecs(), ElementsAre(2, 3));
+  EXPECT_THAT(messages[0].hello().codecs(), ElementsAre(2));
   EXPECT_EQ(messages[0].hello().scene(), "flag");
   EXPECT_EQ(messages[0].hello().client_name(), "test");
   EXPECT_NE(messages[0].request_id(), 0u);
@@ -406,6 +406,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         WrongDescription{"no_cloth", [](v1::StreamDescription& d) { d.clear_cloths(); }, "0 cloths"},
         WrongDescription{"a_codec", [](v1::StreamDescription& d) { d.set_codec(1); }, "codec is 1"},
+        WrongDescription{"a_reserved_codec", [](v1::StreamDescription& d) { d.set_codec(3); },
+                         "codec is 3; this client decodes codec 2"},
         WrongDescription{"no_rate", [](v1::StreamDescription& d) { d.set_simulation_rate(0); },
                          "simulation_rate is 0"},
         WrongDescription{"rate", [](v1::StreamDescription& d) { d.set_stream_rate(71); },

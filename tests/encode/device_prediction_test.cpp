@@ -17,12 +17,7 @@
 namespace clothstream::tests {
 namespace {
 
-class DevicePrediction : public GpuTest, public testing::WithParamInterface<model::Coding> {};
-INSTANTIATE_TEST_SUITE_P(Codings, DevicePrediction,
-                         testing::Values(model::Coding::entropy, model::Coding::packed),
-                         [](const auto& coding) {
-                           return coding.param == model::Coding::packed ? "packed" : "entropy";
-                         });
+class DevicePrediction : public GpuTest {};
 
 // Encodes states that are given.
 class Playing : public Encoding {
@@ -43,25 +38,20 @@ class Playing : public Encoding {
   }
 };
 
-model::Scene codedAs(model::Coding coding, model::Scene scene) {
-  scene.stream.coding = coding;
-  return scene;
+model::Scene squareOf(std::uint32_t edge) {
+  return sceneOf({calmCloth(edge, edge)});
 }
 
-model::Scene squareOf(std::uint32_t edge, model::Coding coding) {
-  return codedAs(coding, sceneOf({calmCloth(edge, edge)}));
-}
-
-TEST_P(DevicePrediction, EqualsTheReferenceIfWeightsFitOnlySomeChunks) {
+TEST_F(DevicePrediction, EqualsTheReferenceIfWeightsFitOnlySomeChunks) {
   // The cloth is so large that each phase of the finest level needs its own dispatch and only some chunks are
   // fitted per frame.
-  Playing playing(squareOf(100, GetParam()));
+  Playing playing(squareOf(100));
   for (std::uint64_t tick = 1; tick <= 24 && !HasFailure(); ++tick)
     playing.show(codec::sampleMotion(playing.layout, tick, 0.04f).positions, tick, tick == 16);
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceWhileVerticesRestAndMoveAgain) {
-  Playing playing(squareOf(40, GetParam()));
+TEST_F(DevicePrediction, EqualsTheReferenceWhileVerticesRestAndMoveAgain) {
+  Playing playing(squareOf(40));
   std::uint64_t moment = 1;
   for (std::uint64_t tick = 1; tick <= 60 && !HasFailure(); ++tick) {
     // All stand still from 20 to 29.
@@ -76,8 +66,8 @@ TEST_P(DevicePrediction, EqualsTheReferenceWhileVerticesRestAndMoveAgain) {
   }
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceForEveryPlaceOfKeyFrames) {
-  Playing playing(squareOf(24, GetParam()));
+TEST_F(DevicePrediction, EqualsTheReferenceForEveryPlaceOfKeyFrames) {
+  Playing playing(squareOf(24));
   const std::set<std::uint64_t> keys{1, 2, 3, 6, 10, 15, 21, 22, 40};
   for (std::uint64_t tick = 1; tick <= 50 && !HasFailure(); ++tick) {
     const bool forgets = tick == 30 || tick == 31;
@@ -88,10 +78,10 @@ TEST_P(DevicePrediction, EqualsTheReferenceForEveryPlaceOfKeyFrames) {
   }
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceAtEveryMaxErrorAndWithWideResiduals) {
+TEST_F(DevicePrediction, EqualsTheReferenceAtEveryMaxErrorAndWithWideResiduals) {
   for (const float maxError : {5e-6f, 1e-4f, 0.0005f, 0.01f, 1.0f}) {
     // The mesh has uneven weights of parents, whose sums need more than 32 bits here.
-    model::Scene scene = codedAs(GetParam(), sceneOf({calmCloth(16, 16), discCloth(12)}));
+    model::Scene scene = sceneOf({calmCloth(16, 16), discCloth(12)});
     scene.stream.maxError = maxError;
     Playing playing(scene);
     std::mt19937 random(3);
@@ -105,8 +95,8 @@ TEST_P(DevicePrediction, EqualsTheReferenceAtEveryMaxErrorAndWithWideResiduals) 
   }
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceHalfwayBetweenUnits) {
-  model::Scene scene = squareOf(16, GetParam());
+TEST_F(DevicePrediction, EqualsTheReferenceHalfwayBetweenUnits) {
+  model::Scene scene = squareOf(16);
   // A unit is 2^-18 m at this error (codec::hierarchical::latticeUnit()), so that positions are exactly
   // halfway between units.
   scene.stream.maxError = 261 * 0x1p-19f;
@@ -138,15 +128,14 @@ model::Cloth confetti(std::uint32_t triangles) {
   return cloth;
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceForEveryShapeOfCloth) {
-  Playing playing(
-      codedAs(GetParam(), sceneOf({confetti(600), calmCloth(3, 2), discCloth(12), calmCloth(2, 31)})));
+TEST_F(DevicePrediction, EqualsTheReferenceForEveryShapeOfCloth) {
+  Playing playing(sceneOf({confetti(600), calmCloth(3, 2), discCloth(12), calmCloth(2, 31)}));
   for (std::uint64_t tick = 1; tick <= 12 && !HasFailure(); ++tick)
     playing.show(codec::sampleMotion(playing.layout, tick, 0.05f).positions, tick);
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceForEveryNumberOfWaitingFrames) {
-  const model::Scene scene = squareOf(30, GetParam());
+TEST_F(DevicePrediction, EqualsTheReferenceForEveryNumberOfWaitingFrames) {
+  const model::Scene scene = squareOf(30);
   simulation::ClothSimulation simulation(device(), scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
@@ -180,8 +169,8 @@ TEST_P(DevicePrediction, EqualsTheReferenceForEveryNumberOfWaitingFrames) {
   }
 }
 
-TEST_P(DevicePrediction, EqualsTheReferenceIfAnotherThreadCodes) {
-  const model::Scene scene = squareOf(20, GetParam());
+TEST_F(DevicePrediction, EqualsTheReferenceIfAnotherThreadCodes) {
+  const model::Scene scene = squareOf(20);
   simulation::ClothSimulation simulation(device(), scene);
   const codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   encode::FrameEncoder encoder(device(), simulation, layout, encode::Prediction::onDevice);
@@ -232,8 +221,8 @@ TEST_P(DevicePrediction, EqualsTheReferenceIfAnotherThreadCodes) {
   }
 }
 
-TEST_P(DevicePrediction, RefusesTemporalLayers) {
-  const model::Scene scene = squareOf(4, GetParam());
+TEST_F(DevicePrediction, RefusesTemporalLayers) {
+  const model::Scene scene = squareOf(4);
   const simulation::ClothSimulation simulation(device(), scene);
   codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
   layout.temporalLayers = 2;

@@ -68,7 +68,6 @@ TEST(EncoderThreads, MakeTheSamePacketsWithLayersNormalsAndLag) {
   expectTheSamePackets(layout);
   layout.temporalLayers = 1;
   layout.normals = NormalMode::octahedral;
-  layout.codec = codec::kCodecPacked;
   expectTheSamePackets(layout, 3);
 }
 

@@ -19,30 +19,19 @@ struct Sort {
   const char* name;
   model::Normals normals;
   encode::Prediction prediction = encode::Prediction::onHost;
-  model::Coding coding = model::Coding::entropy;
-
-  model::Scene cloths() const {
-    model::Scene scene = clothsOf(normals);
-    scene.stream.coding = coding;
-    return scene;
-  }
 };
 
 class FrameEncoder : public GpuTest, public testing::WithParamInterface<Sort> {};
-INSTANTIATE_TEST_SUITE_P(
-    Sorts, FrameEncoder,
-    testing::Values(
-        Sort{"onHost", model::Normals::none}, Sort{"onHostWithNormals", model::Normals::octahedral},
-        Sort{"onDevice", model::Normals::none, encode::Prediction::onDevice},
-        Sort{"onDeviceWithNormals", model::Normals::octahedral, encode::Prediction::onDevice},
-        Sort{"packedOnHost", model::Normals::octahedral, encode::Prediction::onHost, model::Coding::packed},
-        Sort{"packedOnDevice", model::Normals::none, encode::Prediction::onDevice, model::Coding::packed},
-        Sort{"packedOnDeviceWithNormals", model::Normals::octahedral, encode::Prediction::onDevice,
-             model::Coding::packed}),
-    [](const auto& chosen) { return chosen.param.name; });
+INSTANTIATE_TEST_SUITE_P(Sorts, FrameEncoder,
+                         testing::Values(Sort{"onHost", model::Normals::none},
+                                         Sort{"onHostWithNormals", model::Normals::octahedral},
+                                         Sort{"onDevice", model::Normals::none, encode::Prediction::onDevice},
+                                         Sort{"onDeviceWithNormals", model::Normals::octahedral,
+                                              encode::Prediction::onDevice}),
+                         [](const auto& chosen) { return chosen.param.name; });
 
 TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
-  Encoding encoding(GetParam().cloths(), GetParam().prediction);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 120; ++tick) {
     const encode::RecordedFrame frame = encoding.tick(tick, tick % 40 == 0);
     EXPECT_EQ(frame.kind == codec::PacketKind::key, tick == 1 || tick % 40 == 0) << tick;
@@ -53,7 +42,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfTheReferenceEncoder) {
 }
 
 TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfEverySize) {
-  Encoding encoding(GetParam().cloths(), GetParam().prediction);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
   std::mt19937 random(1);
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
     const float extents[] = {1e-19f, 0.001f, 1, 32, 8000, 1e6f};
@@ -70,7 +59,7 @@ TEST_P(FrameEncoder, EqualsTheReferenceOnStatesOfEverySize) {
 TEST_P(FrameEncoder, KeepsTheErrorAtTheEdgesOfRounding) {
   // Positions halfway between lattice points and the floats next to them, where a device with other rounding
   // would differ.
-  Encoding encoding(GetParam().cloths(), GetParam().prediction);
+  Encoding encoding(clothsOf(GetParam().normals), GetParam().prediction);
   const float step = 2 * encoding.layout.maxError - 0x1p-18f;
   std::mt19937 random(2);
   std::uniform_int_distribution<int> point(-30000, 30000), offset(-3, 3);
@@ -100,7 +89,7 @@ TEST_P(FrameEncoder, KeepsTheErrorFarFromTheOriginOfTheWorld) {
 }
 
 TEST_P(FrameEncoder, MakesThePacketsOfMeshes) {
-  model::Scene scene = GetParam().cloths();
+  model::Scene scene = clothsOf(GetParam().normals);
   scene.cloths.insert(scene.cloths.begin() + 1, discCloth(9));
   Encoding encoding(scene, GetParam().prediction);
   for (std::uint64_t tick = 1; tick <= 30 && !testing::Test::HasFailure(); ++tick)
@@ -111,7 +100,7 @@ TEST_P(FrameEncoder, MakesThePacketsOfMeshes) {
 class Discarding {
  public:
   explicit Discarding(const Sort& sort)
-      : scene_(sort.cloths()),
+      : scene_(clothsOf(sort.normals)),
         simulation_(device(), scene_),
         layout_(encode::streamLayout(scene_, kEpoch)),
         encoder_(device(), simulation_, layout_, sort.prediction),

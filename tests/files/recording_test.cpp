@@ -102,6 +102,14 @@ TEST_F(StreamFile, ReadsDamagedFileSafely) {
   EXPECT_GT(detected, whole_.size());
 }
 
+TEST_F(StreamFile, RefusesAReservedCodecAndNamesIt) {
+  ASSERT_TRUE(RecordingWriter::create(
+                  path(), {.layout = {.codec = 3, .cloths = {{12, 3, 4, {}}}}, .rate = 72, .frames = 1})
+                  ->finish());
+  EXPECT_THAT(RecordingReader::open(path()).error(),
+              HasSubstr("has the unknown codec 3; this version decodes codec 2"));
+}
+
 TEST_F(StreamFile, RefusesOtherFile) {
   EXPECT_THAT(errorOf("not one"), HasSubstr("is not a file of clothstream encode"));
   EXPECT_THAT(errorOf(std::string(100000, '\xff')), HasSubstr("is not a file of clothstream encode"));

@@ -130,7 +130,7 @@ constexpr const char* kEveryField = R"json({
                          "orientation": {"x": 0.5, "y": 0.5, "z": -0.5, "w": 0.5}}],
                "steady": true}
   }],
-  "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL", "coding": "CODING_PACKED",
+  "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL",
              "temporalLayers": 2, "qualities": 4}
 })json";
 
@@ -242,6 +242,8 @@ TEST(SceneFile, RefusesUnknownFieldsAndWrongTypes) {
               AllOf(HasSubstr("cloths[0].mass"), HasSubstr("heavy")));
   EXPECT_THAT(errorOf("{\"substeps\": -1}"), AllOf(HasSubstr("substeps"), HasSubstr("-1")));
   EXPECT_THAT(errorOf("{\"integrator\": \"MAGIC\"}"), AllOf(HasSubstr("integrator"), HasSubstr("MAGIC")));
+  EXPECT_THAT(errorOf("{\"stream\": {\"coding\": \"CODING_PACKED\"}}"),
+              AllOf(HasSubstr("(stream) coding"), HasSubstr("correct or remove it")));
   EXPECT_THAT(errorOf("[]"), StartsWith("my.json: not a scene"));
 }
 

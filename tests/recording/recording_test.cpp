@@ -319,6 +319,14 @@ TEST(FrameCheck, CountsFramesWithFaultsAndNamesTheFirst) {
       "31 at 0.500 s");
 }
 
+TEST(FrameCheck, RefusesAReservedCodecAndNamesIt) {
+  v1::StreamDescription description = sampleDescription();
+  description.set_codec(3);
+  const auto check = FrameCheck::make(layoutOf(description));
+  ASSERT_FALSE(check.has_value());
+  EXPECT_EQ(check.error(), "its stream has the unknown codec 3; this version decodes codec 2");
+}
+
 TEST(Recording, ReportsTheKindOfOtherFiles) {
   const e2e::TemporaryDirectory directory;
   const auto errorOf = [&](const char* name, const std::string& content) {

@@ -201,7 +201,8 @@ std::string readDrawing(const ClothMessage& source, Cloth& cloth) {
 // Returns the error; empty if the numbers agree.
 std::string check(const Description& description, const std::vector<ClothMessage>& cloths) {
   if (!codec::isCodec(description.codec))
-    return "codec is " + std::to_string(description.codec) + "; this client decodes " + decodedCodecs();
+    return "codec is " + std::to_string(description.codec) + "; this client decodes codec " +
+           std::to_string(codec::kCodecHierarchical);
   const std::uint32_t simulation = description.simulationRate, stream = description.streamRate;
   if (simulation == 0 || simulation > kMaxRate)
     return "simulation_rate is " + std::to_string(simulation) + "; 1 to " + std::to_string(kMaxRate) +
@@ -337,15 +338,6 @@ void apply(const ParameterChange& change, Description& description) {
   parameters::applyChange(
       change, description.environment, description.cloths,
       [](const ClothChange& clothChange, Cloth& cloth) { apply(clothChange, cloth.parameters); });
-}
-
-std::string decodedCodecs() {
-  std::string list;
-  for (const std::uint32_t id : codec::kCodecs) {
-    if (!list.empty()) list += ", ";
-    list += std::to_string(id);
-  }
-  return list;
 }
 
 }  // namespace clothstream::client

@@ -74,7 +74,4 @@ const Hull* hullOf(const Collider& collider, const Description& description);
 // Applies a change to the environment and to the cloths that it names; the name "" means all cloths.
 void apply(const ParameterChange& change, Description& description);
 
-// Lists the ids of all codecs, for error messages.
-std::string decodedCodecs();
-
 }  // namespace clothstream::client

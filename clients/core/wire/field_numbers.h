@@ -35,11 +35,6 @@ struct ConstraintPath {
   static constexpr std::uint32_t kMatrixFree = 1;
   static constexpr std::uint32_t kAssembled = 2;
 };
-struct Coding {
-  static constexpr std::uint32_t kUnspecified = 0;
-  static constexpr std::uint32_t kEntropy = 1;
-  static constexpr std::uint32_t kPacked = 2;
-};
 struct Normals {
   static constexpr std::uint32_t kUnspecified = 0;
   static constexpr std::uint32_t kNone = 1;
@@ -280,7 +275,6 @@ struct MotionKey {
 struct StreamSettings {
   static constexpr Field kMaxError{1, WireType::kFixed32};
   static constexpr Field kNormals{2, WireType::kVarint};
-  static constexpr Field kCoding{3, WireType::kVarint};
   static constexpr Field kTemporalLayers{50, WireType::kVarint};
   static constexpr Field kQualities{51, WireType::kVarint};
 };

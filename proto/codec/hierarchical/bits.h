@@ -2,18 +2,12 @@
 // Streams of bits, and short codes for small numbers.
 #pragma once
 
-#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 namespace clothstream::codec::hierarchical {
-
-// Number of bits of an Elias gamma code of value + 2^k (BitWriter::putGamma()).
-constexpr unsigned gammaBits(std::uint32_t value, unsigned k) {
-  return 2 * static_cast<unsigned>(std::bit_width(value + (1u << k))) - 1 - k;
-}
 
 // Writes bits, lowest first. The caller makes sure that `out` has room.
 class BitWriter {
@@ -71,18 +65,6 @@ class BitReader {
     const unsigned width = k + extra;
     return (get(width) | 1u << width) - (1u << k);
   }
-  // Reads ones up to and including the next zero, and returns their number. Reads at most `most` ones (16 or
-  // fewer), and then no zero.
-  std::uint32_t getOnes(unsigned most) {
-    if (count_ <= most) refill();
-    const unsigned ones = std::min(static_cast<unsigned>(std::countr_one(pending_)), most);
-    const unsigned taken = ones < most ? ones + 1 : ones;
-    pending_ >>= taken;
-    count_ -= taken;
-    return ones;
-  }
-  // Skips to the next whole byte. False if the skipped bits are not zero.
-  [[nodiscard]] bool endByte() { return get(count_ % 8) == 0 && !broken_; }
   // Number of bytes from which at least one bit was read.
   std::size_t bytesTaken() const { return at_ - count_ / 8; }
   // True if all bytes were read, none was missing, and the rest of the last byte is zero.

@@ -44,10 +44,6 @@ inline constexpr std::uint32_t kRestsAtOnce = 64;
 // the rest.
 inline constexpr std::size_t kSections = 5;
 enum Section : std::uint8_t { kWeightChanges, kCoarseSymbols, kFineSymbols, kCoarseBits, kFineBits };
-// Sections of a packet of codec 3: the same changes, the groups of the coarse vertices (packed_blocks.h), the
-// groups of the others.
-inline constexpr std::size_t kPackedSections = 3;
-enum PackedSection : std::uint8_t { kPackedWeightChanges, kCoarseGroups, kFineGroups };
 inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;
 // Value of the first number beyond the symbols. Along the normal it is no residual: the vertex is where it
 // was in the previous frame and has no other residuals.

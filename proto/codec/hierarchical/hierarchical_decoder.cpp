@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Decoder of codecs 2 and 3.
+// Decoder of codec 2.
 #include "proto/codec/hierarchical/hierarchical_decoder.h"
 
 #include <algorithm>
@@ -19,14 +19,12 @@ Int32x4 unzigzagLanes(Int32x4 numbers) {
 bool HierarchicalDecoder::allocate(const StreamLayout& layout, Detail detail) {
   layout_ = layout;
   isCoarse_ = detail == Detail::coarse;
-  isPacked_ = layout.codec == kCodecPacked;
   hasNormals_ = layout.normals == NormalMode::octahedral;
   unit_ = latticeUnit(layout.maxError);
   if (hasNormals_ && !(normals_.allocate(layout.vertexCount()) &&
                        newNormals_.allocate(layout.vertexCount()) && normalPrediction_.allocate(layout)))
     return false;
-  return predictor_.allocate(layout, unit_.stepBits) &&
-         (!isPacked_ || packed_.allocate(layout, predictor_.hierarchy().coarseVertices));
+  return predictor_.allocate(layout, unit_.stepBits);
 }
 
 bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer,
@@ -64,7 +62,7 @@ bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t refere
 
 bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer) {
   const PacketHeader& header = packet.header;
-  if (header.sectionCount != (isPacked_ ? kPackedSections : kSections)) return false;
+  if (header.sectionCount != kSections) return false;
   const bool key = header.kind == PacketKind::key;
   const std::uint8_t layer = header.temporalLayer;
   const std::span<const std::byte> changes = packet.body.first(header.sectionBytes[kWeightChanges]);
@@ -73,7 +71,6 @@ bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t r
   bool atRest;
   if (!readWeights(changes, key, layer, weights, atRest)) return false;
   const Vectors vectors = weightVectors(atRest ? Weights{} : weights[layer]);
-  if (isPacked_ && !readPacked(packet)) return false;
   Streams streams = openStreams(packet);
   beyond_ = Int32x4::all(0);
   predictor_.begin(key, referenceLayer);
@@ -98,7 +95,6 @@ bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t r
 }
 
 HierarchicalDecoder::Streams HierarchicalDecoder::openStreams(const ParsedPacket& packet) const {
-  if (isPacked_) return {RansReader({}), BitReader({}), 0, 0};
   const auto& bytes = packet.header.sectionBytes;
   const std::span<const std::byte> body = packet.body.subspan(bytes[kWeightChanges]);
   const std::size_t coarseSymbols = bytes[kCoarseSymbols], coarseBits = bytes[kCoarseBits],
@@ -108,19 +104,12 @@ HierarchicalDecoder::Streams HierarchicalDecoder::openStreams(const ParsedPacket
           coarseBits};
 }
 
-bool HierarchicalDecoder::readPacked(const ParsedPacket& packet) {
-  const auto& bytes = packet.header.sectionBytes;
-  const std::span<const std::byte> groups = packet.body.subspan(bytes[kPackedWeightChanges]);
-  return packed_.readCoarse(groups.first(bytes[kCoarseGroups])) &&
-         (isCoarse_ || packed_.readFine(groups.subspan(bytes[kCoarseGroups])));
-}
-
 void HierarchicalDecoder::decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights,
                                        Streams& streams) {
   for (std::size_t i = begin; i < end; ++i) {
     const Phase& phase = predictor_.hierarchy().phases[i];
     const ScaleModel model(kScaleWeights[scaleClassOf(phase.weightClass, key)]);
-    const bool quiet = !isPacked_ && streams.bits.get(1) != 0;
+    const bool quiet = streams.bits.get(1) != 0;
     for (std::uint32_t first = phase.begin; first < phase.end; first += kChunk) {
       decodeChunk(first, std::min(kChunk, phase.end - first), weights[phase.weightClass],
                   quiet ? nullptr : &model, streams);
@@ -134,8 +123,7 @@ void HierarchicalDecoder::decodeNormals(Streams& streams) {
   std::array<NormalScale, 2> scales;
   for (std::size_t vertex = 0; vertex < predicted.size(); ++vertex) {
     std::array<std::int32_t, 2> residuals;
-    for (std::size_t c = 0; c < 2; ++c)
-      residuals[c] = isPacked_ ? packed_.ofNormal(c, vertex) : readOfNormal(c, vertex, scales[c], streams);
+    for (std::size_t c = 0; c < 2; ++c) residuals[c] = readOfNormal(c, vertex, scales[c], streams);
     const FacedNormal& expected = predicted[vertex];
     const auto moved = [](std::int8_t from, std::int32_t by) {
       return static_cast<std::int8_t>(static_cast<std::uint32_t>(from) + static_cast<std::uint32_t>(by));
@@ -161,32 +149,15 @@ std::int32_t HierarchicalDecoder::readOfNormal(std::size_t component, std::size_
 void HierarchicalDecoder::decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
                                       const ScaleModel* model, Streams& streams) {
   predictor_.predict(begin, count, weights, predictions_.data(), frames_.data());
-  bool any = model != nullptr;
-  if (isPacked_)
-    any = loadPacked(begin, count);
-  else if (any)
+  if (model != nullptr) {
     readResiduals(count, *model, streams);
-  if (any) return reconstruct(begin, count);
+    return reconstruct(begin, count);
+  }
   for (std::uint32_t first = 0; first < count; first += 4) {
     const Prediction* four = &predictions_[first];
     place(begin + first, std::min(count - first, 4u), four,
           {four[0].position, four[1].position, four[2].position, four[3].position}, Int32x4::all(0));
   }
-}
-
-bool HierarchicalDecoder::loadPacked(std::uint32_t begin, std::uint32_t count) {
-  std::int32_t all = 0;
-  for (const Component component : kCodingOrder) {
-    const std::int32_t* from = packed_.residuals(component) + begin;
-    for (std::uint32_t i = 0; i < count; ++i) all |= residuals_[component][i] = from[i];
-  }
-  anyStays_ = false;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    stays_[i] = packed_.stays()[begin + i] != 0;
-    anyStays_ = anyStays_ || stays_[i];
-    if (stays_[i]) residuals_[kAlongU][i] = residuals_[kAlongV][i] = 0;
-  }
-  return all != 0 || anyStays_;
 }
 
 void HierarchicalDecoder::readResiduals(std::uint32_t count, const ScaleModel& model, Streams& streams) {

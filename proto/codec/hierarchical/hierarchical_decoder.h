@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Decoder of codecs 2 and 3: turns the part of a packet after the header into vertices. Decoder
+// Decoder of codec 2: turns the part of a packet after the header into vertices. Decoder
 // (proto/codec/decoder.h) has already checked that the packet belongs to the stream and that its reference is
 // held.
 #pragma once
@@ -12,7 +12,6 @@
 #include "proto/codec/coarse_packet.h"
 #include "proto/codec/hierarchical/bits.h"
 #include "proto/codec/hierarchical/frame_coder.h"
-#include "proto/codec/hierarchical/packed_residuals.h"
 #include "proto/codec/hierarchical/rans.h"
 #include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
@@ -34,7 +33,6 @@ class HierarchicalDecoder {
   std::uint64_t reconstructionHash() const;
 
  private:
-  // Symbols and bits of codec 2. Empty in codec 3, whose residuals are read before.
   struct Streams {
     RansReader symbols;
     BitReader bits;
@@ -48,14 +46,11 @@ class HierarchicalDecoder {
 
   bool decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer);
   Streams openStreams(const ParsedPacket& packet) const;
-  bool readPacked(const ParsedPacket& packet);
   // Applies the changes that a frame of this layer carries to `weights`.
   bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
                    bool& atRest) const;
   void decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights, Streams& streams);
   void decodeNormals(Streams& streams);
-  // Replaces readResiduals() in codec 3. False if no vertex stays or has a residual that is not 0.
-  bool loadPacked(std::uint32_t begin, std::uint32_t count);
   std::int32_t readOfNormal(std::size_t component, std::size_t vertex, NormalScale& scale, Streams& streams);
   // A null model means that the chunk has no residuals.
   void decodeChunk(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights,
@@ -72,10 +67,9 @@ class HierarchicalDecoder {
              const std::array<Int32x4, 4>& positions, Int32x4 magnitudes);
 
   StreamLayout layout_;
-  bool isCoarse_ = false, isPacked_ = false, hasNormals_ = false;
+  bool isCoarse_ = false, hasNormals_ = false;
   LatticeUnit unit_{};
   Predictor predictor_;
-  PackedResiduals packed_;  // used by codec 3 only
   NormalPrediction normalPrediction_;
   // by vertex; the second are those of the frame that is being decoded
   Array<FacedNormal> normals_, newNormals_;

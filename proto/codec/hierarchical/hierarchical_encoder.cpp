@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Encoder of codecs 2 and 3.
+// Encoder of codec 2.
 #include "proto/codec/hierarchical/hierarchical_encoder.h"
 
 #include <cmath>
@@ -80,7 +80,7 @@ struct HierarchicalEncoder::State {
         unit(latticeUnit(layout.maxError)),
         wanted(vertices),
         stillFrames(vertices),
-        writer(makeFrameWriter(layout)),
+        writer(layout),
         sentNormals(hasNormals ? vertices : 0) {
     if (!predictor.allocate(layout, unit.stepBits) || (hasNormals && !normalPrediction.allocate(layout)))
       std::abort();  // memory is out, as in any other allocation here
@@ -138,7 +138,7 @@ struct HierarchicalEncoder::State {
   std::vector<std::uint8_t> stillFrames;  // frames with an unchanged position, up to kStillFrames
   std::uint32_t restInterval =
       0;  // 1 / restInterval of the vertices may start to rest in this frame; 0: none may
-  std::unique_ptr<FrameWriter> writer;
+  FrameWriter writer;
   std::optional<FitSchedule> fitted;
   std::array<std::uint32_t, kWeightClasses + 1> chunks{};  // number of chunks of each class coded so far
   std::optional<WeightPlan> plan;
@@ -293,13 +293,13 @@ void HierarchicalEncoder::State::use(const Weights& chosen) {
 }
 
 void HierarchicalEncoder::State::encodePhases() {
-  writer->begin();
+  writer.begin();
   quiet = true;
   chunks.fill(0);
   const Hierarchy& hierarchy = predictor.hierarchy();
   for (std::size_t i = 0; i < hierarchy.phases.size(); ++i) {
     encodePhase(hierarchy.phases[i]);
-    if (i + 1 == hierarchy.coarsePhases) writer->endCoarse();
+    if (i + 1 == hierarchy.coarsePhases) writer.endCoarse();
   }
 }
 
@@ -346,7 +346,7 @@ void HierarchicalEncoder::State::share(std::uint32_t count, std::uint32_t least,
 }
 
 void HierarchicalEncoder::State::encodePhase(const Phase& phase) {
-  writer->beginPhase();
+  writer.beginPhase();
   bool any = false;
   std::uint32_t& number = chunks[phase.weightClass];
   for (std::uint32_t first = phase.begin; first < phase.end; first += batch) {
@@ -358,7 +358,7 @@ void HierarchicalEncoder::State::encodePhase(const Phase& phase) {
     number += count;
     for (std::uint32_t i = 0; i < count; ++i) any = write(phase.weightClass, encoded[i]) || any;
   }
-  writer->endPhase(any);
+  writer.endPhase(any);
   quiet = quiet && !any;
 }
 
@@ -387,7 +387,7 @@ void HierarchicalEncoder::State::encodeChunk(const Phase& phase, std::uint32_t b
                     &scratch.predictions[first], positions, packed);
   }
   out.any = out.any || chunk.anyStays;
-  if (writer->needsScales()) scale(scratch, count, model, chunk);
+  scale(scratch, count, model, chunk);
   for (std::uint32_t i = 0; out.fits && i < count; ++i) {
     const std::uint32_t slot = begin + i;
     fitTo(scratch, weightClass, predictor.features(slot, scratch.predictions[i]), wanted[slot].load(), i);
@@ -399,7 +399,7 @@ void HierarchicalEncoder::State::encodeChunk(const Phase& phase, std::uint32_t b
 }
 
 bool HierarchicalEncoder::State::write(std::uint32_t weightClass, const EncodedChunk& chunk) {
-  writer->add(chunk.residuals, chunk.count);
+  writer.add(chunk.residuals, chunk.count);
   if (chunk.fits) plan->add(weightClass, chunk.products);
   return chunk.any;
 }
@@ -444,8 +444,8 @@ void HierarchicalEncoder::State::encodeNormals(std::span<const float> normals) {
     const Octahedral& expected = predicted[vertex].octahedral;
     sentNormals[vertex] = faceNormal(&normals[3 * vertex], predicted[vertex].top);
     const Octahedral& sent = sentNormals[vertex].octahedral;
-    writer->addNormal(static_cast<std::int8_t>(sent.u - expected.u),
-                      static_cast<std::int8_t>(sent.v - expected.v));
+    writer.addNormal(static_cast<std::int8_t>(sent.u - expected.u),
+                     static_cast<std::int8_t>(sent.v - expected.v));
   }
 }
 
@@ -467,7 +467,7 @@ HierarchicalEncoder::HierarchicalEncoder(const StreamLayout& layout, const Encod
 HierarchicalEncoder::~HierarchicalEncoder() = default;
 
 std::size_t HierarchicalEncoder::packetBound() const {
-  return state_->writer->packetBound();
+  return state_->writer.packetBound();
 }
 
 std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const float> positions,
@@ -489,7 +489,7 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   if (s.hasNormals) s.encodeNormals(normals);
   s.predictor.keep(role.layer);
   s.plan->end(s.quiet);
-  return s.writer->write(role, std::span(s.weightBytes).first(weightBytes), out);
+  return s.writer.write(role, std::span(s.weightBytes).first(weightBytes), out);
 }
 
 std::uint64_t HierarchicalEncoder::reconstructionHash() const {

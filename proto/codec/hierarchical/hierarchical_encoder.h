@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Encoder of codecs 2 and 3: vertices to packets.
+// Encoder of codec 2: vertices to packets.
 #pragma once
 
 #include <cstddef>

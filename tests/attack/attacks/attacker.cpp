@@ -90,7 +90,7 @@ v1::ClientMessage helloTo(const std::string& scene) {
   v1::ClientMessage message;
   message.mutable_hello()->set_protocol_version(1);
   message.mutable_hello()->set_scene(scene);
-  for (const std::uint32_t codec : {1u, 2u, 3u}) message.mutable_hello()->add_codecs(codec);
+  for (const std::uint32_t codec : {1u, 2u}) message.mutable_hello()->add_codecs(codec);
   return message;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite codec: both codecs on the CPU over motions that they were not fitted to; codec 2 also with temporal
-// layers, and for a square grid as a mesh.
+// Suite codec: the codec on the CPU over motions that it was not fitted to, also with temporal layers, with
+// normals, and for a square grid as a mesh.
 #include <array>
 #include <functional>
 #include <vector>
@@ -14,7 +14,7 @@
 namespace clothstream::bench {
 namespace {
 
-// Frames of a motion in memory, so that each codec has them and the caches to itself.
+// Frames of a motion in memory, so that each variant has them and the caches to itself.
 class Frames {
  public:
   explicit Frames(const BenchMotion& motion) : floats_(3 * std::size_t{motion.cloth.vertexCount}) {
@@ -45,15 +45,12 @@ nlohmann::ordered_json measure(const std::string& motion, const codec::StreamLay
 }
 
 struct Variant {
-  std::uint8_t codec, temporalLayers;
+  std::uint8_t temporalLayers;
   codec::NormalMode normals;
 };
-constexpr std::array kVariants{Variant{codec::kCodecHierarchical, 1, codec::NormalMode::none},
-                               Variant{codec::kCodecHierarchical, 2, codec::NormalMode::none},
-                               Variant{codec::kCodecHierarchical, 3, codec::NormalMode::none},
-                               Variant{codec::kCodecHierarchical, 1, codec::NormalMode::octahedral},
-                               Variant{codec::kCodecPacked, 1, codec::NormalMode::none},
-                               Variant{codec::kCodecPacked, 1, codec::NormalMode::octahedral}};
+constexpr std::array kVariants{Variant{1, codec::NormalMode::none}, Variant{2, codec::NormalMode::none},
+                               Variant{3, codec::NormalMode::none},
+                               Variant{1, codec::NormalMode::octahedral}};
 
 }  // namespace
 
@@ -64,7 +61,6 @@ Rows runCodec(vulkan::Device& device, const Settings& settings) {
     const auto ofTheGrid = [&](std::size_t frame) { return frames[frame]; };
     codec::StreamLayout layout{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
     for (const Variant& variant : kVariants) {
-      layout.codec = variant.codec;
       layout.temporalLayers = variant.temporalLayers;
       layout.normals = variant.normals;
       rows.push_back(measure(motion.name, layout, frames.count(), ofTheGrid));
@@ -76,10 +72,7 @@ Rows runCodec(vulkan::Device& device, const Settings& settings) {
     }
     if (motion.cloth.rows < 2 || motion.cloth.rows != motion.cloth.columns) continue;
     codec::CutGrid cut(motion.cloth.rows);
-    const codec::StreamLayout ofAMesh{.epoch = 1,
-                                      .codec = codec::kCodecHierarchical,
-                                      .maxError = settings.maxError,
-                                      .cloths = {cut.cloth()}};
+    const codec::StreamLayout ofAMesh{.epoch = 1, .maxError = settings.maxError, .cloths = {cut.cloth()}};
     rows.push_back(measure(motion.name, ofAMesh, frames.count(),
                            [&](std::size_t frame) { return cut.renumbered(frames[frame]); }));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Codecs 2 and 3 as FrameCodec.
+// Codec 2 as FrameCodec.
 #pragma once
 
 #include <memory>

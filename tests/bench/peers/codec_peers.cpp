@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Our codecs compared with raw floats, Draco, meshoptimizer and zstd. They alternate frame by frame.
+// Our codec compared with raw floats, Draco, meshoptimizer and zstd. They alternate frame by frame.
 #include <array>
 #include <optional>
 #include <stdexcept>
@@ -16,7 +16,7 @@ namespace {
 // Max errors of the curves.
 constexpr std::array kErrors{0.0001, 0.0002, 0.0005, 0.001, 0.002};
 
-// Our codecs, then the others, all at this max error.
+// Our codec, then the others, all at this max error.
 std::vector<CodecMeasurement> measurements(const codec::ClothLayout& cloth, double maxError) {
   std::vector<CodecMeasurement> all;
   all.emplace_back(std::make_unique<OurCodec>(codec::StreamLayout{

@@ -4,7 +4,7 @@ import math
 import struct
 
 from arithmetic import add, cross, dot, frame, reach, sat, sat16, shift, sub, subs, times, wrap
-from entropy import Bits, DISTRIBUTIONS, Groups, SCALE_WEIGHTS, Symbols, unzigzag
+from entropy import Bits, DISTRIBUTIONS, SCALE_WEIGHTS, Symbols, unzigzag
 from order import Cloths, EQUAL
 
 
@@ -21,7 +21,6 @@ class Decoder:
         self.count = sum(cloth["vertexCount"] for cloth in stream["cloths"])
         self.max_error, self.qualities = stream["maxError"], stream.get("qualities", 1)
         self.layers = stream.get("temporalLayers", 1)
-        self.packed = stream["codec"] == 3
         self.has_normals = stream["normals"] == "octahedral"
         self.held = {}  # the newest frame of each layer, by layer
         self.history = []  # reference of the current frame, reference of that frame, and so on
@@ -62,8 +61,7 @@ class Decoder:
     def decode(self, packet):
         key, layer, tick, reference, sections, quality = packet
         if self.coarse:
-            emptied = (2,) if self.packed else (2, 4)
-            sections = [b"" if i in emptied else section for i, section in enumerate(sections)]
+            sections = [b"" if i in (2, 4) else section for i, section in enumerate(sections)]
         self.history = []
         if not key:
             at = next(frame for frame in self.held.values() if frame["tick"] == reference)
@@ -71,13 +69,10 @@ class Decoder:
             self.history = [at, at["history"][0], at["history"][1]]
         self.set_quality(quality)
         weights, left = self.read_weights(sections[0], key, layer)
-        if self.packed:
-            symbols, bits = self.read_packed(sections), Bits(b"")
-        else:
-            symbols, bits = Symbols(sections[1] + sections[2]), Bits(sections[3] + sections[4])
-            if not self.coarse:
-                reach("a packet with symbols of %s coarse vertices and %s others" % (
-                    "some" if len(sections[1]) > 16 else "no", "some" if sections[2] else "no"))
+        symbols, bits = Symbols(sections[1] + sections[2]), Bits(sections[3] + sections[4])
+        if not self.coarse:
+            reach("a packet with symbols of %s coarse vertices and %s others" % (
+                "some" if len(sections[1]) > 16 else "no", "some" if sections[2] else "no"))
         now = {name: [None] * self.count for name in "RSGQEDMW"}
         now["rests"] = [False] * self.count
         for number, (weight_class, phase) in enumerate(self.cloths.phases):
@@ -85,7 +80,7 @@ class Decoder:
                 self.check_coarse(sections, symbols, bits)
                 if self.coarse:
                     break
-            quiet = not self.packed and bits.get(1)
+            quiet = bits.get(1)
             for start in range(0, len(phase), 64):
                 group = phase[start:start + 64]
                 predicted = [self.predict(now, v, weights[weight_class]) for v in group]
@@ -96,7 +91,7 @@ class Decoder:
             self.check_coarse(sections, symbols, bits)
         has_normals = self.has_normals and not self.coarse
         now["normals"] = self.read_normals(now, symbols, bits) if has_normals else None
-        if not self.packed and not self.coarse:
+        if not self.coarse:
             symbols.check_end()
             bits.check_end()
         phases = self.cloths.phases
@@ -114,22 +109,7 @@ class Decoder:
         self.held = {layer: now} if key else {**self.held, layer: now}
         self.newest = now
 
-    def read_packed(self, sections):
-        """The residuals of all vertices along u, v, n (None for n if the vertex stays), and those of the normals."""
-        order = [v for _, phase in self.cloths.phases for v in phase]
-        coarse = sum(len(phase) for _, phase in self.cloths.phases[:self.cloths.coarse_phases])
-        first, second = Groups(sections[1]), Groups(sections[2])
-        residuals, normals = first.read(coarse, 3), []
-        if not self.coarse:
-            residuals += second.read(self.count - coarse, 3)
-            normals = second.read(self.count, 2) if self.has_normals else []
-        first.bits.check_end()
-        second.bits.check_end()
-        return {v: (u, w, n) for v, (n, u, w) in zip(order, residuals)}, normals
-
     def check_coarse(self, sections, symbols, bits):
-        if self.packed:
-            return
         assert 2 * symbols.at == len(sections[1]) and (bits.at + 7) // 8 == len(sections[3])
 
     def read_normals(self, now, symbols, bits):
@@ -151,9 +131,6 @@ class Decoder:
             for c in 0, 1:
                 x = n[(top + 1 + c) % 3]
                 guess = (254 * abs(x) + size) // (2 * size) * (-1 if x < 0 else 1) if size else 0
-                if self.packed:
-                    octahedral.append((guess + symbols[1][v][c] + 128) % 256 - 128)
-                    continue
                 o = max(4, min(16383, expected[c])).bit_length() - 1
                 scale = 2 * (o - 2) + (max(4, min(16383, expected[c])) >> o - 1 & 1)
                 b = 0 if scale < 16 else (scale - 14) // 2
@@ -250,12 +227,7 @@ class Decoder:
     def read_residuals(self, now, group, scale_class, quiet, symbols, bits):
         residuals, stays = [[0, 0, 0] for _ in group], [False] * len(group)
         magnitude = lambda i, c: min(abs(residuals[i][c]), 31)
-        if self.packed:
-            for i, v in enumerate(group):
-                stays[i] = symbols[0][v][2] is None
-                if not stays[i]:
-                    residuals[i] = list(symbols[0][v])
-        elif not quiet:
+        if not quiet:
             for c in 2, 0, 1:
                 w = SCALE_WEIGHTS[scale_class][c]
                 for i, v in enumerate(group):
@@ -349,14 +321,14 @@ def parse(packet):
             if b < 128:
                 return value
 
-    assert packet[0] == 1
+    assert packet[0] == 1 and packet[1] == 2
     varint()  # epoch
     tick = varint()
     references = [tick - varint() for _ in range(byte())]
     for _ in range(varint()):
         varint(), varint()
     sizes = [varint() for _ in range(byte())]
-    assert at + sum(sizes) == len(packet) and len(sizes) == {2: 5, 3: 3}[packet[1]]
+    assert at + sum(sizes) == len(packet) and len(sizes) == 5
     sections = []
     for size in sizes:
         sections.append(packet[at:at + size])

@@ -22,17 +22,14 @@ def numbers(cell):
 def check_packets():
     """Decodes the packets of the page. Returns their number."""
     positions = list(zip(*(map(numbers, row[1:]) for row in rows(4) if row[0].isdigit())))
-    expected = {"small_1": positions[0], "packed_small_1": positions[0], "small_2": positions[1],
-                "small_3": positions[1], "small_4": positions[2]}
+    expected = {"small_1": positions[0], "small_2": positions[1], "small_3": positions[1], "small_4": positions[2]}
     cloth = {"vertexCount": 9, "rows": 3, "columns": 3}
-    decoders = {codec: Decoder({"codec": codec, "maxError": 0.009999999776482582, "normals": "none", "cloths": [cloth]})
-                for codec in (2, 3)}
-    found = [row for row in rows(3) if re.fullmatch("(packed_)?small_[0-9]", row[0])]
-    assert [row[0] for row in found] == list(sorted(expected, key=lambda name: ("packed" in name, name)))
+    decoder = Decoder({"maxError": 0.009999999776482582, "normals": "none", "cloths": [cloth]})
+    found = [row for row in rows(3) if re.fullmatch("small_[0-9]", row[0])]
+    assert [row[0] for row in found] == list(expected)
     for name, packet, hashed in found:
         packet = bytes.fromhex(packet)
         assert packet == open("tests/golden/%s.bin" % name, "rb").read(), name
-        decoder = decoders[packet[1]]
         decoder.decode(parse(packet))
         assert tuple(decoder.newest["R"]) == expected[name], name
         assert decoder.hash() == hashed, name
