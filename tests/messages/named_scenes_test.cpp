@@ -84,7 +84,7 @@ TEST(NamedScenes, AreAllListed) {
 TEST(NamedScenes, SphereDropComesToRestOnTheSphere) {
   const model::Scene scene = *loadScene("sphere_drop");
   reference::ReferenceSimulation simulation(scene);
-  while (simulation.ticks() < 5 * scene.simulationRate) simulation.tick();
+  while (simulation.ticks() < 6 * scene.simulationRate) simulation.tick();
   const reference::ReferenceCloth& sheet = simulation.cloths()[0];
   const double mass = scene.cloths[0].mass;
   EXPECT_LT(std::sqrt(2 * sheet.kineticEnergy() / mass), 0.01);  // m/s, root mean square
