@@ -155,7 +155,7 @@ struct ClothSimulation::Pipeline {
   std::unique_ptr<BendingStage> nextBending(std::span<const model::Cloth> cloths);
   // `stage` replaces the present stage unless it is null.
   void setBending(std::unique_ptr<BendingStage> stage, std::span<const model::Cloth> cloths);
-  void makeAttachments(AttachmentTables tables);
+  void makeAttachments(const AttachmentTables& tables);
   // Inputs relative to the origin.
   const TickInputs& nearby(const TickInputs& inputs);
   // Whether setCloths() has to make these.
@@ -281,19 +281,14 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
     skins = std::make_unique<SkinStage>(on, std::move(tables), solidTables, solids->solids(), workgroupSize);
   if (MotionBoundStage::isIn(scene))
     motionBound = std::make_unique<MotionBoundStage>(on, scene, stateOf(buffers, collision), workgroupSize);
-  if (const AttachmentTables tables = attachmentTables(scene); !tables.empty()) {
+  if (const AttachmentTables tables = attachmentTables(scene, origin); !tables.empty()) {
     makeAttachments(tables);
     attachments->setSlack(scene.cloths);
   }
   prepare();
 }
 
-void ClothSimulation::Pipeline::makeAttachments(AttachmentTables tables) {
-  for (shared::FrameRecord& frame : tables.frames) {
-    frame.position.x -= origin.x();
-    frame.position.y -= origin.y();
-    frame.position.z -= origin.z();
-  }
+void ClothSimulation::Pipeline::makeAttachments(const AttachmentTables& tables) {
   attachments =
       std::make_unique<AttachmentStage>(device, tables, stateOf(buffers, collision), nodes, workgroupSize);
 }

@@ -80,7 +80,7 @@ TEST_P(FrameEncoder, KeepsTheErrorAtTheEdgesOfRounding) {
 
 // The simulation and the encoder work near an origin, and packets hold positions in the world.
 TEST_P(FrameEncoder, KeepsTheErrorFarFromTheOriginOfTheWorld) {
-  model::Scene scene = GetParam().cloths();
+  model::Scene scene = clothsOf(GetParam().normals);
   for (model::Cloth& cloth : scene.cloths) cloth.grid.pose.position += model::Vec3(700, -300, 90);
   scene.stream.maxError = 0.002f;
   Encoding encoding(scene, GetParam().prediction);

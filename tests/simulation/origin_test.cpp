@@ -11,6 +11,9 @@ namespace {
 
 using model::Vec3;
 
+// Of floats between 512 and 1024, m.
+constexpr float kSpacing = 0x1p-14f;
+
 class Origin : public GpuTest {};
 
 // A grid with an attachment and a mesh with self-collision, a ball, and a hand that grabs.
@@ -61,15 +64,15 @@ TEST_F(Origin, FarScenesMoveAsNearOnes) {
     const simulation::TickStatus other = away.tick(inputsAt(there, far, tick));
     ASSERT_TRUE(other.healthy);
     EXPECT_EQ(one.stateHash, other.stateHash) << tick;
-    // The far box is rounded, by half the spacing of floats there.
-    EXPECT_LT((other.low - far - one.low).norm(), 3e-5);
-    EXPECT_LT((other.high - far - one.high).norm(), 3e-5);
+    // The far box is rounded.
+    EXPECT_LT((other.low - far - one.low).norm(), kSpacing);
+    EXPECT_LT((other.high - far - one.high).norm(), kSpacing);
   }
   const simulation::StateSnapshot saved = away.save();
   EXPECT_EQ(saved.bytes, near.save().bytes);
   EXPECT_EQ(saved.origin, far);
   EXPECT_EQ(simulation::unpack(saved, far).positions, near.state().positions);
-  EXPECT_LT((away.state().positions[40] - far - near.state().positions[40]).norm(), 3e-5);
+  EXPECT_LT((away.state().positions[40] - far - near.state().positions[40]).norm(), kSpacing);
   const simulation::TickStatus there12 = simulation::statusOf(saved, model::reachOf(there.stream));
   EXPECT_EQ(there12.stateHash, simulation::statusOf(near.save()).stateHash);
   EXPECT_TRUE(there12.healthy);
@@ -86,7 +89,7 @@ TEST_F(Origin, SnapshotsOfEitherKindRestoreTheState) {
   other.restore(saved);
   EXPECT_EQ(other.save().bytes, saved.bytes);
   other.restore(simulation::inWorld(saved));
-  EXPECT_LT((other.state().positions[40] - running.state().positions[40]).norm(), 6e-5);
+  EXPECT_LT((other.state().positions[40] - running.state().positions[40]).norm(), 2 * kSpacing);
 }
 
 TEST_F(Origin, ReportsTheEnergyOfTheHeightInTheWorld) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "server/model/origin.h"
 #include "server/model/tethers.h"
 #include "server/simulation/texel.h"
 
@@ -13,10 +14,11 @@ namespace {
 
 // `first` is the cloth's first node in the scene.
 void addAttached(const model::Scene& scene, const model::Cloth& cloth, std::uint32_t first,
-                 AttachmentTables& tables) {
-  const std::vector<model::Vec3> rest = model::restPositions(cloth);
+                 const model::Vec3& origin, AttachmentTables& tables) {
+  const std::vector<model::Vec3> rest = model::restPositions(cloth, origin);
   for (const model::Attachment& attachment : cloth.attachments) {
-    const model::Pose start = model::frameAt(scene, attachment, 0);
+    model::Pose start = model::frameAt(scene, attachment, 0);
+    start.position -= origin;
     const auto frame = static_cast<float>(tables.frames.size());
     tables.frames.push_back(frameRecord(start));
     const std::vector<std::uint8_t> attached = model::attachedNodes(cloth, attachment);
@@ -48,13 +50,13 @@ shared::FrameRecord frameRecord(const model::Pose& pose) {
   return {vectorOf(pose.position), 0, texel(pose.orientation)};
 }
 
-AttachmentTables attachmentTables(const model::Scene& scene) {
+AttachmentTables attachmentTables(const model::Scene& scene, const model::Vec3& origin) {
   AttachmentTables tables;
   const bool anyTethers =
       std::ranges::any_of(scene.cloths, [](const model::Cloth& cloth) { return cloth.tethers.has_value(); });
   std::uint32_t first = 0;
   for (const model::Cloth& cloth : scene.cloths) {
-    addAttached(scene, cloth, first, tables);
+    addAttached(scene, cloth, first, origin, tables);
     if (cloth.tethers)
       for (const model::NodeTethers& tethers : model::nodeTethers(cloth))
         tables.tethers.push_back(record(tethers, first));

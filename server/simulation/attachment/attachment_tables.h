@@ -19,7 +19,8 @@ struct AttachmentTables {
   bool empty() const { return attached.empty() && tethers.empty(); }
 };
 
-AttachmentTables attachmentTables(const model::Scene& scene);
+// Positions are relative to `origin`.
+AttachmentTables attachmentTables(const model::Scene& scene, const model::Vec3& origin);
 
 shared::FrameRecord frameRecord(const model::Pose& pose);
 

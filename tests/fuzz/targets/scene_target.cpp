@@ -10,6 +10,7 @@
 #include "server/messages/limits.h"
 #include "server/messages/parsed_size.h"
 #include "server/messages/scene_message.h"
+#include "server/model/origin.h"
 #include "server/scene/live_scene.h"
 #include "server/simulation/assembled/assembled_tables.h"
 #include "server/simulation/attachment/attachment_tables.h"
@@ -43,7 +44,7 @@ struct Tables {
                                                    .wholeMeshNodes = 1024,
                                                    .rounds = 1 << 20})),
         bending(simulation::bendingTables(scene.cloths)),
-        attachments(simulation::attachmentTables(scene)),
+        attachments(simulation::attachmentTables(scene, model::originOf(scene))),
         masses(simulation::inverseMasses(scene.cloths)),
         state(simulation::restState(scene.cloths)) {}
 
