@@ -805,6 +805,7 @@ struct Checkpoint {
   static constexpr Field kState{2, WireType::kBytes};
   static constexpr Field kRestored{3, WireType::kVarint};
   static constexpr Field kGripsHold{4, WireType::kVarint};
+  static constexpr Field kOrigin{6, WireType::kBytes};
   static constexpr Field kHeld{5, WireType::kBytes};
   static constexpr Field kStart{50, WireType::kVarint};
 };
@@ -829,7 +830,13 @@ struct RecordedTick {
   static constexpr Field kColliders{10, WireType::kBytes};
   static constexpr Field kAttachments{11, WireType::kBytes};
   static constexpr Field kGrips{12, WireType::kBytes};
+  static constexpr Field kCarries{13, WireType::kBytes};
   static constexpr Field kSubsteps{60, WireType::kVarint};
+};
+struct AppliedCarry {
+  static constexpr Field kCloth{1, WireType::kVarint};
+  static constexpr Field kFrom{2, WireType::kBytes};
+  static constexpr Field kTo{3, WireType::kBytes};
 };
 struct ClothParameters {
   static constexpr Field kCloth{1, WireType::kBytes};
