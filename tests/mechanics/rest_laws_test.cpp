@@ -117,8 +117,8 @@ class FarLaws : public tests::GpuTest, public testing::WithParamInterface<int> {
 TEST_P(FarLaws, ClothFarFromTheOriginIsNearlyStill) {
   const auto x = static_cast<float>(GetParam());
   const double draped = restlessness(drapedAt(x)), hung = restlessness(hungAt(x));
-  EXPECT_LT(draped, 0.5);
-  EXPECT_LT(hung, 0.1);
+  EXPECT_LT(draped, 0.05);
+  EXPECT_LT(hung, 0.01);
   expectRow({std::to_string(GetParam()), figure(draped), figure(hung)});
 }
 
