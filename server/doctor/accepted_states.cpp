@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Hashes after a thousand ticks on Mesa's software device (lavapipe of Mesa 22.3.6). `clothstream-server step --scene NAME --ticks 1000 --every 1000 --out FILE` prints one
-// into FILE.json.
+// Hashes after a thousand ticks on Mesa's software device (lavapipe of Mesa 22.3.6). `clothstream-server step
+// --scene NAME --ticks 1000 --every 1000 --out FILE` prints one into FILE.json.
 #include "server/doctor/acceptance.h"
 
 namespace clothstream::doctor {
