@@ -103,7 +103,7 @@ double asymmetryAfterASecond(const Way& way) {
   return largest;
 }
 
-// What may act beside the springs.
+// A feature that acts on the cloth besides its springs.
 struct Part {
   std::string name;
   void (*add)(model::Cloth& cloth);

@@ -30,7 +30,7 @@ TEST(Jump, StartsBeyondAThirdOfATurn) {
   EXPECT_TRUE(hasJumped(at(0), at(0, 90), kTick, 0.6f));
 }
 
-TEST(Jump, OfOnePoseIsOneOfAll) {
+TEST(Jump, CountsIfOnePoseJumps) {
   const std::vector<Pose> before = {at(0), at(1)}, calm = {at(0.1f), at(1.1f)}, jumped = {at(0.1f), at(3)};
   EXPECT_FALSE(hasJumped(before, calm, kTick));
   EXPECT_TRUE(hasJumped(before, jumped, kTick));

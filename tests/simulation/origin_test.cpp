@@ -11,7 +11,7 @@ namespace {
 
 using model::Vec3;
 
-// Of floats between 512 and 1024, m.
+// Distance between neighbouring floats from 512 to 1024, m.
 constexpr float kSpacing = 0x1p-14f;
 
 class Origin : public GpuTest {};
