@@ -27,12 +27,12 @@ float reachOf(float maxError, std::uint8_t qualities) {
   return reach;
 }
 
-float maxErrorFor(float coordinate) {
+float maxErrorFor(float distance) {
   // Steps have all of their bits from 40 m on. A larger max error then has a larger reach.
-  const double unit = std::max(double{coordinate}, 40.0) / kMaxWanted;
+  const double unit = std::max(double{distance}, 40.0) / kMaxWanted;
   const double error = unit * hierarchical::kUnitsInMaxError + 0x1p-19;
   double micrometres = std::ceil(1e6 * error);
-  while (reachOf(static_cast<float>(1e-6 * micrometres)) < coordinate)
+  while (reachOf(static_cast<float>(1e-6 * micrometres)) < distance)
     micrometres = std::ceil(1.000001 * micrometres);
   return static_cast<float>(1e-6 * micrometres);
 }

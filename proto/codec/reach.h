@@ -7,13 +7,14 @@
 
 namespace clothstream::codec {
 
-// Largest magnitude of a coordinate, in metres, that packets with this max error hold: 2^27 units, less a
-// margin for residuals. An encoder clamps coordinates beyond it, so callers refuse them first. At least 40 m.
+// Largest distance along each axis from StreamLayout::origin, in metres, that packets with this max error
+// hold: 2^27 units, less a margin for residuals. An encoder clamps positions beyond it, so callers refuse
+// them first. At least 40 m.
 float reachOf(float maxError);
 // The same for all qualities of a stream.
 float reachOf(float maxError, std::uint8_t qualities);
-// Max error, in whole micrometres, from which on streams hold coordinates of this magnitude.
-float maxErrorFor(float coordinate);
+// Max error, in whole micrometres, from which on streams hold this distance.
+float maxErrorFor(float distance);
 
 // Largest distance of a decoded vertex from its true position, in metres, if no coordinate of it is beyond
 // `coordinate`: sqrt(3) max errors. Beyond 16 m the rounding of decoded floats is added.

@@ -39,7 +39,7 @@ inline constexpr std::uint8_t kMaxTemporalLayers = 3;
 struct StreamLayout {
   std::uint32_t epoch = 0;
   std::uint8_t codec = kCodecHierarchical;
-  // Maximum error in metres along each of three orthogonal axes, for vertices within 32 m of the origin.
+  // Maximum error in metres along each of three orthogonal axes, for vertices within 32 m of zero.
   // Farther out the spacing of floats is added. The axes turn with the surface, so the encoder promises a
   // distance of at most sqrt(3) maxError.
   float maxError = 0.0005f;
@@ -52,8 +52,8 @@ struct StreamLayout {
   // it. A stream changes its quality at a key frame.
   std::uint8_t qualities = 1;
   std::vector<ClothLayout> cloths;
-  // Point to which the positions that an encoder gets are relative, in metres. Decoders know nothing of it:
-  // packets hold positions in the world.
+  // Point to which the positions that an encoder gets and that packets hold are relative, in metres. Decoders
+  // add it.
   std::array<float, 3> origin = {};
 
   std::uint32_t vertexCount() const {
@@ -70,14 +70,16 @@ inline constexpr std::uint32_t kDefaultMaxVertices = 1u << 20;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 
 // True if a stream can have this layout: a known codec, 1 to kMaxTemporalLayers layers, at least one cloth,
-// no empty cloth, grids of rows x columns vertices, triangles of existing vertices, finite rest positions, at
-// most kMaxVertices vertices, and a max error between the two bounds above.
+// no empty cloth, grids of rows x columns vertices, triangles of existing vertices, a finite origin and
+// finite rest positions, at most kMaxVertices vertices, and a max error between the two bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
   if (!isCodec(layout.codec)) return false;
   if (layout.temporalLayers < 1 || layout.temporalLayers > kMaxTemporalLayers) return false;
   if (layout.qualities < 1 || layout.qualities > kMaxQualities) return false;
+  for (const float coordinate : layout.origin)
+    if (!std::isfinite(coordinate)) return false;
   std::uint64_t vertices = 0;
   for (const ClothLayout& cloth : layout.cloths) {
     const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;

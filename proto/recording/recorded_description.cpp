@@ -49,15 +49,16 @@ std::string sizeProblemOf(const v1::StreamDescription& description, const ReadLi
 }
 
 codec::StreamLayout layoutOf(const v1::StreamDescription& description) {
-  codec::StreamLayout layout{.epoch = description.epoch(),
-                             .codec = small(description.codec()),
-                             .maxError = description.max_error(),
-                             .normals = description.normals() == v1::NORMALS_OCTAHEDRAL
-                                            ? codec::NormalMode::octahedral
-                                            : codec::NormalMode::none,
-                             .temporalLayers = small(std::max(description.temporal_layers(), 1u)),
-                             .qualities = small(std::max(description.qualities(), 1u)),
-                             .cloths = {}};
+  codec::StreamLayout layout{
+      .epoch = description.epoch(),
+      .codec = small(description.codec()),
+      .maxError = description.max_error(),
+      .normals = description.normals() == v1::NORMALS_OCTAHEDRAL ? codec::NormalMode::octahedral
+                                                                 : codec::NormalMode::none,
+      .temporalLayers = small(std::max(description.temporal_layers(), 1u)),
+      .qualities = small(std::max(description.qualities(), 1u)),
+      .cloths = {},
+      .origin = {description.origin().x(), description.origin().y(), description.origin().z()}};
   for (const v1::ClothDescription& cloth : description.cloths()) {
     codec::ClothLayout& made = layout.cloths.emplace_back();
     made = {cloth.vertex_count(), cloth.rows(), cloth.columns(), numbersOf<std::uint32_t>(cloth.triangles())};

@@ -139,10 +139,6 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
   const double mantissa = std::frexp(codec::hierarchical::quantisationScale(unit_.unit), &exponent);
   push_.scale = static_cast<std::uint32_t>(std::ldexp(mantissa, codec::hierarchical::kScaleBits));
   push_.scaleShift = static_cast<std::uint32_t>(codec::hierarchical::kScaleBits - exponent);
-  const std::array<std::int32_t, 3> origin = codec::hierarchical::originInUnits(layout, unit_.unit);
-  push_.originX = static_cast<std::uint32_t>(origin[0]);
-  push_.originY = static_cast<std::uint32_t>(origin[1]);
-  push_.originZ = static_cast<std::uint32_t>(origin[2]);
 }
 
 void DevicePredictor::makeNormals(const vulkan::Device& device, const codec::StreamLayout& layout) {

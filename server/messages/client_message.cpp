@@ -16,6 +16,7 @@
 #include "server/messages/skin_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
+#include "server/model/origin.h"
 
 namespace clothstream::messages {
 namespace {
@@ -84,6 +85,7 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
     return attachment->name;
   };
   const double reach = model::reachOf(scene.stream);
+  const model::Vec3 origin = model::originOf(scene);
   for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i) {
     const v1::AttachmentPose& from = message.attachments(i);
     const Path path = poses.at("attachments", i);
@@ -92,7 +94,8 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
     const model::Pose pose = toPose(checks, path / "pose", from.pose());
     // Cloth that follows its attachment out of the stream's range would roll the scene back for everyone.
     for (int axis = 0; axis < 3; ++axis)
-      checks.number(path / "pose", pose.position[axis], {.min = -reach, .max = reach});
+      checks.number(path / "pose", pose.position[axis],
+                    {.min = origin[axis] - reach, .max = origin[axis] + reach});
     to.attachments.push_back({static_cast<std::size_t>(found - known.begin()), pose});
   }
 }

@@ -13,6 +13,7 @@
 #include "server/messages/solid_message.h"
 #include "server/messages/vectors.h"
 #include "server/model/mesh.h"
+#include "server/model/origin.h"
 
 namespace clothstream::messages {
 namespace {
@@ -101,6 +102,8 @@ v1::StreamDescription descriptionWithoutCloths(const model::Scene& scene, std::u
   description.set_normals(toMessage(scene.stream.normals));
   description.set_temporal_layers(scene.stream.temporalLayers);
   description.set_qualities(scene.stream.qualities);
+  if (const model::Vec3 origin = model::originOf(scene); !origin.isZero(0))
+    write(origin, *description.mutable_origin());
   for (const model::Collider& collider : scene.colliders) {
     v1::ColliderState& state = *description.add_colliders();
     write(collider, model::poseAt(collider, seconds), state);

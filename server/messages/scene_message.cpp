@@ -18,6 +18,7 @@
 #include "server/model/coarse_level.h"
 #include "server/model/hinges.h"
 #include "server/model/mesh.h"
+#include "server/model/origin.h"
 #include "server/model/springs.h"
 #include "server/model/stability.h"
 
@@ -191,19 +192,20 @@ void checkSelections(Checks& checks, const model::Scene& scene) {
                     tests, limits::kMaxSelectionTests));
 }
 
-// A stream holds no coordinate beyond its reach, and a cloth that starts there could not be sent.
+// A stream holds no position beyond its reach, and a cloth that starts there could not be sent.
 void checkReach(Checks& checks, const model::Scene& scene) {
   const float reach = model::reachOf(scene.stream);
+  const model::Vec3 origin = model::originOf(scene);
   for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
-    const float farthest = model::farthestCoordinate(scene.cloths[i]);
-    if (std::abs(farthest) <= reach) continue;
+    const float farthest = model::farthestFrom(origin, scene.cloths[i]);
+    if (farthest <= reach) continue;
     return checks.fail(
         Path().at("cloths", static_cast<int>(i)), "",
-        fmt::format(
-            "has a node with a coordinate of {:.6g} m; must be within {:.4g} m of the origin along each "
-            "axis, which is what a stream with a maxError of {:.4g} m holds: place the cloth nearer to the "
-            "origin, or set stream.maxError to {} or more",
-            farthest, reach, scene.stream.maxError, model::maxErrorFor(std::abs(farthest))));
+        fmt::format("has a node {:.6g} m from ({}, {}, {}), the middle of the scene, along an axis; must be "
+                    "within {:.4g} m, which is what a stream with a maxError of {:.4g} m holds: place the "
+                    "cloths nearer to one another, or set stream.maxError to {} or more",
+                    farthest, origin.x(), origin.y(), origin.z(), reach, scene.stream.maxError,
+                    model::maxErrorFor(farthest)));
   }
 }
 
@@ -349,11 +351,12 @@ std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::C
       least);
 }
 
-std::string outOfReach(const model::StreamSettings& stream) {
+std::string outOfReach(const model::Scene& scene) {
+  const model::Vec3 origin = model::originOf(scene);
   return fmt::format(
-      "cloth left the range that the stream holds, {:.4g} m from the origin along each axis at a "
+      "cloth left the range that the stream holds, {:.4g} m from ({}, {}, {}) along each axis at a "
       "maxError of {:.4g} m",
-      model::reachOf(stream), stream.maxError);
+      model::reachOf(scene.stream), origin.x(), origin.y(), origin.z(), scene.stream.maxError);
 }
 
 Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMesh, const SceneLimits& most,

@@ -68,6 +68,6 @@ std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::C
 std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound);
 
 // Says that cloth is where the stream cannot hold it.
-std::string outOfReach(const model::StreamSettings& stream);
+std::string outOfReach(const model::Scene& scene);
 
 }  // namespace clothstream::messages

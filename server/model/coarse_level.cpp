@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "server/model/mesh.h"
+#include "server/model/origin.h"
 #include "server/model/springs.h"
 
 namespace clothstream::model {
@@ -108,7 +109,7 @@ CoarseLevel gridLevel(const Cloth& cloth, std::uint32_t cells) {
   const Grid& grid = cloth.grid;
   const Lattice lattice = latticeOf(cloth, cells);
   const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
-  const std::vector<Vec3> rest = restPositions(cloth);
+  const std::vector<Vec3> rest = restPositions(cloth, originOf(cloth));
   CoarseLevel level;
   level.lattice = {static_cast<std::uint32_t>(lattice.rows.size()),
                    static_cast<std::uint32_t>(lattice.columns.size()), lattice.stride};
@@ -226,7 +227,7 @@ Centres centresOf(const Distances& distances, const std::vector<std::uint8_t>& p
 CoarseLevel meshLevel(const Cloth& cloth, std::uint32_t cells) {
   const Distances distances(cloth);
   const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
-  const std::vector<Vec3> rest = restPositions(cloth);
+  const std::vector<Vec3> rest = restPositions(cloth, originOf(cloth));
   const std::size_t side = cells + 1;
   const Centres centres =
       centresOf(distances, pinned, std::min<std::size_t>(side * side, (pinned.size() + 3) / 4));

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "server/model/mesh.h"
+#include "server/model/origin.h"
 
 namespace clothstream::model {
 namespace {
@@ -102,7 +103,7 @@ double bentFromRest(const HingeShape& shape, double restAngle) {
 }
 
 std::vector<Hinge> hinges(const Cloth& cloth) {
-  const std::vector<Vec3> rest = restPositions(cloth);
+  const std::vector<Vec3> rest = restPositions(cloth, originOf(cloth));
   std::vector<Hinge> found;
   const auto add = [&](const std::array<std::uint32_t, 4>& nodes, float part) {
     found.push_back(hingeOf(rest, nodes));
@@ -136,7 +137,7 @@ std::vector<Hinge> hinges(const Cloth& cloth) {
 // Gershgorin's circle theorem: in the sum of weight grad grad^T, the block row of a node of mass m is at most
 // the sum of weight |grad_i| (sum of |grad_j|) over m.
 double bendingRate(const Cloth& cloth) {
-  const std::vector<Vec3> rest = restPositions(cloth);
+  const std::vector<Vec3> rest = restPositions(cloth, originOf(cloth));
   const std::vector<double> masses = nodeMasses(cloth);
   const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
   std::vector<double> sums(rest.size(), 0);

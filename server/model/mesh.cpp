@@ -133,6 +133,11 @@ Mesh makeMesh(MeshShape shape, const Cancellation& cancellation) {
   mesh.shape = std::move(shape);
   mesh.areas = lumpedAreas(mesh.shape);
   mesh.area = std::accumulate(mesh.areas.begin(), mesh.areas.end(), 0.0);
+  if (!mesh.shape.positions.empty()) mesh.low = mesh.high = mesh.shape.positions[0];
+  for (const Vec3& position : mesh.shape.positions) {
+    mesh.low = mesh.low.cwiseMin(position);
+    mesh.high = mesh.high.cwiseMax(position);
+  }
   cancellation.check();
   mesh.links = LinkFinder(mesh.shape).find(cancellation);
   for (const double area : mesh.areas) mesh.shares.push_back(area / mesh.area);

@@ -43,6 +43,7 @@ struct Mesh {
   double area = 0;                // m^2
   std::vector<double> shares;     // fraction of the cloth's mass per node, proportional to its area
   std::vector<SpringLink> links;  // ordered as springLinks() says
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // box of the positions, m
 
   std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(shape.positions.size()); }
 };

@@ -1,21 +1,54 @@
 // SPDX-License-Identifier: MIT
 #include "server/model/origin.h"
 
-#include <limits>
-
 #include "server/model/mesh.h"
 
 namespace clothstream::model {
 
+namespace {
+
+struct Extent {
+  Vec3 low, high;
+};
+
+// Of the start positions.
+Extent extentOf(const Cloth& cloth) {
+  if (cloth.mesh) return {cloth.mesh->low, cloth.mesh->high};
+  Grid corners = cloth.grid;
+  corners.rows = corners.columns = 2;
+  const std::vector<Vec3> positions = restPositions(corners);
+  Extent extent{positions[0], positions[0]};
+  for (const Vec3& position : positions) {
+    extent.low = extent.low.cwiseMin(position);
+    extent.high = extent.high.cwiseMax(position);
+  }
+  return extent;
+}
+
+Vec3 originOf(const Extent& extent) {
+  return kOriginStep * ((extent.low / 2 + extent.high / 2) / kOriginStep).array().round().matrix();
+}
+
+}  // namespace
+
 Vec3 originOf(const Scene& scene) {
-  Vec3 low = Vec3::Constant(std::numeric_limits<float>::max()), high = -low;
-  for (const Cloth& cloth : scene.cloths)
-    for (const Vec3& position : restPositions(cloth)) {
-      low = low.cwiseMin(position);
-      high = high.cwiseMax(position);
-    }
   if (scene.cloths.empty()) return Vec3::Zero();
-  return kOriginStep * ((low / 2 + high / 2) / kOriginStep).array().round().matrix();
+  Extent all = extentOf(scene.cloths[0]);
+  for (const Cloth& cloth : scene.cloths) {
+    const Extent extent = extentOf(cloth);
+    all.low = all.low.cwiseMin(extent.low);
+    all.high = all.high.cwiseMax(extent.high);
+  }
+  return originOf(all);
+}
+
+Vec3 originOf(const Cloth& cloth) {
+  return originOf(extentOf(cloth));
+}
+
+float farthestFrom(const Vec3& point, const Cloth& cloth) {
+  const Extent extent = extentOf(cloth);
+  return (extent.high - point).cwiseMax(point - extent.low).maxCoeff();
 }
 
 std::vector<Vec3> restPositions(const Cloth& cloth, const Vec3& origin) {

@@ -156,25 +156,8 @@ float reachOf(const StreamSettings& stream) {
   return codec::reachOf(stream.maxError, stream.qualities);
 }
 
-float maxErrorFor(float coordinate) {
-  return codec::maxErrorFor(coordinate);
-}
-
-float farthestCoordinate(const Cloth& cloth) {
-  float farthest = 0;
-  const auto look = [&](std::span<const Vec3> positions) {
-    for (const Vec3& position : positions)
-      for (int axis = 0; axis < 3; ++axis)
-        if (std::abs(position[axis]) > std::abs(farthest)) farthest = position[axis];
-  };
-  if (cloth.mesh) {
-    look(cloth.mesh->shape.positions);
-  } else {
-    Grid corners = cloth.grid;
-    corners.rows = corners.columns = 2;
-    look(restPositions(corners));
-  }
-  return farthest;
+float maxErrorFor(float distance) {
+  return codec::maxErrorFor(distance);
 }
 
 }  // namespace clothstream::model

@@ -291,12 +291,10 @@ GridSpacing spacing(const Grid& grid);
 // are then equally accurate for every mesh.
 float suitedMaxError(const Scene& scene);
 
-// Largest magnitude of a coordinate, in metres, that all qualities of the stream hold. Nodes must not be
-// beyond it.
+// Largest distance along each axis from originOf() that all qualities of the stream hold, in metres. Nodes
+// must not be beyond it.
 float reachOf(const StreamSettings& stream);
-// Max error in metres from which on streams hold a coordinate of this magnitude.
-float maxErrorFor(float coordinate);
-// Coordinate of a node at the start that has the largest magnitude, in metres.
-float farthestCoordinate(const Cloth& cloth);
+// Max error in metres from which on streams hold this distance.
+float maxErrorFor(float distance);
 
 }  // namespace clothstream::model

@@ -21,6 +21,7 @@ constexpr double kTinyLengthSquared = 1e-12;  // m^2, of a spring
 constexpr double kTinyAirSquared = 1e-20;     // of |u||N|, m^6/s^2
 constexpr double kTinyNormalSquared = 1e-30;  // m^4
 constexpr double kDepthRounding = 2.4e-7;     // of the kernels' contacts, relative to coordinates
+constexpr double kOpposed = -0.5;             // product of the normals of two contacts that pinch
 
 // `u` is the velocity of the air relative to the triangle, `N` its area vector.
 Vec3 airForce(const Vec3& u, const Vec3& N, double density, double drag, double lift) {
@@ -302,7 +303,7 @@ void ReferenceCloth::limitStretch(double h) {
 
 void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step, double friction,
                              std::span<const Vec3> from, std::span<const std::uint8_t> only) {
-  const double mu = cloth_.friction * friction;
+  presses_.resize(positions_.size());
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     if (inverseMasses_[i] == 0 || (!only.empty() && only[i] == 0)) continue;
     const std::optional<Contact> contact = contactOf(shape, cloth_.thickness, step, from[i], positions_[i]);
@@ -310,22 +311,35 @@ void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step
     positions_[i] += contact->depth * contact->normal;
     const Vec3 carried =
         step.velocity + contact->velocity + step.spin.cross(positions_[i] - step.after.position);
-    const Vec3 relative = velocities_[i] - carried;
-    const double approach = relative.dot(contact->normal);
-    const auto heldOf = [&](const Vec3& motion, double most) {
-      const Vec3 along = motion - motion.dot(contact->normal) * contact->normal;
-      const double length = along.norm();
-      return length > 0 ? Vec3(std::min(1.0, most / length) * along) : Vec3(Vec3::Zero());
-    };
+    const double approach = (velocities_[i] - carried).dot(contact->normal);
     velocities_[i] -= std::min(approach, 0.0) * contact->normal;
-    if (mu == 0) continue;
     const double extents = (positions_[i] - step.after.position).lpNorm<1>() + positions_[i].lpNorm<1>();
     const double wayOut =
         (contact->depth - kDepthRounding * extents) / step.seconds - std::max(approach, 0.0);
-    const double most = mu * std::max({-approach, wayOut, 0.0});
-    velocities_[i] -= heldOf(relative, most);
-    positions_[i] -= heldOf(positions_[i] - from[i] - step.seconds * carried, step.seconds * most);
+    std::optional<Press>& last = presses_[i];
+    const bool opposed = last && last->normal.dot(contact->normal) < kOpposed;
+    if (last) rub(i, *last, opposed ? Vec3(Vec3::Zero()) : contact->normal, from[i]);
+    last = Press{contact->normal, last && !opposed ? last->normal : Vec3(Vec3::Zero()), carried,
+                 cloth_.friction * friction * std::max({-approach, wayOut, 0.0}), step.seconds};
   }
+}
+
+void ReferenceCloth::finishContacts(std::span<const Vec3> from) {
+  for (std::size_t i = 0; i < presses_.size(); ++i)
+    if (presses_[i]) rub(i, *presses_[i], Vec3::Zero(), from[i]);
+  presses_.clear();
+}
+
+void ReferenceCloth::rub(std::size_t i, const Press& press, const Vec3& next, const Vec3& from) {
+  const auto change = [&](const Vec3& motion, double most) {
+    const Vec3 along = motion - motion.dot(press.normal) * press.normal;
+    const double length = along.norm();
+    Vec3 held = length > 0 ? Vec3(-std::min(1.0, most / length) * along) : Vec3(Vec3::Zero());
+    for (const Vec3& other : {press.before, next}) held -= std::min(held.dot(other), 0.0) * other;
+    return held;
+  };
+  velocities_[i] += change(velocities_[i] - press.carried, press.most);
+  positions_[i] += change(positions_[i] - from - press.seconds * press.carried, press.seconds * press.most);
 }
 
 std::vector<Vec3> ReferenceCloth::normals() const {

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -58,9 +59,11 @@ class ReferenceCloth {
 
   // Moves nodes out of the shape on their way from `from` (one place per node) to their positions. Their
   // velocity relative to the surface loses the part into the surface, and Coulomb friction acts on the rest
-  // ([Va21] 3.4, Alg. 4). `only` selects nodes, one byte per node; empty: all.
+  // ([Va21] 3.4, Alg. 4): that of each contact after the next one, that of the last one in finishContacts().
+  // `only` selects nodes, one byte per node; empty: all.
   void collide(const model::Shape& shape, const ColliderStep& step, double friction,
                std::span<const Vec3> from, std::span<const std::uint8_t> only = {});
+  void finishContacts(std::span<const Vec3> from);
 
   // Unit normals; (0,0,1) if they vanish. A grid uses up to eight triangles around a node ([Va21] 3.5, Alg.
   // 5), a mesh the area vectors of a node's triangles.
@@ -75,6 +78,15 @@ class ReferenceCloth {
   double penetration(const model::Shape& shape, const Pose& pose) const;
 
  private:
+  // A contact whose friction has not acted yet.
+  struct Press {
+    Vec3 normal, before;  // its normal, and that of the contact before it; 0 if none, or opposed
+    Vec3 carried;         // velocity of the surface
+    double most;          // speed that friction takes
+    double seconds;       // of the substep
+  };
+  // Moves nothing into the surfaces of the contacts before and after this one (`next`), unless opposed.
+  void rub(std::size_t node, const Press& press, const Vec3& next, const Vec3& from);
   void setMass(float mass);
   // m/s^2; 0 for pinned nodes. Valid until the next call.
   const std::vector<Vec3>& accelerations(const model::Environment& environment);
@@ -94,6 +106,7 @@ class ReferenceCloth {
   std::vector<model::Triangle> triangles_;
   std::vector<model::Hinge> hinges_;  // created at first use
   std::vector<Vec3> positions_, velocities_, forces_;
+  std::vector<std::optional<Press>> presses_;  // by node, of the contacts since finishContacts()
   std::vector<Vec3> start_, startVelocities_;  // at the substep's start, for solvers of linear systems
   model::SpringColours colours_;               // of xpbd, created at first use
   std::vector<double> masses_, inverseMasses_;

@@ -101,6 +101,7 @@ void ReferenceSimulation::collide(const TickInputs& inputs, std::uint32_t index,
     }
     cloths_[cloth].collide(collider.shape, step, collider.friction, before_[cloth], only);
   }
+  cloths_[cloth].finishContacts(before_[cloth]);
 }
 
 // Nodes take their ways past the colliders, which stand still meanwhile. What they keep becomes velocity.
@@ -121,6 +122,7 @@ void ReferenceSimulation::correct(const CoarseCorrection& level, std::size_t num
         stepOf(collider.start, collider.end, index, scene_.substeps, scene_.tickSeconds()).before;
     cloth.collide(collider.shape, {pose, pose}, 0, start);
   }
+  cloth.finishContacts(start);
   const std::uint32_t since = index > 0 ? every : scene_.substeps - (scene_.substeps - 1) / every * every;
   const double rate = 1 / (since * scene_.substepSeconds());
   for (std::size_t i = 0; i < ways.size(); ++i)

@@ -624,8 +624,7 @@ void SceneHost::recover() {
   sinceHealthy_ = 0;
   recovery_ = cure == Cure::rollback ? Recovery::rollback : Recovery::reset;
   (cure == Cure::rollback ? live_.metrics.rollbacks : live_.metrics.resets).add();
-  std::string text =
-      status_.outOfReach ? messages::outOfReach(scene_.stream) : "the simulation became unstable";
+  std::string text = status_.outOfReach ? messages::outOfReach(scene_) : "the simulation became unstable";
   switch (cure) {
     case Cure::rollback:
       text += ": the scene continues from its newest healthy state, at most a second old";

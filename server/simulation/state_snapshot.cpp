@@ -63,12 +63,11 @@ TickStatus statusOf(const StateSnapshot& snapshot, float reach) {
     sum.low += hash.low;
     sum.high += hash.high;
     for (const std::uint32_t word : words) isInWorld = isInWorld && !shared::isOutsideWorld(word);
+    for (std::size_t k = 0; k < 3; ++k)
+      isInReach = isInReach && !shared::isBeyond(words[k], std::bit_cast<std::uint32_t>(reach));
     const model::Vec3 place(snapshot.origin.x() + std::bit_cast<float>(words[0]),
                             snapshot.origin.y() + std::bit_cast<float>(words[1]),
                             snapshot.origin.z() + std::bit_cast<float>(words[2]));
-    for (const float x : place)
-      isInReach = isInReach &&
-                  !shared::isBeyond(std::bit_cast<std::uint32_t>(x), std::bit_cast<std::uint32_t>(reach));
     low = low.cwiseMin(place);
     high = high.cwiseMax(place);
   }

@@ -50,8 +50,8 @@ StateSnapshot inWorld(const StateSnapshot& snapshot);
 // Status of a tick.
 struct TickStatus {
   std::uint64_t stateHash = 0;  // of positions and velocities, bits
-  // True: every component is finite and within kWorldExtent of zero (m; m/s), and no position is out of
-  // reach.
+  // True: every component is finite and within kWorldExtent of zero (m; m/s), and no position is farther
+  // from the origin of the simulation than the reach.
   bool healthy = true;
   // True: the state is unhealthy only because a position is out of reach, and so cannot be streamed.
   bool outOfReach = false;

@@ -106,7 +106,7 @@ Outcome run(vulkan::Device& device, const model::Scene& scene, const StepOptions
     if (!status.healthy) {
       outcome = Outcome::unhealthy;
       fmt::print(stderr, "tick {}: {}; {} ends with the {} frames before it\n", tick,
-                 status.outOfReach ? messages::outOfReach(scene.stream)
+                 status.outOfReach ? messages::outOfReach(scene)
                                    : std::string("the state left the range of numbers"),
                  options.out.string(), file.frames());
     } else if (wanted) {

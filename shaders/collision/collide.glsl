@@ -160,13 +160,57 @@ vec3 alongSurface(vec3 v, vec3 normal) {
   return along;
 }
 
+// A contact whose friction has not acted yet. Friction waits for the next contact of the node: only then is
+// it known which motion along the surface remains.
+struct Press {
+  uint collider;  // kNoCollider: there is no contact
+  vec3 normal;
+  vec3 before;   // normal of the contact before this one; 0 if there is none, or if they are opposed
+  vec3 carried;  // velocity of the surface
+  float pushed;  // speed at which the collider pushes
+  float friction;
+};
+const uint kNoCollider = 0xFFFFFFFFu;
+const Press kNoPress = Press(kNoCollider, vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0);
+
+// Without the part that leads into a surface.
+vec3 keptOut(vec3 change, vec3 normal) {
+  precise vec3 kept = change - min(dotProduct(change, normal), 0.0) * normal;
+  return kept;
+}
+
+// Friction takes at most its coefficient times the speed at which the collider pushes. It acts on the
+// velocity relative to the surface, and on the way since the substep's start, which other colliders may have
+// caused. It moves nothing into the surfaces of the contacts before and after this one (`next`; 0 if there is
+// none), unless they are opposed: a node that two colliders pinch cannot be outside of both.
+void rub(Press press, vec3 next, CollisionPush push, CollidingNode node, vec3 from, inout vec3 position,
+         inout vec3 velocity) {
+  precise float most = press.friction * press.pushed;
+  precise vec3 relative = velocity - press.carried;
+  vec3 slip = alongSurface(relative, press.normal);
+  precise vec3 slower = -heldShare(slip, most) * slip;
+  slower = keptOut(keptOut(slower, press.before), next);
+  precise vec3 way = position - from - push.substepSeconds * press.carried;
+  vec3 slid = alongSurface(way, press.normal);
+  precise vec3 back = -heldShare(slid, push.substepSeconds * most) * slid;
+  back = keptOut(keptOut(back, press.before), next);
+  precise vec3 slowed = velocity + slower;
+  precise vec3 stayed = position + back;
+  velocity = slowed;
+  position = stayed;
+  if (push.contactClothCount > 0 && node.inverseMass > 0.0) {
+    precise vec3 given = slower + press.pushed * press.normal;
+    reportContact(press.collider * push.contactClothCount + node.cloth, given, node.inverseMass);
+  }
+}
+
 // Moves a free node, which was at `from` at the substep's start, out of the collider. Its velocity relative
-// to the surface, which moves with `surfaceVelocity` and spins, loses the part into the surface. Friction
-// takes at most its coefficient times the speed at which the collider pushes: that of the approach, or that
-// of the way out, less its rounding and a speed away from the surface. It acts on the velocity, and on the
-// way since the substep's start, which other colliders may have caused.
+// to the surface, which moves with `surfaceVelocity` and spins, loses the part into the surface. The collider
+// pushes with the speed of the approach, or that of the way out, less its rounding and a speed away from the
+// surface.
 void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity, vec3 spin,
-           CollisionPush push, CollidingNode node, vec3 from, inout vec3 position, inout vec3 velocity) {
+           CollisionPush push, CollidingNode node, vec3 from, inout Press last, inout vec3 position,
+           inout vec3 velocity) {
   precise vec3 surface = position + contact.depth * contact.normal;
   precise vec3 arm = surface - collider.after;
   precise vec3 carried = surfaceVelocity + crossProduct(spin, arm);
@@ -177,29 +221,32 @@ void leave(uint index, Collider collider, Contact contact, vec3 surfaceVelocity,
   precise float wayOut = pressed * push.substepRate - max(approach, 0.0);
   precise float met = max(-approach, 0.0);
   precise float pushed = max(met, wayOut);
-  precise float most = collider.friction * pushed;
-  vec3 slip = alongSurface(relative, contact.normal);
-  precise vec3 after = carried + (1.0 - heldShare(slip, most)) * slip + max(approach, 0.0) * contact.normal;
-  precise vec3 gained = after - velocity;
-  velocity = after;
-  precise vec3 way = surface - from - push.substepSeconds * carried;
-  vec3 slid = alongSurface(way, contact.normal);
-  precise vec3 stayed = surface - heldShare(slid, push.substepSeconds * most) * slid;
-  position = stayed;
-  if (push.contactClothCount > 0 && node.inverseMass > 0.0) {
-    precise vec3 given = gained + (pushed - met) * contact.normal;
-    reportContact(index * push.contactClothCount + node.cloth, given, node.inverseMass);
+  precise vec3 stopped = velocity + met * contact.normal;
+  position = surface;
+  velocity = stopped;
+  bool opposed = dotProduct(last.normal, contact.normal) < kOpposed;
+  if (last.collider != kNoCollider) {
+    rub(last, opposed ? vec3(0.0) : contact.normal, push, node, from, position, velocity);
   }
+  last = Press(index, contact.normal, opposed ? vec3(0.0) : last.normal, carried, pushed, collider.friction);
 }
 
 // Moves a free node that comes from `from` out of the collider, if it touches it.
 void collide(uint index, Collider collider, ColliderFrame frame, CollisionPush push, CollidingNode node,
-             vec3 from, inout vec3 position, inout vec3 velocity) {
+             vec3 from, inout Press last, inout vec3 position, inout vec3 velocity) {
   Contact contact = findContact(collider, frame, from, position);
   if (contact.depth <= 0.0) {
     return;
   }
-  leave(index, collider, contact, collider.velocity, frame.spin, push, node, from, position, velocity);
+  leave(index, collider, contact, collider.velocity, frame.spin, push, node, from, last, position, velocity);
+}
+
+// The friction of the last contact.
+void finishContacts(Press last, CollisionPush push, CollidingNode node, vec3 from, inout vec3 position,
+                    inout vec3 velocity) {
+  if (last.collider != kNoCollider) {
+    rub(last, vec3(0.0), push, node, from, position, velocity);
+  }
 }
 
 // Collides a node with every collider that it may touch, in ascending order. A node that is pushed out of the
@@ -214,6 +261,7 @@ void collideWithAll(CollidingNode node, CollisionPush push, vec3 from, inout vec
   if (!covers(list, from, position)) {
     list = allColliders(push.colliderCount);
   }
+  Press last = kNoPress;
   uint i = 0;
   do {
     uint index = 0;
@@ -228,13 +276,14 @@ void collideWithAll(CollidingNode node, CollisionPush push, vec3 from, inout vec
       }
     } while (!near && i < list.count);
     if (near) {
-      collide(index, collider, fetchFrame(collider, push), push, node, from, position, velocity);
+      collide(index, collider, fetchFrame(collider, push), push, node, from, last, position, velocity);
       if (!covers(list, from, position)) {
         list = allColliders(push.colliderCount);
         i = index + 1;
       }
     }
   } while (i < list.count);
+  finishContacts(last, push, node, from, position, velocity);
 }
 
 #endif

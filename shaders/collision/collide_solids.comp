@@ -28,7 +28,8 @@ layout(push_constant) uniform Push {
   SolidPush push;
 };
 
-void collideWithSolid(uint number, CollidingNode node, vec3 from, inout vec3 position, inout vec3 velocity) {
+void collideWithSolid(uint number, CollidingNode node, vec3 from, inout Press last, inout vec3 position,
+                      inout vec3 velocity) {
   Collider collider = fetchCollider(number, push.collision, node.thickness, node.friction);
   if (!mayTouch(collider, from, position)) {
     return;
@@ -43,7 +44,7 @@ void collideWithSolid(uint number, CollidingNode node, vec3 from, inout vec3 pos
   if (touch.contact.depth > 0.0) {
     touch.contact.normal = rotate(frame.after, touch.contact.normal);
     precise vec3 surface = collider.velocity + push.collision.tickRate * rotate(frame.after, touch.motion);
-    leave(number, collider, touch.contact, surface, frame.spin, push.collision, node, from, position,
+    leave(number, collider, touch.contact, surface, frame.spin, push.collision, node, from, last, position,
           velocity);
   }
 }
@@ -64,9 +65,11 @@ void main() {
   vec3 position = here.xyz;
   vec3 velocity = velocities[index].xyz;
   CollidingNode node = CollidingNode(index, uint(tile.cloth), here.w, cloth.thickness, cloth.friction);
+  Press last = kNoPress;
   for (uint solid = 0u; solid < push.solidCount; ++solid) {
-    collideWithSolid(push.collision.colliderCount + solid, node, from, position, velocity);
+    collideWithSolid(push.collision.colliderCount + solid, node, from, last, position, velocity);
   }
+  finishContacts(last, push.collision, node, from, position, velocity);
   positions[index].xyz = snapTiny(position);
   velocities[index].xyz = snapTiny(velocity);
 }

@@ -59,6 +59,9 @@ const float kThicknessReach = 1.75;
 // Rounding error of a contact's depth, relative to coordinates.
 const float kDepthRounding = 2.4e-7f;
 
+// Two contacts pinch a node if the product of their normals is below this.
+const float kOpposed = -0.5f;
+
 // One substep.
 struct CollisionPush {
   uint32_t colliderCount;

@@ -239,7 +239,7 @@ struct FinishPush {
 struct HashPush {
   vec3 origin;  // of the positions, m
   uint32_t nodeCount;
-  uint32_t reach;  // bits of the largest magnitude of a component of a position in the world, m
+  uint32_t reach;  // bits of the largest magnitude of a component of a position, m
 };
 
 // A component is not finite or outside the world; a component of a position is beyond HashPush::reach.

@@ -36,11 +36,11 @@ void main() {
         isOutsideWorld(v.y) || isOutsideWorld(v.z)) {
       unhealthy |= kOutsideWorld;
     }
-    precise vec3 inWorld = push.origin + uintBitsToFloat(p);
-    uvec3 w = floatBitsToUint(inWorld);
-    if (isBeyond(w.x, push.reach) || isBeyond(w.y, push.reach) || isBeyond(w.z, push.reach)) {
+    if (isBeyond(p.x, push.reach) || isBeyond(p.y, push.reach) || isBeyond(p.z, push.reach)) {
       unhealthy |= kOutOfReach;
     }
+    precise vec3 inWorld = push.origin + uintBitsToFloat(p);
+    uvec3 w = floatBitsToUint(inWorld);
     uvec3 place = uvec3(orderOf(w.x), orderOf(w.y), orderOf(w.z));
     invertedLow = max(invertedLow, ~place);
     high = max(high, place);

@@ -52,6 +52,7 @@ GoldenStream readStream(const nlohmann::json& json) {
   stream.layout.maxError = json.at("maxError");
   stream.layout.temporalLayers = json.value("temporalLayers", std::uint8_t{1});
   stream.layout.qualities = json.value("qualities", std::uint8_t{1});
+  stream.layout.origin = json.value("origin", stream.layout.origin);
   stream.layout.normals = json.at("normals") == "octahedral" ? NormalMode::octahedral : NormalMode::none;
   for (const nlohmann::json& cloth : json.at("cloths")) {
     stream.layout.cloths.push_back({cloth.at("vertexCount"), cloth.at("rows"), cloth.at("columns"),
@@ -82,6 +83,7 @@ nlohmann::ordered_json describe(const GoldenStream& stream) {
       {"normals", stream.layout.normals == NormalMode::octahedral ? "octahedral" : "none"}};
   if (stream.layout.temporalLayers > 1) json["temporalLayers"] = stream.layout.temporalLayers;
   if (stream.layout.qualities > 1) json["qualities"] = stream.layout.qualities;
+  if (stream.layout.origin != StreamLayout{}.origin) json["origin"] = stream.layout.origin;
   for (const ClothLayout& cloth : stream.layout.cloths) {
     nlohmann::ordered_json& described = json["cloths"].emplace_back();
     described = {{"vertexCount", cloth.vertexCount}, {"rows", cloth.rows}, {"columns", cloth.columns}};

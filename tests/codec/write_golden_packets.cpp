@@ -135,7 +135,7 @@ GoldenStream makeHeldStream() {
   return makeStream("held", layout, moments);
 }
 
-// A mesh and a grid.
+// A mesh and a grid, far from the origin of the world.
 GoldenStream makeMeshStream() {
   constexpr std::uint32_t kEdge = 14;
   const ClothLayout grid{.vertexCount = kEdge * kEdge, .rows = kEdge, .columns = kEdge};
@@ -148,7 +148,7 @@ GoldenStream makeMeshStream() {
                       frame.positions.begin());
     moments.push_back({tick, tick == 1 ? PacketKind::key : PacketKind::predicted, frame});
   }
-  return makeStream("mesh", {.epoch = 9, .cloths = {mesh.cloth(), grid}}, moments);
+  return makeStream("mesh", {.epoch = 9, .cloths = {mesh.cloth(), grid}, .origin = {640, -128, 64}}, moments);
 }
 
 // The smallest grid with all kinds of vertices. The page FRAME_FORMAT.md shows these packets.

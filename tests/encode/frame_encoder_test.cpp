@@ -78,11 +78,10 @@ TEST_P(FrameEncoder, KeepsTheErrorAtTheEdgesOfRounding) {
   }
 }
 
-// The simulation and the encoder work near an origin, and packets hold positions in the world.
+// The decoder adds the origin, near which simulation and encoder work.
 TEST_P(FrameEncoder, KeepsTheErrorFarFromTheOriginOfTheWorld) {
   model::Scene scene = clothsOf(GetParam().normals);
   for (model::Cloth& cloth : scene.cloths) cloth.grid.pose.position += model::Vec3(700, -300, 90);
-  scene.stream.maxError = 0.002f;
   Encoding encoding(scene, GetParam().prediction);
   EXPECT_NE(encoding.simulation.origin(), model::Vec3::Zero());
   for (std::uint64_t tick = 1; tick <= 30; ++tick) encoding.tick(tick, tick % 10 == 1, inputsOf(scene));

@@ -86,6 +86,39 @@ TEST_F(ContactLaws, ASheetSlidesFromTheAngleOfFriction) {
   }
 }
 
+// Loose nodes in a groove of two planes at 45 degrees: each carries 1 / sqrt(2) of the weight. Metres that
+// they move along it in a second.
+double wayInAGroove(double slope) {
+  model::Cloth cloth = tests::looseCloth(2, 4);
+  cloth.grid.height = 0.0001f;
+  cloth.grid.pose.position.y() = 0.004f * std::numbers::sqrt2_v<float>;
+  cloth.friction = kFriction;
+  model::Scene scene = tests::sceneOf({cloth});
+  scene.environment.gravity = Vec3(static_cast<float>(kGravity * std::sin(slope)),
+                                   static_cast<float>(-kGravity * std::cos(slope)), 0);
+  std::vector<MovingCollider> sides;
+  for (const float degrees : {45.0f, -45.0f}) {
+    const model::Pose side{Vec3::Zero(), tests::turned(degrees, Vec3::UnitX())};
+    sides.push_back({model::Plane{}, side, side, 1});
+  }
+  Running running(scene);
+  const Vec3 start = running.state().positions[1];
+  for (int tick = 0; tick < 72; ++tick) running.tick(tests::inputsOf(scene, sides));
+  return double{(running.state().positions[1] - start).x()};
+}
+
+TEST_F(ContactLaws, ASheetSlidesInAGroove) {
+  const double exact = double{kFriction} * std::numbers::sqrt2, angle = std::atan(exact), h = 1.0 / 720;
+  const double held = wayInAGroove(0.98 * angle), slope = 1.3 * angle;
+  const double acceleration = wayInAGroove(slope) / (h * h * 720 * 721 / 2);
+  const double friction = (kGravity * std::sin(slope) - acceleration) / (kGravity * std::cos(slope));
+  EXPECT_LT(std::abs(held), 1e-5);
+  EXPECT_NEAR(friction, exact, 0.02 * exact);
+  expectRow({"friction of a slide in a groove", fmt::format("{:.4f}", exact), "2 %",
+             fmt::format("{:.4f}", friction)});
+  expectRow({"way in a groove below its angle of friction, m", "0", "1e-5", figure(std::abs(held))});
+}
+
 // 20 g, 20 cm x 50 cm, of cotton.
 model::Scene towel(model::SolverKind solver) {
   model::Cloth cloth;
@@ -103,16 +136,19 @@ model::Scene towel(model::SolverKind solver) {
   return scene;
 }
 
-double lowered(const NodeState& start, const NodeState& end) {
+// Mean of the nodes of one of the scene's equal cloths.
+double lowered(const model::Scene& scene, const NodeState& start, const NodeState& end, std::size_t cloth) {
+  const std::size_t nodes = start.positions.size() / scene.cloths.size();
   double sum = 0;
-  for (std::size_t i = 0; i < start.positions.size(); ++i)
+  for (std::size_t i = cloth * nodes; i < (cloth + 1) * nodes; ++i)
     sum += double{start.positions[i].y() - end.positions[i].y()};
-  return sum / static_cast<double>(start.positions.size());
+  return sum / static_cast<double>(nodes);
 }
 
 // Two shapes close on a towel to 4 mm of interference. A normal force above W / (2 mu) = 0.1 N holds its
 // weight. After a quarter of a second they rise by 30 cm in a second, and the towel with them.
-double slipInAPinch(model::Scene scene, const model::Shape& shape, float half, float friction) {
+double slipInAPinch(model::Scene scene, const model::Shape& shape, float half, float friction,
+                    std::size_t cloth = 0) {
   scene.colliders = {{.name = "thumb", .shape = shape}, {.name = "finger", .shape = shape}};
   Running running(scene);
   const NodeState start = running.state();
@@ -130,7 +166,7 @@ double slipInAPinch(model::Scene scene, const model::Shape& shape, float half, f
                                                   {shape, at(before), at(nextBefore), friction}}))
                     .healthy);
   }
-  return lowered(start, running.state()) + 0.3;
+  return lowered(scene, start, running.state(), cloth) + 0.3;
 }
 
 TEST_F(ContactLaws, APinchLiftsATowel) {
@@ -152,6 +188,27 @@ TEST_F(ContactLaws, APinchLiftsATowel) {
   expectRow({"slip of a towel that two spheres pinch and lift, `massSpring`, m", "0", "0.05",
              figure(std::abs(byForces))});
   EXPECT_GT(slipInAPinch(towel(model::SolverKind::xpbd), fingers, 0.025f, 0), 2) << "without friction";
+}
+
+// Three towels, whose balls touch. Boxes pinch the outer ones, and only friction between cloths lifts the one
+// in the middle.
+TEST_F(ContactLaws, APinchLiftsThreeTowels) {
+  const auto slipOfTheMiddle = [](float friction) {
+    constexpr float kRadius = 0.01f;
+    model::Scene scene = towel(model::SolverKind::xpbd);
+    scene.cloths.resize(3, scene.cloths[0]);
+    for (std::size_t i = 0; i < 3; ++i) {
+      scene.cloths[i].name += std::to_string(i);
+      scene.cloths[i].selfCollision = model::SelfCollision{.radius = kRadius, .friction = friction};
+      scene.cloths[i].grid.pose.position.z() = 2 * kRadius * (static_cast<float>(i) - 1);
+    }
+    return slipInAPinch(scene, model::Box{Vec3(0.3f, 0.06f, 0.05f)}, 0.025f + 2 * kRadius, 1, 1);
+  };
+  const double slip = slipOfTheMiddle(1);
+  EXPECT_LT(std::abs(slip), 0.05);
+  EXPECT_GT(slipOfTheMiddle(0), 1) << "without friction";
+  expectRow({"slip of a towel between two others that two boxes pinch and lift, m", "0", "0.05",
+             figure(std::abs(slip))});
 }
 
 // A third of it hangs over the edge of a table. A plate can only add friction.

@@ -58,6 +58,26 @@ double spinAfter20Seconds(const Way& way, bool mesh, void (*add)(model::Cloth& c
   return std::abs(momentum.angular.y()) / momentum.inertia;
 }
 
+// The same, held by a grab instead.
+double spinOfGrabbedCloth(const Way& way) {
+  model::Cloth cloth = clothOf(way);
+  cloth.damping = 1;
+  const model::Scene scene = sceneOf(cloth);
+  tests::Running running(scene);
+  const model::Pose hand{running.state().positions[0], model::Quaternion::Identity()};
+  simulation::TickInputs inputs = tests::inputsOf(scene);
+  inputs.grabs = {
+      {.state = simulation::Grab::State::takes, .start = hand, .end = hand, .radius = 0.01f, .reach = 0.01f}};
+  for (std::uint32_t tick = 0; tick < 20 * scene.simulationRate; ++tick) {
+    EXPECT_TRUE(running.tick(inputs).healthy);
+    EXPECT_EQ(running.grabs()[0].taken, 1u);
+    inputs.grabs[0].state = simulation::Grab::State::holds;
+  }
+  const NodeState state = running.state();
+  const Momentum momentum = momentumOf(scene, state, state.positions[0].cast<double>());
+  return std::abs(momentum.angular.y()) / momentum.inertia;
+}
+
 // The same without damping, for two seconds of swinging: angular momentum about the vertical, as a share of
 // what moves.
 double angularMomentumMade(const Way& way) {
@@ -123,6 +143,8 @@ std::vector<Part> parts() {
       {"self-collision with friction", [](model::Cloth& cloth) { collideWithItself(cloth, 0.5f); }}};
 }
 
+class MomentumOfGrabs : public tests::GpuTest {};
+
 class MomentumOfParts : public tests::GpuTest, public testing::WithParamInterface<Part> {};
 
 TEST_P(MomentumOfParts, DoesNotTurnTheCloth) {
@@ -133,6 +155,14 @@ TEST_P(MomentumOfParts, DoesNotTurnTheCloth) {
 
 INSTANTIATE_TEST_SUITE_P(Parts, MomentumOfParts, testing::ValuesIn(parts()),
                          [](const auto& part) { return lettersOf(part.param.name); });
+
+TEST_F(MomentumOfGrabs, DoesNotTurnTheCloth) {
+  for (const std::size_t way : {0, 5}) {
+    const double spin = spinOfGrabbedCloth(ways()[way]);
+    EXPECT_LT(spin, 0.001);
+    expectRow({"a grab instead of the pin, " + ways()[way].name, figure(spin)});
+  }
+}
 
 class MomentumLaws : public tests::GpuTest, public testing::WithParamInterface<Way> {};
 

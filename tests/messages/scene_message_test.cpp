@@ -593,12 +593,15 @@ const BadScene kBadScenes[] = {
        s.set_substeps(2);
      },
      "because of the springs of \"sheet\", whose mass is 0.6 kg; 2 would do with a mass of at least"},
-    {"cloths[0]: has a node with a coordinate of 801 m",
-     [](v1::Scene& s) { grid(s).mutable_pose()->mutable_position()->set_x(800); },
-     "set stream.maxError to 0.000778 or more"},
-    {"cloths[0]: has a node with a coordinate of -521.5 m",
-     [](v1::Scene& s) { grid(s).mutable_pose()->mutable_position()->set_y(-520); },
-     "must be within 514.2 m of the origin along each axis"},
+    {"cloths[0]: has a node 601 m from (128, 0, 0), the middle of the scene, along an axis",
+     [](v1::Scene& s) {
+       *s.add_cloths() = s.cloths(0);
+       s.mutable_cloths(1)->set_name("far");
+       grid(s).mutable_pose()->mutable_position()->set_x(-472);
+       s.mutable_cloths(1)->mutable_grid()->mutable_pose()->mutable_position()->set_x(728);
+     },
+     "must be within 514.2 m, which is what a stream with a maxError of 0.0005 m holds: place the cloths nearer "
+     "to one another, or set stream.maxError to 0.000584 or more"},
     {"substeps = 10: no number up to 256",
      [](v1::Scene& s) {
        cloth(s).mutable_bend()->set_stiffness(1e6f);

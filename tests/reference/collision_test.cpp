@@ -23,6 +23,7 @@ void collideWithSphere(ReferenceCloth& cloth, const Vec3& centre, const Vec3& ve
   const ColliderStep step{.before = {centre}, .after = {centre}, .velocity = velocity, .spin = Vec3::Zero()};
   const std::vector<Vec3> from(cloth.positions().begin(), cloth.positions().end());
   cloth.collide(model::Sphere{radius}, step, friction, from);
+  cloth.finishContacts(from);
 }
 
 TEST(ReferenceCollision, PutsNodesOnTheSurfacePlusThickness) {

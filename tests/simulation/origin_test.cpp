@@ -32,7 +32,6 @@ model::Scene sceneAt(const Vec3& place) {
     position = (1024 * position).array().round().matrix() / 1024 + place + Vec3(0, 0, 0.25f);
   mesh.mesh = std::make_shared<const model::Mesh>(model::makeMesh(shape));
   model::Scene scene = sceneOf({grid, mesh});
-  scene.stream.maxError = 0.002f;
   return scene;
 }
 
@@ -76,7 +75,7 @@ TEST_F(Origin, FarScenesMoveAsNearOnes) {
   const simulation::TickStatus there12 = simulation::statusOf(saved, model::reachOf(there.stream));
   EXPECT_EQ(there12.stateHash, simulation::statusOf(near.save()).stateHash);
   EXPECT_TRUE(there12.healthy);
-  EXPECT_FALSE(simulation::statusOf(saved, 600).healthy);
+  EXPECT_FALSE(simulation::statusOf(saved, 0.03f).healthy);
 }
 
 TEST_F(Origin, SnapshotsOfEitherKindRestoreTheState) {

@@ -151,6 +151,8 @@ bool readParts(Bytes message, Description& description, std::vector<ClothMessage
         description.layout.qualities =
             static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
         return true;
+      case F::kOrigin.tag:
+        return readVec3(reader.get_view(), description.layout.origin);
       case F::kMaterials.tag:
         return description.materials.size() < kMaxMaterials &&
                setText(description.materials.emplace_back(), reader);

@@ -505,6 +505,7 @@ struct StreamDescription {
   static constexpr Field kColliders{9, WireType::kBytes};
   static constexpr Field kTemporalLayers{11, WireType::kVarint};
   static constexpr Field kQualities{12, WireType::kVarint};
+  static constexpr Field kOrigin{13, WireType::kBytes};
   static constexpr Field kDefinition{10, WireType::kBytes};
   static constexpr Field kMaterials{40, WireType::kBytes};
 };

@@ -23,14 +23,6 @@ double quantisationScale(float unit) {
   return std::ldexp(std::round(std::ldexp(mantissa, kScaleBits)), exponent - kScaleBits);
 }
 
-std::array<std::int32_t, 3> originInUnits(const StreamLayout& layout, float unit) {
-  std::array<std::int32_t, 3> units;
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    units[axis] = static_cast<std::int32_t>(std::clamp(std::round(double{layout.origin[axis]} / double{unit}),
-                                                       -double{kMaxWanted}, double{kMaxWanted}));
-  return units;
-}
-
 Weights keyFrameWeights() {
   Weights weights{};
   for (std::size_t c = 0; c < kWeightClasses; ++c) weights[c][kRingFeature] = -192;

@@ -30,9 +30,6 @@ inline constexpr int kUnitsInMaxError = (1 << 7) + 2;
 // constant of two units above leaves half a unit for it.
 inline constexpr int kScaleBits = 29;
 double quantisationScale(float unit);
-// StreamLayout::origin in units, rounded. Encoders add it to rounded positions, which are near it: that takes
-// the half unit of which quantisationScale() then needs little.
-std::array<std::int32_t, 3> originInUnits(const StreamLayout& layout, float unit);
 
 // An encoder lets a vertex rest that has been wanted in the same place for kStillFrames frames. At most about
 // kRestsAtOnce vertices start to rest in a frame; if there are more, they alternate.

@@ -280,8 +280,10 @@ void HierarchicalDecoder::writePositions(float* out) const {
   const Array<std::uint32_t>& vertexOf = predictor_.hierarchy().vertexOf;
   const std::span<const Node> nodes = predictor_.nodes();
   const Float32x4 unit = Float32x4::all(unit_.unit);
+  const auto& [x, y, z] = layout_.origin;
+  const Float32x4 origin = Float32x4::of(x, y, z, 0);
   for (std::size_t slot = 0; slot < nodes.size(); ++slot)
-    (Float32x4::of(nodes[slot].load()) * unit).storeThree(out + 3 * std::size_t{vertexOf[slot]});
+    (Float32x4::of(nodes[slot].load()) * unit + origin).storeThree(out + 3 * std::size_t{vertexOf[slot]});
 }
 
 std::uint64_t HierarchicalDecoder::reconstructionHash() const {

@@ -158,17 +158,15 @@ void HierarchicalEncoder::State::quantise(std::span<const float> positions) {
   constexpr double limit = kMaxWanted;
   const Array<std::uint32_t>& vertexOf = predictor.hierarchy().vertexOf;
   const double perUnit = quantisationScale(unit.unit);
-  const std::array<std::int32_t, 3> origin = originInUnits(layout, unit.unit);
-  const auto coordinate = [&](float x, std::size_t axis) {
+  const auto coordinate = [&](float x) {
     const double q = static_cast<double>(x) * perUnit;
     if (!(q >= -limit)) return -kMaxWanted;  // also catches NaN
-    const std::int32_t nearby = q > limit ? kMaxWanted : simde_mm_cvtsd_si32(simde_mm_set_sd(q));
-    return std::clamp(nearby + origin[axis], -kMaxWanted, kMaxWanted);
+    return q > limit ? kMaxWanted : simde_mm_cvtsd_si32(simde_mm_set_sd(q));
   };
   const auto quantiseSlots = [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
     for (std::size_t slot = begin; slot < end; ++slot) {
       const float* p = &positions[3 * std::size_t{vertexOf[slot]}];
-      const Node next{coordinate(p[0], 0), coordinate(p[1], 1), coordinate(p[2], 2), 0};
+      const Node next{coordinate(p[0]), coordinate(p[1]), coordinate(p[2]), 0};
       const bool still = next.load().sameThree(wanted[slot].load());
       stillFrames[slot] =
           still ? static_cast<std::uint8_t>(std::min<std::uint32_t>(stillFrames[slot] + 1u, kStillFrames))

@@ -92,6 +92,7 @@ struct Float32x4 {
   static Float32x4 of(Int32x4 a) { return {simde_mm_cvtepi32_ps(a.v)}; }
   static Float32x4 ofBits(Int32x4 a) { return {simde_mm_castsi128_ps(a.v)}; }
   static Float32x4 all(float value) { return {simde_mm_set1_ps(value)}; }
+  static Float32x4 of(float a, float b, float c, float d) { return {simde_mm_setr_ps(a, b, c, d)}; }
   // Stores the first three lanes to any address.
   void storeThree(float* to) const {
     simde_mm_storel_pi(reinterpret_cast<simde__m64*>(to), v);

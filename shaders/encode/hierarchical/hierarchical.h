@@ -49,7 +49,6 @@ struct PredictPush {
   uint32_t scaleShift;
   uint32_t firstPhase;
   uint32_t endPhase;
-  uint32_t originX, originY, originZ;  // of the positions, in units, signed
 };
 
 // Results that a frame's kernels add up by integer atomics, whose order does not matter. Zero before the
@@ -82,7 +81,7 @@ CLOTHSTREAM_SHARED_END
 
 #ifdef __cplusplus
 namespace clothstream::shared {
-static_assert(sizeof(PredictPush) == 44 && sizeof(SlotStatus) == 16);
+static_assert(sizeof(PredictPush) == 32 && sizeof(SlotStatus) == 16);
 }  // namespace clothstream::shared
 #endif
 

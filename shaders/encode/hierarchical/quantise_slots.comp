@@ -68,8 +68,7 @@ void main() {
   uint slot = gl_GlobalInvocationID.x;
   if (slot < push.vertexCount) {
     vec3 p = texelFetch(positions, int(slotTable[slot])).xyz;
-    ivec3 nearby = ivec3(quantise(p.x), quantise(p.y), quantise(p.z));
-    ivec3 q = clamp(nearby + ivec3(uvec3(push.originX, push.originY, push.originZ)), -kLimit, kLimit);
+    ivec3 q = ivec3(quantise(p.x), quantise(p.y), quantise(p.z));
     ivec4 before = wanted[slot];
     uint still = q == before.xyz ? min(uint(before.w) + 1, kMaxStillFrames) : 0;
     wanted[slot] = ivec4(q, int(still));

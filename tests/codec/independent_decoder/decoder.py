@@ -20,6 +20,7 @@ class Decoder:
         self.cloths = Cloths(stream["cloths"])
         self.count = sum(cloth["vertexCount"] for cloth in stream["cloths"])
         self.max_error, self.qualities = stream["maxError"], stream.get("qualities", 1)
+        self.origin = [float32(x) for x in stream.get("origin", (0, 0, 0))]
         self.layers = stream.get("temporalLayers", 1)
         self.has_normals = stream["normals"] == "octahedral"
         self.held = {}  # the newest frame of each layer, by layer
@@ -145,7 +146,8 @@ class Decoder:
 
     def metres(self):
         """The decoded positions: float32 coordinates of all vertices, one after the other."""
-        return [float32(float32(x) * self.unit) for position in self.newest["R"] for x in position]
+        return [float32(float32(float32(x) * self.unit) + origin)
+                for position in self.newest["R"] for x, origin in zip(position, self.origin)]
 
     def normals(self):
         """Unit normals of all vertices: as sent, or from the decoded positions."""

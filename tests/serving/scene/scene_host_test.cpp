@@ -593,7 +593,7 @@ TEST_F(SceneHostTest, RollsBackClothThatLeavesTheRangeOfTheStream) {
   EXPECT_EQ(notice.kind(), v1::NOTICE_KIND_ROLLED_BACK);
   EXPECT_EQ(
       notice.text(),
-      "cloth left the range that the stream holds, 49.65 m from the origin along each axis at a maxError of "
+      "cloth left the range that the stream holds, 49.65 m from (0, 0, 0) along each axis at a maxError of "
       "5e-05 m: the scene continues from its newest healthy state, at most a second old");
 }
 
