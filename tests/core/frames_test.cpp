@@ -40,6 +40,21 @@ struct Joined {
   ClientUnderTest client;
 };
 
+// 640 m is exact in the decoded floats, whose spacing is then 0.06 mm.
+TEST(Frames, AreMovedByTheOriginOfTheStream) {
+  ScriptedServer server;
+  v1::StreamDescription description = server.description();
+  description.mutable_origin()->set_x(640);
+  ClientUnderTest client;
+  client.receive(server.welcome());
+  client.receiveAll(chunksOf(description.SerializeAsString(), 1 << 18, 1));
+  ASSERT_EQ(client.receive(server.frame(1, codec::PacketKind::key)), kFrame);
+  const float* decoded = cs_positions(client.get());
+  for (std::size_t i = 0; i < server.positions().size(); ++i)
+    ASSERT_NEAR(decoded[i], server.positions()[i] + (i % 3 == 0 ? 640 : 0),
+                std::sqrt(3.0f) * 0.0005f + 4e-5f);
+}
+
 class DecodedFrames : public ::testing::TestWithParam<codec::NormalMode> {};
 
 TEST_P(DecodedFrames, AreWithinMaxErrorAndAcknowledged) {

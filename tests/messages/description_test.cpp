@@ -42,6 +42,14 @@ TEST(ToDescription, HasEverythingThatADecoderNeeds) {
   EXPECT_TRUE(toScene(description.definition()));
 }
 
+TEST(ToDescription, HasTheOriginOfAFarScene) {
+  v1::Scene message = smallScene();
+  EXPECT_FALSE(toDescription(*toScene(message), 3, 1, 0).has_origin());
+  message.mutable_cloths(0)->mutable_grid()->mutable_pose()->mutable_position()->set_x(-700);
+  const v1::Vec3 origin = toDescription(*toScene(message), 3, 1, 0).origin();
+  EXPECT_EQ(model::Vec3(origin.x(), origin.y(), origin.z()), model::Vec3(-704, 0, 0));
+}
+
 TEST(ToDescription, EqualsItsTwoPartsConcatenated) {
   const model::Scene scene = *toScene(sceneWithHull());
   v1::StreamDescription parsed;
