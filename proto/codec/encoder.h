@@ -38,8 +38,8 @@ class Encoder {
   std::size_t packetBound() const;
 
   // Encodes one frame into `out`, which has at least packetBound() bytes, and returns the size of the packet.
-  // `positions` are metres, 3 floats a vertex. Coordinates beyond reachOf() (reach.h) are clamped, and NaN
-  // too: the packet then decodes, but not to these positions. Callers check. `normals` have about unit
+  // `positions` are metres relative to StreamLayout::origin, 3 floats a vertex. Coordinates beyond reachOf()
+  // (reach.h) are clamped, and NaN too: the packet then decodes, but not to these positions. Callers check. `normals` have about unit
   // length, or are empty if the layout has none. `tick` must grow from call to call, except after
   // forgetHistory(). The first frame is always a key frame. A predicted frame refers to the previous frame;
   // with temporal layers, to the newest frame of a lower layer or, in the base, to the previous frame of the

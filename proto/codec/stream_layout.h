@@ -68,10 +68,12 @@ inline constexpr std::uint32_t kMaxVertices = 1u << 26;
 // Vertices that a reader of streams and files accepts unless its caller allows more.
 inline constexpr std::uint32_t kDefaultMaxVertices = 1u << 20;
 inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
+// Largest magnitude of a coordinate of an origin, m.
+inline constexpr float kFarthestOrigin = 1e6f;
 
 // True if a stream can have this layout: a known codec, 1 to kMaxTemporalLayers layers, at least one cloth,
-// no empty cloth, grids of rows x columns vertices, triangles of existing vertices, a finite origin and
-// finite rest positions, at most kMaxVertices vertices, and a max error between the two bounds above.
+// no empty cloth, grids of rows x columns vertices, triangles of existing vertices, finite rest positions, at
+// most kMaxVertices vertices, and a max error and an origin within the bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
@@ -79,7 +81,7 @@ inline bool isPossible(const StreamLayout& layout) {
   if (layout.temporalLayers < 1 || layout.temporalLayers > kMaxTemporalLayers) return false;
   if (layout.qualities < 1 || layout.qualities > kMaxQualities) return false;
   for (const float coordinate : layout.origin)
-    if (!std::isfinite(coordinate)) return false;
+    if (!(std::abs(coordinate) <= kFarthestOrigin)) return false;
   std::uint64_t vertices = 0;
   for (const ClothLayout& cloth : layout.cloths) {
     const std::uint64_t nodes = std::uint64_t{cloth.rows} * cloth.columns;

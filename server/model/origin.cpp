@@ -4,7 +4,6 @@
 #include "server/model/mesh.h"
 
 namespace clothstream::model {
-
 namespace {
 
 struct Extent {

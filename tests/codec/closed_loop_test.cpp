@@ -327,7 +327,7 @@ TEST(Hierarchical, ChangesQualityAtAKeyFrame) {
 TEST(Layout, IsRefusedIfImpossible) {
   const StreamLayout good = mixedLayout(NormalMode::none);
   ASSERT_NE(Decoder::make(good), nullptr);
-  std::vector<StreamLayout> bad(18, good);
+  std::vector<StreamLayout> bad(20, good);
   bad[0].cloths.clear();
   bad[1].cloths[0].rows = 8;
   bad[2].cloths[0].rows = 0;
@@ -346,6 +346,8 @@ TEST(Layout, IsRefusedIfImpossible) {
   bad[15].qualities = 0;
   bad[16].qualities = kMaxQualities + 1;
   bad[17].codec = 3;
+  bad[18].origin[1] = std::nanf("");
+  bad[19].origin[2] = -1.1e6f;
   for (std::size_t i = 0; i < bad.size(); ++i) {
     EXPECT_EQ(Decoder::make(bad[i]), nullptr) << i;
     EXPECT_EQ(Encoder::make(bad[i]), nullptr) << i;

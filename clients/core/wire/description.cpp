@@ -226,7 +226,7 @@ std::string check(const Description& description, const std::vector<ClothMessage
            "there are "
            "no vertices or more than " +
            std::to_string(codec::kMaxVertices) +
-           ", or max_error, temporal_layers or qualities is out of range";
+           ", or max_error, temporal_layers, qualities or origin is out of range";
   return {};
 }
 
