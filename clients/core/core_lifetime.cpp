@@ -50,8 +50,8 @@ void cs_destroy(cs_client* client) noexcept {
   delete client;
 }
 
-void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) noexcept {
-  client->client.want({quality, temporal_layers});
+void cs_want(cs_client* client, uint32_t quality) noexcept {
+  client->client.want(quality);
 }
 
 void cs_set_token(cs_client* client, const char* token) noexcept {

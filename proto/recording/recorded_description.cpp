@@ -55,7 +55,6 @@ codec::StreamLayout layoutOf(const v1::StreamDescription& description) {
                              .normals = description.normals() == v1::NORMALS_OCTAHEDRAL
                                             ? codec::NormalMode::octahedral
                                             : codec::NormalMode::none,
-                             .temporalLayers = small(std::max(description.temporal_layers(), 1u)),
                              .qualities = small(std::max(description.qualities(), 1u)),
                              .cloths = {}};
   for (const v1::ClothDescription& cloth : description.cloths()) {

@@ -99,7 +99,6 @@ v1::StreamDescription descriptionWithoutCloths(const model::Scene& scene, std::u
   description.set_stream_rate(scene.streamRate);
   description.set_max_error(scene.stream.maxError);
   description.set_normals(toMessage(scene.stream.normals));
-  description.set_temporal_layers(scene.stream.temporalLayers);
   description.set_qualities(scene.stream.qualities);
   for (const model::Collider& collider : scene.colliders) {
     v1::ColliderState& state = *description.add_colliders();

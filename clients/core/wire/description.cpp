@@ -143,10 +143,6 @@ bool readParts(Bytes message, Description& description, std::vector<ClothMessage
                readCollider(reader.get_view(), description.colliders.emplace_back());
       case F::kDefinition.tag:
         return definition = reader.get_view(), true;
-      case F::kTemporalLayers.tag:
-        description.layout.temporalLayers =
-            static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
-        return true;
       case F::kQualities.tag:
         description.layout.qualities =
             static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
@@ -224,7 +220,7 @@ std::string check(const Description& description, const std::vector<ClothMessage
            "there are "
            "no vertices or more than " +
            std::to_string(codec::kMaxVertices) +
-           ", or max_error, temporal_layers or qualities is out of range";
+           ", or max_error or qualities is out of range";
   return {};
 }
 
