@@ -858,12 +858,12 @@ void cs_set_loop(cs_client* client, int loop) CS_NOEXCEPT;
  */
 
 typedef struct cs_statistics {
-  uint64_t tick;          /* tick of the newest decoded frame */
-  uint64_t frames;        /* decoded frames */
-  uint64_t key_frames;    /* decoded frames that are key frames */
-  uint64_t dropped;       /* frames that never arrived, from gaps between ticks */
-  uint64_t decode_errors; /* packets that the decoder refused */
-  uint64_t bytes;         /* bytes of received packets */
+  uint64_t tick;            /* tick of the newest decoded frame */
+  uint64_t frames;          /* decoded frames */
+  uint64_t key_frames;      /* decoded frames that are key frames */
+  uint64_t dropped;         /* frames that never arrived, from gaps between ticks */
+  uint64_t decode_errors;   /* packets that the decoder refused */
+  uint64_t bytes;           /* bytes of received packets */
   uint64_t hash_mismatches; /* decoded frames whose hash differs from the server's */
   double frames_per_second; /* over the last second */
   double kbit_per_second;   /* over the last second */
@@ -905,8 +905,8 @@ typedef struct cs_cloth_report {
 } cs_cloth_report;
 
 void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) CS_NOEXCEPT;
-/* Quality that the server sends now. It depends on cs_want and on the connection. Fails before the description;
- * then the quality is 0. */
+/* Quality that the server sends now. It depends on cs_want and on the connection. Fails before the
+ * description; then the quality is 0. */
 int cs_get_quality(const cs_client* client, uint32_t* quality) CS_NOEXCEPT;
 /* Time between the first and the newest decoded frame, on the caller's clock. */
 double cs_stream_seconds(const cs_client* client) CS_NOEXCEPT;

@@ -313,9 +313,7 @@ std::uint32_t LiveScene::codec() const {
 
 delivery::StreamShape LiveScene::shape() const {
   if (!source) return {.rate = start_.streamRate, .qualities = start_.stream.qualities};
-  return {.rate = start_.streamRate,
-          .qualities = source->qualities(),
-          .lockstep = source->inLockstep()};
+  return {.rate = start_.streamRate, .qualities = source->qualities(), .lockstep = source->inLockstep()};
 }
 
 v1::ParameterChange LiveScene::restart() {

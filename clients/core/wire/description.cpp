@@ -219,8 +219,7 @@ std::string check(const Description& description, const std::vector<ClothMessage
     return "a cloth's rows x columns is not its vertex_count, a triangle names a vertex that is not there, "
            "there are "
            "no vertices or more than " +
-           std::to_string(codec::kMaxVertices) +
-           ", or max_error or qualities is out of range";
+           std::to_string(codec::kMaxVertices) + ", or max_error or qualities is out of range";
   return {};
 }
 
