@@ -20,7 +20,7 @@ cs_client* create(const char* scene, const char* clientName, const char* display
                                .clientName = clientName,
                                .displayName = displayName,
                                .role = role,
-                               .wanted = {},
+                               .quality = 0,
                                .token = {},
                                .contentId = 0},
                               kind)};
