@@ -56,8 +56,8 @@ typedef enum clothstream_log_level {
 typedef struct clothstream_options {
   uint32_t version; /* CLOTHSTREAM_OPTIONS_VERSION; later versions add fields at the end */
   uint32_t role;    /* requested cs_role */
-  uint32_t
-      quality; /* best quality level, 0 (finest) to 3, as in cs_want; cs_get_quality returns what arrives */
+  /* Best quality level, 0 (finest) to 3, as in cs_want. cs_get_quality returns what the server sends. */
+  uint32_t quality;
   const char* scene;        /* "" means the server's default scene */
   const char* client_name;  /* name of the program */
   const char* display_name; /* name for other participants; may be "" */
