@@ -125,7 +125,6 @@ Expected<EncodeFigures> encodeFile(const EncodeOptions& options) {
   const codec::StreamLayout layout{.epoch = kEpoch,
                                    .codec = codec::kCodecHierarchical,
                                    .maxError = *maxError,
-                                   .temporalLayers = static_cast<std::uint8_t>(options.layers),
                                    .cloths = {figures.shape.cloth()}};
   const auto side = sideOf(*motion, layout, *positions);
   if (!side) return tl::unexpected(side.error());

@@ -29,7 +29,6 @@ struct EncodeOptions {
   std::string motion, out;
   Quality quality = Quality::standard;
   std::optional<double> maxError;  // m along each axis; replaces the quality
-  std::uint32_t layers = 1;        // temporal layers
   std::uint32_t keyEvery = 0;      // frames; 0: only the first
   bool json = false;
 };

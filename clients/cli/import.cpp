@@ -58,7 +58,6 @@ v1::StreamDescription descriptionOf(const Motion& motion, const codec::StreamLay
   description.set_stream_rate(static_cast<std::uint32_t>(motion.rate()));
   description.set_max_error(layout.maxError);
   description.set_normals(v1::NORMALS_NONE);
-  description.set_temporal_layers(layout.temporalLayers);
   description.set_qualities(layout.qualities);
   const measure::Surface& surface = motion.surface();
   for (std::size_t i = 0; i < surface.cloths.size(); ++i) {

@@ -152,7 +152,6 @@ ExitCode join(const JoinOptions& options) {
   clientOptions.displayName = options.name;
   clientOptions.role = options.role;
   clientOptions.quality = options.quality;
-  clientOptions.temporalLayers = options.temporalLayers;
   clientOptions.maxVertices = options.maxVertices;
   if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };

@@ -19,8 +19,8 @@ struct JoinOptions {
   std::string scene;
   std::string name;  // name that others see
   cs_role role = CS_ROLE_UNSPECIFIED;
-  std::uint32_t quality = 0, temporalLayers = 0;  // upper limits, as in cs_want
-  std::uint32_t maxVertices = 0;                  // 0: the default of cs_limits
+  std::uint32_t quality = 0;      // finest wanted, as in cs_want
+  std::uint32_t maxVertices = 0;  // 0: the default of cs_limits
   bool reconnects = true;
   std::optional<double> seconds;  // not set: until a signal
   std::string objPath;            // empty: no file

@@ -199,10 +199,6 @@ int run(int argc, char** argv) {
       .add_option("--quality", joinOptions.quality,
                   "Finest quality to receive: 0 is the finest, each further level doubles the error")
       ->check(CLI::Range(0, 3));
-  joinCommand
-      .add_option("--layers", joinOptions.temporalLayers,
-                  "Most temporal layers to receive; fewer layers mean fewer frames a second. Default: all")
-      ->check(CLI::Range(1, 3));
   addStreamLimit(joinCommand, joinOptions.maxVertices);
   joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
                        "End when the connection is lost. Default: try to reconnect for a minute");

@@ -35,11 +35,6 @@ void MotionCommands::add(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->excludes(quality);
   encode_
-      ->add_option("--layers", encodeOptions_.layers,
-                   "Temporal layers: with 2 every second frame can be left out, with 3 three of four")
-      ->check(CLI::Range(1u, std::uint32_t{codec::kMaxTemporalLayers}))
-      ->capture_default_str();
-  encode_
       ->add_option("--key-every", encodeOptions_.keyEvery,
                    "Frames from one key frame to the next; 0: only the first frame")
       ->capture_default_str();

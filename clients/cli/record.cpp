@@ -52,9 +52,8 @@ class StreamFile {
     if (message_.has_welcome()) welcome_ = message_.welcome();
     if (message_.has_chunk()) return take(message_.chunk());
     if (!writer_) return;
-    const auto packet = message_.has_frame()
-                            ? codec::parsePacket(std::as_bytes(std::span(message_.frame().packet())))
-                            : std::nullopt;
+    // Nothing if the message has no frame.
+    const auto packet = codec::parsePacket(std::as_bytes(std::span(message_.frame().packet())));
     if (fullQuality_ && packet && packet->header.quality > 0) coarse_ = true;
     if (coarse_) return;
     if (!chunkStart_) chunkStart_ = SteadyClock::now();

@@ -54,7 +54,7 @@ Report Report::of(const cs_client* client, std::uint64_t nowUs) {
   report.frameDivisor = cs_frame_divisor(client);
   report.seconds = cs_stream_seconds(client);
   cs_get_statistics(client, nowUs, &report.statistics);
-  cs_get_operating_point(client, &report.quality, &report.temporalLayers);
+  cs_get_quality(client, &report.quality);
   cs_cloth cloth;
   for (std::uint32_t i = 0; cs_get_cloth(client, i, &cloth) != 0; ++i) {
     ClothFigures figures{.name = cloth.name, .solver = {}};
@@ -92,7 +92,6 @@ std::string Report::json(bool hash) const {
       {"roundTripMs", statistics.round_trip_ms},
       {"dropped", statistics.dropped},
       {"quality", quality},
-      {"temporalLayers", temporalLayers},
       {"decodeErrors", statistics.decode_errors},
   };
   object["cloths"] = nlohmann::ordered_json::array();

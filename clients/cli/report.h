@@ -27,8 +27,8 @@ struct Report {
   std::uint32_t vertices = 0, streamRate = 0, frameDivisor = 1;
   double seconds = 0;  // from the first frame to the newest
   cs_statistics statistics{};
-  std::uint32_t quality = 0, temporalLayers = 0;  // as currently sent
-  std::vector<ClothFigures> cloths;               // empty before the first report
+  std::uint32_t quality = 0;         // as currently sent
+  std::vector<ClothFigures> cloths;  // empty before the first report
 
   static Report of(const cs_client* client, std::uint64_t nowUs);
 

@@ -64,8 +64,8 @@ bool Client::renew(std::string_view token) {
   return true;
 }
 
-void Client::want(const OperatingPoint& atMost) {
-  hello_.wanted = atMost;
+void Client::want(std::uint32_t finest) {
+  hello_.quality = finest;
   if (outbox_.helloWaits()) sendHello();
 }
 
@@ -209,7 +209,7 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   hello_.contentId = known ? welcome_.contentId : 0;
   reconnection_.joined(nowUs);
   redirection_.welcomed();
-  point_ = formerPoint_ = {};
+  quality_ = 0;
   frameDivisor_ = 1;
   acknowledgement_ = {};
   if (returned && !resumed_) clock_ = {};
@@ -292,13 +292,10 @@ std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs, const cs_de
 std::uint32_t Client::packetReceived(std::uint64_t nowUs, const cs_decoded* given) {
   const auto packet = std::as_bytes(std::span(frame_.packet.data(), frame_.packet.size()));
   const auto parsed = codec::parsePacket(packet);
-  // Frames that the server omits are not lost. At a change of layers or of the divisor, the larger distance
-  // between frames counts.
-  statistics_.arrived(
-      parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
-      std::max(ticksPerFrame(point_), ticksPerFrame(formerPoint_)) * std::max(frameDivisor_, frame_.divisor),
-      nowUs);
-  formerPoint_ = point_;
+  // Frames that the server omits are not lost. At a change of the divisor, the larger distance between frames
+  // counts.
+  statistics_.arrived(parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
+                      description_.ticksPerFrame() * std::max(frameDivisor_, frame_.divisor), nowUs);
   frameDivisor_ = frame_.divisor;
   const bool isMirror = kind_ == Kind::mirror;
   const cs_decoding decoding = !isMirror ? decode(packet)
@@ -493,22 +490,10 @@ std::uint32_t Client::pairingCodeReceived(Bytes body) {
 }
 
 std::uint32_t Client::operatingPointReceived(Bytes body) {
-  const std::optional<OperatingPoint> point = readOperatingPoint(body);
-  if (!point) return failMalformed("OperatingPoint");
-  point_ = *point;
+  const std::optional<std::uint32_t> quality = readOperatingPoint(body);
+  if (!quality) return failMalformed("OperatingPoint");
+  quality_ = *quality;
   return 0;
-}
-
-OperatingPoint Client::operatingPoint() const {
-  if (!described()) return {};
-  const std::uint32_t all = description_.layout.temporalLayers;
-  return {point_.quality, point_.temporalLayers == 0 ? all : std::min(point_.temporalLayers, all)};
-}
-
-std::uint32_t Client::ticksPerFrame(const OperatingPoint& point) const {
-  const std::uint32_t all = description_.layout.temporalLayers;
-  const std::uint32_t leftOut = point.temporalLayers == 0 ? 0 : all - std::min(point.temporalLayers, all);
-  return description_.ticksPerFrame() << leftOut;
 }
 
 std::uint32_t Client::playbackReceived(Bytes body, std::uint64_t nowUs) {

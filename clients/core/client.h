@@ -58,7 +58,7 @@ class Client {
   // Whether the program opens connections at connectServer().
   void followRedirects(bool on) { follows_ = on; }
   // Has no effect on the current connection if its Hello is sent already.
-  void want(const OperatingPoint& atMost);
+  void want(std::uint32_t finest);
 
   void setLimits(const Limits& limits) { limits_ = limits; }
   void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
@@ -125,8 +125,8 @@ class Client {
   bool described() const { return newest_.begun(); }
   const FrameStatistics& statistics() const { return statistics_; }
   const ServerClock& clock() const { return clock_; }
-  // Quality and layers that the server sends now; no layers before the description.
-  OperatingPoint operatingPoint() const;
+  // Quality that the server sends now; 0 before the description.
+  std::uint32_t quality() const { return described() ? quality_ : 0; }
   // Divisor of the newest frame; 1 before the first.
   std::uint32_t frameDivisor() const { return frameDivisor_; }
   // State of the recording at this time.
@@ -194,8 +194,6 @@ class Client {
   std::uint32_t answerReceived(const ServerMessage& message);
   bool readAnswer(const ServerMessage& message);
   void forgetRequests();
-  // Ticks from one frame to the next at this operating point.
-  std::uint32_t ticksPerFrame(const OperatingPoint& point) const;
   std::uint32_t playbackReceived(Bytes body, std::uint64_t nowUs);
 
   // `code` is the ErrorCode of the server; 0 if the client found the error.
@@ -228,8 +226,8 @@ class Client {
   Description description_;
   NewestFrame newest_;
   Frame frame_;
-  OperatingPoint point_, formerPoint_;  // current one, and that of the newest frame
-  std::uint32_t frameDivisor_ = 1;      // of the newest frame
+  std::uint32_t quality_ = 0;       // from the newest OperatingPoint
+  std::uint32_t frameDivisor_ = 1;  // of the newest frame
   Acknowledgement acknowledgement_;
   bool holdsAcknowledgements_ = false;
   std::optional<std::uint64_t> unseenTick_;  // of a frame whose acknowledgement is held

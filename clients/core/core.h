@@ -109,8 +109,8 @@ cs_client* cs_create_as(const char* scene, const char* client_name, const char* 
 void cs_destroy(cs_client* client) CS_NOEXCEPT;
 /* Limits what the server sends. Call before the first cs_next_outgoing. A later call does not affect the
  * current connection; it takes effect at the next one. quality: best quality level, 0 to 3; 0 is the finest
- * and the default. temporal_layers: 1 to 3; 0 means all and is the default. */
-void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) CS_NOEXCEPT;
+ * and the default. */
+void cs_want(cs_client* client, uint32_t quality) CS_NOEXCEPT;
 /* Proof of identity for a server that requires one (docs/identity.md): a token, or a pairing code of six
  * digits. "" means none. The newer call replaces the older one. Call before the first cs_next_outgoing; a
  * later call takes effect at the next connection. After pairing, CS_EVENT_TOKEN reports the server's token,
@@ -858,13 +858,12 @@ void cs_set_loop(cs_client* client, int loop) CS_NOEXCEPT;
  */
 
 typedef struct cs_statistics {
-  uint64_t tick;          /* tick of the newest decoded frame */
-  uint64_t frames;        /* decoded frames */
-  uint64_t key_frames;    /* decoded frames that are key frames */
-  uint64_t dropped;       /* frames that never arrived, from gaps between ticks; only of temporal layers that
-                           * the server sends */
-  uint64_t decode_errors; /* packets that the decoder refused */
-  uint64_t bytes;         /* bytes of received packets */
+  uint64_t tick;            /* tick of the newest decoded frame */
+  uint64_t frames;          /* decoded frames */
+  uint64_t key_frames;      /* decoded frames that are key frames */
+  uint64_t dropped;         /* frames that never arrived, from gaps between ticks */
+  uint64_t decode_errors;   /* packets that the decoder refused */
+  uint64_t bytes;           /* bytes of received packets */
   uint64_t hash_mismatches; /* decoded frames whose hash differs from the server's */
   double frames_per_second; /* over the last second */
   double kbit_per_second;   /* over the last second */
@@ -906,9 +905,9 @@ typedef struct cs_cloth_report {
 } cs_cloth_report;
 
 void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) CS_NOEXCEPT;
-/* Quality and temporal layers that the server sends now. They depend on cs_want and on the connection. Fails
- * before the description; then quality and layers are 0. */
-int cs_get_operating_point(const cs_client* client, uint32_t* quality, uint32_t* temporal_layers) CS_NOEXCEPT;
+/* Quality that the server sends now. It depends on cs_want and on the connection. Fails before the
+ * description; then the quality is 0. */
+int cs_get_quality(const cs_client* client, uint32_t* quality) CS_NOEXCEPT;
 /* Time between the first and the newest decoded frame, on the caller's clock. */
 double cs_stream_seconds(const cs_client* client) CS_NOEXCEPT;
 /* Fails if `out->version` is unknown. */

@@ -20,7 +20,7 @@ cs_client* create(const char* scene, const char* clientName, const char* display
                                .clientName = clientName,
                                .displayName = displayName,
                                .role = role,
-                               .wanted = {},
+                               .quality = 0,
                                .token = {},
                                .contentId = 0},
                               kind)};
@@ -50,8 +50,8 @@ void cs_destroy(cs_client* client) noexcept {
   delete client;
 }
 
-void cs_want(cs_client* client, uint32_t quality, uint32_t temporal_layers) noexcept {
-  client->client.want({quality, temporal_layers});
+void cs_want(cs_client* client, uint32_t quality) noexcept {
+  client->client.want(quality);
 }
 
 void cs_set_token(cs_client* client, const char* token) noexcept {

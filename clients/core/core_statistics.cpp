@@ -24,10 +24,8 @@ void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* 
   out->decode_ms = client->client.decodeMs();
 }
 
-int cs_get_operating_point(const cs_client* client, uint32_t* quality, uint32_t* temporal_layers) noexcept {
-  const OperatingPoint point = client->client.operatingPoint();
-  *quality = point.quality;
-  *temporal_layers = point.temporalLayers;
+int cs_get_quality(const cs_client* client, uint32_t* quality) noexcept {
+  *quality = client->client.quality();
   return client->client.described() ? 1 : 0;
 }
 

@@ -46,7 +46,6 @@ v1::StreamDescription toMessage(const RecordingHead& head) {
   message.set_max_error(layout.maxError);
   message.set_normals(layout.normals == codec::NormalMode::octahedral ? v1::NORMALS_OCTAHEDRAL
                                                                       : v1::NORMALS_NONE);
-  message.set_temporal_layers(layout.temporalLayers);
   message.set_qualities(layout.qualities);
   for (const codec::ClothLayout& cloth : layout.cloths) {
     v1::ClothDescription& description = *message.add_cloths();
@@ -66,7 +65,6 @@ codec::StreamLayout toLayout(const v1::StreamDescription& message) {
                              .normals = message.normals() == v1::NORMALS_OCTAHEDRAL
                                             ? codec::NormalMode::octahedral
                                             : codec::NormalMode::none,
-                             .temporalLayers = small(std::max(message.temporal_layers(), 1u)),
                              .qualities = small(std::max(message.qualities(), 1u)),
                              .cloths = {}};
   for (const v1::ClothDescription& cloth : message.cloths())

@@ -28,7 +28,7 @@ struct clothstream_stream {
 
 // First version of clothstream_options.
 struct clothstream_options_1 {
-  std::uint32_t version, role, quality, temporal_layers;
+  std::uint32_t version, role, quality;
   const char *scene, *client_name, *display_name;
   std::uint32_t join_timeout_ms, reconnect_for_ms;
 };
@@ -81,7 +81,6 @@ NativeClientOptions clientOptions(const clothstream_options& options) {
   client.displayName = options.display_name;
   client.role = static_cast<cs_role>(options.role);
   client.quality = options.quality;
-  client.temporalLayers = options.temporal_layers;
   client.joinTimeout = std::chrono::milliseconds(options.join_timeout_ms);
   client.acknowledgesSeen = true;
   client.reconnectFor = std::chrono::milliseconds(options.reconnect_for_ms);
@@ -99,7 +98,6 @@ void clothstream_default_options_2(clothstream_options* out) noexcept {
   *out = {.version = CLOTHSTREAM_OPTIONS_VERSION,
           .role = CS_ROLE_UNSPECIFIED,
           .quality = 0,
-          .temporal_layers = 0,
           .scene = "",
           .client_name = kClientName,
           .display_name = "",
@@ -118,7 +116,6 @@ extern "C" void clothstream_default_options(clothstream_options_1* out) noexcept
   *out = {.version = 1,
           .role = CS_ROLE_UNSPECIFIED,
           .quality = 0,
-          .temporal_layers = 0,
           .scene = "",
           .client_name = kClientName,
           .display_name = "",

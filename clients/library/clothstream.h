@@ -56,9 +56,8 @@ typedef enum clothstream_log_level {
 typedef struct clothstream_options {
   uint32_t version; /* CLOTHSTREAM_OPTIONS_VERSION; later versions add fields at the end */
   uint32_t role;    /* requested cs_role */
-  /* Limits as in cs_want. quality: best quality level, 0 (finest) to 3. temporal_layers: 1 to 3; 0 means all.
-   * cs_get_operating_point returns what the server sends. */
-  uint32_t quality, temporal_layers;
+  /* Best quality level, 0 (finest) to 3, as in cs_want. cs_get_quality returns what the server sends. */
+  uint32_t quality;
   const char* scene;        /* "" means the server's default scene */
   const char* client_name;  /* name of the program */
   const char* display_name; /* name for other participants; may be "" */

@@ -18,10 +18,9 @@ std::string error(const clothstream_options& options) {
     return "options->role is " + std::to_string(options.role) + "; allowed is a cs_role, 0 to " +
            std::to_string(CS_ROLE_OWNER) + ".";
   constexpr std::uint32_t kMost = 3;
-  if (options.quality > kMost || options.temporal_layers > kMost)
-    return "options->quality is " + std::to_string(options.quality) + " and temporal_layers " +
-           std::to_string(options.temporal_layers) + "; 0 to " + std::to_string(kMost) +
-           " is allowed for both.";
+  if (options.quality > kMost)
+    return "options->quality is " + std::to_string(options.quality) + "; 0 to " + std::to_string(kMost) +
+           " is allowed.";
   for (const char* text : {options.scene, options.client_name, options.display_name, options.token,
                            options.ca_file, options.fingerprint})
     if (!text)

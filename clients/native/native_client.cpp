@@ -52,7 +52,7 @@ class NativeClient::Stream {
               &cs_destroy),
         transport_(std::move(transport)) {
     cs_set_token(core_.get(), address_.token.c_str());
-    cs_want(core_.get(), options.quality, options.temporalLayers);
+    cs_want(core_.get(), options.quality);
     cs_set_clock(core_.get(), &NativeClient::nowUs);
     cs_hold_acknowledgements(core_.get(), options.acknowledgesSeen ? 1 : 0);
     limitVertices(core_.get(), options.maxVertices);

@@ -26,8 +26,7 @@ struct NativeClientOptions {
   std::string clientName = "clothstream";
   std::string displayName;  // name that others see; may be empty
   cs_role role = CS_ROLE_UNSPECIFIED;
-  // Finest quality and most temporal layers that the client requests, as in cs_want.
-  std::uint32_t quality = 0, temporalLayers = 0;
+  std::uint32_t quality = 0;  // finest quality that the client requests, as in cs_want
   // Vertices that the client accepts from the server; twice as many triangles (cs_set_limits). 0 means the
   // defaults of cs_limits. At most 67,108,864.
   std::uint32_t maxVertices = 0;

@@ -58,8 +58,7 @@ ROWS = [
     ("Streams", [
         ("Frames sent a second", "short", [(rate("clothstream_scene_taken_frames_total"), "{{scene}}")]),
         ("Frames that subscribers missed, a second", "short",
-         [(rate("clothstream_scene_dropped_frames_total"), "{{scene}}, too slow"),
-          (rate("clothstream_scene_thinned_frames_total"), "{{scene}}, fewer layers")]),
+         [(rate("clothstream_scene_dropped_frames_total"), "{{scene}}")]),
         ("From a pose to its packet", "s", [(quantile(0.5, "clothstream_scene_input_to_packet_seconds"), "{{scene}}, median"),
                                             (quantile(0.99, "clothstream_scene_input_to_packet_seconds"), "{{scene}}, p99")]),
         ("Encoding a frame, p99", "s", [(quantile(0.99, "clothstream_scene_encode_seconds"), "{{scene}}")]),

@@ -8,7 +8,6 @@
 
 #include "proto/codec/array.h"
 #include "proto/codec/hierarchical/hierarchical_decoder.h"
-#include "proto/codec/temporal_layers.h"
 #include "proto/codec/vertex_normals.h"
 
 namespace clothstream::codec {
@@ -34,18 +33,12 @@ struct Decoder::State {
       return DecodeResult::malformed;
     if (header.referenceCount > 1) return DecodeResult::malformed;
     const bool key = header.kind == PacketKind::key;
-    if (header.temporalLayer >= (key ? 1 : layout.temporalLayers)) return DecodeResult::malformed;
     if (header.quality >= layout.qualities) return DecodeResult::malformed;
-    std::uint8_t referenceLayer = 0;
     if (!key) {
-      const std::optional<std::uint8_t> found = held.find(header.references[0]);
-      if (!found) return DecodeResult::missingReference;
-      if (*found > header.temporalLayer || header.quality != quality) return DecodeResult::malformed;
-      referenceLayer = *found;
+      if (!hasFrame || header.references[0] != tick) return DecodeResult::missingReference;
+      if (header.quality != quality) return DecodeResult::malformed;
     }
-    if (!body.decode(*packet, referenceLayer)) return DecodeResult::malformed;
-    if (key) held.clear();
-    held.hold(header.temporalLayer, header.tick);
+    if (!body.decode(*packet)) return DecodeResult::malformed;
     tick = header.tick;
     quality = header.quality;
     hasFrame = true;
@@ -63,7 +56,6 @@ struct Decoder::State {
   hierarchical::HierarchicalDecoder body;
   bool sendsNormals = false;
   Array<float> positions, normals;
-  HeldFrames held;
   std::uint64_t tick = 0;
   std::uint8_t quality = 0;
   std::uint64_t hash = 0;
@@ -86,7 +78,6 @@ DecodeResult Decoder::decode(std::span<const std::byte> packet) {
   return state_->decode(packet);
 }
 void Decoder::restart() {
-  state_->held.clear();
   state_->hasFrame = false;
 }
 std::uint64_t Decoder::tick() const {

@@ -18,8 +18,7 @@ enum class DecodeResult : std::uint8_t {
   ok,
   malformed,         // not a valid packet of this stream's codec
   wrongEpoch,        // packet of another description
-  missingReference,  // the reference was not decoded or is no longer held: request a key frame, or
-                     // skip the packet if its layer is above the base
+  missingReference,  // the reference is not the newest decoded frame: request a key frame
   stale,             // not newer than the newest decoded frame
 };
 

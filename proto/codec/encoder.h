@@ -18,8 +18,7 @@ struct EncoderOptions {
   std::uint8_t quality = 0;
   // Number of frames between a frame and the newest frame that its weights are fitted to; the weights of a
   // key frame are fitted to an earlier key frame. 0 fits to all earlier frames, and fits a key frame to
-  // itself. A lag lets later frames be prepared before earlier ones are coded. It requires one temporal
-  // layer. Decoders do not depend on it.
+  // itself. A lag lets later frames be prepared before earlier ones are coded. Decoders do not depend on it.
   std::uint32_t weightLag = 0;
   // Threads that predict large frames, with the same result to the bit. They must outlive the encoder.
   // Without them the caller's thread does all work.
@@ -39,20 +38,18 @@ class Encoder {
 
   // Encodes one frame into `out`, which has at least packetBound() bytes, and returns the size of the packet.
   // `positions` are metres relative to StreamLayout::origin, 3 floats a vertex. Coordinates beyond reachOf()
-  // (reach.h) are clamped, and NaN too: the packet then decodes, but not to these positions. Callers check. `normals` have about unit
-  // length, or are empty if the layout has none. `tick` must grow from call to call, except after
-  // forgetHistory(). The first frame is always a key frame. A predicted frame refers to the previous frame;
-  // with temporal layers, to the newest frame of a lower layer or, in the base, to the previous frame of the
-  // base. The packet header names the reference.
+  // (reach.h) are clamped, and NaN too: the packet then decodes, but not to these positions. Callers check.
+  // `normals` have about unit length, or are empty if the layout has none. `tick` must grow from call to
+  // call, except after forgetHistory(). The first frame is always a key frame. A predicted frame refers to
+  // the previous frame.
   std::size_t encode(std::uint64_t tick, PacketKind kind, std::span<const float> positions,
                      std::span<const float> normals, std::span<std::byte> out);
 
   // Makes the next frame a key frame.
   void forgetHistory();
 
-  // Kind, layer and reference of the newest frame, as in its header; the reference of a key frame is 0.
+  // Kind and reference of the newest frame, as in its header; the reference of a key frame is 0.
   PacketKind kind() const;
-  std::uint8_t layer() const;
   std::uint64_t referenceTick() const;
 
   // Hash of the newest frame. Equals the decoder's hash.

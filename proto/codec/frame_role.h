@@ -11,11 +11,8 @@ namespace clothstream::codec {
 struct FrameRole {
   std::uint64_t tick = 0;
   PacketKind kind = PacketKind::key;
-  std::uint8_t layer = 0;
-  // Unused for key frames: the layer whose newest frame is the reference, and the tick of that frame.
-  std::uint8_t referenceLayer = 0;
-  std::uint64_t referenceTick = 0;
-  std::uint8_t quality = 0;  // of this frame and of its references
+  std::uint64_t referenceTick = 0;  // of a predicted frame
+  std::uint8_t quality = 0;         // of this frame and of its reference
 };
 
 }  // namespace clothstream::codec

@@ -114,12 +114,13 @@ std::optional<ParsedPacket> parsePacket(std::span<const std::byte> bytes) {
   std::optional<ParsedPacket> packet(std::in_place);
   PacketHeader& header = packet->header;
   Reader reader(bytes);
-  std::uint8_t kind;
+  std::uint8_t kind, reserved;
   if (!reader.byte(header.version) || header.version != kPacketVersion) return std::nullopt;
   if (!reader.byte(header.codec)) return std::nullopt;
   if (!reader.byte(kind) || kind > static_cast<std::uint8_t>(PacketKind::predicted)) return std::nullopt;
   header.kind = static_cast<PacketKind>(kind);
-  if (!reader.byte(header.quality) || !reader.byte(header.temporalLayer)) return std::nullopt;
+  if (!reader.byte(header.quality)) return std::nullopt;
+  if (!reader.byte(reserved) || reserved != 0) return std::nullopt;
   if (!reader.varint(header.epoch) || !reader.varint(header.tick)) return std::nullopt;
   if (!readReferences(reader, header) || !readRanges(reader, header) || !readSections(reader, header)) {
     return std::nullopt;
@@ -143,7 +144,7 @@ std::size_t writeHeader(const PacketHeader& header, std::span<std::byte> out) {
   writer.byte(header.codec);
   writer.byte(static_cast<std::uint8_t>(header.kind));
   writer.byte(header.quality);
-  writer.byte(header.temporalLayer);
+  writer.byte(0);  // reserved
   writer.varint(header.epoch);
   writer.varint(header.tick);
   writer.byte(header.referenceCount);

@@ -30,7 +30,6 @@ struct PacketHeader {
   std::uint32_t epoch = 0;
   PacketKind kind = PacketKind::key;
   std::uint8_t quality = 0;
-  std::uint8_t temporalLayer = 0;
   std::uint64_t tick = 0;
   std::uint8_t referenceCount = 0;  // 0 for a key frame
   std::array<std::uint64_t, kMaxReferences> references{};

@@ -33,9 +33,6 @@ constexpr bool isCodec(std::uint32_t id) {
   return std::find(kCodecs.begin(), kCodecs.end(), id) != kCodecs.end();
 }
 
-// Maximum number of temporal layers: frames at full, half and a quarter of the rate.
-inline constexpr std::uint8_t kMaxTemporalLayers = 3;
-
 struct StreamLayout {
   std::uint32_t epoch = 0;
   std::uint8_t codec = kCodecHierarchical;
@@ -44,10 +41,6 @@ struct StreamLayout {
   // distance of at most sqrt(3) maxError.
   float maxError = 0.0005f;
   NormalMode normals = NormalMode::none;
-  // Number of temporal layers. With 1, each frame refers to the previous one and no packet can be dropped.
-  // With 2 or 3, every second frame or all but every fourth can be dropped, from the highest layer down.
-  // Layers cost bits (docs/codec.md).
-  std::uint8_t temporalLayers = 1;
   // Number of quality levels of the stream. maxError is that of quality 0, and each further quality doubles
   // it. A stream changes its quality at a key frame.
   std::uint8_t qualities = 1;
@@ -71,14 +64,13 @@ inline constexpr float kSmallestMaxError = 5e-6f, kLargestMaxError = 1000;
 // Largest magnitude of a coordinate of an origin, m.
 inline constexpr float kFarthestOrigin = 1e6f;
 
-// True if a stream can have this layout: a known codec, 1 to kMaxTemporalLayers layers, at least one cloth,
-// no empty cloth, grids of rows x columns vertices, triangles of existing vertices, finite rest positions, at
-// most kMaxVertices vertices, and a max error and an origin within the bounds above.
+// True if a stream can have this layout: a known codec, at least one cloth, no empty cloth, grids of rows x
+// columns vertices, triangles of existing vertices, finite rest positions, at most kMaxVertices vertices, and
+// a max error and an origin within the bounds above.
 inline bool isPossible(const StreamLayout& layout) {
   if (!(layout.maxError >= kSmallestMaxError && layout.maxError <= kLargestMaxError)) return false;
   if (layout.normals != NormalMode::none && layout.normals != NormalMode::octahedral) return false;
   if (!isCodec(layout.codec)) return false;
-  if (layout.temporalLayers < 1 || layout.temporalLayers > kMaxTemporalLayers) return false;
   if (layout.qualities < 1 || layout.qualities > kMaxQualities) return false;
   for (const float coordinate : layout.origin)
     if (!(std::abs(coordinate) <= kFarthestOrigin)) return false;

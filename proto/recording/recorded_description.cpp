@@ -55,7 +55,6 @@ codec::StreamLayout layoutOf(const v1::StreamDescription& description) {
       .maxError = description.max_error(),
       .normals = description.normals() == v1::NORMALS_OCTAHEDRAL ? codec::NormalMode::octahedral
                                                                  : codec::NormalMode::none,
-      .temporalLayers = small(std::max(description.temporal_layers(), 1u)),
       .qualities = small(std::max(description.qualities(), 1u)),
       .cloths = {},
       .origin = {description.origin().x(), description.origin().y(), description.origin().z()}};

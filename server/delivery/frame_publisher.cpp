@@ -115,7 +115,6 @@ void FramePublisher::publish(const CompleteFrame::Recorded& recorded, const enco
       .key = encoded.kind == codec::PacketKind::key,
       .referenceTick = encoded.referenceTick,
       .quality = recorded.quality,
-      .layer = encoded.layer,
       .complete = complete,
       .repeated = frame_.repeated};
 

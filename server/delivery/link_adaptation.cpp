@@ -16,25 +16,16 @@ constexpr double kUsedThroughput = 0.9;
 
 }  // namespace
 
-LinkAdaptation::LinkAdaptation(OperatingPoint best, std::uint8_t qualities) {
-  for (std::uint8_t layers = best.layers; layers > 1; --layers) points_.push_back({best.quality, layers});
-  for (std::uint8_t quality = best.quality; quality < qualities; ++quality) points_.push_back({quality, 1});
-}
-
-void LinkAdaptation::made(std::uint8_t quality, std::uint8_t layer, std::size_t bytes,
-                          Clock::time_point now) {
+void LinkAdaptation::made(std::uint8_t quality, std::size_t bytes, Clock::time_point now) {
   double kept = newestMade_ ? std::exp(-schedule::seconds(now - *newestMade_) / kAverageSeconds) : 1;
-  if (quality != ratesQuality_) kept *= std::pow(kCoarserRate, quality - ratesQuality_);
-  for (double& rate : rates_) rate *= kept;
-  rates_[layer] += static_cast<double>(bytes) / kAverageSeconds;
-  ratesQuality_ = quality;
+  if (quality != rateQuality_) kept *= std::pow(kCoarserRate, quality - rateQuality_);
+  rate_ = rate_ * kept + static_cast<double>(bytes) / kAverageSeconds;
+  rateQuality_ = quality;
   newestMade_ = now;
 }
 
-double LinkAdaptation::bytesPerSecond(const OperatingPoint& point) const {
-  double rate = 0;
-  for (std::uint8_t layer = 0; layer < point.layers; ++layer) rate += rates_[layer];
-  return rate * std::pow(kCoarserRate, point.quality - ratesQuality_);
+double LinkAdaptation::bytesPerSecond(std::uint8_t quality) const {
+  return rate_ * std::pow(kCoarserRate, quality - rateQuality_);
 }
 
 bool LinkAdaptation::update(bool behind, Clock::time_point now) {
@@ -49,10 +40,10 @@ bool LinkAdaptation::update(bool behind, Clock::time_point now) {
     strain_ = std::max(strain_ - passed / 2, Clock::duration::zero());
   calm_ =
       strain_ == Clock::duration::zero() ? calm_ + passed : std::max(calm_ - passed, Clock::duration::zero());
-  const std::size_t before = step_;
+  const std::uint8_t before = quality_;
   if (strain_ >= kPatience) stepDown(now);
-  if (step_ > 0 && calm_ >= wait_) stepUp(now);
-  return step_ != before;
+  if (quality_ > finest_ && calm_ >= wait_) stepUp(now);
+  return quality_ != before;
 }
 
 void LinkAdaptation::strain(Clock::duration more, Clock::time_point since) {
@@ -64,25 +55,24 @@ void LinkAdaptation::strain(Clock::duration more, Clock::time_point since) {
 }
 
 void LinkAdaptation::stepDown(Clock::time_point now) {
-  const std::size_t last = points_.size() - 1;
   calm_ = Clock::duration::zero();
-  // There is no lower point. The strain is bounded, so that the way up does not take long.
-  if (step_ == last) {
+  // There is no coarser quality. The strain is bounded, so that the way up does not take long.
+  if (quality_ == coarsest_) {
     strain_ = kPatience;
     return;
   }
   const bool failed = steppedUp_ && now - *steppedUp_ < kTrial;
   backOff_ = failed ? std::min<Clock::duration>(2 * backOff_, kLongestWait) : kShortestWait;
   wait_ = backOff_;
-  ++step_;
+  ++quality_;
   const double carried = kUsedThroughput * static_cast<double>(delivered_) /
                          std::max(schedule::seconds(now - strainedSince_), 1e-3);
-  while (step_ < last && bytesPerSecond(points_[step_]) > carried) ++step_;
+  while (quality_ < coarsest_ && bytesPerSecond(quality_) > carried) ++quality_;
   strain_ = Clock::duration::zero();
 }
 
 void LinkAdaptation::stepUp(Clock::time_point now) {
-  --step_;
+  --quality_;
   steppedUp_ = now;
   wait_ = kClimb;
   calm_ = Clock::duration::zero();

@@ -1,36 +1,25 @@
 // SPDX-License-Identifier: MIT
-// Adapts the part of a stream that one subscriber receives to the throughput of its link.
+// Adapts the quality that one subscriber receives to the throughput of its link.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
-#include "proto/codec/stream_layout.h"
 #include "server/schedule/clock.h"
 
 namespace clothstream::delivery {
 
 using schedule::Clock;
 
-// Part of a stream: one quality, and its temporal layers 0 to layers - 1.
-struct OperatingPoint {
-  std::uint8_t quality = 0;
-  std::uint8_t layers = 1;
-  bool operator==(const OperatingPoint&) const = default;
-};
-
-// Steps between the operating point that a subscriber asked for and the base layer of the coarsest quality.
-// Layers are dropped first, then quality. update() is called with every frame and says whether the subscriber
-// is behind. Time spent behind adds up as strain; time spent not behind reduces it half as fast, so that a
-// single delay counts for little.
+// Steps between the quality that a subscriber asked for and the coarsest one. update() is called with every
+// frame and says whether the subscriber is behind. Time spent behind adds up as strain; time spent not behind
+// reduces it half as fast, so that a single delay counts for little.
 //
-// Step down: when the strain reaches kPatience, to the best point that the recent throughput can carry.
-// Step up: one point at a time, after a period in which the subscriber was hardly behind. If a step up fails
-// within kTrial, the wait before the next one doubles. The wait is bounded so that the way from the lowest
-// point to the best takes 3 s at most. With a single point nothing changes.
+// Step down: when the strain reaches kPatience, to the finest quality that the recent throughput can carry.
+// Step up: one quality at a time, after a period in which the subscriber was hardly behind. If a step up
+// fails within kTrial, the wait before the next one doubles. The wait is bounded so that the way from the
+// coarsest quality to the finest takes 3 s at most. With a single quality nothing changes.
 //
 // Not thread-safe. Reads no clock: all times are arguments.
 class LinkAdaptation {
@@ -44,19 +33,20 @@ class LinkAdaptation {
   // Bit rate of a quality relative to the next finer one. Measured: less for calm cloth, more for a flag.
   static constexpr double kCoarserRate = 0.7;
 
-  // `best` is the point that the subscriber asked for; the stream has `qualities` qualities.
-  LinkAdaptation(OperatingPoint best, std::uint8_t qualities);
+  // The subscriber asked for the quality `finest`; the last one of the stream is `coarsest`.
+  LinkAdaptation(std::uint8_t finest, std::uint8_t coarsest)
+      : finest_(finest), coarsest_(coarsest), quality_(finest) {}
 
-  const OperatingPoint& point() const { return points_[step_]; }
+  std::uint8_t quality() const { return quality_; }
 
-  // Records a frame of the subscriber's quality, also if the subscriber does not receive its layer.
-  void made(std::uint8_t quality, std::uint8_t layer, std::size_t bytes, Clock::time_point now);
+  // Records a frame of the subscriber's quality.
+  void made(std::uint8_t quality, std::size_t bytes, Clock::time_point now);
   // Records bytes that the subscriber acknowledged.
   void delivered(std::size_t bytes) { delivered_ += bytes; }
   // Records that frames were dropped because they waited too long.
   void dropped(Clock::time_point now) { strain(kDropStrain, now); }
-  // Call at least with each frame. `behind`: something waits for the subscriber. Returns whether the point
-  // has changed.
+  // Call at least with each frame. `behind`: something waits for the subscriber. Returns whether the
+  // quality has changed.
   bool update(bool behind, Clock::time_point now);
 
  private:
@@ -64,13 +54,12 @@ class LinkAdaptation {
   void strain(Clock::duration more, Clock::time_point since);
   void stepDown(Clock::time_point now);
   void stepUp(Clock::time_point now);
-  double bytesPerSecond(const OperatingPoint& point) const;
+  double bytesPerSecond(std::uint8_t quality) const;
 
-  std::vector<OperatingPoint> points_;  // the best first
-  std::size_t step_ = 0;
+  std::uint8_t finest_, coarsest_, quality_;
 
-  std::array<double, codec::kMaxTemporalLayers> rates_{};  // bytes/s of each layer in ratesQuality_
-  std::uint8_t ratesQuality_ = 0;
+  double rate_ = 0;  // bytes/s in rateQuality_
+  std::uint8_t rateQuality_ = 0;
   std::optional<Clock::time_point> newestMade_;
 
   std::optional<Clock::time_point> newestUpdate_;

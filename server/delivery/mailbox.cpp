@@ -15,10 +15,9 @@ std::size_t costOf(const std::vector<std::byte>& message) {
   return message.size() + Mailbox::kMessageOverhead;
 }
 
-SharedBytes messageOf(const OperatingPoint& point) {
+SharedBytes operatingPoint(std::uint8_t quality) {
   v1::ServerMessage message;
-  message.mutable_operating_point()->set_quality(point.quality);
-  message.mutable_operating_point()->set_temporal_layers(point.layers);
+  message.mutable_operating_point()->set_quality(quality);
   return serialise(message);
 }
 
@@ -75,17 +74,16 @@ void Mailbox::mergeAnnouncements(SharedMerges& merges) {
 }
 
 void Mailbox::subscribe(std::shared_ptr<const DescriptionChunks> description, const StreamShape& shape,
-                        telemetry::SceneMetrics& metrics, OperatingPoint wanted) {
+                        telemetry::SceneMetrics& metrics, std::uint8_t finest) {
   {
     const std::lock_guard lock(mutex_);
     description_ = std::move(description);
     streaming_ = !description_;
     shape_ = shape;
     const auto coarsest = static_cast<std::uint8_t>(shape.qualities - 1);
-    adaptation_ = LinkAdaptation({std::min(wanted.quality, coarsest), std::min(wanted.layers, shape.layers)},
-                                 shape.qualities);
-    reported_ = {0, shape.layers};
-    quality_ = adaptation_.point().quality;
+    quality_ = std::min(finest, coarsest);
+    adaptation_ = LinkAdaptation(quality_, coarsest);
+    reported_ = 0;
     metrics_ = &metrics;
     endpointWaits_ = false;
   }
@@ -98,7 +96,7 @@ void Mailbox::deliver(const PublishedFrame& frame) {
     if (!streaming_ || closed_ || (frame.repeated && !needsKey_)) return;
     adapt(frame.complete);
     if (frame.quality == quality_)
-      adaptation_.made(frame.quality, frame.layer, frame.message->size(), frame.complete);
+      adaptation_.made(frame.quality, frame.message->size(), frame.complete);
     else if (!frame.key || (shape_.qualities > 1 && frame.quality != chosenQuality()))
       return;
     sinceKey_ = frame.key ? 0 : sinceKey_ + 1;
@@ -122,67 +120,45 @@ void Mailbox::deliver(std::span<const PublishedFrame> frames) {
 }
 
 std::uint8_t Mailbox::chosenQuality() const {
-  return shape_.qualities > 1 ? adaptation_.point().quality : quality_;
+  return shape_.qualities > 1 ? adaptation_.quality() : quality_;
 }
 
 void Mailbox::adapt(Clock::time_point now) {
   if (shape_.lockstep) return;
   const bool behind = !held_.empty() || (needsKey_ && !(endpointWaits_ && hasRoom()));
-  const OperatingPoint before = adaptation_.point();
+  const std::uint8_t before = adaptation_.quality();
   if (!adaptation_.update(behind, now)) return;
-  const OperatingPoint after = adaptation_.point();
-  const bool up = after.quality < before.quality || after.layers > before.layers;
-  (up ? metrics_->stepsUp : metrics_->stepsDown).add();
-  if (after.layers < before.layers) dropHeld(after.layers);
+  (adaptation_.quality() < before ? metrics_->stepsUp : metrics_->stepsDown).add();
 }
 
 bool Mailbox::hold(const PublishedFrame& frame) {
   if (decodable_ && frame.tick <= *decodable_) return false;
   if (frame.key) {
-    dropHeld(0);
-    chain_ = {};
+    dropHeld();
     quality_ = frame.quality;
     needsKey_ = requestsKey_ = false;
-  } else if (frame.layer >= adaptation_.point().layers) {
-    metrics_->framesThinned.add();
-    return false;
-  } else if (needsKey_ || std::ranges::find(chain_, frame.referenceTick) == chain_.end()) {
-    needsKey_ = needsKey_ || frame.layer == 0;
+  } else if (needsKey_ || frame.referenceTick != newest_) {
+    needsKey_ = true;
     countDropped(1);
     return false;
-  } else if (!makeRoom(frame)) {
+  } else if (!held_.empty() &&
+             (held_.size() == kMaxHeld || heldBytes_ + frame.message->size() > kMaxHeldBytes)) {
+    adaptation_.dropped(frame.complete);
+    dropHeld();
+    needsKey_ = true;
     countDropped(1);
     return false;
   }
   held_.push_back(frame);
   heldBytes_ += frame.message->size();
-  chain_[frame.layer] = frame.tick;
+  newest_ = frame.tick;
   return true;
 }
 
-bool Mailbox::makeRoom(const PublishedFrame& frame) {
-  const auto fits = [&] {
-    return held_.empty() || (held_.size() < kMaxHeld && heldBytes_ + frame.message->size() <= kMaxHeldBytes);
-  };
-  if (fits()) return true;
-  adaptation_.dropped(frame.complete);
-  for (std::uint8_t layer = shape_.layers; --layer > 0;) {
-    if (layer == frame.layer) return false;
-    dropHeld(layer);
-    if (fits()) return true;
-  }
-  dropHeld(0);
-  needsKey_ = true;
-  return false;
-}
-
-void Mailbox::dropHeld(std::uint8_t layer) {
-  countDropped(std::erase_if(held_, [&](const PublishedFrame& frame) {
-    if (frame.layer < layer) return false;
-    heldBytes_ -= frame.message->size();
-    chain_[frame.layer].reset();
-    return true;
-  }));
+void Mailbox::dropHeld() {
+  countDropped(held_.size());
+  held_.clear();
+  heldBytes_ = 0;
 }
 
 RequestedFrames Mailbox::requested(Clock::time_point now) {
@@ -240,7 +216,7 @@ std::optional<std::uint64_t> Mailbox::overdue(Clock::time_point before) const {
 
 void Mailbox::restart() {
   const std::lock_guard lock(mutex_);
-  dropHeld(0);
+  dropHeld();
   sent_.clear();
   decodable_.reset();
   leavesOut_ = false;
@@ -310,10 +286,9 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
     return message;
   }
   if (!hasFrame) return std::nullopt;
-  const OperatingPoint point{held_.front().quality, adaptation_.point().layers};
-  if (point != reported_) {
-    reported_ = point;
-    return messageOf(point);
+  if (const std::uint8_t quality = held_.front().quality; quality != reported_) {
+    reported_ = quality;
+    return operatingPoint(quality);
   }
 
   const PublishedFrame frame = std::move(held_.front());
@@ -328,8 +303,7 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
 }
 
 std::size_t Mailbox::window() const {
-  const int leftOut = shape_.layers - adaptation_.point().layers;
-  const double inFlight = std::ceil(roundTrip_.value_or(0) * (shape_.rate >> leftOut)) + (leavesOut_ ? 1 : 0);
+  const double inFlight = std::ceil(roundTrip_.value_or(0) * shape_.rate) + (leavesOut_ ? 1 : 0);
   return kMinWindow + static_cast<std::size_t>(std::min(inFlight, double{kMaxWindow - kMinWindow}));
 }
 

@@ -2,7 +2,6 @@
 // Send queue of one peer: control messages first, then the newest frames that it can decode and has room for.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -40,14 +39,13 @@ namespace clothstream::delivery {
 // queue on the way must not enlarge the window that feeds it.
 //
 // A predicted frame is sent only if the frame that it refers to was sent. For a subscriber without room, up
-// to kMaxHeld frames are held. If more arrive, frames of the highest layer are dropped first, because no
-// other layer needs them. If the base layer alone is too much, all held frames are dropped, and the
-// subscriber continues with the next key frame. It asks for that key frame once it has room and its endpoint
-// waits for something to write. A peer that does not read therefore asks for nothing.
+// to kMaxHeld frames are held. If more arrive, all held frames are dropped, and the subscriber continues with
+// the next key frame. It asks for that key frame once it has room and its endpoint waits for something to
+// write. A peer that does not read therefore asks for nothing.
 //
-// LinkAdaptation chooses layers and quality; the peer gets an OperatingPoint message when they change. A new
-// quality begins with a key frame; until then the former quality continues. A subscriber that was sent a tick
-// in one quality never gets a key frame of the same tick in another one, because decoders reject it as stale.
+// LinkAdaptation chooses the quality; the peer gets an OperatingPoint message when it changes. A new quality
+// begins with a key frame; until then the former quality continues. A subscriber that was sent a tick in one
+// quality never gets a key frame of the same tick in another one, because decoders reject it as stale.
 class Mailbox {
  public:
   static constexpr std::size_t kMaxControlBytes = 256 * 1024;
@@ -80,10 +78,10 @@ class Mailbox {
   // Same; `merges` is shared by all mailboxes that get this message.
   void announce(SharedBytes message, SharedMerges& merges);
 
-  // Starts sending frames: the description first, unless it is null because the peer has it already. `wanted`
-  // is limited to what the stream has. `metrics` must outlive the mailbox.
+  // Starts sending frames: the description first, unless it is null because the peer has it already. `finest`
+  // is the best quality wanted; it is limited to what the stream has. `metrics` must outlive the mailbox.
   void subscribe(std::shared_ptr<const DescriptionChunks> description, const StreamShape& shape,
-                 telemetry::SceneMetrics& metrics, OperatingPoint wanted = {0, codec::kMaxTemporalLayers});
+                 telemetry::SceneMetrics& metrics, std::uint8_t finest = 0);
   void deliver(const PublishedFrame& frame);
   // If the subscriber needs a key frame and has room for it: gives it `frames`, which were published before:
   // a key frame in its quality and those that follow, at most kMaxHeld in all.
@@ -144,13 +142,9 @@ class Mailbox {
   // Quality that the adaptation chose; the present one if the stream has a single quality.
   std::uint8_t chosenQuality() const;
   void adapt(Clock::time_point now);
-  // Queues a frame. Returns false if its layer is left out, it cannot be decoded, or there is no room.
+  // Queues a frame. Returns false if it cannot be decoded, or there is no room.
   bool hold(const PublishedFrame& frame);
-  // Drops held frames, the highest layer first, until `frame` fits. Returns false if `frame` itself must be
-  // dropped.
-  bool makeRoom(const PublishedFrame& frame);
-  // Drops the held frames of this layer and the layers above it.
-  void dropHeld(std::uint8_t layer);
+  void dropHeld();
   void countDropped(std::size_t frames);
 
   const bool atEdge_;
@@ -166,15 +160,14 @@ class Mailbox {
 
   telemetry::SceneMetrics* metrics_ = nullptr;
   StreamShape shape_;
-  LinkAdaptation adaptation_{{}, 1};
-  OperatingPoint reported_;  // newest one sent to the peer
-  bool streaming_ = false;   // the description is sent
+  LinkAdaptation adaptation_{0, 0};
+  std::uint8_t reported_ = 0;  // newest quality in an OperatingPoint that the peer was sent
+  bool streaming_ = false;     // the description is sent
   bool needsKey_ = true;
   bool requestsKey_ = false;    // the peer asked for a key frame and continues without it
   std::uint32_t sinceKey_ = 0;  // frames of quality_ since the newest key frame
   std::uint8_t quality_ = 0;
-  // Tick of the newest frame of each layer that is held, or else was sent.
-  std::array<std::optional<std::uint64_t>, codec::kMaxTemporalLayers> chain_;
+  std::uint64_t newest_ = 0;  // tick of the newest frame that is held, or else was sent
   std::deque<PublishedFrame> held_;
   std::size_t heldBytes_ = 0;
   std::deque<Sent> sent_;  // frames that are not acknowledged

@@ -19,7 +19,7 @@ struct PublishedFrame {
   std::uint64_t tick = 0;
   bool key = false;
   std::uint64_t referenceTick = 0;  // of a predicted frame
-  std::uint8_t quality = 0, layer = 0;
+  std::uint8_t quality = 0;
   Clock::time_point complete{};
   // A frame of this tick was published before. Only subscribers that need a key frame take it.
   bool repeated = false;
@@ -33,18 +33,16 @@ inline PublishedFrame publishedFrame(const codec::PacketHeader& header, SharedBy
           .key = header.kind == codec::PacketKind::key,
           .referenceTick = header.references[0],
           .quality = header.quality,
-          .layer = header.temporalLayer,
           .complete = complete};
 }
 
-// Rate, temporal layers and qualities of a scene's stream.
+// Rate and qualities of a scene's stream.
 struct StreamShape {
-  std::uint32_t rate = 0;  // frames/s, all layers together
-  std::uint8_t layers = 1;
+  std::uint32_t rate = 0;  // frames/s
   // Number of qualities of each frame. 1 means a single quality, which may have any number.
   std::uint8_t qualities = 1;
-  // The next frame is published when every subscriber has acknowledged the last one. Layers and quality then
-  // do not adapt to the link.
+  // The next frame is published when every subscriber has acknowledged the last one. The quality then does
+  // not adapt to the link.
   bool lockstep = false;
 };
 

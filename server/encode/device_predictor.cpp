@@ -85,7 +85,7 @@ static_assert(shared::kClasses == codec::hierarchical::kWeightClasses &&
 
 bool DevicePredictor::supports(const vulkan::Device& device, const codec::StreamLayout& layout) {
   const vulkan::Limits& limits = device.limits();
-  return layout.temporalLayers == 1 && momentBytes(layout.vertexCount()) <= limits.maxStorageRange &&
+  return momentBytes(layout.vertexCount()) <= limits.maxStorageRange &&
          layout.vertexCount() <= std::uint64_t{limits.maxDispatchX} * kWorkgroupSize;
 }
 
@@ -103,8 +103,7 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
       predictNormals_(device, describe("predict_normals", kernels::predict_normals, true, 6)),
       finish_(device, describe("finish_records", kernels::finish_records, false, 7)) {
   if (!supports(device, layout))
-    throw std::runtime_error(
-        "frames are predicted on the host where there are temporal layers or very many vertices");
+    throw std::runtime_error("frames with very many vertices are predicted on the host");
   if (!hierarchy_.build(layout)) throw std::bad_alloc();
   const std::size_t n = vertices_, phases = hierarchy_.phases.size();
   const auto table = [&](Buffer& buffer, Buffer& upload, std::size_t bytes) {

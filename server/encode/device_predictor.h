@@ -25,7 +25,7 @@ class DevicePredictor {
   DevicePredictor(const vulkan::Device& device, const simulation::ClothSimulation& simulation,
                   const codec::StreamLayout& layout);
 
-  // True for one temporal layer, if the device's buffers and dispatches are large enough.
+  // True if the device's buffers and dispatches are large enough.
   static bool supports(const vulkan::Device& device, const codec::StreamLayout& layout);
 
   // Weights in the frame, if it is not at rest, and weights after it.

@@ -45,7 +45,6 @@ codec::StreamLayout streamLayout(const model::Scene& scene, std::uint32_t epoch)
   codec::StreamLayout layout{.epoch = epoch,
                              .maxError = scene.stream.maxError,
                              .normals = normals ? codec::NormalMode::octahedral : codec::NormalMode::none,
-                             .temporalLayers = scene.stream.temporalLayers,
                              .qualities = scene.stream.qualities,
                              .cloths = {}};
   const model::Vec3 origin = model::originOf(scene);

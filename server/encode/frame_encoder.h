@@ -21,8 +21,7 @@ namespace clothstream::encode {
 codec::StreamLayout streamLayout(const model::Scene& scene, std::uint32_t epoch);
 
 // The place of prediction. `automatic` chooses the device on GPUs. It chooses the host on software devices,
-// where a dispatch costs more than the CPU's vectors, for temporal layers, and if the device's buffers are
-// too small.
+// where a dispatch costs more than the CPU's vectors, and if the device's buffers are too small.
 enum class Prediction : std::uint8_t { automatic, onHost, onDevice };
 
 // Lag of the weights, in frames. Frames that the device predicts have the packets of a codec::Encoder with
@@ -35,7 +34,7 @@ struct RecordedFrame {
   std::uint32_t slot = 0;
   std::uint64_t tick = 0;
   codec::PacketKind kind = codec::PacketKind::key;
-  std::uint64_t referenceTick = 0;  // of a predicted frame in a stream with one temporal layer
+  std::uint64_t referenceTick = 0;  // of a predicted frame
 };
 
 struct EncodedFrame {
@@ -43,7 +42,6 @@ struct EncodedFrame {
   std::uint64_t reconstructionHash = 0;
   // As in the packet's header. The kind differs from that of the recorded frame if a key frame was discarded.
   codec::PacketKind kind = codec::PacketKind::key;
-  std::uint8_t layer = 0;
   std::uint64_t referenceTick = 0;  // of a predicted frame; else 0
 };
 
@@ -72,8 +70,7 @@ class FrameEncoder {
 
   // Records a frame of the simulation's present positions, and of its normals if the layout has them; these
   // must be recorded before. `tick` must grow from call to call, unless history was forgotten. A predicted
-  // frame refers to the frame recorded before; with temporal layers codec::Encoder chooses. The first frame
-  // is always a key frame.
+  // frame refers to the frame recorded before. The first frame is always a key frame.
   RecordedFrame record(vulkan::Recorder& recorder, std::uint64_t tick, bool forceKey);
 
   // Makes the next frame a key frame, after a rollback or restore.

@@ -28,7 +28,7 @@ class HierarchicalDeviceStage final : public EncodeStage {
                           const codec::StreamLayout& layout)
       : predictor_(device, simulation, layout),
         fitted_(predictor_.hierarchy()),
-        plan_(predictor_.hierarchy(), 1, kWeightLag),
+        plan_(predictor_.hierarchy(), kWeightLag),
         writer_(layout) {}
 
   std::size_t packetBound() const override { return writer_.packetBound(); }
@@ -97,7 +97,7 @@ std::size_t HierarchicalDeviceStage::code(const RecordedFrame& frame, std::span<
   const bool key = frame.kind == codec::PacketKind::key;
   const codec::FrameRole role = roleOf(frame);
   sinceKey_ = key ? 0 : sinceKey_ + 1;
-  plan_.begin(role);
+  plan_.begin(key);
   const bool atRest = !key && predictor_.status(frame.slot).moved == 0;
   const std::size_t weightBytes = plan_.write(atRest, weightBytes_.data());
   const bool any = addResiduals(frame.slot);
@@ -118,7 +118,6 @@ EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, st
   return {.bytes = bytes,
           .reconstructionHash = std::uint64_t{status.hashHigh} << 32 | status.hashLow,
           .kind = role.kind,
-          .layer = role.layer,
           .referenceTick = role.referenceTick};
 }
 

@@ -46,7 +46,6 @@ class HierarchicalHostStage final : public EncodeStage {
     return {.bytes = bytes,
             .reconstructionHash = encoder_->reconstructionHash(),
             .kind = encoder_->kind(),
-            .layer = encoder_->layer(),
             .referenceTick = encoder_->referenceTick()};
   }
 

@@ -73,7 +73,6 @@ v1::ParameterChange EdgeSource::parameters() const {
 
 bool EdgeSource::belongsHere(const codec::PacketHeader& header) const {
   return header.epoch == description_.epoch() && header.codec == description_.codec() &&
-         header.temporalLayer < std::max(description_.temporal_layers(), 1u) &&
          header.quality < (qualities_ > 1 ? qualities_ : codec::kMaxQualities);
 }
 

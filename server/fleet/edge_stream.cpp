@@ -39,8 +39,7 @@ std::string problemOf(const v1::StreamDescription& description) {
                        description.codec());
   const auto isRate = [](std::uint32_t rate) { return rate >= 1 && rate <= 100'000; };
   if (!isRate(description.simulation_rate()) || !isRate(description.stream_rate()) ||
-      description.qualities() > codec::kMaxQualities ||
-      description.temporal_layers() > codec::kMaxTemporalLayers)
+      description.qualities() > codec::kMaxQualities)
     return "its description is not valid";
   return {};
 }

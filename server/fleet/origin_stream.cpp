@@ -45,7 +45,7 @@ class SceneRelay final : public delivery::Relay {
         for (auto& [edge, interest] : interests_)
           interest.frames.keyFrames &= static_cast<std::uint8_t>(~bit);
     }
-    nats_.publish(framesSubject(stream_, frame.quality, frame.layer), frame.message);
+    nats_.publish(framesSubject(stream_, frame.quality), frame.message);
   }
 
   void announce(const SharedBytes& message) override {

@@ -19,12 +19,12 @@ std::string streamSubject(const std::string& scene, std::uint64_t stream) {
   return fmt::format("clothstream.{}.{:016x}", scene, stream);
 }
 
-std::string framesSubject(const std::string& stream, std::uint8_t quality, std::uint8_t layer) {
-  return fmt::format("{}.frames.{}.{}", stream, quality, layer);
+std::string framesSubject(const std::string& stream, std::uint8_t quality) {
+  return fmt::format("{}.frames.{}", stream, quality);
 }
 
 std::string framesPattern(const std::string& stream, std::optional<std::uint8_t> quality) {
-  return quality ? fmt::format("{}.frames.{}.*", stream, *quality) : stream + ".frames.*.*";
+  return quality ? framesSubject(stream, *quality) : stream + ".frames.*";
 }
 
 std::string eventsSubject(const std::string& stream) {

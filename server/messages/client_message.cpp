@@ -157,9 +157,6 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
     checks.fail(hello / "role", fmt::format("{}", static_cast<int>(message.role())),
                 "must be ROLE_VIEWER, ROLE_PARTICIPANT, ROLE_OWNER or left out");
   checks.integer(hello / "quality", message.quality(), 0, limits::kMaxQualities - 1);
-  const std::uint32_t layer =
-      message.has_temporal_layer() ? message.temporal_layer() : limits::kMaxTemporalLayers - 1;
-  checks.integer(hello / "temporalLayer", layer, 0, limits::kMaxTemporalLayers - 1);
   if (checks.failed()) return std::move(checks).result(Joining{});
   return Joining{std::min(message.protocol_version(), kProtocolVersion),
                  *codec,
@@ -167,8 +164,7 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
                  visible(message.client_name()),
                  visible(message.display_name()),
                  message.role(),
-                 static_cast<std::uint8_t>(message.quality()),
-                 static_cast<std::uint8_t>(layer + 1)};
+                 static_cast<std::uint8_t>(message.quality())};
 }
 
 Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const model::Scene& scene) {

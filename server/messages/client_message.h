@@ -29,9 +29,7 @@ struct Joining {
   std::string scene;  // empty: the server's default
   std::string clientName, displayName;
   v1::Role role = v1::ROLE_UNSPECIFIED;
-  // Upper limits that the client sets for its stream.
-  std::uint8_t quality = 0;         // finest quality; 0 is the finest of all
-  std::uint8_t temporalLayers = 1;  // number of temporal layers
+  std::uint8_t quality = 0;  // finest quality that the client wants; 0 is the finest of all
 };
 
 // `codecs` are the codecs of the server. Selects the first codec of the client that is among them.

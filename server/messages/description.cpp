@@ -100,7 +100,6 @@ v1::StreamDescription descriptionWithoutCloths(const model::Scene& scene, std::u
   description.set_stream_rate(scene.streamRate);
   description.set_max_error(scene.stream.maxError);
   description.set_normals(toMessage(scene.stream.normals));
-  description.set_temporal_layers(scene.stream.temporalLayers);
   description.set_qualities(scene.stream.qualities);
   if (const model::Vec3 origin = model::originOf(scene); !origin.isZero(0))
     write(origin, *description.mutable_origin());

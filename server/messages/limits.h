@@ -60,7 +60,6 @@ inline constexpr Range kJointRadius{0.001, 0.1};       // m
 inline constexpr double kMaxHandReach = 0.5;           // m, distance of a joint from its wrist
 inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
-inline constexpr std::uint32_t kMaxTemporalLayers = 3;
 inline constexpr std::uint32_t kMaxQualities = 4;
 inline constexpr Range kGrabRadius{0.001, 1};                // m
 inline constexpr Range kGrabReach{0, 1};                     // m

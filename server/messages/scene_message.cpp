@@ -86,9 +86,6 @@ model::StreamSettings toStreamSettings(Checks& checks, const Path& path, const v
   if (message.has_max_error())
     settings.maxError = checks.number(path / "maxError", message.max_error(), limits::kMaxError);
   settings.normals = toNormals(checks, path / "normals", message.normals());
-  if (message.has_temporal_layers())
-    settings.temporalLayers = static_cast<std::uint8_t>(
-        checks.integer(path / "temporalLayers", message.temporal_layers(), 1, limits::kMaxTemporalLayers));
   if (message.has_qualities())
     settings.qualities = static_cast<std::uint8_t>(
         checks.integer(path / "qualities", message.qualities(), 1, limits::kMaxQualities));

@@ -120,7 +120,6 @@ v1::Scene toMessageWithoutMeshes(const model::Scene& scene) {
   for (const model::Collider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
   message.mutable_stream()->set_max_error(scene.stream.maxError);
   message.mutable_stream()->set_normals(toMessage(scene.stream.normals));
-  message.mutable_stream()->set_temporal_layers(scene.stream.temporalLayers);
   message.mutable_stream()->set_qualities(scene.stream.qualities);
   return message;
 }

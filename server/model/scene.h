@@ -239,8 +239,7 @@ enum class Normals : std::uint8_t { none, octahedral };
 struct StreamSettings {
   float maxError = 0.0005f;  // m, per axis
   Normals normals = Normals::none;
-  std::uint8_t temporalLayers = 1;  // 1 to 3
-  std::uint8_t qualities = 3;       // 1 to 4; each has twice the maximum error of the previous one
+  std::uint8_t qualities = 3;  // 1 to 4; each has twice the maximum error of the previous one
 };
 
 struct Scene {

@@ -80,8 +80,6 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                std::map<std::string, model::Normals>{{"none", model::Normals::none},
                                                      {"octahedral", model::Normals::octahedral}},
                "Normals of --scene: none (clients compute them) or octahedral");
-  table.number("--temporal-layers", options.temporalLayers, {.min = 1, .max = 3},
-               "Temporal layers of --scene. Clients with slow links skip layers above the first");
   table.number("--qualities", options.qualities, {.min = 1, .max = 4},
                "Quality levels of --scene. Clients with slow links receive coarser ones");
   table.flag(

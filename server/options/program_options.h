@@ -65,7 +65,7 @@ struct ProgramOptions {
   std::optional<std::uint32_t> rate, substeps;
   std::optional<float> maxError;
   std::optional<model::Normals> normals;
-  std::optional<std::uint32_t> temporalLayers, qualities;
+  std::optional<std::uint32_t> qualities;
   std::filesystem::path recordDirectory;  // empty: nothing is recorded
   bool recordsOnRequest = false;          // record only scenes that clients ask for
   double recordLimitMb = 0;               // megabytes per file; 0 means no limit

@@ -48,8 +48,6 @@ model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
   scene.substeps = options.substeps.value_or(scene.substeps);
   scene.stream.maxError = options.maxError.value_or(scene.stream.maxError);
   scene.stream.normals = options.normals.value_or(scene.stream.normals);
-  if (options.temporalLayers)
-    scene.stream.temporalLayers = static_cast<std::uint8_t>(*options.temporalLayers);
   if (options.qualities) scene.stream.qualities = static_cast<std::uint8_t>(*options.qualities);
   auto checked = messages::toScene(messages::toMessage(scene));
   if (!checked)

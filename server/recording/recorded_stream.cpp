@@ -80,9 +80,6 @@ tl::expected<RecordedStream, std::string> RecordedStream::of(RecordingReader rea
   if (!isRate(description->simulation_rate()) || !isRate(description->stream_rate()))
     return tl::unexpected(fmt::format("its rates of {} and {} per second are invalid for a stream",
                                       description->simulation_rate(), description->stream_rate()));
-  if (description->temporal_layers() > codec::kMaxTemporalLayers)
-    return tl::unexpected(fmt::format("its stream has {} temporal layers; a stream has at most {}",
-                                      description->temporal_layers(), codec::kMaxTemporalLayers));
   auto check = FrameCheck::make(layoutOf(*description));
   if (!check) return tl::unexpected(check.error());
   return RecordedStream(std::move(reader), std::move(*description), std::move(*check));

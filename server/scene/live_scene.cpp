@@ -21,8 +21,7 @@
 namespace clothstream::scene {
 namespace {
 
-static_assert(messages::limits::kMaxTemporalLayers == codec::kMaxTemporalLayers &&
-              messages::limits::kMaxQualities == codec::kMaxQualities);
+static_assert(messages::limits::kMaxQualities == codec::kMaxQualities);
 
 v1::ParameterChange allParameters(const model::Scene& scene) {
   std::vector<double> areas;
@@ -313,15 +312,8 @@ std::uint32_t LiveScene::codec() const {
 }
 
 delivery::StreamShape LiveScene::shape() const {
-  if (!source)
-    return {.rate = start_.streamRate,
-            .layers = start_.stream.temporalLayers,
-            .qualities = start_.stream.qualities};
-  const std::uint32_t layers = source->description().temporal_layers();
-  return {.rate = start_.streamRate,
-          .layers = static_cast<std::uint8_t>(std::max(layers, 1u)),
-          .qualities = source->qualities(),
-          .lockstep = source->inLockstep()};
+  if (!source) return {.rate = start_.streamRate, .qualities = start_.stream.qualities};
+  return {.rate = start_.streamRate, .qualities = source->qualities(), .lockstep = source->inLockstep()};
 }
 
 v1::ParameterChange LiveScene::restart() {

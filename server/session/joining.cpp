@@ -224,8 +224,7 @@ void Session::hello(const v1::Hello& message) {
   const bool known =
       continues_ || (admission->resumed && message.description_content_id() == description->contentId());
   if (!continues_) welcome(*admission, *joining, description->contentId());
-  mailbox_->subscribe(known ? nullptr : description, scene->shape(), scene->metrics,
-                      {joining->quality, joining->temporalLayers});
+  mailbox_->subscribe(known ? nullptr : description, scene->shape(), scene->metrics, joining->quality);
   tellPresentState(*scene);
   server_.wake(*scene);
   telemetry::log(

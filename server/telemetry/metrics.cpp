@@ -49,8 +49,7 @@ std::string table(const std::string& scene, const SceneMetrics& m) {
                      {"bytes", m.packetBytes.value()},
                      {"skipped", m.skippedFrames.value()},
                      {"taken", m.framesTaken.value()},
-                     {"dropped", m.framesDropped.value()},
-                     {"thinned", m.framesThinned.value()}});
+                     {"dropped", m.framesDropped.value()}});
   addCounters(text, {{"steps down", m.stepsDown.value()}, {"steps up", m.stepsUp.value()}});
   if (m.overloadStepsDown.value() > 0)
     addCounters(text, {{"overload steps down", m.overloadStepsDown.value()},

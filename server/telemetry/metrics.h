@@ -46,10 +46,9 @@ struct SceneMetrics {
   Counter skippedFrames;      // frames not encoded because the encoder was behind, per quality
   Counter framesTaken;        // frames taken by endpoints, per subscriber
   Counter framesDropped;      // frames not sent because the subscriber was behind, per subscriber
-  Counter framesThinned;      // frames of temporal layers that the subscriber skips, per subscriber
   Counter sentBytes;          // bytes of all messages that endpoints have taken, per subscriber
-  Counter stepsDown;          // subscribers moved to fewer layers or a coarser quality
-  Counter stepsUp;            // subscribers moved to more layers or a finer quality
+  Counter stepsDown;          // subscribers moved to a coarser quality
+  Counter stepsUp;            // subscribers moved to a finer quality
   Counter overloadStepsDown;  // reductions of frames or substeps because the device was overloaded
   Counter overloadStepsUp;    // the opposite
   Counter rollbacks;          // returns to the last good state

@@ -63,7 +63,7 @@ class Viewer {
  public:
   explicit Viewer(scene::LiveScene& scene) : scene_(scene) {
     scene.subscribers.add(mailbox_);
-    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {});
+    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics);
   }
   ~Viewer() { scene_.subscribers.remove(*mailbox_); }
   Viewer(const Viewer&) = delete;

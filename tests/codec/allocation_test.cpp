@@ -81,12 +81,6 @@ TEST(Allocation, HappensOnlyAtConstructionWithNormals) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::octahedral));
 }
 
-TEST(Allocation, HappensOnlyAtConstructionWithTemporalLayers) {
-  StreamLayout layout = mixedLayout(NormalMode::none);
-  layout.temporalLayers = 3;
-  expectAllocationOnlyAtConstruction(layout);
-}
-
 TEST(Allocation, HappensOnlyAtConstructionWithAWeightLag) {
   expectAllocationOnlyAtConstruction(mixedLayout(NormalMode::none), {.weightLag = 3});
 }

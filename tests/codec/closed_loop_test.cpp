@@ -327,7 +327,7 @@ TEST(Hierarchical, ChangesQualityAtAKeyFrame) {
 TEST(Layout, IsRefusedIfImpossible) {
   const StreamLayout good = mixedLayout(NormalMode::none);
   ASSERT_NE(Decoder::make(good), nullptr);
-  std::vector<StreamLayout> bad(20, good);
+  std::vector<StreamLayout> bad(18, good);
   bad[0].cloths.clear();
   bad[1].cloths[0].rows = 8;
   bad[2].cloths[0].rows = 0;
@@ -341,13 +341,11 @@ TEST(Layout, IsRefusedIfImpossible) {
   bad[10].codec = 1;
   bad[11].codec = 200;
   bad[12].cloths[0].restPositions.assign(3 * 63, 0);  // rest positions of a grid
-  bad[13].temporalLayers = 0;
-  bad[14].temporalLayers = kMaxTemporalLayers + 1;
-  bad[15].qualities = 0;
-  bad[16].qualities = kMaxQualities + 1;
-  bad[17].codec = 3;
-  bad[18].origin[1] = std::nanf("");
-  bad[19].origin[2] = -1.1e6f;
+  bad[13].qualities = 0;
+  bad[14].qualities = kMaxQualities + 1;
+  bad[15].codec = 3;
+  bad[16].origin[1] = std::nanf("");
+  bad[17].origin[2] = -1.1e6f;
   for (std::size_t i = 0; i < bad.size(); ++i) {
     EXPECT_EQ(Decoder::make(bad[i]), nullptr) << i;
     EXPECT_EQ(Encoder::make(bad[i]), nullptr) << i;

@@ -15,10 +15,9 @@ namespace {
 
 constexpr std::uint32_t kRows = 61, kColumns = 45;
 
-StreamLayout layoutWith(NormalMode normals, std::uint8_t layers) {
+StreamLayout layoutWith(NormalMode normals) {
   return {.epoch = 3,
           .normals = normals,
-          .temporalLayers = layers,
           .cloths = {{.vertexCount = kRows * kColumns, .rows = kRows, .columns = kColumns},
                      {.vertexCount = 1},
                      {.vertexCount = 25}}};
@@ -44,9 +43,7 @@ double distance(const float* a, const float* b) {
 
 class CoarsePacket : public testing::TestWithParam<StreamLayout> {};
 INSTANTIATE_TEST_SUITE_P(Layouts, CoarsePacket,
-                         testing::Values(layoutWith(NormalMode::none, 1), layoutWith(NormalMode::none, 3),
-                                         layoutWith(NormalMode::octahedral, 1),
-                                         layoutWith(NormalMode::octahedral, 3)));
+                         testing::Values(layoutWith(NormalMode::none), layoutWith(NormalMode::octahedral)));
 
 TEST_P(CoarsePacket, HoldsExactCoarseVertices) {
   const StreamLayout& layout = GetParam();
@@ -80,7 +77,7 @@ TEST_P(CoarsePacket, HoldsExactCoarseVertices) {
 }
 
 TEST(CoarsePackets, AreRefusedByAFullDecoder) {
-  const StreamLayout layout = layoutWith(NormalMode::none, 1);
+  const StreamLayout layout = layoutWith(NormalMode::none);
   const auto encoder = Encoder::make(layout);
   const auto decoder = Decoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound());
@@ -93,7 +90,7 @@ TEST(CoarsePackets, AreRefusedByAFullDecoder) {
 }
 
 TEST(CoarsePackets, AreMadeOnlyFromPacketsOfKnownCodecs) {
-  const StreamLayout layout = layoutWith(NormalMode::none, 1);
+  const StreamLayout layout = layoutWith(NormalMode::none);
   const auto encoder = Encoder::make(layout);
   std::vector<std::byte> packet(encoder->packetBound()), out(packet.size());
   const MotionFrame frame = sampleMotion(layout, 1, 0.02f);

@@ -50,7 +50,6 @@ GoldenStream readStream(const nlohmann::json& json) {
   stream.layout.epoch = json.at("epoch");
   stream.layout.codec = json.at("codec");
   stream.layout.maxError = json.at("maxError");
-  stream.layout.temporalLayers = json.value("temporalLayers", std::uint8_t{1});
   stream.layout.qualities = json.value("qualities", std::uint8_t{1});
   stream.layout.origin = json.value("origin", stream.layout.origin);
   stream.layout.normals = json.at("normals") == "octahedral" ? NormalMode::octahedral : NormalMode::none;
@@ -81,7 +80,6 @@ nlohmann::ordered_json describe(const GoldenStream& stream) {
       {"codec", stream.layout.codec},
       {"maxError", stream.layout.maxError},
       {"normals", stream.layout.normals == NormalMode::octahedral ? "octahedral" : "none"}};
-  if (stream.layout.temporalLayers > 1) json["temporalLayers"] = stream.layout.temporalLayers;
   if (stream.layout.qualities > 1) json["qualities"] = stream.layout.qualities;
   if (stream.layout.origin != StreamLayout{}.origin) json["origin"] = stream.layout.origin;
   for (const ClothLayout& cloth : stream.layout.cloths) {

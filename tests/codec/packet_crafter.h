@@ -16,8 +16,8 @@
 
 namespace clothstream::codec {
 
-// Predicted frames of streams with one temporal layer. They have weights of every size, and all residuals are
-// 0. Coordinates may become too large: a decoder then refuses the packet.
+// Predicted frames. They have weights of every size, and all residuals are 0. Coordinates may become too
+// large: a decoder then refuses the packet.
 class PacketCrafter {
  public:
   explicit PacketCrafter(const StreamLayout& layout);

@@ -19,7 +19,6 @@ PacketHeader largestHeader() {
   header.epoch = 0xffffffffu;
   header.kind = PacketKind::predicted;
   header.quality = 255;
-  header.temporalLayer = 255;
   header.tick = kLastTick;
   header.referenceCount = kMaxReferences;
   header.references = {0, 1, kLastTick - 1, kLastTick - 200};
@@ -59,7 +58,6 @@ void expectEqual(const PacketHeader& a, const PacketHeader& b) {
   EXPECT_EQ(a.epoch, b.epoch);
   EXPECT_EQ(a.kind, b.kind);
   EXPECT_EQ(a.quality, b.quality);
-  EXPECT_EQ(a.temporalLayer, b.temporalLayer);
   EXPECT_EQ(a.tick, b.tick);
   EXPECT_EQ(a.referenceCount, b.referenceCount);
   EXPECT_EQ(a.references, b.references);
@@ -103,7 +101,7 @@ TEST(PacketHeader, RefusesBytesOutsideOfSections) {
   EXPECT_FALSE(parsePacket(bytes).has_value());
 }
 
-// Bytes of the small header: version, codec, kind, quality, layer, epoch, tick (2), references (count,
+// Bytes of the small header: version, codec, kind, quality, reserved, epoch, tick (2), references (count,
 // distance), ranges (count, gap, cloths, gap, cloths), sections (count, sizes).
 struct Damage {
   const char* what;
@@ -112,10 +110,10 @@ struct Damage {
 };
 TEST(PacketHeader, RefusesValuesOutOfRange) {
   const Damage damages[] = {
-      {"another version", 0, 2},     {"an unknown kind", 2, 2},     {"references of a key frame", 2, 0},
-      {"no reference", 8, 0},        {"five references", 8, 5},     {"a reference to itself", 9, 0},
-      {"no range", 10, 0},           {"an empty range", 12, 0},     {"nine sections", 15, 9},
-      {"a section too long", 16, 4}, {"a section too short", 16, 2}};
+      {"another version", 0, 2},       {"an unknown kind", 2, 2},     {"references of a key frame", 2, 0},
+      {"the reserved byte", 4, 1},     {"no reference", 8, 0},        {"five references", 8, 5},
+      {"a reference to itself", 9, 0}, {"no range", 10, 0},           {"an empty range", 12, 0},
+      {"nine sections", 15, 9},        {"a section too long", 16, 4}, {"a section too short", 16, 2}};
   const std::vector<std::byte> bytes = packetOf(smallHeader());
   ASSERT_TRUE(parsePacket(bytes).has_value());
   for (const Damage& damage : damages) {

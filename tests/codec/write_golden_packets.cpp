@@ -99,7 +99,7 @@ GoldenStream makeStream(const std::string& name, const StreamLayout& layout) {
                      {132, PacketKind::predicted, sampleMotion(layout, 4, 0.05f)}});
 }
 
-// A motion that lasts until weights have been sent for each layer.
+// A motion that lasts until weights have been sent several times.
 GoldenStream makeLongStream(const std::string& name, const StreamLayout& layout) {
   std::vector<Moment> moments;
   for (std::uint64_t tick = 1; tick <= 12; ++tick) {
@@ -175,6 +175,9 @@ GoldenStream makeSmallStream() {
   std::vector<std::byte> ofReservedCodec(next.begin(), next.end());
   ofReservedCodec[1] = std::byte{3};
   making.refuse("reserved_codec", std::move(ofReservedCodec));
+  std::vector<std::byte> withReservedByte(next.begin(), next.end());
+  withReservedByte[4] = std::byte{1};
+  making.refuse("reserved_byte", std::move(withReservedByte));
   return making.take();
 }
 
@@ -257,9 +260,6 @@ int main() try {
                                         .normals = NormalMode::none,
                                         .cloths = {{.vertexCount = 150, .rows = 15, .columns = 10}}}),
        makeLongStream("weighted", {.epoch = 9, .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
-       makeLongStream(
-           "layered",
-           {.epoch = 9, .temporalLayers = 3, .cloths = {{.vertexCount = 400, .rows = 20, .columns = 20}}}),
        makeStream("vertex", {.epoch = 0xffffffffu,
                              .maxError = 0.01f,
                              .normals = NormalMode::none,

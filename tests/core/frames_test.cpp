@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/codec/temporal_layers.h"
 #include "tests/core/scripted_server.h"
 
 namespace clothstream::client {
@@ -351,50 +350,21 @@ TEST(Frames, RefusesFrameOfAnotherEpoch) {
 
 TEST(Frames, FollowsChangeOfQuality) {
   Joined joined({.qualities = 3});
-  std::uint32_t quality = 9, layers = 9;
-  ASSERT_EQ(cs_get_operating_point(joined.client.get(), &quality, &layers), 1);
+  std::uint32_t quality = 9;
+  ASSERT_EQ(cs_get_quality(joined.client.get(), &quality), 1);
   EXPECT_EQ(quality, 0u);
-  EXPECT_EQ(layers, 1u);
   joined.client.receive(joined.server.frame(1));
   joined.client.receive(joined.server.frame(2));
   joined.server.goTo(2);
-  EXPECT_EQ(joined.client.receive(ScriptedServer::operatingPoint(2, 1)), 0u);
+  EXPECT_EQ(joined.client.receive(ScriptedServer::operatingPoint(2)), 0u);
   for (std::uint64_t tick = 3; tick <= 5; ++tick)
     EXPECT_EQ(joined.client.receive(joined.server.frame(tick)), kFrame);
-  cs_get_operating_point(joined.client.get(), &quality, &layers);
+  cs_get_quality(joined.client.get(), &quality);
   EXPECT_EQ(quality, 2u);
   const cs_statistics statistics = joined.client.statistics();
   EXPECT_EQ(statistics.decode_errors, 0u);
   EXPECT_EQ(statistics.hash_mismatches, 0u);
   EXPECT_EQ(statistics.dropped, 0u);
-}
-
-TEST(Frames, DoesNotCountOmittedLayersAsDropped) {
-  Joined joined({.temporalLayers = 3});
-  // Ticks from 1 have the layers 0 2 1 2. The server sends layers up to `highest`.
-  std::uint64_t tick = 1;
-  const auto send = [&](std::uint64_t end, std::uint8_t highest) {
-    for (; tick < end; ++tick) {
-      const std::string frame = joined.server.frame(tick);
-      if (codec::layerOf(tick - 1, 3) <= highest) {
-        EXPECT_EQ(joined.client.receive(frame), kFrame);
-      }
-    }
-  };
-  send(13, 2);
-  joined.client.receive(ScriptedServer::operatingPoint(0, 1));
-  send(25, 0);
-  std::uint32_t quality = 9, layers = 9;
-  cs_get_operating_point(joined.client.get(), &quality, &layers);
-  EXPECT_EQ(layers, 1u);
-  joined.client.receive(ScriptedServer::operatingPoint(0, 2));
-  send(42, 1);
-  EXPECT_EQ(joined.client.statistics().dropped, 0u);
-  // One frame is sent and lost.
-  for (; tick < 45; ++tick) static_cast<void>(joined.server.frame(tick));
-  send(46, 1);
-  EXPECT_EQ(joined.client.statistics().dropped, 1u);
-  EXPECT_EQ(joined.client.statistics().decode_errors, 0u);
 }
 
 TEST(Statistics, RatesCoverTheLastSecond) {

@@ -120,32 +120,31 @@ TEST(Joining, AsksForPairingCodesAndBans) {
   EXPECT_EQ(code.valid_s, 300u);
 }
 
-TEST(Joining, SendsTheWantedOperatingPointWithoutLosingRequests) {
+TEST(Joining, SendsTheWantedQualityWithoutLosingRequests) {
   ClientUnderTest client;
   cs_list_scenes(client.get());
-  cs_want(client.get(), 2, 1);
+  cs_want(client.get(), 2);
   const auto sent = client.outgoing();
   ASSERT_THAT(sent, SizeIs(2));
   EXPECT_EQ(sent[0].hello().quality(), 2u);
-  EXPECT_EQ(sent[0].hello().temporal_layer(), 0u);
   EXPECT_TRUE(sent[1].has_list_scenes());
 }
 
 // The server ends a connection with two Hellos.
-TEST(Joining, SendsALaterWantedOperatingPointWithTheNextConnection) {
+TEST(Joining, SendsALaterWantedQualityWithTheNextConnection) {
   ClientUnderTest client;
   client.outgoing();
-  cs_want(client.get(), 1, 0);
+  cs_want(client.get(), 1);
   EXPECT_THAT(client.outgoing(), SizeIs(0));
   client.join(ScriptedServer());
   cs_list_scenes(client.get());
-  cs_want(client.get(), 2, 0);
+  cs_want(client.get(), 2);
   const auto sent = client.outgoing();
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_TRUE(sent[0].has_list_scenes());
 
   cs_disconnected(client.get(), 0);
-  cs_want(client.get(), 3, 0);
+  cs_want(client.get(), 3);
   EXPECT_THAT(client.outgoing(), SizeIs(0));
   cs_connecting(client.get(), 0);
   const auto again = client.outgoing();
@@ -425,8 +424,6 @@ INSTANTIATE_TEST_SUITE_P(
             [](v1::StreamDescription& d) { d.mutable_cloths(0)->set_vertex_count(4'000'000'000); },
             "4000000000 vertices; this client accepts at most 1048576"},
         WrongDescription{"max_error", [](v1::StreamDescription& d) { d.set_max_error(0); }, "max_error"},
-        WrongDescription{"temporal_layers", [](v1::StreamDescription& d) { d.set_temporal_layers(257); },
-                         "temporal_layers"},
         WrongDescription{"qualities", [](v1::StreamDescription& d) { d.set_qualities(257); }, "qualities"},
         WrongDescription{"not_finite",
                          [](v1::StreamDescription& d) {

@@ -31,7 +31,7 @@ function writeMotion() {
 
 try {
   writeMotion();
-  execFileSync(clothstream, ["encode", motion, recording, "--layers", "2", "--key-every", "4"]);
+  execFileSync(clothstream, ["encode", motion, recording, "--key-every", "4"]);
   execFileSync(clothstream, ["decode", recording, decoded]);
   const native = readFileSync(decoded);
   const core = new Core(modulePath);

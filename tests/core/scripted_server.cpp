@@ -25,7 +25,6 @@ ScriptedServer::ScriptedServer(ScriptedStream stream) : stream_(std::move(stream
   layout_.codec = codec::kCodecHierarchical;
   for (const ClothSize& cloth : stream_.cloths)
     layout_.cloths.push_back({cloth.rows * cloth.columns, cloth.rows, cloth.columns});
-  layout_.temporalLayers = stream_.temporalLayers;
   layout_.qualities = stream_.qualities;
   goTo(0);
   pose(0);
@@ -75,7 +74,6 @@ v1::StreamDescription ScriptedServer::description() const {
   description.set_max_error(layout_.maxError);
   description.set_normals(stream_.normals == codec::NormalMode::none ? v1::NORMALS_NONE
                                                                      : v1::NORMALS_OCTAHEDRAL);
-  description.set_temporal_layers(stream_.temporalLayers);
   description.set_qualities(stream_.qualities);
   std::size_t first = 0;
   for (const ClothSize& size : stream_.cloths) {
@@ -167,10 +165,9 @@ std::string ScriptedServer::serialise(const v1::Frame& frame) {
   return serialised(message);
 }
 
-std::string ScriptedServer::operatingPoint(std::uint32_t quality, std::uint32_t temporalLayers) {
+std::string ScriptedServer::operatingPoint(std::uint32_t quality) {
   v1::ServerMessage message;
   message.mutable_operating_point()->set_quality(quality);
-  message.mutable_operating_point()->set_temporal_layers(temporalLayers);
   return serialised(message);
 }
 

@@ -27,7 +27,7 @@ struct ScriptedStream {
   std::uint32_t simulationRate = 72, streamRate = 72;
   codec::NormalMode normals = codec::NormalMode::none;
   std::vector<ClothSize> cloths{{"curtain", 9, 7}};
-  std::uint8_t temporalLayers = 1, qualities = 1;
+  std::uint8_t qualities = 1;
 };
 
 // The functions return serialised ServerMessages.
@@ -51,7 +51,7 @@ class ScriptedServer {
   const std::vector<float>& positions() const { return positions_; }
 
   static std::string serialise(const v1::Frame& frame);
-  static std::string operatingPoint(std::uint32_t quality, std::uint32_t temporalLayers);
+  static std::string operatingPoint(std::uint32_t quality);
   static std::string pong(std::uint64_t clientTimeUs, std::uint64_t serverTimeUs);
   static std::string error(v1::ErrorCode code, const std::string& text, bool fatal,
                            const std::string& server = {});

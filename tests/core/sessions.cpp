@@ -100,7 +100,6 @@ Session goldenSession(const std::string& name) {
     description.set_simulation_rate(72);
     description.set_stream_rate(72);
     description.set_max_error(stream.layout.maxError);
-    description.set_temporal_layers(stream.layout.temporalLayers);
     description.set_qualities(stream.layout.qualities);
     description.set_normals(stream.layout.normals == codec::NormalMode::none ? v1::NORMALS_NONE
                                                                              : v1::NORMALS_OCTAHEDRAL);

@@ -34,7 +34,7 @@ constexpr const char* kScene = R"({
     "structural": {"stiffness": 2}, "shear": {"stiffness": 0.5},
     "pins": [{"columnStep": 99, "lastColumn": 99}]
   }],
-  "stream": {"temporalLayers": 2, "qualities": 3}
+  "stream": {"qualities": 3}
 })";
 
 // Events that a client has received.
@@ -68,8 +68,7 @@ struct Seen {
       keyFramesAtFirst = statistics.key_frames;
     }
     matches = matches && statistics.hash_mismatches == 0 && statistics.decode_errors == 0;
-    std::uint32_t layers = 0;
-    cs_get_operating_point(client, &quality, &layers);
+    cs_get_quality(client, &quality);
   }
 };
 

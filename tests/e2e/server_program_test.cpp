@@ -400,7 +400,6 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--substeps=16",
                                        "--max-error=.5e-3",
                                        "--normals=Octahedral",
-                                       "--temporal-layers=2",
                                        "--qualities=3",
                                        "--always-run",
                                        "--reports=0.25",

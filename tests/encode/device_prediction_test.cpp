@@ -221,15 +221,5 @@ TEST_F(DevicePrediction, EqualsTheReferenceIfAnotherThreadCodes) {
   }
 }
 
-TEST_F(DevicePrediction, RefusesTemporalLayers) {
-  const model::Scene scene = squareOf(4);
-  const simulation::ClothSimulation simulation(device(), scene);
-  codec::StreamLayout layout = encode::streamLayout(scene, kEpoch);
-  layout.temporalLayers = 2;
-  EXPECT_THROW(encode::FrameEncoder(device(), simulation, layout, encode::Prediction::onDevice),
-               std::runtime_error);
-  EXPECT_NO_THROW(encode::FrameEncoder(device(), simulation, layout));
-}
-
 }  // namespace
 }  // namespace clothstream::tests

@@ -62,11 +62,8 @@ TEST(EncoderThreads, MakeTheSamePacketsAsOneThread) {
   expectTheSamePackets(largeLayout());
 }
 
-TEST(EncoderThreads, MakeTheSamePacketsWithLayersNormalsAndLag) {
+TEST(EncoderThreads, MakeTheSamePacketsWithNormalsAndLag) {
   StreamLayout layout = largeLayout();
-  layout.temporalLayers = 3;
-  expectTheSamePackets(layout);
-  layout.temporalLayers = 1;
   layout.normals = NormalMode::octahedral;
   expectTheSamePackets(layout, 3);
 }

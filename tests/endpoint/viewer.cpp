@@ -21,7 +21,6 @@ codec::StreamLayout layoutOf(const v1::StreamDescription& description) {
   layout.maxError = description.max_error();
   layout.normals = description.normals() == v1::NORMALS_OCTAHEDRAL ? codec::NormalMode::octahedral
                                                                    : codec::NormalMode::none;
-  layout.temporalLayers = static_cast<std::uint8_t>(description.temporal_layers());
   layout.qualities = static_cast<std::uint8_t>(std::max(1u, description.qualities()));
   for (const v1::ClothDescription& cloth : description.cloths())
     layout.cloths.push_back({cloth.vertex_count(), cloth.rows(), cloth.columns()});

@@ -15,7 +15,6 @@
 
 #include "clients/files/recording.h"
 #include "proto/codec/packet_header.h"
-#include "proto/codec/temporal_layers.h"
 #include "proto/codec/vertex_normals.h"
 #include "tests/e2e/process.h"
 #include "tests/e2e/temporary_directory.h"
@@ -147,18 +146,16 @@ TEST_F(MotionCommands, ScaleQualityWithEdgesOfFirstFrame) {
   EXPECT_LT(coarse.at("bitsPerVertex").get<double>(), fine.at("bitsPerVertex").get<double>());
 }
 
-TEST_F(MotionCommands, SetRequestedLayersAndKeyFrames) {
-  EXPECT_EQ(roundTrip({"--layers", "3", "--key-every", "16"}).at("keyFrames"), 3);
+TEST_F(MotionCommands, SetRequestedKeyFrames) {
+  EXPECT_EQ(roundTrip({"--key-every", "16"}).at("keyFrames"), 3);
   auto recording = RecordingReader::open(stream_);
   ASSERT_TRUE(recording) << recording.error();
-  EXPECT_EQ(recording->head().layout.temporalLayers, 3);
   for (std::uint32_t frame = 0; frame < kShape.frames; ++frame) {
     const auto packet = recording->next();
     ASSERT_TRUE(packet) << packet.error();
     const auto parsed = codec::parsePacket(packet->packet());
     ASSERT_TRUE(parsed);
     EXPECT_EQ(parsed->header.kind == codec::PacketKind::key, frame % 16 == 0) << frame;
-    EXPECT_EQ(parsed->header.temporalLayer, codec::layerOf(frame % 16, 3)) << frame;
   }
 }
 
@@ -198,7 +195,7 @@ TEST_F(MotionCommands, RefuseInvalidArguments) {
            {"encode", motion_, stream_, "--max-error", "1e-9"},
            {"encode", motion_, stream_, "--max-error", "nan"},
            {"encode", motion_, stream_, "--max-error", "1e6"},
-           {"encode", motion_, stream_, "--layers", "4"},
+           {"encode", motion_, stream_, "--layers", "2"},
            {"encode", motion_, stream_, "--key-every", "-1"},
            {"encode", motion_, motion_},
            {"decode", motion_}}) {

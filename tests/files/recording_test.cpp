@@ -22,7 +22,6 @@ class StreamFile : public ::testing::Test {
                                                               .codec = codec::kCodecHierarchical,
                                                               .maxError = 0.002f,
                                                               .normals = codec::NormalMode::octahedral,
-                                                              .temporalLayers = 2,
                                                               .qualities = 3,
                                                               .cloths = {{12, 3, 4, {}}}},
                                                    .rate = 72,
@@ -67,7 +66,6 @@ TEST_F(StreamFile, ReadsWhatWasWritten) {
   EXPECT_EQ(head.layout.codec, codec::kCodecHierarchical);
   EXPECT_EQ(head.layout.maxError, 0.002f);
   EXPECT_EQ(head.layout.normals, codec::NormalMode::octahedral);
-  EXPECT_EQ(head.layout.temporalLayers, 2);
   EXPECT_EQ(head.layout.qualities, 3);
   ASSERT_EQ(head.layout.cloths.size(), 1u);
   EXPECT_EQ(head.layout.cloths[0].rows, 3u);

@@ -400,7 +400,7 @@ TEST_F(EdgeTest, MessagesThatDoNotBelongToAStreamAreDropped) {
   frame.mutable_frame()->set_packet("not a packet");
   welcome.mutable_welcome()->set_scene("small");
   for (const std::string& bytes : {std::string("\xff\xff\xff"), std::string(), frame.SerializeAsString()}) {
-    send(framesSubject(subject, 0, 0), bytes);
+    send(framesSubject(subject, 0), bytes);
     send(kOffers, bytes);
     send(interestSubject(subject), bytes);
     send(descriptionSubject(subject), bytes);

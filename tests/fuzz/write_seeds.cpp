@@ -77,7 +77,7 @@ CoreInput coreInput(const client::ScriptedStream& stream, int frames) {
   message()->mutable_list_scenes()->add_scenes()->set_name("curtain");
   message()->mutable_presence()->mutable_participant()->set_id(7);
   message()->mutable_playback()->set_length(3);
-  message()->mutable_operating_point()->set_temporal_layers(1);
+  message()->mutable_operating_point()->set_quality(1);
   v1::TickEvents& events = *message()->mutable_tick_events();
   events.add_grabs()->set_grab_id(1);
   events.add_contacts()->set_cloth("curtain");
@@ -89,7 +89,7 @@ void writeCore(const std::filesystem::path& directory) {
   folder.add(coreInput({.cloths = {{"curtain", 3, 3}}}, 2));
   folder.add(
       coreInput({.normals = codec::NormalMode::octahedral, .cloths = {{"a", 4, 3}, {"curtain", 2, 2}}}, 2));
-  folder.add(coreInput({.cloths = {{"curtain", 2, 2}}, .temporalLayers = 3, .qualities = 2}, 4));
+  folder.add(coreInput({.cloths = {{"curtain", 2, 2}}, .qualities = 2}, 4));
   CoreInput calls;
   *calls.add_steps()->mutable_message() = parsed(client::ScriptedServer().welcome());
   *calls.add_steps()->mutable_description() =
@@ -121,7 +121,6 @@ void writeDecoder(const std::filesystem::path& directory) {
   mesh.set_epoch(1);
   mesh.set_codec(codec::kCodecHierarchical);
   mesh.set_max_error(0.001f);
-  mesh.set_temporal_layers(1);
   mesh.set_qualities(1);
   DecoderInput::Cloth& cloth = *mesh.add_cloths();
   cloth.set_vertex_count(4);
@@ -241,7 +240,6 @@ void writeRecording(const std::filesystem::path& directory) {
   description.set_simulation_rate(72);
   description.set_stream_rate(72);
   description.set_max_error(stream.layout.maxError);
-  description.set_temporal_layers(stream.layout.temporalLayers);
   for (const codec::ClothLayout& layout : stream.layout.cloths) {
     v1::ClothDescription& cloth = *description.add_cloths();
     cloth.set_name("sheet");
@@ -437,7 +435,6 @@ void writeFiles(const std::filesystem::path& directory) {
   description.set_stream_rate(72);
   description.set_simulation_rate(72);
   description.set_max_error(0.001f);
-  description.set_temporal_layers(1);
   v1::ClothDescription& cloth = *description.add_cloths();
   cloth.set_vertex_count(4);
   cloth.set_rows(2);

@@ -12,7 +12,7 @@ static unsafe class Follow
     [StructLayout(LayoutKind.Sequential)]
     struct Options
     {
-        public uint version, role, quality, temporalLayers;
+        public uint version, role, quality;
         public IntPtr scene, clientName, displayName;
         public uint joinTimeoutMs, reconnectForMs;
     }

@@ -150,14 +150,7 @@ TEST_F(LibraryTest, ReportsTheEndOfTheStream) {
   EXPECT_EQ(program.waitForEnd(kProgram), 0) << program.errors();
 }
 
-TEST_F(LibraryTest, SendsOnlyTheRequestedPartOfTheStream) {
-  const TemporaryDirectory directory;
-  const std::string sceneFile = directory.path() / "layered.json";
-  std::string scene = contents("tests/e2e/small.json");
-  scene.insert(scene.find('{') + 1, R"("stream": {"temporalLayers": 2, "qualities": 3},)");
-  std::ofstream(sceneFile) << scene;
-  TearDown();
-  startServer({"--scene", "small", "--scene-file", sceneFile});
+TEST_F(LibraryTest, ReceivesTheRequestedQuality) {
   const Ended ended = run({FOLLOW_C, web_, "wants"});
   EXPECT_EQ(ended.code, 0) << ended.output << ended.errors;
 }

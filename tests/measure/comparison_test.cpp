@@ -355,7 +355,6 @@ TEST_F(Comparison, ImportedRecordingDescribesNormalsAndQualities) {
   ASSERT_TRUE(description) << description.error();
   EXPECT_EQ(description->normals(), v1::NORMALS_NONE);
   EXPECT_EQ(description->qualities(), 1u);
-  EXPECT_EQ(description->temporal_layers(), 1u);
 }
 
 }  // namespace

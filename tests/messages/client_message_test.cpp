@@ -80,23 +80,17 @@ v1::Hello hello() {
   return message;
 }
 
-TEST(ToJoining, ReadsQualityAndTemporalLayers) {
+TEST(ToJoining, ReadsQuality) {
   v1::Hello message = hello();
   auto joining = toJoining(message, kCodecs);
   ASSERT_TRUE(joining);
   EXPECT_EQ(joining->quality, 0);
-  EXPECT_EQ(joining->temporalLayers, 3);
   message.set_quality(3);
-  message.set_temporal_layer(0);
   joining = toJoining(message, kCodecs);
   ASSERT_TRUE(joining);
   EXPECT_EQ(joining->quality, 3);
-  EXPECT_EQ(joining->temporalLayers, 1);
   message.set_quality(4);
   EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.quality = 4: must be"));
-  message.set_quality(0);
-  message.set_temporal_layer(3);
-  EXPECT_THAT(toJoining(message, kCodecs).error().text, StartsWith("hello.temporalLayer = 3: must be"));
 }
 
 TEST(ToJoining, SelectsVersionAndFirstCommonCodec) {

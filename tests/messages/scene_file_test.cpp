@@ -130,8 +130,7 @@ constexpr const char* kEveryField = R"json({
                          "orientation": {"x": 0.5, "y": 0.5, "z": -0.5, "w": 0.5}}],
                "steady": true}
   }],
-  "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL",
-             "temporalLayers": 2, "qualities": 4}
+  "stream": {"maxError": 0.001, "normals": "NORMALS_OCTAHEDRAL", "qualities": 4}
 })json";
 
 using Names = std::set<std::string>;
@@ -244,6 +243,8 @@ TEST(SceneFile, RefusesUnknownFieldsAndWrongTypes) {
   EXPECT_THAT(errorOf("{\"integrator\": \"MAGIC\"}"), AllOf(HasSubstr("integrator"), HasSubstr("MAGIC")));
   EXPECT_THAT(errorOf("{\"stream\": {\"coding\": \"CODING_PACKED\"}}"),
               AllOf(HasSubstr("(stream) coding"), HasSubstr("correct or remove it")));
+  EXPECT_THAT(errorOf("{\"stream\": {\"temporalLayers\": 2}}"),
+              AllOf(HasSubstr("(stream) temporalLayers"), HasSubstr("correct or remove it")));
   EXPECT_THAT(errorOf("[]"), StartsWith("my.json: not a scene"));
 }
 

@@ -527,7 +527,6 @@ const BadScene kBadScenes[] = {
        addKey(s, 1);
        collider(s).mutable_motion()->mutable_keys(0)->mutable_position()->set_y(2000);
      }},
-    {"stream.temporalLayers = 4:", [](v1::Scene& s) { s.mutable_stream()->set_temporal_layers(4); }, "from 1 to 3"},
     {"stream.qualities = 0:", [](v1::Scene& s) { s.mutable_stream()->set_qualities(0); }, "from 1 to 4"},
     {"stream.maxError = 1:", [](v1::Scene& s) { s.mutable_stream()->set_max_error(1); }, "from 1e-05 to 0.1"},
     {"cloths[0].solver.constraint.iterations = 0:",

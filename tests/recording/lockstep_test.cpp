@@ -170,9 +170,8 @@ TEST_F(LockstepTest, AnnouncesThePositionOncePerRecordedSecond) {
   EXPECT_THAT(viewer.playbacks.front().speed(), 0);
 }
 
-TEST_F(LockstepTest, KeepsAllLayersForASlowSubscriber) {
-  playback = std::make_shared<Playback>(streamOf(sampleRecording(kSampleFrames, 3)), kUnpacedLockstep);
-  scene = std::make_unique<scene::LiveScene>("sample", playback);
+TEST_F(LockstepTest, KeepsAllFramesForASlowSubscriber) {
+  play(kUnpacedLockstep);
   Viewer& viewer = join();
   viewer.acknowledges = false;
   for (std::size_t frames = 1; frames <= 30; ++frames) {

@@ -87,20 +87,6 @@ class PlaybackTest : public ::testing::Test {
   Clock::time_point now = Clock::now();
 };
 
-TEST_F(PlaybackTest, DropsLayersThatAViewerDoesNotRequest) {
-  play(sampleRecording(kSampleFrames, 3));
-  Viewer base(*scene, 1);
-  join();
-  for (double time = 0; time < 1; time += 0.001) {
-    step(0.001);
-    viewer->read(now);
-    base.read(now);
-  }
-  EXPECT_GT(viewer->frames.size(), 55u);
-  EXPECT_GT(base.frames.size(), viewer->frames.size() / 5);
-  EXPECT_LT(base.frames.size(), viewer->frames.size() / 3);
-}
-
 TEST_F(PlaybackTest, SendsEveryFrameWhenItIsDue) {
   play();
   pass(1);

@@ -35,7 +35,6 @@ v1::StreamDescription descriptionOf(const codec::StreamLayout& layout) {
   description.set_simulation_rate(kSampleRate);
   description.set_stream_rate(kSampleRate);
   description.set_max_error(layout.maxError);
-  description.set_temporal_layers(1);
   v1::ClothDescription& cloth = *description.add_cloths();
   cloth.set_name("sheet");
   cloth.set_vertex_count(layout.cloths[0].vertexCount);
@@ -96,16 +95,12 @@ const codec::StreamLayout& sampleLayout() {
   return kLayout;
 }
 
-v1::StreamDescription sampleDescription(std::uint8_t layers) {
-  v1::StreamDescription description = descriptionOf(kLayout);
-  description.set_temporal_layers(layers);
-  return description;
+v1::StreamDescription sampleDescription() {
+  return descriptionOf(kLayout);
 }
 
-void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers) {
-  codec::StreamLayout layout = kLayout;
-  layout.temporalLayers = layers;
-  write(sink, frames, layout, sampleDescription(layers), false);
+void writeSample(const Sink& sink, std::uint32_t frames) {
+  write(sink, frames, kLayout, sampleDescription(), false);
 }
 
 void writeSampleWithSliders(const Sink& sink, std::uint32_t frames, const codec::StreamLayout& layout) {
@@ -123,14 +118,14 @@ SampleSliders sampleSliders(std::uint32_t frame) {
           .stiffness = stiffness == 0 ? kStiffness : static_cast<float>(stiffness * kFramesAChange)};
 }
 
-std::string sampleRecording(std::uint32_t frames, std::uint8_t layers) {
+std::string sampleRecording(std::uint32_t frames) {
   std::string bytes;
   writeSample(
       [&](std::string_view more) {
         bytes += more;
         return Written();
       },
-      frames, layers);
+      frames);
   return bytes;
 }
 

@@ -21,13 +21,13 @@ constexpr std::uint64_t sampleTime(std::uint64_t frame) {
   return kSampleStart + frame * 1'000'000'000 / kSampleRate;
 }
 
-// Layout of its stream. The number of temporal layers in the description may differ.
+// Layout of its stream.
 const codec::StreamLayout& sampleLayout();
-v1::StreamDescription sampleDescription(std::uint8_t layers = 1);
+v1::StreamDescription sampleDescription();
 
 // Writes a recording of `frames` frames and their ticks to the sink.
-void writeSample(const Sink& sink, std::uint32_t frames, std::uint8_t layers = 1);
-std::string sampleRecording(std::uint32_t frames, std::uint8_t layers = 1);
+void writeSample(const Sink& sink, std::uint32_t frames);
+std::string sampleRecording(std::uint32_t frames);
 
 // Interval of parameter changes in frames, starting after the first frame. At every second change the wind's
 // x becomes the frame's number, at the others the stiffness of the structural springs.

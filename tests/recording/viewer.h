@@ -42,13 +42,11 @@ struct Seen {
 // Accepts every frame at once, and acknowledges it unless `acknowledges` is false.
 class Viewer {
  public:
-  explicit Viewer(scene::LiveScene& scene, std::uint8_t layers = codec::kMaxTemporalLayers)
+  explicit Viewer(scene::LiveScene& scene)
       : scene_(scene), mailbox_(std::make_shared<delivery::Mailbox>([] {})) {
     scene.subscribers.add(mailbox_);
-    codec::StreamLayout layout = sampleLayout();
-    layout.temporalLayers = scene.shape().layers;
-    decoder_ = codec::Decoder::make(layout);
-    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics, {.quality = 0, .layers = layers});
+    decoder_ = codec::Decoder::make(sampleLayout());
+    mailbox_->subscribe(scene.description(), scene.shape(), scene.metrics);
     read(Clock::time_point{});
   }
   ~Viewer() { scene_.subscribers.remove(*mailbox_); }

@@ -142,7 +142,6 @@ void TestPeer::seeChunk(const v1::Chunk& chunk) {
   layout.codec = static_cast<std::uint8_t>(description_.codec());
   layout.maxError = description_.max_error();
   layout.normals = octahedral ? codec::NormalMode::octahedral : codec::NormalMode::none;
-  layout.temporalLayers = static_cast<std::uint8_t>(description_.temporal_layers());
   layout.qualities = static_cast<std::uint8_t>(std::max(1u, description_.qualities()));
   for (const v1::ClothDescription& cloth : description_.cloths())
     layout.cloths.push_back(
@@ -163,7 +162,6 @@ void TestPeer::seeFrame(const v1::Frame& frame, const delivery::SharedBytes& byt
   frames_.push_back({.tick = decoder_->tick(),
                      .key = header.kind == codec::PacketKind::key,
                      .quality = header.quality,
-                     .layer = header.temporalLayer,
                      .stateHash = frame.state_hash(),
                      .message = bytes,
                      .colliders = {frame.colliders().begin(), frame.colliders().end()}});

@@ -24,7 +24,7 @@ namespace clothstream::tests {
 struct SeenFrame {
   std::uint64_t tick = 0;
   bool key = false;
-  std::uint8_t quality = 0, layer = 0;
+  std::uint8_t quality = 0;
   std::uint64_t stateHash = 0;
   delivery::SharedBytes message;
   std::vector<v1::ColliderState> colliders;

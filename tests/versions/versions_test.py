@@ -73,7 +73,7 @@ class Versions(unittest.TestCase):
         address = self.serve(server, "--scene", "curtain")
         summary = self.join(client, address, "--name", "guest", "--collider", "0,1,0,0.2")
         self.assertEqual(summary["scene"], "curtain")
-        self.join(client, address, "--quality", 1, "--layers", 1)
+        self.join(client, address, "--quality", 1)
         self.run_program(client, "set", address, "--gravity", "0,-5,0")
         self.run_program(client, "create", "--named", "flag", "--name", "mine", "--server", address)
         names = [scene["name"] for scene in json.loads(self.run_program(client, "list", address, "--json").stdout)]

@@ -138,9 +138,7 @@ void writeHello(std::string& out, std::uint64_t requestId, const Hello& hello) {
     message.add_string(F::kScene.number, hello.scene);
     message.add_string(F::kClientName.number, hello.clientName);
     message.add_string(F::kDisplayName.number, hello.displayName);
-    if (hello.wanted.quality > 0) message.add_uint32(F::kQuality.number, hello.wanted.quality);
-    if (hello.wanted.temporalLayers > 0)
-      message.add_uint32(F::kTemporalLayer.number, hello.wanted.temporalLayers - 1);
+    if (hello.quality > 0) message.add_uint32(F::kQuality.number, hello.quality);
     message.add_uint32(F::kRole.number, hello.role);
     if (hello.token.empty()) return;
     message.add_bytes(F::kResumeToken.number, hello.token);

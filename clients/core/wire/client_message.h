@@ -22,7 +22,7 @@ namespace clothstream::client {
 struct Hello {
   std::string scene, clientName, displayName;
   std::uint32_t role = 0;
-  OperatingPoint wanted = {};  // upper limit
+  std::uint32_t quality = 0;  // finest quality wanted
   // Token and description of the last Welcome, for a client that returns. Empty and 0 if it has none.
   std::string token;
   std::uint64_t contentId = 0;

@@ -143,10 +143,6 @@ bool readParts(Bytes message, Description& description, std::vector<ClothMessage
                readCollider(reader.get_view(), description.colliders.emplace_back());
       case F::kDefinition.tag:
         return definition = reader.get_view(), true;
-      case F::kTemporalLayers.tag:
-        description.layout.temporalLayers =
-            static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
-        return true;
       case F::kQualities.tag:
         description.layout.qualities =
             static_cast<std::uint8_t>(std::clamp<std::uint32_t>(reader.get_uint32(), 1, 255));
@@ -225,8 +221,7 @@ std::string check(const Description& description, const std::vector<ClothMessage
     return "a cloth's rows x columns is not its vertex_count, a triangle names a vertex that is not there, "
            "there are "
            "no vertices or more than " +
-           std::to_string(codec::kMaxVertices) +
-           ", or max_error, temporal_layers, qualities or origin is out of range";
+           std::to_string(codec::kMaxVertices) + ", or max_error, qualities or origin is out of range";
   return {};
 }
 

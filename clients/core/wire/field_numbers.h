@@ -275,7 +275,6 @@ struct MotionKey {
 struct StreamSettings {
   static constexpr Field kMaxError{1, WireType::kFixed32};
   static constexpr Field kNormals{2, WireType::kVarint};
-  static constexpr Field kTemporalLayers{50, WireType::kVarint};
   static constexpr Field kQualities{51, WireType::kVarint};
 };
 
@@ -410,7 +409,6 @@ struct Hello {
   static constexpr Field kClientName{4, WireType::kBytes};
   static constexpr Field kDisplayName{5, WireType::kBytes};
   static constexpr Field kQuality{6, WireType::kVarint};
-  static constexpr Field kTemporalLayer{7, WireType::kVarint};
   static constexpr Field kRole{30, WireType::kVarint};
   static constexpr Field kResumeToken{31, WireType::kBytes};
   static constexpr Field kDescriptionContentId{32, WireType::kVarint};
@@ -503,7 +501,6 @@ struct StreamDescription {
   static constexpr Field kNormals{7, WireType::kVarint};
   static constexpr Field kCloths{8, WireType::kBytes};
   static constexpr Field kColliders{9, WireType::kBytes};
-  static constexpr Field kTemporalLayers{11, WireType::kVarint};
   static constexpr Field kQualities{12, WireType::kVarint};
   static constexpr Field kOrigin{13, WireType::kBytes};
   static constexpr Field kDefinition{10, WireType::kBytes};
@@ -570,7 +567,6 @@ struct ColliderMeshDescription {
 };
 struct OperatingPoint {
   static constexpr Field kQuality{1, WireType::kVarint};
-  static constexpr Field kTemporalLayers{2, WireType::kVarint};
 };
 struct FrameAck {
   static constexpr Field kTick{1, WireType::kVarint};

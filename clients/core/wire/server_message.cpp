@@ -247,11 +247,10 @@ std::optional<cs_playback> readPlayback(Bytes message) {
   return playback;
 }
 
-std::optional<OperatingPoint> readOperatingPoint(Bytes message) {
+std::optional<std::uint32_t> readOperatingPoint(Bytes message) {
   using F = field::OperatingPoint;
-  return readMessage<OperatingPoint>(message, [](OperatingPoint& point, std::uint32_t tag, Reader& reader) {
-    if (tag == F::kQuality.tag) return set(point.quality, reader.get_uint32());
-    return tag == F::kTemporalLayers.tag ? set(point.temporalLayers, reader.get_uint32()) : skip(reader);
+  return readMessage<std::uint32_t>(message, [](std::uint32_t& quality, std::uint32_t tag, Reader& reader) {
+    return tag == F::kQuality.tag ? set(quality, reader.get_uint32()) : skip(reader);
   });
 }
 

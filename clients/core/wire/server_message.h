@@ -119,12 +119,6 @@ struct Pong {
   std::uint64_t clientTimeUs = 0, serverTimeUs = 0;
 };
 
-// Part of the stream that the server sends.
-struct OperatingPoint {
-  std::uint32_t quality = 0;
-  std::uint32_t temporalLayers = 0;  // 0 means all
-};
-
 struct ServerError {
   std::uint32_t code = 0;
   std::string text;
@@ -162,7 +156,8 @@ struct TickEvents {
 [[nodiscard]] std::optional<Presence> readPresence(Bytes message);
 // Also nullopt if the length is negative.
 [[nodiscard]] std::optional<cs_playback> readPlayback(Bytes message);
-[[nodiscard]] std::optional<OperatingPoint> readOperatingPoint(Bytes message);
+// Quality that the server sends.
+[[nodiscard]] std::optional<std::uint32_t> readOperatingPoint(Bytes message);
 [[nodiscard]] std::optional<ParameterChange> readParameterChanged(Bytes message);
 [[nodiscard]] std::optional<ServerError> readError(Bytes message);
 // DNS name of the server to which the scene moves; empty if it is not a DNS name.

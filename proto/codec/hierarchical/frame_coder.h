@@ -47,15 +47,12 @@ inline constexpr unsigned kWeightGammaBits = 4, kEscapeGammaBits = 2;
 inline constexpr std::uint32_t kStays = 0;
 
 // A first section that is not empty starts with a bit. If it is 1, nothing follows and all weights are 0 in
-// this frame alone, so that resting cloth stays where it is. If it is 0, changes follow, layer by layer.
+// this frame alone, so that resting cloth stays where it is. If it is 0, changes follow.
 
-// Weights that the changes of a key frame apply to, and weights that a key frame leaves for every layer.
+// Weights that the changes of a key frame apply to, and weights that a key frame leaves. Any other frame
+// starts with the weights that its reference left, and leaves them with its changes.
 Weights keyFrameWeights();
 Weights startingWeights();
-
-// Indexed by layer. A frame starts with the weights that its reference left. It changes those of its own
-// layer and of higher ones, and leaves them to the frames that refer to it.
-using LayerWeights = std::array<Weights, kMaxTemporalLayers>;
 
 std::array<WeightVectors, kWeightClasses + 1> weightVectors(const Weights& weights);
 

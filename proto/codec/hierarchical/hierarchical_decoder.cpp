@@ -14,6 +14,25 @@ Int32x4 unzigzagLanes(Int32x4 numbers) {
   return numbers.bitsShiftedRight(1) ^ (Int32x4::all(0) - (numbers & Int32x4::all(1)));
 }
 
+// Applies the changes that a frame carries to `weights`.
+bool readWeights(std::span<const std::byte> section, bool key, Weights& weights, bool& atRest) {
+  atRest = false;
+  if (section.empty()) return true;
+  BitReader reader(section);
+  atRest = reader.get(1) != 0;
+  if (atRest) return reader.atEnd();
+  for (std::size_t c = 0; c < kWeightClasses; ++c) {
+    if (reader.get(1) == 0) continue;
+    for (std::size_t f = firstWeight(key); f < endWeight(key); ++f) {
+      std::int16_t& weight = weights[c][f];
+      const std::int64_t value = std::int64_t{weight} + codec::unzigzag(reader.getGamma(kWeightGammaBits));
+      if (value < -kMaxWeight || value > kMaxWeight) return false;
+      weight = static_cast<std::int16_t>(value);
+    }
+  }
+  return reader.atEnd();
+}
+
 }  // namespace
 
 bool HierarchicalDecoder::allocate(const StreamLayout& layout, Detail detail) {
@@ -27,32 +46,11 @@ bool HierarchicalDecoder::allocate(const StreamLayout& layout, Detail detail) {
   return predictor_.allocate(layout, unit_.stepBits);
 }
 
-bool HierarchicalDecoder::readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer,
-                                      LayerWeights& weights, bool& atRest) const {
-  atRest = false;
-  if (section.empty()) return true;
-  BitReader reader(section);
-  atRest = reader.get(1) != 0;
-  const std::uint8_t layers = atRest ? layer : key ? 1 : layout_.temporalLayers;
-  for (; layer < layers; ++layer) {
-    for (std::size_t c = 0; c < kWeightClasses; ++c) {
-      if (reader.get(1) == 0) continue;
-      for (std::size_t f = firstWeight(key); f < endWeight(key); ++f) {
-        std::int16_t& weight = weights[layer][c][f];
-        const std::int64_t value = std::int64_t{weight} + codec::unzigzag(reader.getGamma(kWeightGammaBits));
-        if (value < -kMaxWeight || value > kMaxWeight) return false;
-        weight = static_cast<std::int16_t>(value);
-      }
-    }
-  }
-  return reader.atEnd();
-}
-
-bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t referenceLayer) {
+bool HierarchicalDecoder::decode(const ParsedPacket& packet) {
   // A quality starts with a key frame. A refused key frame changes nothing.
   const LatticeUnit unit = latticeUnit(maxErrorOf(layout_, packet.header.quality));
   predictor_.setStepBits(unit.stepBits);
-  if (!decodeFrame(packet, referenceLayer)) {
+  if (!decodeFrame(packet)) {
     predictor_.setStepBits(unit_.stepBits);
     return false;
   }
@@ -60,37 +58,34 @@ bool HierarchicalDecoder::decode(const ParsedPacket& packet, std::uint8_t refere
   return true;
 }
 
-bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer) {
+bool HierarchicalDecoder::decodeFrame(const ParsedPacket& packet) {
   const PacketHeader& header = packet.header;
   if (header.sectionCount != kSections) return false;
   const bool key = header.kind == PacketKind::key;
-  const std::uint8_t layer = header.temporalLayer;
   const std::span<const std::byte> changes = packet.body.first(header.sectionBytes[kWeightChanges]);
-  LayerWeights weights = weights_[referenceLayer];
-  if (key) weights.fill(keyFrameWeights());
+  Weights weights = key ? keyFrameWeights() : weights_;
   bool atRest;
-  if (!readWeights(changes, key, layer, weights, atRest)) return false;
-  const Vectors vectors = weightVectors(atRest ? Weights{} : weights[layer]);
+  if (!readWeights(changes, key, weights, atRest)) return false;
+  const Vectors vectors = weightVectors(atRest ? Weights{} : weights);
   Streams streams = openStreams(packet);
   beyond_ = Int32x4::all(0);
-  predictor_.begin(key, referenceLayer);
+  predictor_.begin(key);
   const Hierarchy& hierarchy = predictor_.hierarchy();
   decodePhases(0, hierarchy.coarsePhases, key, vectors, streams);
   if (!streams.isCoarseRead()) return false;
   if (isCoarse_) {
     if (isOutside()) return false;
     predictor_.interpolate(hierarchy.coarseVertices, static_cast<std::uint32_t>(hierarchy.vertexOf.size()));
-    predictor_.keep(layer, hierarchy.coarseVertices);
+    predictor_.keep(hierarchy.coarseVertices);
   } else {
     decodePhases(hierarchy.coarsePhases, hierarchy.phases.size(), key, vectors, streams);
     if (isOutside()) return false;
     if (hasNormals_) decodeNormals(streams);
     if (!streams.symbols.atEnd() || !streams.bits.atEnd()) return false;
     if (hasNormals_) std::swap(normals_, newNormals_);
-    predictor_.keep(layer);
+    predictor_.keep();
   }
-  if (key) weights.fill(startingWeights());
-  weights_[layer] = weights;
+  weights_ = key ? startingWeights() : weights;
   return true;
 }
 

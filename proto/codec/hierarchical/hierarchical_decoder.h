@@ -23,9 +23,9 @@ class HierarchicalDecoder {
   // False if memory is out. Call it once, before anything else.
   [[nodiscard]] bool allocate(const StreamLayout& layout, Detail detail);
 
-  // Takes the newest frame of `referenceLayer` as the reference of a predicted frame. False if the sections
-  // are not a frame of this layout; then the decoder is unchanged.
-  [[nodiscard]] bool decode(const ParsedPacket& packet, std::uint8_t referenceLayer);
+  // A predicted frame refers to the newest frame. False if the sections are not a frame of this layout; then
+  // the decoder is unchanged.
+  [[nodiscard]] bool decode(const ParsedPacket& packet);
   // Positions and normals of the newest frame, 3 floats a vertex.
   void writePositions(float* out) const;
   // Only if the stream sends normals.
@@ -44,11 +44,8 @@ class HierarchicalDecoder {
   };
   using Vectors = std::array<WeightVectors, kWeightClasses + 1>;
 
-  bool decodeFrame(const ParsedPacket& packet, std::uint8_t referenceLayer);
+  bool decodeFrame(const ParsedPacket& packet);
   Streams openStreams(const ParsedPacket& packet) const;
-  // Applies the changes that a frame of this layer carries to `weights`.
-  bool readWeights(std::span<const std::byte> section, bool key, std::uint8_t layer, LayerWeights& weights,
-                   bool& atRest) const;
   void decodePhases(std::size_t begin, std::size_t end, bool key, const Vectors& weights, Streams& streams);
   void decodeNormals(Streams& streams);
   std::int32_t readOfNormal(std::size_t component, std::size_t vertex, NormalScale& scale, Streams& streams);
@@ -73,8 +70,8 @@ class HierarchicalDecoder {
   NormalPrediction normalPrediction_;
   // by vertex; the second are those of the frame that is being decoded
   Array<FacedNormal> normals_, newNormals_;
-  std::array<LayerWeights, kMaxTemporalLayers> weights_{};  // left by the newest frame of each layer
-  Int32x4 beyond_{};  // set where a coordinate of this frame exceeds kMaxCoordinate
+  Weights weights_{};  // left by the newest frame
+  Int32x4 beyond_{};   // set where a coordinate of this frame exceeds kMaxCoordinate
   // State of the chunk that is being decoded.
   std::array<Prediction, kChunk> predictions_{};
   std::array<SurfaceFrames, kChunk / 4> frames_;

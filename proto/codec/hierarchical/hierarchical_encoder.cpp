@@ -85,7 +85,7 @@ struct HierarchicalEncoder::State {
     if (!predictor.allocate(layout, unit.stepBits) || (hasNormals && !normalPrediction.allocate(layout)))
       std::abort();  // memory is out, as in any other allocation here
     fitted.emplace(predictor.hierarchy());
-    plan.emplace(predictor.hierarchy(), layout.temporalLayers, options.weightLag);
+    plan.emplace(predictor.hierarchy(), options.weightLag);
     scratches.resize(workers != nullptr ? kMaxPieces : 1);
     encoded.resize(batch / kChunk);
   }
@@ -474,18 +474,17 @@ std::size_t HierarchicalEncoder::encode(const FrameRole& role, std::span<const f
   const bool key = role.kind == PacketKind::key;
   s.frame = key ? 0 : s.frame + 1;
   s.quantise(positions);
-  s.predictor.begin(key, role.referenceLayer);
-  s.plan->begin(role);
+  s.predictor.begin(key);
+  s.plan->begin(key);
   s.restInterval = 0;
-  // Counting in the base is enough: all other layers refer to it.
-  if (!key && role.layer == 0) s.countRests();
+  if (!key) s.countRests();
   // A key frame cannot use the past, so its weights are fitted to a first attempt at the same frame.
   if (key && s.plan->attempts()) s.attempt();
   const std::size_t weightBytes = s.plan->write(!key && s.isAtRest(), s.weightBytes.data());
   s.use(s.plan->used());
   s.encodePhases();
   if (s.hasNormals) s.encodeNormals(normals);
-  s.predictor.keep(role.layer);
+  s.predictor.keep();
   s.plan->end(s.quiet);
   return s.writer.write(role, std::span(s.weightBytes).first(weightBytes), out);
 }

@@ -24,7 +24,6 @@ std::size_t PacketAssembly::headerBound() const {
 std::byte* PacketAssembly::begin(const FrameRole& role, std::span<std::byte> out) {
   header_.kind = role.kind;
   header_.quality = role.quality;
-  header_.temporalLayer = role.layer;
   header_.tick = role.tick;
   header_.referenceCount = role.kind == PacketKind::key ? 0 : 1;
   header_.references[0] = role.referenceTick;

@@ -11,28 +11,24 @@ bool Predictor::allocate(const StreamLayout& layout, int stepBits) {
   setStepBits(stepBits);
   const std::size_t vertices = layout.vertexCount();
   bool allocated = hierarchy_.build(layout);
-  for (std::size_t i = 0; i <= layout.temporalLayers; ++i) {
-    Moment& moment = moments_[i];
-    allocated = allocated && moment.nodes.allocate(vertices + 1) && moment.records.allocate(vertices);
-    if (allocated) moment.nodes[vertices] = Node{};
-    if (i < layout.temporalLayers) ofLayer_[i] = i;
+  for (Moment* const moment : {&newest_, &made_}) {
+    allocated = allocated && moment->nodes.allocate(vertices + 1) && moment->records.allocate(vertices);
+    if (allocated) moment->nodes[vertices] = Node{};
   }
-  made_ = layout.temporalLayers;
   return allocated;
 }
 
-void Predictor::begin(bool key, std::uint8_t referenceLayer) {
+void Predictor::begin(bool key) {
   static constexpr Node kNoNode{};
   static constexpr Record kNoRecord{};
-  const Moment& past = moments_[ofLayer_[referenceLayer]];
   work_ = {.key = key,
            .fineBits = stepBits_ - 4,
            .stride = key ? 0u : 1u,
-           .pastNodes = key ? &kNoNode : past.nodes.data(),
-           .pastRecords = key ? &kNoRecord : past.records.data(),
+           .pastNodes = key ? &kNoNode : newest_.nodes.data(),
+           .pastRecords = key ? &kNoRecord : newest_.records.data(),
            .neighbours = hierarchy_.neighbours.data(),
-           .nodes = moments_[made_].nodes.data(),
-           .records = moments_[made_].records.data()};
+           .nodes = made_.nodes.data(),
+           .records = made_.records.data()};
 }
 
 FeatureVectors Predictor::features(std::uint32_t slot, const Prediction& p) const {
@@ -88,7 +84,7 @@ void Predictor::interpolate(std::uint32_t begin, std::uint32_t end) {
   }
 }
 
-void Predictor::keep(std::uint8_t layer, std::size_t slots) {
+void Predictor::keep(std::size_t slots) {
   const Work work = work_;
   const Node* nodes = work.nodes;
   const Nearest* const allNearest = hierarchy_.nearest.data();
@@ -105,8 +101,7 @@ void Predictor::keep(std::uint8_t layer, std::size_t slots) {
     const Int16x8 past = work.key ? present : Int16x8::load(record.curvatures).pairsSwapped();
     evenAndOdd(present, past).store(record.curvatures);
   }
-  newest_ = made_;
-  std::swap(made_, ofLayer_[layer]);
+  std::swap(newest_, made_);
 }
 
 }  // namespace clothstream::codec::hierarchical

@@ -96,8 +96,8 @@ class Predictor {
 
   const Hierarchy& hierarchy() const { return hierarchy_; }
 
-  // A predicted frame refers to the newest frame of `referenceLayer`.
-  void begin(bool key, std::uint8_t referenceLayer);
+  // A predicted frame refers to the newest frame that was kept.
+  void begin(bool key);
   // Predicts up to kChunk vertices, none of which is a parent of another or in its ring. `out` and `frames`
   // have room for a multiple of eight vertices.
   void predict(std::uint32_t begin, std::uint32_t count, const WeightVectors& weights, Prediction* out,
@@ -114,14 +114,13 @@ class Predictor {
              const std::array<Int32x4, 4>& positions, Int32x4 magnitudes);
   // Replaces predict() and place() for vertices without residuals: interpolates them from this frame alone.
   void interpolate(std::uint32_t begin, std::uint32_t end);
-  // Makes the frame the newest one of `layer`. Only the first `slots` slots are kept; nothing may refer to
-  // the others.
-  void keep(std::uint8_t layer, std::size_t slots);
-  void keep(std::uint8_t layer) { keep(layer, hierarchy_.vertexOf.size()); }
+  // Makes the frame the newest one. Only the first `slots` slots are kept; nothing may refer to the others.
+  void keep(std::size_t slots);
+  void keep() { keep(hierarchy_.vertexOf.size()); }
 
   // Nodes in coding order: of the newest frame that was kept; of the frame that is being made; and of its
   // reference (undefined in a key frame).
-  std::span<const Node> nodes() const { return {moments_[newest_].nodes.data(), hierarchy_.vertexOf.size()}; }
+  std::span<const Node> nodes() const { return {newest_.nodes.data(), hierarchy_.vertexOf.size()}; }
   std::span<const Node> made() const { return {work_.nodes, hierarchy_.vertexOf.size()}; }
   std::span<const Node> reference() const { return {work_.pastNodes, hierarchy_.vertexOf.size()}; }
 
@@ -158,10 +157,7 @@ class Predictor {
     Array<Node> nodes;
     Array<Record> records;
   };
-  // Moments of each layer's newest frame, and of the frame that is being made.
-  std::array<Moment, kMaxTemporalLayers + 1> moments_;
-  std::array<std::size_t, kMaxTemporalLayers> ofLayer_{};
-  std::size_t made_ = 0, newest_ = 0;
+  Moment newest_, made_;  // of the newest frame that was kept, and of the frame that is being made
   Work work_;
 };
 

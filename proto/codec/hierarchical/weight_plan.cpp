@@ -2,7 +2,7 @@
 // Plan of the weights that a frame predicts with.
 #include "proto/codec/hierarchical/weight_plan.h"
 
-#include <cassert>
+#include <utility>
 
 #include "proto/codec/zigzag.h"
 
@@ -16,31 +16,26 @@ constexpr std::uint32_t kFewVertices = 100;
 
 }  // namespace
 
-WeightPlan::WeightPlan(const Hierarchy& hierarchy, std::uint8_t layers, std::uint32_t lag)
-    : lag_(lag), layers_(layers), fitters_(layers), keyWeights_(keyFrameWeights()) {
-  assert(lag == 0 || layers == 1);
+WeightPlan::WeightPlan(const Hierarchy& hierarchy, std::uint32_t lag)
+    : lag_(lag), weights_(startingWeights()), keyWeights_(keyFrameWeights()) {
   for (const Phase& phase : hierarchy.phases) classSizes_[phase.weightClass] += phase.end - phase.begin;
-  kept_[0][0] = startingWeights();
   if (lag > 0) planned_.assign(lag + 1, {.weights = startingWeights(), .keyWeights = keyWeights_});
 }
 
-void WeightPlan::begin(const FrameRole& role) {
-  key_ = role.kind == PacketKind::key;
-  if (key_) beforeKey_ = kept_[0][0];
+void WeightPlan::begin(bool key) {
+  key_ = key;
+  if (key_) beforeKey_ = std::exchange(weights_, keyFrameWeights());
   sinceKey_ = key_ ? 0 : sinceKey_ + 1;
-  layer_ = role.layer;
-  weights_ = key_ ? LayerWeights{keyFrameWeights()} : kept_[role.referenceLayer];
-  used_ = weights_[layer_];
+  used_ = weights_;
 }
 
 void WeightPlan::retry() {
-  for (WeightFitter& fitter : fitters_) fitter.clear();
+  fitter_.clear();
 }
 
 bool WeightPlan::isDue(std::uint32_t sinceKey, bool quiet) const {
   if (sinceKey == 0) return true;
-  // With layers the base sends the weights of all layers, because it is never dropped.
-  const bool eager = layers_ == 1 && sinceKey <= lag_ + kEagerFrames;
+  const bool eager = sinceKey <= lag_ + kEagerFrames;
   return sinceKey > lag_ && !quiet && (eager || sinceKey % kWeightInterval == 0);
 }
 
@@ -58,43 +53,37 @@ std::size_t WeightPlan::write(bool atRest, std::byte* out) {
   }
   std::size_t bytes = 0;
   const Weights* const plan = lag_ > 0 ? planned(number_, sinceKey_) : nullptr;
-  if (lag_ > 0 ? plan != nullptr : layer_ == 0 && isDue(sinceKey_, quiet_)) {
+  if (lag_ > 0 ? plan != nullptr : isDue(sinceKey_, quiet_)) {
     BitWriter writer(out);
     writer.put(0, 1);
-    for (std::size_t of = 0; of < (key_ ? 1u : layers_); ++of)
-      writeChanges(of, lag_ > 0 ? *plan : next(of), writer);
+    // Motion after a key frame is expected to be like the motion before it.
+    writeChanges(lag_ > 0 ? *plan : sinceKey_ == 1 ? beforeKey_ : fitted(), writer);
     bytes = static_cast<std::size_t>(writer.finish() - out);
   }
-  used_ = weights_[layer_];
+  used_ = weights_;
   return bytes;
 }
 
-// Motion after a key frame is expected to be like the motion before it.
-Weights WeightPlan::next(std::size_t of) {
-  return sinceKey_ == 1 && layers_ == 1 ? beforeKey_ : fitted(of);
-}
-
-Weights WeightPlan::fitted(std::size_t of) {
-  Weights next = weights_[of];
-  fitters_[of].fit(next, key_);
+Weights WeightPlan::fitted() {
+  Weights next = weights_;
+  fitter_.fit(next, key_);
   for (std::size_t c = 0; c < kWeightClasses; ++c) {
     for (std::size_t f = 0; f < kFeatures; ++f) {
       const bool isFixed = key_ && (f < firstWeight(true) || f >= endWeight(true));
-      if (classSizes_[c] < kFewVertices || isFixed) next[c][f] = weights_[of][c][f];
+      if (classSizes_[c] < kFewVertices || isFixed) next[c][f] = weights_[c][f];
     }
   }
   return next;
 }
 
-void WeightPlan::writeChanges(std::size_t of, const Weights& next, BitWriter& writer) {
-  Weights& current = weights_[of];
+void WeightPlan::writeChanges(const Weights& next, BitWriter& writer) {
   for (std::size_t c = 0; c < kWeightClasses; ++c) {
-    const bool changes = next[c] != current[c];
+    const bool changes = next[c] != weights_[c];
     writer.put(changes ? 1 : 0, 1);
     if (!changes) continue;
     for (std::size_t f = firstWeight(key_); f < endWeight(key_); ++f)
-      writer.putGamma(zigzag(next[c][f] - current[c][f]), kWeightGammaBits);
-    current[c] = next[c];
+      writer.putGamma(zigzag(next[c][f] - weights_[c][f]), kWeightGammaBits);
+    weights_[c] = next[c];
   }
 }
 
@@ -102,22 +91,21 @@ void WeightPlan::end(bool quiet) {
   quiet_ = quiet;
   if (lag_ > 0) plan(quiet);
   if (key_) {
-    weights_.fill(startingWeights());
+    weights_ = startingWeights();
     retry();
   }
-  kept_[layer_] = weights_;
   ++number_;
 }
 
 void WeightPlan::plan(bool quiet) {
   if (key_) {
-    weights_[0] = keyFrameWeights();
-    keyWeights_ = fitted(0);
+    weights_ = keyFrameWeights();
+    keyWeights_ = fitted();
   }
   Planned& plan = planned_[(number_ + lag_) % planned_.size()];
   plan.keyWeights = keyWeights_;
   plan.isDue = !key_ && isDue(sinceKey_ + lag_, quiet);
-  plan.weights = plan.isDue ? fitted(0) : key_ ? beforeKey_ : weights_[0];
+  plan.weights = plan.isDue ? fitted() : key_ ? beforeKey_ : weights_;
 }
 
 }  // namespace clothstream::codec::hierarchical

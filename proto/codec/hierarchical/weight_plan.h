@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/codec/frame_role.h"
 #include "proto/codec/hierarchical/bits.h"
 #include "proto/codec/hierarchical/frame_coder.h"
 #include "proto/codec/hierarchical/weight_fitter.h"
@@ -18,14 +17,14 @@ namespace clothstream::codec::hierarchical {
 // Without a lag the weights of a frame are fitted to everything that was added before; those of a key frame
 // to everything added between retry() and write(). With a lag they are fitted to the frames that are at least
 // `lag` frames older, and those of a key frame to the last such key frame. A caller that prepares frames
-// ahead then knows the weights before the frames in between are coded. A lag requires one temporal layer.
+// ahead then knows the weights before the frames in between are coded.
 class WeightPlan {
  public:
-  WeightPlan(const Hierarchy& hierarchy, std::uint8_t layers, std::uint32_t lag);
+  WeightPlan(const Hierarchy& hierarchy, std::uint32_t lag);
 
-  static constexpr std::size_t kMaxBytes = kMaxTemporalLayers * kWeightClasses * kFeatures * 4;
+  static constexpr std::size_t kMaxBytes = kWeightClasses * kFeatures * 4;
 
-  void begin(const FrameRole& role);
+  void begin(bool key);
   // True if a key frame is attempted once before it is coded. Only without a lag.
   bool attempts() const { return lag_ == 0; }
   void retry();
@@ -33,9 +32,7 @@ class WeightPlan {
   // weights that the frame predicts with. A frame at rest leaves the weights that it started with.
   std::size_t write(bool atRest, std::byte* out);
   const Weights& used() const { return used_; }
-  void add(std::uint32_t weightClass, const ChunkProducts& products) {
-    fitters_[layer_].add(weightClass, products);
-  }
+  void add(std::uint32_t weightClass, const ChunkProducts& products) { fitter_.add(weightClass, products); }
   // `quiet`: the frame had no residuals.
   void end(bool quiet);
 
@@ -51,23 +48,19 @@ class WeightPlan {
   };
 
   bool isDue(std::uint32_t sinceKey, bool quiet) const;
-  void writeChanges(std::size_t of, const Weights& next, BitWriter& writer);
-  Weights next(std::size_t of);
-  Weights fitted(std::size_t of);
+  void writeChanges(const Weights& next, BitWriter& writer);
+  Weights fitted();
   void plan(bool quiet);
 
   std::uint32_t lag_;
-  std::uint8_t layers_;
   std::array<std::uint32_t, kWeightClasses + 1> classSizes_{};
-  std::vector<WeightFitter> fitters_;                    // indexed by layer
-  std::array<LayerWeights, kMaxTemporalLayers> kept_{};  // left by the newest frame of each layer
-  Weights beforeKey_{};                                  // left by the frame before the key frame
-  LayerWeights weights_{};                               // left by this frame
-  Weights used_{};                                       // used in this frame
-  std::uint64_t number_ = 0;                             // number of this frame
+  WeightFitter fitter_;
+  Weights beforeKey_{};       // left by the frame before the key frame
+  Weights weights_;           // left by this frame
+  Weights used_{};            // used in this frame
+  std::uint64_t number_ = 0;  // number of this frame
   std::uint32_t sinceKey_ = 0;
   bool key_ = true, quiet_ = false;
-  std::uint8_t layer_ = 0;
   Weights keyWeights_;
   std::vector<Planned> planned_;  // indexed by number modulo the size
 };

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Suite codec: the codec on the CPU over motions that it was not fitted to, also with temporal layers, with
-// normals, and for a square grid as a mesh.
-#include <array>
+// Suite codec: the codec on the CPU over motions that it was not fitted to, also with normals, and for a
+// square grid as a mesh.
 #include <functional>
 #include <vector>
 
@@ -44,14 +43,6 @@ nlohmann::ordered_json measure(const std::string& motion, const codec::StreamLay
   return measurement.row(motion);
 }
 
-struct Variant {
-  std::uint8_t temporalLayers;
-  codec::NormalMode normals;
-};
-constexpr std::array kVariants{Variant{1, codec::NormalMode::none}, Variant{2, codec::NormalMode::none},
-                               Variant{3, codec::NormalMode::none},
-                               Variant{1, codec::NormalMode::octahedral}};
-
 }  // namespace
 
 Rows runCodec(vulkan::Device& device, const Settings& settings) {
@@ -60,9 +51,8 @@ Rows runCodec(vulkan::Device& device, const Settings& settings) {
     const Frames frames(motion);
     const auto ofTheGrid = [&](std::size_t frame) { return frames[frame]; };
     codec::StreamLayout layout{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
-    for (const Variant& variant : kVariants) {
-      layout.temporalLayers = variant.temporalLayers;
-      layout.normals = variant.normals;
+    for (const auto normals : {codec::NormalMode::none, codec::NormalMode::octahedral}) {
+      layout.normals = normals;
       rows.push_back(measure(motion.name, layout, frames.count(), ofTheGrid));
     }
     if (settings.encoderThreads > 1) {

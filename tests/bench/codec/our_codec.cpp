@@ -17,7 +17,6 @@ OurCodec::OurCodec(const codec::StreamLayout& layout, codec::Workers* workers)
 
 std::string OurCodec::name() const {
   std::string name = fmt::format("codec {}", layout_.codec);
-  if (layout_.temporalLayers > 1) name += fmt::format(", {} layers", layout_.temporalLayers);
   if (hasWorkers_) name += ", several threads";
   if (layout_.normals != codec::NormalMode::none) name += ", with normals";
   return name;

@@ -21,9 +21,8 @@ class Decoder:
         self.count = sum(cloth["vertexCount"] for cloth in stream["cloths"])
         self.max_error, self.qualities = stream["maxError"], stream.get("qualities", 1)
         self.origin = [float32(x) for x in stream.get("origin", (0, 0, 0))]
-        self.layers = stream.get("temporalLayers", 1)
         self.has_normals = stream["normals"] == "octahedral"
-        self.held = {}  # the newest frame of each layer, by layer
+        self.newest = None
         self.history = []  # reference of the current frame, reference of that frame, and so on
 
     def set_quality(self, quality):
@@ -36,40 +35,35 @@ class Decoder:
             self.k -= 1
         self.unit = float32(unit(self.k))
 
-    def read_weights(self, section, key, layer):
-        """The weights that the frame uses, and by layer the weights that it leaves."""
+    def read_weights(self, section, key):
+        """The weights that the frame uses, and those that it leaves."""
         alone = lambda f, w: [[w if i == f and c < 6 else 0 for i in range(16)] for c in range(7)]
-        if key:
-            left = [alone(7, -192)] * 3
-        else:
-            left = self.history[0]["weights"]
-        left = [[row[:] for row in weights] for weights in left]
-        used = left[layer]
+        left = alone(7, -192) if key else [row[:] for row in self.history[0]["weights"]]
+        used = left
         if section:
             bits = Bits(section)
             if bits.get(1):
                 used = [[0] * 16] * 7
             else:
-                for weights in left[layer:1 if key else self.layers]:
-                    for c in range(6):
-                        if bits.get(1):
-                            for f in (6, 7) if key else range(16):
-                                weights[c][f] += unzigzag(bits.gamma(4))
-                                assert abs(weights[c][f]) <= 2047
+                for weights in left[:6]:
+                    if bits.get(1):
+                        for f in (6, 7) if key else range(16):
+                            weights[f] += unzigzag(bits.gamma(4))
+                            assert abs(weights[f]) <= 2047
             bits.check_end()
-        return used, [alone(2, 700)] * 3 if key else left
+        return used, alone(2, 700) if key else left
 
     def decode(self, packet):
-        key, layer, tick, reference, sections, quality = packet
+        key, tick, reference, sections, quality = packet
         if self.coarse:
             sections = [b"" if i in (2, 4) else section for i, section in enumerate(sections)]
         self.history = []
         if not key:
-            at = next(frame for frame in self.held.values() if frame["tick"] == reference)
-            assert at["layer"] <= layer < self.layers and at["quality"] == quality
+            at = self.newest
+            assert at["tick"] == reference and at["quality"] == quality
             self.history = [at, at["history"][0], at["history"][1]]
         self.set_quality(quality)
-        weights, left = self.read_weights(sections[0], key, layer)
+        weights, left = self.read_weights(sections[0], key)
         symbols, bits = Symbols(sections[1] + sections[2]), Bits(sections[3] + sections[4])
         if not self.coarse:
             reach("a packet with symbols of %s coarse vertices and %s others" % (
@@ -105,9 +99,8 @@ class Decoder:
         for _, phase in phases[len(decoded):]:
             for v in phase:
                 now["R"][v] = self.guess(now, v)
-        now.update(tick=tick, layer=layer, weights=left, quality=quality)
+        now.update(tick=tick, weights=left, quality=quality)
         now["history"] = self.history[:2] or [now, now]
-        self.held = {layer: now} if key else {**self.held, layer: now}
         self.newest = now
 
     def check_coarse(self, sections, symbols, bits):
@@ -306,7 +299,7 @@ def area_of(corners):
 
 
 def parse(packet):
-    """Kind, layer, tick, reference, sections and quality."""
+    """Kind, tick, reference, sections and quality."""
     at = 5
 
     def byte():
@@ -323,7 +316,7 @@ def parse(packet):
             if b < 128:
                 return value
 
-    assert packet[0] == 1 and packet[1] == 2
+    assert packet[0] == 1 and packet[1] == 2 and packet[4] == 0
     varint()  # epoch
     tick = varint()
     references = [tick - varint() for _ in range(byte())]
@@ -335,4 +328,4 @@ def parse(packet):
     for size in sizes:
         sections.append(packet[at:at + size])
         at += size
-    return packet[2] == 0, packet[4], tick, references[0] if references else None, sections, packet[3]
+    return packet[2] == 0, tick, references[0] if references else None, sections, packet[3]

@@ -151,7 +151,7 @@ void Program::call(const CoreInput::Call& call) {
       static_cast<void>(cs_connect_at(client()));
       return cs_follow_redirects(client(), index % 2 == 1 ? 1 : 0);
     case 3:
-      return cs_want(client(), index, static_cast<std::uint32_t>(call.numbers_size()));
+      return cs_want(client(), index);
     case 4:
       return cs_list_scenes(client());
     case 5: {
@@ -470,8 +470,8 @@ void Program::readNumbers() {
   cs_pairing_code code;
   if (cs_get_pairing_code(client(), &code) != 0) expectText(code.code);
   expectText(cs_token(client()));
-  std::uint32_t quality = 0, layers = 0;
-  cs_get_operating_point(client(), &quality, &layers);
+  std::uint32_t quality = 0;
+  cs_get_quality(client(), &quality);
   require(std::isfinite(cs_stream_seconds(client())), "the time of the stream is finite");
   require(cs_frame_divisor(client()) >= 1, "frames have a divisor");
   cs_collider played;

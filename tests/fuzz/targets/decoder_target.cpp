@@ -25,7 +25,6 @@ codec::StreamLayout layoutOf(const DecoderInput::Layout& message) {
   layout.codec = static_cast<std::uint8_t>(message.codec());
   layout.maxError = message.max_error();
   layout.normals = message.normals() == 0 ? codec::NormalMode::none : codec::NormalMode::octahedral;
-  layout.temporalLayers = static_cast<std::uint8_t>(message.temporal_layers());
   layout.qualities = static_cast<std::uint8_t>(message.qualities());
   for (const DecoderInput::Cloth& cloth : message.cloths())
     layout.cloths.push_back({cloth.vertex_count(),

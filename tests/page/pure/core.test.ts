@@ -115,7 +115,6 @@ async function connect(resumeToken = "", follows = true): Promise<Connection> {
       proof: { token: "" },
       resumeToken,
       quality: 0,
-      temporalLayers: 0,
       pageOrigin: performance.timeOrigin,
       shares: false,
     },

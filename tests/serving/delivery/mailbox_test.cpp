@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "proto/codec/temporal_layers.h"
 
 namespace clothstream::delivery {
 namespace {
@@ -378,30 +377,9 @@ TEST_F(MailboxTest, LimitsHeldBytes) {
   EXPECT_EQ(metrics.framesDropped.value(), 5u);
 }
 
-TEST_F(MailboxTest, DropsTheHighestLayerFirstAndBreaksNoReference) {
-  shape.layers = 3;
-  join();
-  // Ticks from 1 have the layers 0 2 1 2. A mailbox without a reader holds three frames.
-  const auto layered = [&](std::uint64_t tick) {
-    PublishedFrame made = frame(tick, tick == 1);
-    made.layer = codec::layerOf(tick - 1, 3);
-    made.referenceTick = made.layer == 0 ? tick - 4 : made.layer == 1 ? tick - 2 : tick - 1;
-    return made;
-  };
-  std::vector<PublishedFrame> frames;
-  for (std::uint64_t tick = 1; tick <= 4; ++tick) mailbox.deliver(frames.emplace_back(layered(tick)));
-  // Frame 4 is dropped because it has the highest layer. Frame 5 has the base layer and displaces frame 2.
-  mailbox.deliver(frames.emplace_back(layered(5)));
-  EXPECT_EQ(metrics.framesDropped.value(), 2u);
-  EXPECT_EQ(taken(frames), (Ticks{1, 3}));
-  ASSERT_TRUE(mailbox.acknowledge(3, now));
-  EXPECT_EQ(taken(frames), Ticks{5});
-  EXPECT_FALSE(wantsKeyFrame());
-}
-
-TEST_F(MailboxTest, SendsTheRequestedLayersAndQualityAndReportsThem) {
-  shape = {.rate = 72, .layers = 3, .qualities = 2};
-  mailbox.subscribe(nullptr, shape, metrics, {.quality = 1, .layers = 1});
+TEST_F(MailboxTest, SendsTheRequestedQualityAndReportsIt) {
+  shape = {.rate = 72, .qualities = 2};
+  mailbox.subscribe(nullptr, shape, metrics, 1);
   EXPECT_FALSE(mailbox.next(now));
   EXPECT_EQ(mailbox.requested(now).keyFrames, 0b10);
   mailbox.deliver(frame(1, true));  // quality 0
@@ -413,20 +391,14 @@ TEST_F(MailboxTest, SendsTheRequestedLayersAndQualityAndReportsThem) {
   const auto first = mailbox.next(now);
   ASSERT_TRUE(first && parsed.ParseFromArray((*first)->data(), static_cast<int>((*first)->size())));
   EXPECT_EQ(parsed.operating_point().quality(), 1u);
-  EXPECT_EQ(parsed.operating_point().temporal_layers(), 1u);
   EXPECT_EQ(mailbox.next(now), wanted.message);
-  PublishedFrame upper = frame(3);
-  upper.quality = upper.layer = 1;
-  mailbox.deliver(upper);
-  EXPECT_FALSE(mailbox.next(now));
-  EXPECT_EQ(metrics.framesThinned.value(), 1u);
   const RequestedFrames requested = mailbox.requested(now);
   EXPECT_EQ(requested.qualities, 0b10);
   EXPECT_EQ(requested.keyFrames, 0);
 }
 
 TEST_F(MailboxTest, SendsNoTickInTwoQualities) {
-  shape = {.rate = 72, .layers = 1, .qualities = 2};
+  shape = {.rate = 72, .qualities = 2};
   mailbox.subscribe(nullptr, shape, metrics);
   EXPECT_FALSE(mailbox.next(now));
   const std::vector<PublishedFrame> fine{frame(1, true), frame(2), frame(3), frame(4)};

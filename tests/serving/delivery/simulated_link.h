@@ -16,7 +16,7 @@
 
 #include "clients/core/stream/frame_feedback.h"
 #include "clothstream/v1/session.pb.h"
-#include "proto/codec/temporal_layers.h"
+#include "proto/codec/stream_layout.h"
 #include "server/delivery/mailbox.h"
 
 namespace clothstream::delivery {
@@ -28,9 +28,8 @@ using schedule::seconds;
 // gets a frame that it cannot decode.
 class SimulatedLink {
  public:
-  SimulatedLink(const StreamShape& shape, OperatingPoint wanted, Clock::time_point now)
-      : given{0, shape.layers}, arrived_(given) {
-    mailbox->subscribe(nullptr, shape, metrics, wanted);
+  SimulatedLink(const StreamShape& shape, std::uint8_t finest, Clock::time_point now) {
+    mailbox->subscribe(nullptr, shape, metrics, finest);
     EXPECT_FALSE(mailbox->next(now));
   }
 
@@ -42,7 +41,7 @@ class SimulatedLink {
     const double carried = bytesPerSecond * seconds(time);
     budget_ = std::min(budget_ + carried, carried + kBurst);
     while (const auto message = mailbox->next(now)) {
-      if (const auto point = pointIn(*message)) given = *point;
+      if (const auto quality = qualityIn(*message)) given = *quality;
       queue_.push_back(*message);
     }
     while (!queue_.empty() && static_cast<double>(queue_.front()->size()) <= budget_) {
@@ -58,7 +57,7 @@ class SimulatedLink {
 
   struct Arrived {
     std::uint64_t tick;
-    std::uint8_t quality, layer;
+    std::uint8_t quality;
     Clock::duration age;
   };
 
@@ -67,7 +66,7 @@ class SimulatedLink {
   telemetry::SceneMetrics metrics;
   const std::shared_ptr<Mailbox> mailbox = std::make_shared<Mailbox>([] {});
   std::vector<Arrived> arrived;
-  OperatingPoint given;  // newest point that the mailbox sent; it may still be on the link
+  std::uint8_t given = 0;  // newest quality that the mailbox announced; it may still be on the link
 
  private:
   static constexpr double kBurst = 2000;  // bytes that an idle link takes at once
@@ -80,19 +79,18 @@ class SimulatedLink {
     std::uint64_t tick;
   };
 
-  // Operating point of a message; nullopt for a frame.
-  std::optional<OperatingPoint> pointIn(const SharedBytes& message) const {
+  // Quality that a message announces; nullopt for a frame.
+  std::optional<std::uint8_t> qualityIn(const SharedBytes& message) const {
     if (published_.contains(message.get())) return std::nullopt;
     v1::ServerMessage parsed;
     EXPECT_TRUE(parsed.ParseFromArray(message->data(), static_cast<int>(message->size())));
     EXPECT_TRUE(parsed.has_operating_point());
-    return OperatingPoint{static_cast<std::uint8_t>(parsed.operating_point().quality()),
-                          static_cast<std::uint8_t>(parsed.operating_point().temporal_layers())};
+    return static_cast<std::uint8_t>(parsed.operating_point().quality());
   }
 
   void arrive(const SharedBytes& message, Clock::time_point now) {
-    if (const auto point = pointIn(message)) {
-      arrived_ = *point;
+    if (const auto quality = qualityIn(message)) {
+      quality_ = *quality;
       return;
     }
     const PublishedFrame& frame = published_.at(message.get());
@@ -100,31 +98,25 @@ class SimulatedLink {
     if (!arrived.empty()) {
       ASSERT_GT(frame.tick, arrived.back().tick);
     }
-    if (frame.key) {
-      decoded_.clear();
-    } else {
-      ASSERT_EQ(frame.quality, quality_) << "tick " << frame.tick;
-      ASSERT_TRUE(decoded_.find(frame.referenceTick)) << "tick " << frame.tick;
+    if (!frame.key) {
+      ASSERT_FALSE(arrived.empty());
+      ASSERT_EQ(frame.quality, arrived.back().quality) << "tick " << frame.tick;
+      ASSERT_EQ(frame.referenceTick, arrived.back().tick) << "tick " << frame.tick;
     }
-    ASSERT_EQ(frame.quality, arrived_.quality) << "tick " << frame.tick;
-    ASSERT_LT(frame.layer, arrived_.layers) << "tick " << frame.tick;
-    quality_ = frame.quality;
-    decoded_.hold(frame.layer, frame.tick);
-    arrived.push_back({frame.tick, frame.quality, frame.layer, now - frame.complete});
+    ASSERT_EQ(frame.quality, quality_) << "tick " << frame.tick;
+    arrived.push_back({frame.tick, frame.quality, now - frame.complete});
     if (acknowledgement_.due(static_cast<std::uint64_t>(1e6 * seconds(now.time_since_epoch()))))
       acks_.push_back({now + latency, frame.tick});
   }
 
-  OperatingPoint arrived_;
   double budget_ = 0;
   std::deque<SharedBytes> queue_;
   std::deque<Arriving> arriving_;
   std::deque<Ack> acks_;
   // Indexed by the address of the message, which is unique because the messages are kept.
   std::map<const void*, PublishedFrame> published_;
-  codec::HeldFrames decoded_;
   client::Acknowledgement acknowledgement_;
-  std::uint8_t quality_ = 0;
+  std::uint8_t quality_ = 0;  // newest quality that was announced
 };
 
 // Encodes the requested frames, as SceneHost does.
@@ -135,8 +127,8 @@ class SimulatedScene {
 
   explicit SimulatedScene(const StreamShape& shape) : shape_(shape) {}
 
-  SimulatedLink& join(OperatingPoint wanted = {0, codec::kMaxTemporalLayers}) {
-    return *links_.emplace_back(std::make_unique<SimulatedLink>(shape_, wanted, now));
+  SimulatedLink& join(std::uint8_t finest = 0) {
+    return *links_.emplace_back(std::make_unique<SimulatedLink>(shape_, finest, now));
   }
   // Bytes of all frames in the finest quality.
   double fullRate() const { return static_cast<double>(kFrameBytes) * shape_.rate; }
@@ -161,8 +153,6 @@ class SimulatedScene {
   static constexpr std::chrono::milliseconds kStep{1}, kKeyFrameInterval{100};
   struct Encoder {
     bool alive = false;
-    std::uint64_t sinceKey = 0;
-    codec::HeldFrames held;
     Clock::time_point lastKey{};
   };
 
@@ -180,21 +170,14 @@ class SimulatedScene {
       encoder.alive = wanted;
       if (!wanted) continue;
       ++encoded[quality];
-      if (key) {
-        encoder.sinceKey = 0;
-        encoder.held.clear();
-        encoder.lastKey = now;
-      }
-      const std::uint8_t layer = codec::layerOf(encoder.sinceKey++, shape_.layers);
+      if (key) encoder.lastKey = now;
       const PublishedFrame frame{
           .message = std::make_shared<std::vector<std::byte>>(static_cast<std::size_t>(bytes)),
           .tick = tick_,
           .key = key,
-          .referenceTick = key ? 0 : *encoder.held.tick(encoder.held.referenceOf(layer)),
+          .referenceTick = key ? 0 : tick_ - 1,
           .quality = quality,
-          .layer = layer,
           .complete = now};
-      encoder.held.hold(layer, tick_);
       for (const auto& link : links_) link->deliver(frame);
     }
   }

@@ -47,7 +47,7 @@ class QualitySubscriber {
         })),
         decoder_(codec::Decoder::make(encode::streamLayout(hosted.live.start(), LiveScene::kEpoch))) {
     hosted.live.subscribers.add(mailbox_);
-    mailbox_->subscribe(nullptr, hosted.live.shape(), hosted.live.metrics, {quality, 1});
+    mailbox_->subscribe(nullptr, hosted.live.shape(), hosted.live.metrics, quality);
     take();
   }
   ~QualitySubscriber() { hosted_.live.subscribers.remove(*mailbox_); }

@@ -442,12 +442,11 @@ TEST_F(JoinTest, FullSceneAndFullServerRefuseWithTheReason) {
   fifth.join();
 }
 
-// A server with a scene whose stream has two temporal layers and three qualities.
+// A server with a scene whose stream has three qualities.
 class QualityTest : public ::testing::Test {
  protected:
   void SetUp() override {
     model::Scene scene = tests::smallScene();
-    scene.stream.temporalLayers = 2;
     scene.stream.qualities = 3;
     ServerOptions options;
     options.defaultScene = "small";
@@ -457,10 +456,9 @@ class QualityTest : public ::testing::Test {
       GTEST_SKIP() << error.what();
     }
   }
-  static v1::Hello wanting(std::uint32_t quality, std::optional<std::uint32_t> layer = {}) {
+  static v1::Hello wanting(std::uint32_t quality) {
     v1::Hello hello;
     hello.set_quality(quality);
-    if (layer) hello.set_temporal_layer(*layer);
     return hello;
   }
   telemetry::SceneMetrics& metrics() { return server->state().scenes.front()->metrics; }
@@ -476,7 +474,6 @@ TEST_F(QualityTest, EachPeerGetsTheRequestedQuality) {
   for (int i = 0; i < 10; ++i)
     for (TestPeer* peer : {&fine, &coarse, &coarser}) peer->readFrames(1);
   EXPECT_EQ(fine.description().qualities(), 3u);
-  EXPECT_EQ(fine.description().temporal_layers(), 2u);
   std::uint8_t quality = 0;
   for (const TestPeer* peer : {&fine, &coarse, &coarser}) {
     EXPECT_EQ(peer->frames().front().quality, quality);
@@ -486,22 +483,12 @@ TEST_F(QualityTest, EachPeerGetsTheRequestedQuality) {
   }
 }
 
-TEST_F(QualityTest, OmitsLayersThatAreNotRequested) {
+TEST_F(QualityTest, RefusesQualityOutOfRange) {
   TestPeer peer(*server);
-  peer.hello(wanting(0, 0));
-  peer.readFrames(10);
-  for (const SeenFrame& frame : peer.frames()) EXPECT_EQ(frame.layer, 0);
-  EXPECT_GE(metrics().framesThinned.value(), 5u);
-}
-
-TEST_F(QualityTest, RefusesQualityAndLayersOutOfRange) {
-  TestPeer quality(*server), layer(*server);
-  quality.hello(wanting(4));
-  const v1::Error error = quality.readToTheEnd().error();
+  peer.hello(wanting(4));
+  const v1::Error error = peer.readToTheEnd().error();
   EXPECT_EQ(error.code(), v1::ERROR_CODE_INVALID_ARGUMENT);
   EXPECT_THAT(error.text(), HasSubstr("hello.quality = 4"));
-  layer.hello(wanting(0, 3));
-  EXPECT_THAT(layer.readToTheEnd().error().text(), HasSubstr("hello.temporalLayer = 3"));
 }
 
 TEST_F(QualityTest, UnacknowledgedFramesLowerTheQualityUntilAcknowledged) {
@@ -518,9 +505,8 @@ TEST_F(QualityTest, UnacknowledgedFramesLowerTheQualityUntilAcknowledged) {
   slow.send(ack);
   slow.readUntil([&](const v1::ServerMessage&) { return slow.frames().back().quality == 2; });
   slow.readUntil([&](const v1::ServerMessage&) { return slow.frames().back().quality == 0; });
-  slow.readUntil([&](const v1::ServerMessage&) { return slow.frames().back().layer == 1; });
   EXPECT_GE(metrics().stepsDown.value(), 1u);
-  EXPECT_GE(metrics().stepsUp.value(), 3u);
+  EXPECT_GE(metrics().stepsUp.value(), 2u);
 }
 
 TEST_F(JoinTest, StoppingServerNotifiesAllPeers) {

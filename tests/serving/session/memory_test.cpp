@@ -31,7 +31,6 @@ model::Scene largeScene() {
   cloth.structural = cloth.shear = cloth.bend = {0.05f, 0};
   cloth.pins.clear();
   scene.substeps = 2;
-  scene.stream.temporalLayers = 3;
   // One quality, because the encoders of further qualities would be counted as well.
   scene.stream.qualities = 1;
   return scene;

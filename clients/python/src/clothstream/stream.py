@@ -29,7 +29,7 @@ _ROLES = {"viewer": Role.VIEWER, "participant": Role.PARTICIPANT, "owner": Role.
 
 
 def join(address: str, scene: str = "", *, role: str | Role = "", name: str = "", token: str = "", ca_file: str = "",
-         fingerprint: str = "", quality: int = 0, temporal_layers: int = 0, timeout: float = 10.0,
+         fingerprint: str = "", quality: int = 0, timeout: float = 10.0,
          reconnect_for: float = 60.0) -> Stream:
     """Joins a scene, and returns when its description has arrived. Use the result in a `with` statement.
 
@@ -37,7 +37,7 @@ def join(address: str, scene: str = "", *, role: str | Role = "", name: str = ""
     scene: "" means the server's default scene. role: "viewer", "participant" or "owner"; "" lets the server choose.
     name: what other participants see. token: proof of identity, sent to other machines only with TLS.
     ca_file, fingerprint: with TLS, a PEM file of authorities, or the fingerprint of the server's key.
-    quality: best quality level, 0 (finest) to 3. temporal_layers: 1 to 3; 0 means all.
+    quality: best quality level, 0 (finest) to 3.
     timeout, reconnect_for: seconds to join, and to try to reconnect after a loss.
 
     Raises ValueError if an argument is not allowed, and ConnectionFailed."""
@@ -49,7 +49,7 @@ def join(address: str, scene: str = "", *, role: str | Role = "", name: str = ""
     options.scene, options.display_name, options.token, options.ca_file, options.fingerprint = kept
     options.client_name = b"clothstream Python"
     options.role = _ROLES[role.lower()] if isinstance(role, str) else role
-    options.quality, options.temporal_layers = quality, temporal_layers
+    options.quality = quality
     options.join_timeout_ms, options.reconnect_for_ms = max(1, round(1000 * timeout)), round(1000 * reconnect_for)
     handle = c.c_void_p()
     result = lib.clothstream_open(address.encode(), c.byref(options), c.byref(handle))

@@ -50,7 +50,7 @@ namespace ClothStream.Core
                 throw new ArgumentException("A fingerprint needs TLS; use wss://" + address + ".");
             fixed (byte* scene = Utf8.Bytes(options.Scene), program = Utf8.Bytes(options.ClientName), name = Utf8.Bytes(options.DisplayName))
                 core = Native.cs_create_as(scene, program, name, (uint)options.Role);
-            Native.cs_want(Handle, options.Quality, options.TemporalLayers);
+            Native.cs_want(Handle, options.Quality);
             fixed (byte* token = Utf8.Bytes(options.Token), code = Utf8.Bytes(options.PairingCode), resume = Utf8.Bytes(options.ResumeToken))
             {
                 if (!string.IsNullOrEmpty(options.Token)) Native.cs_set_token(Handle, token);

@@ -23,7 +23,5 @@ namespace ClothStream.Core
         public string ResumeToken = "";
         /// <summary>Best quality level, 0 (finest) to 3.</summary>
         public uint Quality;
-        /// <summary>1 to 3; 0 means all.</summary>
-        public uint TemporalLayers;
     }
 }

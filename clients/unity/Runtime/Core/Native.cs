@@ -476,7 +476,7 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern IntPtr cs_create(byte* scene, byte* clientName);
         [DllImport(Library)] public static extern IntPtr cs_create_as(byte* scene, byte* clientName, byte* displayName, uint role);
         [DllImport(Library)] public static extern void cs_destroy(IntPtr client);
-        [DllImport(Library)] public static extern void cs_want(IntPtr client, uint quality, uint temporalLayers);
+        [DllImport(Library)] public static extern void cs_want(IntPtr client, uint quality);
         [DllImport(Library)] public static extern void cs_set_token(IntPtr client, byte* token);
         [DllImport(Library)] public static extern void cs_set_pairing_code(IntPtr client, byte* code);
         [DllImport(Library)] public static extern int cs_renew_token(IntPtr client, byte* token);
@@ -603,7 +603,7 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern void cs_set_speed(IntPtr client, double speed);
         [DllImport(Library)] public static extern void cs_set_loop(IntPtr client, int loop);
         [DllImport(Library)] public static extern void cs_get_statistics(IntPtr client, ulong nowUs, Statistics* @out);
-        [DllImport(Library)] public static extern int cs_get_operating_point(IntPtr client, uint* quality, uint* temporalLayers);
+        [DllImport(Library)] public static extern int cs_get_quality(IntPtr client, uint* quality);
         [DllImport(Library)] public static extern double cs_stream_seconds(IntPtr client);
         [DllImport(Library)] public static extern int cs_get_stage_statistics(IntPtr client, StageStatistics* @out);
         [DllImport(Library)] public static extern int cs_get_cloth_report(IntPtr client, uint index, ClothReport* @out);

@@ -97,10 +97,9 @@ export class Client {
     return this.core.text(this.core.exports.cs_resume_token(this.handle.pointer));
   }
 
-  // Limits what the server sends from the next connection on: best quality, 0 (finest) to 3, and temporal layers, 1 to 3
-  // or 0 for all.
-  want(quality: number, temporalLayers: number): void {
-    this.core.exports.cs_want(this.handle.pointer, quality, temporalLayers);
+  // Best quality that the server sends from the next connection on, 0 (finest) to 3.
+  want(quality: number): void {
+    this.core.exports.cs_want(this.handle.pointer, quality);
   }
 
   // Handles one ServerMessage that arrived at a time (microseconds). Returns ClientEvent bits.

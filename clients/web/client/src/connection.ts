@@ -40,7 +40,7 @@ export class Connection {
   ) {
     this.clockOffsetMs = performance.timeOrigin - options.pageOrigin;
     this.client = new Client(core, "whole", options.scene, options.program, options.identity);
-    this.client.want(options.quality, options.temporalLayers);
+    this.client.want(options.quality);
     if ("code" in options.proof) this.client.setPairingCode(options.proof.code);
     else this.client.setToken(options.proof.token);
     this.client.setResumeToken(options.resumeToken);

@@ -51,7 +51,6 @@ export interface SessionOptions {
   // For the place in the scene while the page reloads. Default: after a reload, one joins as a new participant.
   places?: TokenStore;
   quality?: number; // best quality wanted, 0 (finest, the default) to 3
-  temporalLayers?: number; // 1 to 3; 0, the default: all
   // Addresses of the package's own files, where a bundler does not find them.
   wasmUrl?: string | URL;
   makeWorker?: () => Worker;
@@ -168,7 +167,7 @@ export class Session {
   }
 
   private begin(scene: string, proof: Proof, resumeToken = ""): Client {
-    const { url, program = "", identity = { name: "", role: 0 }, quality = 0, temporalLayers = 0 } = this.options;
+    const { url, program = "", identity = { name: "", role: 0 }, quality = 0 } = this.options;
     this.scene = scene;
     this.ring = undefined;
     const client = new Client(this.core, "mirror", scene, program, identity);
@@ -191,7 +190,6 @@ export class Session {
       proof,
       resumeToken,
       quality,
-      temporalLayers,
       pageOrigin: performance.timeOrigin,
       shares: globalThis.crossOriginIsolated,
     });

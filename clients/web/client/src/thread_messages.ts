@@ -20,7 +20,6 @@ export interface Start {
   proof: Proof;
   resumeToken: string;
   quality: number;
-  temporalLayers: number;
   pageOrigin: number; // performance.timeOrigin of the page
   shares: boolean; // whether frames go through shared memory
 }

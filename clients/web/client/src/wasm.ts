@@ -31,7 +31,7 @@ export interface CoreExports {
   cs_receive_decoded(mirror: Pointer, message: Pointer, bytes: number, decoded: Pointer, nowUs: bigint): number;
   cs_sends_normals(client: Pointer): number;
   cs_reconstruction_hash(client: Pointer): bigint;
-  cs_want(client: Pointer, quality: number, temporalLayers: number): void;
+  cs_want(client: Pointer, quality: number): void;
   cs_get_role(client: Pointer): number;
   cs_set_role(client: Pointer, participant: bigint, role: number): void;
   cs_remove_participant(client: Pointer, participant: bigint): void;

@@ -225,10 +225,10 @@ function late(longestMs: number): Failure {
     kind: "late",
     title: "Frames arrive late",
     text:
-      "The cloth may stop and jump. Go closer to the Wi-Fi, or choose a lower quality or frame rate.",
+      "The cloth may stop and jump. Go closer to the Wi-Fi, or choose a lower quality.",
     wait: `The longest pause was ${(longestMs / 1000).toFixed(1)} s.`,
     quiet: true,
-    actions: [{ label: "Quality and frame rate", action: "view" }],
+    actions: [{ label: "Quality", action: "view" }],
   };
 }
 

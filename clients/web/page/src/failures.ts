@@ -13,7 +13,7 @@ export interface FailuresListener {
   // Joins the scene of the address again, or the default scene.
   join(): void;
   joinDefault(): void;
-  // Shows the choices of quality and frame rate.
+  // Shows the choices of quality.
   viewWanted(): void;
   changed(failure: Failure | undefined): void;
 }

@@ -5,7 +5,6 @@ import { Roles, type Session } from "@clothstream/client";
 import type { Doing, Mode, PanelButton, PanelRow } from "@clothstream/three";
 import { drawHud, kHudHeight, kHudWidth, type HudTheme } from "./panel/hud_drawing";
 import type { Panel } from "./panel/panel";
-import type { Limit } from "./panel/limits";
 
 const kTabs = ["Scenes", "People", "Quality", "Figures"] as const;
 const kOnePage = 7; // rows of a list
@@ -76,9 +75,7 @@ export class HeadsetPanel {
       case "Quality":
         return [
           { text: "Best quality of your stream" },
-          this.limit("quality"),
-          { text: "Its frame rate" },
-          this.limit("layers"),
+          this.qualities(),
           { text: "A change joins the scene again." },
         ];
       case "Figures":
@@ -137,14 +134,13 @@ export class HeadsetPanel {
     return [...rows.slice(first, first + most - 1), { text: `${this.page + 1} of ${pages}`, buttons: [turn("Back", -1), turn("More", 1)] }];
   }
 
-  private limit(limit: Limit): PanelRow {
-    const { limits } = this.panel;
-    const chosen = limits.value(limit);
+  private qualities(): PanelRow {
+    const { quality } = this.panel;
     return {
-      buttons: limits.choices(limit).map((choice) => ({
-        text: choice.text,
-        isChosen: choice.value === chosen,
-        action: () => limits.choose(limit, choice.value),
+      buttons: quality.choices.map(({ text, value }) => ({
+        text,
+        isChosen: value === quality.value,
+        action: () => quality.choose(value),
       })),
     };
   }

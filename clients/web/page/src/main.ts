@@ -99,8 +99,7 @@ async function start(): Promise<void> {
     program: "clothstream page",
     tokens: browserTokens,
     places: tabPlaces,
-    quality: limit("quality", 3),
-    temporalLayers: limit("layers", 3),
+    quality: qualityOfAddress(),
     listener,
   };
   const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset(), said: (text) => headset.say(text) });
@@ -138,12 +137,6 @@ async function start(): Promise<void> {
   );
   listenToKeys(view, drag, panel.controls);
 
-  // Number of the query, 0 to `most`. Returns 0 without a valid one.
-  function limit(name: string, most: number): number {
-    const value = Number(query.get(name));
-    return Number.isInteger(value) && value >= 0 && value <= most ? value : 0;
-  }
-
   function chooseScene(name: string): void {
     const url = new URL(window.location.href);
     if (name) url.searchParams.set("scene", name);
@@ -166,7 +159,7 @@ async function start(): Promise<void> {
   function takePause(client: Client | undefined): number {
     if (!client || panel.isPaused(client)) session.gaps.restart();
     const pauseMs = session.gaps.take(performance.now());
-    if (client) failures.sample(pauseMs, intervalOf(client, options.temporalLayers ?? 0));
+    if (client) failures.sample(pauseMs, intervalOf(client));
     return pauseMs;
   }
   // A hidden page draws nothing, and its frames may wait.
@@ -224,10 +217,15 @@ function sceneOfAddress(): string {
   return new URLSearchParams(window.location.search).get("scene") ?? "";
 }
 
-// Usual time between frames, ms. Fewer temporal layers halve the rate once each.
-function intervalOf({ frames }: Client, temporalLayers: number): number {
-  const skipped = temporalLayers === 0 ? 1 : 2 ** Math.max(0, 3 - temporalLayers);
-  return (1000 * frames.divisor * skipped) / Math.max(1, frames.streamRate);
+// 0, the finest, without a valid one.
+function qualityOfAddress(): number {
+  const value = Number(new URLSearchParams(window.location.search).get("quality"));
+  return Number.isInteger(value) && value >= 0 && value <= 3 ? value : 0;
+}
+
+// Usual time between frames, ms.
+function intervalOf({ frames }: Client): number {
+  return (1000 * frames.divisor) / Math.max(1, frames.streamRate);
 }
 
 // Time at which the frame will be seen. A headset may predict it.

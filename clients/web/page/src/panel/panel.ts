@@ -7,8 +7,8 @@ import { ClothPanel } from "./cloth";
 import { Create } from "./create";
 import { element, write } from "./dom";
 import { HudPanel } from "./hud_panel";
-import { Limits } from "./limits";
 import { People } from "./people";
+import { QualityChoice } from "./quality_choice";
 import { Requests } from "./requests";
 import { Scenes } from "./scenes";
 import { Tabs, type Tab } from "./tabs";
@@ -26,7 +26,7 @@ export class Panel {
   readonly controls = new Controls();
   readonly hud = new HudPanel();
   private readonly cloth = new ClothPanel();
-  readonly limits: Limits;
+  readonly quality: QualityChoice;
   readonly scenes: Scenes;
   private readonly requests: Requests;
   private readonly people: People;
@@ -47,7 +47,7 @@ export class Panel {
       listWanted: () => this.wantList(),
       said: (text) => listener.said(text),
     });
-    this.limits = new Limits(options, () => listener.sceneChosen(session().client.sceneName));
+    this.quality = new QualityChoice(options, () => listener.sceneChosen(session().client.sceneName));
     this.people = new People(this.requests, session);
     this.create = new Create(this.requests, (scene, repairs) => this.scenes.made(scene, repairs));
     this.tabs = new Tabs((tab) => this.shown(tab));
@@ -119,7 +119,7 @@ export class Panel {
     return this.scenes.isPaused || client.playback.state()?.paused === true;
   }
 
-  // Opens the tab View at the choices of quality and frame rate.
+  // Opens the tab View at the choices of quality.
   showView(): void {
     this.tabs.open(true);
     this.tabs.select("view");
