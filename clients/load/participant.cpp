@@ -198,17 +198,11 @@ void Participant::count(const codec::PacketHeader& header, std::uint32_t frameDi
           std::max(cs_simulation_rate(core_.get()) / std::max(cs_stream_rate(core_.get()), 1u), 1u)} *
       std::max(frameDivisor_, frameDivisor);
   frameDivisor_ = frameDivisor;
-  if (frames_ > 0) {
-    const std::uint64_t before = ticks_[(frames_ - 1) % ticks_.size()];
-    if (header.tick > before)
-      figures_.dropped += std::max<std::uint64_t>((header.tick - before) / perFrame, 1) - 1;
-  }
-  if (!options_.decodes) {
-    for (std::size_t i = 0; i < header.referenceCount; ++i)
-      if (std::find(ticks_.begin(), ticks_.end(), header.references[i]) == ticks_.end())
-        ++figures_.decodeErrors;
-  }
-  ticks_[frames_++ % ticks_.size()] = header.tick;
+  if (newestTick_ && header.tick > *newestTick_)
+    figures_.dropped += std::max<std::uint64_t>((header.tick - *newestTick_) / perFrame, 1) - 1;
+  if (!options_.decodes && header.referenceCount > 0 && header.references[0] != newestTick_)
+    ++figures_.decodeErrors;
+  newestTick_ = header.tick;
   ++figures_.frames;
 }
 

@@ -2,7 +2,6 @@
 // A participant that moves a sphere and measures the frames it receives.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -87,11 +86,9 @@ class Participant final : private LinkListener {
   Figures figures_;
   std::uint64_t decodeErrorsTaken_ = 0, hashMismatchesTaken_ = 0;
   PoseTiming poseTiming_;
-  std::uint64_t decodedTickUs_ = 0;  // start of the newest decoded tick, server's clock; 0: none
-  // Newest ticks, a ring indexed by frame number. Frames can only refer to these.
-  std::array<std::uint64_t, 64> ticks_{};
-  std::uint64_t frames_ = 0;
-  std::uint32_t frameDivisor_ = 1;  // of the newest frame
+  std::uint64_t decodedTickUs_ = 0;          // start of the newest decoded tick, server's clock; 0: none
+  std::optional<std::uint64_t> newestTick_;  // of the frames, to which the next one refers
+  std::uint32_t frameDivisor_ = 1;           // of the newest frame
   Clock::time_point readsAgainAt_{};
   bool readLater_ = false;
   std::optional<Failure> ended_;

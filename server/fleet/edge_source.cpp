@@ -108,8 +108,7 @@ void EdgeSource::keep(const delivery::PublishedFrame& frame) {
     kept = {frame};
     return;
   }
-  const bool follows =
-      std::ranges::find(kept, frame.referenceTick, &delivery::PublishedFrame::tick) != kept.end();
+  const bool follows = !kept.empty() && kept.back().tick == frame.referenceTick;
   if (follows && kept.size() < delivery::Mailbox::kMaxHeld)
     kept.push_back(frame);
   else
