@@ -25,7 +25,8 @@ Extent extentOf(const Cloth& cloth) {
 }
 
 Vec3 originOf(const Extent& extent) {
-  return kOriginStep * ((extent.low / 2 + extent.high / 2) / kOriginStep).array().round().matrix();
+  const Vec3 steps = ((extent.low / 2 + extent.high / 2) / kOriginStep).array().round();
+  return kOriginStep * steps + Vec3::Zero();  // without -0
 }
 
 }  // namespace

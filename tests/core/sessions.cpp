@@ -101,6 +101,10 @@ Session goldenSession(const std::string& name) {
     description.set_stream_rate(72);
     description.set_max_error(stream.layout.maxError);
     description.set_qualities(stream.layout.qualities);
+    const auto& [x, y, z] = stream.layout.origin;
+    description.mutable_origin()->set_x(x);
+    description.mutable_origin()->set_y(y);
+    description.mutable_origin()->set_z(z);
     description.set_normals(stream.layout.normals == codec::NormalMode::none ? v1::NORMALS_NONE
                                                                              : v1::NORMALS_OCTAHEDRAL);
     for (const codec::ClothLayout& layout : stream.layout.cloths) {

@@ -600,7 +600,7 @@ const BadScene kBadScenes[] = {
        s.mutable_cloths(1)->mutable_grid()->mutable_pose()->mutable_position()->set_x(728);
      },
      "must be within 514.2 m, which is what a stream with a maxError of 0.0005 m holds: place the cloths nearer "
-     "to one another, or set stream.maxError to 0.000584 or more"},
+     "to one another, or set stream.maxError to 0.000585 or more"},
     {"substeps = 10: no number up to 256",
      [](v1::Scene& s) {
        cloth(s).mutable_bend()->set_stiffness(1e6f);
@@ -713,9 +713,12 @@ INSTANTIATE_TEST_SUITE_P(All, ToSceneRefuses, testing::ValuesIn(kBadScenes),
 
 TEST(ToScene, AcceptsTheMaximumErrorThatItRequested) {
   v1::Scene message = smallScene();
-  grid(message).mutable_pose()->mutable_position()->set_x(800);
+  *message.add_cloths() = message.cloths(0);
+  message.mutable_cloths(1)->set_name("far");
+  grid(message).mutable_pose()->mutable_position()->set_x(-472);
+  message.mutable_cloths(1)->mutable_grid()->mutable_pose()->mutable_position()->set_x(728);
   ASSERT_FALSE(toScene(message));
-  message.mutable_stream()->set_max_error(0.000778f);
+  message.mutable_stream()->set_max_error(0.000585f);
   const Result<model::Scene> scene = toScene(message);
   EXPECT_TRUE(scene) << scene.error().text;
 }
