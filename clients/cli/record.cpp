@@ -52,7 +52,7 @@ class StreamFile {
     if (message_.has_welcome()) welcome_ = message_.welcome();
     if (message_.has_chunk()) return take(message_.chunk());
     if (!writer_) return;
-    // A message without a frame has an empty packet, which no packet can be.
+    // A message without a frame has no bytes here, which parsePacket() refuses.
     const auto packet = codec::parsePacket(std::as_bytes(std::span(message_.frame().packet())));
     if (fullQuality_ && packet && packet->header.quality > 0) coarse_ = true;
     if (coarse_) return;

@@ -10,7 +10,7 @@ struct Extent {
   Vec3 low, high;
 };
 
-// Of the start positions.
+// Box of the start positions of a cloth.
 Extent extentOf(const Cloth& cloth) {
   if (cloth.mesh) return {cloth.mesh->low, cloth.mesh->high};
   Grid corners = cloth.grid;
