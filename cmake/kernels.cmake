@@ -1,5 +1,5 @@
 # clothstream_add_kernels(TARGET file.comp...): compiles each GLSL kernel to SPIR-V, validates it, and embeds it as
-#   #include "kernels/<name>.h"   inline constexpr std::uint32_t clothstream::kernels::<name>[]
+#   #include "kernels/<name>.h"   inline constexpr vulkan::KernelCode clothstream::kernels::<name>
 # Kernels include files by their path from the project's root, or relative to their folder.
 find_program(GLSLANG glslangValidator REQUIRED)
 find_program(SPIRV_VAL spirv-val REQUIRED)

@@ -24,7 +24,6 @@ namespace {
 using codec::hierarchical::FitSchedule;
 using codec::hierarchical::Phase;
 using codec::hierarchical::Weights;
-using vulkan::BindingKind;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 
@@ -45,17 +44,6 @@ constexpr std::size_t kScaleWords = sizeof codec::hierarchical::kScaleWeights / 
 
 constexpr std::size_t momentBytes(std::size_t vertices) {
   return (vertices + 1 + shared::kRecordRows * vertices) * sizeof(Row);
-}
-
-vulkan::KernelDescription describe(const char* name, std::span<const std::uint32_t> spirv, bool readsTexels,
-                                   std::size_t bindings, std::uint32_t workgroupSize = kWorkgroupSize) {
-  std::vector<BindingKind> kinds(bindings, BindingKind::storage);
-  if (readsTexels) kinds[0] = BindingKind::texels;
-  return {.name = name,
-          .spirv = spirv,
-          .bindings = std::move(kinds),
-          .pushConstantBytes = sizeof(shared::PredictPush),
-          .workgroupSize = workgroupSize};
 }
 
 // Packs ten bits each; the weights are within twice a whole.
@@ -95,13 +83,12 @@ DevicePredictor::DevicePredictor(const vulkan::Device& device, const simulation:
       vertices_(layout.vertexCount()),
       hasNormals_(layout.normals == codec::NormalMode::octahedral),
       unit_(codec::hierarchical::latticeUnit(layout.maxError)),
-      quantise_(device, describe("quantise_slots", kernels::quantise_slots, true, 5)),
-      predictPhase_(device, describe("predict_phase", kernels::predict_phase, false, 10)),
-      predictSmallPhases_(device, describe("predict_small_phases", kernels::predict_small_phases, false, 10,
-                                           smallPhasesWorkgroupSize(device))),
-      sumProducts_(device, describe("sum_products", kernels::sum_products, false, 9)),
-      predictNormals_(device, describe("predict_normals", kernels::predict_normals, true, 6)),
-      finish_(device, describe("finish_records", kernels::finish_records, false, 7)) {
+      quantise_(device, kernels::quantise_slots, kWorkgroupSize),
+      predictPhase_(device, kernels::predict_phase, kWorkgroupSize),
+      predictSmallPhases_(device, kernels::predict_small_phases, smallPhasesWorkgroupSize(device)),
+      sumProducts_(device, kernels::sum_products, kWorkgroupSize),
+      predictNormals_(device, kernels::predict_normals, kWorkgroupSize),
+      finish_(device, kernels::finish_records, kWorkgroupSize) {
   if (!supports(device, layout))
     throw std::runtime_error("frames with very many vertices are predicted on the host");
   if (!hierarchy_.build(layout)) throw std::bad_alloc();

@@ -13,13 +13,10 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::BindingKind;
 using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 using vulkan::Kernel;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 constexpr std::uint32_t kMarked = CLOTHSTREAM_MARKED_SPRINGS;
 
@@ -37,36 +34,20 @@ std::uint32_t firstSpringOf(const shared::SystemRecord& system) {
   return shared::wholeNumber(system.firstSpringLow, system.firstSpringHigh);
 }
 
-std::unique_ptr<Kernel> makeKernel(const vulkan::Device& device, const SolveGroup& group,
-                                   std::uint32_t workgroupSize) {
-  const char* name = group.stretched ? "mark_stretched" : (group.mesh ? "mark_meshes" : "mark_grids");
-  std::span<const std::uint32_t> spirv = kernels::mark_grids;
-  std::vector<BindingKind> bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage};
-  if (group.stretched) {
-    spirv = kernels::mark_stretched;
-    bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage};
-  } else if (group.mesh) {
-    spirv = kernels::mark_meshes;
-    bindings = {kTexels, kTexels, kTexels, kTexels, kStorage};
-  }
-  return std::make_unique<Kernel>(
-      device,
-      vulkan::KernelDescription{.name = name,
-                                .spirv = spirv,
-                                .bindings = bindings,
-                                .pushConstantBytes = sizeof(shared::MarkPush),
-                                .workgroupSize = workgroupSize,
-                                .specialisation = {0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u, 1u}});
-}
-
-Bindings bindingsOf(const vulkan::Device& device, const SolveGroup& group, const Kernel& kernel,
-                    const ActiveSprings::Buffers& b, const Buffer& marks) {
+Bindings bind(const vulkan::Device& device, const SolveGroup& group, const ActiveSprings::Buffers& b,
+              const Buffer& marks, std::uint32_t workgroupSize) {
+  const auto kernel = [&](const vulkan::KernelCode& code) {
+    return Kernel(device, code, workgroupSize, {0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u, 1u});
+  };
   if (group.stretched)
-    return Bindings(device, kernel,
+    return Bindings(device, kernel(kernels::mark_stretched),
                     {&b.cloths, &b.systems, &b.chunks, &b.vectors, &b.stretched->springs(),
                      &b.stretched->lists(), &b.solves, &marks});
-  if (group.mesh) return Bindings(device, kernel, {&b.cloths, &b.systems, &b.chunks, &b.rows, &marks});
-  return Bindings(device, kernel, {&b.cloths, &b.systems, &b.chunks, &b.along, &b.solves, &marks});
+  if (group.mesh)
+    return Bindings(device, kernel(kernels::mark_meshes),
+                    {&b.cloths, &b.systems, &b.chunks, &b.rows, &marks});
+  return Bindings(device, kernel(kernels::mark_grids),
+                  {&b.cloths, &b.systems, &b.chunks, &b.along, &b.solves, &marks});
 }
 
 }  // namespace
@@ -115,9 +96,7 @@ ActiveSprings::ActiveSprings(const vulkan::Device& device, ActiveTables tables, 
         system.columns = static_cast<std::int64_t>(record->columns);
       }
     }
-    std::unique_ptr<Kernel> kernel = makeKernel(device, on, workgroupSize_);
-    Bindings bindings = bindingsOf(device, on, *kernel, buffers, marks_);
-    groups_.push_back({on, firstMark, std::move(kernel), std::move(bindings)});
+    groups_.push_back({on, firstMark, bind(device, on, buffers, marks_, workgroupSize_)});
     firstMark += marksOf(on);
   }
   std::ranges::sort(systems_, {}, &System::cloth);

@@ -51,7 +51,6 @@ class ActiveSprings {
   struct Group {
     SolveGroup on;
     std::uint32_t firstMark = 0;  // of its springs, if its cloths are meshes
-    std::unique_ptr<vulkan::Kernel> kernel;
     vulkan::Bindings bindings;
   };
 

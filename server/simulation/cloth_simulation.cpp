@@ -34,7 +34,7 @@
 #include "server/simulation/runge_kutta_stage.h"
 #include "server/simulation/self_collision/self_collision_stage.h"
 #include "server/simulation/solve_stage.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_memory.h"
 #include "server/simulation/texel.h"
 #include "server/simulation/xpbd_stage.h"
@@ -44,7 +44,6 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::BindingKind;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 
@@ -125,16 +124,10 @@ AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airD
           follow == Follow::paper};
 }
 
-Stage makeHash(const vulkan::Device& device, const Buffers& b, std::uint32_t workgroupSize) {
-  return Stage(device,
-               {.name = "hash_state",
-                .spirv = kernels::hash_state,
-                .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::storage},
-                .pushConstantBytes = sizeof(shared::HashPush),
-                .workgroupSize = workgroupSize,
-                .specialisation = {}},
-               {&b.state.positions[0], &b.state.velocities[0], &b.status},
-               {&b.state.positions[1], &b.state.velocities[1], &b.status});
+StateBindings bindHash(const vulkan::Device& device, const Buffers& b, std::uint32_t workgroupSize) {
+  return bindStates(device, {device, kernels::hash_state, workgroupSize}, [&](std::size_t from) {
+    return BufferList{&b.state.positions[from], &b.state.velocities[from], &b.status};
+  });
 }
 
 }  // namespace
@@ -194,7 +187,7 @@ struct ClothSimulation::Pipeline {
   SolidTables solidTables;
   CollisionStage collision;
   GridStage grids;
-  Stage hash;
+  StateBindings hash;
   std::unique_ptr<MeshStage> meshes;            // null if no cloth is a mesh
   std::unique_ptr<RungeKuttaStage> rungeKutta;  // null for other integrators
   SolveStage solves;
@@ -254,7 +247,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
             {.rowsPerInvocation = options.rowsPerInvocation,
              .workgroupSize = workgroupSize,
              .advanceKernel = options.advanceKernel}),
-      hash(makeHash(on, buffers, workgroupSize)),
+      hash(bindHash(on, buffers, workgroupSize)),
       solves(on, stateOf(buffers, collision), options.workgroupSize, options.solveWholeNodes),
       stiffness(springStiffness(scene.cloths)),
       asked(options) {
@@ -558,7 +551,7 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
 void ClothSimulation::Pipeline::recordStatus(vulkan::Recorder& recorder) {
   recorder.beginStage("hash");
   recorder.barrier();
-  recorder.dispatch(hash.from[present], shared::HashPush{vectorOf(origin), nodes, reach},
+  recorder.dispatch(hash[present], shared::HashPush{vectorOf(origin), nodes, reach},
                     hashInvocations(device, nodes));
   if (motionBound)
     motionBound->recordDepths(recorder, present, collision.push(substeps - 1, substeps, tickRate));

@@ -17,6 +17,7 @@
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
+#include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::simulation {
@@ -61,8 +62,8 @@ struct SimulationOptions {
   // Nodes of the largest cloth whose linear system one workgroup solves. Absent: the measured best for the
   // device.
   std::optional<std::uint32_t> solveWholeNodes = {};
-  // Another build of the kernel advance_mass_spring, for comparisons. Empty: the regular one.
-  std::span<const std::uint32_t> advanceKernel = {};
+  // Another build of the kernel advance_mass_spring, for comparisons. Null: the regular one.
+  const vulkan::KernelCode* advanceKernel = nullptr;
 };
 
 // Lists the cloths for which a simulation lacks stages.

@@ -9,8 +9,6 @@
 
 namespace clothstream::simulation {
 
-using vulkan::BindingKind;
-
 // On software devices every load costs time, so that an invocation handles several rows. On GPUs every idle
 // lane costs time (vulkan::KernelSettings).
 GridStage::Cut GridStage::cutGrids(const vulkan::Device& device, std::span<const model::Cloth> cloths,
@@ -31,40 +29,29 @@ GridStage::GridStage(const vulkan::Device& device, std::span<const model::Cloth>
     : device_(device),
       state_(state),
       integrator_(integrator),
-      advanceSpirv_(options.advanceKernel.empty()
-                        ? std::span<const std::uint32_t>(kernels::advance_mass_spring)
-                        : options.advanceKernel),
+      advanceCode_(options.advanceKernel == nullptr ? kernels::advance_mass_spring : *options.advanceKernel),
       cut_(cutGrids(device, cloths, options)),
       tiles_(device, cut_.tiles.records),
       normals_(
-          device,
-          {.name = "compute_normals",
-           .spirv = kernels::compute_normals,
-           .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::storage},
-           .workgroupSize = cut_.workgroupSize,
-           .specialisation = {cut_.rowsPerInvocation}},
-          {&state.cloths, &tiles_.texels(), state.positions[0], &normals},
-          {&state.cloths, &tiles_.texels(), state.positions[1], &normals}) {}
+          bindStates(device, {device, kernels::compute_normals, cut_.workgroupSize, {cut_.rowsPerInvocation}},
+                     [&](std::size_t from) {
+                       return BufferList{&state.cloths, &tiles_.texels(), state.positions[from], &normals};
+                     })) {}
 
-const Stage& GridStage::advance(const AdvanceVariant& variant) {
-  std::unique_ptr<Stage>& made = advances_[variant.index()];
+const StateBindings& GridStage::advance(const AdvanceVariant& variant) {
+  std::optional<StateBindings>& made = advances_[variant.index()];
   if (made) return *made;
   const StateBuffers& s = state_;
-  made = std::make_unique<Stage>(
-      device_,
-      vulkan::KernelDescription{
-          .name = "advance_mass_spring",
-          .spirv = advanceSpirv_,
-          .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                       BindingKind::storage, BindingKind::storage, BindingKind::texels, BindingKind::texels,
-                       BindingKind::storage, BindingKind::storage},
-          .pushConstantBytes = sizeof(shared::AdvancePush),
-          .workgroupSize = cut_.workgroupSize,
-          .specialisation = variant.specialisation(cut_.rowsPerInvocation, integrator_)},
-      Stage::Buffers{&s.cloths, &tiles_.texels(), s.positions[0], s.velocities[0], s.positions[1],
-                     s.velocities[1], &s.colliders, &s.nearColliders, &s.contactImpulses, &s.stretches},
-      Stage::Buffers{&s.cloths, &tiles_.texels(), s.positions[1], s.velocities[1], s.positions[0],
-                     s.velocities[0], &s.colliders, &s.nearColliders, &s.contactImpulses, &s.stretches});
+  made = bindStates(device_,
+                    {device_, advanceCode_, cut_.workgroupSize,
+                     variant.specialisation(cut_.rowsPerInvocation, integrator_)},
+                    [&](std::size_t from) {
+                      const std::size_t to = 1 - from;
+                      return BufferList{&s.cloths,          &tiles_.texels(), s.positions[from],
+                                        s.velocities[from], s.positions[to],  s.velocities[to],
+                                        &s.colliders,       &s.nearColliders, &s.contactImpulses,
+                                        &s.stretches};
+                    });
   return *made;
 }
 
@@ -82,13 +69,13 @@ void GridStage::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, co
   const TileRange tiles = cut_.tiles.ranges.of(follow);
   push.firstTile = tiles.first;
   if (tiles.count > 0)
-    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * cut_.workgroupSize,
+    recorder.dispatch(advance(variant)[from], push, std::uint64_t{tiles.count} * cut_.workgroupSize,
                       std::uint64_t{cut_.rowsPerInvocation} * push.collision.nodeWork);
 }
 
 void GridStage::recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const {
   const std::uint64_t tiles = cut_.tiles.records.size();
-  if (tiles > 0) recorder.dispatch(normals_.from[present], tiles * cut_.workgroupSize);
+  if (tiles > 0) recorder.dispatch(normals_[present], tiles * cut_.workgroupSize);
 }
 
 }  // namespace clothstream::simulation

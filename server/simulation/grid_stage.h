@@ -4,13 +4,13 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <span>
 
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/scene_tables.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
@@ -22,7 +22,7 @@ namespace clothstream::simulation {
 struct GridOptions {
   std::uint32_t rowsPerInvocation = 0;
   std::uint32_t workgroupSize = 64;  // at most the limit of the device
-  std::span<const std::uint32_t> advanceKernel = {};
+  const vulkan::KernelCode* advanceKernel = nullptr;
 };
 
 // Belongs to the device's thread. Accesses the nodes of grids only; there may be none.
@@ -53,16 +53,16 @@ class GridStage {
   };
   static Cut cutGrids(const vulkan::Device& device, std::span<const model::Cloth> cloths,
                       const GridOptions& options);
-  const Stage& advance(const AdvanceVariant& variant);
+  const StateBindings& advance(const AdvanceVariant& variant);
 
   const vulkan::Device& device_;
   StateBuffers state_;
   model::Integrator integrator_;
-  std::span<const std::uint32_t> advanceSpirv_;
+  const vulkan::KernelCode& advanceCode_;
   Cut cut_;
   DeviceTable tiles_;
-  std::array<std::unique_ptr<Stage>, AdvanceVariant::kCount> advances_;  // created at their first use
-  Stage normals_;
+  std::array<std::optional<StateBindings>, AdvanceVariant::kCount> advances_;  // made at their first use
+  StateBindings normals_;
 };
 
 }  // namespace clothstream::simulation

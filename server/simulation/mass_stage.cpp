@@ -9,15 +9,17 @@
 
 namespace clothstream::simulation {
 
-using vulkan::BindingKind;
+namespace {
+
+constexpr std::uint32_t kWorkgroup = 64;
+
+}  // namespace
 
 MassStage::MassStage(const vulkan::Device& device, std::uint32_t nodes,
                      const std::array<const vulkan::Buffer*, kStates>& positions)
     : nodes_(nodes),
       upload_(device, vulkan::BufferPurpose::upload, nodes * sizeof(float)),
-      kernel_(device, {.name = "set_masses",
-                       .spirv = kernels::set_masses,
-                       .bindings = {BindingKind::storage, BindingKind::storage}}),
+      kernel_(device, kernels::set_masses, kWorkgroup),
       bindings_{vulkan::Bindings(device, kernel_, {&upload_, positions[0]}),
                 vulkan::Bindings(device, kernel_, {&upload_, positions[1]}),
                 vulkan::Bindings(device, kernel_, {&upload_, positions[2]})} {}

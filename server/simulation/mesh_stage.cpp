@@ -7,10 +7,6 @@
 
 namespace clothstream::simulation {
 
-using vulkan::BindingKind;
-using vulkan::Bindings;
-using vulkan::Kernel;
-
 namespace {
 
 // Work of a node of a mesh (vulkan::Recorder::dispatch).
@@ -29,41 +25,24 @@ MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, con
       nodes_(device, tables.nodes),
       springEnds_(device, tables.springEnds),
       corners_(device, tables.corners),
-      normals_(device, {.name = "compute_mesh_normals",
-                        .spirv = kernels::compute_mesh_normals,
-                        .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                                     BindingKind::storage, BindingKind::texels, BindingKind::texels},
-                        .workgroupSize = workgroupSize}),
-      normalsOf_{Bindings(device, normals_,
-                          {&state.cloths, &tiles_.texels(), state.positions[0], &normals, &nodes_.texels(),
-                           &corners_.texels()}),
-                 Bindings(device, normals_,
-                          {&state.cloths, &tiles_.texels(), state.positions[1], &normals, &nodes_.texels(),
-                           &corners_.texels()})} {}
+      normals_(
+          bindStates(device, {device, kernels::compute_mesh_normals, workgroupSize}, [&](std::size_t from) {
+            return BufferList{&state.cloths, &tiles_.texels(), state.positions[from],
+                              &normals,      &nodes_.texels(), &corners_.texels()};
+          })) {}
 
-vulkan::Bindings MeshStage::advanceFrom(const Kernel& kernel, std::size_t from) const {
-  const std::size_t to = 1 - from;
-  return Bindings(device_, kernel,
-                  {&state_.cloths, &tiles_.texels(), state_.positions[from], state_.velocities[from],
-                   state_.positions[to], state_.velocities[to], &state_.colliders, &state_.nearColliders,
-                   &state_.contactImpulses, &nodes_.texels(), &corners_.texels(), &springEnds_.texels()});
-}
-
-MeshStage::Advance::Advance(const MeshStage& stage, const AdvanceVariant& variant)
-    : kernel(stage.device_, {.name = "advance_mesh",
-                             .spirv = kernels::advance_mesh,
-                             .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                                          BindingKind::texels, BindingKind::storage, BindingKind::storage,
-                                          BindingKind::texels, BindingKind::texels, BindingKind::storage,
-                                          BindingKind::texels, BindingKind::texels, BindingKind::texels},
-                             .pushConstantBytes = sizeof(shared::AdvancePush),
-                             .workgroupSize = stage.workgroupSize_,
-                             .specialisation = variant.specialisation(1, stage.integrator_)}),
-      from{stage.advanceFrom(kernel, 0), stage.advanceFrom(kernel, 1)} {}
-
-const MeshStage::Advance& MeshStage::advance(const AdvanceVariant& variant) {
-  std::unique_ptr<Advance>& made = advances_[variant.index()];
-  if (!made) made = std::make_unique<Advance>(*this, variant);
+const StateBindings& MeshStage::advance(const AdvanceVariant& variant) {
+  std::optional<StateBindings>& made = advances_[variant.index()];
+  if (made) return *made;
+  const StateBuffers& s = state_;
+  made = bindStates(
+      device_, {device_, kernels::advance_mesh, workgroupSize_, variant.specialisation(1, integrator_)},
+      [&](std::size_t from) {
+        const std::size_t to = 1 - from;
+        return BufferList{&s.cloths,          &tiles_.texels(), s.positions[from],  s.velocities[from],
+                          s.positions[to],    s.velocities[to], &s.colliders,       &s.nearColliders,
+                          &s.contactImpulses, &nodes_.texels(), &corners_.texels(), &springEnds_.texels()};
+      });
   return *made;
 }
 
@@ -81,12 +60,12 @@ void MeshStage::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, co
   const TileRange tiles = tileRanges_.of(follow);
   push.firstTile = tiles.first;
   if (tiles.count > 0)
-    recorder.dispatch(advance(variant).from[from], push, std::uint64_t{tiles.count} * workgroupSize_,
+    recorder.dispatch(advance(variant)[from], push, std::uint64_t{tiles.count} * workgroupSize_,
                       kMeshWork * push.collision.nodeWork);
 }
 
 void MeshStage::recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const {
-  recorder.dispatch(normalsOf_[present], std::uint64_t{tileRanges_.count()} * workgroupSize_);
+  recorder.dispatch(normals_[present], std::uint64_t{tileRanges_.count()} * workgroupSize_);
 }
 
 }  // namespace clothstream::simulation

@@ -4,17 +4,17 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <vector>
 
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/mesh_tables.h"
 #include "server/simulation/report_stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
-#include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::simulation {
@@ -43,17 +43,7 @@ class MeshStage {
   }
 
  private:
-  struct Advance {
-    Advance(const MeshStage& stage, const AdvanceVariant& variant);
-    Advance(const Advance&) = delete;
-    Advance& operator=(const Advance&) = delete;
-
-    vulkan::Kernel kernel;
-    std::array<vulkan::Bindings, 2> from;  // they refer to the kernel
-  };
-
-  const Advance& advance(const AdvanceVariant& variant);
-  vulkan::Bindings advanceFrom(const vulkan::Kernel& kernel, std::size_t from) const;
+  const StateBindings& advance(const AdvanceVariant& variant);
 
   const vulkan::Device& device_;
   StateBuffers state_;
@@ -61,9 +51,8 @@ class MeshStage {
   std::uint32_t workgroupSize_;
   TileRanges tileRanges_;
   DeviceTable tiles_, nodes_, springEnds_, corners_;
-  std::array<std::unique_ptr<Advance>, AdvanceVariant::kCount> advances_;
-  vulkan::Kernel normals_;
-  std::array<vulkan::Bindings, 2> normalsOf_;
+  std::array<std::optional<StateBindings>, AdvanceVariant::kCount> advances_;  // made at their first use
+  StateBindings normals_;
 };
 
 }  // namespace clothstream::simulation

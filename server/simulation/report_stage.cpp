@@ -18,11 +18,8 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 // Work of a node and a mesh, with a search that is not bounded (vulkan::Recorder::dispatch).
 constexpr std::uint64_t kSolidDepthWork = 100;
@@ -93,56 +90,31 @@ ReportStage::ReportStage(const vulkan::Device& device, ReportBlocks blocks, cons
               of_.cloths.size() * shared::kReportCounts * sizeof(std::uint32_t)),
       readback_(device, BufferPurpose::readback, sums_.bytes() + counts_.bytes()),
       clothUploads_{uploadOf(device, of_.cloths), uploadOf(device, of_.cloths)},
-      measure_(device, {.name = "measure_cloths",
-                        .spirv = kernels::measure_cloths,
-                        .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
-                                     kStorage},
-                        .pushConstantBytes = sizeof(shared::MeasurePush),
-                        .workgroupSize = workgroupSize,
-                        .specialisation = {}}),
-      penetrations_(device, {.name = "measure_penetrations",
-                             .spirv = kernels::measure_penetrations,
-                             .bindings = {kTexels, kTexels, kTexels, kStorage, kTexels, kTexels},
-                             .pushConstantBytes = sizeof(shared::PenetrationPush),
-                             .workgroupSize = workgroupSize,
-                             .specialisation = {}}),
-      addUp_(device, {.name = "add_up_cloths",
-                      .spirv = kernels::add_up_cloths,
-                      .bindings = {kTexels, kStorage, kStorage},
-                      .workgroupSize = workgroupSize,
-                      .specialisation = {}}),
-      measureIn_{measureIn(device, state, meshes, 0), measureIn(device, state, meshes, 1)},
-      penetrationsIn_{penetrationsIn(device, state, 0), penetrationsIn(device, state, 1)},
-      addUpAll_(device, addUp_, {&cloths_, &runs_, &sums_}) {
+      measure_(bindStates(device, {device, kernels::measure_cloths, workgroupSize},
+                          [&](std::size_t present) {
+                            return BufferList{&state.cloths,
+                                              &blocks_,
+                                              &cloths_,
+                                              state.positions[present],
+                                              state.velocities[present],
+                                              meshes.nodes != nullptr ? meshes.nodes : &blocks_,
+                                              meshes.ends != nullptr ? meshes.ends : &blocks_,
+                                              &runs_,
+                                              &counts_};
+                          })),
+      penetrations_(bindStates(device, {device, kernels::measure_penetrations, workgroupSize},
+                               [&](std::size_t present) {
+                                 return BufferList{&state.cloths, &blocks_,         state.positions[present],
+                                                   &counts_,      &state.colliders, &state.nearColliders};
+                               })),
+      addUp_(device, {device, kernels::add_up_cloths, workgroupSize}, {&cloths_, &runs_, &sums_}) {
   if (solids != nullptr)
-    solidDepths_ = std::make_unique<Stage>(
-        device,
-        vulkan::KernelDescription{
-            .name = "measure_solids",
-            .spirv = kernels::measure_solids,
-            .bindings = {kTexels, kTexels, kTexels, kStorage, kTexels, kTexels},
-            .pushConstantBytes = sizeof(shared::PenetrationPush),
-            .workgroupSize = workgroupSize,
-            .specialisation = {solids->specialisation().begin(), solids->specialisation().end()}},
-        Stage::Buffers{&state.cloths, &blocks_, state.positions[0], &counts_, &solids->solids(),
-                       &state.colliders},
-        Stage::Buffers{&state.cloths, &blocks_, state.positions[1], &counts_, &solids->solids(),
-                       &state.colliders});
-}
-
-Bindings ReportStage::measureIn(const vulkan::Device& device, const StateBuffers& state,
-                                const MeshSprings& meshes, std::size_t present) const {
-  return Bindings(device, measure_,
-                  {&state.cloths, &blocks_, &cloths_, state.positions[present], state.velocities[present],
-                   meshes.nodes != nullptr ? meshes.nodes : &blocks_,
-                   meshes.ends != nullptr ? meshes.ends : &blocks_, &runs_, &counts_});
-}
-
-Bindings ReportStage::penetrationsIn(const vulkan::Device& device, const StateBuffers& state,
-                                     std::size_t present) const {
-  return Bindings(
-      device, penetrations_,
-      {&state.cloths, &blocks_, state.positions[present], &counts_, &state.colliders, &state.nearColliders});
+    solidDepths_ =
+        bindStates(device, {device, kernels::measure_solids, workgroupSize, solids->specialisation()},
+                   [&](std::size_t present) {
+                     return BufferList{&state.cloths, &blocks_,          state.positions[present],
+                                       &counts_,      &solids->solids(), &state.colliders};
+                   });
 }
 
 void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
@@ -165,7 +137,7 @@ void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
   recorder.barrier();
   const auto blocks = static_cast<std::uint32_t>(of_.records.size());
   recorder.dispatch(
-      measureIn_[present],
+      measure_[present],
       shared::MeasurePush{.gravity = {gravity.x(), gravity.y(), gravity.z(), gravity.dot(origin)},
                           .blockCount = blocks,
                           .reserved0 = 0,
@@ -176,13 +148,13 @@ void ReportStage::record(vulkan::Recorder& recorder, std::uint32_t present,
       .collision = collision, .blockCount = blocks, .solidCount = solidCount, .reserved0 = 0, .reserved1 = 0};
   const std::uint64_t depthThreads = std::uint64_t{blocks} * (shared::kReportBlock / shared::kReportDepths);
   if (collision.colliderCount > 0)
-    recorder.dispatch(penetrationsIn_[present], penetration, depthThreads,
+    recorder.dispatch(penetrations_[present], penetration, depthThreads,
                       std::uint64_t{shared::kReportDepths} * collision.nodeWork);
   if (solidCount > 0)
-    recorder.dispatch(solidDepths_->from[present], penetration, depthThreads,
+    recorder.dispatch((*solidDepths_)[present], penetration, depthThreads,
                       std::uint64_t{shared::kReportDepths} * solidCount * kSolidDepthWork);
   recorder.barrier();
-  recorder.dispatch(addUpAll_, of_.cloths.size() * workgroupSize_);
+  recorder.dispatch(addUp_, of_.cloths.size() * workgroupSize_);
   recorder.barrier();
   recorder.copy(sums_, readback_, sums_.bytes());
   recorder.copy(counts_, readback_, counts_.bytes(), 0, sums_.bytes());

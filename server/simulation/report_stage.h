@@ -4,18 +4,17 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "server/model/scene.h"
 #include "server/simulation/cloth_report.h"
 #include "server/simulation/collision/solid_stage.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
-#include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 #include "shaders/collision/collision.h"
 #include "shaders/report/report.h"
@@ -62,10 +61,6 @@ class ReportStage {
  private:
   ReportStage(const vulkan::Device& device, ReportBlocks blocks, const StateBuffers& state,
               const MeshSprings& meshes, const SolidStage* solids, std::uint32_t workgroupSize);
-  vulkan::Bindings measureIn(const vulkan::Device& device, const StateBuffers& state,
-                             const MeshSprings& meshes, std::size_t present) const;
-  vulkan::Bindings penetrationsIn(const vulkan::Device& device, const StateBuffers& state,
-                                  std::size_t present) const;
 
   std::uint32_t workgroupSize_;
   std::uint32_t slot_ = 0;
@@ -74,10 +69,9 @@ class ReportStage {
   vulkan::Buffer blockUpload_, blocks_, cloths_, runs_, sums_, counts_, readback_;
   std::array<vulkan::Buffer, 2>
       clothUploads_;  // used alternately: a recording may be in flight while the next one is made
-  vulkan::Kernel measure_, penetrations_, addUp_;
-  std::array<vulkan::Bindings, 2> measureIn_, penetrationsIn_;
-  vulkan::Bindings addUpAll_;
-  std::unique_ptr<Stage> solidDepths_;  // null if no collider is a triangle mesh
+  StateBindings measure_, penetrations_;
+  vulkan::Bindings addUp_;
+  std::optional<StateBindings> solidDepths_;  // absent if no collider is a triangle mesh
 };
 
 }  // namespace clothstream::simulation

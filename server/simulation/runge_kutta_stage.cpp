@@ -7,12 +7,10 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-using vulkan::Kernel;
-using vulkan::kStorage;
-using vulkan::kTexels;
+
+constexpr std::uint32_t kWorkgroup = 64;
 
 // Length of each explicit Euler step, as a part of the substep.
 constexpr std::array<float, 4> kParts{0.5f, 0.5f, 1.0f, 1.0f / 6};
@@ -30,30 +28,28 @@ RungeKuttaStage::RungeKuttaStage(const vulkan::Device& device, const StateBuffer
       startVelocities_(makeBuffer(device, BufferPurpose::state, offsets_.back())),
       sums_(makeBuffer(device, BufferPurpose::state, offsets_.back())),
       velocitySums_(makeBuffer(device, BufferPurpose::state, offsets_.back())),
-      combine_{makeCombine(device, 1), makeCombine(device, 2), makeCombine(device, 3),
-               makeCombine(device, 4)},
-      combineFrom_{{{combineFrom(device, state, 0, 0), combineFrom(device, state, 0, 1)},
-                    {combineFrom(device, state, 1, 0), combineFrom(device, state, 1, 1)},
-                    {combineFrom(device, state, 2, 0), combineFrom(device, state, 2, 1)},
-                    {combineFrom(device, state, 3, 0), combineFrom(device, state, 3, 1)}}} {}
+      combine_{bindCombine(device, state, 0), bindCombine(device, state, 1), bindCombine(device, state, 2),
+               bindCombine(device, state, 3)} {}
 
-Kernel RungeKuttaStage::makeCombine(const vulkan::Device& device, std::uint32_t stage) const {
-  return Kernel(device, {.name = "combine_runge_kutta",
-                         .spirv = kernels::combine_runge_kutta,
-                         .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage,
-                                      kStorage, kStorage, kStorage, kStorage, kStorage, kStorage},
-                         .pushConstantBytes = sizeof(shared::RungeKuttaPush),
-                         .workgroupSize = 64,
-                         .specialisation = {stage}});
-}
-
-Bindings RungeKuttaStage::combineFrom(const vulkan::Device& device, const StateBuffers& state,
-                                      std::size_t stage, std::size_t from) const {
-  const std::size_t to = 1 - from;
-  return Bindings(device, combine_[stage],
-                  {&state.cloths, &state.colliders, &state.nearColliders, &start_, state.positions[from],
-                   state.velocities[from], state.positions[to], state.velocities[to], &start_,
-                   &startVelocities_, &sums_, &velocitySums_, &state.contactImpulses});
+StateBindings RungeKuttaStage::bindCombine(const vulkan::Device& device, const StateBuffers& state,
+                                           std::uint32_t stage) const {
+  return bindStates(device, {device, kernels::combine_runge_kutta, kWorkgroup, {stage + 1}},
+                    [&](std::size_t from) {
+                      const std::size_t to = 1 - from;
+                      return BufferList{&state.cloths,
+                                        &state.colliders,
+                                        &state.nearColliders,
+                                        &start_,
+                                        state.positions[from],
+                                        state.velocities[from],
+                                        state.positions[to],
+                                        state.velocities[to],
+                                        &start_,
+                                        &startVelocities_,
+                                        &sums_,
+                                        &velocitySums_,
+                                        &state.contactImpulses};
+                    });
 }
 
 void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,
@@ -66,7 +62,7 @@ void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,
         .collision = collision, .firstNode = 0, .count = offsets_.back(), .cloth = 0, .reserved = 0};
     if (stage + 1 < kStages) {
       recorder.barrier();
-      recorder.dispatch(combineFrom_[stage][stepFrom], push, push.count);
+      recorder.dispatch(combine_[stage][stepFrom], push, push.count);
       continue;
     }
     // Each cloth has its own friction and thickness.
@@ -74,7 +70,7 @@ void RungeKuttaStage::record(vulkan::Recorder& recorder, std::uint32_t from,
       push.firstNode = offsets_[push.cloth];
       push.count = offsets_[push.cloth + 1] - push.firstNode;
       recorder.barrier();
-      recorder.dispatch(combineFrom_[stage][stepFrom], push, push.count, collision.nodeWork);
+      recorder.dispatch(combine_[stage][stepFrom], push, push.count, collision.nodeWork);
     }
   }
 }

@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
-#include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 #include "shaders/shared/simulation.h"
 
@@ -33,15 +33,13 @@ class RungeKuttaStage {
  private:
   static constexpr std::size_t kStages = 4;
 
-  vulkan::Kernel makeCombine(const vulkan::Device& device, std::uint32_t stage) const;
-  vulkan::Bindings combineFrom(const vulkan::Device& device, const StateBuffers& state, std::size_t stage,
-                               std::size_t from) const;
+  StateBindings bindCombine(const vulkan::Device& device, const StateBuffers& state,
+                            std::uint32_t stage) const;
 
   std::vector<std::uint32_t> offsets_;
   vulkan::Buffer start_, startVelocities_, sums_, velocitySums_;
-  std::array<vulkan::Kernel, kStages> combine_;
   // The steps alternate between the states. The substep may start from either state.
-  std::array<std::array<vulkan::Bindings, 2>, kStages> combineFrom_;
+  std::array<StateBindings, kStages> combine_;
 };
 
 }  // namespace clothstream::simulation

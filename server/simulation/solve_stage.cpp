@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -24,14 +25,10 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::BindingKind;
 using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 using vulkan::Kernel;
-using vulkan::kImages;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 constexpr std::uint32_t kSolveLanes = CLOTHSTREAM_SOLVE_LANES;
 // shaders/solve/linear_system.glsl, and solve_stretched.comp.
@@ -114,89 +111,54 @@ std::uint32_t iterationsPerDispatch(const vulkan::Device& device, const SolveGro
 
 }  // namespace
 
-// Kernels of a group. Those that it does not need are null: for systems that one workgroup solves, or for
+// Kernels of a group. Those that it does not need are absent: for systems that one workgroup solves, or for
 // larger ones.
 struct GroupKernels {
-  std::unique_ptr<Kernel> check, springs, prepare, whole, multiply, measure, update;
+  std::optional<Kernel> check, springs, prepare, whole, multiply, measure, update;
 };
 
 struct SolveStage::Kernels {
   Kernels(const vulkan::Device& on, const SolveCut& partition, const StretchedLimits& limits)
       : device(on), cut(partition), stretched(on, limits) {}
 
-  std::unique_ptr<Kernel> make(const char* name, std::span<const std::uint32_t> spirv,
-                               std::vector<BindingKind> bindings, std::size_t push, const SolveGroup& group,
-                               bool iterates = false, bool measure = false) const {
-    return std::make_unique<Kernel>(
-        device,
-        vulkan::KernelDescription{
-            .name = name,
-            .spirv = spirv,
-            .bindings = std::move(bindings),
-            .pushConstantBytes = static_cast<std::uint32_t>(push),
-            .workgroupSize = iterates ? cut.iterationWorkgroup : cut.workgroup,
-            .specialisation = {isImplicit(group) ? 1u : 0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u,
-                               isAdaptive(group) ? 1u : 0u, measure ? 1u : 0u, cut.spread ? 1u : 0u,
-                               isPaper(group) ? 1u : 0u, isLimit(group) ? 1u : 0u}});
+  Kernel make(const vulkan::KernelCode& code, const SolveGroup& group, bool iterates = false,
+              bool measure = false) const {
+    return Kernel(
+        device, code, iterates ? cut.iterationWorkgroup : cut.workgroup,
+        {isImplicit(group) ? 1u : 0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u, isAdaptive(group) ? 1u : 0u,
+         measure ? 1u : 0u, cut.spread ? 1u : 0u, isPaper(group) ? 1u : 0u, isLimit(group) ? 1u : 0u});
   }
 
   const GroupKernels& of(const SolveGroup& group) {
     const std::size_t mode = static_cast<std::size_t>(group.acadMode);
     const std::size_t kind = isImplicit(group) ? 1 : (isAdaptive(group) ? 2 + mode : 0);
     GroupKernels& on = groups[(2 * kind + (group.mesh ? 1 : 0)) * 2 + (group.bend ? 1 : 0)];
-    // All kernels that compute spring terms have the same first bindings.
-    const auto weighing = [](std::initializer_list<BindingKind> more) {
-      std::vector<BindingKind> bindings = {kTexels, kTexels, kTexels,  kTexels,  kTexels,
-                                           kTexels, kTexels, kStorage, kStorage, kStorage};
-      for (const BindingKind binding : more) bindings.push_back(binding);
-      return bindings;
-    };
-    const std::vector<BindingKind> vectors = {kTexels,  kTexels,  kTexels, kTexels, kTexels,
-                                              kTexels,  kTexels,  kTexels, kImages, kStorage,
-                                              kStorage, kStorage, kStorage};
-    std::vector<BindingKind> multiply = vectors;
-    multiply.push_back(kStorage);
     if (!on.prepare && group.mesh) {
-      on.springs = make("prepare_springs", kernels::prepare_springs, weighing({kTexels, kStorage, kStorage}),
-                        sizeof(shared::PreparePush), group);
-      on.prepare =
-          make("prepare_meshes", kernels::prepare_meshes,
-               weighing({kTexels, kTexels, kTexels, kTexels, kStorage}), sizeof(shared::PreparePush), group);
+      on.springs = make(kernels::prepare_springs, group);
+      on.prepare = make(kernels::prepare_meshes, group);
     } else if (!on.prepare) {
-      if (isAdaptive(group))
-        on.check =
-            make("check_stretch", kernels::check_stretch, weighing({}), sizeof(shared::PreparePush), group);
-      on.prepare = make("prepare_grids", kernels::prepare_grids, weighing({kStorage, kStorage, kStorage}),
-                        sizeof(shared::PreparePush), group);
+      if (isAdaptive(group)) on.check = make(kernels::check_stretch, group);
+      on.prepare = make(kernels::prepare_grids, group);
     }
-    if (!on.whole && group.smallSystems > 0)
-      on.whole = make("solve_velocities", kernels::solve_velocities, vectors, sizeof(shared::SolvePush),
-                      group, true);
+    if (!on.whole && group.smallSystems > 0) on.whole = make(kernels::solve_velocities, group, true);
     if (!on.multiply && group.hasLarge()) {
-      on.multiply = make("multiply_residuals", kernels::multiply_residuals, multiply,
-                         sizeof(shared::SolvePush), group, true);
-      on.measure = make("multiply_residuals", kernels::multiply_residuals, multiply,
-                        sizeof(shared::SolvePush), group, true, true);
-      on.update = make("update_corrections", kernels::update_corrections, vectors, sizeof(shared::SolvePush),
-                       group, true);
+      on.multiply = make(kernels::multiply_residuals, group, true);
+      on.measure = make(kernels::multiply_residuals, group, true, true);
+      on.update = make(kernels::update_corrections, group, true);
     }
     return on;
   }
 
   const Kernel& apply(const SolveGroup& group) {
-    std::unique_ptr<Kernel>& kernel = applies[group.mesh ? 1 : 0];
-    if (!kernel)
-      kernel = make("apply_velocities", kernels::apply_velocities,
-                    {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage,
-                     kStorage, kStorage, kStorage},
-                    sizeof(shared::ApplyPush), group);
+    std::optional<Kernel>& kernel = applies[group.mesh ? 1 : 0];
+    if (!kernel) kernel = make(kernels::apply_velocities, group);
     return *kernel;
   }
 
   const vulkan::Device& device;
   SolveCut cut;
   std::array<GroupKernels, 20> groups;
-  std::array<std::unique_ptr<Kernel>, 2> applies;
+  std::array<std::optional<Kernel>, 2> applies;
   StretchedKernels stretched;
 };
 
@@ -275,7 +237,7 @@ struct SolveStage::Systems {
                                              &freeVelocity, &actives, &state.contactImpulses, &groupSizes});
     if (group.on.stretched) return;
     const GroupKernels& with = kernels.of(group.on);
-    const auto bindTo = [&](std::vector<Bindings>& bindings, const std::unique_ptr<Kernel>& kernel,
+    const auto bindTo = [&](std::vector<Bindings>& bindings, const std::optional<Kernel>& kernel,
                             std::vector<const Buffer*> first, std::initializer_list<const Buffer*> more) {
       first.insert(first.end(), more);
       bindings.emplace_back(device, *kernel, first);

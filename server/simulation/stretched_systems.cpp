@@ -15,9 +15,6 @@ using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 using vulkan::Kernel;
-using vulkan::kImages;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 namespace {
 
@@ -43,22 +40,16 @@ StretchedLimits stretchedLimits(const vulkan::Device& device, std::uint32_t work
           .mostLoops = kMostLoops};
 }
 
-const Kernel& StretchedKernels::of(const SolveGroup& group, bool continues) {
+Kernel StretchedKernels::of(const SolveGroup& group, bool continues) {
   const std::size_t mode = static_cast<std::size_t>(group.acadMode);
   const std::uint32_t workgroup = continues ? group.continuedWorkgroup : limits_.workgroup;
-  std::unique_ptr<Kernel>& kernel = kernels_[{mode, group.bend, continues, workgroup}];
+  std::optional<Kernel>& kernel = kernels_[{mode, group.bend, continues, workgroup}];
   if (!kernel)
-    kernel = std::make_unique<Kernel>(
-        device_, vulkan::KernelDescription{
-                     .name = "solve_stretched",
-                     .spirv = kernels::solve_stretched,
-                     .bindings = {kTexels, kTexels, kTexels, kTexels, kImages, kStorage, kTexels, kStorage,
-                                  kImages, kStorage, kImages, kStorage, kStorage, kStorage, kStorage},
-                     .pushConstantBytes = sizeof(shared::StretchedPush),
-                     .workgroupSize = workgroup,
-                     .specialisation = {0u, 0u, group.bend ? 1u : 0u, 1u, continues ? 1u : 0u, 0u,
-                                        group.acadMode == model::AcadMode::paper ? 1u : 0u,
-                                        group.acadMode == model::AcadMode::limit ? 1u : 0u}});
+    kernel.emplace(
+        device_, kernels::solve_stretched, workgroup,
+        std::initializer_list<std::uint32_t>{0u, 0u, group.bend ? 1u : 0u, 1u, continues ? 1u : 0u, 0u,
+                                             group.acadMode == model::AcadMode::paper ? 1u : 0u,
+                                             group.acadMode == model::AcadMode::limit ? 1u : 0u});
   return *kernel;
 }
 

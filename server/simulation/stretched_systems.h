@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <map>
-#include <memory>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -29,13 +29,13 @@ class StretchedKernels {
       : device_(device), limits_(limits) {}
   const StretchedLimits& limits() const { return limits_; }
   // `continues`: the wide workgroups.
-  const vulkan::Kernel& of(const SolveGroup& group, bool continues);
+  vulkan::Kernel of(const SolveGroup& group, bool continues);
 
  private:
   const vulkan::Device& device_;
   StretchedLimits limits_;
   // By mode, bend springs, `continues` and width.
-  std::map<std::tuple<std::size_t, bool, bool, std::uint32_t>, std::unique_ptr<vulkan::Kernel>> kernels_;
+  std::map<std::tuple<std::size_t, bool, bool, std::uint32_t>, std::optional<vulkan::Kernel>> kernels_;
 };
 
 // Belongs to SolveStage and refers to its buffers. A substep has one dispatch per group, whose size is 0 if

@@ -16,8 +16,6 @@ namespace {
 using vulkan::Bindings;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 constexpr std::uint32_t kAllPasses = 7;
 
@@ -81,68 +79,61 @@ void XpbdStage::recordTables(vulkan::Recorder& recorder) const {
   for (const DeviceTable* table : {&tiles_, &colours_, &links_}) table->recordUpload(recorder);
 }
 
-const Stage& XpbdStage::grids(const XpbdVariant& variant, std::uint32_t passes) {
+const StateBindings& XpbdStage::grids(const XpbdVariant& variant, std::uint32_t passes) {
   // Corners have no bend springs.
   const bool bend = variant.bend && passes != 1;
   const std::size_t pass = passes == kAllPasses ? 3 : passes / 2;
-  std::unique_ptr<Stage>& stage = grids_[pass | (variant.damped ? 4u : 0u) | (bend ? 8u : 0u)];
-  if (stage) return *stage;
-  const Buffer *one = state_.positions[0], *other = state_.positions[1];
-  stage = std::make_unique<Stage>(
-      device_,
-      vulkan::KernelDescription{
-          .name = "correct_grids",
-          .spirv = kernels::correct_grids,
-          .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage},
-          .pushConstantBytes = sizeof(shared::XpbdPush),
-          .workgroupSize = passes == kAllPasses ? cut_.wholeWorkgroup : cut_.partWorkgroup,
-          .specialisation = {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, passes, bend ? 1u : 0u,
-                             device_.hasGpuKernels() ? 1u : 0u}},
-      Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, other, &multipliers_},
-      Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, one, &multipliers_});
-  return *stage;
+  std::optional<StateBindings>& made = grids_[pass | (variant.damped ? 4u : 0u) | (bend ? 8u : 0u)];
+  if (made) return *made;
+  made = bindStates(device_,
+                    {device_,
+                     kernels::correct_grids,
+                     passes == kAllPasses ? cut_.wholeWorkgroup : cut_.partWorkgroup,
+                     {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, passes, bend ? 1u : 0u,
+                      device_.hasGpuKernels() ? 1u : 0u}},
+                    [&](std::size_t from) {
+                      const Buffer* to = state_.positions[1 - from];
+                      return BufferList{&state_.cloths, &tiles_.texels(), state_.positions[from], to, to,
+                                        &multipliers_};
+                    });
+  return *made;
 }
 
-const Stage& XpbdStage::meshes(const XpbdVariant& variant, bool whole) {
-  std::unique_ptr<Stage>& stage = meshes_[(whole ? 1u : 0u) | (variant.damped ? 2u : 0u)];
-  if (stage) return *stage;
-  const Buffer *one = state_.positions[0], *other = state_.positions[1];
-  stage = std::make_unique<Stage>(
-      device_,
-      vulkan::KernelDescription{
-          .name = "correct_meshes",
-          .spirv = kernels::correct_meshes,
-          .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kTexels, kTexels},
-          .pushConstantBytes = sizeof(shared::XpbdPush),
-          .workgroupSize = whole ? cut_.wholeWorkgroup : cut_.partWorkgroup,
-          .specialisation = {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, whole ? 1u : 0u}},
-      Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, other, &multipliers_, &colours_.texels(),
-                     &links_.texels()},
-      Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, one, &multipliers_, &colours_.texels(),
-                     &links_.texels()});
-  return *stage;
+const StateBindings& XpbdStage::meshes(const XpbdVariant& variant, bool whole) {
+  std::optional<StateBindings>& made = meshes_[(whole ? 1u : 0u) | (variant.damped ? 2u : 0u)];
+  if (made) return *made;
+  made = bindStates(device_,
+                    {device_,
+                     kernels::correct_meshes,
+                     whole ? cut_.wholeWorkgroup : cut_.partWorkgroup,
+                     {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, whole ? 1u : 0u}},
+                    [&](std::size_t from) {
+                      const Buffer* to = state_.positions[1 - from];
+                      return BufferList{&state_.cloths, &tiles_.texels(),   state_.positions[from], to, to,
+                                        &multipliers_,  &colours_.texels(), &links_.texels()};
+                    });
+  return *made;
 }
 
-const Stage& XpbdStage::finish(const XpbdVariant& variant) {
-  std::unique_ptr<Stage>& stage = finish_[variant.colliders ? 1 : 0];
-  if (stage) return *stage;
-  const auto& [one, other] = state_.positions;
-  const auto& [oneVelocity, otherVelocity] = state_.velocities;
-  const Buffer *colliders = &state_.colliders, *near = &state_.nearColliders;
-  stage = std::make_unique<Stage>(
-      device_,
-      vulkan::KernelDescription{.name = "finish_corrections",
-                                .spirv = kernels::finish_corrections,
-                                .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
-                                             kStorage, kTexels, kStorage},
-                                .pushConstantBytes = sizeof(shared::FinishPush),
-                                .workgroupSize = cut_.partWorkgroup,
-                                .specialisation = {variant.colliders ? 1u : 0u}},
-      Stage::Buffers{&state_.cloths, &tiles_.texels(), one, other, colliders, near, other, otherVelocity,
-                     otherVelocity, &state_.contactImpulses},
-      Stage::Buffers{&state_.cloths, &tiles_.texels(), other, one, colliders, near, one, oneVelocity,
-                     oneVelocity, &state_.contactImpulses});
-  return *stage;
+const StateBindings& XpbdStage::finish(const XpbdVariant& variant) {
+  std::optional<StateBindings>& made = finish_[variant.colliders ? 1 : 0];
+  if (made) return *made;
+  made = bindStates(
+      device_, {device_, kernels::finish_corrections, cut_.partWorkgroup, {variant.colliders ? 1u : 0u}},
+      [&](std::size_t from) {
+        const Buffer *to = state_.positions[1 - from], *velocities = state_.velocities[1 - from];
+        return BufferList{&state_.cloths,
+                          &tiles_.texels(),
+                          state_.positions[from],
+                          to,
+                          &state_.colliders,
+                          &state_.nearColliders,
+                          to,
+                          velocities,
+                          velocities,
+                          &state_.contactImpulses};
+      });
+  return *made;
 }
 
 void XpbdStage::prepare(const XpbdVariant& variant) {
@@ -168,13 +159,13 @@ void XpbdStage::recordWhole(vulkan::Recorder& recorder, std::uint32_t from, cons
         workPerInvocation(std::uint64_t{nodes} * (push.endIteration - first), cut_.wholeWorkgroup);
     if (tables_.wholeGrids.count > 0) {
       push.firstTile = tables_.wholeGrids.first;
-      dispatch(recorder, grids(variant, kAllPasses).from[from], push,
+      dispatch(recorder, grids(variant, kAllPasses)[from], push,
                threads(tables_.wholeGrids, cut_.wholeWorkgroup), work);
     }
     if (tables_.wholeMeshes.count > 0) {
       push.firstTile = tables_.wholeMeshes.first;
-      dispatch(recorder, meshes(variant, true).from[from], push,
-               threads(tables_.wholeMeshes, cut_.wholeWorkgroup), work);
+      dispatch(recorder, meshes(variant, true)[from], push, threads(tables_.wholeMeshes, cut_.wholeWorkgroup),
+               work);
     }
   }
 }
@@ -186,7 +177,7 @@ void XpbdStage::recordParts(vulkan::Recorder& recorder, std::uint32_t from, cons
     for (std::uint32_t pass = 0; pass < kGridPasses; ++pass) {
       push.endIteration = push.firstIteration + 1;
       push.firstTile = tables_.partGrids[pass].first;
-      dispatch(recorder, grids(variant, 1u << pass).from[from], push,
+      dispatch(recorder, grids(variant, 1u << pass)[from], push,
                threads(tables_.partGrids[pass], cut_.partWorkgroup), model::kBlock * model::kBlock);
     }
   for (const XpbdTables::PartMesh& mesh : tables_.partMeshes) {
@@ -195,7 +186,7 @@ void XpbdStage::recordParts(vulkan::Recorder& recorder, std::uint32_t from, cons
       for (const TileRange& colour : mesh.colours) {
         push.firstSpring = colour.first;
         push.springs = colour.count;
-        dispatch(recorder, meshes(variant, false).from[from], push, colour.count, 1);
+        dispatch(recorder, meshes(variant, false)[from], push, colour.count, 1);
       }
   }
 }
@@ -207,7 +198,7 @@ void XpbdStage::record(vulkan::Recorder& recorder, std::uint32_t from, const Xpb
   const std::uint32_t most = device_.limits().maxDispatchX;
   for (std::uint32_t done = 0; done < tables_.nodes.count; done += most) {
     push.firstTile = tables_.nodes.first + done;
-    dispatch(recorder, finish(variant).from[from], push,
+    dispatch(recorder, finish(variant)[from], push,
              std::uint64_t{std::min(most, tables_.nodes.count - done)} * cut_.partWorkgroup,
              push.collision.nodeWork);
   }

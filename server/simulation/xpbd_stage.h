@@ -5,13 +5,12 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 
 #include "server/model/scene.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/simulation/xpbd_tables.h"
 #include "server/vulkan/buffer.h"
@@ -51,11 +50,11 @@ class XpbdStage {
 
  private:
   template <std::size_t count>
-  using Stages = std::array<std::unique_ptr<Stage>, count>;  // created at their first use
+  using Variants = std::array<std::optional<StateBindings>, count>;  // made at their first use
 
-  const Stage& grids(const XpbdVariant& variant, std::uint32_t passes);
-  const Stage& meshes(const XpbdVariant& variant, bool whole);
-  const Stage& finish(const XpbdVariant& variant);
+  const StateBindings& grids(const XpbdVariant& variant, std::uint32_t passes);
+  const StateBindings& meshes(const XpbdVariant& variant, bool whole);
+  const StateBindings& finish(const XpbdVariant& variant);
   void recordWhole(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant);
   void recordParts(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant);
 
@@ -65,9 +64,9 @@ class XpbdStage {
   XpbdTables tables_;
   DeviceTable tiles_, colours_, links_;
   vulkan::Buffer multipliers_;
-  Stages<16> grids_;
-  Stages<4> meshes_;
-  Stages<2> finish_;
+  Variants<16> grids_;
+  Variants<4> meshes_;
+  Variants<2> finish_;
 };
 
 }  // namespace clothstream::simulation

@@ -9,7 +9,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <vulkan/vulkan_raii.hpp>
@@ -22,14 +22,16 @@
 namespace clothstream::vulkan {
 
 struct Kernel::Handles {
+  KernelCode code;
+  std::vector<std::uint32_t> constants;  // by constant_id: the workgroup size, then the specialisation
+  SpirvInterface interface;
   vk::raii::DescriptorSetLayout setLayout = nullptr;
   vk::raii::PipelineLayout layout = nullptr;
   vk::raii::Pipeline pipeline = nullptr;
 };
 
-// Address of the embedded SPIR-V, bindings, bytes of push constants, workgroup size with specialisation.
-using PipelineKey =
-    std::tuple<const std::uint32_t*, std::vector<BindingKind>, std::uint32_t, std::vector<std::uint32_t>>;
+// Address of the embedded SPIR-V, and Kernel::Handles::constants.
+using PipelineKey = std::pair<const std::uint32_t*, std::vector<std::uint32_t>>;
 
 struct Device::Handles {
   vk::raii::Context context;

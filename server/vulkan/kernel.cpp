@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -26,104 +27,114 @@ constexpr vk::DescriptorType typeOf(BindingKind kind) {
 
 constexpr std::uint32_t kWord = sizeof(std::uint32_t);
 
-}  // namespace
-
-std::shared_ptr<const Kernel::Handles> Kernel::makePipeline(const Device::Handles& device,
-                                                            const KernelDescription& description,
-                                                            std::span<const std::uint32_t> constants) {
+// Makes the pipeline of handles with code, constants and interface.
+void makePipeline(const Device::Handles& device, Kernel::Handles& made) {
+  const vk::raii::Device& vulkan = device.device;
   std::vector<vk::DescriptorSetLayoutBinding> slots;
-  for (const BindingKind kind : description.bindings)
+  for (const Binding& binding : made.interface.bindings)
     slots.push_back({.binding = static_cast<std::uint32_t>(slots.size()),
-                     .descriptorType = typeOf(kind),
+                     .descriptorType = typeOf(binding.kind),
                      .descriptorCount = 1,
                      .stageFlags = vk::ShaderStageFlagBits::eCompute});
+  made.setLayout = vk::raii::DescriptorSetLayout(
+      vulkan, vk::DescriptorSetLayoutCreateInfo{.bindingCount = static_cast<std::uint32_t>(slots.size()),
+                                                .pBindings = slots.data()});
+  const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
+                                   .size = made.interface.pushConstantBytes};
+  made.layout =
+      vk::raii::PipelineLayout(vulkan, vk::PipelineLayoutCreateInfo{.setLayoutCount = 1,
+                                                                    .pSetLayouts = &*made.setLayout,
+                                                                    .pushConstantRangeCount = push.size > 0,
+                                                                    .pPushConstantRanges = &push});
   std::vector<vk::SpecializationMapEntry> entries;
-  for (std::uint32_t id = 0; id < constants.size(); ++id)
+  for (std::uint32_t id = 0; id < made.constants.size(); ++id)
     entries.push_back({.constantID = id, .offset = id * kWord, .size = kWord});
   const vk::SpecializationInfo specialisation{.mapEntryCount = static_cast<std::uint32_t>(entries.size()),
                                               .pMapEntries = entries.data(),
-                                              .dataSize = constants.size_bytes(),
-                                              .pData = constants.data()};
-  const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
-                                   .size = description.pushConstantBytes};
-  const vk::raii::Device& vulkan = device.device;
-  auto made = std::make_shared<Handles>();
-  made->setLayout = vk::raii::DescriptorSetLayout(
-      vulkan, vk::DescriptorSetLayoutCreateInfo{.bindingCount = static_cast<std::uint32_t>(slots.size()),
-                                                .pBindings = slots.data()});
-  made->layout = vk::raii::PipelineLayout(
-      vulkan, vk::PipelineLayoutCreateInfo{.setLayoutCount = 1,
-                                           .pSetLayouts = &*made->setLayout,
-                                           .pushConstantRangeCount = description.pushConstantBytes > 0,
-                                           .pPushConstantRanges = &push});
-  const vk::raii::ShaderModule module(vulkan,
-                                      vk::ShaderModuleCreateInfo{.codeSize = description.spirv.size_bytes(),
-                                                                 .pCode = description.spirv.data()});
+                                              .dataSize = made.constants.size() * kWord,
+                                              .pData = made.constants.data()};
+  const vk::raii::ShaderModule module(
+      vulkan,
+      vk::ShaderModuleCreateInfo{.codeSize = made.code.spirv.size_bytes(), .pCode = made.code.spirv.data()});
   vk::PipelineCreateFlags flags = vk::PipelineCreateFlagBits::eDispatchBase;
   if (device.keepsStatistics) flags |= vk::PipelineCreateFlagBits::eCaptureStatisticsKHR;
-  made->pipeline =
+  made.pipeline =
       vk::raii::Pipeline(vulkan, device.pipelineCache,
                          vk::ComputePipelineCreateInfo{.flags = flags,
                                                        .stage = {.stage = vk::ShaderStageFlagBits::eCompute,
                                                                  .module = *module,
                                                                  .pName = "main",
                                                                  .pSpecializationInfo = &specialisation},
-                                                       .layout = *made->layout});
+                                                       .layout = *made.layout});
   if (device.validates())
     vulkan.setDebugUtilsObjectNameEXT(
         {.objectType = vk::ObjectType::ePipeline,
-         .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*made->pipeline)),
-         .pObjectName = description.name});
-  return made;
+         .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*made.pipeline)),
+         .pObjectName = made.code.name});
 }
 
-Kernel::~Kernel() = default;
-Kernel::Kernel(Kernel&&) noexcept = default;
-Kernel& Kernel::operator=(Kernel&&) noexcept = default;
-
-Kernel::Kernel(const Device& device, const KernelDescription& description)
-    : name_(description.name),
-      bindings_(description.bindings),
-      pushConstantBytes_(description.pushConstantBytes),
-      workgroupSize_(description.workgroupSize),
-      spirv_(description.spirv),
-      specialisation_(description.specialisation) {
+// Throws std::runtime_error if these handles, which have no pipeline yet, exceed what the device allows.
+void checkLimits(const Device& device, const Kernel::Handles& handles) {
   const Limits& limits = device.limits();
-  if (workgroupSize_ > limits.maxWorkgroupSizeX || workgroupSize_ > limits.maxWorkgroupInvocations)
-    throw std::runtime_error(fmt::format(
-        "kernel {}: a workgroup of {} invocations is more than the {} of {}", name_, workgroupSize_,
-        std::min(limits.maxWorkgroupSizeX, limits.maxWorkgroupInvocations), device.info().name));
-  if (pushConstantBytes_ > limits.maxPushConstantBytes)
+  const std::uint32_t workgroupSize = handles.constants.front(),
+                      most = std::min(limits.maxWorkgroupSizeX, limits.maxWorkgroupInvocations),
+                      pushBytes = handles.interface.pushConstantBytes;
+  if (workgroupSize > most)
+    throw std::runtime_error(fmt::format("kernel {}: a workgroup of {} invocations is more than the {} of {}",
+                                         handles.code.name, workgroupSize, most, device.info().name));
+  if (pushBytes > limits.maxPushConstantBytes)
     throw std::runtime_error(fmt::format("kernel {}: {} bytes of push constants are more than the {} of {}",
-                                         name_, pushConstantBytes_, limits.maxPushConstantBytes,
+                                         handles.code.name, pushBytes, limits.maxPushConstantBytes,
                                          device.info().name));
+}
 
-  std::vector<std::uint32_t> constants{workgroupSize_};
-  constants.insert(constants.end(), description.specialisation.begin(), description.specialisation.end());
+}  // namespace
+
+Kernel::Kernel(const Device& device, const KernelCode& code, std::uint32_t workgroupSize,
+               std::span<const std::uint32_t> specialisation) {
+  std::vector<std::uint32_t> constants{workgroupSize};
+  constants.insert(constants.end(), specialisation.begin(), specialisation.end());
+  const std::scoped_lock lock(device.handles().pipelinesMutex);
+  std::weak_ptr<const Handles>& shared = device.handles().pipelines[{code.spirv.data(), constants}];
+  handles_ = shared.lock();
+  if (handles_) return;
+  const auto made = std::make_shared<Handles>(
+      Handles{.code = code, .constants = std::move(constants), .interface = interfaceOf(code.spirv)});
+  checkLimits(device, *made);
   try {
-    const std::scoped_lock lock(device.handles().pipelinesMutex);
-    auto& shared =
-        device.handles().pipelines[{description.spirv.data(), bindings_, pushConstantBytes_, constants}];
-    handles_ = shared.lock();
-    if (!handles_) {
-      shared = handles_ = makePipeline(device.handles(), description, constants);
-      if (!device.executes()) device.handles().kept.push_back(handles_);
-    }
+    makePipeline(device.handles(), *made);
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(
-        fmt::format("kernel {} is refused by {}: {}", name_, device.info().name, error.what()));
+        fmt::format("kernel {} is refused by {}: {}", code.name, device.info().name, error.what()));
   }
+  shared = handles_ = made;
+  if (!device.executes()) device.handles().kept.push_back(made);
+}
+
+std::string_view Kernel::name() const {
+  return handles_->code.name;
+}
+std::uint32_t Kernel::workgroupSize() const {
+  return handles_->constants.front();
+}
+std::span<const std::uint32_t> Kernel::specialisation() const {
+  return std::span(handles_->constants).subspan(1);
+}
+const SpirvInterface& Kernel::interface() const {
+  return handles_->interface;
 }
 
 Bindings::~Bindings() = default;
 Bindings::Bindings(Bindings&&) noexcept = default;
 Bindings& Bindings::operator=(Bindings&&) noexcept = default;
 
-Bindings::Bindings(const Device& device, const Kernel& kernel, std::span<const Buffer* const> buffers)
-    : kernel_(&kernel), handles_(std::make_unique<Handles>()) {
-  const std::span<const BindingKind> kinds = kernel.bindings();
-  assert(buffers.size() == kinds.size());
-  const auto count = static_cast<std::uint32_t>(kinds.size());
+Bindings::Bindings(const Device& device, Kernel kernel, std::span<const Buffer* const> buffers)
+    : kernel_(std::move(kernel)), handles_(std::make_unique<Handles>()) {
+  const std::span<const Binding> bindings = kernel_.interface().bindings;
+  if (buffers.size() != bindings.size())
+    throw std::logic_error(fmt::format("kernel {} has {} bindings and is given {} buffers", kernel_.name(),
+                                       bindings.size(), buffers.size()));
+  const auto count = static_cast<std::uint32_t>(bindings.size());
   for (const Buffer* buffer : buffers) buffers_.push_back({&buffer->handles(), buffer->bytes()});
   if (count == 0 || !device.executes()) return;
 
@@ -133,16 +144,16 @@ Bindings::Bindings(const Device& device, const Kernel& kernel, std::span<const B
   for (std::uint32_t i = 0; i < count; ++i) {
     const Buffer& buffer = *buffers[i];
     if (buffer.bytes() > device.limits().maxStorageRange)
-      throw std::runtime_error(
-          fmt::format("kernel {}, binding {}: a buffer of {} bytes is more than the {} that kernels "
-                      "can bind on {}",
-                      kernel.name(), i, buffer.bytes(), device.limits().maxStorageRange, device.info().name));
-    assert(kinds[i] == BindingKind::storage || *buffer.handles().texelView);
+      throw std::runtime_error(fmt::format(
+          "kernel {}, binding {}: a buffer of {} bytes is more than the {} that kernels "
+          "can bind on {}",
+          kernel_.name(), i, buffer.bytes(), device.limits().maxStorageRange, device.info().name));
+    assert(bindings[i].kind == BindingKind::storage || *buffer.handles().texelView);
     infos[i] = vk::DescriptorBufferInfo{.buffer = *buffer.handles().buffer, .range = VK_WHOLE_SIZE};
-    sizes.push_back({.type = typeOf(kinds[i]), .descriptorCount = 1});
+    sizes.push_back({.type = typeOf(bindings[i].kind), .descriptorCount = 1});
     writes.push_back({.dstBinding = i,
                       .descriptorCount = 1,
-                      .descriptorType = typeOf(kinds[i]),
+                      .descriptorType = typeOf(bindings[i].kind),
                       .pBufferInfo = &infos[i],
                       .pTexelBufferView = &*buffer.handles().texelView});
   }
@@ -153,13 +164,13 @@ Bindings::Bindings(const Device& device, const Kernel& kernel, std::span<const B
                                              .maxSets = 1,
                                              .poolSizeCount = count,
                                              .pPoolSizes = sizes.data()});
-    vk::raii::DescriptorSets sets(vulkan,
-                                  vk::DescriptorSetAllocateInfo{.descriptorPool = *handles_->pool,
-                                                                .descriptorSetCount = 1,
-                                                                .pSetLayouts = &*kernel.handles().setLayout});
+    vk::raii::DescriptorSets sets(
+        vulkan, vk::DescriptorSetAllocateInfo{.descriptorPool = *handles_->pool,
+                                              .descriptorSetCount = 1,
+                                              .pSetLayouts = &*kernel_.handles().setLayout});
     handles_->set = std::move(sets.front());
   } catch (const vk::SystemError& error) {
-    throw std::runtime_error(fmt::format("kernel {} cannot be bound: {}", kernel.name(), error.what()));
+    throw std::runtime_error(fmt::format("kernel {} cannot be bound: {}", kernel_.name(), error.what()));
   }
   for (vk::WriteDescriptorSet& write : writes) write.dstSet = *handles_->set;
   vulkan.updateDescriptorSets(writes, nullptr);

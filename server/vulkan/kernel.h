@@ -7,67 +7,46 @@
 #include <initializer_list>
 #include <memory>
 #include <span>
-#include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
+#include "server/vulkan/spirv_interface.h"
 
 namespace clothstream::vulkan {
 
-enum class BindingKind : std::uint8_t {
-  storage,
-  texels,  // read only
-  images,  // RGBA32F texels that the kernel also writes
-};
-inline constexpr auto kStorage = BindingKind::storage;
-inline constexpr auto kTexels = BindingKind::texels;
-inline constexpr auto kImages = BindingKind::images;
-
-struct KernelDescription {
-  const char* name = "";                      // for errors, validation and timings
-  std::span<const std::uint32_t> spirv = {};  // from clothstream_add_kernels
-  std::vector<BindingKind> bindings = {};     // binding 0, 1, 2, ... of set 0
-  std::uint32_t pushConstantBytes = 0;
-  // Invocations in x. Kernels declare `layout(local_size_x_id = 0) in;`, which receives this number as
-  // constant_id 0.
-  std::uint32_t workgroupSize = 64;
-  std::vector<std::uint32_t> specialisation = {};  // constant_id 1, 2, 3, ...; pass floats by std::bit_cast
+// SPIR-V of a kernel. clothstream_add_kernels makes one for each GLSL file: kernels::<name>.
+struct KernelCode {
+  const char* name = "";  // for errors, validation and timings
+  std::span<const std::uint32_t> spirv = {};
 };
 
-// Kernels of one device with the same SPIR-V, specialisation and interface share one pipeline, because
-// software devices compile a pipeline when it first runs. Throws std::runtime_error, which names the kernel,
-// if the device refuses it.
+// A compute pipeline. Copies share it, and so do all kernels of one device with the same code, workgroup size
+// and specialisation, because software devices compile a pipeline when it first runs.
 class Kernel {
  public:
-  Kernel(const Device& device, const KernelDescription& description);
-  ~Kernel();
-  Kernel(Kernel&&) noexcept;
-  Kernel& operator=(Kernel&&) noexcept;
+  // `workgroupSize`: invocations in x. Kernels declare `layout(local_size_x_id = 0) in;`, which receives this
+  // number as constant_id 0. `specialisation`: constant_id 1, 2, 3, ...; pass floats by std::bit_cast. Throws
+  // std::runtime_error, which names the kernel, if the device refuses it.
+  Kernel(const Device& device, const KernelCode& code, std::uint32_t workgroupSize,
+         std::span<const std::uint32_t> specialisation = {});
+  Kernel(const Device& device, const KernelCode& code, std::uint32_t workgroupSize,
+         std::initializer_list<std::uint32_t> specialisation)
+      : Kernel(device, code, workgroupSize, std::span(specialisation.begin(), specialisation.size())) {}
 
-  std::uint32_t workgroupSize() const { return workgroupSize_; }
+  std::string_view name() const;
+  std::uint32_t workgroupSize() const;
+  std::span<const std::uint32_t> specialisation() const;
+  // What its SPIR-V declares.
+  const SpirvInterface& interface() const;
 
   // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }
-  const std::string& name() const { return name_; }
-  std::span<const BindingKind> bindings() const { return bindings_; }
-  std::uint32_t pushConstantBytes() const { return pushConstantBytes_; }
-  std::span<const std::uint32_t> spirv() const { return spirv_; }
-  // KernelDescription::specialisation.
-  std::span<const std::uint32_t> specialisation() const { return specialisation_; }
 
  private:
-  static std::shared_ptr<const Handles> makePipeline(const Device::Handles& device,
-                                                     const KernelDescription& description,
-                                                     std::span<const std::uint32_t> constants);
-
-  std::string name_;
-  std::vector<BindingKind> bindings_;
-  std::uint32_t pushConstantBytes_ = 0;
-  std::uint32_t workgroupSize_ = 0;
-  std::span<const std::uint32_t> spirv_;
-  std::vector<std::uint32_t> specialisation_;
   std::shared_ptr<const Handles> handles_;
 };
 
@@ -77,24 +56,25 @@ struct BoundBuffer {
   std::size_t bytes = 0;
 };
 
-// One buffer for each of the kernel's bindings, in order. Kernel and buffers must outlive this object.
+// A kernel with one buffer for each of its bindings, in order. The buffers must outlive this object.
 class Bindings {
  public:
-  Bindings(const Device& device, const Kernel& kernel, std::span<const Buffer* const> buffers);
-  Bindings(const Device& device, const Kernel& kernel, std::initializer_list<const Buffer*> buffers)
-      : Bindings(device, kernel, std::span(buffers.begin(), buffers.size())) {}
+  // Throws std::runtime_error, which names the kernel, if the device cannot bind the buffers.
+  Bindings(const Device& device, Kernel kernel, std::span<const Buffer* const> buffers);
+  Bindings(const Device& device, Kernel kernel, std::initializer_list<const Buffer*> buffers)
+      : Bindings(device, std::move(kernel), std::span(buffers.begin(), buffers.size())) {}
   ~Bindings();
   Bindings(Bindings&&) noexcept;
   Bindings& operator=(Bindings&&) noexcept;
 
-  const Kernel& kernel() const { return *kernel_; }
+  const Kernel& kernel() const { return kernel_; }
   std::span<const BoundBuffer> buffers() const { return buffers_; }
   // Only for this folder (handles.h).
   struct Handles;
   const Handles& handles() const { return *handles_; }
 
  private:
-  const Kernel* kernel_;
+  Kernel kernel_;
   std::vector<BoundBuffer> buffers_;
   std::unique_ptr<Handles> handles_;
 };

@@ -210,14 +210,17 @@ void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push,
 }
 
 void Recorder::touch(const Bindings& bindings) {
-  const std::vector<std::byte> push(bindings.kernel().pushConstantBytes());
-  bind(bindings, push.data(), bindings.kernel().pushConstantBytes());
+  const std::vector<std::byte> push(bindings.kernel().interface().pushConstantBytes);
+  bind(bindings, push.data(), static_cast<std::uint32_t>(push.size()));
   handles_->current().dispatch(0, 1, 1);
 }
 
 void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes) {
   const Kernel& kernel = bindings.kernel();
-  assert(open_ && pushBytes == kernel.pushConstantBytes());
+  assert(open_);
+  if (pushBytes != kernel.interface().pushConstantBytes)
+    throw std::logic_error(fmt::format("kernel {} has {} bytes of push constants and is given {}",
+                                       kernel.name(), kernel.interface().pushConstantBytes, pushBytes));
   waitBefore(kernelCommand);
   handles_->current().bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.handles().pipeline);
   if (*bindings.handles().set)

@@ -24,13 +24,7 @@ double secondsToCopyTexels(vulkan::Device& device, std::size_t texels) {
   const Buffer to(device, BufferPurpose::state, bytes);
   const Buffer sample(device, BufferPurpose::readback, 16);
   constexpr std::uint32_t kWorkgroup = 256;
-  const vulkan::Kernel kernel(device,
-                              {.name = "copy_texels",
-                               .spirv = kernels::copy_texels,
-                               .bindings = {vulkan::BindingKind::texels, vulkan::BindingKind::storage},
-                               .workgroupSize = kWorkgroup,
-                               .specialisation = {}});
-  const vulkan::Bindings bindings(device, kernel, {&from, &to});
+  const vulkan::Bindings bindings(device, {device, kernels::copy_texels, kWorkgroup}, {&from, &to});
   vulkan::Recorder recorder(device);
   const bool kernelFits = (texels + kWorkgroup - 1) / kWorkgroup <= device.limits().maxDispatchX;
 

@@ -93,7 +93,7 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
     Candidate candidate{variant, squareCloth(size, variant), {}, nullptr};
     candidate.inputs = inputsOf(candidate.scene, variant);
     simulation::SimulationOptions options{settings.rowsPerInvocation, settings.workgroupSize, {}};
-    if (variant.builtin) options.advanceKernel = kernels::advance_mass_spring_builtin;
+    if (variant.builtin) options.advanceKernel = &kernels::advance_mass_spring_builtin;
     candidate.simulated = std::make_unique<Simulated>(device, candidate.scene, options);
     candidate.referenceSeconds = candidate.simulated->check(candidate.inputs);
     candidates.push_back(std::move(candidate));

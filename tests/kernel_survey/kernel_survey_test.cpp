@@ -20,7 +20,6 @@
 #include "server/vulkan/kernel_statistics.h"
 #include "tests/kernel_survey/figures.h"
 #include "tests/kernel_survey/roofline.h"
-#include "tests/kernel_survey/spirv_interface.h"
 #include "tests/kernel_survey/survey.h"
 #include "tests/kernel_survey/survey_scenes.h"
 #include "tests/simulation/all_kernels.h"

@@ -12,7 +12,6 @@
 
 #include "server/encode/frame_encoder.h"
 #include "server/vulkan/recorder.h"
-#include "tests/kernel_survey/spirv_interface.h"
 
 namespace clothstream::kernel_survey {
 namespace {
@@ -24,9 +23,9 @@ struct Extent {
   double bytes = 0, invocations = 0;
 };
 
-std::string settingsOf(const vulkan::Kernel& kernel, const SpirvInterface& spirv) {
+std::string settingsOf(const vulkan::Kernel& kernel) {
   std::string text;
-  for (const auto& [id, constant] : spirv.constants) {
+  for (const auto& [id, constant] : kernel.interface().constants) {
     if (id > kernel.specialisation().size()) continue;
     const std::uint32_t value = kernel.specialisation()[id - 1];
     if (constant.isBool && value == 0) continue;
@@ -40,14 +39,16 @@ std::string settingsOf(const vulkan::Kernel& kernel, const SpirvInterface& spirv
 constexpr std::string_view kSparse = "nearColliders";
 
 // Bytes of the bound buffers. A buffer that is bound twice is read and written once.
-double bytesOf(const vulkan::Bindings& bindings, const SpirvInterface& spirv) {
+double bytesOf(const vulkan::Bindings& bindings) {
   std::set<const void*> read, written;
   double bytes = 0;
-  for (const auto& [number, access] : spirv.bindings) {
-    if (access.name == kSparse) continue;
-    const vulkan::BoundBuffer& buffer = bindings.buffers()[number];
-    if (access.reads && read.insert(buffer.identity).second) bytes += static_cast<double>(buffer.bytes);
-    if (access.writes && written.insert(buffer.identity).second) bytes += static_cast<double>(buffer.bytes);
+  const std::span<const vulkan::Binding> access = bindings.kernel().interface().bindings;
+  for (std::size_t i = 0; i < access.size(); ++i) {
+    if (access[i].name == kSparse) continue;
+    const vulkan::BoundBuffer& buffer = bindings.buffers()[i];
+    if (access[i].reads && read.insert(buffer.identity).second) bytes += static_cast<double>(buffer.bytes);
+    if (access[i].writes && written.insert(buffer.identity).second)
+      bytes += static_cast<double>(buffer.bytes);
   }
   return bytes;
 }
@@ -116,23 +117,16 @@ class Collection {
   std::vector<SurveyedKernel> take() { return std::move(kernels_); }
 
  private:
-  const SpirvInterface& interface(const vulkan::Kernel& kernel) {
-    const auto [known, isNew] = interfaces_.try_emplace(kernel.name());
-    if (isNew) known->second = interfaceOf(kernel.spirv());
-    return known->second;
-  }
-
   Extent extentOf(const vulkan::RehearsedKernel& rehearsed) {
-    return {bytesOf(*rehearsed.bindings, interface(rehearsed.bindings->kernel())),
-            static_cast<double>(rehearsed.invocations)};
+    return {bytesOf(*rehearsed.bindings), static_cast<double>(rehearsed.invocations)};
   }
 
   Key note(const vulkan::RehearsedKernel& rehearsed, const std::string& scene) {
     const vulkan::Kernel& kernel = rehearsed.bindings->kernel();
-    const Key key{kernel.name(), settingsOf(kernel, interface(kernel)), kernel.workgroupSize()};
+    const Key key{std::string(kernel.name()), settingsOf(kernel), kernel.workgroupSize()};
     const auto [place, isNew] = places_.try_emplace(key, kernels_.size());
     if (isNew)
-      kernels_.push_back({.kernel = kernel.name(),
+      kernels_.push_back({.kernel = std::string(kernel.name()),
                           .settings = std::get<1>(key),
                           .workgroupSize = kernel.workgroupSize(),
                           .subgroupSize = vulkan::subgroupSizeOf(device_, kernel),
@@ -145,7 +139,6 @@ class Collection {
   }
 
   vulkan::Device& device_;
-  std::map<std::string, SpirvInterface> interfaces_;
   std::map<Key, std::size_t> places_;
   std::map<Key, std::string> lastScene_;
   std::vector<SurveyedKernel> kernels_;

@@ -30,12 +30,7 @@ class Arithmetic : public GpuTest {
       std::uint32_t first, stride;
     };
     constexpr std::uint32_t kSlice = 1u << 21;
-    const vulkan::Kernel kernel(device(), {.name = "evaluate_reciprocal_square_root",
-                                           .spirv = kernels::evaluate_reciprocal_square_root,
-                                           .bindings = {vulkan::BindingKind::storage},
-                                           .pushConstantBytes = sizeof(Push),
-                                           .workgroupSize = 64,
-                                           .specialisation = {}});
+    const vulkan::Kernel kernel(device(), kernels::evaluate_reciprocal_square_root, 64);
     const vulkan::Buffer results(device(), vulkan::BufferPurpose::readback, kSlice * sizeof(float));
     const vulkan::Bindings bindings(device(), kernel, {&results});
     double largest = 0;
@@ -117,7 +112,7 @@ const std::set<std::uint32_t> kExactInstructions{
 constexpr std::uint32_t kInverseSqrt = 32;
 const std::set<std::string> kKernelsThatEstimate{"predict_phase", "predict_small_phases", "sum_products"};
 
-class KernelArithmetic : public ::testing::TestWithParam<NamedKernel> {};
+class KernelArithmetic : public ::testing::TestWithParam<vulkan::KernelCode> {};
 
 TEST_P(KernelArithmetic, UsesOnlyOperationsWithTheSameBitsOnEveryDevice) {
   const FloatArithmetic found = floatArithmeticOf(GetParam().spirv);
@@ -137,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(All, KernelArithmetic, ::testing::ValuesIn(kAllKernels)
                          [](const auto& kernel) { return std::string(kernel.param.name); });
 
 TEST(KernelArithmeticCheck, SeesTheArithmeticOfKernels) {
-  const FloatArithmetic found = floatArithmeticOf(kernels::advance_mass_spring);
+  const FloatArithmetic found = floatArithmeticOf(kernels::advance_mass_spring.spirv);
   EXPECT_GT(found.operations.at("FMul"), 5);
   EXPECT_GE(std::size(kAllKernels), 48u);
 }

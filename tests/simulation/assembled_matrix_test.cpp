@@ -21,12 +21,8 @@ namespace {
 using simulation::AssembledTables;
 using simulation::DeviceTable;
 using simulation::NodeState;
-using vulkan::BindingKind;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-using vulkan::kImages;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 constexpr std::uint32_t kWorkgroup = 8;
 constexpr double kSubstepSeconds = 1.0 / 720;
@@ -150,34 +146,14 @@ Products productsOf(const model::Scene& scene, const AssembledTables& tables, co
       sums(device(), BufferPurpose::state, tables.chunks.size() * 2 * sizeof(float)),
       solves(device(), BufferPurpose::state, tables.systems.size() * sizeof(shared::SolveRecord)),
       readback(device(), BufferPurpose::readback, 2 * half);
-  const auto kernel = [](const char* name, std::span<const std::uint32_t> spirv,
-                         std::vector<BindingKind> bindings, std::size_t push) {
-    return vulkan::Kernel(device(), {.name = name,
-                                     .spirv = spirv,
-                                     .bindings = std::move(bindings),
-                                     .pushConstantBytes = static_cast<std::uint32_t>(push),
-                                     .workgroupSize = kWorkgroup,
-                                     .specialisation = {}});
-  };
-  const vulkan::Kernel fill =
-      kernel("fill_jacobian", kernels::fill_jacobian,
-             {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage},
-             sizeof(shared::AssemblePush));
-  const vulkan::Kernel assemble =
-      kernel("multiply_jacobians", kernels::multiply_jacobians,
-             {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage}, 0);
-  const vulkan::Kernel multiply =
-      kernel("multiply_system", kernels::multiply_system,
-             {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kImages, kStorage, kStorage, kStorage},
-             sizeof(shared::MultiplierPush));
-  const vulkan::Bindings filling(device(), fill,
+  const vulkan::Bindings filling(device(), {device(), kernels::fill_jacobian, kWorkgroup},
                                  {&cloths.texels(), &systems.texels(), &chunks.texels(), &rows.texels(),
                                   &positions, &velocities, &blocks, &vectors, &solves});
-  const vulkan::Bindings assembling(device(), assemble,
+  const vulkan::Bindings assembling(device(), {device(), kernels::multiply_jacobians, kWorkgroup},
                                     {&cloths.texels(), &systems.texels(), &chunks.texels(), &entries.texels(),
                                      &columns.texels(), &sources.texels(), &blocks, &values});
   const vulkan::Bindings multiplying(
-      device(), multiply,
+      device(), {device(), kernels::multiply_system, kWorkgroup},
       {&cloths.texels(), &systems.texels(), &chunks.texels(), &entries.texels(), &columns.texels(), &values,
        &vectors, &vectors, &sums, &solves});
   const std::uint64_t threads = tables.chunks.size() * std::uint64_t{kWorkgroup};

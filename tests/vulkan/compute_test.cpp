@@ -45,12 +45,7 @@ std::vector<T> contents(const Buffer& buffer) {
 }
 
 Kernel countUp(std::uint32_t workgroupSize = 64) {
-  return {tests::device(),
-          {.name = "count_up",
-           .spirv = kernels::count_up,
-           .bindings = {BindingKind::storage, BindingKind::storage},
-           .pushConstantBytes = sizeof(std::uint32_t),
-           .workgroupSize = workgroupSize}};
+  return {tests::device(), kernels::count_up, workgroupSize};
 }
 
 TEST_F(ComputeTest, BufferContentsSurviveTheRoundTrip) {
@@ -98,12 +93,8 @@ TEST_F(ComputeTest, KernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
   };
   constexpr std::uint32_t kCount = 100;  // not a multiple of the workgroup size
   for (const std::uint32_t workgroupSize : {1u, 8u, 64u, 128u}) {
-    const Kernel kernel(tests::device(), {.name = "add_scaled",
-                                          .spirv = kernels::add_scaled,
-                                          .bindings = {BindingKind::storage},
-                                          .pushConstantBytes = sizeof(Push),
-                                          .workgroupSize = workgroupSize,
-                                          .specialisation = {3, std::bit_cast<std::uint32_t>(0.5f)}});
+    const Kernel kernel(tests::device(), kernels::add_scaled, workgroupSize,
+                        {3, std::bit_cast<std::uint32_t>(0.5f)});
     const Buffer values(tests::device(), BufferPurpose::readback, (kCount + 28) * sizeof(float));
     std::fill(values.mapped<float>().begin(), values.mapped<float>().end(), 1.0f);
     const Bindings bindings(tests::device(), kernel, {&values});
@@ -115,17 +106,42 @@ TEST_F(ComputeTest, KernelGetsSpecialisationPushConstantsAndWorkgroupSize) {
   }
 }
 
+TEST_F(ComputeTest, KernelKnowsItsInterface) {
+  const SpirvInterface adds = interfaceOf(kernels::add_scaled.spirv),
+                       gathers = interfaceOf(kernels::gather_texels.spirv);
+  EXPECT_EQ(adds.pushConstantBytes, 8u);
+  ASSERT_EQ(adds.bindings.size(), 1u);
+  EXPECT_EQ(adds.bindings[0].kind, BindingKind::storage);
+  EXPECT_EQ(adds.constants.size(), 2u);
+  EXPECT_EQ(gathers.pushConstantBytes, 4u);
+  ASSERT_EQ(gathers.bindings.size(), 2u);
+  EXPECT_EQ(gathers.bindings[0].kind, BindingKind::texels);
+  EXPECT_TRUE(gathers.bindings[0].reads && !gathers.bindings[0].writes);
+  EXPECT_EQ(gathers.bindings[1].kind, BindingKind::storage);
+  EXPECT_TRUE(gathers.bindings[1].writes);
+}
+
+TEST_F(ComputeTest, BindingsAreOneForEachBuffer) {
+  const Buffer buffer = uploadOf({1});
+  EXPECT_THROW(Bindings(tests::device(), countUp(), {&buffer}), std::logic_error);
+  EXPECT_THROW(Bindings(tests::device(), countUp(), {&buffer, &buffer, &buffer}), std::logic_error);
+}
+
+TEST_F(ComputeTest, PushConstantsHaveTheKernelsSize) {
+  const Buffer buffer = uploadOf({1});
+  const Bindings bindings(tests::device(), countUp(), {&buffer, &buffer});
+  Recorder recorder(tests::device());
+  recorder.begin();
+  EXPECT_THROW(recorder.dispatch(bindings, std::uint64_t{1}, 1), std::logic_error);
+}
+
 TEST_F(ComputeTest, KernelReadsTexelsThatCopiesWrote) {
   constexpr std::uint32_t kCount = 300;
   const Buffer upload(tests::device(), BufferPurpose::upload, kCount * 16);
   for (std::uint32_t i = 0; i < kCount * 4; ++i) upload.mapped<float>()[i] = static_cast<float>(i);
   const Buffer texels(tests::device(), BufferPurpose::texels, kCount * 16);
   const Buffer sums(tests::device(), BufferPurpose::readback, kCount * sizeof(float));
-  const Kernel kernel(tests::device(), {.name = "gather_texels",
-                                        .spirv = kernels::gather_texels,
-                                        .bindings = {BindingKind::texels, BindingKind::storage},
-                                        .pushConstantBytes = sizeof(std::uint32_t)});
-  const Bindings bindings(tests::device(), kernel, {&texels, &sums});
+  const Bindings bindings(tests::device(), {tests::device(), kernels::gather_texels, 64}, {&texels, &sums});
   tests::run([&](Recorder& recorder) {
     recorder.copy(upload, texels, upload.bytes());
     recorder.barrier();

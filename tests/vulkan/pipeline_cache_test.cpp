@@ -36,10 +36,7 @@ class PipelineCacheTest : public tests::GpuTest {
   // the device took from the cache.
   std::size_t useCache() const {
     const Device device({.cacheDirectory = directory_});
-    const Kernel kernel(device, {.name = "count_up",
-                                 .spirv = kernels::count_up,
-                                 .bindings = {BindingKind::storage, BindingKind::storage},
-                                 .pushConstantBytes = sizeof(std::uint32_t)});
+    const Kernel kernel(device, kernels::count_up, 64);
     return device.pipelineCacheLoaded();
   }
 

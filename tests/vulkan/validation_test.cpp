@@ -31,14 +31,10 @@ class ValidationTest : public tests::GpuTest {
     device_ = std::make_unique<Device>(DeviceOptions{.validation = true});
     for (Buffer& buffer : buffers_)
       buffer = Buffer(*device_, BufferPurpose::state, kCount * sizeof(std::uint32_t));
-    kernel_ = std::make_unique<Kernel>(
-        *device_, KernelDescription{.name = "count_up",
-                                    .spirv = kernels::count_up,
-                                    .bindings = {BindingKind::storage, BindingKind::storage},
-                                    .pushConstantBytes = sizeof(std::uint32_t)});
-    first_ = std::make_unique<Bindings>(*device_, *kernel_,
+    const Kernel kernel(*device_, kernels::count_up, 64);
+    first_ = std::make_unique<Bindings>(*device_, kernel,
                                         std::initializer_list<const Buffer*>{&buffers_[0], &buffers_[1]});
-    second_ = std::make_unique<Bindings>(*device_, *kernel_,
+    second_ = std::make_unique<Bindings>(*device_, kernel,
                                          std::initializer_list<const Buffer*>{&buffers_[1], &buffers_[2]});
   }
 
@@ -49,19 +45,18 @@ class ValidationTest : public tests::GpuTest {
                                  vk::CommandBufferAllocateInfo{.commandPool = *pool, .commandBufferCount = 1})
             .front());
     commands.begin(vk::CommandBufferBeginInfo{});
-    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel_->handles().pipeline);
-    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel_->handles().layout, 0,
+    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *bindings.kernel().handles().pipeline);
+    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *bindings.kernel().handles().layout, 0,
                                 *bindings.handles().set, nullptr);
-    commands.pushConstants<std::uint32_t>(*kernel_->handles().layout, vk::ShaderStageFlagBits::eCompute, 0,
-                                          kCount);
-    commands.dispatch(kCount / kernel_->workgroupSize(), 1, 1);
+    commands.pushConstants<std::uint32_t>(*bindings.kernel().handles().layout,
+                                          vk::ShaderStageFlagBits::eCompute, 0, kCount);
+    commands.dispatch(kCount / bindings.kernel().workgroupSize(), 1, 1);
     commands.end();
     return commands;
   }
 
   std::unique_ptr<Device> device_;
   std::array<Buffer, 3> buffers_;
-  std::unique_ptr<Kernel> kernel_;
   std::unique_ptr<Bindings> first_, second_;
 };
 

@@ -17,11 +17,7 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::BindingKind;
 using vulkan::BufferPurpose;
-using vulkan::kImages;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 // On a software device a workgroup is no wider than the CPU's vectors, and an invocation makes at most 65,535
 // loop rounds; compare SolveStage.
@@ -43,17 +39,6 @@ constexpr std::uint32_t kFillWork = 8;
 // Bindings need a buffer even for an empty table.
 std::size_t texels(std::size_t count) {
   return std::max<std::size_t>(1, count) * sizeof(shared::vec4);
-}
-
-vulkan::KernelDescription kernel(const char* name, std::span<const std::uint32_t> spirv,
-                                 std::vector<BindingKind> bindings, std::size_t push,
-                                 const AssembledCut& cut) {
-  return {.name = name,
-          .spirv = spirv,
-          .bindings = std::move(bindings),
-          .pushConstantBytes = static_cast<std::uint32_t>(push),
-          .workgroupSize = cut.workgroup,
-          .specialisation = {}};
 }
 
 }  // namespace
@@ -82,44 +67,39 @@ AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const mod
       sums_(device, BufferPurpose::state, tables_.chunks.size() * 2 * sizeof(float)),
       solves_(device, BufferPurpose::state, tables_.systems.size() * sizeof(shared::SolveRecord)),
       solvesReadback_(device, BufferPurpose::readback, solves_.bytes()),
-      fill_(device,
-            kernel("fill_jacobian", kernels::fill_jacobian,
-                   {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage},
-                   sizeof(shared::AssemblePush), cut_),
-            {&state.cloths, &systems_.texels(), &chunks_.texels(), &rows_.texels(), state.positions[0],
-             state.velocities[1], &blocks_, &vectors_, &solves_},
-            {&state.cloths, &systems_.texels(), &chunks_.texels(), &rows_.texels(), state.positions[1],
-             state.velocities[0], &blocks_, &vectors_, &solves_}),
-      multiplyJacobians_(
-          device,
-          kernel("multiply_jacobians", kernels::multiply_jacobians,
-                 {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage}, 0, cut_),
-          {&state.cloths, &systems_.texels(), &chunks_.texels(), &entries_.texels(), &columns_.texels(),
-           &sources_.texels(), &blocks_, &values_}),
-      apply_(device,
-             kernel("apply_multipliers", kernels::apply_multipliers,
-                    {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage,
-                     kTexels, kStorage, kTexels},
-                    sizeof(shared::ApplyMultiplierPush), cut_),
-             {&state.cloths, &nodeRanges_.texels(), &nodeEntries_.texels(), &nodeRows_.texels(),
-              &state.colliders, &state.nearColliders, state.positions[0], state.positions[1],
-              state.velocities[1], &blocks_, &state.contactImpulses, &vectors_},
-             {&state.cloths, &nodeRanges_.texels(), &nodeEntries_.texels(), &nodeRows_.texels(),
-              &state.colliders, &state.nearColliders, state.positions[1], state.positions[0],
-              state.velocities[0], &blocks_, &state.contactImpulses, &vectors_}) {
-  const auto make = [&](const char* name, std::span<const std::uint32_t> spirv) {
-    return std::make_unique<Pass>(
-        device,
-        kernel(name, spirv,
-               {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kImages, kStorage, kStorage, kStorage},
-               sizeof(shared::MultiplierPush), cut_),
-        Stage::Buffers{&state.cloths, &systems_.texels(), &chunks_.texels(), &entries_.texels(),
-                       &columns_.texels(), &values_, &vectors_, &vectors_, &sums_, &solves_});
+      fill_(bindStates(device, {device, kernels::fill_jacobian, cut_.workgroup},
+                       [&](std::size_t from) {
+                         return BufferList{&state.cloths,
+                                           &systems_.texels(),
+                                           &chunks_.texels(),
+                                           &rows_.texels(),
+                                           state.positions[from],
+                                           state.velocities[1 - from],
+                                           &blocks_,
+                                           &vectors_,
+                                           &solves_};
+                       })),
+      multiplyJacobians_(device, {device, kernels::multiply_jacobians, cut_.workgroup},
+                         {&state.cloths, &systems_.texels(), &chunks_.texels(), &entries_.texels(),
+                          &columns_.texels(), &sources_.texels(), &blocks_, &values_}),
+      apply_(bindStates(device, {device, kernels::apply_multipliers, cut_.workgroup}, [&](std::size_t from) {
+        const std::size_t to = 1 - from;
+        return BufferList{&state.cloths,          &nodeRanges_.texels(),
+                          &nodeEntries_.texels(), &nodeRows_.texels(),
+                          &state.colliders,       &state.nearColliders,
+                          state.positions[from],  state.positions[to],
+                          state.velocities[to],   &blocks_,
+                          &state.contactImpulses, &vectors_};
+      })) {
+  const auto make = [&](const vulkan::KernelCode& code) {
+    return vulkan::Bindings(device, {device, code, cut_.workgroup},
+                            {&state.cloths, &systems_.texels(), &chunks_.texels(), &entries_.texels(),
+                             &columns_.texels(), &values_, &vectors_, &vectors_, &sums_, &solves_});
   };
-  if (tables_.wholeSystems.count > 0) solve_ = make("solve_multipliers", kernels::solve_multipliers);
+  if (tables_.wholeSystems.count > 0) solve_ = make(kernels::solve_multipliers);
   if (tables_.partChunks.count > 0) {
-    multiply_ = make("multiply_system", kernels::multiply_system);
-    update_ = make("update_multipliers", kernels::update_multipliers);
+    multiply_ = make(kernels::multiply_system);
+    update_ = make(kernels::update_multipliers);
   }
   // The largest tables by far; only the device still needs them.
   for (std::vector<shared::NumbersRecord>* table : {&tables_.columns, &tables_.sources}) {
@@ -146,7 +126,7 @@ void AssembledStage::recordWhole(vulkan::Recorder& recorder, bool measures) cons
     const std::uint64_t rounds =
         std::uint64_t{tables_.wholeRounds} * (push.endIteration - push.firstIteration);
     recorder.barrier();
-    recorder.dispatch(solve_->bindings, push, std::uint64_t{tables_.wholeSystems.count} * cut_.workgroup,
+    recorder.dispatch(*solve_, push, std::uint64_t{tables_.wholeSystems.count} * cut_.workgroup,
                       rounds / kRoundsPerWork + 1);
     push.firstIteration = push.endIteration;
   }
@@ -159,14 +139,14 @@ void AssembledStage::recordParts(vulkan::Recorder& recorder, bool measures) cons
   push.firstChunk = tables_.partChunks.first;
   const std::uint64_t threads = std::uint64_t{tables_.partChunks.count} * cut_.workgroup;
   for (std::uint32_t iteration = 0; iteration < tables_.partIterations; ++iteration)
-    for (const Pass* half : {multiply_.get(), update_.get()}) {
+    for (const vulkan::Bindings* half : {&*multiply_, &*update_}) {
       recorder.barrier();
-      recorder.dispatch(half->bindings, push, threads);
+      recorder.dispatch(*half, push, threads);
     }
   if (!measures) return;
   push.measures = 1;
   recorder.barrier();
-  recorder.dispatch(multiply_->bindings, push, threads);
+  recorder.dispatch(*multiply_, push, threads);
 }
 
 void AssembledStage::record(vulkan::Recorder& recorder, std::uint32_t from,
@@ -174,15 +154,14 @@ void AssembledStage::record(vulkan::Recorder& recorder, std::uint32_t from,
                             bool measures) const {
   const std::uint64_t chunkThreads = std::uint64_t{tables_.chunks.size()} * cut_.workgroup;
   recorder.barrier();
-  recorder.dispatch(fill_.from[from], shared::AssemblePush{static_cast<float>(1 / substepSeconds)},
-                    chunkThreads,
+  recorder.dispatch(fill_[from], shared::AssemblePush{static_cast<float>(1 / substepSeconds)}, chunkThreads,
                     workPerInvocation(CLOTHSTREAM_ASSEMBLED_CHUNK_ROWS * kFillWork, cut_.workgroup));
   recorder.barrier();
-  recorder.dispatch(multiplyJacobians_.bindings, chunkThreads);
+  recorder.dispatch(multiplyJacobians_, chunkThreads);
   recordWhole(recorder, measures);
   recordParts(recorder, measures);
   recorder.barrier();
-  recorder.dispatch(apply_.from[from],
+  recorder.dispatch(apply_[from],
                     shared::ApplyMultiplierPush{.collision = collision,
                                                 .substepSeconds = static_cast<float>(substepSeconds),
                                                 .reserved0 = 0,

@@ -3,14 +3,13 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 
 #include "server/model/scene.h"
 #include "server/simulation/assembled/assembled_tables.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
@@ -55,17 +54,6 @@ class AssembledStage {
   std::span<const std::uint32_t> cloths() const { return tables_.cloths; }
 
  private:
-  // A kernel that does not access the state.
-  struct Pass {
-    Pass(const vulkan::Device& device, const vulkan::KernelDescription& description, Stage::Buffers buffers)
-        : kernel(device, description), bindings(device, kernel, buffers) {}
-    Pass(const Pass&) = delete;
-    Pass& operator=(const Pass&) = delete;
-
-    vulkan::Kernel kernel;
-    vulkan::Bindings bindings;  // they refer to the kernel
-  };
-
   void recordWhole(vulkan::Recorder& recorder, bool measures) const;
   void recordParts(vulkan::Recorder& recorder, bool measures) const;
 
@@ -73,11 +61,11 @@ class AssembledStage {
   AssembledTables tables_;
   DeviceTable systems_, chunks_, rows_, entries_, columns_, sources_, nodeEntries_, nodeRows_, nodeRanges_;
   vulkan::Buffer blocks_, values_, vectors_, sums_, solves_, solvesReadback_;
-  Stage fill_;
-  Pass multiplyJacobians_;
-  std::unique_ptr<Pass> solve_;              // if one workgroup solves a system
-  std::unique_ptr<Pass> multiply_, update_;  // if several workgroups solve a system
-  Stage apply_;
+  StateBindings fill_;
+  vulkan::Bindings multiplyJacobians_;
+  std::optional<vulkan::Bindings> solve_;              // if one workgroup solves a system
+  std::optional<vulkan::Bindings> multiply_, update_;  // if several workgroups solve a system
+  StateBindings apply_;
 };
 
 }  // namespace clothstream::simulation

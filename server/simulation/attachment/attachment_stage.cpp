@@ -19,8 +19,6 @@ namespace {
 
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 constexpr float kNoSlip = 1e18f;  // m, more than any distance in the world; its square is finite
 constexpr std::size_t kGrabBytes = kMaxGrabs * sizeof(shared::GrabRecord);
@@ -90,50 +88,36 @@ AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentT
                Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes)},
       readbacks_{Buffer(device, BufferPurpose::readback, kReportBytes),
                  Buffer(device, BufferPurpose::readback, kReportBytes)},
-      carry_(device,
-             {.name = "carry_nodes",
-              .spirv = kernels::carry_nodes,
-              .bindings = {kStorage, kStorage},
-              .pushConstantBytes = sizeof(shared::CarryPush),
-              .workgroupSize = workgroupSize},
-             {state.positions[0], state.velocities[0]}, {state.positions[1], state.velocities[1]}),
-      aim_(device,
-           {.name = "aim_attachments",
-            .spirv = kernels::aim_attachments,
-            .bindings = {kTexels, kTexels, kTexels, kStorage},
-            .pushConstantBytes = sizeof(shared::AimPush),
-            .workgroupSize = workgroupSize},
-           {&attached_.texels(), &frames_, state.positions[0], state.velocities[0]},
-           {&attached_.texels(), &frames_, state.positions[1], state.velocities[1]}),
-      findNearest_(device,
-                   {.name = "find_nearest_nodes",
-                    .spirv = kernels::find_nearest_nodes,
-                    .bindings = {kTexels, kStorage, kTexels},
-                    .pushConstantBytes = sizeof(shared::GrabPush),
-                    .workgroupSize = workgroupSize},
-                   {&grabs_, &reports_, state.positions[0]}, {&grabs_, &reports_, state.positions[1]}),
-      beginGrabs_(device,
-                  {.name = "begin_grabs",
-                   .spirv = kernels::begin_grabs,
-                   .bindings = {kTexels, kStorage, kTexels, kStorage},
-                   .pushConstantBytes = sizeof(shared::GrabPush),
-                   .workgroupSize = workgroupSize},
-                  {&grabs_, &reports_, state.positions[0], &grabbed_},
-                  {&grabs_, &reports_, state.positions[1], &grabbed_}),
-      tie_(makePull(device, state, false)),
-      pull_(makePull(device, state, true)) {}
+      carry_(bindStates(device, {device, kernels::carry_nodes, workgroupSize},
+                        [&](std::size_t from) {
+                          return BufferList{state.positions[from], state.velocities[from]};
+                        })),
+      aim_(bindStates(
+          device, {device, kernels::aim_attachments, workgroupSize},
+          [&](std::size_t from) {
+            return BufferList{&attached_.texels(), &frames_, state.positions[from], state.velocities[from]};
+          })),
+      findNearest_(bindStates(device, {device, kernels::find_nearest_nodes, workgroupSize},
+                              [&](std::size_t from) {
+                                return BufferList{&grabs_, &reports_, state.positions[from]};
+                              })),
+      beginGrabs_(bindStates(device, {device, kernels::begin_grabs, workgroupSize},
+                             [&](std::size_t from) {
+                               return BufferList{&grabs_, &reports_, state.positions[from], &grabbed_};
+                             })),
+      tie_(bindPull(device, state, false)),
+      pull_(bindPull(device, state, true)) {}
 
 // The buffers that do not have the substep's start have its result.
-Stage AttachmentStage::makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const {
-  return Stage(device,
-               {.name = "pull_nodes",
-                .spirv = kernels::pull_nodes,
-                .bindings = {kTexels, kStorage, kTexels, kStorage, kStorage, kStorage},
-                .pushConstantBytes = sizeof(shared::PullPush),
-                .workgroupSize = workgroupSize_,
-                .specialisation = {hasTethers_ ? 1u : 0u, grabs ? 1u : 0u}},
-               {&grabs_, &reports_, &tethers_.texels(), state.positions[1], state.velocities[1], &grabbed_},
-               {&grabs_, &reports_, &tethers_.texels(), state.positions[0], state.velocities[0], &grabbed_});
+StateBindings AttachmentStage::bindPull(const vulkan::Device& device, const StateBuffers& state,
+                                        bool grabs) const {
+  return bindStates(
+      device, {device, kernels::pull_nodes, workgroupSize_, {hasTethers_ ? 1u : 0u, grabs ? 1u : 0u}},
+      [&](std::size_t from) {
+        const std::size_t to = 1 - from;
+        return BufferList{&grabs_,  &reports_, &tethers_.texels(), state.positions[to], state.velocities[to],
+                          &grabbed_};
+      });
 }
 
 std::uint64_t AttachmentStage::invocations() const {
@@ -199,7 +183,7 @@ void AttachmentStage::recordCarries(vulkan::Recorder& recorder, std::uint32_t pr
                                     std::span<const std::uint32_t> clothOffsets) {
   for (const model::Carry& carry : carries) {
     const std::uint32_t first = clothOffsets[carry.cloth], count = clothOffsets[carry.cloth + 1] - first;
-    recorder.dispatch(carry_.from[present],
+    recorder.dispatch(carry_[present],
                       shared::CarryPush{.from = vectorOf(carry.from.position),
                                         .firstNode = first,
                                         .to = vectorOf(carry.to.position),
@@ -212,12 +196,12 @@ void AttachmentStage::recordCarries(vulkan::Recorder& recorder, std::uint32_t pr
 
 void AttachmentStage::recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate) {
   if (attachedCount_ > 0)
-    recorder.dispatch(aim_.from[present],
-                      shared::AimPush{attachedCount_, tickRate, model::kMaxAttachmentSpeed}, attachedCount_);
+    recorder.dispatch(aim_[present], shared::AimPush{attachedCount_, tickRate, model::kMaxAttachmentSpeed},
+                      attachedCount_);
   if (!takes_) return;
-  recorder.dispatch(findNearest_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
+  recorder.dispatch(findNearest_[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
   recorder.barrier();
-  recorder.dispatch(beginGrabs_.from[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
+  recorder.dispatch(beginGrabs_[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
 }
 
 void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
@@ -226,7 +210,7 @@ void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t pr
   const float rate = tickRate * static_cast<float>(substeps);
   recorder.barrier();
   recorder.dispatch(
-      (grabCount_ > 0 ? pull_ : tie_).from[present],
+      (grabCount_ > 0 ? pull_ : tie_)[present],
       shared::PullPush{.nodeCount = nodeCount_,
                        .progressBefore = static_cast<float>(substep) / static_cast<float>(substeps),
                        .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),

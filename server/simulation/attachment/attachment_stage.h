@@ -12,7 +12,7 @@
 #include "server/simulation/attachment/attachment_tables.h"
 #include "server/simulation/attachment/grab.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/buffer.h"
@@ -68,7 +68,7 @@ class AttachmentStage {
  private:
   // Records the upload of constant tables once.
   void recordTables(vulkan::Recorder& recorder);
-  Stage makePull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
+  StateBindings bindPull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
   // Number of invocations, which share the nodes.
   std::uint64_t invocations() const;
 
@@ -91,7 +91,7 @@ class AttachmentStage {
   // Held nodes, then reports. Created when they are first needed.
   vulkan::Buffer heldReadback_, heldUpload_;
   std::uint32_t savedGrabs_ = 0;  // by the newest recordSave()
-  Stage carry_, aim_, findNearest_, beginGrabs_, tie_, pull_;
+  StateBindings carry_, aim_, findNearest_, beginGrabs_, tie_, pull_;
 };
 
 }  // namespace clothstream::simulation

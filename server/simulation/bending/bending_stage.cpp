@@ -10,9 +10,6 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::kStorage;
-using vulkan::kTexels;
-
 // Work of a node (vulkan::Recorder::dispatch), which gathers from its hinges.
 constexpr std::uint32_t kBendWork = 4;
 
@@ -39,22 +36,15 @@ BendingStage::BendingStage(const vulkan::Device& device, const BendingTables& ta
       lists_(device, tables.lists),
       forces_(device, vulkan::BufferPurpose::texels,
               std::max<std::size_t>(1, tables.hinges.size()) * 4 * sizeof(shared::vec4)),
-      measure_(device,
-               {.name = "measure_hinges",
-                .spirv = kernels::measure_hinges,
-                .bindings = {kTexels, kTexels, kTexels, kStorage},
-                .pushConstantBytes = sizeof(shared::BendingPush),
-                .workgroupSize = workgroupSize},
-               {&state.cloths, &hinges_.texels(), state.positions[0], &forces_},
-               {&state.cloths, &hinges_.texels(), state.positions[1], &forces_}),
-      bend_(device,
-            {.name = "bend_nodes",
-             .spirv = kernels::bend_nodes,
-             .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage},
-             .pushConstantBytes = sizeof(shared::BendingPush),
-             .workgroupSize = workgroupSize},
-            {&incidences_.texels(), &lists_.texels(), &forces_, state.positions[0], state.velocities[0]},
-            {&incidences_.texels(), &lists_.texels(), &forces_, state.positions[1], state.velocities[1]}) {}
+      measure_(
+          bindStates(device, {device, kernels::measure_hinges, workgroupSize},
+                     [&](std::size_t from) {
+                       return BufferList{&state.cloths, &hinges_.texels(), state.positions[from], &forces_};
+                     })),
+      bend_(bindStates(device, {device, kernels::bend_nodes, workgroupSize}, [&](std::size_t from) {
+        return BufferList{&incidences_.texels(), &lists_.texels(), &forces_, state.positions[from],
+                          state.velocities[from]};
+      })) {}
 
 bool BendingStage::isIn(std::span<const model::Cloth> cloths) {
   return std::ranges::any_of(cloths, [](const model::Cloth& cloth) { return cloth.dihedralBending > 0; });
@@ -72,10 +62,10 @@ void BendingStage::recordTables(vulkan::Recorder& recorder) const {
 
 void BendingStage::record(vulkan::Recorder& recorder, std::uint32_t present, double substepSeconds) const {
   shared::BendingPush push{hingeCount_, static_cast<float>(substepSeconds)};
-  recorder.dispatch(measure_.from[present], push, hingeCount_, 1);
+  recorder.dispatch(measure_[present], push, hingeCount_, 1);
   recorder.barrier();
   push.count = nodeCount_;
-  recorder.dispatch(bend_.from[present], push, nodeCount_, kBendWork);
+  recorder.dispatch(bend_[present], push, nodeCount_, kBendWork);
 }
 
 }  // namespace clothstream::simulation

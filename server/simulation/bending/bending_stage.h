@@ -10,7 +10,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/bending/bending_tables.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
@@ -44,7 +44,7 @@ class BendingStage {
   std::uint32_t hingeCount_, nodeCount_;
   DeviceTable hinges_, incidences_, lists_;
   vulkan::Buffer forces_;
-  Stage measure_, bend_;
+  StateBindings measure_, bend_;
 };
 
 }  // namespace clothstream::simulation

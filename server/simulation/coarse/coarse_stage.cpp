@@ -14,9 +14,6 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::kStorage;
-using vulkan::kTexels;
-
 static_assert(model::kMaxCoarseNodes == CLOTHSTREAM_COARSE_NODES);
 
 // Invocations that hold the links of a cloth. A software device runs eight at a time, and barriers between
@@ -27,20 +24,6 @@ constexpr std::uint32_t kGpuRows = 1, kCpuRows = 8;
 
 // Work of an invocation (vulkan::Recorder::dispatch).
 constexpr std::uint32_t kAverageWork = 8, kHoldWork = 64, kMoveMeshWork = 1;
-
-const std::vector<vulkan::BindingKind> kMoved{kTexels,  kTexels, kTexels, kTexels, kStorage,
-                                              kStorage, kTexels, kTexels, kStorage};
-
-vulkan::KernelDescription kernelOf(const char* name, std::span<const std::uint32_t> spirv,
-                                   std::uint32_t workgroupSize, std::vector<vulkan::BindingKind> bindings,
-                                   std::vector<std::uint32_t> specialisation = {}) {
-  return {.name = name,
-          .spirv = spirv,
-          .bindings = std::move(bindings),
-          .pushConstantBytes = sizeof(shared::CoarsePush),
-          .workgroupSize = workgroupSize,
-          .specialisation = std::move(specialisation)};
-}
 
 vulkan::Buffer texels(const vulkan::Device& device, std::size_t count) {
   return {device, vulkan::BufferPurpose::texels, std::max<std::size_t>(1, count) * sizeof(shared::vec4)};
@@ -63,39 +46,42 @@ CoarseStage::CoarseStage(const vulkan::Device& device, const CoarseTables& table
       links_(device, tables.links),
       parts_(texels(device, tables.parts)),
       corrections_(texels(device, tables.nodes.size())),
-      averageNodes_(device,
-                    kernelOf("average_nodes", kernels::average_nodes, workgroupSize,
-                             {kTexels, kTexels, kTexels, kStorage}),
-                    {&nodes_.texels(), &means_.texels(), state.positions[0], &parts_},
-                    {&nodes_.texels(), &means_.texels(), state.positions[1], &parts_}),
-      averageRows_(device,
-                   kernelOf("average_rows", kernels::average_rows, workgroupSize, {kTexels, kStorage}),
-                   {state.positions[0], &parts_}, {state.positions[1], &parts_}),
-      hold_(
-          device,
-          kernelOf("hold_links", kernels::hold_links, device.hasGpuKernels() ? kGpuHoldLanes : kCpuHoldLanes,
-                   {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage}),
-          {&nodes_.texels(), &parts_, &means_.texels(), &colours_.texels(), &links_.texels(),
-           state.positions[0], &corrections_},
-          {&nodes_.texels(), &parts_, &means_.texels(), &colours_.texels(), &links_.texels(),
-           state.positions[1], &corrections_}),
-      moves_{Moves(device, shares_.texels(), corrections_, state, workgroupSize, rows_, false),
-             Moves(device, shares_.texels(), corrections_, state, workgroupSize, rows_, true)} {}
+      averageNodes_(
+          bindStates(device, {device, kernels::average_nodes, workgroupSize},
+                     [&](std::size_t from) {
+                       return BufferList{&nodes_.texels(), &means_.texels(), state.positions[from], &parts_};
+                     })),
+      averageRows_(bindStates(device, {device, kernels::average_rows, workgroupSize},
+                              [&](std::size_t from) {
+                                return BufferList{state.positions[from], &parts_};
+                              })),
+      hold_(bindStates(device,
+                       {device, kernels::hold_links, device.hasGpuKernels() ? kGpuHoldLanes : kCpuHoldLanes},
+                       [&](std::size_t from) {
+                         return BufferList{&nodes_.texels(),   &parts_,          &means_.texels(),
+                                           &colours_.texels(), &links_.texels(), state.positions[from],
+                                           &corrections_};
+                       })),
+      moves_{bindMoves(device, state, workgroupSize, false), bindMoves(device, state, workgroupSize, true)} {}
 
-CoarseStage::Moves::Moves(const vulkan::Device& device, const vulkan::Buffer& shares,
-                          const vulkan::Buffer& corrections, const StateBuffers& state,
-                          std::uint32_t workgroupSize, std::uint32_t rows, bool colliders)
-    : mesh(device, kernelOf("move_mesh", kernels::move_mesh, workgroupSize, kMoved, {colliders ? 1u : 0u}),
-           {&shares, &corrections, state.positions[0], state.velocities[0], state.positions[0],
-            state.velocities[0], &state.colliders, &state.nearColliders, &state.contactImpulses},
-           {&shares, &corrections, state.positions[1], state.velocities[1], state.positions[1],
-            state.velocities[1], &state.colliders, &state.nearColliders, &state.contactImpulses}),
-      grid(device,
-           kernelOf("move_grid", kernels::move_grid, workgroupSize, kMoved, {colliders ? 1u : 0u, rows}),
-           {&shares, &corrections, state.positions[0], state.velocities[0], state.positions[0],
-            state.velocities[0], &state.colliders, &state.nearColliders, &state.contactImpulses},
-           {&shares, &corrections, state.positions[1], state.velocities[1], state.positions[1],
-            state.velocities[1], &state.colliders, &state.nearColliders, &state.contactImpulses}) {}
+CoarseStage::Moves CoarseStage::bindMoves(const vulkan::Device& device, const StateBuffers& state,
+                                          std::uint32_t workgroupSize, bool colliders) const {
+  const std::uint32_t collides = colliders ? 1 : 0;
+  const auto buffers = [&](std::size_t from) {
+    const vulkan::Buffer *positions = state.positions[from], *velocities = state.velocities[from];
+    return BufferList{&shares_.texels(),
+                      &corrections_,
+                      positions,
+                      velocities,
+                      positions,
+                      velocities,
+                      &state.colliders,
+                      &state.nearColliders,
+                      &state.contactImpulses};
+  };
+  return {bindStates(device, {device, kernels::move_mesh, workgroupSize, {collides}}, buffers),
+          bindStates(device, {device, kernels::move_grid, workgroupSize, {collides, rows_}}, buffers)};
+}
 
 bool CoarseStage::isIn(std::span<const model::Cloth> cloths) {
   return std::ranges::any_of(cloths, [](const model::Cloth& cloth) { return cloth.coarse.has_value(); });
@@ -141,17 +127,16 @@ void CoarseStage::recordLevel(vulkan::Recorder& recorder, std::uint32_t present,
   const std::uint64_t colliding = collides ? push.collision.nodeWork : 0;
   const std::uint64_t sums =
       isGrid ? std::uint64_t{push.rows} * push.coarseColumns : std::uint64_t{push.coarseCount} * push.parts;
-  recorder.dispatch((isGrid ? averageRows_ : averageNodes_).from[present], push, sums, kAverageWork);
+  recorder.dispatch((isGrid ? averageRows_ : averageNodes_)[present], push, sums, kAverageWork);
   recorder.barrier();
-  recorder.dispatch(hold_.from[present], push, hold_.kernel.workgroupSize(), kHoldWork);
+  recorder.dispatch(hold_[present], push, hold_[present].kernel().workgroupSize(), kHoldWork);
   recorder.barrier();
   if (!isGrid) {
-    recorder.dispatch(moves.mesh.from[present], push, push.nodeCount, kMoveMeshWork + colliding);
+    recorder.dispatch(moves.mesh[present], push, push.nodeCount, kMoveMeshWork + colliding);
     return;
   }
   const std::uint64_t strips = (push.rows + rows_ - 1) / rows_;
-  recorder.dispatch(moves.grid.from[present], push, strips * push.columns,
-                    (rows_ + 1) / 2 + rows_ * colliding);
+  recorder.dispatch(moves.grid[present], push, strips * push.columns, (rows_ + 1) / 2 + rows_ * colliding);
 }
 
 }  // namespace clothstream::simulation

@@ -10,11 +10,12 @@
 #include "server/model/scene.h"
 #include "server/simulation/coarse/coarse_tables.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
+#include "shaders/shared/simulation.h"
 
 namespace clothstream::simulation {
 
@@ -43,21 +44,21 @@ class CoarseStage {
 
  private:
   struct Moves {
-    Moves(const vulkan::Device& device, const vulkan::Buffer& shares, const vulkan::Buffer& corrections,
-          const StateBuffers& state, std::uint32_t workgroupSize, std::uint32_t rows, bool colliders);
-    Stage mesh, grid;
+    StateBindings mesh, grid;
   };
 
   CoarseStage(const vulkan::Device& device, const CoarseTables& tables, const StateBuffers& state,
               std::uint32_t workgroupSize);
 
+  Moves bindMoves(const vulkan::Device& device, const StateBuffers& state, std::uint32_t workgroupSize,
+                  bool colliders) const;
   void recordLevel(vulkan::Recorder& recorder, std::uint32_t present, const shared::CoarsePush& push) const;
 
   std::vector<CoarseTables::Level> levels_;
   std::uint32_t rows_;  // of a column, that an invocation moves
   DeviceTable nodes_, means_, shares_, colours_, links_;
   vulkan::Buffer parts_, corrections_;
-  Stage averageNodes_, averageRows_, hold_;
+  StateBindings averageNodes_, averageRows_, hold_;
   std::array<Moves, 2> moves_;  // without and with colliders
 };
 

@@ -13,7 +13,6 @@
 namespace clothstream::simulation {
 namespace {
 
-using vulkan::BindingKind;
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 
@@ -24,6 +23,8 @@ constexpr std::size_t kBoundsBytes =
 
 // The lists are no larger than the positions, so that they limit no cloth's size (Limits::maxStorageRange).
 static_assert(shared::kNearStride * sizeof(float) <= shared::kNearNodes * sizeof(shared::vec4));
+
+constexpr std::uint32_t kGatherWorkgroup = 32;
 
 constexpr std::size_t listsOf(std::uint32_t nodes) {
   return (std::size_t{nodes} + shared::kNearNodes - 1) / shared::kNearNodes;
@@ -56,15 +57,10 @@ CollisionStage::CollisionStage(const vulkan::Device& device, const SolidTables& 
       uploads_{Buffer(device, BufferPurpose::upload, kColliderBytes + kBoundsBytes),
                Buffer(device, BufferPurpose::upload, kColliderBytes + kBoundsBytes)},
       device_(device),
-      kernel_(device, {.name = "gather_near_colliders",
-                       .spirv = kernels::gather_near_colliders,
-                       .bindings = {BindingKind::texels, BindingKind::texels, BindingKind::texels,
-                                    BindingKind::storage},
-                       .pushConstantBytes = sizeof(shared::GatherPush),
-                       .workgroupSize = 32,
-                       .specialisation = {}}),
-      from_{vulkan::Bindings(device, kernel_, {positions[0], velocities[0], &bounds_, &nearLists_}),
-            vulkan::Bindings(device, kernel_, {positions[1], velocities[1], &bounds_, &nearLists_})} {}
+      gather_(bindStates(device, {device, kernels::gather_near_colliders, kGatherWorkgroup},
+                         [&](std::size_t from) {
+                           return BufferList{positions[from], velocities[from], &bounds_, &nearLists_};
+                         })) {}
 
 void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders,
                                   bool reportsContacts) {
@@ -120,7 +116,7 @@ std::vector<float> CollisionStage::inOrder(std::span<const float> numbers) const
 void CollisionStage::recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds,
                                   float thickness) {
   if (!active()) return;
-  recorder.dispatch(from_[present], shared::GatherPush{nodeCount_, count_, tickSeconds, thickness},
+  recorder.dispatch(gather_[present], shared::GatherPush{nodeCount_, count_, tickSeconds, thickness},
                     listsOf(nodeCount_), shared::kNearNodes + count_);
 }
 

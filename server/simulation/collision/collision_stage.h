@@ -9,9 +9,9 @@
 
 #include "server/simulation/collision/collider_tables.h"
 #include "server/simulation/collision/moving_collider.h"
+#include "server/simulation/state_bindings.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
-#include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::simulation {
@@ -77,8 +77,7 @@ class CollisionStage {
   std::array<vulkan::Buffer, 2>
       contactReadbacks_;  // used alternately; created when contacts are first reported
   const vulkan::Device& device_;
-  vulkan::Kernel kernel_;
-  std::array<vulkan::Bindings, 2> from_;
+  StateBindings gather_;
 };
 
 }  // namespace clothstream::simulation

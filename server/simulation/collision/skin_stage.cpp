@@ -15,8 +15,6 @@ namespace {
 
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 // Nodes of a tree below which one invocation refits all nodes.
 constexpr std::uint32_t kRefitRoots = 64;
@@ -49,17 +47,6 @@ void write(std::span<const model::Transform> transforms, std::span<float> to) {
   std::size_t at = 0;
   for (const model::Transform& transform : transforms)
     for (const double number : transform) to[at++] = static_cast<float>(number);
-}
-
-vulkan::KernelDescription kernelOf(const char* name, std::span<const std::uint32_t> spirv,
-                                   std::vector<vulkan::BindingKind> bindings, std::uint32_t pushBytes,
-                                   std::uint32_t workgroupSize) {
-  return {.name = name,
-          .spirv = spirv,
-          .bindings = std::move(bindings),
-          .pushConstantBytes = pushBytes,
-          .workgroupSize = workgroupSize,
-          .specialisation = {}};
 }
 
 }  // namespace
@@ -103,15 +90,10 @@ SkinStage::SkinStage(const vulkan::Device& device, SkinTables tables, SolidTable
       uploads_{Buffer(device, BufferPurpose::upload, transformTexels_.bytes()),
                Buffer(device, BufferPurpose::upload, transformTexels_.bytes())},
       transforms_(2 * model::kMaxJoints),
-      skin_(device, kernelOf("skin_solid", kernels::skin_solid, {kTexels, kTexels, kStorage},
-                             sizeof(shared::SkinPush), workgroupSize)),
-      weigh_(device, kernelOf("weigh_solid", kernels::weigh_solid, {kTexels, kTexels, kStorage},
-                              sizeof(shared::SkinPush), workgroupSize)),
-      refit_(device, kernelOf("refit_solid", kernels::refit_solid, {kTexels, kStorage},
-                              sizeof(shared::RefitPush), workgroupSize)),
-      skinIn_(device, skin_, {&rests_.texels(), &transformTexels_, &texels}),
-      weighIn_(device, weigh_, {&fans_.texels(), &texels, &texels}),
-      refitIn_(device, refit_, {&texels, &texels}) {}
+      skin_(device, {device, kernels::skin_solid, workgroupSize},
+            {&rests_.texels(), &transformTexels_, &texels}),
+      weigh_(device, {device, kernels::weigh_solid, workgroupSize}, {&fans_.texels(), &texels, &texels}),
+      refit_(device, {device, kernels::refit_solid, workgroupSize}, {&texels, &texels}) {}
 
 void SkinStage::recordTables(vulkan::Recorder& recorder) const {
   rests_.recordUpload(recorder);
@@ -154,16 +136,16 @@ void SkinStage::recordRefit(vulkan::Recorder& recorder, const SkinTables::Skinne
                                .firstRoot = upperLevels ? 1 : roots,
                                .rootCount = upperLevels ? 1 : roots,
                                .levels = upperLevels ? levelsBelow(roots) : levelsBelow(leaves / roots) + 1};
-  recorder.dispatch(refitIn_, push, push.rootCount);
+  recorder.dispatch(refit_, push, push.rootCount);
 }
 
 // Every dispatch writes to the buffer of all meshes, so barriers are between them.
 void SkinStage::record(vulkan::Recorder& recorder) const {
   for (const SkinTables::Skinned& skinned : tables_.skinned) {
     recorder.barrier();
-    recorder.dispatch(skinIn_, skinned.push, skinned.push.vertexCount);
+    recorder.dispatch(skin_, skinned.push, skinned.push.vertexCount);
     recorder.barrier();
-    recorder.dispatch(weighIn_, skinned.push, skinned.push.vertexCount);
+    recorder.dispatch(weigh_, skinned.push, skinned.push.vertexCount);
     recorder.barrier();
     recordRefit(recorder, skinned, false);
     recorder.barrier();

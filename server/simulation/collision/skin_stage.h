@@ -60,8 +60,7 @@ class SkinStage {
   std::uint32_t slot_ = 0;
   std::vector<model::Transform>
       transforms_;  // of the joints of one mesh, at the start and at the end of a tick
-  vulkan::Kernel skin_, weigh_, refit_;
-  vulkan::Bindings skinIn_, weighIn_, refitIn_;
+  vulkan::Bindings skin_, weigh_, refit_;
 };
 
 }  // namespace clothstream::simulation

@@ -10,9 +10,6 @@
 
 namespace clothstream::simulation {
 
-using vulkan::kStorage;
-using vulkan::kTexels;
-
 namespace {
 
 // Work of a sample, in searches near the surface: a search from far away visits many triangles.
@@ -31,17 +28,14 @@ SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
       tileCount_(static_cast<std::uint32_t>(nodeTiles(cloths, workgroupSize).size())),
       solids_(device, tables.texels),
       tiles_(device, nodeTiles(cloths, workgroupSize)),
-      collide_(device,
-               {.name = "collide_solids",
-                .spirv = kernels::collide_solids,
-                .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kTexels},
-                .pushConstantBytes = sizeof(shared::SolidPush),
-                .workgroupSize = workgroupSize,
-                .specialisation = tables.specialisation()},
-               {&state.cloths, &tiles_.texels(), &solids_.texels(), state.positions[0], state.positions[1],
-                state.velocities[1], &state.contactImpulses, &state.colliders},
-               {&state.cloths, &tiles_.texels(), &solids_.texels(), state.positions[1], state.positions[0],
-                state.velocities[0], &state.contactImpulses, &state.colliders}) {
+      collide_(bindStates(device, {device, kernels::collide_solids, workgroupSize, tables.specialisation()},
+                          [&](std::size_t from) {
+                            const std::size_t to = 1 - from;
+                            return BufferList{&state.cloths,          &tiles_.texels(),
+                                              &solids_.texels(),      state.positions[from],
+                                              state.positions[to],    state.velocities[to],
+                                              &state.contactImpulses, &state.colliders};
+                          })) {
   for (std::size_t i = 0; i < tables.solids.size(); ++i) {
     const model::ClosedMesh& mesh = *tables.solids[i];
     workOfSolid_ = std::max(workOfSolid_, static_cast<std::uint64_t>(model::colliderWork(tables.solids[i])));
@@ -55,13 +49,8 @@ SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
          std::min(static_cast<std::uint64_t>(kSampleWork * model::searchWork(mesh)), kMostWork)});
   }
   if (sampled_.empty()) return;
-  sample_.emplace(device, vulkan::KernelDescription{.name = "sample_distances",
-                                                    .spirv = kernels::sample_distances,
-                                                    .bindings = {kTexels, kStorage},
-                                                    .pushConstantBytes = sizeof(shared::SamplePush),
-                                                    .workgroupSize = workgroupSize,
-                                                    .specialisation = {}});
-  sampleIn_.emplace(device, *sample_, std::vector{&solids_.texels(), &solids_.texels()});
+  sample_.emplace(device, vulkan::Kernel(device, kernels::sample_distances, workgroupSize),
+                  BufferList{&solids_.texels(), &solids_.texels()});
 }
 
 void SolidStage::recordTables(vulkan::Recorder& recorder) const {
@@ -69,7 +58,7 @@ void SolidStage::recordTables(vulkan::Recorder& recorder) const {
   tiles_.recordUpload(recorder);
   for (const Sampled& sampled : sampled_) {
     recorder.barrier();
-    recorder.dispatch(*sampleIn_, sampled.push, sampled.points, sampled.work, kMostWork);
+    recorder.dispatch(*sample_, sampled.push, sampled.points, sampled.work, kMostWork);
   }
 }
 
@@ -77,7 +66,7 @@ void SolidStage::record(vulkan::Recorder& recorder, std::uint32_t present,
                         const shared::CollisionPush& collision, std::uint32_t solidCount) const {
   recorder.barrier();
   recorder.dispatch(
-      collide_.from[present],
+      collide_[present],
       shared::SolidPush{
           .collision = collision, .solidCount = solidCount, .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
       std::uint64_t{tileCount_} * workgroupSize_, 1 + solidCount * workOfSolid_, solidCount * mostOfSolid_);

@@ -10,7 +10,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/collision/solid_tables.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/recorder.h"
 
@@ -32,7 +32,7 @@ class SolidStage {
 
   const vulkan::Buffer& solids() const { return solids_.texels(); }
   // Constants of the kernels that include distance_grid.glsl.
-  std::span<const std::uint32_t> specialisation() const { return collide_.kernel.specialisation(); }
+  std::span<const std::uint32_t> specialisation() const { return collide_[0].kernel().specialisation(); }
 
  private:
   std::uint32_t workgroupSize_;
@@ -40,7 +40,7 @@ class SolidStage {
   std::uint64_t workOfSolid_ = 0;  // of the costliest mesh, for each node, in node-steps
   std::uint64_t mostOfSolid_ = 0;  // that its search may take
   DeviceTable solids_, tiles_;
-  Stage collide_;
+  StateBindings collide_;
   // A mesh whose distances are sampled.
   struct Sampled {
     shared::SamplePush push;
@@ -48,8 +48,7 @@ class SolidStage {
     std::uint64_t work = 0;  // of a point, in node-steps
   };
   std::vector<Sampled> sampled_;
-  std::optional<vulkan::Kernel> sample_;  // absent if no mesh is
-  std::optional<vulkan::Bindings> sampleIn_;
+  std::optional<vulkan::Bindings> sample_;  // absent if no mesh is
 };
 
 }  // namespace clothstream::simulation

@@ -25,8 +25,6 @@ namespace {
 
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 // Work of an invocation (vulkan::Recorder::dispatch): of a triangle that searches the tree, and of the
 // expected pairs of a triangle or a node.
@@ -44,24 +42,6 @@ float gapOf(std::span<const model::Cloth> cloths) {
   for (const model::Cloth& cloth : cloths)
     if (model::boundsMotion(cloth)) radius = std::min(radius, cloth.selfCollision->radius);
   return kGap * radius;
-}
-
-vulkan::KernelDescription kernelOf(const char* name, std::span<const std::uint32_t> spirv,
-                                   std::uint32_t workgroupSize, std::uint32_t pushBytes,
-                                   std::vector<vulkan::BindingKind> bindings,
-                                   std::vector<std::uint32_t> specialisation = {}) {
-  return {.name = name,
-          .spirv = spirv,
-          .bindings = std::move(bindings),
-          .pushConstantBytes = pushBytes,
-          .workgroupSize = workgroupSize,
-          .specialisation = std::move(specialisation)};
-}
-
-vulkan::KernelDescription limitKernel(std::uint32_t workgroupSize, bool edges, bool slide) {
-  return kernelOf("limit_pairs", kernels::limit_pairs, workgroupSize, sizeof(shared::PairPush),
-                  {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage},
-                  {edges ? 1u : 0u, slide ? 1u : 0u});
 }
 
 // Twice the thickness of the thickest cloth.
@@ -98,16 +78,25 @@ void MotionBoundStage::List::recordClear(vulkan::Recorder& recorder) const {
 MotionBoundStage::Limits::Limits(const vulkan::Device& device, const StateBuffers& state,
                                  const MotionBoundStage& stage, const List& list, bool edges,
                                  std::uint32_t workgroupSize)
-    : slide(device, limitKernel(workgroupSize, edges, true),
-            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[0], state.positions[1],
-             &list.pairs, &list.groups, &stage.corrections_, &stage.shares_},
-            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[1], state.positions[0],
-             &list.pairs, &list.groups, &stage.corrections_, &stage.shares_}),
-      limit(device, limitKernel(workgroupSize, edges, false),
-            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[0], state.positions[1],
-             &list.pairs, &list.groups, &stage.corrections_, &stage.shares_},
-            {&stage.parts_.texels(), &stage.faces_.texels(), state.positions[1], state.positions[0],
-             &list.pairs, &list.groups, &stage.corrections_, &stage.shares_}) {}
+    : slide(bindLimit(device, state, stage, list, edges, true, workgroupSize)),
+      limit(bindLimit(device, state, stage, list, edges, false, workgroupSize)) {}
+
+StateBindings MotionBoundStage::Limits::bindLimit(const vulkan::Device& device, const StateBuffers& state,
+                                                  const MotionBoundStage& stage, const List& list, bool edges,
+                                                  bool slides, std::uint32_t workgroupSize) {
+  return bindStates(device,
+                    {device, kernels::limit_pairs, workgroupSize, {edges ? 1u : 0u, slides ? 1u : 0u}},
+                    [&](std::size_t from) {
+                      return BufferList{&stage.parts_.texels(),
+                                        &stage.faces_.texels(),
+                                        state.positions[from],
+                                        state.positions[1 - from],
+                                        &list.pairs,
+                                        &list.groups,
+                                        &stage.corrections_,
+                                        &stage.shares_};
+                    });
+}
 
 MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Scene& scene,
                                    const StateBuffers& state, std::uint32_t workgroupSize)
@@ -129,47 +118,43 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
       facePairs_(device, kFacePairs * tables_.nodeCount, workgroupSize),
       nodePairs_(device, kNodePairs * tables_.nodeCount, workgroupSize),
       edgePairs_(device, kEdgePairs * tables_.nodeCount, workgroupSize),
-      boxFaces_(device,
-                kernelOf("box_faces", kernels::box_faces, workgroupSize, sizeof(shared::TreePush),
-                         {kTexels, kTexels, kTexels, kStorage}),
-                {&faces_.texels(), state.positions[0], state.positions[1], &boxes_},
-                {&faces_.texels(), state.positions[1], state.positions[0], &boxes_}),
-      boxBranches_(device, kernelOf("box_branches", kernels::box_branches, workgroupSize,
-                                    sizeof(shared::TreePush), {kTexels, kStorage})),
-      branchBindings_(device, boxBranches_, {&branches_.texels(), &boxes_}),
-      findFaces_(device, kernelOf("find_faces", kernels::find_faces, workgroupSize, sizeof(shared::PairPush),
-                                  {kTexels, kStorage, kStorage, kStorage})),
-      findBindings_(device, findFaces_, {&faces_.texels(), &boxes_, &facePairs_.pairs, &facePairs_.groups}),
-      findPairs_(
-          device,
-          kernelOf("find_pairs", kernels::find_pairs, workgroupSize, sizeof(shared::PairPush),
-                   {kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage}),
-          {&faces_.texels(), state.positions[0], state.positions[1], &facePairs_.pairs, &facePairs_.groups,
-           &nodePairs_.pairs, &nodePairs_.groups, &edgePairs_.pairs, &edgePairs_.groups},
-          {&faces_.texels(), state.positions[1], state.positions[0], &facePairs_.pairs, &facePairs_.groups,
-           &nodePairs_.pairs, &nodePairs_.groups, &edgePairs_.pairs, &edgePairs_.groups}),
+      boxFaces_(bindStates(
+          device, {device, kernels::box_faces, workgroupSize},
+          [&](std::size_t from) {
+            return BufferList{&faces_.texels(), state.positions[from], state.positions[1 - from], &boxes_};
+          })),
+      boxBranches_(device, {device, kernels::box_branches, workgroupSize}, {&branches_.texels(), &boxes_}),
+      findFaces_(device, {device, kernels::find_faces, workgroupSize},
+                 {&faces_.texels(), &boxes_, &facePairs_.pairs, &facePairs_.groups}),
+      findPairs_(bindStates(device, {device, kernels::find_pairs, workgroupSize},
+                            [&](std::size_t from) {
+                              return BufferList{
+                                  &faces_.texels(),   state.positions[from], state.positions[1 - from],
+                                  &facePairs_.pairs,  &facePairs_.groups,    &nodePairs_.pairs,
+                                  &nodePairs_.groups, &edgePairs_.pairs,     &edgePairs_.groups};
+                            })),
       nodeLimits_(device, state, *this, nodePairs_, false, workgroupSize),
       edgeLimits_(device, state, *this, edgePairs_, true, workgroupSize),
-      slideNodes_(
-          device,
-          kernelOf("slide_nodes", kernels::slide_nodes, workgroupSize, sizeof(shared::NodePush),
-                   {kTexels, kStorage, kStorage, kStorage, kStorage}),
-          {&parts_.texels(), state.positions[0], state.positions[1], state.velocities[1], &corrections_},
-          {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &corrections_}),
+      slideNodes_(bindStates(device, {device, kernels::slide_nodes, workgroupSize},
+                             [&](std::size_t from) {
+                               const std::size_t to = 1 - from;
+                               return BufferList{&parts_.texels(), state.positions[from], state.positions[to],
+                                                 state.velocities[to], &corrections_};
+                             })),
       shortenMotions_(
-          device,
-          kernelOf("shorten_motions", kernels::shorten_motions, workgroupSize, sizeof(shared::NodePush),
-                   {kTexels, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage, kStorage}),
-          {&parts_.texels(), state.positions[0], state.positions[1], state.velocities[1], &shares_,
-           &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_},
-          {&parts_.texels(), state.positions[1], state.positions[0], state.velocities[0], &shares_,
-           &facePairs_.groups, &nodePairs_.groups, &edgePairs_.groups, &report_}),
+          bindStates(device, {device, kernels::shorten_motions, workgroupSize},
+                     [&](std::size_t from) {
+                       const std::size_t to = 1 - from;
+                       return BufferList{
+                           &parts_.texels(), state.positions[from], state.positions[to], state.velocities[to],
+                           &shares_,         &facePairs_.groups,    &nodePairs_.groups,  &edgePairs_.groups,
+                           &report_};
+                     })),
       measureDepths_(
-          device,
-          kernelOf("measure_depths", kernels::measure_depths, workgroupSize, sizeof(shared::DepthPush),
-                   {kTexels, kTexels, kStorage, kTexels, kTexels}),
-          {&parts_.texels(), state.positions[0], &depths_, &state.colliders, &state.nearColliders},
-          {&parts_.texels(), state.positions[1], &depths_, &state.colliders, &state.nearColliders}) {
+          bindStates(device, {device, kernels::measure_depths, workgroupSize}, [&](std::size_t from) {
+            return BufferList{&parts_.texels(), state.positions[from], &depths_, &state.colliders,
+                              &state.nearColliders};
+          })) {
   assert(isIn(scene));
 }
 
@@ -211,11 +196,11 @@ void MotionBoundStage::recordParts(vulkan::Recorder& recorder, const vulkan::Bin
 
 void MotionBoundStage::recordTree(vulkan::Recorder& recorder, std::uint32_t from) const {
   const auto faces = static_cast<std::uint32_t>(tables_.faces.size());
-  recorder.dispatch(boxFaces_.from[from], shared::TreePush{0, faces, gap_}, faces);
+  recorder.dispatch(boxFaces_[from], shared::TreePush{0, faces, gap_}, faces);
   for (std::size_t level = 0; level + 1 < tables_.levels.size(); ++level) {
     const std::uint32_t first = tables_.levels[level], count = tables_.levels[level + 1] - first;
     recorder.barrier();
-    recorder.dispatch(branchBindings_, shared::TreePush{first, count, gap_}, count);
+    recorder.dispatch(boxBranches_, shared::TreePush{first, count, gap_}, count);
   }
 }
 
@@ -236,32 +221,32 @@ void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t f
                                   .edgePairs = edgePairs_.capacity,
                                   .gap = gap_,
                                   .substepRate = 1 / substepSeconds_};
-  const auto onPairs = [&](Stage Limits::*kernel) {
+  const auto onPairs = [&](StateBindings Limits::*kernel) {
     const std::uint64_t most = std::uint64_t{tables_.nodeCount} * kLimitWork;
     recorder.barrier();
-    recordParts(recorder, (nodeLimits_.*kernel).from[from], push, nodePairs_, most, kLimitPairWork);
-    recordParts(recorder, (edgeLimits_.*kernel).from[from], push, edgePairs_, most, kLimitPairWork);
+    recordParts(recorder, (nodeLimits_.*kernel)[from], push, nodePairs_, most, kLimitPairWork);
+    recordParts(recorder, (edgeLimits_.*kernel)[from], push, edgePairs_, most, kLimitPairWork);
   };
   recorder.barrier();
   for (const List* list : {&facePairs_, &nodePairs_, &edgePairs_}) list->recordClear(recorder);
   recordTree(recorder, from);
   recorder.barrier();
-  recorder.dispatch(findBindings_, push, faceCount, kSearchWork, kMostSearchWork);
+  recorder.dispatch(findFaces_, push, faceCount, kSearchWork, kMostSearchWork);
   recorder.barrier();
-  recordParts(recorder, findPairs_.from[from], push, facePairs_, std::uint64_t{faceCount} * kFindWork,
+  recordParts(recorder, findPairs_[from], push, facePairs_, std::uint64_t{faceCount} * kFindWork,
               kFindPairWork);
   onPairs(&Limits::slide);
   recorder.barrier();
-  recorder.dispatch(slideNodes_.from[from], nodePush, tables_.nodeCount);
+  recorder.dispatch(slideNodes_[from], nodePush, tables_.nodeCount);
   onPairs(&Limits::limit);
   recorder.barrier();
-  recorder.dispatch(shortenMotions_.from[from], nodePush, tables_.nodeCount);
+  recorder.dispatch(shortenMotions_[from], nodePush, tables_.nodeCount);
 }
 
 void MotionBoundStage::recordDepths(vulkan::Recorder& recorder, std::uint32_t present,
                                     const shared::CollisionPush& collision) const {
   if (collision.colliderCount == 0) return;
-  recorder.dispatch(measureDepths_.from[present],
+  recorder.dispatch(measureDepths_[present],
                     shared::DepthPush{.collision = collision,
                                       .nodeCount = tables_.nodeCount,
                                       .touch = touch_,

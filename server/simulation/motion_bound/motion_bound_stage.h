@@ -9,7 +9,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/motion_bound/motion_bound_tables.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
@@ -79,7 +79,11 @@ class MotionBoundStage {
     Limits(const vulkan::Device& device, const StateBuffers& state, const MotionBoundStage& stage,
            const List& list, bool edges, std::uint32_t workgroupSize);
 
-    Stage slide, limit;
+    static StateBindings bindLimit(const vulkan::Device& device, const StateBuffers& state,
+                                   const MotionBoundStage& stage, const List& list, bool edges, bool slides,
+                                   std::uint32_t workgroupSize);
+
+    StateBindings slide, limit;
   };
 
   // Runs a kernel on each part of a list. Most parts are empty: `expected` is the work of all of them, and
@@ -93,14 +97,11 @@ class MotionBoundStage {
   DeviceTable parts_, faces_, branches_;
   vulkan::Buffer boxes_, corrections_, shares_, report_, reportReadback_, depths_, depthReadback_;
   List facePairs_, nodePairs_, edgePairs_;
-  Stage boxFaces_;
-  vulkan::Kernel boxBranches_;
-  vulkan::Bindings branchBindings_;
-  vulkan::Kernel findFaces_;
-  vulkan::Bindings findBindings_;
-  Stage findPairs_;
+  StateBindings boxFaces_;
+  vulkan::Bindings boxBranches_, findFaces_;
+  StateBindings findPairs_;
   Limits nodeLimits_, edgeLimits_;
-  Stage slideNodes_, shortenMotions_, measureDepths_;
+  StateBindings slideNodes_, shortenMotions_, measureDepths_;
 };
 
 }  // namespace clothstream::simulation

@@ -23,8 +23,6 @@ namespace {
 
 using vulkan::Bindings;
 using vulkan::BufferPurpose;
-using vulkan::kStorage;
-using vulkan::kTexels;
 
 constexpr std::uint32_t kListsATick = 3;
 // Work of a node (vulkan::Recorder::dispatch) when its neighbours are listed, and in a contact iteration.
@@ -112,63 +110,30 @@ SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const model
       groups_(device, BufferPurpose::indirect, sizeof(shared::ContactGroups)),
       report_(device, BufferPurpose::state, sizeof(shared::CrowdReport)),
       reportReadback_(device, BufferPurpose::readback, 2 * sizeof(shared::CrowdReport)),
-      measure_(device,
-               {.name = "measure_velocities",
-                .spirv = kernels::measure_velocities,
-                .bindings = {kTexels, kTexels, kStorage},
-                .pushConstantBytes = sizeof(shared::NeighbourPush),
-                .workgroupSize = workgroupSize},
-               [&](const vulkan::Kernel& kernel, std::size_t of) {
-                 return Bindings(device, kernel, {&rests_, state.velocities[of], &table_});
-               }),
-      countCells_(device,
-                  {.name = "count_cells",
-                   .spirv = kernels::count_cells,
-                   .bindings = {kTexels, kTexels, kStorage, kStorage},
-                   .pushConstantBytes = sizeof(shared::NeighbourPush),
-                   .workgroupSize = workgroupSize},
-                  [&](const vulkan::Kernel& kernel, std::size_t of) {
-                    return Bindings(device, kernel, {&rests_, state.positions[of], &table_, &entries_});
-                  }),
-      startCells_(device,
-                  {.name = "start_cells",
-                   .spirv = kernels::start_cells,
-                   .bindings = {kStorage, kStorage},
-                   .pushConstantBytes = sizeof(shared::NeighbourPush),
-                   .workgroupSize = workgroupSize},
-                  [&](const vulkan::Kernel& kernel, std::size_t) {
-                    return Bindings(device, kernel, {&table_, &starts_});
-                  }),
-      fillCells_(device,
-                 {.name = "fill_cells",
-                  .spirv = kernels::fill_cells,
-                  .bindings = {kTexels, kStorage, kStorage, kStorage},
-                  .pushConstantBytes = sizeof(shared::NeighbourPush),
-                  .workgroupSize = workgroupSize},
-                 [&](const vulkan::Kernel& kernel, std::size_t) {
-                   return Bindings(device, kernel, {&rests_, &entries_, &table_, &order_});
-                 }),
-      sortCells_(
-          device,
-          {.name = "sort_cells",
-           .spirv = kernels::sort_cells,
-           .bindings = {kTexels, kStorage, kStorage, kStorage, kStorage},
-           .pushConstantBytes = sizeof(shared::NeighbourPush),
-           .workgroupSize = workgroupSize},
-          [&](const vulkan::Kernel& kernel, std::size_t of) {
-            return Bindings(device, kernel, {state.positions[of], &entries_, &starts_, &order_, &sorted_});
-          }),
-      gather_(device,
-              {.name = "gather_neighbours",
-               .spirv = kernels::gather_neighbours,
-               .bindings = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage},
-               .pushConstantBytes = sizeof(shared::NeighbourPush),
-               .workgroupSize = workgroupSize},
-              [&](const vulkan::Kernel& kernel, std::size_t of) {
-                return Bindings(device, kernel,
-                                {&state.cloths, &rests_, &sorted_, state.velocities[of], &table_, &starts_,
-                                 &neighbours_, &report_});
-              }) {
+      measure_(bindStates(device, {device, kernels::measure_velocities, workgroupSize},
+                          [&](std::size_t of) {
+                            return BufferList{&rests_, state.velocities[of], &table_};
+                          })),
+      countCells_(bindStates(device, {device, kernels::count_cells, workgroupSize},
+                             [&](std::size_t of) {
+                               return BufferList{&rests_, state.positions[of], &table_, &entries_};
+                             })),
+      startCells_(bindStates(device, {device, kernels::start_cells, workgroupSize},
+                             [&](std::size_t) {
+                               return BufferList{&table_, &starts_};
+                             })),
+      fillCells_(bindStates(device, {device, kernels::fill_cells, workgroupSize},
+                            [&](std::size_t) {
+                              return BufferList{&rests_, &entries_, &table_, &order_};
+                            })),
+      sortCells_(bindStates(device, {device, kernels::sort_cells, workgroupSize},
+                            [&](std::size_t of) {
+                              return BufferList{state.positions[of], &entries_, &starts_, &order_, &sorted_};
+                            })),
+      gather_(bindStates(device, {device, kernels::gather_neighbours, workgroupSize}, [&](std::size_t of) {
+        return BufferList{&state.cloths, &rests_,  &sorted_,     state.velocities[of],
+                          &table_,       &starts_, &neighbours_, &report_};
+      })) {
   assert(isIn(scene));
   fillRests(scene, restsUpload_.mapped<shared::RestRecord>());
   makeContacts(scene.cloths);
@@ -176,35 +141,37 @@ SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const model
 
 SelfCollisionStage::Contacts::Contacts(const vulkan::Device& device, const StateBuffers& state,
                                        const SelfCollisionStage& stage, bool several)
-    : count(device,
-            {.name = "count_contacts",
-             .spirv = kernels::count_contacts,
-             .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage,
-                          kStorage, kStorage},
-             .pushConstantBytes = sizeof(shared::ContactPush),
-             .workgroupSize = stage.workgroupSize_,
-             .specialisation = {several ? 1u : 0u}},
-            [&](const vulkan::Kernel& kernel, std::size_t of) {
-              return Bindings(device, kernel,
-                              {&state.cloths, &stage.rests_, &stage.neighbours_, state.positions[of],
-                               state.velocities[of], &stage.contactPositions_, &stage.contactVelocities_,
-                               &stage.contacts_, &stage.touching_, &stage.groups_, &stage.report_});
-            }),
-      resolve(device,
-              {.name = "resolve_contacts",
-               .spirv = kernels::resolve_contacts,
-               .bindings = {kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kTexels, kStorage,
-                            kStorage, kStorage, kStorage, kStorage},
-               .pushConstantBytes = sizeof(shared::ContactPush),
-               .workgroupSize = stage.workgroupSize_,
-               .specialisation = {several ? 1u : 0u}},
-              [&](const vulkan::Kernel& kernel, std::size_t of) {
-                return Bindings(device, kernel,
-                                {&state.cloths, &stage.rests_, &state.colliders, &state.nearColliders,
-                                 &stage.contacts_, &stage.contactPositions_, &stage.contactVelocities_,
-                                 state.positions[1 - of], &stage.touching_, &stage.groups_,
-                                 state.positions[of], state.velocities[of], &state.contactImpulses});
-              }) {}
+    : count(bindStates(device, {device, kernels::count_contacts, stage.workgroupSize_, {several ? 1u : 0u}},
+                       [&](std::size_t of) {
+                         return BufferList{&state.cloths,
+                                           &stage.rests_,
+                                           &stage.neighbours_,
+                                           state.positions[of],
+                                           state.velocities[of],
+                                           &stage.contactPositions_,
+                                           &stage.contactVelocities_,
+                                           &stage.contacts_,
+                                           &stage.touching_,
+                                           &stage.groups_,
+                                           &stage.report_};
+                       })),
+      resolve(bindStates(device,
+                         {device, kernels::resolve_contacts, stage.workgroupSize_, {several ? 1u : 0u}},
+                         [&](std::size_t of) {
+                           return BufferList{&state.cloths,
+                                             &stage.rests_,
+                                             &state.colliders,
+                                             &state.nearColliders,
+                                             &stage.contacts_,
+                                             &stage.contactPositions_,
+                                             &stage.contactVelocities_,
+                                             state.positions[1 - of],
+                                             &stage.touching_,
+                                             &stage.groups_,
+                                             state.positions[of],
+                                             state.velocities[of],
+                                             &state.contactImpulses};
+                         })) {}
 
 void SelfCollisionStage::makeContacts(std::span<const model::Cloth> cloths) {
   const bool several = hasSeveralMaterials(cloths);
@@ -245,9 +212,9 @@ void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint3
       .aheadSeconds = kAhead * substepSeconds_ * static_cast<float>(interval_ - 1),
       .reach = reach_,
       .restFactor = model::kNeighbours};
-  const auto dispatch = [&](const Kernel& kernel, std::uint64_t invocations) {
+  const auto dispatch = [&](const StateBindings& kernel, std::uint64_t invocations) {
     recorder.barrier();
-    recorder.dispatch(kernel.on[state], push, invocations);
+    recorder.dispatch(kernel[state], push, invocations);
   };
   recorder.barrier();
   recorder.fill(table_, 0, table_.bytes());
@@ -256,9 +223,9 @@ void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint3
   dispatch(startCells_, cellCount_ / shared::kCellBlock);
   dispatch(fillCells_, nodeCount_);
   recorder.barrier();
-  recorder.dispatch(sortCells_.on[state], push, nodeCount_, 1, kMostSortWork);
+  recorder.dispatch(sortCells_[state], push, nodeCount_, 1, kMostSortWork);
   recorder.barrier();
-  recorder.dispatch(gather_.on[state], push, nodeCount_, kGatherWork, kMostGatherWork);
+  recorder.dispatch(gather_[state], push, nodeCount_, kGatherWork, kMostGatherWork);
 }
 
 void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_t state,
@@ -272,9 +239,9 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, touching));
   recorder.barrier();
-  recorder.dispatch(contactKernels_[several_]->count.on[state], push, nodeCount_, kContactWork);
+  recorder.dispatch(contactKernels_[several_]->count[state], push, nodeCount_, kContactWork);
   recorder.barrier();
-  const Bindings& resolve = contactKernels_[several_]->resolve.on[state];
+  const Bindings& resolve = contactKernels_[several_]->resolve[state];
   const std::uint64_t work = std::uint64_t{kContactWork} * collision.nodeWork;
   // Indirect dispatches cannot be divided.
   if (recorder.divides(resolve, nodeCount_, work))

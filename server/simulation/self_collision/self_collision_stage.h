@@ -8,10 +8,10 @@
 #include <span>
 
 #include "server/model/scene.h"
+#include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
-#include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 #include "shaders/self_collision/self_collision.h"
 
@@ -54,23 +54,11 @@ class SelfCollisionStage {
   const vulkan::Buffer& neighbours() const { return neighbours_; }
 
  private:
-  // A kernel with bindings for each of the two states.
-  struct Kernel {
-    template <typename Bind>
-    Kernel(const vulkan::Device& device, const vulkan::KernelDescription& description, const Bind& bind)
-        : kernel(device, description), on{bind(kernel, 0), bind(kernel, 1)} {}
-    Kernel(const Kernel&) = delete;
-    Kernel& operator=(const Kernel&) = delete;
-
-    vulkan::Kernel kernel;
-    std::array<vulkan::Bindings, 2> on;  // by state
-  };
-
   // Kernels of contacts, for equal and for different materials of the cloths.
   struct Contacts {
     Contacts(const vulkan::Device& device, const StateBuffers& state, const SelfCollisionStage& stage,
              bool several);
-    Kernel count, resolve;
+    StateBindings count, resolve;
   };
   void makeContacts(std::span<const model::Cloth> cloths);
 
@@ -88,7 +76,7 @@ class SelfCollisionStage {
   vulkan::Buffer table_, starts_, entries_, order_, sorted_, neighbours_;
   vulkan::Buffer contactPositions_, contactVelocities_, contacts_, touching_, groups_;
   vulkan::Buffer report_, reportReadback_;
-  Kernel measure_, countCells_, startCells_, fillCells_, sortCells_, gather_;
+  StateBindings measure_, countCells_, startCells_, fillCells_, sortCells_, gather_;
   std::array<std::unique_ptr<Contacts>, 2> contactKernels_;
   std::size_t several_ = 0;  // index of the kernels in use
 };
