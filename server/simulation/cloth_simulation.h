@@ -8,13 +8,12 @@
 #include <span>
 #include <vector>
 
-#include "server/model/jump.h"
 #include "server/model/scene.h"
-#include "server/simulation/attachment/grab.h"
 #include "server/simulation/cloth_report.h"
-#include "server/simulation/collision/moving_collider.h"
 #include "server/simulation/scene_tables.h"
+#include "server/simulation/stage_plan.h"
 #include "server/simulation/state_snapshot.h"
+#include "server/simulation/tick_inputs.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/kernel.h"
@@ -29,26 +28,6 @@ namespace clothstream::simulation {
 //
 // A tick:   recordTick -> (submit, wait) -> status
 // The same inputs give the same bits on every conforming device and with all options.
-
-// Inputs of one tick. All values are validated before.
-struct TickInputs {
-  model::Environment environment;
-  std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
-  bool reportsContacts = false;           // true: contacts() reports this tick
-  bool namesConstraints = false;          // true: a report of this tick has constraintEnds()
-  // Pose of each attachment at the tick's end, in the order of the scene's cloths. Empty: the poses at the
-  // start.
-  std::vector<model::Pose> attachments = {};
-  // Cloths that move as rigid bodies at the tick's start, because their attachments jump.
-  std::vector<model::Carry> carries = {};
-  // At most kMaxGrabs. A grab keeps its index while it is active. An index must be free for one tick before
-  // another grab uses it.
-  std::vector<Grab> grabs = {};
-};
-
-// Inputs that the scene itself gives to a tick (from 0): its wind, its colliders and its attachments. A
-// collider that jumps is at its new pose from the tick's start.
-TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick);
 
 struct SimulationOptions {
   // Rows of a grid that one invocation walks down. 0: as the device's vulkan::KernelSettings have it (fewer
@@ -65,13 +44,6 @@ struct SimulationOptions {
   // Another build of the kernel advance_mass_spring, for comparisons. Null: the regular one.
   const vulkan::KernelCode* advanceKernel = nullptr;
 };
-
-// Lists the cloths for which a simulation lacks stages.
-struct StagePlan {
-  std::vector<model::Cloth> solvers;  // cloths whose solvers need stages; empty: none do
-  std::vector<model::Cloth> bending;  // cloths of the tables of bending; empty: they need no new ones
-};
-struct NewStages;  // kept_stages.h
 
 class ClothSimulation {
  public:

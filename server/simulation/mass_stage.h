@@ -2,10 +2,13 @@
 // Masses that change while a scene runs.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
+#include "server/model/scene.h"
+#include "server/simulation/stage.h"
+#include "server/simulation/state_memory.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/kernel.h"
@@ -13,27 +16,30 @@
 
 namespace clothstream::simulation {
 
-// Belongs to the device's thread. States have the inverse mass of a node in the w of its position.
-class MassStage {
+// The masses of all nodes. States have the inverse mass of a node in the w of its position; a change is
+// uploaded like a table.
+class MassStage final : public Stage {
  public:
-  // States to change: the two alternating ones and the checkpoint.
-  static constexpr std::size_t kStates = 3;
+  MassStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateMemory& state);
 
-  // Throws std::runtime_error if the device has too little memory. The buffers must outlive it.
-  MassStage(const vulkan::Device& device, std::uint32_t nodes,
-            const std::array<const vulkan::Buffer*, kStates>& positions);
+  // Makes what setCloths() needs if these cloths have other masses. Throws std::runtime_error if the device
+  // has too little memory.
+  void prepare(std::span<const model::Cloth> cloths);
+  // Needs prepare().
+  void setCloths(std::span<const model::Cloth> cloths) override;
 
-  // Sets the inverse masses, 1/kg, by node; 0 for pinned nodes. The last recording must be complete.
-  void set(std::span<const float> inverseMasses);
-
-  // The caller records a barrier before and after.
-  void record(vulkan::Recorder& recorder) const;
+  // 1/kg, by node; 0 for pinned nodes.
+  std::span<const float> inverseMasses() const { return inverseMasses_; }
 
  private:
-  std::uint32_t nodes_;
+  void recordTables(vulkan::Recorder& recorder) override;
+
+  const vulkan::Device& device_;
+  const StateMemory& state_;
+  std::vector<float> masses_;         // kg, of the cloths
+  std::vector<float> inverseMasses_;  // 1/kg, of the nodes
   vulkan::Buffer upload_;
-  vulkan::Kernel kernel_;
-  std::array<vulkan::Bindings, kStates> bindings_;
+  std::vector<vulkan::Bindings> bindings_;  // of both states and the checkpoint; made for the first change
 };
 
 }  // namespace clothstream::simulation

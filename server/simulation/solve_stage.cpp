@@ -320,10 +320,12 @@ std::shared_ptr<SolveStage::Systems> SolveStage::makeSystems(std::span<const mod
 }
 
 std::shared_ptr<SolveStage::Systems> SolveStage::exchange(std::shared_ptr<Systems> systems) {
+  outdate();
   return std::exchange(systems_, std::move(systems));
 }
 
-void SolveStage::recordTables(vulkan::Recorder& recorder) const {
+void SolveStage::recordTables(vulkan::Recorder& recorder) {
+  if (!systems_) return;
   for (const DeviceTable* table :
        {&systems_->systems, &systems_->chunks, &systems_->springs, &systems_->incidences, &systems_->lists})
     table->recordUpload(recorder);
@@ -437,13 +439,16 @@ void SolveStage::Systems::recordLarge(vulkan::Recorder& recorder, const Group& g
   dispatch(group.measure[from]);
 }
 
-void SolveStage::record(vulkan::Recorder& recorder, std::uint32_t from,
-                        const shared::CollisionPush& collision, double substepSeconds, bool last) const {
+void SolveStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
+  if (!systems_) return;
   const Systems& all = *systems_;
+  const std::uint32_t from = substep.from;
+  const shared::CollisionPush& collision = substep.collision;
+  const double substepSeconds = substep.tick.substepSeconds;
   recorder.barrier();
   // Without springs to hold, systems of stretched springs need nothing; only the report reads their records.
   if (!all.onlyStretched) recorder.copy(all.emptyGroups, all.groupSizes, all.groupSizes.bytes());
-  bool barred = all.onlyStretched && !last;
+  bool barred = all.onlyStretched && !substep.isLast();
   if (!barred) recorder.fill(all.solves, 0, all.solves.bytes());
   for (const Systems::Group& group : all.groups) {
     if (group.on.stretched) {
@@ -507,11 +512,13 @@ std::uint32_t SolveStage::stretchGroups(Follow follow) const {
   return 0;
 }
 
-void SolveStage::recordReport(vulkan::Recorder& recorder) const {
+void SolveStage::recordReport(vulkan::Recorder& recorder, const Tick&) {
+  if (!systems_) return;
   recorder.copy(systems_->solves, systems_->solvesReadback, systems_->solves.bytes());
 }
 
 std::span<const shared::SolveRecord> SolveStage::report() const {
+  if (!systems_) return {};
   return systems_->solvesReadback.mapped<const shared::SolveRecord>();
 }
 
@@ -532,6 +539,7 @@ void SolveStage::activeSprings(std::size_t most, std::span<std::vector<std::uint
 }
 
 std::span<const std::uint32_t> SolveStage::cloths() const {
+  if (!systems_) return {};
   return systems_->cloths;
 }
 

@@ -12,6 +12,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/solve_tables.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
@@ -23,13 +24,13 @@ namespace clothstream::simulation {
 // nodes by h times that change and lets them collide. Several workgroups solve a large cloth, with one or two
 // dispatches per iteration; these are empty after all systems have converged. The bits are those of a solve
 // by one workgroup.
-class SolveStage {
+class SolveStage final : public Stage {
  public:
   // Starts without systems. `workgroupSize` 0 and `wholeNodes` absent (nodes of the largest cloth that one
   // workgroup solves) mean the measured best for the device.
   SolveStage(const vulkan::Device& device, const StateBuffers& state, std::uint32_t workgroupSize,
              std::optional<std::uint32_t> wholeNodes);
-  ~SolveStage();
+  ~SolveStage() override;
 
   // Everything whose size follows from the cloths.
   struct Systems;
@@ -38,19 +39,15 @@ class SolveStage {
   std::shared_ptr<Systems> makeSystems(std::span<const model::Cloth> cloths);
   // Makes them current, and returns the former ones. No work of this stage may be in flight.
   std::shared_ptr<Systems> exchange(std::shared_ptr<Systems> systems);
-  // True if there is a system. Otherwise nothing below may be called.
+  // True if there is a system.
   bool active() const { return systems_ != nullptr; }
 
-  // Uploads the tables, before the first substep with the present systems.
-  void recordTables(vulkan::Recorder& recorder) const;
-  // Records one substep of `substepSeconds`. The free motion led from state `from` to the other state, which
-  // is corrected in place. Begins with a barrier. `last`: the tick's last substep, which the report is about.
-  void record(vulkan::Recorder& recorder, std::uint32_t from, const shared::CollisionPush& collision,
-              double substepSeconds, bool last) const;
+  // Corrects the free motion in place.
+  void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
 
   // Copies the records of the tick's last substep to the CPU, one per system; report() has them once the
   // recording is complete.
-  void recordReport(vulkan::Recorder& recorder) const;
+  void recordReport(vulkan::Recorder& recorder, const Tick& tick) override;
   std::span<const shared::SolveRecord> report() const;
 
   // Marks the springs that ACAD held in the last recorded substep, if a cloth has it. Begins with a barrier.
@@ -67,6 +64,8 @@ class SolveStage {
 
  private:
   struct Kernels;
+
+  void recordTables(vulkan::Recorder& recorder) override;
 
   const vulkan::Device& device_;
   StateBuffers state_;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Inputs that the scene itself gives to a tick.
+#include "server/simulation/tick_inputs.h"
+
 #include "server/model/wind.h"
-#include "server/simulation/cloth_simulation.h"
 
 namespace clothstream::simulation {
 

@@ -51,8 +51,8 @@ void dispatch(vulkan::Recorder& recorder, const Bindings& bindings, const auto& 
 
 }  // namespace
 
-XpbdVariant xpbdVariantOf(std::span<const shared::ClothRecord> cloths, bool colliders) {
-  XpbdVariant variant{false, false, colliders};
+XpbdStage::Variant XpbdStage::variantOf(std::span<const shared::ClothRecord> cloths, bool colliders) {
+  Variant variant{false, false, colliders};
   for (const shared::ClothRecord& cloth : cloths) {
     for (const shared::XpbdSpringRecord& spring : cloth.xpbdSprings)
       variant.damped = variant.damped || spring.damping != 0;
@@ -75,11 +75,16 @@ XpbdStage::XpbdStage(const vulkan::Device& device, std::span<const model::Cloth>
           device, BufferPurpose::state,
           sizeof(float) * (tables_.iterated ? tables_.gridMultipliers + tables_.links.size() + 1 : 4)) {}
 
-void XpbdStage::recordTables(vulkan::Recorder& recorder) const {
+bool XpbdStage::isIn(std::span<const model::Cloth> cloths) {
+  return std::ranges::any_of(
+      cloths, [](const model::Cloth& cloth) { return cloth.solver.kind == model::SolverKind::xpbd; });
+}
+
+void XpbdStage::recordTables(vulkan::Recorder& recorder) {
   for (const DeviceTable* table : {&tiles_, &colours_, &links_}) table->recordUpload(recorder);
 }
 
-const StateBindings& XpbdStage::grids(const XpbdVariant& variant, std::uint32_t passes) {
+const StateBindings& XpbdStage::grids(const Variant& variant, std::uint32_t passes) {
   // Corners have no bend springs.
   const bool bend = variant.bend && passes != 1;
   const std::size_t pass = passes == kAllPasses ? 3 : passes / 2;
@@ -99,7 +104,7 @@ const StateBindings& XpbdStage::grids(const XpbdVariant& variant, std::uint32_t 
   return *made;
 }
 
-const StateBindings& XpbdStage::meshes(const XpbdVariant& variant, bool whole) {
+const StateBindings& XpbdStage::meshes(const Variant& variant, bool whole) {
   std::optional<StateBindings>& made = meshes_[(whole ? 1u : 0u) | (variant.damped ? 2u : 0u)];
   if (made) return *made;
   made = bindStates(device_,
@@ -115,7 +120,7 @@ const StateBindings& XpbdStage::meshes(const XpbdVariant& variant, bool whole) {
   return *made;
 }
 
-const StateBindings& XpbdStage::finish(const XpbdVariant& variant) {
+const StateBindings& XpbdStage::finish(const Variant& variant) {
   std::optional<StateBindings>& made = finish_[variant.colliders ? 1 : 0];
   if (made) return *made;
   made = bindStates(
@@ -136,17 +141,20 @@ const StateBindings& XpbdStage::finish(const XpbdVariant& variant) {
   return *made;
 }
 
-void XpbdStage::prepare(const XpbdVariant& variant) {
-  if (tables_.wholeGrids.count > 0) grids(variant, kAllPasses);
-  if (tables_.partGrids[0].count > 0)
-    for (std::uint32_t pass = 0; pass < kGridPasses; ++pass) grids(variant, 1u << pass);
-  if (tables_.wholeMeshes.count > 0) meshes(variant, true);
-  if (!tables_.partMeshes.empty()) meshes(variant, false);
-  finish(variant);
+void XpbdStage::prepare(std::span<const shared::ClothRecord> cloths) {
+  for (const bool colliders : {false, true}) {
+    const Variant variant = variantOf(cloths, colliders);
+    if (tables_.wholeGrids.count > 0) grids(variant, kAllPasses);
+    if (tables_.partGrids[0].count > 0)
+      for (std::uint32_t pass = 0; pass < kGridPasses; ++pass) grids(variant, 1u << pass);
+    if (tables_.wholeMeshes.count > 0) meshes(variant, true);
+    if (!tables_.partMeshes.empty()) meshes(variant, false);
+    finish(variant);
+  }
 }
 
 // Records as many dispatches as the device's limit on loop rounds and the time of a dispatch require.
-void XpbdStage::recordWhole(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant) {
+void XpbdStage::recordWhole(vulkan::Recorder& recorder, std::uint32_t from, const Variant& variant) {
   const std::uint32_t nodes = std::max(1u, tables_.wholeNodes);
   const std::uint32_t each = std::max(1u, std::min(cut_.rounds / std::max(1u, tables_.roundsPerIteration),
                                                    nodesPerDispatch(device_) / nodes));
@@ -170,7 +178,7 @@ void XpbdStage::recordWhole(vulkan::Recorder& recorder, std::uint32_t from, cons
   }
 }
 
-void XpbdStage::recordParts(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant) {
+void XpbdStage::recordParts(vulkan::Recorder& recorder, std::uint32_t from, const Variant& variant) {
   shared::XpbdPush push{};
   push.firstMultiplier = tables_.gridMultipliers;
   for (; push.firstIteration < tables_.partGridIterations; ++push.firstIteration)
@@ -191,14 +199,20 @@ void XpbdStage::recordParts(vulkan::Recorder& recorder, std::uint32_t from, cons
   }
 }
 
-void XpbdStage::record(vulkan::Recorder& recorder, std::uint32_t from, const XpbdVariant& variant,
-                       shared::FinishPush push) {
-  recordWhole(recorder, from, variant);
-  recordParts(recorder, from, variant);
+void XpbdStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
+  const Tick& tick = substep.tick;
+  const Variant variant = variantOf(tick.cloths, substep.collision.colliderCount > 0);
+  recordWhole(recorder, substep.from, variant);
+  recordParts(recorder, substep.from, variant);
+  shared::FinishPush push{.collision = substep.collision,
+                          .substepSeconds = static_cast<float>(tick.substepSeconds),
+                          .substepRate = tick.rate * static_cast<float>(tick.substeps),
+                          .firstTile = 0,
+                          .reserved = 0};
   const std::uint32_t most = device_.limits().maxDispatchX;
   for (std::uint32_t done = 0; done < tables_.nodes.count; done += most) {
     push.firstTile = tables_.nodes.first + done;
-    dispatch(recorder, finish(variant)[from], push,
+    dispatch(recorder, finish(variant)[substep.from], push,
              std::uint64_t{std::min(most, tables_.nodes.count - done)} * cut_.partWorkgroup,
              push.collision.nodeWork);
   }

@@ -70,9 +70,12 @@ class Bound {
                 .positions = {&positions_[0], &positions_[1]},
                 .velocities = {&velocities_[0], &velocities_[1]}},
                workgroupSize) {
+    const simulation::TickInputs inputs{motion.scene.environment, {}};
+    const simulation::Tick tick{
+        .inputs = inputs, .cloths = {}, .substepSeconds = motion.scene.substepSeconds()};
     for (int run = 0; run < 2; ++run) {
       recorder_.begin();
-      if (run == 0) stage_.recordTables(recorder_);
+      stage_.uploadTables(recorder_);
       const std::vector<float> masses = simulation::inverseMasses(motion.scene.cloths);
       std::size_t offset = 0;
       const auto load = [&](const std::vector<model::Vec3>& vectors, const vulkan::Buffer& to, bool weighed) {
@@ -85,10 +88,10 @@ class Bound {
       load(motion.start.positions, positions_[0], true);
       load(motion.end.positions, positions_[1], true);
       load(motion.end.velocities, velocities_[1], false);
-      stage_.recordClear(recorder_);
-      stage_.recordSubstep(recorder_, 0);
+      stage_.recordInputs(recorder_, tick);
+      stage_.recordSubstep(recorder_, {.tick = tick});
       recorder_.barrier();
-      stage_.recordReport(recorder_, 0);
+      stage_.recordReport(recorder_, tick);
       recorder_.copy(positions_[1], readback_, nodes_ * sizeof(shared::vec4));
       recorder_.copy(velocities_[1], readback_, nodes_ * sizeof(shared::vec4), 0,
                      nodes_ * sizeof(shared::vec4));

@@ -106,13 +106,16 @@ class Lists {
                 .velocities = {&velocities_, &velocities_}},
                workgroupSize),
         readback_(device(), vulkan::BufferPurpose::readback, stage_.neighbours().bytes()) {
+    const simulation::TickInputs inputs{scene.environment, {}};
+    const simulation::Tick tick{
+        .inputs = inputs, .cloths = {}, .substeps = scene.substeps, .substepSeconds = scene.substepSeconds()};
     recorder_.begin();
-    stage_.recordTables(recorder_);
-    stage_.recordClear(recorder_);
+    stage_.uploadTables(recorder_);
+    stage_.recordInputs(recorder_, tick);
     recorder_.barrier();
-    stage_.recordSubstep(recorder_, 0, 0, {});
+    stage_.recordSubstep(recorder_, {.tick = tick});
     recorder_.barrier();
-    stage_.recordReport(recorder_, 0);
+    stage_.recordReport(recorder_, tick);
     recorder_.copy(stage_.neighbours(), readback_, readback_.bytes());
     submitAndWait(device(), recorder_);
   }

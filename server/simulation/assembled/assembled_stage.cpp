@@ -108,7 +108,7 @@ AssembledStage::AssembledStage(const vulkan::Device& device, std::span<const mod
   }
 }
 
-void AssembledStage::recordTables(vulkan::Recorder& recorder) const {
+void AssembledStage::recordTables(vulkan::Recorder& recorder) {
   for (const DeviceTable* table : {&systems_, &chunks_, &rows_, &entries_, &columns_, &sources_,
                                    &nodeEntries_, &nodeRows_, &nodeRanges_})
     table->recordUpload(recorder);
@@ -149,28 +149,28 @@ void AssembledStage::recordParts(vulkan::Recorder& recorder, bool measures) cons
   recorder.dispatch(*multiply_, push, threads);
 }
 
-void AssembledStage::record(vulkan::Recorder& recorder, std::uint32_t from,
-                            const shared::CollisionPush& collision, double substepSeconds,
-                            bool measures) const {
+void AssembledStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
   const std::uint64_t chunkThreads = std::uint64_t{tables_.chunks.size()} * cut_.workgroup;
   recorder.barrier();
-  recorder.dispatch(fill_[from], shared::AssemblePush{static_cast<float>(1 / substepSeconds)}, chunkThreads,
+  recorder.dispatch(fill_[substep.from],
+                    shared::AssemblePush{static_cast<float>(1 / substep.tick.substepSeconds)}, chunkThreads,
                     workPerInvocation(CLOTHSTREAM_ASSEMBLED_CHUNK_ROWS * kFillWork, cut_.workgroup));
   recorder.barrier();
   recorder.dispatch(multiplyJacobians_, chunkThreads);
-  recordWhole(recorder, measures);
-  recordParts(recorder, measures);
+  recordWhole(recorder, substep.isLast());
+  recordParts(recorder, substep.isLast());
   recorder.barrier();
-  recorder.dispatch(apply_[from],
-                    shared::ApplyMultiplierPush{.collision = collision,
-                                                .substepSeconds = static_cast<float>(substepSeconds),
-                                                .reserved0 = 0,
-                                                .reserved1 = 0,
-                                                .reserved2 = 0},
-                    std::uint64_t{tables_.nodeRanges.size()} * cut_.workgroup, collision.nodeWork);
+  recorder.dispatch(
+      apply_[substep.from],
+      shared::ApplyMultiplierPush{.collision = substep.collision,
+                                  .substepSeconds = static_cast<float>(substep.tick.substepSeconds),
+                                  .reserved0 = 0,
+                                  .reserved1 = 0,
+                                  .reserved2 = 0},
+      std::uint64_t{tables_.nodeRanges.size()} * cut_.workgroup, substep.collision.nodeWork);
 }
 
-void AssembledStage::recordReport(vulkan::Recorder& recorder) const {
+void AssembledStage::recordReport(vulkan::Recorder& recorder, const Tick&) {
   recorder.copy(solves_, solvesReadback_, solves_.bytes());
 }
 

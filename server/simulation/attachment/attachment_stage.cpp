@@ -68,11 +68,12 @@ GrabStatus statusOf(const shared::GrabReport& report) {
 }
 
 AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables,
-                                 const StateBuffers& state, std::uint32_t nodeCount,
+                                 const StateBuffers& state, std::span<const std::uint32_t> clothOffsets,
                                  std::uint32_t workgroupSize)
     : device_(device),
+      clothOffsets_(clothOffsets.begin(), clothOffsets.end()),
       workgroupSize_(workgroupSize),
-      nodeCount_(nodeCount),
+      nodeCount_(clothOffsets.back()),
       attachedCount_(static_cast<std::uint32_t>(tables.attached.size())),
       hasTethers_(!tables.tethers.empty()),
       attached_(device, tables.attached),
@@ -82,7 +83,7 @@ AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentT
       frames_(device, BufferPurpose::texels,
               std::max<std::size_t>(1, tables.frames.size()) * sizeof(shared::FrameRecord)),
       grabs_(device, BufferPurpose::texels, kGrabBytes),
-      grabbed_(device, BufferPurpose::state, nodeCount * sizeof(shared::GrabbedNode)),
+      grabbed_(device, BufferPurpose::state, nodeCount_ * sizeof(shared::GrabbedNode)),
       reports_(device, BufferPurpose::state, kReportBytes),
       uploads_{Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes),
                Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes)},
@@ -125,7 +126,7 @@ std::uint64_t AttachmentStage::invocations() const {
   return std::min<std::uint64_t>(nodeCount_, kMost);
 }
 
-void AttachmentStage::setSlack(std::span<const model::Cloth> cloths) {
+void AttachmentStage::setCloths(std::span<const model::Cloth> cloths) {
   if (!hasTethers_) return;
   std::vector<float> longer;
   for (const model::Cloth& cloth : cloths) longer.push_back(1 + (cloth.tethers ? cloth.tethers->slack : 0));
@@ -143,18 +144,16 @@ void AttachmentStage::setSlack(std::span<const model::Cloth> cloths) {
 }
 
 void AttachmentStage::recordTables(vulkan::Recorder& recorder) {
-  if (std::exchange(tabled_, true)) return;
   attached_.recordUpload(recorder);
   recorder.fill(grabbed_, 0, grabbed_.bytes());
   recorder.fill(reports_, 0, reports_.bytes());
-  recorder.barrier();
 }
 
-void AttachmentStage::recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
-                                   std::span<const Grab> grabs) {
+void AttachmentStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) {
+  const std::vector<model::Pose>& frames = tick.inputs.attachments;
+  const std::vector<Grab>& grabs = tick.inputs.grabs;
   assert(frames.empty() || frames.size() == startFrames_.size());
   assert(grabs.size() <= kMaxGrabs);
-  recordTables(recorder);
   if (!std::exchange(slackened_, true)) tethers_.recordUpload(recorder);
   slot_ = 1 - slot_;
   const Buffer& through = uploads_[slot_];
@@ -179,10 +178,9 @@ void AttachmentStage::recordInputs(vulkan::Recorder& recorder, std::span<const m
 }
 
 void AttachmentStage::recordCarries(vulkan::Recorder& recorder, std::uint32_t present,
-                                    std::span<const model::Carry> carries,
-                                    std::span<const std::uint32_t> clothOffsets) {
+                                    std::span<const model::Carry> carries) const {
   for (const model::Carry& carry : carries) {
-    const std::uint32_t first = clothOffsets[carry.cloth], count = clothOffsets[carry.cloth + 1] - first;
+    const std::uint32_t first = clothOffsets_[carry.cloth], count = clothOffsets_[carry.cloth + 1] - first;
     recorder.dispatch(carry_[present],
                       shared::CarryPush{.from = vectorOf(carry.from.position),
                                         .firstNode = first,
@@ -194,9 +192,16 @@ void AttachmentStage::recordCarries(vulkan::Recorder& recorder, std::uint32_t pr
   }
 }
 
-void AttachmentStage::recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate) {
+void AttachmentStage::recordStart(vulkan::Recorder& recorder, const Tick& tick, std::uint32_t present) {
+  if (attachedCount_ == 0 && !takes_) return;
+  recorder.beginStage("attachments");
+  recorder.barrier();
+  if (!tick.inputs.carries.empty()) {
+    recordCarries(recorder, present, tick.inputs.carries);
+    recorder.barrier();
+  }
   if (attachedCount_ > 0)
-    recorder.dispatch(aim_[present], shared::AimPush{attachedCount_, tickRate, model::kMaxAttachmentSpeed},
+    recorder.dispatch(aim_[present], shared::AimPush{attachedCount_, tick.rate, model::kMaxAttachmentSpeed},
                       attachedCount_);
   if (!takes_) return;
   recorder.dispatch(findNearest_[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
@@ -204,23 +209,21 @@ void AttachmentStage::recordAim(vulkan::Recorder& recorder, std::uint32_t presen
   recorder.dispatch(beginGrabs_[present], shared::GrabPush{nodeCount_, grabCount_}, invocations());
 }
 
-void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
-                                    std::uint32_t substeps, float tickRate) {
+void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
   if (!hasTethers_ && grabCount_ == 0) return;
-  const float rate = tickRate * static_cast<float>(substeps);
+  const shared::CollisionPush& times = substep.collision;
   recorder.barrier();
-  recorder.dispatch(
-      (grabCount_ > 0 ? pull_ : tie_)[present],
-      shared::PullPush{.nodeCount = nodeCount_,
-                       .progressBefore = static_cast<float>(substep) / static_cast<float>(substeps),
-                       .progressAfter = static_cast<float>(substep + 1) / static_cast<float>(substeps),
-                       .substepSeconds = 1 / rate,
-                       .substepRate = rate,
-                       .caughtUp = model::kGrabCorrectionFraction},
-      invocations());
+  recorder.dispatch((grabCount_ > 0 ? pull_ : tie_)[substep.from],
+                    shared::PullPush{.nodeCount = nodeCount_,
+                                     .progressBefore = times.progressBefore,
+                                     .progressAfter = times.progressAfter,
+                                     .substepSeconds = times.substepSeconds,
+                                     .substepRate = times.substepRate,
+                                     .caughtUp = model::kGrabCorrectionFraction},
+                    invocations());
 }
 
-void AttachmentStage::recordReport(vulkan::Recorder& recorder) {
+void AttachmentStage::recordReport(vulkan::Recorder& recorder, const Tick&) {
   if (grabCount_ > 0) recorder.copy(reports_, readbacks_[slot_], grabCount_ * sizeof(shared::GrabReport));
 }
 
@@ -259,7 +262,6 @@ HeldNodes AttachmentStage::collect() const {
 }
 
 void AttachmentStage::recordRestore(vulkan::Recorder& recorder, const HeldNodes& held) {
-  recordTables(recorder);
   // A state that is saved before the next tick has the same grabs.
   grabCount_ = static_cast<std::uint32_t>(held.grabs.size());
   if (held.grabs.empty()) {

@@ -12,6 +12,7 @@
 #include "server/simulation/attachment/attachment_tables.h"
 #include "server/simulation/attachment/grab.h"
 #include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/simulation/state_snapshot.h"
@@ -24,35 +25,21 @@ namespace clothstream::simulation {
 GrabStatus statusOf(const shared::GrabReport& report);
 
 // Belongs to the device's thread.
-//
-// A tick:   recordInputs -> barrier -> recordCarries -> barrier -> recordAim -> substeps, each with
-// recordSubstep at its end -> recordReport
-class AttachmentStage {
+class AttachmentStage final : public Stage {
  public:
   // Throws std::runtime_error where the device has no room.
   AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables, const StateBuffers& state,
-                  std::uint32_t nodeCount, std::uint32_t workgroupSize);
+                  std::span<const std::uint32_t> clothOffsets, std::uint32_t workgroupSize);
 
-  // Sets the slack of the tethers of these cloths from the next tick on. Must be called before the first
-  // tick.
-  void setSlack(std::span<const model::Cloth> cloths);
+  // Sets the slack of the tethers. Must be called before the first tick.
+  void setCloths(std::span<const model::Cloth> cloths) override;
 
-  // `frames` are the poses of the attachments at the tick's end; empty: their poses at the start. At most one
-  // tick may be in flight.
-  void recordInputs(vulkan::Recorder& recorder, std::span<const model::Pose> frames,
-                    std::span<const Grab> grabs);
-  // Carries cloths along, each by another one of these. The state is in the buffers `present`.
-  void recordCarries(vulkan::Recorder& recorder, std::uint32_t present, std::span<const model::Carry> carries,
-                     std::span<const std::uint32_t> clothOffsets);
-  // True if recordAim() has work in this tick.
-  bool aims() const { return attachedCount_ > 0 || takes_; }
-  // Gives attached nodes their velocities, and lets grabs begin. The state is in the buffers `present`.
-  void recordAim(vulkan::Recorder& recorder, std::uint32_t present, float tickRate);
-  // Applies tethers and grabs at a substep's end. The result of the substep is in the buffers other than
-  // `present`.
-  void recordSubstep(vulkan::Recorder& recorder, std::uint32_t present, std::uint32_t substep,
-                     std::uint32_t substeps, float tickRate);
-  void recordReport(vulkan::Recorder& recorder);
+  void recordInputs(vulkan::Recorder& recorder, const Tick& tick) override;
+  // Carries cloths along, gives attached nodes their velocities, and lets grabs begin. Stage "attachments".
+  void recordStart(vulkan::Recorder& recorder, const Tick& tick, std::uint32_t present) override;
+  // Applies tethers and grabs to the substep's end.
+  void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
+  void recordReport(vulkan::Recorder& recorder, const Tick& tick) override;
 
   // Reports of the grabs of the last recorded tick, once it is complete.
   std::span<const shared::GrabReport> report() const;
@@ -66,16 +53,17 @@ class AttachmentStage {
   void recordRestore(vulkan::Recorder& recorder, const HeldNodes& held);
 
  private:
-  // Records the upload of constant tables once.
-  void recordTables(vulkan::Recorder& recorder);
+  void recordTables(vulkan::Recorder& recorder) override;
+  void recordCarries(vulkan::Recorder& recorder, std::uint32_t present,
+                     std::span<const model::Carry> carries) const;
   StateBindings bindPull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
   // Number of invocations, which share the nodes.
   std::uint64_t invocations() const;
 
   const vulkan::Device& device_;
+  std::vector<std::uint32_t> clothOffsets_;
   std::uint32_t workgroupSize_, nodeCount_, attachedCount_;
   bool hasTethers_;
-  bool tabled_ = false;    // the constant tables are on the device
   bool slackened_ = true;  // the tethers on the device have the present slack
   bool takes_ = false;     // a grab begins in this tick
   std::uint32_t grabCount_ = 0, slot_ = 0;

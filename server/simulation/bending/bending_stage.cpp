@@ -56,16 +56,17 @@ bool BendingStage::serves(std::span<const model::Cloth> cloths) const {
   return true;
 }
 
-void BendingStage::recordTables(vulkan::Recorder& recorder) const {
+void BendingStage::recordTables(vulkan::Recorder& recorder) {
   for (const DeviceTable* table : {&hinges_, &incidences_, &lists_}) table->recordUpload(recorder);
 }
 
-void BendingStage::record(vulkan::Recorder& recorder, std::uint32_t present, double substepSeconds) const {
-  shared::BendingPush push{hingeCount_, static_cast<float>(substepSeconds)};
-  recorder.dispatch(measure_[present], push, hingeCount_, 1);
+void BendingStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
+  shared::BendingPush push{hingeCount_, static_cast<float>(substep.tick.substepSeconds)};
+  recorder.barrier();
+  recorder.dispatch(measure_[substep.from], push, hingeCount_, 1);
   recorder.barrier();
   push.count = nodeCount_;
-  recorder.dispatch(bend_[present], push, nodeCount_, kBendWork);
+  recorder.dispatch(bend_[substep.from], push, nodeCount_, kBendWork);
 }
 
 }  // namespace clothstream::simulation

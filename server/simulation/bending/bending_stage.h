@@ -10,6 +10,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/bending/bending_tables.h"
 #include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
@@ -19,7 +20,7 @@
 namespace clothstream::simulation {
 
 // Belongs to the device's thread. Changes velocities at the start of a substep, for every solver.
-class BendingStage {
+class BendingStage final : public Stage {
  public:
   // Throws std::runtime_error if the device has too little memory.
   BendingStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
@@ -31,14 +32,13 @@ class BendingStage {
   // True if the tables have the hinges of this cloth.
   bool bends(std::size_t cloth) const { return bends_[cloth]; }
 
-  // Uploads the tables, before the next substep.
-  void recordTables(vulkan::Recorder& recorder) const;
-  // The substep's start is in the buffers `present`. The caller records a barrier before and after.
-  void record(vulkan::Recorder& recorder, std::uint32_t present, double substepSeconds) const;
+  void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
 
  private:
   BendingStage(const vulkan::Device& device, const BendingTables& tables,
                std::span<const model::Cloth> cloths, const StateBuffers& state, std::uint32_t workgroupSize);
+
+  void recordTables(vulkan::Recorder& recorder) override;
 
   std::vector<bool> bends_;  // cloths in the tables
   std::uint32_t hingeCount_, nodeCount_;

@@ -87,36 +87,32 @@ bool CoarseStage::isIn(std::span<const model::Cloth> cloths) {
   return std::ranges::any_of(cloths, [](const model::Cloth& cloth) { return cloth.coarse.has_value(); });
 }
 
-void CoarseStage::recordTables(vulkan::Recorder& recorder) const {
+void CoarseStage::recordTables(vulkan::Recorder& recorder) {
   for (const DeviceTable* table : {&nodes_, &means_, &shares_, &colours_, &links_})
     table->recordUpload(recorder);
 }
 
-bool CoarseStage::record(vulkan::Recorder& recorder, std::uint32_t present, const Substep& substep,
-                         const shared::CollisionPush& collision,
-                         std::span<const shared::ClothRecord> cloths) const {
-  bool any = false;
+void CoarseStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
+  const Tick& tick = substep.tick;
   for (const CoarseTables::Level& level : levels_) {
     if (substep.index % level.every != 0) continue;
     // The last correction of a tick may be fewer substeps before the next one.
     const std::uint32_t since =
-        substep.index > 0 ? level.every : substep.count - (substep.count - 1) / level.every * level.every;
+        substep.index > 0 ? level.every : tick.substeps - (tick.substeps - 1) / level.every * level.every;
     shared::CoarsePush push = level.push;
-    push.velocityRate = static_cast<float>(1 / (since * substep.seconds));
-    push.thickness = cloths[level.cloth].thickness;
-    push.collision = {.colliderCount = collision.colliderCount,
-                      .progressBefore = collision.progressBefore,
-                      .progressAfter = collision.progressBefore,
+    push.velocityRate = static_cast<float>(1 / (since * tick.substepSeconds));
+    push.thickness = tick.cloths[level.cloth].thickness;
+    push.collision = {.colliderCount = substep.collision.colliderCount,
+                      .progressBefore = substep.collision.progressBefore,
+                      .progressAfter = substep.collision.progressBefore,
                       .tickRate = 0,
                       .substepRate = 0,
                       .contactClothCount = 0,
-                      .nodeWork = collision.nodeWork,
+                      .nodeWork = substep.collision.nodeWork,
                       .substepSeconds = 0};
-    if (any) recorder.barrier();
-    recordLevel(recorder, present, push);
-    any = true;
+    recorder.barrier();
+    recordLevel(recorder, substep.from, push);
   }
-  return any;
 }
 
 void CoarseStage::recordLevel(vulkan::Recorder& recorder, std::uint32_t present,

@@ -10,18 +10,18 @@
 #include "server/model/scene.h"
 #include "server/simulation/coarse/coarse_tables.h"
 #include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
-#include "shaders/shared/simulation.h"
 
 namespace clothstream::simulation {
 
 // Belongs to the device's thread. Changes positions and velocities at the start of a substep, for every
 // solver.
-class CoarseStage {
+class CoarseStage final : public Stage {
  public:
   // Throws std::runtime_error if the device has too little memory.
   CoarseStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
@@ -29,18 +29,8 @@ class CoarseStage {
 
   static bool isIn(std::span<const model::Cloth> cloths);
 
-  // Uploads the tables, before the next substep.
-  void recordTables(vulkan::Recorder& recorder) const;
-  // Substep `index` of a tick of `count` substeps, `seconds` each.
-  struct Substep {
-    std::uint32_t index, count;
-    double seconds;
-  };
-  // Corrects the start of a substep, which is in the buffers `present`. `collision` is the push of the
-  // substep, and `cloths` are the records of the scene. The caller records a barrier before. Returns true if
-  // the caller must record one after.
-  bool record(vulkan::Recorder& recorder, std::uint32_t present, const Substep& substep,
-              const shared::CollisionPush& collision, std::span<const shared::ClothRecord> cloths) const;
+  // Corrects the start of a substep.
+  void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
 
  private:
   struct Moves {
@@ -52,6 +42,7 @@ class CoarseStage {
 
   Moves bindMoves(const vulkan::Device& device, const StateBuffers& state, std::uint32_t workgroupSize,
                   bool colliders) const;
+  void recordTables(vulkan::Recorder& recorder) override;
   void recordLevel(vulkan::Recorder& recorder, std::uint32_t present, const shared::CoarsePush& push) const;
 
   std::vector<CoarseTables::Level> levels_;

@@ -62,8 +62,8 @@ CollisionStage::CollisionStage(const vulkan::Device& device, const SolidTables& 
                            return BufferList{positions[from], velocities[from], &bounds_, &nearLists_};
                          })) {}
 
-void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders,
-                                  bool reportsContacts) {
+void CollisionStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) {
+  const std::vector<MovingCollider>& colliders = tick.inputs.colliders;
   ordered_.clear();
   indices_.clear();
   double work = 1;
@@ -83,11 +83,11 @@ void CollisionStage::recordInputs(vulkan::Recorder& recorder, std::span<const Mo
   std::size_t offset = upload(recorder, tables_.records, through, 0, colliders_, 0);
   offset = upload(recorder, tables_.planes, through, offset, colliders_, offset);
   upload(recorder, tables_.bounds, through, offset, bounds_, 0);
-  reportsContacts_ = reportsContacts && !colliders.empty();
+  reportsContacts_ = tick.inputs.reportsContacts && !colliders.empty();
   if (reportsContacts_) recorder.fill(contactImpulses_, 0, contactBytes());
 }
 
-void CollisionStage::recordContacts(vulkan::Recorder& recorder) {
+void CollisionStage::recordReport(vulkan::Recorder& recorder, const Tick&) {
   if (!reportsContacts_) return;
   Buffer& readback = contactReadbacks_[slot_];
   if (readback.bytes() == 0) readback = Buffer(device_, BufferPurpose::readback, contactImpulses_.bytes());
@@ -113,10 +113,13 @@ std::vector<float> CollisionStage::inOrder(std::span<const float> numbers) const
   return values;
 }
 
-void CollisionStage::recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds,
-                                  float thickness) {
-  if (!active()) return;
-  recorder.dispatch(gather_[present], shared::GatherPush{nodeCount_, count_, tickSeconds, thickness},
+void CollisionStage::recordStart(vulkan::Recorder& recorder, const Tick& tick, std::uint32_t present) {
+  if (count_ == 0) return;
+  float thickness = 0;
+  for (const shared::ClothRecord& cloth : tick.cloths) thickness = std::max(thickness, cloth.thickness);
+  recorder.beginStage("near");
+  recorder.barrier();
+  recorder.dispatch(gather_[present], shared::GatherPush{nodeCount_, count_, 1 / tick.rate, thickness},
                     listsOf(nodeCount_), shared::kNearNodes + count_);
 }
 

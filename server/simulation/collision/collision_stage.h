@@ -9,6 +9,7 @@
 
 #include "server/simulation/collision/collider_tables.h"
 #include "server/simulation/collision/moving_collider.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
@@ -17,10 +18,8 @@
 namespace clothstream::simulation {
 
 // A kernel that includes shaders/collision/collide.glsl binds colliders() and nearLists(), and is pushed
-// push(). Belongs to the device's thread.
-//
-// A tick:   recordInputs -> barrier -> recordGather -> substeps
-class CollisionStage {
+// push().
+class CollisionStage final : public Stage {
  public:
   // `positions` and `velocities` are the two state buffers of the scene: texels that outlive the stage.
   // `solids` has the meshes of all colliders and outlives the stage.
@@ -28,15 +27,12 @@ class CollisionStage {
                  std::uint32_t clothCount, std::array<const vulkan::Buffer*, 2> positions,
                  std::array<const vulkan::Buffer*, 2> velocities);
 
-  // Uploads the colliders of the next tick. At most one tick may be in flight. `reportsContacts`: count their
-  // contacts.
-  void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders,
-                    bool reportsContacts);
-
-  // Lists the colliders that nodes may touch within `tickSeconds`. The state is in the buffers `present`, and
-  // no cloth is thicker than `thickness`. The caller records stage and barrier. Records nothing if there are
-  // no colliders.
-  void recordGather(vulkan::Recorder& recorder, std::uint32_t present, float tickSeconds, float thickness);
+  // Uploads the colliders.
+  void recordInputs(vulkan::Recorder& recorder, const Tick& tick) override;
+  // Lists the colliders that nodes may touch within the tick. Stage "near".
+  void recordStart(vulkan::Recorder& recorder, const Tick& tick, std::uint32_t present) override;
+  // Copies the contacts to the CPU.
+  void recordReport(vulkan::Recorder& recorder, const Tick& tick) override;
 
   // True if the tick has colliders that are not triangle meshes.
   bool active() const { return count_ > 0; }
@@ -44,8 +40,6 @@ class CollisionStage {
   std::uint32_t solidCount() const { return static_cast<std::uint32_t>(indices_.size()) - count_; }
   shared::CollisionPush push(std::uint32_t substep, std::uint32_t substeps, float tickRate) const;
 
-  // Copies the contacts to the CPU, after the tick's substeps and a barrier.
-  void recordContacts(vulkan::Recorder& recorder);
   // Contacts of the last recorded tick, once it is complete.
   std::vector<ContactStatus> contacts() const;
 

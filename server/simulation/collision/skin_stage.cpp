@@ -95,12 +95,14 @@ SkinStage::SkinStage(const vulkan::Device& device, SkinTables tables, SolidTable
       weigh_(device, {device, kernels::weigh_solid, workgroupSize}, {&fans_.texels(), &texels, &texels}),
       refit_(device, {device, kernels::refit_solid, workgroupSize}, {&texels, &texels}) {}
 
-void SkinStage::recordTables(vulkan::Recorder& recorder) const {
+void SkinStage::recordTables(vulkan::Recorder& recorder) {
   rests_.recordUpload(recorder);
   fans_.recordUpload(recorder);
 }
 
-void SkinStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders) {
+void SkinStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) {
+  const std::vector<MovingCollider>& colliders = tick.inputs.colliders;
+  moves_ = false;
   slot_ = 1 - slot_;
   const Buffer& upload = uploads_[slot_];
   for (const SkinTables::Skinned& skinned : tables_.skinned) {
@@ -110,6 +112,7 @@ void SkinStage::recordInputs(vulkan::Recorder& recorder, std::span<const MovingC
       return own != nullptr && *own == solid;
     });
     if (collider == colliders.end()) continue;
+    moves_ = true;
     const bool rests = collider->jointsStart.empty();
     const std::size_t joints = skinned.push.jointCount;
     transforms_.resize(2 * joints);
@@ -140,7 +143,9 @@ void SkinStage::recordRefit(vulkan::Recorder& recorder, const SkinTables::Skinne
 }
 
 // Every dispatch writes to the buffer of all meshes, so barriers are between them.
-void SkinStage::record(vulkan::Recorder& recorder) const {
+void SkinStage::recordStart(vulkan::Recorder& recorder, const Tick&, std::uint32_t) {
+  if (!moves_) return;
+  recorder.beginStage("skins");
   for (const SkinTables::Skinned& skinned : tables_.skinned) {
     recorder.barrier();
     recorder.dispatch(skin_, skinned.push, skinned.push.vertexCount);

@@ -10,6 +10,7 @@
 #include "server/simulation/collision/moving_collider.h"
 #include "server/simulation/collision/solid_tables.h"
 #include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
 #include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
 
@@ -33,23 +34,20 @@ struct SkinTables {
 };
 SkinTables skinTables(const SolidTables& solids);
 
-// Belongs to the device's thread.
-//
-// A tick:   recordInputs -> barrier -> record -> substeps
-class SkinStage {
+class SkinStage final : public Stage {
  public:
   // `solids` outlives the stage. The buffer `texels` has its texels.
   SkinStage(const vulkan::Device& device, SkinTables tables, SolidTables& solids,
             const vulkan::Buffer& texels, std::uint32_t workgroupSize);
 
-  void recordTables(vulkan::Recorder& recorder) const;
-  // Uploads the joints of the colliders, and sets the reach and the motion of their meshes in the tables. At
-  // most one tick may be in flight. A mesh with joints belongs to one collider. Allocates nothing.
-  void recordInputs(vulkan::Recorder& recorder, std::span<const MovingCollider> colliders);
-  // Moves vertices, their normals and the boxes of the trees. Has its own barriers, except at the end.
-  void record(vulkan::Recorder& recorder) const;
+  // Uploads the joints of the colliders, and sets the reach and the motion of their meshes in the tables,
+  // which CollisionStage reads. A mesh with joints belongs to one collider. Allocates nothing.
+  void recordInputs(vulkan::Recorder& recorder, const Tick& tick) override;
+  // Moves vertices, their normals and the boxes of the trees. Stage "skins".
+  void recordStart(vulkan::Recorder& recorder, const Tick& tick, std::uint32_t present) override;
 
  private:
+  void recordTables(vulkan::Recorder& recorder) override;
   void recordRefit(vulkan::Recorder& recorder, const SkinTables::Skinned& skinned, bool upperLevels) const;
 
   SkinTables tables_;
@@ -58,6 +56,7 @@ class SkinStage {
   vulkan::Buffer transformTexels_;
   std::array<vulkan::Buffer, 2> uploads_;  // used alternately: a tick may be in flight
   std::uint32_t slot_ = 0;
+  bool moves_ = false;  // a collider of the tick has one of the meshes
   std::vector<model::Transform>
       transforms_;  // of the joints of one mesh, at the start and at the end of a tick
   vulkan::Bindings skin_, weigh_, refit_;

@@ -53,7 +53,7 @@ SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
                   BufferList{&solids_.texels(), &solids_.texels()});
 }
 
-void SolidStage::recordTables(vulkan::Recorder& recorder) const {
+void SolidStage::recordTables(vulkan::Recorder& recorder) {
   solids_.recordUpload(recorder);
   tiles_.recordUpload(recorder);
   for (const Sampled& sampled : sampled_) {
@@ -62,14 +62,18 @@ void SolidStage::recordTables(vulkan::Recorder& recorder) const {
   }
 }
 
-void SolidStage::record(vulkan::Recorder& recorder, std::uint32_t present,
-                        const shared::CollisionPush& collision, std::uint32_t solidCount) const {
+void SolidStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
+  const std::uint32_t solids = substep.solids;
+  if (solids == 0) return;
   recorder.barrier();
-  recorder.dispatch(
-      collide_[present],
-      shared::SolidPush{
-          .collision = collision, .solidCount = solidCount, .reserved0 = 0, .reserved1 = 0, .reserved2 = 0},
-      std::uint64_t{tileCount_} * workgroupSize_, 1 + solidCount * workOfSolid_, solidCount * mostOfSolid_);
+  recorder.dispatch(collide_[substep.from],
+                    shared::SolidPush{.collision = substep.collision,
+                                      .solidCount = solids,
+                                      .reserved0 = 0,
+                                      .reserved1 = 0,
+                                      .reserved2 = 0},
+                    std::uint64_t{tileCount_} * workgroupSize_, 1 + solids * workOfSolid_,
+                    solids * mostOfSolid_);
 }
 
 }  // namespace clothstream::simulation

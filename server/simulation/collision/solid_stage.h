@@ -10,31 +10,30 @@
 #include "server/model/scene.h"
 #include "server/simulation/collision/solid_tables.h"
 #include "server/simulation/device_table.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::simulation {
 
-// Meshes of a scene on the device. Belongs to the device's thread.
-class SolidStage {
+// Meshes of a scene on the device.
+class SolidStage final : public Stage {
  public:
   // `tables` are those of the scene's colliders.
   SolidStage(const vulkan::Device& device, const SolidTables& tables, std::span<const model::Cloth> cloths,
              const StateBuffers& state, std::uint32_t workgroupSize);
 
-  void recordTables(vulkan::Recorder& recorder) const;
-  // Collides all nodes with the meshes. The state at the substep's start is in the buffers `present`, its end
-  // in the others. Begins with a barrier. The colliders from number collision.colliderCount on are
-  // `solidCount` meshes.
-  void record(vulkan::Recorder& recorder, std::uint32_t present, const shared::CollisionPush& collision,
-              std::uint32_t solidCount) const;
+  // Collides all nodes with the meshes, which are the colliders from number collision.colliderCount on.
+  void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
 
   const vulkan::Buffer& solids() const { return solids_.texels(); }
   // Constants of the kernels that include distance_grid.glsl.
   std::span<const std::uint32_t> specialisation() const { return collide_[0].kernel().specialisation(); }
 
  private:
+  void recordTables(vulkan::Recorder& recorder) override;
+
   std::uint32_t workgroupSize_;
   std::uint32_t tileCount_;
   std::uint64_t workOfSolid_ = 0;  // of the costliest mesh, for each node, in node-steps

@@ -103,7 +103,6 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
     : tables_(motionBoundTables(scene.cloths)),
       gap_(gapOf(scene.cloths)),
       touch_(touchOf(scene.cloths)),
-      substepSeconds_(static_cast<float>(scene.substepSeconds())),
       parts_(device, tables_.parts),
       faces_(device, tables_.faces),
       branches_(device, tables_.branches),
@@ -163,11 +162,7 @@ void MotionBoundStage::setCloths(std::span<const model::Cloth> cloths) {
   touch_ = touchOf(cloths);
 }
 
-void MotionBoundStage::setSubstepSeconds(double seconds) {
-  substepSeconds_ = static_cast<float>(seconds);
-}
-
-void MotionBoundStage::recordTables(vulkan::Recorder& recorder) const {
+void MotionBoundStage::recordTables(vulkan::Recorder& recorder) {
   parts_.recordUpload(recorder);
   faces_.recordUpload(recorder);
   branches_.recordUpload(recorder);
@@ -175,7 +170,7 @@ void MotionBoundStage::recordTables(vulkan::Recorder& recorder) const {
   recorder.fill(shares_, std::bit_cast<std::uint32_t>(1.0f), shares_.bytes());
 }
 
-void MotionBoundStage::recordClear(vulkan::Recorder& recorder) const {
+void MotionBoundStage::recordInputs(vulkan::Recorder& recorder, const Tick&) {
   recorder.fill(report_, 0, report_.bytes());
   recorder.fill(depths_, 0, depths_.bytes());
 }
@@ -204,7 +199,8 @@ void MotionBoundStage::recordTree(vulkan::Recorder& recorder, std::uint32_t from
   }
 }
 
-void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t from) const {
+void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
+  const std::uint32_t from = substep.from;
   const auto faceCount = static_cast<std::uint32_t>(tables_.faces.size());
   const shared::PairPush push{
       .faceCount = faceCount,
@@ -220,7 +216,7 @@ void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t f
                                   .nodePairs = nodePairs_.capacity,
                                   .edgePairs = edgePairs_.capacity,
                                   .gap = gap_,
-                                  .substepRate = 1 / substepSeconds_};
+                                  .substepRate = 1 / static_cast<float>(substep.tick.substepSeconds)};
   const auto onPairs = [&](StateBindings Limits::*kernel) {
     const std::uint64_t most = std::uint64_t{tables_.nodeCount} * kLimitWork;
     recorder.barrier();
@@ -243,8 +239,8 @@ void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t f
   recorder.dispatch(shortenMotions_[from], nodePush, tables_.nodeCount);
 }
 
-void MotionBoundStage::recordDepths(vulkan::Recorder& recorder, std::uint32_t present,
-                                    const shared::CollisionPush& collision) const {
+void MotionBoundStage::recordEnd(vulkan::Recorder& recorder, const Tick&, std::uint32_t present,
+                                 const shared::CollisionPush& collision) {
   if (collision.colliderCount == 0) return;
   recorder.dispatch(measureDepths_[present],
                     shared::DepthPush{.collision = collision,
@@ -255,9 +251,9 @@ void MotionBoundStage::recordDepths(vulkan::Recorder& recorder, std::uint32_t pr
                     tables_.nodeCount, collision.nodeWork);
 }
 
-void MotionBoundStage::recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const {
-  recorder.copy(depths_, depthReadback_, depths_.bytes(), 0, slot * depths_.bytes());
-  recorder.copy(report_, reportReadback_, report_.bytes(), 0, slot * report_.bytes());
+void MotionBoundStage::recordReport(vulkan::Recorder& recorder, const Tick& tick) {
+  recorder.copy(depths_, depthReadback_, depths_.bytes(), 0, tick.slot * depths_.bytes());
+  recorder.copy(report_, reportReadback_, report_.bytes(), 0, tick.slot * report_.bytes());
 }
 
 MotionBoundStage::Report MotionBoundStage::report(std::uint32_t slot) const {

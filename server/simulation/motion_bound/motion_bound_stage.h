@@ -9,6 +9,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/motion_bound/motion_bound_tables.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
@@ -23,7 +24,7 @@ namespace clothstream::simulation {
 // and of two edges, that could meet between the substep's start and its end. It separates those that come too
 // near, and then shortens the motion of nodes so that no pair meets (docs/simulation.md). Pairs and visits of
 // the search are limited in proportion to the nodes.
-class MotionBoundStage {
+class MotionBoundStage final : public Stage {
  public:
   // At least one cloth must have model::boundsMotion(). Throws std::runtime_error if the device has too
   // little memory. Results do not depend on `workgroupSize`.
@@ -32,22 +33,15 @@ class MotionBoundStage {
 
   static bool isIn(const model::Scene& scene);
 
-  // Sets the gap, which follows from the radii of the cloths. No tick may be in flight.
-  void setCloths(std::span<const model::Cloth> cloths);
-  // Sets the duration of a substep. No tick may be in flight.
-  void setSubstepSeconds(double seconds);
+  // Sets the gap, which follows from the radii of the cloths.
+  void setCloths(std::span<const model::Cloth> cloths) override;
 
-  // Uploads the tables, once, before the first tick.
-  void recordTables(vulkan::Recorder& recorder) const;
-  // Resets the tick's report. The caller records a barrier after it.
-  void recordClear(vulkan::Recorder& recorder) const;
-  // Records a substep, which led from state `from` to the other state. Begins with a barrier.
-  void recordSubstep(vulkan::Recorder& recorder, std::uint32_t from) const;
-
-  // Records, after the last substep and a barrier, how deep the nodes are inside the colliders. `present` has
-  // the state, and `collision` is that of the last substep.
-  void recordDepths(vulkan::Recorder& recorder, std::uint32_t present,
-                    const shared::CollisionPush& collision) const;
+  void recordInputs(vulkan::Recorder& recorder, const Tick& tick) override;
+  void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
+  // Measures how deep the nodes are inside the colliders.
+  void recordEnd(vulkan::Recorder& recorder, const Tick& tick, std::uint32_t present,
+                 const shared::CollisionPush& collision) override;
+  void recordReport(vulkan::Recorder& recorder, const Tick& tick) override;
 
   struct Report {
     // Substeps in which no node moved, because a list of pairs was too short or the search for them took too
@@ -55,8 +49,7 @@ class MotionBoundStage {
     std::uint32_t overflows = 0;
     std::uint32_t shortened = 0;  // motions that were shortened
   };
-  // Copies the report to the CPU, after a barrier; report() has it once the recording is complete.
-  void recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const;
+  // Report of the tick with this slot, once it is complete.
   Report report(std::uint32_t slot) const;
   // For each collider, as the device numbers them: depth inside any collider of the deepest node that touches
   // it, in metres. 0: none is inside.
@@ -86,6 +79,7 @@ class MotionBoundStage {
     StateBindings slide, limit;
   };
 
+  void recordTables(vulkan::Recorder& recorder) override;
   // Runs a kernel on each part of a list. Most parts are empty: `expected` is the work of all of them, and
   // `work` that of a pair (vulkan::Recorder::dispatch).
   static void recordParts(vulkan::Recorder& recorder, const vulkan::Bindings& bindings, shared::PairPush push,
@@ -93,7 +87,7 @@ class MotionBoundStage {
   void recordTree(vulkan::Recorder& recorder, std::uint32_t from) const;
 
   MotionBoundTables tables_;
-  float gap_, touch_, substepSeconds_;
+  float gap_, touch_;
   DeviceTable parts_, faces_, branches_;
   vulkan::Buffer boxes_, corrections_, shares_, report_, reportReadback_, depths_, depthReadback_;
   List facePairs_, nodePairs_, edgePairs_;

@@ -90,8 +90,6 @@ SelfCollisionStage::SelfCollisionStage(const vulkan::Device& device, const model
       nodeCount_(scene.nodeCount()),
       cellCount_(cellCountOf(nodeCount_)),
       measureInvocations_((nodeCount_ + 63) / 64),
-      interval_(searchInterval(scene.substeps)),
-      substepSeconds_(static_cast<float>(scene.substepSeconds())),
       reach_(reachOf(scene.cloths)),
       restsUpload_(device, BufferPurpose::upload, nodeCount_ * kTexelBytes),
       rests_(device, BufferPurpose::texels, nodeCount_ * kTexelBytes),
@@ -185,33 +183,30 @@ void SelfCollisionStage::setCloths(std::span<const model::Cloth> cloths) {
   reach_ = reachOf(cloths);
 }
 
-void SelfCollisionStage::setSubsteps(std::uint32_t substeps, double substepSeconds) {
-  interval_ = searchInterval(substeps);
-  substepSeconds_ = static_cast<float>(substepSeconds);
-}
-
-void SelfCollisionStage::recordTables(vulkan::Recorder& recorder) const {
+void SelfCollisionStage::recordTables(vulkan::Recorder& recorder) {
   recorder.copy(restsUpload_, rests_, rests_.bytes());
   recorder.fill(groups_, 1, groups_.bytes());
 }
 
-void SelfCollisionStage::recordClear(vulkan::Recorder& recorder) const {
+void SelfCollisionStage::recordInputs(vulkan::Recorder& recorder, const Tick&) {
   recorder.fill(report_, 0, report_.bytes());
 }
 
-void SelfCollisionStage::recordSubstep(vulkan::Recorder& recorder, std::uint32_t from, std::uint32_t index,
-                                       const shared::CollisionPush& collision) const {
-  if (index % interval_ == 0) recordNeighbours(recorder, 1 - from);
-  for (int i = 0; i < model::kContactIterations; ++i) recordContacts(recorder, 1 - from, collision);
+void SelfCollisionStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
+  const std::uint32_t interval = searchInterval(substep.tick.substeps);
+  if (substep.index % interval == 0) recordNeighbours(recorder, substep, interval);
+  for (int i = 0; i < model::kContactIterations; ++i) recordContacts(recorder, substep);
 }
 
-void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint32_t state) const {
-  const shared::NeighbourPush push{
-      .nodeCount = nodeCount_,
-      .cellCount = cellCount_,
-      .aheadSeconds = kAhead * substepSeconds_ * static_cast<float>(interval_ - 1),
-      .reach = reach_,
-      .restFactor = model::kNeighbours};
+void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, const Substep& substep,
+                                          std::uint32_t interval) const {
+  const std::uint32_t state = 1 - substep.from;
+  const auto substepSeconds = static_cast<float>(substep.tick.substepSeconds);
+  const shared::NeighbourPush push{.nodeCount = nodeCount_,
+                                   .cellCount = cellCount_,
+                                   .aheadSeconds = kAhead * substepSeconds * static_cast<float>(interval - 1),
+                                   .reach = reach_,
+                                   .restFactor = model::kNeighbours};
   const auto dispatch = [&](const StateBindings& kernel, std::uint64_t invocations) {
     recorder.barrier();
     recorder.dispatch(kernel[state], push, invocations);
@@ -228,12 +223,13 @@ void SelfCollisionStage::recordNeighbours(vulkan::Recorder& recorder, std::uint3
   recorder.dispatch(gather_[state], push, nodeCount_, kGatherWork, kMostGatherWork);
 }
 
-void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_t state,
-                                        const shared::CollisionPush& collision) const {
-  const shared::ContactPush push{.collision = collision,
+void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, const Substep& substep) const {
+  const std::uint32_t state = 1 - substep.from;
+  const auto substepSeconds = static_cast<float>(substep.tick.substepSeconds);
+  const shared::ContactPush push{.collision = substep.collision,
                                  .nodeCount = nodeCount_,
-                                 .substepSeconds = substepSeconds_,
-                                 .correctionRate = model::kOverlapCorrectionFraction / substepSeconds_,
+                                 .substepSeconds = substepSeconds,
+                                 .correctionRate = model::kOverlapCorrectionFraction / substepSeconds,
                                  .pushOutSpeed = model::kPushOutSpeed};
   recorder.barrier();
   recorder.fill(groups_, 0, sizeof(std::uint32_t), offsetof(shared::ContactGroups, x));
@@ -242,7 +238,7 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
   recorder.dispatch(contactKernels_[several_]->count[state], push, nodeCount_, kContactWork);
   recorder.barrier();
   const Bindings& resolve = contactKernels_[several_]->resolve[state];
-  const std::uint64_t work = std::uint64_t{kContactWork} * collision.nodeWork;
+  const std::uint64_t work = std::uint64_t{kContactWork} * substep.collision.nodeWork;
   // Indirect dispatches cannot be divided.
   if (recorder.divides(resolve, nodeCount_, work))
     recorder.dispatch(resolve, push, nodeCount_, work);
@@ -250,8 +246,8 @@ void SelfCollisionStage::recordContacts(vulkan::Recorder& recorder, std::uint32_
     recorder.dispatchIndirect(resolve, push, groups_, 0, nodeCount_ * work);
 }
 
-void SelfCollisionStage::recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const {
-  recorder.copy(report_, reportReadback_, report_.bytes(), 0, slot * report_.bytes());
+void SelfCollisionStage::recordReport(vulkan::Recorder& recorder, const Tick& tick) {
+  recorder.copy(report_, reportReadback_, report_.bytes(), 0, tick.slot * report_.bytes());
 }
 
 const shared::CrowdReport& SelfCollisionStage::report(std::uint32_t slot) const {

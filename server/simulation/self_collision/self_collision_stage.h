@@ -8,6 +8,7 @@
 #include <span>
 
 #include "server/model/scene.h"
+#include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
@@ -21,9 +22,7 @@ namespace clothstream::simulation {
 // place. Three times per tick it lists the nodes that may touch until the next search. The search is a
 // counting sort into cells, whose order depends only on the state. In every substep it separates the listed
 // nodes that touch. A method that keeps cloth free of penetrations would replace recordContacts().
-//
-// A tick:   recordClear -> (substeps: recordSubstep) -> recordReport
-class SelfCollisionStage {
+class SelfCollisionStage final : public Stage {
  public:
   // At least one cloth must have self-collision. `workgroupSize` 0: the measured best. The results do not
   // depend on it.
@@ -32,22 +31,13 @@ class SelfCollisionStage {
 
   static bool isIn(const model::Scene& scene);
 
-  // Sets radii and frictions of the cloths that have self-collision. No tick may be in flight.
-  void setCloths(std::span<const model::Cloth> cloths);
+  // Sets radii and frictions of the cloths that have self-collision.
+  void setCloths(std::span<const model::Cloth> cloths) override;
 
-  // Sets the number of substeps of a tick. No tick may be in flight.
-  void setSubsteps(std::uint32_t substeps, double substepSeconds);
-
-  // Uploads the tables, once, before the first tick.
-  void recordTables(vulkan::Recorder& recorder) const;
-  // Resets the tick's report. The caller records a barrier after it.
-  void recordClear(vulkan::Recorder& recorder) const;
-  // Records substep `index` of a tick, which led from state `from` to the other state. Begins with a barrier.
-  void recordSubstep(vulkan::Recorder& recorder, std::uint32_t from, std::uint32_t index,
-                     const shared::CollisionPush& collision) const;
-
-  // Copies the report to the CPU, after a barrier; report() has it once the recording is complete.
-  void recordReport(vulkan::Recorder& recorder, std::uint32_t slot) const;
+  void recordInputs(vulkan::Recorder& recorder, const Tick& tick) override;
+  void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
+  void recordReport(vulkan::Recorder& recorder, const Tick& tick) override;
+  // Report of the tick with this slot, once it is complete.
   const shared::CrowdReport& report(std::uint32_t slot) const;
 
   // For tests: the lists of gather_neighbours.comp, kNeighbourStride floats per node.
@@ -62,16 +52,15 @@ class SelfCollisionStage {
   };
   void makeContacts(std::span<const model::Cloth> cloths);
 
-  void recordNeighbours(vulkan::Recorder& recorder, std::uint32_t state) const;
-  void recordContacts(vulkan::Recorder& recorder, std::uint32_t state,
-                      const shared::CollisionPush& collision) const;
+  void recordTables(vulkan::Recorder& recorder) override;
+  void recordNeighbours(vulkan::Recorder& recorder, const Substep& substep, std::uint32_t interval) const;
+  void recordContacts(vulkan::Recorder& recorder, const Substep& substep) const;
 
   const vulkan::Device& device_;
   const StateBuffers state_;
   std::uint32_t workgroupSize_;
   std::uint32_t nodeCount_, cellCount_, measureInvocations_;
-  std::uint32_t interval_;  // substeps between searches
-  float substepSeconds_, reach_;
+  float reach_;
   vulkan::Buffer restsUpload_, rests_;
   vulkan::Buffer table_, starts_, entries_, order_, sorted_, neighbours_;
   vulkan::Buffer contactPositions_, contactVelocities_, contacts_, touching_, groups_;
