@@ -40,8 +40,7 @@ ForceStage::ForceStage(const vulkan::Device& device, const model::Scene& scene, 
       grids_(device, scene.cloths, state, normals, scene.integrator, options) {
   const MeshTables tables = meshTables(scene.cloths, workgroupSize_);
   if (!tables.nodes.empty())
-    meshes_ =
-        std::make_unique<MeshStage>(device, tables, state, normals, scene.integrator, workgroupSize_);
+    meshes_ = std::make_unique<MeshStage>(device, tables, state, normals, scene.integrator, workgroupSize_);
   if (scene.integrator == model::Integrator::rungeKutta4)
     rungeKutta_ = std::make_unique<RungeKuttaStage>(device, state, clothOffsets(scene.cloths));
 }
@@ -86,8 +85,8 @@ void ForceStage::recordSubstep(vulkan::Recorder& recorder, const Substep& subste
   if (!rungeKutta_) {
     const bool collides = substep.collision.colliderCount > 0;
     for (const Follow follow : kFollows)
-      recordAdvance(recorder, substep.from,
-                    variantOf(tick.cloths, environment.airDensity, collides, follow), follow, push);
+      recordAdvance(recorder, substep.from, variantOf(tick.cloths, environment.airDensity, collides, follow),
+                    follow, push);
     return;
   }
   const AdvanceVariant variant = variantOf(tick.cloths, environment.airDensity, false, Follow::nothing);

@@ -49,8 +49,8 @@ SolverStages Solvers::makeSolvers(std::span<const model::Cloth> cloths) {
   stages.solvers = solversOf(cloths);
   stages.systems = solves_.makeSystems(cloths);
   if (XpbdStage::isIn(cloths))
-    stages.xpbd = std::make_unique<XpbdStage>(device_, cloths, state_, sizes_.askedWorkgroup,
-                                              sizes_.xpbdWholeNodes);
+    stages.xpbd =
+        std::make_unique<XpbdStage>(device_, cloths, state_, sizes_.askedWorkgroup, sizes_.xpbdWholeNodes);
   if (AssembledStage::isIn(cloths))
     stages.assembled = std::make_unique<AssembledStage>(device_, cloths, state_, sizes_.askedWorkgroup,
                                                         sizes_.solveWholeNodes);
