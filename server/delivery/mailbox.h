@@ -167,7 +167,8 @@ class Mailbox {
   bool requestsKey_ = false;    // the peer asked for a key frame and continues without it
   std::uint32_t sinceKey_ = 0;  // frames of quality_ since the newest key frame
   std::uint8_t quality_ = 0;
-  std::uint64_t newest_ = 0;  // tick of the newest frame that is held, or else was sent
+  // Tick of the newest frame that is held, or else was sent, or was dropped while a key frame is awaited.
+  std::uint64_t newest_ = 0;
   std::deque<PublishedFrame> held_;
   std::size_t heldBytes_ = 0;
   std::deque<Sent> sent_;  // frames that are not acknowledged
