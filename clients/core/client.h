@@ -126,7 +126,7 @@ class Client {
   const FrameStatistics& statistics() const { return statistics_; }
   const ServerClock& clock() const { return clock_; }
   // Quality that the server sends now; 0 before the description.
-  std::uint32_t quality() const { return quality_; }
+  std::uint32_t quality() const { return described() ? quality_ : 0; }
   // Divisor of the newest frame; 1 before the first.
   std::uint32_t frameDivisor() const { return frameDivisor_; }
   // State of the recording at this time.
