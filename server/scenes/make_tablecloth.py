@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-# Writes tablecloth.obj: a disc of rings with a hem, in the XZ plane. Each ring is rotated against its neighbours.
+# make_tablecloth.py FILE writes a mesh to FILE when the server is built: a disc of rings with a hem, in the XZ plane.
+# Each ring is rotated against its neighbours.
+import sys
 from math import cos, pi, sin
 
 RINGS, RADIUS, HEM = 22, 0.8, 2  # number of rings; metres; number of outer rings that form the hem
@@ -27,7 +29,7 @@ def strip(ring):
                 yield c, b, d
 
 
-with open("tablecloth.obj", "w") as out:
+with open(sys.argv[1], "w") as out:
     out.write("# made by make_tablecloth.py\no tablecloth\n")
     for x, z in points:
         out.write(f"v {x:.6f} 0 {z:.6f}\n")
