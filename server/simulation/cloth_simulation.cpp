@@ -107,7 +107,8 @@ struct Stages {
     }
   }
 
-  // Joints move before CollisionStage reads the reach of their meshes.
+  // In their order. Attachments carry nodes before CollisionStage lists the colliders near them, and joints
+  // move before it reads the reach of their meshes.
   std::vector<Stage*> list() {
     const auto [solves, assembled, xpbd] = solvers.afterForces();
     std::vector<Stage*> all{coarse.get(),      solvers.bending(),
@@ -142,8 +143,8 @@ struct ClothSimulation::Pipeline {
 
   // Grabs may begin in a scene without attachments.
   void makeAttachments();
-  // The stages changed.
-  void listStages() { stages = all.list(); }
+  // Call it when a stage was made or replaced.
+  void listStages() { order = stages.list(); }
   // Creates the kernels that the present cloths need, and those that they need as soon as a collider appears.
   void prepare();
   // Inputs relative to the origin.
@@ -155,7 +156,7 @@ struct ClothSimulation::Pipeline {
   void recordEnd(vulkan::Recorder& recorder, const Tick& tick);
   // Push of the last substep.
   shared::CollisionPush lastPush() const {
-    return all.collision.push(substeps - 1, substeps, static_cast<float>(simulationRate));
+    return stages.collision.push(substeps - 1, substeps, static_cast<float>(simulationRate));
   }
 
   const vulkan::Device& device;
@@ -169,8 +170,8 @@ struct ClothSimulation::Pipeline {
   std::vector<shared::ClothRecord> records;
   std::vector<SpringStiffness> stiffness;  // of the cloths' springs
   Memory memory;
-  Stages all;
-  std::vector<Stage*> stages;           // `all`, in their order
+  Stages stages;
+  std::vector<Stage*> order;            // of the stages
   std::unique_ptr<ReportStage> report;  // created for the first report
   TickInputs moved;                     // by nearby(), of scenes with an origin elsewhere
 
@@ -193,23 +194,23 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       records(clothRecords(scene.cloths, substepSeconds)),
       stiffness(springStiffness(scene.cloths)),
       memory(on, offsets.back(), records.size()),
-      all(on, scene, memory, offsets, options, workgroupSize) {
+      stages(on, scene, memory, offsets, options, workgroupSize) {
   std::memcpy(memory.uploads[slot].mapped().data(), records.data(), memory.cloths.bytes());
-  memory.state.write(restState(scene.cloths, origin), all.masses.inverseMasses());
+  memory.state.write(restState(scene.cloths, origin), stages.masses.inverseMasses());
   listStages();
   prepare();
 }
 
 void ClothSimulation::Pipeline::makeAttachments() {
-  if (all.attachments) return;
-  all.attachments = std::make_unique<AttachmentStage>(device, AttachmentTables{},
-                                                      stateOf(memory, all.collision), offsets, workgroupSize);
+  if (stages.attachments) return;
+  stages.attachments = std::make_unique<AttachmentStage>(
+      device, AttachmentTables{}, stateOf(memory, stages.collision), offsets, workgroupSize);
   listStages();
 }
 
 void ClothSimulation::Pipeline::prepare() {
-  all.forces.prepare(records);
-  all.solvers.prepare(records);
+  stages.forces.prepare(records);
+  stages.solvers.prepare(records);
 }
 
 const TickInputs& ClothSimulation::Pipeline::nearby(const TickInputs& inputs) {
@@ -232,8 +233,8 @@ void ClothSimulation::Pipeline::start(vulkan::Recorder& recorder) {
     memory.state.recordUpload(recorder, present);
     recorder.barrier();
   }
-  if (std::ranges::none_of(stages, &Stage::isOutdated)) return;
-  for (Stage* stage : stages) stage->uploadTables(recorder);
+  if (std::ranges::none_of(order, &Stage::isOutdated)) return;
+  for (Stage* stage : order) stage->uploadTables(recorder);
   recorder.barrier();
 }
 
@@ -242,19 +243,19 @@ void ClothSimulation::Pipeline::recordInputs(vulkan::Recorder& recorder, const T
   std::memcpy(upload.mapped().data(), records.data(), upload.bytes());
   recorder.beginStage("inputs");
   recorder.copy(upload, memory.cloths, upload.bytes());
-  for (Stage* stage : stages) stage->recordInputs(recorder, tick);
+  for (Stage* stage : order) stage->recordInputs(recorder, tick);
 }
 
 void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const Tick& tick) {
-  for (Stage* stage : stages) stage->recordStart(recorder, tick, present);
+  for (Stage* stage : order) stage->recordStart(recorder, tick, present);
   recorder.beginStage("advance");
   for (std::uint32_t index = 0; index < substeps; ++index) {
     const Substep substep{.tick = tick,
                           .index = index,
                           .from = present,
-                          .collision = all.collision.push(index, substeps, tick.rate),
-                          .solids = all.collision.solidCount()};
-    for (Stage* stage : stages) stage->recordSubstep(recorder, substep);
+                          .collision = stages.collision.push(index, substeps, tick.rate),
+                          .solids = stages.collision.solidCount()};
+    for (Stage* stage : order) stage->recordSubstep(recorder, substep);
     present = 1 - present;
   }
 }
@@ -262,9 +263,9 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
 void ClothSimulation::Pipeline::recordEnd(vulkan::Recorder& recorder, const Tick& tick) {
   recorder.beginStage("hash");
   recorder.barrier();
-  for (Stage* stage : stages) stage->recordEnd(recorder, tick, present, lastPush());
+  for (Stage* stage : order) stage->recordEnd(recorder, tick, present, lastPush());
   recorder.barrier();
-  for (Stage* stage : stages) stage->recordReport(recorder, tick);
+  for (Stage* stage : order) stage->recordReport(recorder, tick);
 }
 
 ClothSimulation::ClothSimulation(const vulkan::Device& device, const model::Scene& scene,
@@ -281,33 +282,34 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
                     [](const shared::ClothRecord& a, const shared::ClothRecord& b) {
                       return a.rows == b.rows && a.columns == b.columns;
                     }));
-  on.all.masses.prepare(cloths);
-  if (on.all.solvers.set(cloths)) on.all.forces.setTiles(cloths);
+  on.stages.masses.prepare(cloths);
+  const bool divides = on.stages.solvers.set(cloths);
   on.listStages();
-  for (Stage* stage : on.stages) stage->setCloths(cloths);
+  if (divides) on.stages.forces.setTiles(cloths);
+  for (Stage* stage : on.order) stage->setCloths(cloths);
   on.stiffness = springStiffness(cloths);
   on.records = std::move(records);
   on.prepare();
 }
 
 bool ClothSimulation::makesStages(std::span<const model::Cloth> cloths) const {
-  return pipeline_->all.solvers.needs(cloths);
+  return pipeline_->stages.solvers.needs(cloths);
 }
 
 StagePlan ClothSimulation::planStages(std::span<const model::Cloth> cloths) const {
-  return pipeline_->all.solvers.plan(cloths);
+  return pipeline_->stages.solvers.plan(cloths);
 }
 
 std::shared_ptr<NewStages> ClothSimulation::makeStages(const StagePlan& plan) {
-  return pipeline_->all.solvers.make(plan);
+  return pipeline_->stages.solvers.make(plan);
 }
 
 void ClothSimulation::takeStages(std::shared_ptr<NewStages> stages) {
-  pipeline_->all.solvers.take(std::move(stages));
+  pipeline_->stages.solvers.take(std::move(stages));
 }
 
 std::uint64_t ClothSimulation::stagesMade() const {
-  return pipeline_->all.solvers.made();
+  return pipeline_->stages.solvers.made();
 }
 
 void ClothSimulation::setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths) {
@@ -337,35 +339,35 @@ void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& i
 void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
   recorder.beginStage("normals");
-  pipeline_->all.forces.recordNormals(recorder, pipeline_->present);
+  pipeline_->stages.forces.recordNormals(recorder, pipeline_->present);
 }
 
 void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs& inputs) {
   Pipeline& on = *pipeline_;
   if (!on.report)
-    on.report =
-        std::make_unique<ReportStage>(on.device, on.records, stateOf(on.memory, on.all.collision),
-                                      on.all.forces.springs(), on.all.solids.get(), on.asked.workgroupSize);
+    on.report = std::make_unique<ReportStage>(on.device, on.records, stateOf(on.memory, on.stages.collision),
+                                              on.stages.forces.springs(), on.stages.solids.get(),
+                                              on.asked.workgroupSize);
   recorder.beginStage("report");
   on.report->record(recorder, on.present, on.stiffness, inputs.environment.gravity, on.origin, on.lastPush(),
-                    on.all.collision.solidCount());
-  on.namesConstraints = inputs.namesConstraints && on.all.solvers.recordActiveSprings(recorder);
+                    on.stages.collision.solidCount());
+  on.namesConstraints = inputs.namesConstraints && on.stages.solvers.recordActiveSprings(recorder);
 }
 
 std::vector<ContactStatus> ClothSimulation::contacts() const {
-  return pipeline_->all.collision.contacts();
+  return pipeline_->stages.collision.contacts();
 }
 
 std::vector<float> ClothSimulation::depths() const {
-  const Stages& all = pipeline_->all;
-  if (!all.motionBound) return {};
-  return all.collision.inOrder(all.motionBound->depths(pipeline_->slot));
+  const Stages& stages = pipeline_->stages;
+  if (!stages.motionBound) return {};
+  return stages.collision.inOrder(stages.motionBound->depths(pipeline_->slot));
 }
 
 std::vector<GrabStatus> ClothSimulation::grabs() const {
   std::vector<GrabStatus> grabs;
-  if (pipeline_->all.attachments)
-    for (const shared::GrabReport& report : pipeline_->all.attachments->report())
+  if (pipeline_->stages.attachments)
+    for (const shared::GrabReport& report : pipeline_->stages.attachments->report())
       grabs.push_back(statusOf(report));
   return grabs;
 }
@@ -373,24 +375,25 @@ std::vector<GrabStatus> ClothSimulation::grabs() const {
 std::vector<ClothReport> ClothSimulation::report() const {
   assert(pipeline_->report);
   std::vector<ClothReport> reports = pipeline_->report->collect();
-  pipeline_->all.solvers.addTo(reports);
+  pipeline_->stages.solvers.addTo(reports);
   return reports;
 }
 
 std::vector<std::vector<std::uint32_t>> ClothSimulation::constraintEnds() const {
   std::vector<std::vector<std::uint32_t>> ends(pipeline_->records.size());
-  if (pipeline_->namesConstraints) pipeline_->all.solvers.solves().activeSprings(kMostNamedConstraints, ends);
+  if (pipeline_->namesConstraints)
+    pipeline_->stages.solvers.solves().activeSprings(kMostNamedConstraints, ends);
   return ends;
 }
 
 TickStatus ClothSimulation::status() const {
-  const Stages& all = pipeline_->all;
-  TickStatus status = all.hash.status(pipeline_->slot);
-  if (all.selfCollision) {
-    const shared::CrowdReport& report = all.selfCollision->report(pipeline_->slot);
+  const Stages& stages = pipeline_->stages;
+  TickStatus status = stages.hash.status(pipeline_->slot);
+  if (stages.selfCollision) {
+    const shared::CrowdReport& report = stages.selfCollision->report(pipeline_->slot);
     status.crowded = report.lists + report.balls;
   }
-  if (all.motionBound) status.crowded += all.motionBound->report(pipeline_->slot).overflows;
+  if (stages.motionBound) status.crowded += stages.motionBound->report(pipeline_->slot).overflows;
   return status;
 }
 
@@ -410,13 +413,13 @@ void ClothSimulation::recordSaveState(vulkan::Recorder& recorder) {
   pipeline_->start(recorder);
   recorder.beginStage("state");
   pipeline_->memory.state.recordSave(recorder, pipeline_->present);
-  if (pipeline_->all.attachments) pipeline_->all.attachments->recordSave(recorder);
+  if (pipeline_->stages.attachments) pipeline_->stages.attachments->recordSave(recorder);
 }
 
 StateSnapshot ClothSimulation::collectState(std::uint64_t tick) const {
   StateSnapshot snapshot = pack(pipeline_->memory.state.collect(), tick);
   snapshot.origin = pipeline_->origin;
-  if (pipeline_->all.attachments) snapshot.held = pipeline_->all.attachments->collect();
+  if (pipeline_->stages.attachments) snapshot.held = pipeline_->stages.attachments->collect();
   return snapshot;
 }
 
@@ -427,7 +430,8 @@ void ClothSimulation::recordRestoreState(vulkan::Recorder& recorder, const State
         fmt::format("a snapshot of {} bytes is of another scene: this one's {} nodes take {}",
                     snapshot.bytes.size(), nodeCount(), expected));
   pipeline_->start(recorder);
-  pipeline_->memory.state.write(unpack(snapshot, pipeline_->origin), pipeline_->all.masses.inverseMasses());
+  pipeline_->memory.state.write(unpack(snapshot, pipeline_->origin),
+                                pipeline_->stages.masses.inverseMasses());
   recorder.beginStage("state");
   pipeline_->memory.state.recordUpload(recorder, pipeline_->present);
 }
@@ -441,13 +445,13 @@ void ClothSimulation::recordRestoreGrabs(vulkan::Recorder& recorder, const HeldN
   if (!fits) throw std::invalid_argument("a snapshot holds nodes or grabs that its scene does not have");
   if (!held.grabs.empty()) on.makeAttachments();
   on.start(recorder);
-  if (!on.all.attachments) return;
+  if (!on.stages.attachments) return;
   recorder.beginStage("state");
-  on.all.attachments->recordRestore(recorder, held);
+  on.stages.attachments->recordRestore(recorder, held);
 }
 
 std::vector<shared::SolveRecord> ClothSimulation::solves() const {
-  return pipeline_->all.solvers.records();
+  return pipeline_->stages.solvers.records();
 }
 
 const model::Vec3& ClothSimulation::origin() const {

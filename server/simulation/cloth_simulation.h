@@ -41,7 +41,8 @@ struct SimulationOptions {
   // Nodes of the largest cloth whose linear system one workgroup solves. Absent: the measured best for the
   // device.
   std::optional<std::uint32_t> solveWholeNodes = {};
-  // Another build of the kernel advance_mass_spring, for comparisons. Null: the regular one.
+  // Another build of the kernel advance_mass_spring, for comparisons; it outlives the simulation. Null: the
+  // regular one.
   const vulkan::KernelCode* advanceKernel = nullptr;
 };
 
@@ -78,8 +79,8 @@ class ClothSimulation {
   void setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths);
 
   // Records all substeps of one tick, and its status. At most one tick may be in flight at the call. Stages:
-  // "inputs", "attachments" (if cloth is attached or grabbed), "near" (if there are colliders), "skins" (if a
-  // collider has joints), "advance", "hash".
+  // "inputs", "attachments" (if cloth is attached or grabbed), "skins" (if a collider has joints), "near" (if
+  // there are colliders), "advance", "hash".
   void recordTick(vulkan::Recorder& recorder, const TickInputs& inputs);
 
   // Records the vertex normals of the present positions ([Va21] 3.5, Alg. 5; of meshes from their triangles).

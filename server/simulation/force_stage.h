@@ -36,7 +36,7 @@ class ForceStage final : public Stage {
 
   void recordInputs(vulkan::Recorder& recorder, const Tick& tick) override;
   void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
-  // Records the normals of the state in the buffers `present`, after a barrier.
+  // Records the normals of the state in the buffers `present`. The caller records a barrier before.
   void recordNormals(vulkan::Recorder& recorder, std::uint32_t present) const;
 
   MeshSprings springs() const { return meshes_ ? meshes_->springs() : MeshSprings{}; }

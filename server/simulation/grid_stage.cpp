@@ -2,8 +2,6 @@
 // Kernels of grids, and the partition of their work.
 #include "server/simulation/grid_stage.h"
 
-#include <initializer_list>
-
 #include "kernels/advance_mass_spring.h"
 #include "kernels/compute_normals.h"
 

@@ -32,6 +32,7 @@ MassStage::MassStage(const vulkan::Device& device, std::span<const model::Cloth>
 void MassStage::prepare(std::span<const model::Cloth> cloths) {
   if (!bindings_.empty() || massesOf(cloths) == masses_) return;
   vulkan::Buffer upload(device_, vulkan::BufferPurpose::upload, inverseMasses_.size() * sizeof(float));
+  std::ranges::copy(inverseMasses_, upload.mapped<float>().begin());
   const vulkan::Kernel kernel(device_, kernels::set_masses, kWorkgroup);
   std::vector<vulkan::Bindings> bindings;
   for (const vulkan::Buffer* positions :
@@ -50,7 +51,7 @@ void MassStage::setCloths(std::span<const model::Cloth> cloths) {
   outdate();
 }
 
-// The start state has the masses of the start.
+// Without bindings no mass has changed, and the start state has the right ones.
 void MassStage::recordTables(vulkan::Recorder& recorder) {
   for (const vulkan::Bindings& bindings : bindings_) recorder.dispatch(bindings, inverseMasses_.size());
 }

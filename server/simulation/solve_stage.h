@@ -51,6 +51,7 @@ class SolveStage final : public Stage {
   std::span<const shared::SolveRecord> report() const;
 
   // Marks the springs that ACAD held in the last recorded substep, if a cloth has it. Begins with a barrier.
+  // There must be a system.
   void recordActiveSprings(vulkan::Recorder& recorder);
   // Ends of these springs once the recording is complete: ActiveSprings::collect().
   void activeSprings(std::size_t most, std::span<std::vector<std::uint32_t>> ofCloths) const;

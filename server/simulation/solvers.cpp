@@ -98,8 +98,8 @@ bool Solvers::set(std::span<const model::Cloth> cloths) {
   // Memory is allocated before anything changes, because that may fail.
   const std::vector<model::Solver> wanted = solversOf(cloths);
   const std::vector<model::Cloth> bent = bendingCloths(cloths);
-  std::unique_ptr<BendingStage> bending =
-      !bent.empty() && !needsBending(cloths) ? std::move(taken_->bending) : makeBending(bent);
+  const bool takes = !bent.empty() && !needsBending(cloths);
+  std::unique_ptr<BendingStage> bending = takes ? nullptr : makeBending(bent);
   const bool changes = !haveSameTables(wanted, solvers_);
   if (changes) {
     std::optional<SolverStages> next = kept_.take(wanted);
@@ -110,6 +110,7 @@ bool Solvers::set(std::span<const model::Cloth> cloths) {
     }
     kept_.keep(exchange(std::move(*next)));
   }
+  if (takes) bending = std::move(taken_->bending);
   if (bending) {
     bending_ = std::move(bending);
     ++made_;

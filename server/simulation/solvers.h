@@ -21,7 +21,7 @@
 
 namespace clothstream::simulation {
 
-// Sizes as SimulationOptions has them.
+// SimulationOptions, and the workgroup that follows from them.
 struct SolverSizes {
   std::uint32_t workgroup = 64;  // at most the limit of the device
   std::uint32_t askedWorkgroup = 0;

@@ -21,7 +21,7 @@ struct Tick {
   std::uint32_t substeps = 1;
   double substepSeconds = 0;
   float rate = 0;          // ticks/s
-  std::uint32_t slot = 0;  // 0 and 1 in turn: the copy that this tick has of what the CPU reads
+  std::uint32_t slot = 0;  // of the readback that this tick writes: 0 or 1; ticks alternate
 };
 
 struct Substep {
@@ -47,7 +47,7 @@ class Stage {
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
 
-  // True if uploadTables() has tables to upload.
+  // True if uploadTables() may have tables to upload.
   bool isOutdated() const { return outdated_; }
   // Records the upload of the tables unless the device has them. A barrier is before and after it.
   void uploadTables(vulkan::Recorder& recorder) {

@@ -13,6 +13,6 @@ struct StagePlan {
   std::vector<model::Cloth> solvers;  // cloths whose solvers need stages; empty: none do
   std::vector<model::Cloth> bending;  // cloths of the tables of bending; empty: they need no new ones
 };
-struct NewStages;  // solvers.h
+struct NewStages;  // kept_stages.h
 
 }  // namespace clothstream::simulation

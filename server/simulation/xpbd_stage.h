@@ -20,7 +20,6 @@
 
 namespace clothstream::simulation {
 
-// Code that the cloths need. The kernels leave out the rest; the bits are the same.
 // Belongs to the device's thread. A substep of [MMC16] starts from the free motion that the forces alone
 // give. One or more Gauss-Seidel sweeps correct the springs in the order of model::springColours(), with
 // multipliers that start from zero. Then velocities follow from the displacement of the nodes, and the nodes
@@ -41,7 +40,7 @@ class XpbdStage final : public Stage {
   void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
 
  private:
-  // Code that a scene needs.
+  // Code that the cloths need. The kernels leave out the rest; the bits are the same.
   struct Variant {
     bool damped, bend, colliders;
   };

@@ -59,7 +59,8 @@ struct BoundBuffer {
 // A kernel with one buffer for each of its bindings, in order. The buffers must outlive this object.
 class Bindings {
  public:
-  // Throws std::runtime_error, which names the kernel, if the device cannot bind the buffers.
+  // Throws std::runtime_error, which names the kernel, if the device cannot bind the buffers, and
+  // std::logic_error if the kernel has another number of bindings.
   Bindings(const Device& device, Kernel kernel, std::span<const Buffer* const> buffers);
   Bindings(const Device& device, Kernel kernel, std::initializer_list<const Buffer*> buffers)
       : Bindings(device, std::move(kernel), std::span(buffers.begin(), buffers.size())) {}

@@ -97,7 +97,7 @@ class KernelSurvey : public ::testing::TestWithParam<const char*> {
 TEST_P(KernelSurvey, CompilesEveryKernelOfTheServer) {
   std::set<std::string> compiled, all;
   for (const SurveyedKernel& kernel : gpu().kernels) compiled.insert(kernel.kernel);
-  for (const tests::NamedKernel& kernel : tests::kAllKernels) all.insert(kernel.name);
+  for (const vulkan::KernelCode& kernel : tests::kAllKernels) all.insert(kernel.name);
   EXPECT_EQ(compiled, all);
 }
 

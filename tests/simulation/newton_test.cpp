@@ -129,7 +129,8 @@ TEST_F(Newton, AFramedSheetOfImplicitEulerComesToRestInItsBalance) {
 }
 
 // The linearisation of a step leaves an error of the second order, so half the step leaves less than half the
-// distance of both motions. It is at most 0.5 % of the way at 288 steps a second, where h^2 k / m is 0.24.
+// distance of both motions. It is at most 0.5 % of the way at 288 steps a second, where h^2 k / m is 0.24. No
+// spring gets longer than 110 %: beyond that it has an additional dashpot, which Newton's method leaves out.
 TEST_F(Newton, AFramedSheetOfImplicitEulerFallsAsNewtonsMethodSays) {
   double distances[2];
   for (const std::uint32_t rate : {144u, 288u}) {
@@ -139,7 +140,7 @@ TEST_F(Newton, AFramedSheetOfImplicitEulerFallsAsNewtonsMethodSays) {
     const std::vector<Vec3> rest = placesInDouble(model::restPositions(scene.cloths.front()));
     std::vector<Vec3> positions = rest, velocities(rest.size(), Vec3::Zero());
     double way = 0, distance = 0;
-    for (std::uint32_t step = 0; step < rate / 8; ++step) {
+    for (std::uint32_t step = 0; step < rate / 12; ++step) {
       running.tick(inputsOf(scene));
       newton.step(positions, velocities, double{scene.cloths.front().damping}, scene.substepSeconds());
       way = std::max(way, farthestNode(rest, positions));

@@ -24,14 +24,14 @@ namespace clothstream::simulation {
 
 GrabStatus statusOf(const shared::GrabReport& report);
 
-// Belongs to the device's thread.
+// Moves attached nodes with their frames and grabbed ones with their grabs, and keeps tethered ones near.
 class AttachmentStage final : public Stage {
  public:
   // Throws std::runtime_error where the device has no room.
   AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables, const StateBuffers& state,
                   std::span<const std::uint32_t> clothOffsets, std::uint32_t workgroupSize);
 
-  // Sets the slack of the tethers. Must be called before the first tick.
+  // Sets the slack of the tethers. With tethers it must be called before the first tick.
   void setCloths(std::span<const model::Cloth> cloths) override;
 
   void recordInputs(vulkan::Recorder& recorder, const Tick& tick) override;

@@ -2,7 +2,6 @@
 #include "server/simulation/coarse/coarse_stage.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "kernels/average_nodes.h"
 #include "kernels/average_rows.h"

@@ -7,8 +7,6 @@
 #include <cassert>
 #include <cstddef>
 #include <span>
-#include <utility>
-#include <vector>
 
 #include "kernels/box_branches.h"
 #include "kernels/box_faces.h"

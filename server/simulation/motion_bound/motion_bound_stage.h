@@ -2,7 +2,6 @@
 // Bound on the motion of nodes that keeps cloth from passing through itself and other cloth.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 
