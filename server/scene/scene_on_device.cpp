@@ -16,14 +16,6 @@
 namespace clothstream::scene {
 namespace {
 
-// Kernel invocations of a slice: first value (10 to 20 ns each on two processors), minimum, and maximum.
-constexpr double kFirstSlice = 1 << 19, kMinSlice = 1 << 12, kMaxSlice = 1e15;
-// A GPU is faster by at least this factor.
-constexpr double kGpuFactor = 64;
-// Most work of a slice, in slices: work that depends on the state, such as the pairs of a heap, can be that
-// much more than in the ticks before. It is limited by the first slice, because slices of calm ticks grow.
-// At first it is one slice, since such work is not known yet, and it grows while slices are short.
-constexpr double kMostFactor = 16;
 // Pause after a slice of loading, as a multiple of its time.
 constexpr int kPause = 2;
 
@@ -35,32 +27,18 @@ SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene,
       simulation(device_, scene),
       encoders(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch), &workers),
       recorder(device_),
-      sliceInvocations_(device_.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice) {
+      slices(device_, recorder) {
   const std::uint32_t most = device.limits().maxAllocations;
   if (device.allocations() + kSpareAllocations > most)
     throw std::runtime_error(
         fmt::format("its buffers would leave fewer than {} of the {} allocations of memory that {} allows: "
                     "delete a scene first",
                     kSpareAllocations, most, device.info().name));
-  sliceRecordings();
   recorder.begin();
   simulation.recordSaveState(recorder);
   submitAndWait(stop);
   start = simulation.collectState(0);
   warmUp(scene, stop);
-}
-
-void SceneOnDevice::scaleSlices(double factor) {
-  const double bounded = std::clamp(factor, 0.25, 1.25);
-  sliceInvocations_ = std::clamp(sliceInvocations_ * bounded, kMinSlice, kMaxSlice);
-  mostFactor_ = std::clamp(mostFactor_ * bounded, 1.0, kMostFactor);
-  sliceRecordings();
-}
-
-void SceneOnDevice::sliceRecordings() {
-  const double first = device.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice;
-  recorder.sliceAfter(static_cast<std::uint64_t>(sliceInvocations_),
-                      static_cast<std::uint64_t>(mostFactor_ * std::min(sliceInvocations_, first)));
 }
 
 void SceneOnDevice::submitAndWait(const std::stop_token& stop) {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Device objects of one scene: simulation, encoders, recorder, and the start state.
+// Device objects of one scene: simulation, encoders, recorder with its slices, and the start state.
 #pragma once
 
 #include <stop_token>
 
 #include "server/encode/quality_encoders.h"
 #include "server/model/scene.h"
+#include "server/scene/slices.h"
 #include "server/simulation/cloth_simulation.h"
 #include "server/simulation/state_snapshot.h"
 #include "server/vulkan/device.h"
@@ -30,15 +31,10 @@ struct SceneOnDevice {
   simulation::ClothSimulation simulation;
   encode::QualityEncoders encoders;
   vulkan::Recorder recorder;
+  Slices slices;
   simulation::StateSnapshot start;
 
-  // Makes the slices of the following recordings larger or smaller by about this factor.
-  void scaleSlices(double factor);
-
  private:
-  double sliceInvocations_;
-  double mostFactor_ = 1;  // most work of a slice, in slices
-  void sliceRecordings();
   // Throws std::runtime_error after a request to stop.
   void submitAndWait(const std::stop_token& stop);
   // Runs everything that a tick and a frame may need. Software devices compile a kernel when it first runs,

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // An allocation that fails leaves messages, transactions and threads in order.
-#include <algorithm>
-#include <chrono>
 #include <future>
 #include <memory>
 #include <new>
@@ -15,10 +13,9 @@
 #include "server/saved_state/database.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/pose_history.h"
+#include "server/schedule/clock.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/faults/lack_of_memory.h"
-#include "tests/serving/scene/hosted_scene.h"
-#include "tests/vulkan/gpu_test.h"
 
 namespace clothstream::tests {
 namespace {
@@ -135,45 +132,6 @@ TEST_F(FailedAllocation, LeavesDeviceThreadRunning) {
   EXPECT_GE(failEachAllocation(
                 kAll, [] { return std::make_unique<Threads>(); }, add, add),
             3u);
-}
-
-using FailedAllocationInTick = GpuTest;
-
-// One allocation after another fails, until those that applying a change needs have failed.
-TEST_F(FailedAllocationInTick, LosesNoChangeOfParameters) {
-#if defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "the sanitizer replaces operator new itself";
-#endif
-  constexpr std::uint64_t kAllocations = 40;
-  for (std::uint64_t from = 0; from < kAllocations; ++from) {
-    HostedScene hosted;
-    hosted.tick();
-    model::ParameterChange change;
-    change.cloths.push_back({.numbers = {{parameters::ClothNumber::drag, 0.9f}}});
-    hosted.change(change);
-    hosted.announced.clear();
-    bool failed = false;
-    try {
-      const ThreadName name("failing");
-      const LackOfMemory lack("failing", {.from = from, .time = std::chrono::hours(1)});
-      hosted.host.begin(hosted.now);
-    } catch (const std::bad_alloc&) {
-      failed = true;
-    }
-    if (failed) {
-      hosted.publisher.drain();
-      device().drain();
-      hosted.host.release();
-      hosted.host.rebuild(
-          std::make_unique<scene::SceneOnDevice>(device(), hosted.live.start(), hosted.publisher.workers()),
-          "memory ran out");
-    } else {
-      hosted.finish();
-    }
-    hosted.tick();
-    EXPECT_TRUE(std::ranges::any_of(hosted.announced, &v1::ServerMessage::has_parameter_changed)) << from;
-    EXPECT_EQ(hosted.live.inbox.depth().changes, 0u) << from;
-  }
 }
 
 }  // namespace

@@ -16,10 +16,8 @@
 #include "server/hosting/server_state.h"
 #include "server/messages/limits.h"
 #include "server/model/input.h"
-#include "server/scene/collider_set.h"
-#include "server/scene/grabs_and_attachments.h"
+#include "server/scene/interaction.h"
 #include "server/scene/live_scene.h"
-#include "server/scene/pose_history.h"
 #include "server/session/session.h"
 #include "server/simulation/cloth_simulation.h"
 #include "tests/fuzz/targets/still_server.h"
@@ -44,8 +42,7 @@ model::Scene scene() {
 // Ticks of a scene without a device: handles its inputs as SceneHost does.
 class Ticks {
  public:
-  explicit Ticks(scene::LiveScene& live)
-      : live_(live), scene_(live.start()), colliders_(scene_), grabs_(scene_) {}
+  explicit Ticks(scene::LiveScene& live) : live_(live), scene_(live.start()), interaction_(scene_) {}
 
   void run() {
     if (live_.resetRequested.exchange(false)) {
@@ -58,18 +55,13 @@ class Ticks {
       live_.subscribers.announce(
           delivery::parametersChanged(accepted.message, tick_ + 1, accepted.participant));
     }
-    for (scene::Poses& poses : inputs_.poses) poses_.add(std::move(poses));
-    poses_.place(schedule::Clock::now(),
-                 [this](std::uint64_t participant, const model::ParticipantPoses& poses) {
-                   colliders_.place(participant, poses.colliders);
-                   grabs_.place(participant, poses.grabs, poses.attachments);
-                 });
-    const double endSeconds = static_cast<double>(tick_ + 1) * scene_.tickSeconds();
-    colliders_.advance(scene_, endSeconds, tickInputs_.colliders);
-    grabs_.advance(scene_, endSeconds, tickInputs_);
-    require(tickInputs_.colliders.size() <= simulation::kMaxColliders,
+    for (scene::Poses& poses : inputs_.poses) interaction_.add(std::move(poses));
+    interaction_.place(schedule::Clock::now());
+    interaction_.advance(scene_, tick_, scene::Recovery::none);
+    const simulation::TickInputs& inputs = interaction_.inputs();
+    require(inputs.colliders.size() <= simulation::kMaxColliders,
             "the simulation has room for all colliders");
-    require(tickInputs_.grabs.size() <= simulation::kMaxGrabs, "the simulation has room for all grabs");
+    require(inputs.grabs.size() <= simulation::kMaxGrabs, "the simulation has room for all grabs");
     live_.tick = ++tick_;
   }
 
@@ -78,10 +70,7 @@ class Ticks {
   model::Scene scene_;
   std::uint64_t tick_ = 0;
   scene::Inputs inputs_;
-  simulation::TickInputs tickInputs_;
-  scene::ColliderSet colliders_;
-  scene::GrabsAndAttachments grabs_;
-  scene::PoseHistory poses_;
+  scene::Interaction interaction_;
 };
 
 class Peer {

@@ -105,7 +105,7 @@ TEST_F(SceneHostTest, SlicesOfATickGiveTheSameStates) {
     LiveScene live(scene);
     delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
     auto loaded = std::make_unique<SceneOnDevice>(tests::device(), scene, publisher.workers());
-    for (int i = 0; i < 20; ++i) loaded->scaleSlices(sliceScale);
+    for (int i = 0; i < 20; ++i) loaded->slices.scale(sliceScale);
     SceneHost host(std::move(loaded), live, publisher, 0);
     std::vector<std::uint64_t> states;
     for (int tick = 0; tick < 3; ++tick) {

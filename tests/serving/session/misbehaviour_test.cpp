@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "server/messages/limits.h"
+#include "server/scene/frame_schedule.h"
 #include "tests/serving/server_test.h"
 
 namespace clothstream::session {
@@ -169,7 +170,7 @@ TEST_F(MisbehaviourTest, FloodOfKeyFrameRequestsGivesFewKeyFrames) {
   }
   const double elapsed = seconds(Clock::now() - start);
   EXPECT_LE(static_cast<double>(metrics().keyFrames.value() - before),
-            elapsed / seconds(SceneHost::kKeyFrameInterval) + 1);
+            elapsed / seconds(FrameSchedule::kKeyFrameInterval) + 1);
 }
 
 TEST_F(MisbehaviourTest, OnePeerGetsAFewKeyFramesThenOneASecond) {
