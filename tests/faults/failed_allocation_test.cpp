@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// An allocation that fails leaves messages, transactions and threads in order.
+// An allocation that fails leaves messages and transactions in order.
 #include <algorithm>
 #include <chrono>
-#include <future>
 #include <memory>
 #include <new>
 #include <string>
@@ -11,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/hosting/device_thread.h"
 #include "server/saved_state/database.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/pose_history.h"
@@ -22,8 +20,6 @@
 
 namespace clothstream::tests {
 namespace {
-
-constexpr std::uint64_t kAll = 1'000'000'000;
 
 class FailedAllocation : public ::testing::Test {
  protected:
@@ -115,26 +111,6 @@ TEST_F(FailedAllocation, LeavesPosesUsable) {
   EXPECT_GE(failEachAllocation(
                 1, [] { return scene::PoseHistory(); }, add, place),
             2u);
-}
-
-TEST_F(FailedAllocation, LeavesDeviceThreadRunning) {
-  struct Threads {
-    delivery::FramePublisher publisher{1, [] {}};
-    telemetry::ServerMetrics metrics;
-    scene::Budget budget;
-    vulkan::DeviceOptions options;
-    hosting::DeviceThread device{options, {}, publisher, metrics, budget, false, 0};
-    std::shared_ptr<scene::LiveScene> scene =
-        std::make_shared<scene::LiveScene>(model::Scene{}, true, nullptr, 1, nullptr);
-  };
-  const auto add = [](const std::unique_ptr<Threads>& threads) {
-    std::future<void> added = threads->device.add(threads->scene);
-    // There is no device, because the thread began without scenes.
-    EXPECT_THROW(added.get(), std::runtime_error);
-  };
-  EXPECT_GE(failEachAllocation(
-                kAll, [] { return std::make_unique<Threads>(); }, add, add),
-            3u);
 }
 
 using FailedAllocationInTick = GpuTest;
