@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// Faults of the device that tests ask for.
+#pragma once
+
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "server/vulkan/device.h"
+
+namespace clothstream::hosting {
+
+// Thread-safe.
+class SimulatedFaults {
+ public:
+  // The next check() throws vulkan::DeviceLost.
+  void loseDevice() {
+    const std::lock_guard lock(mutex_);
+    losesDevice_ = true;
+  }
+  // The next check() throws an error that belongs to no scene.
+  void fail() {
+    const std::lock_guard lock(mutex_);
+    fails_ = true;
+  }
+  // checkScene() throws vulkan::DeviceLost for this scene. An empty name ends this.
+  void loseDeviceIn(std::string scene) {
+    const std::lock_guard lock(mutex_);
+    losesDeviceIn_ = std::move(scene);
+  }
+
+  void check() {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(losesDevice_, false)) throw vulkan::DeviceLost("the loss of the device is simulated");
+    if (std::exchange(fails_, false)) throw std::runtime_error("a failure is simulated");
+  }
+  void checkScene(const std::string& name) const {
+    const std::lock_guard lock(mutex_);
+    if (!losesDeviceIn_.empty() && losesDeviceIn_ == name)
+      throw vulkan::DeviceLost("the loss of the device in a scene is simulated");
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  bool losesDevice_ = false, fails_ = false;
+  std::string losesDeviceIn_;
+};
+
+}  // namespace clothstream::hosting
