@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/model/jump.h"
 #include "server/scene/hand_limits.h"
 
 namespace clothstream::scene {
