@@ -44,6 +44,7 @@ class TickEvents;
 
 enum ErrorCode : int;
 enum NoticeKind : int;
+enum PresenceKind : int;
 enum Role : int;
 
 }  // namespace clothstream::v1

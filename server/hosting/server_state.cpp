@@ -103,7 +103,10 @@ SceneServer::State::State(std::vector<model::Scene> definitions, ServerOptions o
           [this] {
             for (const auto& peer : peersNow()) peer->checkSilence(Clock::now());
             if (!started) return;
-            for (const auto& scene : scenesNow()) scene->roster.expire(Clock::now());
+            for (const auto& scene : scenesNow()) {
+              scene->roster.expire(Clock::now());
+              scene->poses.divideRoom(Clock::now());
+            }
           },
           options.encoderThreads > 0 ? options.encoderThreads
                                      : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),

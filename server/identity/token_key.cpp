@@ -26,7 +26,7 @@
 #include <unistd.h>
 
 #include "server/files/regular_file.h"
-#include "server/scene/token_hash.h"
+#include "server/scene/resume_token.h"
 
 namespace clothstream::identity {
 namespace {

@@ -12,8 +12,8 @@
 #include "server/messages/solid_message.h"
 #include "server/messages/vectors.h"
 #include "server/saved_state/crc.h"
+#include "server/scene/resume_token.h"
 #include "server/scene/snapshot_message.h"
-#include "server/scene/token_hash.h"
 
 namespace clothstream::saved_state {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene that participants share: definition, inbox, subscribers, roster, metrics.
+// A scene that participants share: definition, inbox, subscribers, poses, roster, metrics.
 #pragma once
 
 #include <atomic>
@@ -24,6 +24,7 @@
 #include "server/scene/frame_source.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
+#include "server/scene/newest_poses.h"
 #include "server/scene/roster.h"
 #include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
@@ -149,6 +150,7 @@ class LiveScene : private ColliderBudget {
 
   Inbox inbox;
   delivery::Subscribers subscribers;
+  NewestPoses poses;
   Roster roster;
   telemetry::SceneMetrics metrics;
 

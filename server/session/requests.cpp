@@ -235,7 +235,7 @@ void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
   auto poses = messages::toPoses(message, scene_->start());
   if (!poses) return refuse(poses.error());
   refuseUnless(
-      scene_->roster.post(*mailbox_, message, std::move(*poses), server_.options.participantsMay, now));
+      scene_->poses.post(*mailbox_, message, std::move(*poses), server_.options.participantsMay, now));
 }
 
 std::optional<std::uint64_t> Session::actor(const std::string& name, Action action) {

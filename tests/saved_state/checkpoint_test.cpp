@@ -13,7 +13,7 @@
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/saved_state/state_message.h"
-#include "server/scene/token_hash.h"
+#include "server/scene/resume_token.h"
 #include "tests/serving/scene/busy_scene.h"
 
 namespace clothstream::saved_state {
@@ -54,7 +54,7 @@ scene::SavedScene savedScene(const model::Scene& start, const scene::Checkpoint&
   saved.checkpoint = throughBytes(checkpoint, start);
   scene::SavedParticipant& mover = saved.roster.participants.emplace_back();
   mover.participant.id = 7;
-  mover.tokenHash = scene::hashOfToken(std::string(scene::Roster::kTokenBytes, 'x'));
+  mover.tokenHash = scene::hashOfToken(std::string(scene::kTokenBytes, 'x'));
   return saved;
 }
 

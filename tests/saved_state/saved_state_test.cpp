@@ -16,7 +16,7 @@
 #include "clothstream/v1/saved_state.pb.h"
 #include "server/messages/scene_message.h"
 #include "server/model/price.h"
-#include "server/scene/token_hash.h"
+#include "server/scene/resume_token.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/model/meshes.h"
 #include "tests/serving/server_test.h"

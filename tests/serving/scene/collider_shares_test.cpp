@@ -108,7 +108,7 @@ class SharingTest : public ::testing::Test {
  protected:
   // Lets a participant send poses. Returns the error.
   std::string send(Member& member, std::vector<model::ParticipantCollider> colliders) {
-    const auto posted = roster.post(*member.mailbox, {}, {.colliders = std::move(colliders)}, {}, now);
+    const auto posted = newest.post(*member.mailbox, {}, {.colliders = std::move(colliders)}, {}, now);
     return posted ? std::string() : posted.error().text;
   }
   // Colliders that a participant has after the next tick; those of the tick before if it has none waiting.
@@ -118,6 +118,11 @@ class SharingTest : public ::testing::Test {
     for (const Poses& poses : inputs.poses) has[poses.participant] = poses.now.poses.colliders.size();
     return has[id];
   }
+  // What the server does every second.
+  void aSecondLater() {
+    roster.expire(now);
+    newest.divideRoom(now);
+  }
   void join(Member& member) { ASSERT_TRUE(roster.join({}, member.mailbox, ids, 8, now)); }
 
   Clock::time_point now = Clock::now();
@@ -125,7 +130,8 @@ class SharingTest : public ::testing::Test {
   delivery::Subscribers subscribers;
   Inbox inbox;
   Room room;
-  Roster roster{subscribers, inbox, nullptr, &room};
+  NewestPoses newest{subscribers, inbox, &room};
+  Roster roster{subscribers, newest, nullptr};
   std::map<std::uint64_t, std::size_t> has;
 };
 
@@ -147,12 +153,12 @@ TEST_F(SharingTest, OneParticipantTakesNothingFromOthers) {
   for (std::uint32_t id = 1; id <= 4; ++id) four.push_back(boxAt(id, 0, 3));
   EXPECT_EQ(send(other, four), "");
   EXPECT_EQ(acting(2), 4u);
-  roster.expire(now);
+  aSecondLater();
   EXPECT_EQ(acting(1), 8u);
   EXPECT_LE(room.charged.others, 12 * kMostWeight + 1e-3);
   // A participant that leaves gives its share back.
   roster.leave(*other.mailbox, LeaveReason::left, now);
-  roster.expire(now);
+  aSecondLater();
   EXPECT_EQ(acting(1), 12u);
 }
 
@@ -169,11 +175,11 @@ TEST_F(SharingTest, AReconnectWinsNothing) {
   ReconnectGrace grace;
   roster.disconnect(*greedy.mailbox, grace, now);
   now += grace.poses;
-  roster.expire(now);
+  aSecondLater();
   EXPECT_EQ(acting(2), 10u);
   ASSERT_TRUE(roster.join({.token = admission->token, .attempt = 1}, back.mailbox, ids, 8, now));
   EXPECT_EQ(acting(1), 6u);
-  roster.expire(now);
+  aSecondLater();
   EXPECT_EQ(acting(2), 6u);
 }
 
@@ -197,7 +203,7 @@ TEST_F(SharingTest, HandsActWithoutTheJointsThatHaveNoRoom) {
   const auto move = [&](std::vector<model::ParticipantCollider> colliders) {
     model::ParticipantPoses poses{.colliders = std::move(colliders)};
     poses.joints = {{.collider = 0, .joints = {model::Pose{}}}};
-    const auto posted = roster.post(*member.mailbox, {}, std::move(poses), {}, now);
+    const auto posted = newest.post(*member.mailbox, {}, std::move(poses), {}, now);
     inbox.drain(inputs);
     return posted ? std::string() : posted.error().text;
   };

@@ -69,7 +69,7 @@ TEST_F(RosterTest, RemovedParticipantCannotResume) {
 TEST_F(RosterTest, RestoredParticipantsOwnNothingBeforeTheyReturn) {
   const Person ada = tokenOf("ada", Ownership::always), ben = tokenOf("ben", Ownership::never);
   const Member owner = join(ada), other = join(ben);
-  Roster next(subscribers, inbox, nullptr);
+  Roster next(subscribers, later, nullptr);
   next.restore(roster.saved(), {60s, 2s}, now);
   Member back;
   const auto admission = next.join({.clientName = {},
@@ -94,7 +94,7 @@ TEST_F(RosterTest, RestoredParticipantsOwnNothingBeforeTheyReturn) {
 
 TEST_F(RosterTest, RestoredParticipantThatMayOwnSucceedsWhenItReturns) {
   const Member owner = join(), other = join();
-  Roster next(subscribers, inbox, nullptr);
+  Roster next(subscribers, later, nullptr);
   SavedRoster saved = roster.saved();
   std::erase_if(saved.participants,
                 [&](const auto& known) { return known.participant.id == owner.admission.id; });
@@ -119,7 +119,7 @@ TEST_F(RosterTest, RestoredParticipantThatMayOwnSucceedsWhenItReturns) {
 // All participants of an earlier run have been away equally long.
 TEST_F(RosterTest, OwnersAreEvictedLast) {
   const Member owner = join(), other = join();
-  Roster next(subscribers, inbox, nullptr);
+  Roster next(subscribers, later, nullptr);
   next.restore(roster.saved(), {60s, 2s}, now);
   Member third, back;
   ASSERT_TRUE(next.join({}, third.mailbox, ids, 2, now).has_value());
@@ -162,7 +162,7 @@ TEST_F(RosterTest, RoleThatAnOwnerGaveStaysWithTheSameToken) {
   const Member owner = join(tokenOf("ada", Ownership::always)), viewer = join(ben);
   ASSERT_TRUE(setRole(owner, 2, Role::owner).has_value());
   EXPECT_EQ(comeBack(viewer, ben).admission.role, Role::owner);
-  Roster next(subscribers, inbox, nullptr);
+  Roster next(subscribers, later, nullptr);
   next.restore(roster.saved(), {60s, 2s}, now);
   Member back;
   const auto admission = next.join({.clientName = {},

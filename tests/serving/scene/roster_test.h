@@ -19,6 +19,7 @@
 #include "server/delivery/mailbox.h"
 #include "server/delivery/subscribers.h"
 #include "server/scene/inbox.h"
+#include "server/scene/newest_poses.h"
 #include "server/scene/roster.h"
 #include "server/schedule/clock.h"
 #include "server/telemetry/metrics.h"
@@ -124,7 +125,7 @@ class RosterTest : public ::testing::Test {
     v1::ColliderPoses message;
     message.add_colliders();
     model::ParticipantPoses poses{.colliders = {tests::handAt(1, x)}, .grabs = {{.id = 4}}};
-    return roster.post(*member.mailbox, message, poses, {}, now);
+    return newest.post(*member.mailbox, message, poses, {}, now);
   }
   // Inputs of the next tick as text: "1: 1 colliders, 1 grabs".
   std::vector<std::string> inputs() {
@@ -146,7 +147,9 @@ class RosterTest : public ::testing::Test {
   std::size_t limit = 8;
   delivery::Subscribers subscribers;
   Inbox inbox;
-  Roster roster{subscribers, inbox, nullptr};
+  NewestPoses newest{subscribers, inbox};
+  Roster roster{subscribers, newest, nullptr};
+  NewestPoses later{subscribers, inbox};  // for a roster of a later run
 };
 
 }  // namespace clothstream::scene

@@ -106,12 +106,12 @@ TEST_F(SceneObserverTest, RestoredParticipantsAreNotNew) {
   const Member first = join(ada);
   lose(first);
   const SavedRoster saved = roster.saved();
-  Roster later(subscribers, inbox, nullptr);
-  later.observe(visits);
+  Roster next(subscribers, later, nullptr);
+  next.observe(visits);
   heard();
-  later.restore(saved, {60s, 20s, 2s}, now);
+  next.restore(saved, {60s, 20s, 2s}, now);
   EXPECT_THAT(heard(), ElementsAre());
-  later.expire(now + 61s);
+  next.expire(now + 61s);
   EXPECT_THAT(heard(), ElementsAre("1 left owner ada 0")) << "it was not connected in this run";
 }
 

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/scene/resume_token.h"
 #include "tests/serving/server_test.h"
 
 namespace clothstream::session {
@@ -63,7 +64,7 @@ TEST_F(ParticipantsTest, WelcomeListsParticipantsAndPresenceAnnouncesChanges) {
   join(ada, "Ada");
   EXPECT_EQ(ada.welcome().role(), v1::ROLE_OWNER);
   EXPECT_EQ(ada.welcome().hold_ms(), 60'000u);
-  EXPECT_EQ(ada.welcome().resume_token().size(), Roster::kTokenBytes);
+  EXPECT_EQ(ada.welcome().resume_token().size(), kTokenBytes);
   EXPECT_FALSE(ada.welcome().resumed());
   join(ben, "Ben \xc3\xa9");
   ASSERT_EQ(ben.welcome().participants_size(), 2);

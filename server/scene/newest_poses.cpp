@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+#include "server/scene/newest_poses.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "clothstream/v1/session.pb.h"
+
+namespace clothstream::scene {
+namespace {
+
+PoseTime poseTime(const v1::ColliderPoses& message, Clock::time_point arrival) {
+  PoseTime time{.clientTimeUs = message.client_time_us()};
+  if (message.server_time_us() == 0) return time;
+  if (time.clientTimeUs == 0) time.clientTimeUs = message.server_time_us();
+  // The difference of two unsigned times, read as signed, is correct for both orders.
+  const std::chrono::microseconds ahead(
+      static_cast<std::int64_t>(message.server_time_us() - schedule::microseconds(arrival)));
+  if (ahead > NewestPoses::kMaxAhead) return time;
+  time.trueAt = arrival + std::max<std::chrono::microseconds>(ahead, -NewestPoses::kMaxBehind);
+  return time;
+}
+
+}  // namespace
+
+NewestPoses::Entries::iterator NewestPoses::find(std::uint64_t participant) {
+  return std::ranges::find(entries_, participant, &Entry::participant);
+}
+
+void NewestPoses::add(std::uint64_t participant, Role role, bool posed) {
+  const std::lock_guard lock(mutex_);
+  Entry& entry = entries_.emplace_back();
+  entry.participant = participant;
+  entry.role = role;
+  entry.posed = posed;
+}
+
+void NewestPoses::setRole(std::uint64_t participant, Role role, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = find(participant);
+  if (entry == entries_.end()) return;
+  entry->role = role;
+  if (role != Role::viewer) return;
+  removeFromScene(*entry, now);
+  entry->poses = {};
+}
+
+void NewestPoses::withdraw(std::uint64_t participant, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  if (const auto entry = find(participant); entry != entries_.end()) removeFromScene(*entry, now);
+}
+
+void NewestPoses::resume(std::uint64_t participant, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = find(participant);
+  if (entry == entries_.end() || entry->posed) return;
+  if (entry->poses.colliders.empty() && entry->poses.grabs.empty()) return;
+  entry->posed = true;
+  model::ParticipantPoses poses = entry->poses;
+  limit(*entry, poses.colliders);
+  inbox_.postPoses(participant, std::move(poses), now);
+}
+
+void NewestPoses::remove(std::uint64_t participant, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = find(participant);
+  if (entry == entries_.end()) return;
+  removeFromScene(*entry, now);
+  entries_.erase(entry);
+}
+
+void NewestPoses::clear() {
+  const std::lock_guard lock(mutex_);
+  entries_.clear();
+  inbox_.dropPoses();
+  charge();
+}
+
+messages::Result<void> NewestPoses::post(const delivery::Mailbox& mailbox, const v1::ColliderPoses& message,
+                                         model::ParticipantPoses poses, const Permissions& permissions,
+                                         Clock::time_point arrival) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = find(subscribers_.participantOf(mailbox));
+  if (entry == entries_.end()) return {};
+  if (auto permitted = permit(entry->role, message, permissions); !permitted) return permitted;
+  messages::Result<void> joints;
+  if (budget_ != nullptr && !poses.joints.empty()) {
+    joints = budget_->chargeJoints();
+    if (!joints) poses.joints.clear();
+    if (std::exchange(entry->jointsRefused, !joints)) joints = {};  // it has the error already
+  }
+  entry->posed = true;
+  entry->poses = {.colliders = poses.colliders,
+                  .grabs = poses.grabs,
+                  .wantsContacts = poses.wantsContacts,
+                  .wantsConstraints = poses.wantsConstraints};
+  const std::size_t sent = poses.colliders.size();
+  limit(*entry, poses.colliders);
+  inbox_.postPoses(entry->participant, std::move(poses), arrival, poseTime(message, arrival));
+  if (!joints) return joints;  // the next message may have the other error
+  const bool wasLimited = std::exchange(entry->collidersLimited, entry->acting < sent);
+  if (wasLimited || !entry->collidersLimited) return {};
+  return tl::unexpected(messages::FieldError{
+      v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+      fmt::format(
+          "colliderPoses: {} of {} colliders act, hands and head first: the participants of a scene share "
+          "its room for colliders evenly (--max-scene-load, --max-load); send fewer or smaller ones",
+          entry->acting, sent),
+      telemetry::Refusal::colliders});
+}
+
+void NewestPoses::divideRoom(Clock::time_point now) {
+  if (budget_ == nullptr) return;
+  const std::lock_guard lock(mutex_);
+  ClothBounds bounds;
+  const ClothBounds* const cloth = budget_->boundsOfCloth(bounds) ? &bounds : nullptr;
+  for (Entry& entry : entries_)
+    if (entry.posed) entry.needs = loadOf(entry.poses.colliders, cloth);
+  share_ = shareOfEach();
+  for (Entry& entry : entries_) {
+    if (!entry.posed) continue;
+    model::ParticipantPoses poses = entry.poses;
+    trim(poses.colliders, share_, cloth);
+    entry.uses = loadOf(poses.colliders, cloth);
+    if (poses.colliders.size() == std::exchange(entry.acting, poses.colliders.size())) continue;
+    inbox_.postPoses(entry.participant, std::move(poses), now);
+  }
+  charge();
+}
+
+void NewestPoses::removeFromScene(Entry& entry, Clock::time_point now) {
+  if (!entry.posed) return;
+  inbox_.postPoses(entry.participant, {}, now);
+  entry.posed = false;
+  entry.needs = entry.uses = {};
+  entry.acting = 0;
+  charge();
+}
+
+ColliderLoad NewestPoses::shareOfEach() const {
+  std::vector<double> hands, others;
+  for (const Entry& entry : entries_) {
+    hands.push_back(entry.needs.hands);
+    others.push_back(entry.needs.others);
+  }
+  ColliderLoad share;
+  share.hands = fairShare(hands, budget_->roomForHands());
+  double used = 0;
+  for (const double need : hands) used += std::min(need, share.hands);
+  share.others = fairShare(others, budget_->roomForOthers(used));
+  return share;
+}
+
+void NewestPoses::limit(Entry& entry, std::vector<model::ParticipantCollider>& colliders) {
+  if (budget_ != nullptr && !(colliders.empty() && entry.acting == 0)) {
+    ClothBounds bounds;
+    const ClothBounds* const cloth = budget_->boundsOfCloth(bounds) ? &bounds : nullptr;
+    const ColliderLoad needs = loadOf(colliders, cloth);
+    if (needs != std::exchange(entry.needs, needs)) share_ = shareOfEach();
+    const ColliderLoad uses = trim(colliders, share_, cloth) ? loadOf(colliders, cloth) : needs;
+    if (uses != std::exchange(entry.uses, uses)) charge();
+  }
+  entry.acting = colliders.size();
+}
+
+void NewestPoses::charge() {
+  if (budget_ == nullptr) return;
+  ColliderLoad all;
+  for (const Entry& entry : entries_) all += entry.uses;
+  budget_->chargeColliders(all);
+}
+
+}  // namespace clothstream::scene

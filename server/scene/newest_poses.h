@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+// Newest poses of each participant, and its share of the room for colliders.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <vector>
+
+#include "server/delivery/subscribers.h"
+#include "server/messages/field_error.h"
+#include "server/model/input.h"
+#include "server/scene/collider_shares.h"
+#include "server/scene/inbox.h"
+#include "server/scene/roles.h"
+#include "server/schedule/clock.h"
+
+namespace clothstream::scene {
+
+// Puts poses into the inbox as far as they act. Participants share the budget of colliders evenly, hands and
+// heads first: colliders beyond a participant's share do not act.
+//
+// Thread-safe. The roster says which participants there are, and calls this class while it holds its own
+// lock; this class never calls the roster. Inbox, subscribers and budget are called under the lock of this
+// class.
+class NewestPoses {
+ public:
+  // Accepted range of pose times. Later times count as unknown, earlier ones as kMaxBehind.
+  static constexpr std::chrono::milliseconds kMaxAhead{100}, kMaxBehind{10'000};
+
+  // All must outlive the object. Without `budget` there is room for all colliders.
+  NewestPoses(const delivery::Subscribers& subscribers, Inbox& inbox, ColliderBudget* budget = nullptr)
+      : subscribers_(subscribers), inbox_(inbox), budget_(budget) {}
+
+  // A participant joins. `posed`: the scene may have colliders or grabs of it, from a checkpoint.
+  void add(std::uint64_t participant, Role role, bool posed = false);
+  // A viewer's poses are removed and forgotten.
+  void setRole(std::uint64_t participant, Role role, Clock::time_point now);
+  // Removes the participant's poses from the scene until resume() puts its colliders and grabs back.
+  void withdraw(std::uint64_t participant, Clock::time_point now);
+  void resume(std::uint64_t participant, Clock::time_point now);
+  // The participant is gone.
+  void remove(std::uint64_t participant, Clock::time_point now);
+  // All participants are gone. Poses that no tick has used are dropped.
+  void clear();
+
+  // Puts the poses of the mailbox's participant into the inbox; without a participant it does nothing.
+  // `poses` is the content of `message`. Returns an error if the role is too low. Another error says so when
+  // colliders begin to exceed the participant's share, or when the budget begins to refuse its joints.
+  [[nodiscard]] messages::Result<void> post(const delivery::Mailbox& mailbox,
+                                            const v1::ColliderPoses& message, model::ParticipantPoses poses,
+                                            const Permissions& permissions, Clock::time_point arrival);
+
+  // Divides the room for colliders again, because cloth has moved, or participants have come or gone. Call it
+  // about once a second.
+  void divideRoom(Clock::time_point now);
+
+ private:
+  struct Entry {
+    std::uint64_t participant = 0;
+    Role role = Role::none;
+    bool posed = false;             // the scene may have colliders or grabs of it
+    model::ParticipantPoses poses;  // the newest, without attachments and joints
+    ColliderLoad needs, uses;       // of the colliders in `poses`, while posed
+    std::size_t acting = 0;         // number of them that the scene has
+    bool collidersLimited = false;  // the newest message had more
+    bool jointsRefused = false;     // joints of the newest message that had some
+  };
+  using Entries = std::vector<Entry>;
+
+  // The caller of the following holds the lock. Returns end() if nothing is found.
+  Entries::iterator find(std::uint64_t participant);
+  void removeFromScene(Entry& entry, Clock::time_point now);
+  // Largest weight that the colliders of one participant may have.
+  ColliderLoad shareOfEach() const;
+  // Removes colliders beyond the participant's share, and charges the others.
+  void limit(Entry& entry, std::vector<model::ParticipantCollider>& colliders);
+  void charge();
+
+  const delivery::Subscribers& subscribers_;
+  Inbox& inbox_;
+  ColliderBudget* const budget_;
+
+  std::mutex mutex_;
+  Entries entries_;     // in the order in which the participants joined
+  ColliderLoad share_;  // of each participant's colliders; found when a need changes, and by divideRoom()
+};
+
+}  // namespace clothstream::scene

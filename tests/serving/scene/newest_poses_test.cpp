@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+// Newest poses of participants on their way to the inbox.
+#include "server/scene/newest_poses.h"
+
+#include <chrono>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clothstream/v1/session.pb.h"
+#include "server/delivery/mailbox.h"
+#include "server/delivery/subscribers.h"
+#include "server/scene/inbox.h"
+#include "server/schedule/clock.h"
+#include "tests/serving/small_scene.h"
+
+namespace clothstream::scene {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+class NewestPosesTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<delivery::Mailbox> add(std::uint64_t id, Role role) {
+    auto mailbox = std::make_shared<delivery::Mailbox>(nullptr);
+    subscribers.add(mailbox, id);
+    newest.add(id, role);
+    return mailbox;
+  }
+  messages::Result<void> post(const delivery::Mailbox& mailbox) {
+    v1::ColliderPoses message;
+    message.add_colliders();
+    return newest.post(mailbox, message, {.colliders = {tests::handAt(1, 0)}}, {}, now);
+  }
+  // Inputs of the next tick as text: participant and number of colliders.
+  std::vector<std::string> inputs() {
+    Inputs drained;
+    inbox.drain(drained);
+    std::vector<std::string> lines;
+    for (const Poses& poses : drained.poses)
+      lines.push_back(fmt::format("{}: {}", poses.participant, poses.now.poses.colliders.size()));
+    return lines;
+  }
+
+  Clock::time_point now = Clock::time_point{} + 1000s;
+  delivery::Subscribers subscribers;
+  Inbox inbox;
+  NewestPoses newest{subscribers, inbox};
+};
+
+TEST_F(NewestPosesTest, PoseTimesAreLimitedToAPlausibleRange) {
+  const std::shared_ptr<delivery::Mailbox> mailbox = add(1, Role::participant);
+  const auto trueAt = [&](std::int64_t laterUs) {
+    v1::ColliderPoses message;
+    message.set_client_time_us(77);
+    message.set_server_time_us(schedule::microseconds(now) + static_cast<std::uint64_t>(laterUs));
+    EXPECT_TRUE(newest.post(*mailbox, message, {}, {}, now));
+    Inputs drained;
+    inbox.drain(drained);
+    EXPECT_EQ(drained.poses.at(0).now.time.clientTimeUs, 77u);
+    return drained.poses.at(0).now.time.trueAt;
+  };
+  EXPECT_EQ(trueAt(-30'000), now - 30ms);
+  EXPECT_EQ(trueAt(100'000), now + 100ms);
+  EXPECT_EQ(trueAt(100'001), std::nullopt);
+  EXPECT_EQ(trueAt(std::numeric_limits<std::int64_t>::max()), std::nullopt);
+  EXPECT_EQ(trueAt(-3'600'000'000), now - 10s);
+  EXPECT_EQ(trueAt(std::numeric_limits<std::int64_t>::min()), now - 10s);
+  EXPECT_EQ(trueAt(-static_cast<std::int64_t>(schedule::microseconds(now))), std::nullopt) << "0: not known";
+}
+
+TEST_F(NewestPosesTest, DropsPosesOfThoseWhoLeft) {
+  const auto removed = add(1, Role::participant), disconnected = add(2, Role::participant);
+  newest.remove(1, now);
+  subscribers.remove(*disconnected);
+  EXPECT_TRUE(post(*removed));
+  EXPECT_TRUE(post(*disconnected));
+  EXPECT_THAT(inputs(), IsEmpty());
+}
+
+TEST_F(NewestPosesTest, WithdrawnPosesComeBackOnce) {
+  const auto mailbox = add(1, Role::participant);
+  ASSERT_TRUE(post(*mailbox));
+  inputs();
+  newest.withdraw(1, now);
+  EXPECT_THAT(inputs(), ElementsAre("1: 0"));
+  newest.withdraw(1, now);
+  EXPECT_THAT(inputs(), IsEmpty());
+  newest.resume(1, now);
+  EXPECT_THAT(inputs(), ElementsAre("1: 1"));
+  newest.resume(1, now);
+  EXPECT_THAT(inputs(), IsEmpty());
+}
+
+TEST_F(NewestPosesTest, ForgetsThePosesOfAViewer) {
+  const auto mailbox = add(1, Role::owner);
+  ASSERT_TRUE(post(*mailbox));
+  newest.setRole(1, Role::viewer, now);
+  EXPECT_THAT(inputs(), ElementsAre("1: 0"));
+  EXPECT_EQ(post(*mailbox).error().code, v1::ERROR_CODE_PERMISSION_DENIED);
+  newest.setRole(1, Role::participant, now);
+  newest.resume(1, now);
+  EXPECT_THAT(inputs(), IsEmpty());
+  EXPECT_TRUE(post(*mailbox));
+  EXPECT_THAT(inputs(), ElementsAre("1: 1"));
+}
+
+TEST_F(NewestPosesTest, RemovesWhatACheckpointHas) {
+  newest.add(1, Role::participant, true);
+  newest.add(2, Role::participant);
+  newest.withdraw(1, now);
+  newest.withdraw(2, now);
+  EXPECT_THAT(inputs(), ElementsAre("1: 0"));
+}
+
+}  // namespace
+}  // namespace clothstream::scene
