@@ -3,7 +3,6 @@
 find_package(Protobuf REQUIRED)
 set(protoOut ${PROJECT_BINARY_DIR}/proto_generated)
 set(protoNames fleet recording saved_state scene session)
-set(keepMessagesValid ${CMAKE_CURRENT_LIST_DIR}/keep_messages_valid.cmake)
 set(messageSources)
 foreach(name IN LISTS protoNames)
   set(source ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/${name}.proto)
@@ -11,9 +10,8 @@ foreach(name IN LISTS protoNames)
   add_custom_command(OUTPUT ${stem}.pb.cc ${stem}.pb.h
     COMMAND ${CMAKE_COMMAND} -E make_directory ${protoOut}
     COMMAND protobuf::protoc -I${PROJECT_SOURCE_DIR}/proto --cpp_out=${protoOut} ${source}
-    COMMAND ${CMAKE_COMMAND} -D header=${stem}.pb.h -P ${keepMessagesValid}
     DEPENDS ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/scene.proto ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/session.proto
-      ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/recording.proto ${source} ${keepMessagesValid} VERBATIM)
+      ${PROJECT_SOURCE_DIR}/proto/clothstream/v1/recording.proto ${source} VERBATIM)
   list(APPEND messageSources ${stem}.pb.cc ${stem}.pb.h)
 endforeach()
 add_library(clothstream_protos STATIC ${messageSources})

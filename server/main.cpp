@@ -10,11 +10,16 @@
 #include "proto/text/printable.h"
 #include "server/options/program_options.h"
 #include "server/program/commands.h"
+#include "server/program/out_of_memory.h"
 #include "server/program/signals.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream {
 namespace {
+
+bool servesClients(Command command) {
+  return command == Command::serve || command == Command::play || command == Command::edge;
+}
 
 int run(const ProgramOptions& options, const program::Signals& signals) {
   switch (options.command) {
@@ -52,9 +57,9 @@ int main(int argc, char** argv) {
     if (const int* code = std::get_if<int>(&parsed)) return *code;
     const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const program::Signals signals;
-    telemetry::setUpLog(options.logLevel,
-                        options.logFormat == "json" ? telemetry::LogFormat::json : telemetry::LogFormat::text,
-                        options.logRate);
+    const auto format = options.logFormat == "json" ? telemetry::LogFormat::json : telemetry::LogFormat::text;
+    telemetry::setUpLog(options.logLevel, format, options.logRate);
+    if (servesClients(options.command)) program::endWhenOutOfMemory(format);
     for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
     return run(options, signals);
   } catch (const std::exception& error) {

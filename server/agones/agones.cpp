@@ -33,7 +33,7 @@ void Agones::run() {
     lock.unlock();
     try {
       look(Clock::now());
-    } catch (const std::exception& failure) {  // such as a lack of memory
+    } catch (const std::exception& failure) {  // such as no free descriptor
       spdlog::error("Agones: {}; trying again", failure.what());
     }
     lock.lock();

@@ -85,23 +85,9 @@ void FramePublisher::run() {
 
 void FramePublisher::encode() {
   for (const CompleteFrame::Recorded& recorded : frame_.recorded) {
-    try {
-      makeRoom(recorded);
-      const encode::EncodedFrame encoded = recorded.encoder->entropyCode(recorded.frame, packet_);
-      if (!frame_.discarded) publish(recorded, encoded);
-    } catch (const std::exception& failure) {
-      // For example, memory ran out. Clients miss the frame and request a key frame.
-      spdlog::error("a frame of tick {} could not be published: {}", recorded.frame.tick, failure.what());
-    }
-  }
-}
-
-void FramePublisher::makeRoom(const CompleteFrame::Recorded& recorded) {
-  try {
     packet_.resize(recorded.encoder->packetBound());
-  } catch (...) {
-    recorded.encoder->discard(recorded.frame);
-    throw;
+    const encode::EncodedFrame encoded = recorded.encoder->entropyCode(recorded.frame, packet_);
+    if (!frame_.discarded) publish(recorded, encoded);
   }
 }
 

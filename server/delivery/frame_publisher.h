@@ -68,8 +68,6 @@ class FramePublisher {
  private:
   void run();
   void encode();
-  // Gives packet_ room for the frame, or discards the frame and throws.
-  void makeRoom(const CompleteFrame::Recorded& recorded);
   void publish(const CompleteFrame::Recorded& recorded, const encode::EncodedFrame& encoded);
 
   std::function<void()> everySecond_;

@@ -95,17 +95,12 @@ std::size_t Subscribers::announceHere(const SharedBytes& message) {
 }
 
 void Subscribers::closeAll(const SharedBytes& last) {
-  // One at a time: if a call throws, for example for a lack of memory, a second call closes the others.
-  for (;;) {
-    std::shared_ptr<Mailbox> mailbox;
-    {
-      const std::lock_guard lock(mutex_);
-      if (subscribers_.empty()) return;
-      mailbox = std::move(subscribers_.back().mailbox);
-      subscribers_.pop_back();
-    }
-    mailbox->close(last);
+  std::vector<Subscriber> closing;
+  {
+    const std::lock_guard lock(mutex_);
+    closing.swap(subscribers_);
   }
+  for (const Subscriber& subscriber : closing) subscriber.mailbox->close(last);
 }
 
 RequestedFrames Subscribers::requested(Clock::time_point now) const {

@@ -2,7 +2,6 @@
 #include "server/discovery/announcement.h"
 
 #include <exception>
-#include <new>
 #include <stdexcept>
 #include <utility>
 
@@ -153,7 +152,7 @@ class Announcement::Avahi {
 
   void takeNextName() {
     char* const next = avahi_alternative_service_name(name_.c_str());
-    if (next == nullptr) throw std::bad_alloc();
+    if (next == nullptr) throw std::runtime_error("out of memory");
     name_ = next;
     avahi_free(next);
   }

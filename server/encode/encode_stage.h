@@ -20,9 +20,8 @@ class EncodeStage {
   virtual std::size_t packetBound() const = 0;
   // Called after a barrier, in the stage "encode".
   virtual void record(vulkan::Recorder& recorder, std::uint32_t slot, bool predicted) = 0;
-  // Exactly one of these two is called for each frame, in the order of record(). discard() does not allocate.
+  // Called once for each frame, in the order of record().
   virtual EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) = 0;
-  virtual void discard(const RecordedFrame& frame) = 0;
 };
 
 std::unique_ptr<EncodeStage> makeHierarchicalHostStage(const vulkan::Device& device,

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
-#include <exception>
 #include <latch>
-#include <mutex>
 
 #include <boost/asio/post.hpp>
 #include <boost/asio/thread_pool.hpp>
@@ -27,32 +25,17 @@ EncoderThreads::~EncoderThreads() {
 void EncoderThreads::run(std::uint32_t pieces, const std::function<void(std::uint32_t)>& piece) {
   const std::uint32_t helpers = std::min(others_, std::max(pieces, 1u) - 1);
   std::atomic<std::uint32_t> next = 0;
-  std::mutex mutex;
-  std::exception_ptr failure;  // the first one
   std::latch helped(helpers);
   const auto help = [&] {
-    try {
-      for (std::uint32_t i = next++; i < pieces; i = next++) piece(i);
-    } catch (...) {
-      next = pieces;  // the others need not go on
-      const std::lock_guard lock(mutex);
-      if (!failure) failure = std::current_exception();
-    }
+    for (std::uint32_t i = next++; i < pieces; i = next++) piece(i);
   };
-  for (std::uint32_t i = 0; i < helpers; ++i) {
-    try {
-      boost::asio::post(pool_->threads, [&] {
-        help();
-        helped.count_down();
-      });
-    } catch (const std::exception&) {
-      // There is no memory for the request. This thread does the work.
+  for (std::uint32_t i = 0; i < helpers; ++i)
+    boost::asio::post(pool_->threads, [&] {
+      help();
       helped.count_down();
-    }
-  }
+    });
   help();
   helped.wait();
-  if (failure) std::rethrow_exception(failure);
 }
 
 std::uint32_t EncoderThreads::suitedTo(std::uint32_t processors) {

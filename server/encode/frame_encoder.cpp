@@ -73,7 +73,7 @@ struct FrameEncoder::State {
   // Belong to the device's thread.
   bool hasReference = false;
   std::uint64_t tick = 0;
-  // Set by record(), cleared by entropyCode() and discard().
+  // Set by record(), cleared by entropyCode().
   std::array<std::atomic<bool>, kSlots> taken{};
 };
 
@@ -132,11 +132,6 @@ void FrameEncoder::forgetHistory() {
 EncodedFrame FrameEncoder::entropyCode(const RecordedFrame& frame, std::span<std::byte> out) {
   const Release release{state_->taken[frame.slot]};
   return state_->stage->entropyCode(frame, out);
-}
-
-void FrameEncoder::discard(const RecordedFrame& frame) {
-  const Release release{state_->taken[frame.slot]};
-  state_->stage->discard(frame);
 }
 
 std::size_t FrameEncoder::packetBound() const {

@@ -40,7 +40,7 @@ struct RecordedFrame {
 struct EncodedFrame {
   std::size_t bytes = 0;  // written to `out`
   std::uint64_t reconstructionHash = 0;
-  // As in the packet's header. The kind differs from that of the recorded frame if a key frame was discarded.
+  // As in the packet's header.
   codec::PacketKind kind = codec::PacketKind::key;
   std::uint64_t referenceTick = 0;  // of a predicted frame; else 0
 };
@@ -79,9 +79,6 @@ class FrameEncoder {
   // Codes a frame whose recording is complete, in the order of record(). Frees the slot. `out` has at least
   // packetBound() bytes.
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out);
-  // Replaces entropyCode() for a frame that is not sent: its recording must be complete, too. Frees the slot.
-  // Does not allocate. A decoder may need a key frame to decode the frames after it.
-  void discard(const RecordedFrame& frame);
 
   std::size_t packetBound() const;
 

@@ -44,12 +44,8 @@ class HierarchicalDeviceStage final : public EncodeStage {
   }
 
   EncodedFrame entropyCode(const RecordedFrame& frame, std::span<std::byte> out) override;
-  void discard(const RecordedFrame& frame) override { code(frame, {}); }
 
  private:
-  // Advances the plan of the weights by a frame, as the device has, and returns the bytes that are written to
-  // `out`. Without `out` no packet is written; everything else is the same.
-  std::size_t code(const RecordedFrame& frame, std::span<std::byte> out);
   // These give the writer all residuals of a frame, or of one phase. They return whether a vertex stays or
   // has a residual that is not 0.
   bool addResiduals(std::uint32_t slot);
@@ -93,28 +89,21 @@ bool HierarchicalDeviceStage::addPhase(std::uint32_t slot, const Phase& phase) {
   return any;
 }
 
-std::size_t HierarchicalDeviceStage::code(const RecordedFrame& frame, std::span<std::byte> out) {
+EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, std::span<std::byte> out) {
   const bool key = frame.kind == codec::PacketKind::key;
   const codec::FrameRole role = roleOf(frame);
   sinceKey_ = key ? 0 : sinceKey_ + 1;
   plan_.begin(key);
-  const bool atRest = !key && predictor_.status(frame.slot).moved == 0;
+  const shared::SlotStatus& status = predictor_.status(frame.slot);
+  const bool atRest = !key && status.moved == 0;
   const std::size_t weightBytes = plan_.write(atRest, weightBytes_.data());
   const bool any = addResiduals(frame.slot);
-  const std::size_t bytes =
-      out.empty() ? 0 : writer_.write(role, std::span(weightBytes_).first(weightBytes), out);
+  const std::size_t bytes = writer_.write(role, std::span(weightBytes_).first(weightBytes), out);
   std::array<Phase, FitSchedule::kMaxChunks> chunks;
   const std::size_t count = fitted_.select(sinceKey_, chunks);
   for (std::size_t i = 0; i < count; ++i)
     plan_.add(chunks[i].weightClass, predictor_.products(frame.slot, i));
   plan_.end(!any);
-  return bytes;
-}
-
-EncodedFrame HierarchicalDeviceStage::entropyCode(const RecordedFrame& frame, std::span<std::byte> out) {
-  const std::size_t bytes = code(frame, out);
-  const codec::FrameRole role = roleOf(frame);
-  const shared::SlotStatus& status = predictor_.status(frame.slot);
   return {.bytes = bytes,
           .reconstructionHash = std::uint64_t{status.hashHigh} << 32 | status.hashLow,
           .kind = role.kind,

@@ -49,12 +49,6 @@ class HierarchicalHostStage final : public EncodeStage {
             .referenceTick = encoder_->referenceTick()};
   }
 
-  // The encoder has not seen the frame, so the next one refers to an older frame, which decoders hold. After
-  // a discarded key frame the next one is a key frame, because older frames may belong to a dropped history.
-  void discard(const RecordedFrame& frame) override {
-    if (frame.kind == codec::PacketKind::key) encoder_->forgetHistory();
-  }
-
  private:
   struct Slot {
     vulkan::Buffer positions, normals;

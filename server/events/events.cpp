@@ -10,7 +10,6 @@
 #include "server/scene/live_scene.h"
 #include "server/scene/roster.h"
 #include "server/schedule/clock.h"
-#include "server/schedule/retry.h"
 
 namespace clothstream::events {
 
@@ -51,17 +50,13 @@ class Events::ObservedScene final : public scene::SceneObserver {
   // Reports what `make` returns, unless it is the use of nothing.
   template <class Make>
   void push(const Make& make) {
-    try {
-      Event event{.time = std::chrono::system_clock::now(),
-                  .scene = scene_.name(),
-                  .tenant = scene_.tenant,
-                  .what = make()};
-      const Usage* const usage = std::get_if<Usage>(&event.what);
-      if (usage != nullptr && usage->deviceSeconds <= 0 && usage->sentBytes == 0) return;
-      events_->sender_.push(std::move(event));
-    } catch (const std::exception&) {  // memory ran out
-      events_->sender_.countLost();
-    }
+    Event event{.time = std::chrono::system_clock::now(),
+                .scene = scene_.name(),
+                .tenant = scene_.tenant,
+                .what = make()};
+    const Usage* const usage = std::get_if<Usage>(&event.what);
+    if (usage != nullptr && usage->deviceSeconds <= 0 && usage->sentBytes == 0) return;
+    events_->sender_.push(std::move(event));
   }
 
   const std::shared_ptr<Events> events_;
@@ -80,9 +75,7 @@ Events::Events(EventsOptions options)
 }
 
 Events::~Events() {
-  schedule::retryUntilDone(
-      [this] { boost::asio::post(io_, [this] { sender_.finish(options_.patience); }); },
-      [](const std::exception& failure) { spdlog::error("events: {}; trying again", failure.what()); });
+  boost::asio::post(io_, [this] { sender_.finish(options_.patience); });
   thread_.join();
   sender_.dropRest();
 }
@@ -99,7 +92,7 @@ void Events::run() {
   while (!io_.stopped()) {
     try {
       io_.run();
-    } catch (const std::exception& failure) {  // memory ran out; the next event tries again
+    } catch (const std::exception& failure) {  // no random numbers; the next event tries again
       spdlog::error("events: {}", failure.what());
     }
   }

@@ -2,7 +2,6 @@
 #include "server/events/sender.h"
 
 #include <algorithm>
-#include <exception>
 #include <utility>
 
 #include <boost/asio/post.hpp>
@@ -40,15 +39,7 @@ Sender::Sender(boost::asio::io_context& io, SenderOptions options)
       end_(io),
       delay_(options_.firstRetry) {}
 
-void Sender::push(Event event) noexcept {
-  try {
-    add(std::move(event));
-  } catch (const std::exception&) {  // memory ran out
-    ++dropped_;
-  }
-}
-
-void Sender::add(Event event) {
+void Sender::push(Event event) {
   bool overflows = false;
   {
     const std::lock_guard lock(mutex_);
@@ -88,11 +79,7 @@ void Sender::deliver() {
                {"webhook-signature", signatureOf(options_.key, first.id, timestamp, body)}};
     delivering_ = true;
   }
-  try {
-    post_.send(headers, std::move(body), [this](const HttpPost::Answer& answer) { answered(answer); });
-  } catch (const std::exception& failure) {  // memory ran out
-    answered({.status = 0, .problem = failure.what()});
-  }
+  post_.send(headers, std::move(body), [this](const HttpPost::Answer& answer) { answered(answer); });
 }
 
 void Sender::answered(const HttpPost::Answer& answer) {

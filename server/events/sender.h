@@ -41,10 +41,8 @@ class Sender {
  public:
   Sender(boost::asio::io_context& io, SenderOptions options);
 
-  // Does not block, and does not fail: an event for which there is no memory counts as dropped.
-  void push(Event event) noexcept;
-  // Counts an event that could not be made as dropped.
-  void countLost() { ++dropped_; }
+  // Does not block.
+  void push(Event event);
   // Stops the io_context when all events are delivered, or after this time.
   void finish(std::chrono::milliseconds patience);
   // Drops the events that still wait. The io_context must have stopped.
@@ -60,7 +58,6 @@ class Sender {
     std::string id, body;  // once it was tried
   };
 
-  void add(Event event);
   // Tries to deliver the oldest event, if there is one and none is being delivered.
   void deliver();
   void answered(const HttpPost::Answer& answer);

@@ -131,7 +131,7 @@ void Edge::run() {
         for (auto& [name, known] : scenes_) receiveChunk(*known, arrival, now);
       }
       look(now);
-    } catch (const std::exception& failure) {  // such as a lack of memory
+    } catch (const std::exception& failure) {  // such as a subscription that fails
       spdlog::error("edge: {}; trying again", failure.what());
     }
     next = now + kLookPeriod;

@@ -67,7 +67,7 @@ struct Nats::Subscription::Receiver {
     receiver.metrics.receivedBytes.add(data.size());
     try {
       receiver.handler(natsMsg_GetSubject(message), reply, data);
-    } catch (const std::exception& failure) {  // such as a lack of memory; the library is written in C
+    } catch (const std::exception& failure) {  // the library is written in C
       spdlog::error("a message from NATS failed: {}", failure.what());
     }
   }

@@ -20,7 +20,6 @@
 #include "server/saved_state/contents.h"
 #include "server/scene/live_scene.h"
 #include "server/schedule/clock.h"
-#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::fleet {
@@ -178,7 +177,7 @@ void Origin::run() {
     try {
       lookForScenes();
       offer();
-    } catch (const std::exception& failure) {  // such as a lack of memory
+    } catch (const std::exception& failure) {  // such as a subscription that fails
       spdlog::error("offering scenes to edges failed: {}; trying again", failure.what());
     }
     lock.lock();
@@ -407,16 +406,9 @@ v1::MoveResponse Origin::moveTo(Conversation& talk, std::uint64_t move, const v1
   response.set_gap(schedule::seconds(Clock::now() - stopped));
   // Clients of this server must join at the other one. Those at edges follow by themselves, so their tunnels
   // end first.
-  schedule::retryUntilDone(
-      [&] {
-        tunnels_.end(stream->subject());
-        remove(scene, other.public_name());
-        dropStream(stream);
-      },
-      [&](const std::exception& failure) {
-        telemetry::log({name}, spdlog::level::err, "not removed after its move: {}; trying again",
-                       failure.what());
-      });
+  tunnels_.end(stream->subject());
+  remove(scene, other.public_name());
+  dropStream(stream);
   telemetry::log({name}, spdlog::level::info, "moved to another server at tick {}", scene->tick.load());
   return response;
 }

@@ -70,7 +70,6 @@ std::shared_ptr<const void> SceneServer::State::countConnection(const Identity& 
     }
     ++count;
   }
-  // Made without the lock, because it calls `release` at once if there is no memory for it.
   return {&uncounted, std::move(release)};
 }
 

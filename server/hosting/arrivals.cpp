@@ -12,7 +12,6 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/hosting/server_state.h"
-#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
@@ -112,15 +111,10 @@ void SceneServer::State::abandonArrival(const std::shared_ptr<scene::LiveScene>&
 void SceneServer::State::removeCreated(const std::shared_ptr<scene::LiveScene>& scene,
                                        const delivery::SharedBytes& last) {
   erase(*scene);
-  const auto finish = [&] {
-    scene->roster.close(last);
-    device.remove(scene).wait();
-    scene->discharge();
-    if (scene->keeper) forget(*scene);  // else the name may be that of another scene
-  };
-  schedule::retryUntilDone(finish, [&](const std::exception& failure) {
-    spdlog::error("{}: not removed: {}; trying again", scene->name(), failure.what());
-  });
+  scene->roster.close(last);
+  device.remove(scene).wait();
+  scene->discharge();
+  if (scene->keeper) forget(*scene);  // else the name may be that of another scene
 }
 
 }  // namespace clothstream::hosting

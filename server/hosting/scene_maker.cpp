@@ -13,14 +13,12 @@
 #include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/hosting/give_answer.h"
 #include "server/hosting/server_state.h"
 #include "server/messages/limits.h"
 #include "server/messages/parsed_size.h"
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/validation.h"
-#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
@@ -36,8 +34,8 @@ tl::unexpected<v1::Error> refused(v1::ErrorCode code, std::string text) {
   return tl::unexpected(std::move(error));
 }
 
-// Returns the result of `work`. An exception, such as for a mesh that is too large for the memory, becomes an
-// error for the peer that asked.
+// Returns the result of `work`. An exception, such as for a directory of recordings that cannot be written,
+// becomes an error for the peer that asked.
 template <class Work>
 auto attempt(const char* call, const Work& work) -> decltype(work()) {
   try {
@@ -49,19 +47,6 @@ auto attempt(const char* call, const Work& work) -> decltype(work()) {
   }
 }
 
-// Runs `work` on the maker's thread. An exception, such as for a lack of memory while the answer is given,
-// ends this request and not the thread.
-template <class Work>
-void postTo(boost::asio::thread_pool& thread, Work work) {
-  boost::asio::post(thread, [work = std::move(work)]() mutable {
-    try {
-      work();
-    } catch (const std::exception& failure) {
-      spdlog::error("a request about a scene failed: {}", failure.what());
-    }
-  });
-}
-
 // Counts a waiting request until it is reset or destroyed.
 struct EndWaiting {
   void operator()(std::atomic<std::uint32_t>* count) const { --*count; }
@@ -71,12 +56,12 @@ using Waiting = std::unique_ptr<std::atomic<std::uint32_t>, EndWaiting>;
 }  // namespace
 
 SceneMaker::SceneMaker(SceneServer::State& server) : server_(server) {
-  postTo(thread_, [this] { expireLater(); });
+  boost::asio::post(thread_, [this] { expireLater(); });
 }
 
 SceneMaker::~SceneMaker() {
   stop();
-  postTo(thread_, [this] {
+  boost::asio::post(thread_, [this] {
     ended_ = true;
     expiry_.cancel();
   });
@@ -88,21 +73,11 @@ void SceneMaker::expireLater() {
   if (lifetime.count() == 0 || ended_) return;
   constexpr std::chrono::milliseconds kInterval{1000};
   const std::chrono::milliseconds interval = std::min(lifetime, kInterval);
-  const auto startTimer = [this, lifetime, interval] {
-    expiry_.expires_after(interval);
-    expiry_.async_wait([this, lifetime](const boost::system::error_code& cancelled) {
-      if (cancelled) return;
-      try {
-        deleteUnused(lifetime);
-      } catch (const std::exception& failure) {
-        spdlog::error("unused scenes are not deleted: {}", failure.what());
-      }
-      expireLater();
-    });
-  };
-  // An exception would end the process, because it would leave a thread of the pool.
-  schedule::retryUntilDone(startTimer, [](const std::exception& failure) {
-    spdlog::error("unused scenes are not deleted: {}; trying again", failure.what());
+  expiry_.expires_after(interval);
+  expiry_.async_wait([this, lifetime](const boost::system::error_code& cancelled) {
+    if (cancelled) return;
+    deleteUnused(lifetime);
+    expireLater();
   });
 }
 
@@ -131,9 +106,9 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("createScene: {} scenes wait to be created; try again later", kMaxWaiting));
   }
-  postTo(thread_, [this, waits = std::move(waits), request = std::move(request),
-                   uploaded = std::move(uploaded), tenant = std::move(tenant), wanted = std::move(wanted),
-                   done = std::move(done)]() mutable {
+  boost::asio::post(thread_, [this, waits = std::move(waits), request = std::move(request),
+                              uploaded = std::move(uploaded), tenant = std::move(tenant),
+                              wanted = std::move(wanted), done = std::move(done)]() mutable {
     waits.reset();
     static const std::string nothing;
     const auto end = Clock::now() + server_.options.maxCreationTime;
@@ -160,7 +135,7 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
       }
     });
     uploaded.reset();  // before the answer, so that the peer may upload again at once
-    giveAnswer("createScene", done, std::move(made));
+    done(std::move(made));
   });
   return {};
 }
@@ -174,10 +149,11 @@ tl::expected<void, v1::Error> SceneMaker::enqueue(const char* call, Work work, D
     return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("{}: {} requests about scenes wait; try again later", call, kMaxWaiting));
   }
-  postTo(thread_, [waits = std::move(waits), call, work = std::move(work), done = std::move(done)]() mutable {
-    waits.reset();
-    giveAnswer(call, done, attempt(call, work));
-  });
+  boost::asio::post(
+      thread_, [waits = std::move(waits), call, work = std::move(work), done = std::move(done)]() mutable {
+        waits.reset();
+        done(attempt(call, work));
+      });
   return {};
 }
 
@@ -336,15 +312,10 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
 }
 
 void SceneMaker::undoCreation(const std::shared_ptr<scene::LiveScene>& scene) {
-  const auto undo = [&] {
-    // Nothing waits for the device here, because it may be what takes too long.
-    server_.device.remove(scene);
-    scene->discharge();
-    server_.forget(*scene);
-  };
-  schedule::retryUntilDone(undo, [&](const std::exception& failure) {
-    spdlog::error("{}: its creation is not undone: {}; trying again", scene->name(), failure.what());
-  });
+  // Nothing waits for the device here, because it may be what takes too long.
+  server_.device.remove(scene);
+  scene->discharge();
+  server_.forget(*scene);
 }
 
 tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(const v1::DeleteSceneRequest& request,

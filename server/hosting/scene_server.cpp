@@ -10,13 +10,11 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/hosting/server_state.h"
-#include "server/messages/descriptors.h"
 
 namespace clothstream::hosting {
 
 SceneServer::SceneServer(std::vector<model::Scene> scenes, ServerOptions options) {
   assert(options.maxParticipants <= kMaxParticipants);
-  messages::buildDescriptors();
   bool found = false;
   std::string known;
   for (const model::Scene& scene : scenes) {
@@ -34,7 +32,6 @@ SceneServer::SceneServer(std::vector<model::Scene> scenes, ServerOptions options
 
 SceneServer::SceneServer(std::string name, std::shared_ptr<scene::FrameSource> source,
                          ServerOptions options) {
-  messages::buildDescriptors();
   options.defaultScene = name;
   auto played =
       std::make_shared<scene::LiveScene>(std::move(name), std::move(source), options.maxParticipants);
@@ -42,7 +39,6 @@ SceneServer::SceneServer(std::string name, std::shared_ptr<scene::FrameSource> s
 }
 
 SceneServer::SceneServer(ServerOptions options) {
-  messages::buildDescriptors();
   state_ = std::make_unique<State>(std::vector<model::Scene>{}, std::move(options));
   state_->participants = State::kFirstViewer;
 }

@@ -2,7 +2,6 @@
 #include "server/hosting/server_state.h"
 
 #include <algorithm>
-#include <exception>
 #include <thread>
 #include <utility>
 
@@ -15,7 +14,6 @@
 #include "server/messages/scene_message.h"
 #include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
-#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::hosting {
@@ -301,12 +299,8 @@ void SceneServer::State::stop() {
     stopping = true;
   }
   maker.stop();
-  schedule::retryUntilDone(
-      [this] {
-        const delivery::SharedBytes notice = stoppingNotice(options.drain);
-        for (const auto& peer : peersNow()) peer->close(notice);
-      },
-      [](const std::exception& failure) { spdlog::error("stopping: {}; trying again", failure.what()); });
+  const delivery::SharedBytes notice = stoppingNotice(options.drain);
+  for (const auto& peer : peersNow()) peer->close(notice);
   if (options.store) options.store->flush(kStorePatience);
 }
 

@@ -178,7 +178,7 @@ std::string sign(const TokenKey& key, const Claims& claims) {
   if (key.signing.empty())
     throw std::runtime_error(fmt::format("{}: is a public key; signing needs the private one", key.id));
   jwt_t* made = nullptr;
-  if (jwt_new(&made) != 0) throw std::bad_alloc();
+  if (jwt_new(&made) != 0) throw std::runtime_error("the token cannot be signed");
   const Token token(made);
   int failed = 0;
   const auto add = [&](const char* name, const std::string& value) {

@@ -75,9 +75,7 @@ struct MonitoringEndpoint::State {
   net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};  // until io.stop()
   tcp::acceptor acceptor;
   net::steady_timer acceptTimer{io}, probeTimer{io};
-  std::weak_ptr<void> accepting;  // expired unless accept() or its timer waits
-  bool probing = false;           // probeTimer waits
-  std::string metricsText;        // the newest
+  std::string metricsText;  // the newest
   std::optional<schedule::Clock::time_point> metricsBuilt;
   std::uint16_t port;
   std::thread thread;
@@ -100,12 +98,10 @@ struct MonitoringEndpoint::State {
     thread.join();
   }
 
-  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint. It may
-  // also have ended accept() or probe().
+  // An exception, such as for /proc without a free descriptor, ends the handler of one socket and not the
+  // endpoint.
   void run() {
     for (;;) try {
-        if (accepting.expired()) accept();
-        if (!probing) probe();
         io.run();
         return;
       } catch (const std::exception& failure) {
@@ -114,13 +110,10 @@ struct MonitoringEndpoint::State {
   }
 
   void accept() {
-    // Boost drops a handler whose operation has thrown, and `waits` with it.
-    auto waits = std::make_shared<int>();
-    accepting = waits;
-    acceptor.async_accept([this, waits](boost::system::error_code error, tcp::socket socket) mutable {
+    acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
       if (error) {  // such as no free descriptor; an immediate retry would only spin
         acceptTimer.expires_after(kAcceptPause);
-        acceptTimer.async_wait([this, waits = std::move(waits)](boost::system::error_code) { accept(); });
+        acceptTimer.async_wait([this](boost::system::error_code) { accept(); });
         return;
       }
       accept();  // first, so that it goes on if the connection fails
@@ -135,11 +128,7 @@ struct MonitoringEndpoint::State {
       if (server != nullptr) server->state().device.wake();
     }
     probeTimer.expires_after(deviceSilence / kProbes);
-    probeTimer.async_wait([this](boost::system::error_code) {
-      probing = false;
-      probe();
-    });
-    probing = true;
+    probeTimer.async_wait([this](boost::system::error_code) { probe(); });
   }
 
   Answer answer(std::string_view target) {

@@ -5,7 +5,6 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <optional>
 
@@ -68,19 +67,15 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
     const int signal = end ? signals.wait(*end - Clock::now()) : signals.wait();
     const bool reloads = tls != nullptr || authenticator != nullptr;
     if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && !reloads)) return;
-    try {
-      if (signal == SIGHUP)
-        work.post(signal, [tls, authenticator, readsKeys = !options.tokenKeys.empty()] {
-          if (tls) reload(*tls);
-          if (readsKeys) reload(*authenticator);
-        });
-      else if (signal == SIGUSR1)
-        work.post(signal, [text = report()] { print(text); });
-      else if (signal == SIGUSR2 && options.pairing)
-        work.post(signal, [text = pairingCodeLine(*authenticator)] { print(text); });
-    } catch (const std::exception& failure) {  // such as a lack of memory
-      spdlog::error("what a signal asked for failed: {}", failure.what());
-    }
+    if (signal == SIGHUP)
+      work.post(signal, [tls, authenticator, readsKeys = !options.tokenKeys.empty()] {
+        if (tls) reload(*tls);
+        if (readsKeys) reload(*authenticator);
+      });
+    else if (signal == SIGUSR1)
+      work.post(signal, [text = report()] { print(text); });
+    else if (signal == SIGUSR2 && options.pairing)
+      work.post(signal, [authenticator] { print(pairingCodeLine(*authenticator)); });
   }
 }
 

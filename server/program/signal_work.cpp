@@ -28,7 +28,7 @@ struct SignalWork::State {
       lock.unlock();
       try {
         work();
-      } catch (const std::exception& failure) {  // such as a lack of memory
+      } catch (const std::exception& failure) {  // such as an output that is closed
         spdlog::error("what a signal asked for failed: {}", failure.what());
       }
       work = nullptr;

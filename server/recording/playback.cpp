@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <exception>
 #include <span>
 #include <utility>
 #include <vector>
@@ -24,7 +23,6 @@ using namespace std::chrono_literals;
 constexpr auto kLookAgain = 20ms;
 constexpr auto kAnnouncementPeriod = 1s;
 // Pause after a step that failed.
-constexpr auto kRetryPeriod = 1s;
 // Maximum delay that playback catches up; a longer delay shifts the schedule.
 constexpr auto kMaxLateness = 250ms;
 // Maximum number of messages per step, so that control requests are handled in between.
@@ -85,14 +83,7 @@ std::string Playback::damage() const {
 
 void Playback::run(scene::LiveScene& scene) {
   for (;;) {
-    std::optional<Clock::time_point> next;
-    try {
-      next = step(scene, Clock::now());
-    } catch (const std::exception& failure) {
-      // For example, memory ran out.
-      spdlog::error("{}: playing failed: {}; trying again", scene.name(), failure.what());
-      next = Clock::now() + kRetryPeriod;
-    }
+    const std::optional<Clock::time_point> next = step(scene, Clock::now());
     std::unique_lock lock(mutex_);
     const auto something = [&] { return woken_ || stopping_; };
     if (next)

@@ -88,8 +88,7 @@ Recorder::State Recorder::finish() {
   }
   if (thread_.joinable()) thread_.join();
   const std::lock_guard lock(mutex_);
-  if (std::exchange(file_, nullptr))
-    std::remove(path_.c_str());  // needs no memory: the destructor calls this
+  if (std::exchange(file_, nullptr)) std::remove(path_.c_str());
   return state_;
 }
 
@@ -120,7 +119,7 @@ void Recorder::begin(const vulkan::DeviceInfo& device, const model::Scene& scene
           }
         });
   } catch (const std::exception& failure) {
-    // For example, there is no memory or no thread. The recording would otherwise run forever.
+    // For example, there is no thread. The recording would otherwise run forever.
     fail(failure.what());
   }
 }

@@ -80,17 +80,10 @@ std::int64_t numberOf(sqlite3* database, const char* pragma, int& code) {
 // Runs statements as one transaction, which is on the disk when this returns SQLITE_OK.
 template <typename Work>
 int transaction(sqlite3* database, const Work& work) {
-  // Also when `work` throws: the next transaction could not begin otherwise.
-  const struct EndTransaction {
-    sqlite3* database;
-    ~EndTransaction() {
-      if (sqlite3_get_autocommit(database) == 0)
-        sqlite3_exec(database, "ROLLBACK", nullptr, nullptr, nullptr);
-    }
-  } end{database};
   int code = run(database, "BEGIN IMMEDIATE");
   if (code == SQLITE_OK) code = work();
   if (code == SQLITE_OK || code == SQLITE_DONE) code = run(database, "COMMIT");
+  if (code != SQLITE_OK && sqlite3_get_autocommit(database) == 0) run(database, "ROLLBACK");
   return code;
 }
 

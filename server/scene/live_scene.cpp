@@ -290,14 +290,7 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   const auto pace = role == Role::owner ? Charge::Pace::any : Charge::Pace::inTime;
   if (const auto charged = charge_.charge("parameterChange", changed, pace); !charged)
     return tl::unexpected(charged.error());
-  bool posted = false;
-  try {
-    posted = inbox.postChange(std::move(accepted));
-  } catch (...) {  // memory ran out
-    charge_.restore(definition_);
-    throw;
-  }
-  if (!posted) {
+  if (!inbox.postChange(std::move(accepted))) {
     charge_.restore(definition_);
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,

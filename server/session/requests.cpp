@@ -25,13 +25,11 @@ template <typename Response>
 std::function<void(tl::expected<Response, v1::Error>)> Session::answering(
     Response* (v1::ServerMessage::*body)()) {
   ++asked_;
-  return [weak = weak_from_this(), requestId = requestId_, body,
-          counted = true](tl::expected<Response, v1::Error> response) mutable {
+  return [weak = weak_from_this(), requestId = requestId_, body](tl::expected<Response, v1::Error> response) {
     const std::shared_ptr<Session> session = weak.lock();
     if (!session) return;
     const std::lock_guard lock(session->mutex_);
-    // A call that throws is repeated.
-    if (std::exchange(counted, false)) --session->asked_;
+    --session->asked_;
     if (session->mailbox_->closed()) return;
     session->now_ = Clock::now();
     session->requestId_ = requestId;

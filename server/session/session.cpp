@@ -15,7 +15,6 @@
 #include "server/identity/authenticator.h"
 #include "server/messages/client_message.h"
 #include "server/scene/remote_session.h"
-#include "server/schedule/retry.h"
 #include "server/telemetry/log.h"
 
 namespace clothstream::session {
@@ -104,7 +103,7 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point sent) 
     requestId_ = message->request_id();
     dispatch(*message, now);
   } catch (const std::exception& failure) {
-    // For example, memory ran out. That must end neither the endpoint's thread nor other sessions.
+    // This ends neither the endpoint's thread nor other sessions.
     spdlog::error("{}: a message failed: {}", peer_, failure.what());
     closeLocked(delivery::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                                 "the server could not handle the message; try again later", true, requestId_),
@@ -232,11 +231,7 @@ void Session::end() {
   mailbox_->silence();
   const std::lock_guard lock(mutex_);
   now_ = Clock::now();
-  // The owner's destructor calls this, so nothing may leave it. A lack of memory leaves the participant in
-  // its scene until the next attempt.
-  schedule::retryUntilDone(
-      [&] { closeLocked(nullptr, DisconnectReason::lost); },
-      [&](const std::exception& failure) { spdlog::error("{}: {}; trying again", peer_, failure.what()); });
+  closeLocked(nullptr, DisconnectReason::lost);
   counted_.reset();
 }
 

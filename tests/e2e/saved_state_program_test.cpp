@@ -17,6 +17,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "clients/grpc/grpc_client.h"
 #include "clients/grpc/scene_control.h"
@@ -116,13 +118,29 @@ class SavedStateProgram : public RunningServer {
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
-  void createScene(const std::string& name, SolverKind solver) const {
+  auto requestScene(const std::string& name, SolverKind solver, std::uint32_t rows = 12,
+                    std::uint32_t columns = 10) const {
     model::Scene scene = tests::smallScene(name);
     scene.cloths[0].solver.kind = solver;
+    scene.cloths[0].grid.rows = rows;
+    scene.cloths[0].grid.columns = columns;
     CreateSceneOptions request;
     request.scene = messages::toMessage(scene);
-    const auto made = clothstream::createScene(address_, request);
+    return clothstream::createScene(address_, request);
+  }
+  void createScene(const std::string& name, SolverKind solver) const {
+    const auto made = requestScene(name, solver);
     ASSERT_TRUE(made.has_value()) << made.error().text;
+  }
+  // Lets the server make a large scene with the address space that it has now.
+  void useUpMemory() {
+    std::uint64_t pages = 0;
+    std::ifstream("/proc/" + std::to_string(server_->id()) + "/statm") >> pages;
+    const auto bytes = pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+    const rlimit limit{bytes, bytes};
+    ASSERT_EQ(::prlimit(server_->id(), RLIMIT_AS, &limit, nullptr), 0);
+    EXPECT_FALSE(requestScene("large", SolverKind::xpbd, 8000, 32));
+    EXPECT_EQ(server_->waitForEnd(kPatience), 71);
   }
   // Time in seconds since which a running scene has no newer state on the disk.
   double stateAge() const {
@@ -205,6 +223,30 @@ TEST_F(SavedStateProgram, ScenesOfEverySolverGoOnAfterSigkillAndSigterm) {
     EXPECT_TRUE(members[i]->welcomes()[2].resumed());
     EXPECT_GE(members[i]->firstTicks()[2], last[i]) << "an orderly end loses no tick";
   }
+}
+
+TEST_F(SavedStateProgram, ScenesComeBackAfterMemoryRanOut) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the sanitizer's allocator ends the program";
+#endif
+  // Larger than the memory.
+  const Arguments budgets{"--max-memory", "10000", "--max-scene-memory", "10000"};
+  startServer(options(budgets));
+  if (address_.empty()) return;
+  ASSERT_NO_FATAL_FAILURE(createScene("kept", SolverKind::massSpring));
+  ASSERT_NO_FATAL_FAILURE(useUpMemory());
+  EXPECT_THAT(server_->errors(), HasSubstr("critical memory ran out, so the server ends with status 71."));
+
+  Arguments json = budgets;
+  json.insert(json.end(), {"--log-format", "json"});
+  startServer(options(json));
+  {
+    const Member member(address_, "kept");
+    ASSERT_TRUE(eventually([&] { return member.tick() > 0; }));
+  }
+  ASSERT_NO_FATAL_FAILURE(useUpMemory());
+  EXPECT_THAT(server_->errors(), HasSubstr("{\"level\":\"critical\",\"message\":\"memory ran out,"));
+  server_.reset();
 }
 
 TEST_F(SavedStateProgram, ADamagedDatabaseStopsTheStart) {

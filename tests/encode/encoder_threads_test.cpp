@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -94,19 +93,6 @@ TEST(EncoderThreads, NumberAQuarterOfTheProcessors) {
   EXPECT_EQ(EncoderThreads::suitedTo(2), 1u);
   EXPECT_EQ(EncoderThreads::suitedTo(16), 4u);
   EXPECT_EQ(EncoderThreads::suitedTo(128), 8u);
-}
-
-TEST(EncoderThreads, FailureOfOnePieceReachesTheCaller) {
-  EncoderThreads threads(3);
-  for (int run = 0; run < 20; ++run) {
-    const auto fails = [](std::uint32_t piece) {
-      if (piece % 2 == 1) throw std::runtime_error("no memory");
-    };
-    EXPECT_THROW(threads.run(8, fails), std::runtime_error);
-  }
-  std::atomic<std::uint32_t> sum = 0;
-  threads.run(8, [&](std::uint32_t piece) { sum += piece; });
-  EXPECT_EQ(sum, 28u) << "the threads go on";
 }
 
 }  // namespace

@@ -2,13 +2,11 @@
 #include "server/endpoint/grpc/acceptor.h"
 
 #include <chrono>
-#include <exception>
 #include <utility>
 #include <vector>
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "server/endpoint/listen/listen.h"
@@ -42,34 +40,20 @@ Acceptor::~Acceptor() {
 }
 
 void Acceptor::start() {
-  thread_ = std::thread([this] { run(); });
-}
-
-// An exception, such as for a lack of memory, ends the acceptance of one connection and not the endpoint. It
-// may also have ended accept() or checkLater().
-void Acceptor::run() {
-  for (;;) try {
-      if (accepting_.expired()) accept();
-      checkLater();
-      io_.run();
-      return;
-    } catch (const std::exception& failure) {
-      spdlog::error("gRPC: a connection was not accepted: {}", failure.what());
-    }
+  accept();
+  checkLater();
+  thread_ = std::thread([this] { io_.run(); });
 }
 
 void Acceptor::accept() {
-  // Boost drops a handler whose operation has thrown, and `waits` with it.
-  auto waits = std::make_shared<int>();
-  accepting_ = waits;
-  acceptor_.async_accept([this, waits](boost::system::error_code error, tcp::socket socket) mutable {
+  acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
     if (!error) {
-      accept();  // first, so that it goes on if accepted() throws
-      return accepted(std::move(socket));
+      accepted(std::move(socket));
+      return accept();
     }
     // For example, no descriptor is free. An immediate retry would only spin.
     pause_.expires_after(kAcceptPause);
-    pause_.async_wait([this, waits = std::move(waits)](boost::system::error_code cancelled) {
+    pause_.async_wait([this](boost::system::error_code cancelled) {
       if (!cancelled) accept();
     });
   });
@@ -103,8 +87,8 @@ void Acceptor::checkLater() {
   check_.expires_after(kCheckInterval);
   check_.async_wait([this](boost::system::error_code cancelled) {
     if (cancelled) return;
-    checkLater();  // first, so that it goes on if forgetEnded() throws
     forgetEnded();
+    checkLater();
   });
 }
 

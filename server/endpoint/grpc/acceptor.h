@@ -44,7 +44,6 @@ class Acceptor {
     Admission::Ticket ticket;
   };
 
-  void run();
   void accept();
   void accepted(boost::asio::ip::tcp::socket socket);
   void checkLater();
@@ -56,7 +55,6 @@ class Acceptor {
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_{io_.get_executor()};
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer pause_{io_}, check_{io_};
-  std::weak_ptr<void> accepting_;  // expired unless accept() or its pause waits
   const boost::asio::ip::tcp::endpoint address_;
   const std::size_t maxConnections_;
   Admission admission_;

@@ -16,7 +16,7 @@ bool AnswerBudget::take(const std::string& key, std::size_t bytes) {
   const std::size_t usedByAddress = entry == ofAddress_.end() ? 0 : entry->second;
   if (!hasRoom(used_, bytes, limits_.bytes) || !hasRoom(usedByAddress, bytes, limits_.bytesOfAddress))
     return false;
-  if (!key.empty()) ofAddress_[key] += bytes;  // first, because it may throw
+  if (!key.empty()) ofAddress_[key] += bytes;
   used_ += bytes;
   return true;
 }

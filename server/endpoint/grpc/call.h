@@ -21,7 +21,7 @@
 #include "server/endpoint/grpc/completion_loop.h"
 #include "server/endpoint/grpc/status.h"
 #include "server/endpoint/listen/admission.h"
-#include "server/schedule/retry.h"
+#include "server/schedule/clock.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::hosting {
@@ -66,7 +66,7 @@ class Call : public std::enable_shared_from_this<Call> {
   // Called when the endpoint closes. Ends the call with this status, unless it has a more specific one. Does
   // nothing before a client has made the call.
   void stop(const grpc::Status& status) {
-    if (isMade_) attempt([&] { close(status); });
+    if (isMade_) close(status);
   }
 
  protected:
@@ -91,8 +91,7 @@ class Call : public std::enable_shared_from_this<Call> {
 
   virtual void close(const grpc::Status& status) = 0;
 
-  // Cancels the call if `work` throws, such as for a lack of memory: it would wait for an operation that has
-  // not begun.
+  // Cancels the call if `work` throws: it would wait for an operation that has not begun.
   template <typename Work>
   void attempt(const Work& work) {
     try {
@@ -137,18 +136,12 @@ class Call : public std::enable_shared_from_this<Call> {
   bool isMade_ = false, isOver_ = false;
 };
 
-// Waits for the next call of this kind. Retries while memory is short, because otherwise the endpoint would
-// accept no further call of this kind.
+// Waits for the next call of this kind.
 template <typename Kind, typename... Arguments>
 void await(GrpcEndpointContext& endpoint, Arguments&&... arguments) {
-  std::shared_ptr<Kind> call;
-  schedule::retryUntilDone(
-      [&] {
-        call = std::make_shared<Kind>(endpoint, arguments...);
-        endpoint.calls.insert(call);
-        call->await();
-      },
-      [&](const std::exception&) { endpoint.calls.erase(call); });
+  const auto call = std::make_shared<Kind>(endpoint, arguments...);
+  endpoint.calls.insert(call);
+  call->await();
 }
 
 }  // namespace clothstream::endpoint

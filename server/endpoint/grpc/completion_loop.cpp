@@ -1,25 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/grpc/completion_loop.h"
 
-#include <exception>
 #include <utility>
 
 #include <grpc/support/time.h>
-#include <spdlog/spdlog.h>
 
 namespace clothstream::endpoint {
-namespace {
-
-// An exception, such as for a lack of memory, ends the operation of one call and not the endpoint.
-void survive(const auto& work) {
-  try {
-    work();
-  } catch (const std::exception& failure) {
-    spdlog::error("gRPC: {}", failure.what());
-  }
-}
-
-}  // namespace
 
 CompletionLoop::CompletionLoop(std::unique_ptr<grpc::ServerCompletionQueue> queue)
     : queue_(std::move(queue)) {}
@@ -28,7 +14,7 @@ void CompletionLoop::start() {
   thread_ = std::thread([this] {
     void* tag = nullptr;
     bool ok = false;
-    while (queue_->Next(&tag, &ok)) survive([&] { static_cast<Operation*>(tag)->done(ok); });
+    while (queue_->Next(&tag, &ok)) static_cast<Operation*>(tag)->done(ok);
   });
 }
 
@@ -58,7 +44,7 @@ void CompletionLoop::runTasks() {
     waking_ = false;
     std::swap(tasks, tasks_);
   }
-  for (const auto& task : tasks) survive(task);
+  for (const auto& task : tasks) task();
 }
 
 }  // namespace clothstream::endpoint

@@ -50,15 +50,10 @@ void JoinStream::onBegun(bool ok) {
   std::weak_ptr<JoinStream> weak = std::static_pointer_cast<JoinStream>(shared_from_this());
   auto wake = [&loop = *endpoint_.loop, weak, posted = std::make_shared<std::atomic<bool>>(false)] {
     if (posted->exchange(true)) return;
-    try {
-      loop.post([weak, posted] {
-        posted->store(false);
-        if (const auto self = weak.lock()) self->attempt([&] { self->pump(); });
-      });
-    } catch (...) {
+    loop.post([weak, posted] {
       posted->store(false);
-      throw;
-    }
+      if (const auto self = weak.lock()) self->attempt([&] { self->pump(); });
+    });
   };
   session_ = session::Session::open(endpoint_.server,
                                     {.peer = "grpc " + context_.peer(),

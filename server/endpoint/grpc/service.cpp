@@ -1,35 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/grpc/service.h"
 
-#include <exception>
 #include <utility>
 
 #include <boost/asio/post.hpp>
-#include <fmt/format.h>
 
 #include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/join_stream.h"
 #include "server/endpoint/grpc/unary_call.h"
-#include "server/hosting/give_answer.h"
 #include "server/hosting/server_state.h"
 
 namespace clothstream::endpoint {
 namespace {
 
 using hosting::Identity;
-
-tl::expected<v1::GetSceneResponse, v1::Error> sceneOf(const hosting::SceneServer& server,
-                                                      const v1::GetSceneRequest& request,
-                                                      const Identity& by) {
-  try {
-    return server.getScene(request, by);
-  } catch (const std::exception& failure) {
-    v1::Error error;
-    error.set_code(v1::ERROR_CODE_RESOURCE_EXHAUSTED);
-    error.set_text(fmt::format("getScene: failed on the server: {}", failure.what()));
-    return tl::unexpected(std::move(error));
-  }
-}
 
 template <typename Response>
 tl::expected<Response, v1::Error> toAnswer(messages::Result<Response> result) {
@@ -80,7 +64,7 @@ void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::
         boost::asio::post(slowCalls,
                           [&server, request, by, wanted = std::move(wanted), answer = std::move(answer)] {
                             if (!wanted()) return;  // the client has cancelled the call
-                            hosting::giveAnswer("getScene", answer, sceneOf(server, request, by));
+                            answer(server.getScene(request, by));
                           });
       },
       CallRate::kSceneCost);

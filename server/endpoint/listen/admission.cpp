@@ -59,7 +59,7 @@ tl::expected<Admission::Ticket, telemetry::Refusal> Admission::admit(const ip::a
   if (!key.empty() && !counts.rateOfAddress.take(key, now))
     return tl::unexpected(Refusal::connectionRateOfAddress);
   if (!counts.rate.take(now)) return tl::unexpected(Refusal::connectionRate);
-  if (!key.empty()) ++counts.ofAddress[key];  // first, because it may throw
+  if (!key.empty()) ++counts.ofAddress[key];
   ++counts.connections;
   return Ticket(counts_, std::move(key));
 }

@@ -22,7 +22,6 @@
 #include "server/endpoint/web/http_connection.h"
 #include "server/endpoint/web/web_socket_stream.h"
 #include "server/hosting/server_state.h"
-#include "server/schedule/retry.h"
 #include "server/tls/qr_code.h"
 
 namespace clothstream::endpoint {
@@ -74,7 +73,6 @@ struct WebEndpoint::State {
   net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};  // until io.stop()
   tcp::acceptor acceptor;
   net::steady_timer timer{io};
-  std::weak_ptr<void> accepting;  // expired unless accept() or its timer waits
   std::uint16_t port;
   std::thread thread;
 
@@ -96,20 +94,16 @@ struct WebEndpoint::State {
   }
 
   ~State() {
-    schedule::retryUntilDone(
-        [this] { net::post(io, [this] { stop(); }); },
-        [](const std::exception& failure) { spdlog::error("page: {}", failure.what()); });
+    net::post(io, [this] { stop(); });
     thread.join();
     // No wake may reach `io` during its destruction.
     for (const auto& session : context.streams) session->leave();
     context.streams.clear();
   }
 
-  // An exception, such as for a lack of memory, ends the handler of one socket and not the endpoint. It may
-  // also have ended accept().
+  // An exception ends the handler of one socket and not the endpoint.
   void run() {
     for (;;) try {
-        if (accepting.expired() && !context.stopping) accept();
         io.run();
         return;
       } catch (const std::exception& failure) {
@@ -119,14 +113,11 @@ struct WebEndpoint::State {
   }
 
   void accept() {
-    // Boost drops a handler whose operation has thrown, and `waits` with it.
-    auto waits = std::make_shared<int>();
-    accepting = waits;
-    acceptor.async_accept([this, waits](boost::system::error_code error, tcp::socket socket) mutable {
+    acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
       if (context.stopping) return;
       if (error) {  // such as no free descriptor; an immediate retry would only spin
         timer.expires_after(kAcceptPause);
-        timer.async_wait([this, waits = std::move(waits)](boost::system::error_code cancelled) {
+        timer.async_wait([this](boost::system::error_code cancelled) {
           if (!cancelled) accept();
         });
         return;

@@ -111,15 +111,10 @@ void WebSocketStream::onAccepted(beast::error_code error) {
   auto wake = [&io = endpoint_.io, weak = weak_from_this(),
                posted = std::make_shared<std::atomic<bool>>(false)] {
     if (posted->exchange(true)) return;
-    try {
-      boost::asio::post(io, [weak, posted] {
-        posted->store(false);
-        if (const auto self = weak.lock()) self->attempt([&] { self->pump(); });
-      });
-    } catch (...) {
+    boost::asio::post(io, [weak, posted] {
       posted->store(false);
-      throw;
-    }
+      if (const auto self = weak.lock()) self->attempt([&] { self->pump(); });
+    });
   };
   session_ =
       session::Session::open(endpoint_.server, arrivalOf(beast::get_lowest_layer(socket_)), std::move(wake));

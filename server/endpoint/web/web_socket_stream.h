@@ -34,8 +34,7 @@ class WebSocketStream : public std::enable_shared_from_this<WebSocketStream> {
   void leave() { session_.reset(); }
 
  private:
-  // Ends the stream if `step` throws, such as for a lack of memory: it would wait for an operation that has
-  // not begun.
+  // Ends the stream if `step` throws: it would wait for an operation that has not begun.
   template <class Step>
   void attempt(const Step& step);
   // Handler of an operation, which attempts `next` and keeps the stream alive until then.

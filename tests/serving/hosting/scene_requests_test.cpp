@@ -8,7 +8,6 @@
 #include <future>
 #include <memory>
 #include <mutex>
-#include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -18,7 +17,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/hosting/give_answer.h"
 #include "server/hosting/scene_maker.h"
 #include "server/scene/journal.h"
 #include "server/scene/scene_store.h"
@@ -217,19 +215,6 @@ TEST_F(ScenesTest, CancelsASceneThatTheDeviceDoesNotLoad) {
   peer.readFrames(3);
   EXPECT_EQ(server().listScenes().scenes_size(), 2);
   EXPECT_TRUE(createNamed(peer, "small", "stuck").has_create_scene()) << "the name is free again";
-}
-
-TEST(GiveAnswer, GivesAnErrorIfTheAnswerThrows) {
-  using Answer = tl::expected<v1::DeleteSceneResponse, v1::Error>;
-  int calls = 0;
-  std::string text;
-  const auto done = [&](const Answer& answer) {
-    if (++calls <= 2) throw std::bad_alloc();
-    text = answer ? "" : answer.error().text();
-  };
-  giveAnswer("deleteScene", done, Answer(v1::DeleteSceneResponse()));
-  EXPECT_EQ(calls, 3);
-  EXPECT_EQ(text, "deleteScene: the server could not give the answer; check whether it took effect");
 }
 
 }  // namespace
