@@ -57,9 +57,10 @@ int main(int argc, char** argv) {
     if (const int* code = std::get_if<int>(&parsed)) return *code;
     const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const program::Signals signals;
-    const auto format = options.logFormat == "json" ? telemetry::LogFormat::json : telemetry::LogFormat::text;
-    telemetry::setUpLog(options.logLevel, format, options.logRate);
-    if (servesClients(options.command)) program::endWhenOutOfMemory(format);
+    telemetry::setUpLog(options.logLevel,
+                        options.logFormat == "json" ? telemetry::LogFormat::json : telemetry::LogFormat::text,
+                        options.logRate);
+    if (servesClients(options.command)) program::endWhenOutOfMemory(options);
     for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
     return run(options, signals);
   } catch (const std::exception& error) {

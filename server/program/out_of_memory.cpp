@@ -40,8 +40,8 @@ void endWithJson() {
 
 }  // namespace
 
-void endWhenOutOfMemory(telemetry::LogFormat format) {
-  std::set_new_handler(format == telemetry::LogFormat::json ? endWithJson : endWithText);
+void endWhenOutOfMemory(const ProgramOptions& options) {
+  std::set_new_handler(options.logFormat == "json" ? endWithJson : endWithText);
 }
 
 }  // namespace clothstream::program

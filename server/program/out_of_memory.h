@@ -2,7 +2,7 @@
 // The end of a server whose memory runs out.
 #pragma once
 
-#include "server/telemetry/log.h"
+#include "server/options/program_options.h"
 
 namespace clothstream::program {
 
@@ -10,7 +10,7 @@ namespace clothstream::program {
 inline constexpr int kOutOfMemoryStatus = 71;
 
 // From now on, an allocation of C++ that fails, on any thread, writes one line to standard error and ends the
-// process at once with kOutOfMemoryStatus. The line has the form of the log, without a time.
-void endWhenOutOfMemory(telemetry::LogFormat format);
+// process at once with kOutOfMemoryStatus. The line has the form of the log (--log-format), without a time.
+void endWhenOutOfMemory(const ProgramOptions& options);
 
 }  // namespace clothstream::program
