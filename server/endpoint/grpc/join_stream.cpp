@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "server/endpoint/grpc/join_stream.h"
 
-#include <atomic>
 #include <chrono>
+#include <functional>
+#include <memory>
 #include <span>
 #include <utility>
 
 #include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/status.h"
+#include "server/session/wake.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -45,16 +47,10 @@ void JoinStream::onBegun(bool ok) {
   auto ticket = admit(endpoint_.streams);
   if (!ticket) return finish(ticket.error());
   ticket_.emplace(std::move(*ticket));
-  // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
-  // would deadlock: the release of the session waits for that wake to return.
-  std::weak_ptr<JoinStream> weak = std::static_pointer_cast<JoinStream>(shared_from_this());
-  auto wake = [&loop = *endpoint_.loop, weak, posted = std::make_shared<std::atomic<bool>>(false)] {
-    if (posted->exchange(true)) return;
-    loop.post([weak, posted] {
-      posted->store(false);
-      if (const auto self = weak.lock()) self->attempt([&] { self->pump(); });
-    });
-  };
+  auto wake = session::wakeOf(
+      std::weak_ptr(std::static_pointer_cast<JoinStream>(shared_from_this())),
+      [&loop = *endpoint_.loop](std::function<void()> task) { loop.post(std::move(task)); },
+      [](JoinStream& self) { self.attempt([&] { self.pump(); }); });
   session_ = session::Session::open(endpoint_.server,
                                     {.peer = "grpc " + context_.peer(),
                                      .address = addressKeyOf(context_.peer()),

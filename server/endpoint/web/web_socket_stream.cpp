@@ -17,6 +17,7 @@
 #include "server/endpoint/web/frame_meter.h"
 #include "server/hosting/server_state.h"
 #include "server/session/closing.h"
+#include "server/session/wake.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -106,16 +107,9 @@ void WebSocketStream::accept(http::request<http::empty_body>&& request) {
 void WebSocketStream::onAccepted(beast::error_code error) {
   if (error || endpoint_.stopping) return;
   endpoint_.streams.insert(shared_from_this());
-  // A wake may come from any thread, so it must not own the stream. Dropping the last owner inside a wake
-  // would deadlock: the release of session::Session waits for that wake to return.
-  auto wake = [&io = endpoint_.io, weak = weak_from_this(),
-               posted = std::make_shared<std::atomic<bool>>(false)] {
-    if (posted->exchange(true)) return;
-    boost::asio::post(io, [weak, posted] {
-      posted->store(false);
-      if (const auto self = weak.lock()) self->attempt([&] { self->pump(); });
-    });
-  };
+  auto wake = session::wakeOf(
+      weak_from_this(), [&io = endpoint_.io](auto task) { boost::asio::post(io, std::move(task)); },
+      [](WebSocketStream& self) { self.attempt([&] { self.pump(); }); });
   session_ =
       session::Session::open(endpoint_.server, arrivalOf(beast::get_lowest_layer(socket_)), std::move(wake));
   socket_.next_layer().limitFrames([&io = endpoint_.io, weak = weak_from_this()] {
