@@ -28,8 +28,8 @@ layout(push_constant) uniform Push {
   SolidPush push;
 };
 
-void collideWithSolid(uint number, CollidingNode node, vec3 from, inout Press last, inout vec3 position,
-                      inout vec3 velocity) {
+// Velocity and mass stay in their buffers during the search, which needs nearly all registers.
+void collideWithSolid(uint number, CollidingNode node, vec3 from, inout Press last, inout vec3 position) {
   Collider collider = fetchCollider(number, push.collision, node.thickness, node.friction);
   if (!mayTouch(collider, from, position)) {
     return;
@@ -44,8 +44,11 @@ void collideWithSolid(uint number, CollidingNode node, vec3 from, inout Press la
   if (touch.contact.depth > 0.0) {
     touch.contact.normal = rotate(frame.after, touch.contact.normal);
     precise vec3 surface = collider.velocity + push.collision.tickRate * rotate(frame.after, touch.motion);
+    node.inverseMass = positions[node.index].w;
+    vec3 velocity = velocities[node.index].xyz;
     leave(number, collider, touch.contact, surface, frame.spin, push.collision, node, from, last, position,
           velocity);
+    velocities[node.index].xyz = velocity;
   }
 }
 
@@ -63,12 +66,13 @@ void main() {
   }
   vec3 from = texelFetch(startPositions, int(index)).xyz;
   vec3 position = here.xyz;
-  vec3 velocity = velocities[index].xyz;
-  CollidingNode node = CollidingNode(index, uint(tile.cloth), here.w, cloth.thickness, cloth.friction);
+  CollidingNode node = CollidingNode(index, uint(tile.cloth), 0.0, cloth.thickness, cloth.friction);
   Press last = kNoPress;
   for (uint solid = 0u; solid < push.solidCount; ++solid) {
-    collideWithSolid(push.collision.colliderCount + solid, node, from, last, position, velocity);
+    collideWithSolid(push.collision.colliderCount + solid, node, from, last, position);
   }
+  node.inverseMass = positions[index].w;
+  vec3 velocity = velocities[index].xyz;
   finishContacts(last, push.collision, node, from, position, velocity);
   positions[index].xyz = snapTiny(position);
   velocities[index].xyz = snapTiny(velocity);

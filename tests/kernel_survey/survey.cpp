@@ -75,6 +75,7 @@ class CompiledScene {
       inputs.namesConstraints = true;
       inputs.colliders.emplace_back();
       inputs.grabs.push_back({.state = simulation::Grab::State::takes});
+      inputs.carries.push_back({});
     }
     std::vector<model::Cloth> heavier = scene.cloths;
     for (model::Cloth& cloth : heavier) cloth.mass *= 2;
