@@ -16,11 +16,11 @@
 
 namespace clothstream::simulation {
 
-// What names the springs of the systems with ACAD.
+// These tables name the springs of the systems with ACAD.
 struct ActiveTables {
   std::vector<SolveGroup> groups;
   std::vector<shared::SystemRecord> systems;  // of these groups
-  // Of their meshes: the ends of each spring, numbered from the cloth's first node. Springs of a group follow
+  // The ends of each spring of their meshes, numbered from the cloth's first node. Springs of a group follow
   // each other.
   std::vector<std::array<std::uint32_t, 2>> ends;
   std::uint32_t nodes = 0;  // of the scene

@@ -55,7 +55,7 @@ class StretchedSystems {
               double substepSeconds) const;
   void recordTables(vulkan::Recorder& recorder) const;
 
-  // What solves leave: shaders/solve/stretched_tables.glsl, and the springs of solve_stretched.comp.
+  // Solves leave the lists of shaders/solve/stretched_tables.glsl, and the springs of solve_stretched.comp.
   const vulkan::Buffer& lists() const { return lists_; }
   const vulkan::Buffer& springs() const { return springs_; }
 

@@ -39,7 +39,7 @@ class Kernel {
   std::string_view name() const;
   std::uint32_t workgroupSize() const;
   std::span<const std::uint32_t> specialisation() const;
-  // What its SPIR-V declares.
+  // The interface that its SPIR-V declares.
   const SpirvInterface& interface() const;
 
   // Only for this folder (handles.h).
