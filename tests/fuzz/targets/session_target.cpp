@@ -193,6 +193,7 @@ void run(const SessionInput& input) {
     waitForMaker();
     for (Peer& each : peers) each.read();
   }
+  waitForMaker();  // the answer to one request may have started the next one
   state.erase(*live);
 }
 
