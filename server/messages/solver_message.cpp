@@ -54,17 +54,14 @@ void writeConstraint(const model::Solver& solver, v1::ConstraintSolver& message)
 void readMode(Checks& checks, const Path& path, v1::AcadMode mode, model::Solver& solver) {
   switch (mode) {
     case v1::ACAD_MODE_UNSPECIFIED:
-    case v1::ACAD_MODE_HOLD:
+    case v1::ACAD_MODE_LIMIT:
       break;
     case v1::ACAD_MODE_PAPER:
       solver.acadMode = model::AcadMode::paper;
       break;
-    case v1::ACAD_MODE_LIMIT:
-      solver.acadMode = model::AcadMode::limit;
-      break;
     default:
       checks.fail(path, fmt::format("{}", static_cast<int>(mode)),
-                  "must be ACAD_MODE_HOLD, ACAD_MODE_PAPER or ACAD_MODE_LIMIT");
+                  "must be ACAD_MODE_LIMIT or ACAD_MODE_PAPER");
   }
 }
 
@@ -111,9 +108,8 @@ v1::Solver toMessage(const model::Solver& solver) {
       break;
     case model::SolverKind::acad:
       message.mutable_acad()->set_activation(solver.activation);
-      if (solver.acadMode != model::AcadMode::hold)
-        message.mutable_acad()->set_mode(solver.acadMode == model::AcadMode::paper ? v1::ACAD_MODE_PAPER
-                                                                                   : v1::ACAD_MODE_LIMIT);
+      message.mutable_acad()->set_mode(solver.acadMode == model::AcadMode::paper ? v1::ACAD_MODE_PAPER
+                                                                                 : v1::ACAD_MODE_LIMIT);
       writeConstraint(solver, *message.mutable_acad()->mutable_constraint());
       break;
     case model::SolverKind::xpbd:

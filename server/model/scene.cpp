@@ -37,7 +37,7 @@ std::uint32_t Scene::nodeCount() const {
 }
 
 float correctionFraction(const Solver& solver) {
-  return solver.correctionFraction.value_or(isAcad(solver, AcadMode::hold) ? kCorrectionFraction : 1.0f);
+  return solver.correctionFraction.value_or(1.0f);
 }
 
 bool isAcad(const Solver& solver, AcadMode mode) {

@@ -61,16 +61,12 @@ enum class SolverKind : std::uint8_t {
 
 // How acad chooses and holds constraints.
 enum class AcadMode : std::uint8_t {
-  // A spring that forces alone would stretch beyond the activation is held at that length. Its force stays.
-  hold,
-  // [Va21] 3.3 and Fig. 5 to the letter. A spring that is longer than the activation at the start of a
-  // substep
-  // has no force in it, and is a constraint to its rest length instead.
-  paper,
   // Springs pull and never push to keep the activation's length, in rounds that follow the motion. Springs
-  // are
-  // no stiffer than the substep bears.
+  // are no stiffer than the substep bears.
   limit,
+  // [Va21] 3.3 and Fig. 5 to the letter. A spring that is longer than the activation at the start of a
+  // substep has no force in it, and is a constraint to its rest length instead.
+  paper,
 };
 
 // Storage of a constraint system during a solve. Both paths give the same motion except for rounding.
@@ -93,14 +89,12 @@ struct Solver {
   // For acad: maximum stretch that a substep may give a spring, as a fraction of its length.
   float activation = parameters::kActivation.initial;
   // Fraction of an existing length error that a substep corrects (Baumgarte stabilisation). The error is
-  // stretch; for `constraint` also compression. The correction gives the nodes speed. Absent means 1 for
-  // `constraint` and AcadMode::paper, and kCorrectionFraction for AcadMode::hold. Not for AcadMode::limit.
+  // stretch; for `constraint` also compression. The correction gives the nodes speed. Absent means 1. Only
+  // for `constraint` and AcadMode::paper.
   std::optional<float> correctionFraction = {};
   ConstraintPath path = ConstraintPath::matrixFree;  // for `constraint`
-  AcadMode acadMode = AcadMode::hold;                // for acad
+  AcadMode acadMode = AcadMode::limit;               // for acad
 };
-
-inline constexpr float kCorrectionFraction = 0.15f;
 
 // For AcadMode::limit: rounds per substep, which share the iterations, and the default compliance as a
 // fraction of h^2 / m. A tenth of this compliance holds no better, and the cloth does not come to rest.

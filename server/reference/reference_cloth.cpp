@@ -262,17 +262,13 @@ void ReferenceCloth::enforceConstraints(double h) {
   std::vector<Constraint> constraints;
   for (const model::SpringLink& link : links_) {
     if (!model::isConstraint(solver, link.kind)) continue;
-    const double rest = link.restLength, longest = rest * (1 + double{solver.activation});
+    const double rest = link.restLength;
     const Vec3 d = start_[link.b] - start_[link.a];
     if (solver.kind == model::SolverKind::constraint) {
       constraints.push_back({link.a, link.b, correctionFraction * (d.norm() - rest)});
-    } else if (solver.acadMode == model::AcadMode::paper) {
-      if (isReplaced(link, d.norm()))
-        constraints.push_back(
-            {link.a, link.b, correctionFraction * (d.squaredNorm() - rest * rest) / (2 * d.norm())});
-    } else if ((d + h * (velocities_[link.b] - velocities_[link.a])).norm() > longest) {
-      const double excess = d.norm() - longest;
-      constraints.push_back({link.a, link.b, excess > 0 ? correctionFraction * excess : excess});
+    } else if (isReplaced(link, d.norm())) {
+      constraints.push_back(
+          {link.a, link.b, correctionFraction * (d.squaredNorm() - rest * rest) / (2 * d.norm())});
     }
   }
   const ConstraintSystem system(constraints, start_, velocities_, inverseMasses_,

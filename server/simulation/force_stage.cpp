@@ -26,7 +26,7 @@ AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airD
           airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown),
           colliders && follow == Follow::nothing,
           springs,
-          follow == Follow::hold || follow == Follow::paper || follow == Follow::limit,
+          follow == Follow::limit || follow == Follow::paper,
           follow == Follow::paper};
 }
 

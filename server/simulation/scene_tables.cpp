@@ -53,8 +53,7 @@ Follow followOf(const model::Solver& solver) {
 }
 
 Follow followOf(model::AcadMode mode) {
-  if (mode == model::AcadMode::paper) return Follow::paper;
-  return mode == model::AcadMode::limit ? Follow::limit : Follow::hold;
+  return mode == model::AcadMode::paper ? Follow::paper : Follow::limit;
 }
 
 std::vector<std::uint32_t> clothOffsets(std::span<const model::Cloth> cloths) {

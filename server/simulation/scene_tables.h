@@ -26,13 +26,12 @@ struct TileRange {
 enum class Follow : std::uint8_t {
   nothing,  // no stage: the advance kernel also collides
   solve,    // SolveStage
-  hold,     // SolveStage with acad, by its mode
+  limit,    // SolveStage with acad, by its mode
   paper,
-  limit,
   corrections,  // XpbdStage: springs are no forces
 };
-inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::hold,
-                                     Follow::paper,   Follow::limit, Follow::corrections};
+inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::limit, Follow::paper,
+                                     Follow::corrections};
 Follow followOf(const model::Solver& solver);
 // The Follow of acad with this mode.
 Follow followOf(model::AcadMode mode);

@@ -126,7 +126,7 @@ struct SolveStage::Kernels {
     return Kernel(
         device, code, iterates ? cut.iterationWorkgroup : cut.workgroup,
         {isImplicit(group) ? 1u : 0u, group.mesh ? 1u : 0u, group.bend ? 1u : 0u, isAdaptive(group) ? 1u : 0u,
-         measure ? 1u : 0u, cut.spread ? 1u : 0u, isPaper(group) ? 1u : 0u, isLimit(group) ? 1u : 0u});
+         measure ? 1u : 0u, cut.spread ? 1u : 0u, isPaper(group) ? 1u : 0u});
   }
 
   const GroupKernels& of(const SolveGroup& group) {
@@ -157,7 +157,7 @@ struct SolveStage::Kernels {
 
   const vulkan::Device& device;
   SolveCut cut;
-  std::array<GroupKernels, 20> groups;
+  std::array<GroupKernels, 16> groups;
   std::array<std::optional<Kernel>, 2> applies;
   StretchedKernels stretched;
 };

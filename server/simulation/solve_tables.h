@@ -15,7 +15,7 @@ namespace clothstream::simulation {
 // come first, then the large ones.
 struct SolveGroup {
   model::SolverKind kind = model::SolverKind::constraint;
-  model::AcadMode acadMode = model::AcadMode::hold;  // for acad
+  model::AcadMode acadMode = model::AcadMode::limit;  // for acad
   bool mesh = false;
   bool bend = false;  // a grid has bend springs in its system
   std::uint32_t firstSystem = 0, smallSystems = 0, endSystem = 0;

@@ -48,8 +48,7 @@ Kernel StretchedKernels::of(const SolveGroup& group, bool continues) {
     kernel.emplace(
         device_, kernels::solve_stretched, workgroup,
         std::initializer_list<std::uint32_t>{0u, 0u, group.bend ? 1u : 0u, 1u, continues ? 1u : 0u, 0u,
-                                             group.acadMode == model::AcadMode::paper ? 1u : 0u,
-                                             group.acadMode == model::AcadMode::limit ? 1u : 0u});
+                                             group.acadMode == model::AcadMode::paper ? 1u : 0u});
   return *kernel;
 }
 

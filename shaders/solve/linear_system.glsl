@@ -28,7 +28,7 @@ layout(constant_id = 4) const bool kAdaptive = false;
 // The paper's ACAD: such a spring is a constraint to its rest length and has no force.
 layout(constant_id = 7) const bool kPaper = false;
 // ACAD's one-sided limit: rounds of a solve, each from where the last one led.
-layout(constant_id = 8) const bool kLimit = false;
+const bool kLimit = kAdaptive && !kPaper;
 
 layout(binding = 0) uniform samplerBuffer cloths;   // ClothRecord
 layout(binding = 1) uniform samplerBuffer systems;  // SystemRecord

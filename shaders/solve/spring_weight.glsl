@@ -10,8 +10,8 @@
 // Constraints: [Va21] Eq. 3-11 have (J M^-1 J^T + c) lambda = b, and the nodes move by -M^-1 J^T lambda.
 // Substituting lambda = (b + J move) / c gives (c M + J^T J) move = -J^T b. This system has only as many
 // unknowns as the nodes have coordinates, needs one gather per product, has the same eigenvalues, and has a
-// solution if c is 0. b = C + h J v_free, with C the length minus r. With ACAD a spring takes part only if
-// v_free would stretch it too far ([Va21] 3.3). The kernels solve for the velocity move / h.
+// solution if c is 0. b = C + h J v_free, with C the length minus r. The kernels solve for the velocity
+// move / h.
 //
 // ACAD as the paper has it: a spring takes part if it is too long at the substep's start. v_free is without
 // its force, and C is (l^2 - r^2) / (2 l), the paper's Eq. 3 divided by the length of its Jacobian's row.
@@ -99,9 +99,8 @@ Weight weightOf(End here, End other, SpringKind kind, ClothRecord cloth, bool ex
     precise vec3 limitImpulse = (limitSide * inverseLength) * d;
     return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? limitImpulse : vec3(0.0));
   }
-  precise float excess = squared * inverseLength - longest;
-  precise float corrected = excess > 0.0 || !kAdaptive ? cloth.correctionFraction * excess : excess;
-  precise float side = push.substepRate * corrected + inverseLength * dotProduct(d, relative);
+  precise float excess = cloth.correctionFraction * (squared * inverseLength - kind.restLength);
+  precise float side = push.substepRate * excess + inverseLength * dotProduct(d, relative);
   precise vec3 impulse = (side * inverseLength) * d;
   return Weight(isActive ? inverseSquared : 0.0, 0.0, isActive ? impulse : vec3(0.0));
 }

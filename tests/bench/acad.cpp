@@ -37,7 +37,7 @@ struct Case {
   std::string method;
   model::SolverKind kind;
   double active = 0;  // part of the springs that are constraints
-  model::AcadMode mode = model::AcadMode::hold;
+  model::AcadMode mode = model::AcadMode::limit;
   bool coarse = false;  // with a coarse correction
 };
 
@@ -117,13 +117,8 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
        {Case{"mass_spring", massSpring}, Case{"acad", acad, 0}, Case{"acad", acad, 0.01},
         Case{"acad", acad, 0.05}, Case{"acad", acad, 0.2},
         Case{"acad_paper", acad, 0, model::AcadMode::paper},
-        Case{"acad_limit", acad, 0, model::AcadMode::limit},
-        Case{"acad_limit", acad, 0.01, model::AcadMode::limit},
-        Case{"acad_limit", acad, 0.05, model::AcadMode::limit},
-        Case{"acad_limit", acad, 0.2, model::AcadMode::limit},
-        Case{"mass_spring", massSpring, 0, model::AcadMode::hold, true},
-        Case{"acad", acad, 0.05, model::AcadMode::hold, true},
-        Case{"acad_limit", acad, 0.05, model::AcadMode::limit, true}, Case{"constraint", constraint}}) {
+        Case{"mass_spring", massSpring, 0, model::AcadMode::limit, true},
+        Case{"acad", acad, 0.05, model::AcadMode::limit, true}, Case{"constraint", constraint}}) {
     Candidate candidate{experiment, sceneOf(experiment, size), nullptr};
     check(device, experiment, std::min(size, kLargestCompared), options);
     candidate.simulated = std::make_unique<Simulated>(device, candidate.scene, options);

@@ -53,8 +53,6 @@ std::vector<Case> cases() {
   acad.iterations = 100;
   model::Solver paperAcad = acad;
   paperAcad.acadMode = model::AcadMode::paper;
-  model::Solver limitAcad = acad;
-  limitAcad.acadMode = model::AcadMode::limit;
   return {{7, "mass_spring", 96, 96, "above 200"},
           {7, "mass_spring", 256, 256, "above 200"},
           {7, "mass_spring on the CPU", 96, 96, 44.83, {}, true},
@@ -70,8 +68,7 @@ std::vector<Case> cases() {
           {10, "constraint", 32, 32, "barely 30", constraints(true, 0.0f)},
           {10, "constraint", 32, 32, "barely 30", constraints(true, {})},
           {10, "acad", 32, 32, 206.44, acad},
-          {10, "acad_paper", 32, 32, 206.44, paperAcad},
-          {10, "acad_limit", 32, 32, 206.44, limitAcad}};
+          {10, "acad_paper", 32, 32, 206.44, paperAcad}};
 }
 
 model::Scene sceneOf(const Case& experiment) {

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "server/model/springs.h"
+#include "server/model/strain_limit.h"
 #include "server/reference/implicit_system.h"
 #include "tests/bench/simulated.h"
 
@@ -87,7 +88,7 @@ std::vector<Row> rowsOf(const model::Cloth& cloth, const reference::ReferenceClo
       if (d.norm() <= rest * (1 + double{solver.activation})) continue;
       excess = (d.squaredNorm() - rest * rest) / (2 * d.norm());
     } else if (solver.kind == SolverKind::acad) {
-      const double longest = double{link.restLength} * (1 + double{solver.activation});
+      const double longest = double{link.restLength} * (1 + double{model::heldStrain(solver)});
       if ((d + change).norm() <= longest) continue;
       excess = d.norm() - longest;
     }

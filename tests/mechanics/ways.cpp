@@ -7,13 +7,6 @@
 namespace clothstream::mechanics {
 namespace {
 
-model::Solver acad(model::AcadMode mode) {
-  model::Solver solver;
-  solver.kind = model::SolverKind::acad;
-  solver.acadMode = mode;
-  return solver;
-}
-
 model::Solver plain(model::SolverKind kind) {
   model::Solver solver;
   solver.kind = kind;
@@ -30,8 +23,7 @@ std::vector<Way> ways() {
   model::Solver sweeps = plain(model::SolverKind::xpbd);
   sweeps.iterations = 4;
   return {{"`massSpring`", plain(model::SolverKind::massSpring)},
-          {"`acad`", acad(model::AcadMode::hold), true, false},
-          {"`acad`, `ACAD_MODE_LIMIT`", acad(model::AcadMode::limit), false},
+          {"`acad`", plain(model::SolverKind::acad), false},
           {"`constraint`", plain(model::SolverKind::constraint), true, false},
           {"`implicitEuler`", plain(model::SolverKind::implicitEuler), false, false},
           {"`xpbd`", plain(model::SolverKind::xpbd)},

@@ -301,7 +301,6 @@ class LimitAcad : public GpuTest {};
 model::Solver limitSolver() {
   model::Solver solver;
   solver.kind = model::SolverKind::acad;
-  solver.acadMode = model::AcadMode::limit;
   return solver;
 }
 
@@ -368,25 +367,20 @@ TEST_F(LimitAcad, NamesAsManyConstraintsAsItCounts) {
   model::Cloth sheet = softCloth(30, 41, false);
   model::Scene scene = sceneOf({sheet, disc});
   scene.substeps = 4;
-  for (const model::AcadMode mode : {model::AcadMode::hold, model::AcadMode::limit}) {
-    for (model::Cloth& cloth : scene.cloths) {
-      cloth.solver = limitSolver();
-      cloth.solver.acadMode = mode;
+  for (model::Cloth& cloth : scene.cloths) cloth.solver = limitSolver();
+  std::vector<std::vector<std::uint32_t>> first;
+  for (const std::uint32_t wholeNodes : {4096u, 0u}) {
+    SCOPED_TRACE(wholeNodes);
+    Running running(scene, {.solveWholeNodes = wholeNodes});
+    for (int tick = 0; tick < 5; ++tick) running.tick(passingBall(scene, tick));
+    const std::vector<std::vector<std::uint32_t>> ends = running.tickAndName(passingBall(scene, 5));
+    const std::vector<shared::SolveRecord> solves = running.solves();
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      EXPECT_GT(ends[i].size(), 20u);
+      EXPECT_EQ(sortedEnds(ends[i]).size(), solves[i].constraints);
     }
-    std::vector<std::vector<std::uint32_t>> first;
-    for (const std::uint32_t wholeNodes : {4096u, 0u}) {
-      SCOPED_TRACE(wholeNodes);
-      Running running(scene, {.solveWholeNodes = wholeNodes});
-      for (int tick = 0; tick < 5; ++tick) running.tick(passingBall(scene, tick));
-      const std::vector<std::vector<std::uint32_t>> ends = running.tickAndName(passingBall(scene, 5));
-      const std::vector<shared::SolveRecord> solves = running.solves();
-      for (std::size_t i = 0; i < ends.size(); ++i) {
-        EXPECT_GT(ends[i].size(), 20u);
-        EXPECT_EQ(sortedEnds(ends[i]).size(), solves[i].constraints);
-      }
-      if (first.empty()) first = ends;
-      EXPECT_EQ(ends, first);
-    }
+    if (first.empty()) first = ends;
+    EXPECT_EQ(ends, first);
   }
 }
 
@@ -409,21 +403,18 @@ TEST_F(LimitAcad, GivesTheSameBitsForEveryPartitionOfWork) {
 // A sheet at rest that is thrown apart by a single fast node is solved from that substep on: the forces see
 // the stretch before it happens.
 TEST_F(LimitAcad, SolvesInTheSubstepInWhichASpringFirstBecomesTooLong) {
-  for (const model::AcadMode mode : {model::AcadMode::hold, model::AcadMode::limit}) {
-    model::Cloth cloth = calmCloth(12, 17);
-    cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
-    cloth.solver = limitSolver();
-    cloth.solver.acadMode = mode;
-    model::Scene scene = sceneOf({cloth});
-    scene.substeps = 1;
-    NodeState start = simulation::restState(scene.cloths);
-    // 0.02 m apart, 1 / 72 s: 0.3 m/s stretch a spring by a fifth.
-    start.velocities[5 * 17 + 8] = model::Vec3(0.3f, 0, 0);
-    Running running(scene);
-    running.restore(start);
-    running.tick(inputsOf(scene));
-    EXPECT_GT(running.solves().front().constraints, 0u);
-  }
+  model::Cloth cloth = calmCloth(12, 17);
+  cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;
+  cloth.solver = limitSolver();
+  model::Scene scene = sceneOf({cloth});
+  scene.substeps = 1;
+  NodeState start = simulation::restState(scene.cloths);
+  // 0.02 m apart, 1 / 72 s: 0.3 m/s stretch a spring by a fifth.
+  start.velocities[5 * 17 + 8] = model::Vec3(0.3f, 0, 0);
+  Running running(scene);
+  running.restore(start);
+  running.tick(inputsOf(scene));
+  EXPECT_GT(running.solves().front().constraints, 0u);
 }
 
 std::uint64_t dispatchesOf(const model::Scene& scene) {
@@ -435,7 +426,7 @@ std::uint64_t dispatchesOf(const model::Scene& scene) {
 TEST_F(LimitAcad, NeedsOneDispatchInASubstepMoreThanMassSpring) {
   model::Cloth cloth = calmCloth(40, 41);
   const model::Scene free = sceneOf({cloth});
-  for (const model::AcadMode mode : {model::AcadMode::hold, model::AcadMode::paper, model::AcadMode::limit}) {
+  for (const model::AcadMode mode : {model::AcadMode::limit, model::AcadMode::paper}) {
     cloth.solver = limitSolver();
     cloth.solver.acadMode = mode;
     EXPECT_EQ(dispatchesOf(sceneOf({cloth})), dispatchesOf(free) + free.substeps);
@@ -448,14 +439,12 @@ TEST_F(LimitAcad, ContinuesLongSolvesWithTheSameBits) {
   sheet.solver.iterations = 240;
   sheet.solver.tolerance = 1e-9f;
   sheet.structural.stiffness = sheet.shear.stiffness = 2;
-  for (const model::AcadMode mode : {model::AcadMode::hold, model::AcadMode::limit}) {
-    sheet.solver.acadMode = mode;
-    sheet.solver.compliance = 1e-5f;
-    const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000},
-                                                  {.workgroupSize = 8, .solveWholeNodes = 0},
-                                                  {.workgroupSize = 64, .solveWholeNodes = 1'000}};
-    expectSameBits(sceneOf({sheet}), passingBall, 3, ways);
-  }
+  sheet.solver.acadMode = model::AcadMode::limit;
+  sheet.solver.compliance = 1e-5f;
+  const simulation::SimulationOptions ways[] = {{.workgroupSize = 8, .solveWholeNodes = 1'000},
+                                                {.workgroupSize = 8, .solveWholeNodes = 0},
+                                                {.workgroupSize = 64, .solveWholeNodes = 1'000}};
+  expectSameBits(sceneOf({sheet}), passingBall, 3, ways);
 }
 
 }  // namespace

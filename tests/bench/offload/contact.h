@@ -9,10 +9,14 @@
 
 namespace clothstream::bench::offload {
 
+// shaders/collision/collision.h.
+constexpr float kDepthRounding = 2.4e-7f;
+
 // One node that may touch. Positions are relative to the sphere's centre at the start and at the end. Returns
 // whether it was moved.
-inline bool collideOne(const Ball& ball, float radius, float friction, const float* before, float* after,
+inline bool collideOne(const Ball& ball, const Settings& settings, const float* before, float* after,
                        float* velocity) {
+  const float radius = settings.reach;
   const auto dot3 = [](const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
   const auto unit = [&](const float* v, float* out) {
     const float squared = dot3(v, v);
@@ -46,18 +50,31 @@ inline bool collideOne(const Ball& ball, float radius, float friction, const flo
     depth = radius - dot3(normal, after);
   }
   if (depth <= 0) return false;
-  float relative[3];
+  float speed[3], path[3], extents = 0;
   for (int i = 0; i < 3; ++i) {
     after[i] += depth * normal[i];
-    relative[i] = velocity[i] - ball.velocity[i];
+    extents += std::fabs(after[i]) + std::fabs(after[i] + ball.after[i]);
+    speed[i] = velocity[i] - ball.velocity[i];
+    path[i] = after[i] - before[i];
   }
-  const float approach = dot3(relative, normal);
-  if (approach >= 0) return true;
-  float slip[3];
-  for (int i = 0; i < 3; ++i) slip[i] = relative[i] - approach * normal[i];
-  const float speed = std::sqrt(std::fmax(dot3(slip, slip), 1e-30f));
-  const float kept = std::fmax(1 + friction * approach / speed, 0.0f);
-  for (int i = 0; i < 3; ++i) velocity[i] = ball.velocity[i] + kept * slip[i];
+  const float approach = dot3(speed, normal);
+  for (int i = 0; i < 3; ++i) speed[i] -= std::fmin(approach, 0.0f) * normal[i];
+  const float pressed = (depth - kDepthRounding * extents) / settings.substep - std::fmax(approach, 0.0f);
+  const float most = settings.friction * std::fmax(std::fmax(-approach, pressed), 0.0f);
+  // Friction takes at most `limit` of the part of a vector along the surface.
+  const auto rub = [&](float* vector, float limit) {
+    const float across = dot3(vector, normal);
+    float along[3];
+    for (int i = 0; i < 3; ++i) along[i] = vector[i] - across * normal[i];
+    const float taken = std::fmin(limit / std::sqrt(std::fmax(dot3(along, along), 1e-30f)), 1.0f);
+    for (int i = 0; i < 3; ++i) vector[i] -= taken * along[i];
+  };
+  rub(speed, most);
+  rub(path, settings.substep * most);
+  for (int i = 0; i < 3; ++i) {
+    velocity[i] = ball.velocity[i] + speed[i];
+    after[i] = before[i] + path[i];
+  }
   return true;
 }
 
@@ -71,7 +88,7 @@ inline bool collideOne(const Ball& ball, float radius, float friction, const flo
     const float start[3] = {before.x[lane], before.y[lane], before.z[lane]};
     float place[3] = {after.x[lane], after.y[lane], after.z[lane]};
     float speed[3] = {velocity.x[lane], velocity.y[lane], velocity.z[lane]};
-    if (!collideOne(ball, settings.reach, settings.friction, start, place, speed)) continue;
+    if (!collideOne(ball, settings, start, place, speed)) continue;
     positions.x[at + lane] = place[0] + ball.after[0];
     positions.y[at + lane] = place[1] + ball.after[1];
     positions.z[at + lane] = place[2] + ball.after[2];

@@ -59,17 +59,20 @@ template <bool kUniform, std::size_t kCount>
   const Lanes squared = larger(dot(d, d), splat(1e-12f));
   const Lanes length = squareRoot(squared);
   const Lanes inverse = splat(1) / length;
+  const Lanes begunAlong = dot(begun, d) * inverse, gain = begunAlong * inverse;
   // A growth of zero adds nothing; so does a spring that is not there.
   const Lanes side = splat(rule.stretch) * (length - splat(rule.restLength)) +
-                     splat(rule.damping) * (length - dot(begun, d) * inverse);
+                     splat(rule.damping) * (length - begunAlong);
+  // Ends move along the line at the start unless the spring has turned far: shaders/xpbd/pull.glsl.
+  const Triple way = select((gain > splat(0.5f)) & (gain < splat(1.5f)), (splat(2) - gain) * begun, d);
   if constexpr (kUniform) {
-    const Triple move = (mass * side * inverse) * d;
+    const Triple move = (mass * side * inverse) * way;
     nodes.now[a] = nodes.now[a] + move;
     nodes.now[b] = nodes.now[b] - move;
   } else {
     const Lanes sum = nodes.inverseMass[a] + nodes.inverseMass[b];
     const Lanes scale = select(sum > splat(1.5f) * mass, splat(1), splat(rule.oneFree));
-    const Triple pull = keep(sum > splat(0), (scale * side * inverse) * d);
+    const Triple pull = keep(sum > splat(0), (scale * side * inverse) * way);
     nodes.now[a] = nodes.now[a] + nodes.inverseMass[a] * pull;
     nodes.now[b] = nodes.now[b] - nodes.inverseMass[b] * pull;
   }
@@ -215,23 +218,31 @@ class Xpbd final : public Solver {
     const auto spring = [&](std::size_t a, std::size_t b, const Rule& rule) __attribute__((always_inline)) {
       if (!kSeams || crosses(a, b)) correct<kUniform>(nodes, a, b, rule, mass);
     };
+    // Columns, or rows, 0, 2, 1 in this order.
+    constexpr std::size_t kInTurn[] = {0, 2, 1};
 #pragma unroll
-    for (std::size_t k = 0; k < 8; ++k)
-      spring(k / 2 * kSize + k % 2, k / 2 * kSize + k % 2 + 2, rules_.bendRow);
+    for (std::size_t k = 0; k < 8; ++k) spring(k % 4 * kSize + k / 4, k % 4 * kSize + k / 4 + 2, rules_.bendRow);
 #pragma unroll
     for (std::size_t a = 0; a < 8; ++a) spring(a, a + 2 * kSize, rules_.bendColumn);
 #pragma unroll
     for (std::size_t k = 0; k < 9; ++k) {
-      const std::size_t a = k / 3 * kSize + k % 3;
+      // Both even, then an odd column, then an odd row, then both odd.
+      constexpr std::size_t kQuads[] = {0, 2, 8, 10, 1, 9, 4, 6, 5};
+      const std::size_t a = kQuads[k];
       if (kSeams && !crosses(a, a + kSize + 1)) continue;
       correct<kUniform>(nodes, a, a + kSize + 1, rules_.shear, mass);
       correct<kUniform>(nodes, a + 1, a + kSize, rules_.shear, mass);
     }
 #pragma unroll
-    for (std::size_t k = 0; k < 12; ++k)
-      spring(k / 3 * kSize + k % 3, k / 3 * kSize + k % 3 + 1, rules_.alongRow);
+    for (std::size_t part = 0; part < 2; ++part)
 #pragma unroll
-    for (std::size_t a = 0; a < 12; ++a) spring(a, a + kSize, rules_.alongColumn);
+      for (std::size_t row = 0; row < kSize; ++row)
+#pragma unroll
+        for (std::size_t column = part; column < 3; column += 2)
+          spring(row * kSize + column, row * kSize + column + 1, rules_.alongRow);
+#pragma unroll
+    for (std::size_t k = 0; k < 12; ++k)
+      spring(kInTurn[k / 4] * kSize + k % 4, (kInTurn[k / 4] + 1) * kSize + k % 4, rules_.alongColumn);
 #pragma unroll
     for (std::uint32_t k = 0; k < kSize * kSize; ++k) positions_.set(at(k), nodes.now[k]);
   }
