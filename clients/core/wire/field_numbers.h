@@ -26,7 +26,6 @@ struct Integrator {
 };
 struct AcadMode {
   static constexpr std::uint32_t kUnspecified = 0;
-  static constexpr std::uint32_t kHold = 1;
   static constexpr std::uint32_t kPaper = 2;
   static constexpr std::uint32_t kLimit = 3;
 };
