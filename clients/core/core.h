@@ -352,6 +352,9 @@ typedef struct cs_collider {
    * without it. */
   int32_t yields;
   uint64_t participant_id; /* 0 for a collider of the scene */
+  /* Of a capsule: m, radius of its end at +Y. `radius` is that of its end at -Y; they differ if it is
+   * tapered. Else the same as `radius`. */
+  float top_radius;
 } cs_collider;
 
 /* Frames per second of the stream, and ticks per second of the simulation; 0 before the description. */

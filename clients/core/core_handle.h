@@ -42,6 +42,7 @@ inline int writeCollider(const Collider* collider, cs_collider* out) {
   copy(collider->size, out->size);
   out->yields = collider->yields ? 1 : 0;
   out->participant_id = collider->participantId;
+  out->top_radius = collider->topRadius;
   return 1;
 }
 

@@ -29,6 +29,8 @@ Point turnBack(const std::array<double, 4>& q, const Point& v) {
 constexpr std::size_t kMaxHullTriangles = 252;
 // A corner in front of a face by more than this share of the distances from the origin makes a hull a mesh.
 constexpr double kFlat = 1e-3;
+// Largest change of a capsule's radius along its length (scene.proto).
+constexpr double kMostSlope = 0.99;
 
 double squaredFromSegment(const Point& p, const Point& a, const Point& b) {
   const Point ab = minus(b, a), ap = minus(p, a);
@@ -62,6 +64,9 @@ double solidAngle(const Point& p, const std::array<Point, 3>& t) {
 Solid::Solid(const cs_collider& collider, std::span<const float> corners,
              std::span<const std::uint32_t> triangles)
     : shape_(collider.shape), radius_(double{collider.radius}), halfLength_(0.5 * double{collider.length}) {
+  if (shape_ == CS_SHAPE_CAPSULE && collider.length > 0)
+    slope_ = std::clamp((double{collider.top_radius} - radius_) / double{collider.length}, -kMostSlope,
+                        kMostSlope);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     position_[axis] = double{collider.position[axis]};
     halfSize_[axis] = 0.5 * double{collider.size[axis]};
@@ -121,8 +126,11 @@ double Solid::depthOf(const Point& point) const {
   switch (shape_) {
     case CS_SHAPE_SPHERE:
       return radius_ - std::hypot(p[0], p[1], p[2]);
-    case CS_SHAPE_CAPSULE:
-      return radius_ - std::hypot(p[0], p[1] - std::clamp(p[1], -halfLength_, halfLength_), p[2]);
+    case CS_SHAPE_CAPSULE: {
+      const double nearest = p[1] + slope_ / std::sqrt(1 - slope_ * slope_) * std::hypot(p[0], p[2]);
+      const double y = std::clamp(nearest, -halfLength_, halfLength_);
+      return radius_ + slope_ * (y + halfLength_) - std::hypot(p[0], p[1] - y, p[2]);
+    }
     case CS_SHAPE_PLANE:
       return -p[1];
     case CS_SHAPE_BOX: {

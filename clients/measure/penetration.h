@@ -34,6 +34,7 @@ class Solid {
 
   std::uint32_t shape_ = 0;
   double radius_ = 0, halfLength_ = 0;
+  double slope_ = 0;  // of a capsule's radius along its length
   Point position_{}, halfSize_{};
   std::array<double, 4> orientation_{};          // quaternion x y z w, unit length
   std::vector<Face> faces_;                      // of a hull

@@ -41,6 +41,7 @@ bool readShape(Bytes message, cs_shape shape, cs_recorded_collider& out) {
   if (!(shape == CS_SHAPE_BOX ? readBox(message, collider.size) : readRound(message, collider))) return false;
   out.radius = collider.radius;
   out.length = collider.length;
+  out.top_radius = collider.topRadius;
   std::memcpy(out.size, collider.size.data(), sizeof out.size);
   return true;
 }

@@ -207,6 +207,7 @@ typedef struct cs_recorded_collider {
   cs_recorded_pose start, end;   /* at the start and end of the tick */
   float friction;                /* coefficient */
   float radius, length, size[3]; /* m; 0 if the shape does not have them */
+  float top_radius;              /* m; as in cs_collider */
 } cs_recorded_collider;
 
 /* AppliedGripState of recording.proto. */

@@ -28,8 +28,17 @@ model::Shape toSphere(Checks& checks, const Path& path, const v1::Sphere& messag
 }
 
 model::Shape toCapsule(Checks& checks, const Path& path, const v1::Capsule& message, const Sizes& sizes) {
-  return model::Capsule{checks.number(path / "radius", message.radius(), sizes.radius),
-                        checks.number(path / "length", message.length(), sizes.length)};
+  model::Capsule capsule{.radius = checks.number(path / "radius", message.radius(), sizes.radius),
+                         .length = checks.number(path / "length", message.length(), sizes.length)};
+  if (!message.has_top_radius()) return capsule;
+  const float top = checks.number(path / "topRadius", message.top_radius(), sizes.radius);
+  if (std::abs(top - capsule.radius) > model::kMostSlope * capsule.length)
+    checks.fail(path / "topRadius", fmt::format("{}", top),
+                fmt::format("must differ from \"radius\" by at most {} times \"length\", because one end "
+                            "would be inside the other; use a sphere",
+                            model::kMostSlope));
+  capsule.topRadius = top;
+  return capsule;
 }
 
 model::Shape toBox(Checks& checks, const Path& path, const v1::Box& message, const Sizes& sizes) {
@@ -74,8 +83,10 @@ void writeSimple(const model::Shape& shape, Message& message) {
   std::visit(model::ShapeVisitor{
                  [&](const model::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
                  [&](const model::Capsule& capsule) {
-                   message.mutable_capsule()->set_radius(capsule.radius);
-                   message.mutable_capsule()->set_length(capsule.length);
+                   v1::Capsule& to = *message.mutable_capsule();
+                   to.set_radius(capsule.radius);
+                   to.set_length(capsule.length);
+                   if (capsule.topRadius) to.set_top_radius(*capsule.topRadius);
                  },
                  [&](const model::Plane&) { message.mutable_plane(); },
                  [&](const model::Box& box) { write(box.size, *message.mutable_box()->mutable_size()); },
@@ -132,6 +143,10 @@ void write(const model::Shape& shape, v1::Collider& message) {
 }
 
 void write(const model::Shape& shape, v1::ColliderState& message) {
+  writeSimple(shape, message);
+}
+
+void write(const model::Shape& shape, v1::AppliedCollider& message) {
   writeSimple(shape, message);
 }
 

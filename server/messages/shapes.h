@@ -2,6 +2,7 @@
 // Converts shapes of colliders between messages and the model.
 #pragma once
 
+#include "clothstream/v1/recording.pb.h"
 #include "clothstream/v1/scene.pb.h"
 #include "clothstream/v1/session.pb.h"
 #include "server/messages/mesh_message.h"
@@ -19,6 +20,8 @@ model::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantColl
 void write(const model::Shape& shape, v1::Collider& message);
 // Replaces the shape of the message. Hulls and meshes are left out; the description has them.
 void write(const model::Shape& shape, v1::ColliderState& message);
+// Replaces the shape of the message. Hulls and meshes are left out; the scene has them.
+void write(const model::Shape& shape, v1::AppliedCollider& message);
 void writeHull(const model::ConvexHull& hull, v1::ConvexHull& message);
 
 }  // namespace clothstream::messages

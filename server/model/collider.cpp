@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Sizes of shapes, and interpolation between motion keys.
+// Interpolation between motion keys.
 #include "server/model/collider.h"
 
 #include <cmath>
-#include <limits>
 
 namespace clothstream::model {
 namespace {
@@ -27,27 +26,6 @@ Quaternion between(const Quaternion& from, const Quaternion& to, double part) {
 }
 
 }  // namespace
-
-float reachOf(const Shape& shape) {
-  return std::visit(ShapeVisitor{[](const Sphere& sphere) { return sphere.radius; },
-                                 [](const Capsule& capsule) { return capsule.radius + capsule.length / 2; },
-                                 [](const Plane&) { return std::numeric_limits<float>::infinity(); },
-                                 [](const Box& box) { return box.size.norm() / 2; },
-                                 [](const Hull& hull) {
-                                   Vec3 corner = Vec3::Zero();
-                                   for (const Vec3& vertex : hull->vertices)
-                                     corner = corner.cwiseMax(vertex.cwiseAbs());
-                                   return corner.norm();
-                                 },
-                                 [](const Solid& solid) { return solid->reach; }},
-                    shape);
-}
-
-float* radiusOf(Shape& shape) {
-  if (auto* sphere = std::get_if<Sphere>(&shape)) return &sphere->radius;
-  if (auto* capsule = std::get_if<Capsule>(&shape)) return &capsule->radius;
-  return nullptr;
-}
 
 Pose poseAt(const Pose& resting, const Motion& motion, double seconds) {
   const std::vector<MotionKey>& keys = motion.keys;

@@ -118,15 +118,14 @@ double searchWork(const ClosedMesh& mesh) {
 }
 
 double colliderWork(const Shape& shape) {
-  if (const auto* solid = std::get_if<Solid>(&shape))
-    return (*solid)->distanceCell > 0 ? kGridWork : searchWork(**solid);
-  const double planes =
-      std::visit(ShapeVisitor{[](const Sphere&) { return 0.0; }, [](const Capsule&) { return 0.0; },
-                              [](const Plane&) { return 1.0; }, [](const Box&) { return kBoxPlanes; },
-                              [](const Hull& hull) { return static_cast<double>(hull->planes.size()); },
-                              [](const Solid&) { return 0.0; }},
-                 shape);
-  return kCollider + kPlane * planes;
+  const auto withPlanes = [](double planes) { return kCollider + kPlane * planes; };
+  return std::visit(
+      ShapeVisitor{
+          [&](const Sphere&) { return withPlanes(0); }, [&](const Capsule&) { return withPlanes(0); },
+          [&](const Plane&) { return withPlanes(1); }, [&](const Box&) { return withPlanes(kBoxPlanes); },
+          [&](const Hull& hull) { return withPlanes(static_cast<double>(hull->planes.size())); },
+          [](const Solid& solid) { return solid->distanceCell > 0 ? kGridWork : searchWork(*solid); }},
+      shape);
 }
 
 PriceModel::ClothCounts PriceModel::countsOf(const Grid& grid) {

@@ -12,6 +12,7 @@
 
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
+#include "server/messages/shapes.h"
 #include "server/messages/skin_message.h"
 #include "server/messages/vectors.h"
 
@@ -51,20 +52,6 @@ void writeCloths(const model::Scene& scene, v1::RecordedTick& message) {
   }
 }
 
-void writeShape(const model::Shape& shape, v1::AppliedCollider& message) {
-  std::visit(
-      model::ShapeVisitor{
-          [&](const model::Sphere& sphere) { message.mutable_sphere()->set_radius(sphere.radius); },
-          [&](const model::Capsule& capsule) {
-            message.mutable_capsule()->set_radius(capsule.radius);
-            message.mutable_capsule()->set_length(capsule.length);
-          },
-          [&](const model::Plane&) { message.mutable_plane(); },
-          [&](const model::Box& box) { messages::write(box.size, *message.mutable_box()->mutable_size()); },
-          [&](const model::Hull&) {}, [&](const model::Solid&) {}},
-      shape);
-}
-
 void writeColliders(const scene::AppliedTick& tick, v1::RecordedTick& message) {
   for (std::size_t i = 0; i < tick.inputs.colliders.size(); ++i) {
     const simulation::MovingCollider& collider = tick.inputs.colliders[i];
@@ -75,7 +62,7 @@ void writeColliders(const scene::AppliedTick& tick, v1::RecordedTick& message) {
     const scene::ColliderSet::Identity identity = tick.colliders.identity(i);
     to.set_participant_id(identity.participant);
     to.set_id(identity.id);
-    writeShape(collider.shape, to);
+    messages::write(collider.shape, to);
     messages::writePoses(collider.jointsStart, *to.mutable_joints_start());
     messages::writePoses(collider.jointsEnd, *to.mutable_joints_end());
   }
@@ -129,27 +116,41 @@ class Numbers {
 
 constexpr float kMaxSize = 1e4f;  // m
 
+float sizeOf(Numbers& numbers, float value) {
+  return numbers.number(value, 0, kMaxSize);
+}
+
+model::Capsule capsuleOf(Numbers& numbers, const v1::Capsule& message) {
+  model::Capsule capsule{.radius = sizeOf(numbers, message.radius()),
+                         .length = sizeOf(numbers, message.length())};
+  if (message.has_top_radius()) capsule.topRadius = sizeOf(numbers, message.top_radius());
+  return capsule;
+}
+
 model::Shape shapeOf(Numbers& numbers, const v1::AppliedCollider& message, const model::Scene& scene,
                      bool& known) {
-  const auto size = [&](float value) { return numbers.number(value, 0, kMaxSize); };
   switch (message.shape_case()) {
     case v1::AppliedCollider::kSphere:
-      return model::Sphere{size(message.sphere().radius())};
+      return model::Sphere{sizeOf(numbers, message.sphere().radius())};
     case v1::AppliedCollider::kCapsule:
-      return model::Capsule{size(message.capsule().radius()), size(message.capsule().length())};
+      return capsuleOf(numbers, message.capsule());
     case v1::AppliedCollider::kPlane:
       return model::Plane{};
     case v1::AppliedCollider::kBox: {
       const v1::Vec3& box = message.box().size();
-      return model::Box{{size(box.x()), size(box.y()), size(box.z())}};
+      return model::Box{{sizeOf(numbers, box.x()), sizeOf(numbers, box.y()), sizeOf(numbers, box.z())}};
     }
     case v1::AppliedCollider::SHAPE_NOT_SET:
       break;
   }
   known = false;
   if (message.participant_id() == 0 && message.id() < scene.colliders.size()) {
-    const model::Shape& own = scene.colliders[message.id()].shape;
-    known = std::holds_alternative<model::Hull>(own) || std::holds_alternative<model::Solid>(own);
+    known = std::visit(
+        model::ShapeVisitor{
+            [](const model::Sphere&) { return false; }, [](const model::Capsule&) { return false; },
+            [](const model::Plane&) { return false; }, [](const model::Box&) { return false; },
+            [](const model::Hull&) { return true; }, [](const model::Solid&) { return true; }},
+        scene.colliders[message.id()].shape);
   }
   return known ? scene.colliders[message.id()].shape : model::Shape{};
 }

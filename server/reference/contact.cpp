@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "server/reference/solid.h"
@@ -18,11 +19,15 @@ struct Surface {
   Vec3 normal;
 };
 
-Surface overRound(const Vec3& p, double radius, double length) {
-  const Vec3 centre(0, std::clamp(p.y(), -length / 2, length / 2), 0);
-  const Vec3 offset = p - centre;
+// Over the balls about the points of a segment along Y. The radius of the first one, at -Y, changes by
+// `slope` along the segment.
+Surface overRound(const Vec3& p, double radius, double length, double slope) {
+  const double nearest = p.y() + slope / std::sqrt(1 - slope * slope) * std::hypot(p.x(), p.z());
+  const double y = std::clamp(nearest, -length / 2, length / 2);
+  const Vec3 offset = p - Vec3(0, y, 0);
   const double distance = offset.norm();
-  return {distance - radius, distance > 1e-12 ? Vec3(offset / distance) : Vec3::UnitY()};
+  return {distance - radius - slope * (y + length / 2),
+          distance > 1e-12 ? Vec3(offset / distance) : Vec3::UnitY()};
 }
 
 void raise(Surface& surface, const Vec3& normal, double height) {
@@ -47,18 +52,27 @@ Surface overHull(const Vec3& p, const model::ConvexHull& hull, double thickness)
 }
 
 Surface over(const model::Shape& shape, double thickness, const Vec3& p) {
-  if (const auto* sphere = std::get_if<model::Sphere>(&shape))
-    return overRound(p, sphere->radius + thickness, 0);
-  if (const auto* capsule = std::get_if<model::Capsule>(&shape))
-    return overRound(p, capsule->radius + thickness, capsule->length);
-  if (const auto* box = std::get_if<model::Box>(&shape))
-    return overBox(p, box->size.cast<double>(), thickness);
-  if (const auto* hull = std::get_if<model::Hull>(&shape)) return overHull(p, **hull, thickness);
-  return {p.y() - thickness, Vec3::UnitY()};
+  return std::visit(
+      model::ShapeVisitor{
+          [&](const model::Sphere& sphere) { return overRound(p, sphere.radius + thickness, 0, 0); },
+          [&](const model::Capsule& capsule) {
+            return overRound(p, capsule.radius + thickness, capsule.length, double{model::slopeOf(capsule)});
+          },
+          [&](const model::Plane&) {
+            return Surface{p.y() - thickness, Vec3::UnitY()};
+          },
+          [&](const model::Box& box) { return overBox(p, box.size.cast<double>(), thickness); },
+          [&](const model::Hull& hull) { return overHull(p, *hull, thickness); },
+          [](const model::Solid&) -> Surface { throw std::logic_error("a mesh is not convex"); }},
+      shape);
 }
 
 bool isRound(const model::Shape& shape) {
-  return std::holds_alternative<model::Sphere>(shape) || std::holds_alternative<model::Capsule>(shape);
+  return std::visit(model::ShapeVisitor{
+                        [](const model::Sphere&) { return true; }, [](const model::Capsule&) { return true; },
+                        [](const model::Plane&) { return false; }, [](const model::Box&) { return false; },
+                        [](const model::Hull&) { return false; }, [](const model::Solid&) { return false; }},
+                    shape);
 }
 
 // First point between `from`, which is outside, and `to` with height zero.

@@ -104,7 +104,7 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
   }
   for (std::size_t i = 0; i < state_.colliders.size(); ++i) {
     Placed& collider = state_.colliders[i];
-    const float radius = largestRadius(collider.now.shape);
+    const float radius = model::reachOf(collider.now.shape);
     model::Pose end = collider.now.pose;
     if (collider.yield) {
       Yield& yield = *collider.yield;
@@ -115,10 +115,10 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
     const float grown = jumped || collider.depth == 0
                             ? 0
                             : collider.depth + kGrowth * static_cast<float>(scene.tickSeconds());
-    collider.depth = std::min(leastRadius(collider.now.shape), std::max(grown, kMaxAppearance));
+    collider.depth = std::min(model::largestDepth(collider.now.shape), std::max(grown, kMaxAppearance));
     collider.start = jumped ? end : collider.before;
     collider.before = end;
-    colliders[own + i] = {thinned(collider.now.shape, collider.depth), collider.start, end, 1};
+    colliders[own + i] = {model::thinned(collider.now.shape, collider.depth), collider.start, end, 1};
   }
 }
 
@@ -128,10 +128,10 @@ void ColliderSet::settle(std::span<const float> depths) {
   for (std::size_t i = 0; i < state_.colliders.size(); ++i) {
     Placed& collider = state_.colliders[i];
     const float depth = depths[own + i];
-    const bool fits = depth <= std::min(kYieldDepth, kYieldShare * leastRadius(collider.now.shape));
+    const bool fits = depth <= std::min(kYieldDepth, kYieldShare * model::largestDepth(collider.now.shape));
     if (!collider.yield) {
       if (fits) continue;
-      const float moved = wayOf(largestRadius(collider.now.shape), collider.start, collider.before);
+      const float moved = wayOf(model::reachOf(collider.now.shape), collider.start, collider.before);
       collider.yield = Yield{.accepted = collider.start,
                              .depth = depth,
                              .step = std::max(moved / 2, kLeastStep),
@@ -177,7 +177,7 @@ void ColliderSet::write(const model::Scene& scene, v1::Frame& frame) const {
   for (const Placed& collider : state_.colliders) {
     v1::ColliderState& state = *states.Add();
     model::ParticipantCollider shown = collider.now;
-    shown.shape = thinned(shown.shape, collider.depth);
+    shown.shape = model::thinned(shown.shape, collider.depth);
     if (collider.yield && collider.yield->stands) {
       shown.pose = collider.before;
       state.set_yields(true);

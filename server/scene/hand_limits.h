@@ -20,13 +20,6 @@ inline constexpr float kGrowth = 3;
 inline constexpr float kLeastMaxForce = 20;
 inline constexpr float kPullSeconds = 0.1f;
 
-// Least and largest distance of the surface from the middle. Only for the shapes of participants: spheres,
-// capsules and boxes.
-float leastRadius(const model::Shape& shape);
-float largestRadius(const model::Shape& shape);
-// The shape, made thinner where a point of it is deeper inside than `depth`.
-model::Shape thinned(const model::Shape& shape, float depth);
-
 // At least the longest way of a point that is at most `radius` from the origin of the pose.
 float wayOf(float radius, const model::Pose& from, const model::Pose& to);
 // The pose on the way from `from` to `to`, after at most `step` metres of such a point.

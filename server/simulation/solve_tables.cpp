@@ -187,10 +187,8 @@ SolveTables solveTables(std::span<const model::Cloth> cloths, const WholeLimits&
   tables.incidences.resize(tables.nodes, {0, 0, 0, 0});
   const auto count = [](const auto& table) { return static_cast<std::uint32_t>(table.size()); };
   using enum model::SolverKind;
-  constexpr std::pair<model::SolverKind, model::AcadMode> kKinds[] = {{constraint, {}},
-                                                                      {acad, model::AcadMode::limit},
-                                                                      {acad, model::AcadMode::paper},
-                                                                      {implicitEuler, {}}};
+  constexpr std::pair<model::SolverKind, model::AcadMode> kKinds[] = {
+      {constraint, {}}, {acad, model::AcadMode::limit}, {acad, model::AcadMode::paper}, {implicitEuler, {}}};
   for (const auto& [kind, mode] : kKinds)
     for (const bool mesh : {false, true}) {
       SolveGroup group{.kind = kind, .acadMode = mode, .mesh = mesh};

@@ -128,12 +128,14 @@ Contact findContact(Collider collider, ColliderFrame frame, vec3 from, vec3 to) 
   precise vec3 before = from - collider.before;
   precise vec3 after = to - collider.after;
   ShapeRecord shape = frame.shape;
-  precise float radius = radiusOf(shape) + collider.thickness;
   before = rotateBack(frame.before, before);
   after = rotateBack(frame.after, after);
   Contact contact = kNoContact;
+#if CLOTHSTREAM_SHAPE_KINDS != 4
+#error "findContact() does not know all kinds of shapes (collide_solids.comp has those of meshes)"
+#endif
   if (shape.kind == kRoundShape) {
-    contact = touchRound(before, after, radius, halfLengthOf(shape));
+    contact = touchRound(before, after, roundOf(shape, collider.thickness));
   } else {
     contact = touchPlanes(colliders, before, after, shape, collider.thickness);
   }

@@ -12,6 +12,8 @@ const float kRoundShape = 0;   // sphere or capsule
 const float kBoxShape = 1;     // box
 const float kPlanesShape = 2;  // plane or convex hull
 const float kSolidShape = 3;   // closed triangle mesh; solid.h
+// Number of kinds. Kernels that depend on the kind compare it, and do not compile if it grows without them.
+#define CLOTHSTREAM_SHAPE_KINDS 4
 
 // The shape of a collider. The meaning of the other members depends on `kind`; the functions below name it.
 struct ShapeRecord {
@@ -92,8 +94,9 @@ CLOTHSTREAM_SHARED_END
 #ifdef __cplusplus
 namespace clothstream::shared {
 
-inline ShapeRecord roundShape(float radius, float halfLength) {
-  return {kRoundShape, {radius, halfLength, 0}};
+// `slope`: model::slopeOf().
+inline ShapeRecord roundShape(float radius, float halfLength, float slope) {
+  return {kRoundShape, {radius, halfLength, slope}};
 }
 inline ShapeRecord boxShape(const vec3& halfSize) {
   return {kBoxShape, halfSize};
@@ -118,6 +121,9 @@ float radiusOf(ShapeRecord shape) {
 }
 float halfLengthOf(ShapeRecord shape) {
   return shape.sizes.y;
+}
+float slopeOf(ShapeRecord shape) {
+  return shape.sizes.z;
 }
 vec3 halfSizeOf(ShapeRecord shape) {
   return shape.sizes;

@@ -23,10 +23,44 @@ vec3 unit(vec3 v, float squared) {
   return squared < 1e-24 ? vec3(0.0, 1.0, 0.0) : u;
 }
 
-// The nearest point of a capsule's segment.
+// A point of a capsule's segment at height y, or the nearest end.
 vec3 onSegment(float y, float halfLength) {
   precise float otherEnd = -halfLength;
   return vec3(0.0, y > halfLength ? halfLength : (y < otherEnd ? otherEnd : y), 0.0);
+}
+
+// A sphere, a capsule or a tapered capsule: the balls about the points of its segment. A sphere has no
+// length.
+struct Round {
+  float radius;  // at the end at -Y
+  float halfLength;
+  float slope;  // of the radius along the segment
+  float lean;   // slope / sqrt(1 - slope^2)
+};
+
+Round roundOf(ShapeRecord shape, float thickness) {
+  precise float radius = radiusOf(shape) + thickness;
+  float slope = slopeOf(shape);
+  precise float cosineSquared = 1.0 - slope * slope;
+  precise float lean = slope * reciprocalSquareRoot(cosineSquared);
+  return Round(radius, halfLengthOf(shape), slope, lean);
+}
+
+struct Ball {
+  vec3 centre;
+  float radius;
+};
+
+// The ball of a round shape whose surface is nearest to a point outside, and farthest from a point inside.
+// With the distance q from the axis and the height h over the end at -Y, the distance sqrt(q^2 + (h - t)^2)
+// - r - slope t from the ball at t is smallest at t = h + lean q.
+Ball nearestBall(vec3 p, Round shape) {
+  precise float squared = p.x * p.x + p.z * p.z;
+  precise float away = squared * reciprocalSquareRoot(max(squared, 1e-30));
+  precise float y = p.y + shape.lean * away;
+  vec3 centre = onSegment(y, shape.halfLength);
+  precise float radius = shape.radius + shape.slope * (centre.y + shape.halfLength);
+  return Ball(centre, radius);
 }
 
 // Share t of the path at which the squared distance, squared + 2 t along + t^2 pathSquared, first falls to
@@ -38,11 +72,10 @@ float shareUntilZero(float squared, float along, float pathSquared) {
   return along < 0.0 && discriminant >= 0.0 ? part : 2.0;
 }
 
-// True if the path, which begins outside, enters the capsule. `centre` is the point of the segment nearest to
-// the entry.
-bool entersRound(vec3 from, vec3 path, float radius, float halfLength, out vec3 centre, out vec3 normal) {
+// True if the path, which begins outside, enters a capsule with one radius. `met` is the ball that it enters.
+bool entersCapsule(vec3 from, vec3 path, Round shape, inout Ball met, inout vec3 normal) {
   // The infinite cylinder comes first. A path that begins inside it lies beyond one of the capsule's ends.
-  precise float radiusSquared = radius * radius;
+  precise float radiusSquared = shape.radius * shape.radius;
   precise float squared = from.x * from.x + from.z * from.z - radiusSquared;
   precise float along = from.x * path.x + from.z * path.z;
   precise float pathSquared = path.x * path.x + path.z * path.z;
@@ -51,7 +84,7 @@ bool entersRound(vec3 from, vec3 path, float radius, float halfLength, out vec3 
     part = shareUntilZero(squared, along, pathSquared);
   }
   precise float y = from.y + part * path.y;
-  centre = onSegment(y, halfLength);
+  vec3 centre = onSegment(y, shape.halfLength);
   if (part <= 1.0 && centre.y != y) {
     precise vec3 offset = from - centre;
     precise float outside = dotProduct(offset, offset) - radiusSquared;
@@ -59,39 +92,73 @@ bool entersRound(vec3 from, vec3 path, float radius, float halfLength, out vec3 
   }
   precise vec3 out_ = from + part * path - centre;
   normal = unit(out_, dotProduct(out_, out_));
+  met = Ball(centre, shape.radius);
   return part <= 1.0;
 }
 
-// A sphere is a capsule without length.
-Contact touchRound(vec3 from, vec3 to, float radius, float halfLength) {
-  precise vec3 centre = onSegment(from.y, halfLength);
-  precise vec3 before = from - centre;
-  precise vec3 after = to - onSegment(to.y, halfLength);
+// Steps of Newton's method along a path. The height over a convex shape is a convex function of the path, so
+// that no step leads beyond the first entry. Paths that graze the shape need the most steps.
+const uint kEntrySteps = 12;
+
+// True if the path, which begins outside, enters the tapered capsule. `met` is the ball that it enters.
+bool entersTapered(vec3 from, vec3 path, Round shape, inout Ball met, inout vec3 normal) {
+  uint steps = shape.slope != 0.0 ? kEntrySteps : 0u;
+  float part = 0.0;
+  bool passes = false;
+  uint i = 0;
+  do {
+    precise vec3 at = from + part * path;
+    met = nearestBall(at, shape);
+    precise vec3 out_ = at - met.centre;
+    precise float squared = dotProduct(out_, out_);
+    normal = unit(out_, squared);
+    precise float height = squared * reciprocalSquareRoot(max(squared, 1e-30)) - met.radius;
+    precise float closing = -dotProduct(normal, path);
+    precise float next = part + max(height, 0.0) * reciprocal(max(closing, 1e-20));
+    passes = passes || (height > 0.0 && (closing <= 0.0 || next > 1.0));
+    part = passes ? part : next;
+    ++i;
+  } while (i < steps);
+  return !passes;
+}
+
+Contact touchRound(vec3 from, vec3 to, Round shape) {
+  Ball met = nearestBall(from, shape);
+  Ball last = nearestBall(to, shape);
+  precise vec3 before = from - met.centre;
+  precise vec3 after = to - last.centre;
   precise float beforeSquared = dotProduct(before, before);
   precise float afterSquared = dotProduct(after, after);
-  precise float radiusSquared = radius * radius;
+  precise float startSquared = met.radius * met.radius;
+  precise float endSquared = last.radius * last.radius;
   vec3 normal = unit(before, beforeSquared);
-  bool begunInside = beforeSquared <= radiusSquared;
+  bool begunInside = beforeSquared <= startSquared;
   if (!begunInside) {
     precise vec3 path = to - from;
-    if (!entersRound(from, path, radius, halfLength, centre, normal)) {
+    bool entered = false;
+    if (shape.slope == 0.0) {
+      entered = entersCapsule(from, path, shape, met, normal);
+    } else {
+      entered = entersTapered(from, path, shape, met, normal);
+    }
+    if (!entered) {
       return kNoContact;
     }
   }
   // The node leaves along its own normal if that is on the same side, else along the normal at the entry.
   vec3 outwards = unit(after, afterSquared);
   if (dotProduct(normal, outwards) > 0.0) {
-    if (afterSquared < radiusSquared) {
+    if (afterSquared < endSquared) {
       precise float distance = dotProduct(after, outwards);
-      precise float depth = radius - distance;
+      precise float depth = last.radius - distance;
       return Contact(outwards, depth);
     }
     if (begunInside) {
       return kNoContact;
     }
   }
-  precise vec3 beyond = to - centre;
-  precise float depth = radius - dotProduct(normal, beyond);
+  precise vec3 beyond = to - met.centre;
+  precise float depth = met.radius - dotProduct(normal, beyond);
   return Contact(normal, depth);
 }
 

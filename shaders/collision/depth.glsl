@@ -9,10 +9,14 @@
 float depthIn(Collider collider, ColliderFrame frame, vec3 position) {
   precise vec3 offset = position - collider.after;
   precise vec3 p = rotateBack(frame.after, offset);
+#if CLOTHSTREAM_SHAPE_KINDS != 4
+#error "depthIn() does not know all kinds of shapes (measure_solids.comp has those of meshes)"
+#endif
   if (frame.shape.kind == kRoundShape) {
-    precise vec3 out_ = p - onSegment(p.y, halfLengthOf(frame.shape));
+    Ball ball = nearestBall(p, roundOf(frame.shape, 0.0));
+    precise vec3 out_ = p - ball.centre;
     precise float squared = max(dotProduct(out_, out_), 1e-24);
-    precise float depth = radiusOf(frame.shape) - squared * reciprocalSquareRoot(squared);
+    precise float depth = ball.radius - squared * reciprocalSquareRoot(squared);
     return depth;
   }
   bool isBox = frame.shape.kind == kBoxShape;

@@ -164,26 +164,25 @@ std::vector<Figure> figures() {
   const std::vector<Panel> bend{
       {"constraint, without bend", 200, solverOf(model::SolverKind::constraint, false)},
       {"constraint, with bend", 200, solverOf(model::SolverKind::constraint, true)}};
-  return {
-      {11,
-       kShortSteps,
-       {{"mass_spring", 100}, {"mass_spring", 200}, {"mass_spring", 600}},
-       &expectHarderFromLeftToRight},
-      {12, kShortSteps, bend, &checkBendAndStretch},
-      {13,
-       kShortSteps,
-       {{"acad", 100, acad},
-        {"acad", 200, acad},
-        {"acad", 600, acad},
-        {"acad_paper", 100, paper},
-        {"acad_paper", 200, paper},
-        {"acad_paper", 600, paper}},
-       &checkAcadModes},
-      {14, kLongSteps, bend, &checkBend},
-      {15,
-       kLongSteps,
-       {{"mass_spring", 200}, {"acad", 200, acad}, {"acad_paper", 200, paper}},
-       &checkBlowUp}};
+  return {{11,
+           kShortSteps,
+           {{"mass_spring", 100}, {"mass_spring", 200}, {"mass_spring", 600}},
+           &expectHarderFromLeftToRight},
+          {12, kShortSteps, bend, &checkBendAndStretch},
+          {13,
+           kShortSteps,
+           {{"acad", 100, acad},
+            {"acad", 200, acad},
+            {"acad", 600, acad},
+            {"acad_paper", 100, paper},
+            {"acad_paper", 200, paper},
+            {"acad_paper", 600, paper}},
+           &checkAcadModes},
+          {14, kLongSteps, bend, &checkBend},
+          {15,
+           kLongSteps,
+           {{"mass_spring", 200}, {"acad", 200, acad}, {"acad_paper", 200, paper}},
+           &checkBlowUp}};
 }
 
 model::Scene sceneOf(const Figure& figure, const Panel& panel) {

@@ -49,7 +49,7 @@ TEST(Penetration, SphereHasTheDistanceToItsSurface) {
 
 TEST(Penetration, CapsuleFollowsItsSegmentAndOrientation) {
   cs_collider capsule = colliderOf(CS_SHAPE_CAPSULE);
-  capsule.radius = 0.25f;
+  capsule.radius = capsule.top_radius = 0.25f;
   capsule.length = 2;
   EXPECT_DOUBLE_EQ(depthIn(capsule, {0, 0.9, 0}), 0.25);
   EXPECT_NEAR(depthIn(capsule, {0, 1.2, 0}), 0.05, 1e-12);
@@ -57,6 +57,17 @@ TEST(Penetration, CapsuleFollowsItsSegmentAndOrientation) {
   capsule.orientation[2] = capsule.orientation[3] = std::sqrt(0.5f);
   EXPECT_NEAR(depthIn(capsule, {-1.2, 0, 0}), 0.05, 1e-6);
   EXPECT_NEAR(depthIn(capsule, {0, 0.9, 0}), -0.65, 1e-6);
+}
+
+TEST(Penetration, CapsuleMayBeTapered) {
+  cs_collider limb = colliderOf(CS_SHAPE_CAPSULE);
+  limb.radius = 0.5f;
+  limb.top_radius = 1.5f;
+  limb.length = 2;
+  EXPECT_DOUBLE_EQ(depthIn(limb, {0, 2, 0}), 0.5);
+  EXPECT_DOUBLE_EQ(depthIn(limb, {0, -2, 0}), -0.5);
+  // On the mantle, which leans by 30 degrees.
+  EXPECT_NEAR(depthIn(limb, {1.125 * std::sqrt(0.75), 0.25 - 1.125 / 2, 0}), 0, 1e-12);
 }
 
 TEST(Penetration, PlaneIsTheHalfSpaceBelowIt) {

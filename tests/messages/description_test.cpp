@@ -89,7 +89,10 @@ TEST(ColliderStates, HaveTheShapeExceptForHulls) {
   const model::Pose pose{model::Vec3(1, 2, 3), model::Quaternion(0, 0, 1, 0)};
   write(model::Collider{.name = "a", .shape = model::Capsule{.radius = 0.1f, .length = 0.4f}}, pose, state);
   EXPECT_EQ(state.capsule().length(), 0.4f);
+  EXPECT_FALSE(state.capsule().has_top_radius());
   EXPECT_EQ(state.orientation().y(), 1);
+  write(model::Collider{.name = "limb", .shape = model::Capsule{.topRadius = 0.2f}}, pose, state);
+  EXPECT_EQ(state.capsule().top_radius(), 0.2f);
   write(model::Collider{.name = "b", .shape = model::Plane{}}, pose, state);
   EXPECT_TRUE(state.has_plane());
   write(model::Collider{.name = "c", .shape = model::Box{model::Vec3(1, 2, 3)}}, pose, state);

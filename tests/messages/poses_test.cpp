@@ -168,6 +168,7 @@ TEST(ToColliders, AcceptsCapsulesAndBoxes) {
   ASSERT_TRUE(colliders) << colliders.error().text;
   EXPECT_EQ(std::get<model::Capsule>((*colliders)[0].shape).radius, 0.01f);
   EXPECT_EQ(std::get<model::Capsule>((*colliders)[0].shape).length, 0.03f);
+  EXPECT_FALSE(std::get<model::Capsule>((*colliders)[0].shape).topRadius);
   EXPECT_EQ((*colliders)[0].pose.orientation.z(), 1);
   EXPECT_EQ(std::get<model::Box>((*colliders)[1].shape).size, model::Vec3(1, 2, 3));
   message.mutable_colliders(0)->mutable_capsule()->set_length(11);

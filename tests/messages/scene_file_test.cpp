@@ -87,7 +87,7 @@ constexpr const char* kEveryField = R"json({
     }]
   }],
   "colliders": [{
-    "name": "finger", "capsule": {"radius": 0.25, "length": 0.5}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
+    "name": "finger", "capsule": {"radius": 0.25, "length": 0.5, "topRadius": 0.125}, "pose": {"position": {"x": 1, "y": 0, "z": 0},
     "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "friction": 1
   }, {
     "name": "floor", "plane": {}, "pose": {"position": {"x": 1, "y": 0, "z": 0},

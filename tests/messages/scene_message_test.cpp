@@ -464,6 +464,13 @@ const BadScene kBadScenes[] = {
        collider(s).mutable_capsule()->set_radius(1);
        collider(s).mutable_capsule()->set_length(-1);
      }},
+    {"colliders[0].capsule.topRadius = 1.5:",
+     [](v1::Scene& s) {
+       collider(s).mutable_capsule()->set_radius(1);
+       collider(s).mutable_capsule()->set_length(0.5f);
+       collider(s).mutable_capsule()->set_top_radius(1.5f);
+     },
+     "use a sphere"},
     {"colliders[0].box.size.x = 0:", [](v1::Scene& s) { collider(s).mutable_box(); }},
     {"colliders[0].hull.vertices: has 0 elements", [](v1::Scene& s) { collider(s).mutable_hull(); },
      "must have 4 to 128"},

@@ -88,7 +88,30 @@ TEST(ReachOf, ContainsTheShape) {
   EXPECT_EQ(reachOf(Sphere{0.3f}), 0.3f);
   EXPECT_FLOAT_EQ(reachOf(Capsule{.radius = 0.1f, .length = 0.4f}), 0.3f);
   EXPECT_FLOAT_EQ(reachOf(Box{Vec3(2, 4, 4)}), 3);
+  EXPECT_FLOAT_EQ(reachOf(Capsule{.radius = 0.1f, .length = 0.4f, .topRadius = 0.3f}), 0.5f);
   EXPECT_EQ(reachOf(Plane{}), std::numeric_limits<float>::infinity());
+}
+
+TEST(SlopeOf, StaysBelowOne) {
+  EXPECT_EQ(slopeOf({.radius = 0.1f, .length = 0.4f}), 0);
+  EXPECT_FLOAT_EQ(slopeOf({.radius = 0.1f, .length = 0.4f, .topRadius = 0.2f}), 0.25f);
+  EXPECT_FLOAT_EQ(slopeOf({.radius = 0.2f, .length = 0.4f, .topRadius = 0.1f}), -0.25f);
+  // A change of the radius or of the length may leave one end inside the other.
+  EXPECT_EQ(slopeOf({.radius = 0.1f, .length = 0.1f, .topRadius = 0.5f}), kMostSlope);
+  EXPECT_EQ(slopeOf({.radius = 0.1f, .length = 0, .topRadius = 0.5f}), 0);
+}
+
+TEST(Thinned, LeavesNothingDeeperInside) {
+  const Shape shapes[] = {Sphere{0.3f}, Capsule{.radius = 0.3f, .length = 1},
+                          Capsule{.radius = 0.1f, .length = 1, .topRadius = 0.4f}, Box{Vec3(1, 2, 3)}};
+  for (const Shape& shape : shapes) {
+    EXPECT_GT(largestDepth(shape), 0.2f);
+    EXPECT_EQ(largestDepth(thinned(shape, 0.2f)), 0.2f);
+    EXPECT_EQ(largestDepth(thinned(shape, 9)), largestDepth(shape));
+  }
+  const Shape limb = thinned(shapes[2], 0.2f);
+  EXPECT_EQ(std::get<Capsule>(limb).radius, 0.1f);
+  EXPECT_EQ(std::get<Capsule>(limb).topRadius, 0.2f);
 }
 
 }  // namespace

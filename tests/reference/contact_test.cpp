@@ -2,6 +2,7 @@
 // Contact of a moving point with each shape, compared with simple geometry.
 #include "server/reference/contact.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -43,6 +44,35 @@ TEST(ReferenceContact, StaysOnTheSideOfItsStart) {
 TEST(ReferenceContact, MeetsTheEndOfACapsule) {
   // Through the round end, 0.6 off its axis: it enters 0.8 above the end's centre.
   expectContact(touch(kCapsule, Vec3(0.6, 9, 0), Vec3(0.6, -9, 0)), Vec3(0.6, 0.8, 0), 1 - 0.36 + 8.8);
+}
+
+const model::Shape kLimb = model::Capsule{.radius = 0.5f, .length = 2, .topRadius = 1.5f};
+
+// A point is as far from the convex hull of two balls as from the nearest of the balls between them.
+TEST(ReferenceContact, IsTheHullOfTwoBalls) {
+  for (const double x : {0.0, 0.3, 1.0, 2.5})
+    for (double y = -3; y <= 4; y += 0.25) {
+      double nearest = INFINITY;
+      for (int k = 0; k <= 2000; ++k) {
+        const double t = k / 1000.0;
+        nearest = std::min(nearest, std::hypot(x, y + 1 - t) - (0.5 + 0.5 * t));
+      }
+      const double turn = 0.7 * y;
+      const Vec3 place(x * std::cos(turn), y, x * std::sin(turn));
+      EXPECT_NEAR(heightOver(kLimb, Pose{}, place), nearest, 1e-6) << x << ", " << y;
+    }
+}
+
+TEST(ReferenceContact, MeetsATaperedCapsule) {
+  // The mantle leans by 30 degrees: its normal points down by as much.
+  const Vec3 down(std::sqrt(0.75), -0.5, 0);
+  const Vec3 surface = Vec3(0, 0.25, 0) + 1.125 * down;  // on the ball that is 1.25 above the lower end
+  expectContact(touch(kLimb, surface + down, surface - 0.1 * down), down, 0.1);
+  expectContact(touch(kLimb, surface - 0.1 * down, surface - 0.2 * down), down, 0.2);
+  expectContact(touch(kLimb, Vec3(0, 9, 0), Vec3(0, 2, 0)), Vec3::UnitY(), 0.5);
+  expectContact(touch(kLimb, Vec3(0, -9, 0), Vec3(0, -1, 0)), -Vec3::UnitY(), 0.5);
+  EXPECT_FALSE(touch(kLimb, surface + 0.1 * down + Vec3(0.5, std::sqrt(0.75), 0),
+                     surface + 0.1 * down - Vec3(0.5, std::sqrt(0.75), 0)));
 }
 
 TEST(ReferenceContact, IgnoresAPassingNode) {

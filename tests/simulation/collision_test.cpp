@@ -98,7 +98,8 @@ TEST_F(Collision, AFastThinShapeDoesNotPassThroughTheCloth) {
   cloth.structural = cloth.shear = cloth.bend = {};  // dust: only contacts move a node
   scene.environment.gravity = model::Vec3::Zero();
   const model::Shape shapes[] = {model::Sphere{0.01f}, model::Capsule{.radius = 0.005f, .length = 0.3f},
-                                 model::Box{model::Vec3(0.3f, 0.3f, 0.01f)}, octahedron()};
+                                 model::Box{model::Vec3(0.3f, 0.3f, 0.01f)}, octahedron(),
+                                 model::Capsule{.radius = 0.02f, .length = 0.3f, .topRadius = 0.005f}};
   const float speed = 25, step = speed / 72;
   for (const model::Shape& shape : shapes) {
     Running running(scene);
@@ -137,7 +138,8 @@ TEST_F(Collision, AFastClothDoesNotPassThroughAThinShape) {
   scene.cloths[0].damping = 0;
   scene.environment.gravity = model::Vec3::Zero();
   const model::Shape shapes[] = {model::Box{model::Vec3(1, 1, 0.002f)},
-                                 model::Capsule{.radius = 0.002f, .length = 1}};
+                                 model::Capsule{.radius = 0.002f, .length = 1},
+                                 model::Capsule{.radius = 0.002f, .length = 1, .topRadius = 0.003f}};
   for (const model::Shape& shape : shapes) {
     NodeState state = simulation::restState(scene.cloths);
     for (model::Vec3& velocity : state.velocities) velocity.z() = 30;
@@ -157,6 +159,7 @@ TEST_F(Collision, AFastClothDoesNotPassThroughAThinShape) {
 
 TEST_F(Collision, NodesStayOutsideEveryShapeAndComeToRest) {
   const model::Shape shapes[] = {model::Capsule{.radius = 0.08f, .length = 0.2f},
+                                 model::Capsule{.radius = 0.04f, .length = 0.2f, .topRadius = 0.1f},
                                  model::Box{model::Vec3(0.2f, 0.2f, 0.2f)}, octahedron()};
   for (const model::Shape& shape : shapes) {
     model::Cloth cloth = lyingCloth(21, 21, 0.3f);
@@ -181,7 +184,7 @@ TEST_F(Collision, NodesStayOutsideEveryShapeAndComeToRest) {
     for (const model::Vec3& velocity : running.state().velocities)
       fastest = std::max(fastest, double{velocity.norm()});
     EXPECT_LT(deepest, 2e-6) << "shape " << shape.index();
-    // From the capsule the sheet slides to the floor.
+    // From a capsule the sheet slides to the floor.
     if (!std::holds_alternative<model::Capsule>(shape)) {
       EXPECT_LT(fastest, 0.005) << "shape " << shape.index();
     }

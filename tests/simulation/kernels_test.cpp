@@ -189,7 +189,8 @@ TEST_F(Kernels, TurningShapesCollideAsInTheReference) {
   const model::Pose from{model::Vec3(0.01f, -0.25f, 0.02f), turned(20, model::Vec3(1, 2, 3))};
   const model::Pose to{model::Vec3(0.013f, -0.26f, 0.012f), turned(22, model::Vec3(1, 2.2f, 3))};
   const model::Shape shapes[] = {model::Capsule{.radius = 0.05f, .length = 0.3f}, model::Plane{},
-                                 model::Box{model::Vec3(0.2f, 0.1f, 0.3f)}, octahedron()};
+                                 model::Box{model::Vec3(0.2f, 0.1f, 0.3f)}, octahedron(),
+                                 model::Capsule{.radius = 0.05f, .length = 0.2f, .topRadius = 0.12f}};
   unsigned seed = 20;
   for (const model::Shape& shape : shapes) {
     SCOPED_TRACE(::testing::Message() << "shape " << shape.index());

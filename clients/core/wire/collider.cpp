@@ -50,10 +50,14 @@ bool copyJoints(Bytes bytes, std::vector<float>& joints) {
 bool readRound(Bytes message, Collider& collider) {
   using F = field::Capsule;
   static_assert(field::Sphere::kRadius.tag == F::kRadius.tag);
-  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+  std::optional<float> topRadius;
+  const bool read = readFields(message, [&](std::uint32_t tag, Reader& reader) {
     if (tag == F::kRadius.tag) return setFinite(collider.radius, reader);
+    if (tag == F::kTopRadius.tag) return setFinite(topRadius, reader);
     return tag == F::kLength.tag ? setFinite(collider.length, reader) : skip(reader);
   });
+  collider.topRadius = topRadius.value_or(collider.radius);
+  return read;
 }
 
 bool readBox(Bytes message, Vec3& size) {
@@ -69,7 +73,7 @@ bool readCollider(Bytes message, Collider& collider) {
   collider.position = {};
   collider.orientation = {0, 0, 0, 1};
   collider.shape = CS_SHAPE_HULL;
-  collider.radius = collider.length = 0;
+  collider.radius = collider.length = collider.topRadius = 0;
   collider.size = {};
   collider.hull = collider.mesh = {};
   collider.joints.clear();

@@ -20,7 +20,7 @@ struct Collider {
   Vec3 position{};
   std::array<float, 4> orientation{0, 0, 0, 1};  // x y z w
   cs_shape shape = CS_SHAPE_HULL;
-  float radius = 0, length = 0;
+  float radius = 0, length = 0, topRadius = 0;
   Vec3 size{};
   // Serialised ConvexHull or ColliderMeshDescription, which point into the message; both are empty in frames.
   Bytes hull, mesh;
@@ -41,7 +41,7 @@ struct Hull {
 [[nodiscard]] bool readCollider(Bytes message, Collider& collider);
 [[nodiscard]] std::optional<Hull> readHull(Bytes message);
 [[nodiscard]] std::optional<Hull> readMesh(Bytes message);
-// Reads radius and length of a Sphere or a Capsule. A Sphere is a Capsule without a length.
+// Reads the radii and the length of a Sphere or a Capsule. A Sphere is a Capsule without a length.
 [[nodiscard]] bool readRound(Bytes message, Collider& collider);
 [[nodiscard]] bool readBox(Bytes message, Vec3& size);
 

@@ -224,6 +224,7 @@ struct Sphere {
 struct Capsule {
   static constexpr Field kRadius{1, WireType::kFixed32};
   static constexpr Field kLength{2, WireType::kFixed32};
+  static constexpr Field kTopRadius{3, WireType::kFixed32};
 };
 struct Box {
   static constexpr Field kSize{1, WireType::kBytes};

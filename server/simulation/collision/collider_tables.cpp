@@ -21,25 +21,25 @@ shared::ShapeRecord shapeRecord(const model::Shape& shape, const SolidTables& so
                                 std::vector<vec4>& planes) {
   const auto first = static_cast<float>(firstPlane + planes.size());
   return std::visit(
-      model::ShapeVisitor{[](const model::Sphere& sphere) { return shared::roundShape(sphere.radius, 0); },
-                          [](const model::Capsule& capsule) {
-                            return shared::roundShape(capsule.radius, capsule.length / 2);
-                          },
-                          [&](const model::Plane&) {
-                            planes.push_back({0, 1, 0, 0});
-                            return shared::planesShape(first, 1);
-                          },
-                          [](const model::Box& box) { return shared::boxShape(vectorOf(box.size / 2)); },
-                          [&](const model::Hull& hull) {
-                            for (const model::HalfSpace& plane : hull->planes)
-                              planes.push_back(texel(plane.normal, plane.offset));
-                            return shared::planesShape(first, static_cast<float>(hull->planes.size()));
-                          },
-                          [&](const model::Solid& solid) {
-                            const std::size_t index = solids.indexOf(solid);
-                            return shared::solidShape(static_cast<float>(solids.places[index]),
-                                                      solids.motions[index]);
-                          }},
+      model::ShapeVisitor{
+          [](const model::Sphere& sphere) { return shared::roundShape(sphere.radius, 0, 0); },
+          [](const model::Capsule& capsule) {
+            return shared::roundShape(capsule.radius, capsule.length / 2, model::slopeOf(capsule));
+          },
+          [&](const model::Plane&) {
+            planes.push_back({0, 1, 0, 0});
+            return shared::planesShape(first, 1);
+          },
+          [](const model::Box& box) { return shared::boxShape(vectorOf(box.size / 2)); },
+          [&](const model::Hull& hull) {
+            for (const model::HalfSpace& plane : hull->planes)
+              planes.push_back(texel(plane.normal, plane.offset));
+            return shared::planesShape(first, static_cast<float>(hull->planes.size()));
+          },
+          [&](const model::Solid& solid) {
+            const std::size_t index = solids.indexOf(solid);
+            return shared::solidShape(static_cast<float>(solids.places[index]), solids.motions[index]);
+          }},
       shape);
 }
 

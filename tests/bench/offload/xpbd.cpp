@@ -61,8 +61,8 @@ template <bool kUniform, std::size_t kCount>
   const Lanes inverse = splat(1) / length;
   const Lanes begunAlong = dot(begun, d) * inverse, gain = begunAlong * inverse;
   // A growth of zero adds nothing; so does a spring that is not there.
-  const Lanes side = splat(rule.stretch) * (length - splat(rule.restLength)) +
-                     splat(rule.damping) * (length - begunAlong);
+  const Lanes side =
+      splat(rule.stretch) * (length - splat(rule.restLength)) + splat(rule.damping) * (length - begunAlong);
   // Ends move along the line at the start unless the spring has turned far: shaders/xpbd/pull.glsl.
   const Triple way = select((gain > splat(0.5f)) & (gain < splat(1.5f)), (splat(2) - gain) * begun, d);
   if constexpr (kUniform) {
@@ -221,7 +221,8 @@ class Xpbd final : public Solver {
     // Columns, or rows, 0, 2, 1 in this order.
     constexpr std::size_t kInTurn[] = {0, 2, 1};
 #pragma unroll
-    for (std::size_t k = 0; k < 8; ++k) spring(k % 4 * kSize + k / 4, k % 4 * kSize + k / 4 + 2, rules_.bendRow);
+    for (std::size_t k = 0; k < 8; ++k)
+      spring(k % 4 * kSize + k / 4, k % 4 * kSize + k / 4 + 2, rules_.bendRow);
 #pragma unroll
     for (std::size_t a = 0; a < 8; ++a) spring(a, a + 2 * kSize, rules_.bendColumn);
 #pragma unroll

@@ -10,15 +10,29 @@ const client = { frames: { hull: () => ({ vertices, triangles: Uint32Array.of(0,
 
 function collider(shape: Shape): Collider {
   const orientation = [0, 0, 0, 1] as const;
-  return { index: 0, name: "", shape, position: [9, 9, 9], orientation, radius: 0.5, length: 2, size: [2, 3, 6], participantId: 0n, isHead: false, yields: false };
+  return { index: 0, name: "", shape, position: [9, 9, 9], orientation, radius: 0.5, topRadius: 0.5, length: 2, size: [2, 3, 6], participantId: 0n, isHead: false, yields: false };
 }
 
 test("the reach of a collider is its farthest point, and nothing for a plane", () => {
   assert.equal(reachOf(client, collider(Shape.sphere)), 0.5);
   assert.equal(reachOf(client, collider(Shape.capsule)), 1.5);
+  assert.equal(reachOf(client, { ...collider(Shape.capsule), topRadius: 0.75 }), 1.75);
   assert.equal(reachOf(client, collider(Shape.box)), 3.5);
   assert.equal(reachOf(client, collider(Shape.hull)), 5);
   assert.equal(reachOf(client, collider(Shape.plane)), 0);
+});
+
+test("a tapered capsule is drawn as it is", () => {
+  const drawn = new ColliderMeshes();
+  drawn.place(client, [{ ...collider(Shape.capsule), topRadius: 1 }]);
+  const places = drawn.meshes[0]!.geometry.getAttribute("position").array;
+  for (let i = 0; i < places.length; i += 3) {
+    const away = Math.hypot(places[i]!, places[i + 2]!), y = places[i + 1]!;
+    // The nearest ball: the radius grows by 0.25 for each metre, in the drawing by 0.985 times as much.
+    const slope = 0.985 * 0.25, lean = slope / Math.sqrt(1 - slope * slope);
+    const centre = Math.min(Math.max(y + lean * away, -1), 1);
+    assert.closeTo(Math.hypot(away, y - centre), 0.985 * 0.5 + slope * (centre + 1), 1e-6);
+  }
 });
 
 test("the drawn vertices of a small mesh follow its joints", () => {

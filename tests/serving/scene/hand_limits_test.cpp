@@ -74,14 +74,14 @@ TEST_F(HandLimits, HandsAndHeadsAppearWholeAndBodiesSoon) {
     collider.shape = shape;
     ++collider.id;
     place(collider);
-    for (int i = 0; i < 3 && leastRadius(shape) > kMaxAppearance; ++i) place(collider);
-    EXPECT_EQ(leastRadius(moving.back().shape), leastRadius(shape));
-    EXPECT_EQ(largestRadius(moving.back().shape), largestRadius(shape));
+    for (int i = 0; i < 3 && model::largestDepth(shape) > kMaxAppearance; ++i) place(collider);
+    EXPECT_EQ(model::largestDepth(moving.back().shape), model::largestDepth(shape));
+    EXPECT_EQ(model::reachOf(moving.back().shape), model::reachOf(shape));
   }
 }
 
 TEST_F(HandLimits, ABoxIsThinnedAlongItsThinnestSide) {
-  const model::Shape thin = thinned(model::Box{Vec3(3, 1, 2)}, 0.25f);
+  const model::Shape thin = model::thinned(model::Box{Vec3(3, 1, 2)}, 0.25f);
   EXPECT_EQ(std::get<model::Box>(thin).size, Vec3(3, 0.5f, 2));
 }
 

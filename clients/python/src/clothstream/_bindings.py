@@ -203,6 +203,7 @@ class cs_collider(c.Structure):
         ("size", c.c_float * 3),
         ("yields", c.c_int32),
         ("participant_id", c.c_uint64),
+        ("top_radius", c.c_float),
     ]
 
 
@@ -525,6 +526,7 @@ class cs_recorded_collider(c.Structure):
         ("radius", c.c_float),
         ("length", c.c_float),
         ("size", c.c_float * 3),
+        ("top_radius", c.c_float),
     ]
 
 

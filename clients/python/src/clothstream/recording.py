@@ -73,6 +73,7 @@ class RecordedCollider:
     radius: float  # m
     length: float  # m
     size: Vec3  # m
+    top_radius: float  # m; as in Collider
 
 
 @dataclasses.dataclass(frozen=True)

@@ -47,7 +47,7 @@ class Shape(enum.IntEnum):
     """Shape of a collider, in its own frame."""
 
     SPHERE = b.CS_SHAPE_SPHERE  # radius
-    CAPSULE = b.CS_SHAPE_CAPSULE  # radius; length of the segment along Y, centred on the origin
+    CAPSULE = b.CS_SHAPE_CAPSULE  # radius, top_radius; length of the segment along Y, centred on the origin
     PLANE = b.CS_SHAPE_PLANE  # the half-space y <= 0
     BOX = b.CS_SHAPE_BOX  # size, centred on the origin
     HULL = b.CS_SHAPE_HULL
@@ -84,6 +84,7 @@ class Collider:
     size: Vec3  # m
     yields: int  # 1: it is not where its participant put it, because the cloth there has no room to give way
     participant_id: int  # 0: the scene
+    top_radius: float  # m; of a capsule: radius of its end at +Y, else the same as radius
 
 
 @dataclasses.dataclass(frozen=True)

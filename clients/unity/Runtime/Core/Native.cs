@@ -200,7 +200,7 @@ namespace ClothStream.Core
         [FieldOffset(12)] public uint indexCount;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 72)]
+    [StructLayout(LayoutKind.Explicit, Size = 80)]
     public unsafe struct Collider
     {
         [FieldOffset(0)] public byte* name;
@@ -212,6 +212,7 @@ namespace ClothStream.Core
         [FieldOffset(48)] public fixed float size[3];
         [FieldOffset(60)] public int yields;
         [FieldOffset(64)] public ulong participantId;
+        [FieldOffset(72)] public float topRadius;
     }
 
     [StructLayout(LayoutKind.Explicit, Size = 40)]

@@ -73,7 +73,7 @@ export const cs_submesh = {
   index_count: 8,
 } as const;
 export const cs_collider = {
-  sizeof: 72,
+  sizeof: 80,
   name: 0,
   shape: 4,
   position: 8,
@@ -83,6 +83,7 @@ export const cs_collider = {
   size: 44,
   yields: 56,
   participant_id: 64,
+  top_radius: 72,
 } as const;
 export const cs_play_out_options = {
   sizeof: 40,
@@ -335,7 +336,7 @@ export const cs_recorded_pose = {
   orientation: 12,
 } as const;
 export const cs_recorded_collider = {
-  sizeof: 96,
+  sizeof: 104,
   participant_id: 0,
   id: 8,
   shape: 12,
@@ -345,6 +346,7 @@ export const cs_recorded_collider = {
   radius: 76,
   length: 80,
   size: 84,
+  top_radius: 96,
 } as const;
 export const cs_recorded_grab = {
   sizeof: 76,

@@ -94,6 +94,7 @@ export interface RecordedCollider {
   end: RecordedPose;
   friction: number;
   radius: number;
+  topRadius: number; // as of Collider
   length: number;
   size: Vec3;
 }
@@ -359,6 +360,7 @@ function readCollider(view: DataView, at: number): RecordedCollider {
     end: readPose(view, at + cs_recorded_collider.end),
     friction: view.getFloat32(at + cs_recorded_collider.friction, true),
     radius: view.getFloat32(at + cs_recorded_collider.radius, true),
+    topRadius: view.getFloat32(at + cs_recorded_collider.top_radius, true),
     length: view.getFloat32(at + cs_recorded_collider.length, true),
     size: vec3(view, at + cs_recorded_collider.size),
   };

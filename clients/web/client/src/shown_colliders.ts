@@ -28,6 +28,7 @@ export function readCollider(handle: CoreHandle, view: DataView, at: number, ind
     position: vec3(view, at + cs_collider.position),
     orientation: readFloats(view, at + cs_collider.orientation, [0, 0, 0, 0]),
     radius: view.getFloat32(at + cs_collider.radius, true),
+    topRadius: view.getFloat32(at + cs_collider.top_radius, true),
     length: view.getFloat32(at + cs_collider.length, true),
     size: vec3(view, at + cs_collider.size),
     participantId,
@@ -71,6 +72,7 @@ export class ShownColliders {
     readFloats(view, at + cs_collider.position, collider.position);
     readFloats(view, at + cs_collider.orientation, collider.orientation);
     collider.radius = view.getFloat32(at + cs_collider.radius, true);
+    collider.topRadius = view.getFloat32(at + cs_collider.top_radius, true);
     collider.length = view.getFloat32(at + cs_collider.length, true);
     readFloats(view, at + cs_collider.size, collider.size);
     this.updateId(collider, view, at + cs_collider.participant_id);

@@ -110,6 +110,7 @@ export interface Collider {
   position: Vec3;
   orientation: Quaternion;
   radius: number;
+  topRadius: number; // of a capsule: of its end at +Y; else the same as radius
   length: number;
   size: Vec3;
   participantId: bigint; // 0 for a collider of the scene

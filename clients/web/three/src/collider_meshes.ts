@@ -75,7 +75,7 @@ export function reachOf(client: Client, collider: Collider): number {
     case Shape.sphere:
       return collider.radius;
     case Shape.capsule:
-      return collider.radius + collider.length / 2;
+      return Math.max(collider.radius, collider.topRadius) + collider.length / 2;
     case Shape.plane:
       return 0;
     case Shape.box:
@@ -90,10 +90,10 @@ export function reachOf(client: Client, collider: Collider): number {
 }
 
 // Members of a collider that its geometry depends on. The mesh is reused while it stays the same.
-type Look = Pick<Collider, "shape" | "name" | "radius" | "length" | "size">;
+type Look = Pick<Collider, "shape" | "name" | "radius" | "topRadius" | "length" | "size">;
 
-function looksLike(look: Look, { shape, name, radius, length, size }: Collider): boolean {
-  if (look.shape !== shape || look.radius !== radius || look.length !== length) return false;
+function looksLike(look: Look, { shape, name, radius, topRadius, length, size }: Collider): boolean {
+  if (look.shape !== shape || look.radius !== radius || look.topRadius !== topRadius || look.length !== length) return false;
   if (look.size[0] !== size[0] || look.size[1] !== size[1] || look.size[2] !== size[2]) return false;
   return shape !== Shape.hull || look.name === name;
 }
@@ -103,18 +103,19 @@ function makeMesh(client: Client, collider: Collider): ColliderMesh {
   const mesh = new THREE.Mesh(geometryOf(client, collider), material);
   mesh.castShadow = collider.shape !== Shape.plane;
   mesh.receiveShadow = true;
-  const { shape, name, radius, length, size } = collider;
-  mesh.userData["look"] = { shape, name, radius, length, size: [size[0], size[1], size[2]] } satisfies Look;
+  const { shape, name, radius, topRadius, length, size } = collider;
+  mesh.userData["look"] = { shape, name, radius, topRadius, length, size: [size[0], size[1], size[2]] } satisfies Look;
   return mesh;
 }
 
 function geometryOf(client: Client, collider: Collider): THREE.BufferGeometry {
-  const { radius, length, size } = collider;
+  const { radius, topRadius, length, size } = collider;
   switch (collider.shape) {
     case Shape.sphere:
       return new THREE.SphereGeometry(kShrink * radius, 64, 48);
     case Shape.capsule:
-      return new THREE.CapsuleGeometry(kShrink * radius, length, 16, 48);
+      if (topRadius === radius) return new THREE.CapsuleGeometry(kShrink * radius, length, 16, 48);
+      return taperedCapsule(kShrink * radius, kShrink * topRadius, length);
     case Shape.plane:
       // 2 mm lower, as other shapes are smaller. This also avoids flicker with a floor at the same height.
       return new THREE.PlaneGeometry(2 * kPlaneReach, 2 * kPlaneReach).rotateX(-Math.PI / 2).translate(0, -0.002, 0);
@@ -123,6 +124,23 @@ function geometryOf(client: Client, collider: Collider): THREE.BufferGeometry {
     case Shape.hull:
       return hullGeometry(client, collider);
   }
+}
+
+// The convex hull of a ball at the lower end of a segment along Y and another one at its upper end.
+function taperedCapsule(radius: number, topRadius: number, length: number): THREE.LatheGeometry {
+  const kSteps = 16;
+  // Latitude at which the cone touches both balls.
+  const touching = -Math.asin(THREE.MathUtils.clamp((topRadius - radius) / length, -0.99, 0.99));
+  const outline: THREE.Vector2[] = [];
+  const addArc = (radius: number, y: number, from: number, to: number) => {
+    for (let i = 0; i <= kSteps; ++i) {
+      const latitude = from + ((to - from) * i) / kSteps;
+      outline.push(new THREE.Vector2(Math.max(radius * Math.cos(latitude), 0), y + radius * Math.sin(latitude)));
+    }
+  };
+  addArc(radius, -length / 2, -Math.PI / 2, touching);
+  addArc(topRadius, length / 2, touching, Math.PI / 2);
+  return new THREE.LatheGeometry(outline, 48);
 }
 
 // Moves the vertices of a mesh with joints to where they are now.

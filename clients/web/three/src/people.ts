@@ -13,6 +13,7 @@ const kColours = [0x4f9bd9, 0xe08a4a, 0x6fb56a, 0xc779b8, 0xd9c04f, 0x5fc4bd, 0x
 );
 const kVisorColour = new THREE.Color(0x15171c);
 const kYieldColour = new THREE.Color(0xff3b1f);
+const kTaperedBalls = 12; // of a tapered capsule, besides the one at its end
 const kLabelHeight = 0.16; // m above the middle of the head, in addition to its radius
 
 export class People {
@@ -133,7 +134,7 @@ class Figures {
   }
 
   add(collider: Collider, colour: THREE.Color): void {
-    const { shape, radius, length, size } = collider;
+    const { shape, radius, topRadius, length, size } = collider;
     this.place.position.set(...collider.position);
     this.place.quaternion.set(...collider.orientation);
     switch (shape) {
@@ -144,13 +145,16 @@ class Figures {
         this.put(this.boxes, colour, ...size);
         return;
       case Shape.capsule:
-        // A rod and two balls. Neighbouring bones share a joint, so the balls close the gap between them.
-        this.put(this.rods, colour, radius, length, radius);
+        // A rod and two balls. Neighbouring bones share a joint, so the balls close the gap between them. A tapered
+        // capsule has more balls instead of the rod.
+        if (topRadius === radius) this.put(this.rods, colour, radius, length, radius);
         this.end1.set(0, length / 2, 0).applyQuaternion(this.place.quaternion);
         this.place.position.add(this.end1);
-        this.put(this.balls, colour, radius, radius, radius);
-        this.place.position.addScaledVector(this.end1, -2);
-        this.put(this.balls, colour, radius, radius, radius);
+        for (let i = 0, last = topRadius === radius ? 1 : kTaperedBalls; i <= last; ++i) {
+          const ball = topRadius + ((radius - topRadius) * i) / last;
+          this.put(this.balls, colour, ball, ball, ball);
+          this.place.position.addScaledVector(this.end1, -2 / last);
+        }
         return;
       case Shape.plane:
       case Shape.hull:
