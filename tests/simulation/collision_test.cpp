@@ -99,7 +99,7 @@ TEST_F(Collision, AFastThinShapeDoesNotPassThroughTheCloth) {
   scene.environment.gravity = model::Vec3::Zero();
   const model::Shape shapes[] = {model::Sphere{0.01f}, model::Capsule{.radius = 0.005f, .length = 0.3f},
                                  model::Box{model::Vec3(0.3f, 0.3f, 0.01f)}, octahedron(),
-                                 model::Capsule{.radius = 0.02f, .length = 0.3f, .topRadius = 0.005f}};
+                                 model::Capsule{.radius = 0.01f, .length = 0.3f, .topRadius = 0.004f}};
   const float speed = 25, step = speed / 72;
   for (const model::Shape& shape : shapes) {
     Running running(scene);
