@@ -12,7 +12,8 @@ namespace clothstream::schedule {
 // Starts full. Not thread-safe.
 class TokenBucket {
  public:
-  TokenBucket(double perSecond, double burst) : perSecond_(perSecond), burst_(burst), tokens_(burst) {}
+  constexpr TokenBucket(double perSecond, double burst)
+      : perSecond_(perSecond), burst_(burst), tokens_(burst) {}
 
   // Takes `cost` tokens. Returns false, and takes nothing, if there are fewer.
   bool take(Clock::time_point now, double cost = 1) {

@@ -191,9 +191,6 @@ bool Session::joinRemotely(const v1::Hello& message, const messages::Joining& jo
 }
 
 void Session::hello(const v1::Hello& message) {
-  if (scene_ != nullptr)
-    return fail(v1::ERROR_CODE_OUT_OF_ORDER,
-                fmt::format("this stream has joined '{}' already: open another one", scene_->name()));
   v1::Hello request = message;
   if (!identity_->displayName.empty()) request.set_display_name(identity_->displayName);
   messages::Result<messages::Joining> joining = messages::toJoining(request, codec::kCodecs);

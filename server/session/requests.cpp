@@ -1,5 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Requests of a peer.
+// Table of the messages of a peer, and their handlers.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -40,186 +47,314 @@ std::function<void(tl::expected<Response, v1::Error>)> Session::answering(
   };
 }
 
-void Session::dispatch(const v1::ClientMessage& message, Clock::time_point now) {
-  using Body = v1::ClientMessage;
-  const bool needsIdentity = message.body_case() != Body::kAuthenticate && message.body_case() != Body::kPing;
-  if (needsIdentity && !identity_) {
+struct Session::Messages {
+  using Message = v1::ClientMessage;
+
+  enum class State : std::uint8_t {
+    any,  // also before the peer has an identity
+    identified,
+    outside,  // identified, and no Hello before
+    inScene,  // identified, and after Hello
+  };
+
+  struct RateLimit {
+    Rate rate;
+    const char* what;  // name of the messages for people
+  };
+
+  // A message is checked in this order: state, rate, permission. Handlers check what depends on its content.
+  struct Row {
+    Message::BodyCase body;
+    State state;
+    std::optional<RateLimit> limit = {};
+    std::optional<Action> action = {};  // that the peer must be permitted
+    // Scene of the action. Null only for Action::createScene.
+    const std::string& (*sceneOf)(const Message&) = nullptr;
+    void (*handle)(Session&, const Message&);
+  };
+
+  static std::span<const Row> rows() {
+    constexpr RateLimit kScenes{Rate::control, "requests about scenes"};
+    constexpr RateLimit kBans{Rate::control, "requests about bans"};
+    constexpr RateLimit kParticipants{Rate::control, "requests about participants"};
+    constexpr RateLimit kQueries{Rate::queries, "queries"};
+    using Name = const std::string&;
+    static constexpr auto kRows = std::to_array<Row>({
+        {.body = Message::kAuthenticate,
+         .state = State::any,
+         .limit = RateLimit{Rate::control, "tokens"},
+         .handle = authenticate},
+        {.body = Message::kPing,
+         .state = State::any,
+         .limit = RateLimit{Rate::pings, "pings"},
+         .handle = ping},
+        {.body = Message::kHello, .state = State::outside, .handle = hello},
+        {.body = Message::kCreatePairingCode,
+         .state = State::identified,
+         .limit = RateLimit{Rate::control, "requests about pairing"},
+         .handle = createPairingCode},
+        {.body = Message::kListBans,
+         .state = State::identified,
+         .limit = kBans,
+         .action = Action::manageBans,
+         .sceneOf = [](const Message& message) -> Name { return message.list_bans().scene(); },
+         .handle = listBans},
+        {.body = Message::kLiftBan,
+         .state = State::identified,
+         .limit = kBans,
+         .action = Action::manageBans,
+         .sceneOf = [](const Message& message) -> Name { return message.lift_ban().scene(); },
+         .handle = liftBan},
+        {.body = Message::kListScenes, .state = State::identified, .limit = kQueries, .handle = listScenes},
+        {.body = Message::kGetScene, .state = State::identified, .limit = kQueries, .handle = getScene},
+        {.body = Message::kUpload,
+         .state = State::identified,
+         .action = Action::createScene,
+         .handle = upload},
+        {.body = Message::kCreateScene,
+         .state = State::identified,
+         .limit = kScenes,
+         .action = Action::createScene,
+         .handle = createScene},
+        {.body = Message::kDeleteScene,
+         .state = State::identified,
+         .limit = kScenes,
+         .action = Action::deleteScene,
+         .sceneOf = [](const Message& message) -> Name { return message.delete_scene().name(); },
+         .handle = deleteScene},
+        {.body = Message::kControlScene,
+         .state = State::identified,
+         .limit = kScenes,
+         .action = Action::controlScene,
+         .sceneOf = [](const Message& message) -> Name { return message.control_scene().name(); },
+         .handle = controlScene},
+        {.body = Message::kStartRecording,
+         .state = State::identified,
+         .limit = kScenes,
+         .action = Action::recordScene,
+         .sceneOf = [](const Message& message) -> Name { return message.start_recording().scene(); },
+         .handle = startRecording},
+        {.body = Message::kStopRecording,
+         .state = State::identified,
+         .limit = kScenes,
+         .action = Action::recordScene,
+         .sceneOf = [](const Message& message) -> Name { return message.stop_recording().scene(); },
+         .handle = stopRecording},
+        {.body = Message::kColliderPoses,
+         .state = State::inScene,
+         .limit = RateLimit{Rate::poses, "collider poses"},
+         .handle = colliderPoses},
+        {.body = Message::kParameterChange,
+         .state = State::inScene,
+         .limit = RateLimit{Rate::changes, "parameter changes"},
+         .handle = parameterChange},
+        {.body = Message::kSetRole, .state = State::inScene, .limit = kParticipants, .handle = setRole},
+        {.body = Message::kRemoveParticipant,
+         .state = State::inScene,
+         .limit = kParticipants,
+         .handle = removeParticipant},
+        {.body = Message::kFrameAck, .state = State::inScene, .handle = frameAck},
+        // Only some of these take a token: see the handler.
+        {.body = Message::kKeyFrameRequest, .state = State::inScene, .handle = keyFrameRequest},
+    });
+    return kRows;
+  }
+
+  static const Row* find(int body) {
+    const std::span<const Row> all = rows();
+    const auto found =
+        std::ranges::find(all, body, [](const Row& row) { return static_cast<int>(row.body); });
+    return found == all.end() ? nullptr : &*found;
+  }
+
+  static messages::FieldError reason(messages::FieldError error) { return error; }
+  static messages::FieldError reason(const v1::Error& error) { return {error.code(), error.text()}; }
+
+  template <typename Response, typename Error>
+  static void reply(Session& session, tl::expected<Response, Error> result,
+                    Response* (v1::ServerMessage::*body)()) {
+    if (!result) return session.refuse(reason(std::move(result.error())));
+    v1::ServerMessage message;
+    *(message.*body)() = std::move(*result);
+    session.answer(message);
+  }
+
+  static void authenticate(Session& session, const Message& message) {
+    session.authenticate(message.authenticate());
+  }
+
+  static void ping(Session& session, const Message& message) {
+    v1::ServerMessage pong;
+    pong.mutable_pong()->set_client_time_us(message.ping().client_time_us());
+    pong.mutable_pong()->set_server_time_us(schedule::microseconds(session.now_));
+    session.answer(pong);
+  }
+
+  static void hello(Session& session, const Message& message) { session.hello(message.hello()); }
+
+  static void createPairingCode(Session& session, const Message& message) {
+    reply(session,
+          session.server_.createPairingCode(*session.identity_, message.create_pairing_code(), session.now_),
+          &v1::ServerMessage::mutable_create_pairing_code);
+  }
+
+  static void listBans(Session& session, const Message& message) {
+    reply(session, session.server_.listBans(message.list_bans()), &v1::ServerMessage::mutable_list_bans);
+  }
+
+  static void liftBan(Session& session, const Message& message) {
+    reply(session, session.server_.liftBan(message.lift_ban()), &v1::ServerMessage::mutable_lift_ban);
+  }
+
+  static void listScenes(Session& session, const Message& /*message*/) {
+    v1::ServerMessage list;
+    *list.mutable_list_scenes() = session.server_.listScenes(*session.identity_);
+    session.answer(list);
+  }
+
+  static void getScene(Session& session, const Message& message) {
+    hosting::SceneServer::State& server = session.server_;
+    if (const auto permitted = server.mayUse(*session.identity_, message.get_scene().name()); !permitted)
+      return session.refuse(permitted.error());
+    auto found = server.getScene(message.get_scene(), kMaxAnswerBytes);
+    if (!found && found.error().code() == v1::ERROR_CODE_RESOURCE_EXHAUSTED)
+      server.metrics.refuse(telemetry::Refusal::answerSize);
+    reply(session, std::move(found), &v1::ServerMessage::mutable_get_scene);
+  }
+
+  static void upload(Session& session, const Message& message) {
+    session.uploads_ = true;
+    session.refuseUnless(session.upload_.add(message.upload(), session.now_));
+  }
+
+  static void createScene(Session& session, const Message& message) {
+    const v1::CreateSceneRequest& request = message.create_scene();
+    std::optional<hosting::UploadedContent> uploaded;
+    if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
+      messages::Result<hosting::UploadedContent> taken = session.upload_.take(request.uploaded_content_id());
+      if (!taken) return session.refuse(taken.error());
+      uploaded = std::move(*taken);
+    }
+    const auto wanted = [weak = session.weak_from_this()] {
+      const std::shared_ptr<Session> creator = weak.lock();
+      return creator && !creator->mailbox_->closed();
+    };
+    session.refuseUnlessQueued(session.server_.maker.create(
+        request, std::move(uploaded), session.identity_->subject.tenant, wanted,
+        session.answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene)));
+  }
+
+  static void deleteScene(Session& session, const Message& message) {
+    session.refuseUnlessQueued(session.server_.maker.remove(
+        message.delete_scene(),
+        session.answering<v1::DeleteSceneResponse>(&v1::ServerMessage::mutable_delete_scene)));
+  }
+
+  static void controlScene(Session& session, const Message& message) {
+    const v1::ControlSceneRequest& request = message.control_scene();
+    const std::uint64_t by = session.isIn(request.name()) ? session.participant_ : 0;
+    reply(session, session.server_.controlScene(request, by), &v1::ServerMessage::mutable_control_scene);
+  }
+
+  static void startRecording(Session& session, const Message& message) {
+    session.refuseUnlessQueued(session.server_.maker.startRecording(
+        message.start_recording(),
+        session.answering<v1::StartRecordingResponse>(&v1::ServerMessage::mutable_start_recording)));
+  }
+
+  static void stopRecording(Session& session, const Message& message) {
+    session.refuseUnlessQueued(session.server_.maker.stopRecording(
+        message.stop_recording(),
+        session.answering<v1::StopRecordingResponse>(&v1::ServerMessage::mutable_stop_recording)));
+  }
+
+  static void colliderPoses(Session& session, const Message& message) {
+    scene::LiveScene& scene = *session.scene_;
+    if (scene.source) return;  // a played recording has no inputs
+    auto poses = messages::toPoses(message.collider_poses(), scene.start());
+    if (!poses) return session.refuse(poses.error());
+    session.refuseUnless(scene.poses.post(*session.mailbox_, message.collider_poses(), std::move(*poses),
+                                          session.server_.options.participantsMay, session.now_));
+  }
+
+  static void parameterChange(Session& session, const Message& message) {
+    scene::LiveScene& scene = *session.scene_;
+    const v1::ParameterChange& change = message.parameter_change();
+    session.refuseUnless(
+        scene.roster.permits(*session.mailbox_, change, session.server_.options.participantsMay)
+            .and_then([&] {
+              return scene.change(session.participant_, change, scene.roster.roleOf(*session.mailbox_));
+            }));
+  }
+
+  static void setRole(Session& session, const Message& message) {
+    session.refuseUnless(session.scene_->roster.setRole(*session.mailbox_, message.set_role(), session.now_));
+  }
+
+  static void removeParticipant(Session& session, const Message& message) {
+    session.refuseUnless(
+        session.scene_->roster.remove(*session.mailbox_, message.remove_participant(), session.now_));
+  }
+
+  static void frameAck(Session& session, const Message& message) {
+    delivery::Mailbox& mailbox = *session.mailbox_;
+    const std::uint64_t tick = message.frame_ack().tick();
+    const bool awaited = mailbox.awaitsAcknowledgement();
+    // A peer that continues here may acknowledge frames of the server that had the scene before.
+    if (!mailbox.acknowledge(tick, session.now_))
+      return session.continues_
+                 ? void()
+                 : session.refuse(
+                       {v1::ERROR_CODE_INVALID_ARGUMENT,
+                        fmt::format("frame_ack.tick = {}: must be of a frame that was sent", tick)});
+    if (!session.inLockstep() || !awaited || mailbox.awaitsAcknowledgement()) return;
+    // Each frame permits one such acknowledgement, so they need no other limit.
+    session.bucket(Rate::messages).giveBack();
+    session.server_.wake(*session.scene_);
+  }
+
+  static void keyFrameRequest(Session& session, const Message& message) {
+    // A key frame costs all subscribers of its quality. The mailbox limits early requests.
+    if (message.key_frame_request().early()) return session.mailbox_->requestKeyFrame();
+    if (session.mailbox_->isRestarting()) return;
+    // In lockstep the key frame is a recorded one, which costs nothing.
+    if (!session.inLockstep() && !session.allowed(Rate::keyFrames, "key frame requests")) return;
+    session.mailbox_->restart();
+    if (session.inLockstep()) session.server_.wake(*session.scene_);
+  }
+};
+
+bool Session::handles(int body) {
+  return Messages::find(body) != nullptr;
+}
+
+void Session::dispatch(const v1::ClientMessage& message) {
+  using State = Messages::State;
+  const Messages::Row* const row = Messages::find(message.body_case());
+  if (row == nullptr)
+    return refuse(
+        {v1::ERROR_CODE_MALFORMED_MESSAGE, "the message has no body, or one that this server does not know"});
+  if (row->state != State::any && !identity_) {
     server_.metrics.refuse(telemetry::Refusal::token);
     return fail(v1::ERROR_CODE_UNAUTHENTICATED, whyUnknown_);
   }
-  if (manage(message)) return;
-  switch (message.body_case()) {
-    case Body::kHello:
-      return hello(message.hello());
-    case Body::kPing: {
-      if (!allowed(pingRate_, "pings")) return;
-      v1::ServerMessage pong;
-      pong.mutable_pong()->set_client_time_us(message.ping().client_time_us());
-      pong.mutable_pong()->set_server_time_us(schedule::microseconds(now));
-      return answer(pong);
-    }
-    case Body::kListScenes: {
-      if (!allowed(queryRate_, "queries")) return;
-      v1::ServerMessage list;
-      *list.mutable_list_scenes() = server_.listScenes(*identity_);
-      return answer(list);
-    }
-    case Body::kGetScene: {
-      if (!allowed(queryRate_, "queries")) return;
-      if (const auto may = server_.mayUse(*identity_, message.get_scene().name()); !may)
-        return refuse(may.error());
-      auto found = server_.getScene(message.get_scene(), kMaxAnswerBytes);
-      if (!found && found.error().code() == v1::ERROR_CODE_RESOURCE_EXHAUSTED)
-        server_.metrics.refuse(telemetry::Refusal::answerSize);
-      if (!found) return refuse({found.error().code(), found.error().text()});
-      v1::ServerMessage scene;
-      *scene.mutable_get_scene() = std::move(*found);
-      return answer(scene);
-    }
-    case Body::kUpload:
-      if (const auto may = server_.mayCreate(*identity_); !may) return refuse(may.error());
-      uploads_ = true;
-      return refuseUnless(upload_.add(message.upload(), now));
-    case Body::kCreateScene:
-      return create(message.create_scene());
-    case Body::kDeleteScene:
-      if (!allowed(controlRate_, "requests about scenes")) return;
-      if (!actor(message.delete_scene().name(), Action::deleteScene)) return;
-      return refuseUnlessQueued(
-          server_.maker.remove(message.delete_scene(),
-                               answering<v1::DeleteSceneResponse>(&v1::ServerMessage::mutable_delete_scene)));
-    case Body::kControlScene: {
-      if (!allowed(controlRate_, "requests about scenes")) return;
-      const auto participant = actor(message.control_scene().name(), Action::controlScene);
-      if (!participant) return;
-      auto controlled = server_.controlScene(message.control_scene(), *participant);
-      if (!controlled) return refuse({controlled.error().code(), controlled.error().text()});
-      v1::ServerMessage reply;
-      *reply.mutable_control_scene() = std::move(*controlled);
-      return answer(reply);
-    }
-    case Body::kStartRecording:
-      if (!allowed(controlRate_, "requests about scenes")) return;
-      if (!actor(message.start_recording().scene(), Action::recordScene)) return;
-      return refuseUnlessQueued(server_.maker.startRecording(
-          message.start_recording(),
-          answering<v1::StartRecordingResponse>(&v1::ServerMessage::mutable_start_recording)));
-    case Body::kStopRecording:
-      if (!allowed(controlRate_, "requests about scenes")) return;
-      if (!actor(message.stop_recording().scene(), Action::recordScene)) return;
-      return refuseUnlessQueued(server_.maker.stopRecording(
-          message.stop_recording(),
-          answering<v1::StopRecordingResponse>(&v1::ServerMessage::mutable_stop_recording)));
-    default:
-      break;
-  }
-  if (scene_ == nullptr)
+  if (row->state == State::outside && scene_ != nullptr)
+    return fail(v1::ERROR_CODE_OUT_OF_ORDER,
+                fmt::format("this stream has joined '{}' already: open another one", scene_->name()));
+  if (row->state == State::inScene && scene_ == nullptr)
     return fail(v1::ERROR_CODE_OUT_OF_ORDER, "this stream has not joined a scene: send hello first");
-  dispatchInScene(message, now);
-}
-
-void Session::dispatchInScene(const v1::ClientMessage& message, Clock::time_point now) {
-  using Body = v1::ClientMessage;
-  switch (message.body_case()) {
-    case Body::kColliderPoses:
-      if (allowed(poseRate_, "collider poses")) poses(message.collider_poses(), now);
-      return;
-    case Body::kParameterChange:
-      if (!allowed(changeRate_, "parameter changes")) return;
-      return refuseUnless(
-          scene_->roster.permits(*mailbox_, message.parameter_change(), server_.options.participantsMay)
-              .and_then([&] {
-                return scene_->change(participant_, message.parameter_change(),
-                                      scene_->roster.roleOf(*mailbox_));
-              }));
-    case Body::kSetRole:
-      if (!allowed(controlRate_, "requests about participants")) return;
-      return refuseUnless(scene_->roster.setRole(*mailbox_, message.set_role(), now));
-    case Body::kRemoveParticipant:
-      if (!allowed(controlRate_, "requests about participants")) return;
-      return refuseUnless(scene_->roster.remove(*mailbox_, message.remove_participant(), now));
-    case Body::kFrameAck:
-      return acknowledge(message.frame_ack().tick(), now);
-    case Body::kKeyFrameRequest:
-      // A key frame costs all subscribers of its quality. The mailbox limits early requests.
-      if (message.key_frame_request().early()) return mailbox_->requestKeyFrame();
-      if (mailbox_->isRestarting()) return;
-      // In lockstep the key frame is a recorded one, which costs nothing.
-      if (!inLockstep() && !allowed(keyFrameRate_, "key frame requests")) return;
-      mailbox_->restart();
-      if (inLockstep()) server_.wake(*scene_);
-      return;
-    default:
-      return refuse({v1::ERROR_CODE_MALFORMED_MESSAGE,
-                     "the message has no body, or one that this server does not know"});
+  if (row->limit && !allowed(row->limit->rate, row->limit->what)) return;
+  if (row->action) {
+    const messages::Result<void> permitted = *row->action == Action::createScene
+                                                 ? server_.mayCreate(*identity_)
+                                                 : may(*row->action, row->sceneOf(message));
+    if (!permitted) return refuse(permitted.error());
   }
+  row->handle(*this, message);
 }
 
 bool Session::inLockstep() const {
   return scene_->source && scene_->source->inLockstep();
-}
-
-void Session::acknowledge(std::uint64_t tick, Clock::time_point now) {
-  const bool awaited = mailbox_->awaitsAcknowledgement();
-  // A peer that continues here may acknowledge frames of the server that had the scene before.
-  if (!mailbox_->acknowledge(tick, now))
-    return continues_ ? void()
-                      : refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
-                                fmt::format("frame_ack.tick = {}: must be of a frame that was sent", tick)});
-  if (!inLockstep() || !awaited || mailbox_->awaitsAcknowledgement()) return;
-  // Each frame permits one such acknowledgement, so they need no other limit.
-  messageRate_.giveBack();
-  server_.wake(*scene_);
-}
-
-bool Session::manage(const v1::ClientMessage& message) {
-  using Body = v1::ClientMessage;
-  const auto reply = [this](auto&& result, auto* (v1::ServerMessage::*body)()) {
-    if (!result) return refuse(result.error());
-    v1::ServerMessage answered;
-    *(answered.*body)() = std::move(*result);
-    answer(answered);
-  };
-  switch (message.body_case()) {
-    case Body::kAuthenticate:
-      if (allowed(controlRate_, "tokens")) authenticate(message.authenticate());
-      return true;
-    case Body::kCreatePairingCode:
-      if (allowed(controlRate_, "requests about pairing"))
-        reply(server_.createPairingCode(*identity_, message.create_pairing_code(), now_),
-              &v1::ServerMessage::mutable_create_pairing_code);
-      return true;
-    case Body::kListBans:
-      if (allowed(controlRate_, "requests about bans") &&
-          actor(message.list_bans().scene(), Action::manageBans))
-        reply(server_.listBans(message.list_bans()), &v1::ServerMessage::mutable_list_bans);
-      return true;
-    case Body::kLiftBan:
-      if (allowed(controlRate_, "requests about bans") &&
-          actor(message.lift_ban().scene(), Action::manageBans))
-        reply(server_.liftBan(message.lift_ban()), &v1::ServerMessage::mutable_lift_ban);
-      return true;
-    default:
-      return false;
-  }
-}
-
-void Session::create(const v1::CreateSceneRequest& request) {
-  if (!allowed(controlRate_, "requests about scenes")) return;
-  if (const auto may = server_.mayCreate(*identity_); !may) return refuse(may.error());
-  std::optional<hosting::UploadedContent> uploaded;
-  if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
-    messages::Result<hosting::UploadedContent> taken = upload_.take(request.uploaded_content_id());
-    if (!taken) return refuse(taken.error());
-    uploaded = std::move(*taken);
-  }
-  const auto wanted = [weak = weak_from_this()] {
-    const std::shared_ptr<Session> session = weak.lock();
-    return session && !session->mailbox_->closed();
-  };
-  refuseUnlessQueued(
-      server_.maker.create(request, std::move(uploaded), identity_->subject.tenant, wanted,
-                           answering<v1::CreateSceneResponse>(&v1::ServerMessage::mutable_create_scene)));
 }
 
 void Session::refuseUnlessQueued(const tl::expected<void, v1::Error>& queued) {
@@ -228,22 +363,13 @@ void Session::refuseUnlessQueued(const tl::expected<void, v1::Error>& queued) {
   refuse({queued.error().code(), queued.error().text()});
 }
 
-void Session::poses(const v1::ColliderPoses& message, Clock::time_point now) {
-  if (scene_->source) return;  // a played recording has no inputs
-  auto poses = messages::toPoses(message, scene_->start());
-  if (!poses) return refuse(poses.error());
-  refuseUnless(
-      scene_->poses.post(*mailbox_, message, std::move(*poses), server_.options.participantsMay, now));
+bool Session::isIn(const std::string& name) const {
+  return scene_ != nullptr && server_.find(name) == scene_;
 }
 
-std::optional<std::uint64_t> Session::actor(const std::string& name, Action action) {
-  const bool inside = scene_ != nullptr && server_.find(name) == scene_;
-  const messages::Result<void> may =
-      inside ? scene_->roster.permits(*mailbox_, action, server_.options.participantsMay)
-             : server_.mayFromOutside(*identity_, name, action);
-  if (may) return inside ? participant_ : 0;
-  refuse(may.error());
-  return std::nullopt;
+messages::Result<void> Session::may(Action action, const std::string& name) const {
+  return isIn(name) ? scene_->roster.permits(*mailbox_, action, server_.options.participantsMay)
+                    : server_.mayFromOutside(*identity_, name, action);
 }
 
 }  // namespace clothstream::session

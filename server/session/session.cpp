@@ -90,18 +90,18 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point sent) 
                                   list.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
                                   list.has_list_scenes()) {
         requestId_ = list.request_id();
-        return dispatch(list, now);
+        return dispatch(list);
       }
       if (!remote->send(bytes))
         cutOff(telemetry::Refusal::unreadAnswers,
                "the server that simulates the scene does not answer: join again");
       return;
     }
-    if (!allowed(messageRate_, "messages")) return;
+    if (!allowed(Rate::messages, "messages")) return;
     const messages::Result<v1::ClientMessage> message = messages::parseClientMessage(bytes);
     if (!message) return refuse(message.error(), kMalformedCost);
     requestId_ = message->request_id();
-    dispatch(*message, now);
+    dispatch(*message);
   } catch (const std::exception& failure) {
     // This ends neither the endpoint's thread nor other sessions.
     spdlog::error("{}: a message failed: {}", peer_, failure.what());
@@ -128,11 +128,11 @@ void Session::refuse(const messages::FieldError& reason, double cost) {
   (scene_ != nullptr ? scene_->metrics.rejectedMessages : server_.metrics.rejectedMessages).add();
   if (reason.limit) server_.metrics.refuse(*reason.limit);
   spdlog::debug("{}: refused: {}", peer_, reason.text);
-  if (!offences_.take(now_, cost)) {
+  if (!bucket(Rate::offences).take(now_, cost)) {
     server_.metrics.droppedConnections.add();
     return fail(reason.code, "too many refused messages; the last one: " + reason.text);
   }
-  if (!errorRate_.take(now_)) return;
+  if (!bucket(Rate::errors).take(now_)) return;
   v1::ServerMessage message;
   message.mutable_error()->set_code(reason.code);
   message.mutable_error()->set_text(reason.text);
@@ -145,8 +145,8 @@ void Session::fail(v1::ErrorCode code, std::string text, std::string server) {
               DisconnectReason::removed);
 }
 
-bool Session::allowed(schedule::TokenBucket& bucket, const char* what) {
-  if (bucket.take(sent_)) return true;
+bool Session::allowed(Rate rate, const char* what) {
+  if (bucket(rate).take(sent_)) return true;
   refuse({v1::ERROR_CODE_RATE_LIMITED, fmt::format("too many {}: this one was ignored", what),
           telemetry::Refusal::messageRate});
   return false;

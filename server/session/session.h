@@ -2,6 +2,7 @@
 // One peer of the server: serialised ClientMessages in, serialised ServerMessages out.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -24,6 +25,7 @@
 #include "server/scene/roster.h"
 #include "server/schedule/clock.h"
 #include "server/schedule/token_bucket.h"
+#include "server/session/rates.h"
 #include "server/session/upload.h"
 
 namespace clothstream::delivery {
@@ -97,10 +99,15 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // deleted.
   bool finished() const;
 
+  // Returns whether the body of ClientMessage with this field number has a row in the table of messages.
+  static bool handles(int body);
+
   void close(delivery::SharedBytes last) override;
   void checkSilence(Clock::time_point now) override;
 
  private:
+  struct Messages;  // the table of messages and its handlers: requests.cpp
+
   Session(hosting::SceneServer::State& server, Arrival arrival, std::function<void()> wake);
   void end();
   std::shared_ptr<scene::RemoteSession> remote() const;
@@ -108,14 +115,11 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void identify(const std::string& token);
 
   // All following functions need the lock.
-  void dispatch(const v1::ClientMessage& message, Clock::time_point now);
-  // Handles the messages of a peer that has joined a scene.
-  void dispatchInScene(const v1::ClientMessage& message, Clock::time_point now);
+  // Checks and handles a message as its row in the table says.
+  void dispatch(const v1::ClientMessage& message);
   void authenticate(const v1::AuthenticateRequest& request);
   // Sets the identity and counts the connection. Returns false, and ends the session, if there are too many.
   bool become(identity::Identity identity);
-  // Handles requests about identities and bans. Returns false for other messages.
-  bool manage(const v1::ClientMessage& message);
   // Rights that the identity has in this scene.
   scene::Rights rightsIn(const scene::LiveScene& scene) const;
   void hello(const v1::Hello& message);
@@ -132,9 +136,6 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Sends what a peer that joins must know besides the description: pause, work, playback, recording.
   void tellPresentState(scene::LiveScene& scene);
   bool inLockstep() const;
-  void acknowledge(std::uint64_t tick, Clock::time_point now);
-  void poses(const v1::ColliderPoses& message, Clock::time_point now);
-  void create(const v1::CreateSceneRequest& request);
   // Returns a function that answers the current message when its result is known.
   template <typename Response>
   std::function<void(tl::expected<Response, v1::Error>)> answering(Response* (v1::ServerMessage::*body)());
@@ -145,11 +146,12 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void refuseUnlessQueued(const tl::expected<void, v1::Error>& queued);
   // `server`: another one that has the scene.
   void fail(v1::ErrorCode code, std::string text, std::string server = {});
+  TokenBucket& bucket(Rate rate) { return rates_[static_cast<std::size_t>(rate)]; }
   // Takes a token, or refuses the message.
-  bool allowed(TokenBucket& bucket, const char* what);
-  // Checks whether this peer may do this to the scene of this name. Returns its participant number there, 0
-  // if it is outside the scene, or nothing if the request was refused.
-  std::optional<std::uint64_t> actor(const std::string& scene, scene::Action action);
+  bool allowed(Rate rate, const char* what);
+  bool isIn(const std::string& scene) const;
+  // Returns whether this peer may do this to the scene of this name, from inside or outside.
+  messages::Result<void> may(scene::Action action, const std::string& scene) const;
   enum class DisconnectReason : std::uint8_t { left, removed, lost, pageClosed };
   void disconnect(DisconnectReason reason);
   // Ends a connection that was too slow or silent.
@@ -183,16 +185,8 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   Clock::time_point now_{};
   Clock::time_point sent_{};  // of the newest message; only grows
 
-  TokenBucket poseRate_{480, 120};
-  TokenBucket changeRate_{60, 30};
-  TokenBucket keyFrameRate_{1, 3};
-  TokenBucket pingRate_{20, 150};  // clients send many pings at the start
-  TokenBucket queryRate_{20, 20};
-  TokenBucket controlRate_{10, 10};
-  TokenBucket messageRate_{1000, 500};  // messages of all kinds
-  TokenBucket offences_{100, 500};
-  TokenBucket readRate_;           // bytes
-  TokenBucket errorRate_{50, 50};  // Error messages; further refusals are only counted
+  std::array<TokenBucket, kFullBuckets.size()> rates_ = kFullBuckets;
+  TokenBucket readRate_;  // bytes
 };
 
 }  // namespace clothstream::session

@@ -3,10 +3,13 @@
 #include <limits>
 
 #include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
 
+#include "clothstream/v1/session.pb.h"
 #include "server/messages/limits.h"
 #include "server/scene/frame_schedule.h"
+#include "server/session/session.h"
 #include "tests/serving/server_test.h"
 
 namespace clothstream::session {
@@ -50,6 +53,15 @@ class MisbehaviourTest : public tests::ServerTest {
 
   std::unique_ptr<TestPeer> bystander, culprit;
 };
+
+TEST(Messages, EachHasAHandler) {
+  const google::protobuf::OneofDescriptor* const bodies =
+      v1::ClientMessage::descriptor()->FindOneofByName("body");
+  ASSERT_NE(bodies, nullptr);
+  for (int i = 0; i < bodies->field_count(); ++i)
+    EXPECT_TRUE(Session::handles(bodies->field(i)->number())) << bodies->field(i)->name();
+  EXPECT_FALSE(Session::handles(v1::ClientMessage::BODY_NOT_SET));
+}
 
 TEST_F(MisbehaviourTest, GarbageIsRefusedThenDisconnected) {
   culprit->join();
