@@ -6,6 +6,7 @@
 #include <array>
 #include <cassert>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -110,14 +111,10 @@ struct Stages {
   // In their order. Attachments carry nodes before CollisionStage lists the colliders near them, and joints
   // move before it reads the reach of their meshes.
   std::vector<Stage*> list() {
-    const auto [solves, assembled, xpbd] = solvers.afterForces();
-    std::vector<Stage*> all{coarse.get(),      solvers.bending(),
-                            &forces,           solves,
-                            assembled,         xpbd,
-                            attachments.get(), selfCollision.get(),
-                            skins.get(),       solids.get(),
-                            &collision,        motionBound.get(),
-                            &masses,           &hash};
+    std::vector<Stage*> all{coarse.get(), solvers.bending(), &forces};
+    std::ranges::copy(solvers.afterForces(), std::back_inserter(all));
+    all.insert(all.end(), {attachments.get(), selfCollision.get(), skins.get(), solids.get(), &collision,
+                           motionBound.get(), &masses, &hash});
     std::erase(all, nullptr);
     return all;
   }
@@ -263,7 +260,8 @@ void ClothSimulation::Pipeline::recordSubsteps(vulkan::Recorder& recorder, const
 void ClothSimulation::Pipeline::recordEnd(vulkan::Recorder& recorder, const Tick& tick) {
   recorder.beginStage("hash");
   recorder.barrier();
-  for (Stage* stage : order) stage->recordEnd(recorder, tick, present, lastPush());
+  const shared::CollisionPush push = lastPush();
+  for (Stage* stage : order) stage->recordEnd(recorder, tick, present, push);
   recorder.barrier();
   for (Stage* stage : order) stage->recordReport(recorder, tick);
 }
@@ -355,7 +353,7 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
 }
 
 std::vector<ContactStatus> ClothSimulation::contacts() const {
-  return pipeline_->stages.collision.contacts();
+  return pipeline_->stages.collision.contacts(pipeline_->slot);
 }
 
 std::vector<float> ClothSimulation::depths() const {
@@ -367,7 +365,7 @@ std::vector<float> ClothSimulation::depths() const {
 std::vector<GrabStatus> ClothSimulation::grabs() const {
   std::vector<GrabStatus> grabs;
   if (pipeline_->stages.attachments)
-    for (const shared::GrabReport& report : pipeline_->stages.attachments->report())
+    for (const shared::GrabReport& report : pipeline_->stages.attachments->report(pipeline_->slot))
       grabs.push_back(statusOf(report));
   return grabs;
 }

@@ -12,10 +12,9 @@
 #include <vector>
 
 #include "server/model/scene.h"
-#include "server/simulation/assembled/assembled_stage.h"
 #include "server/simulation/bending/bending_stage.h"
 #include "server/simulation/solve_stage.h"
-#include "server/simulation/xpbd_stage.h"
+#include "server/simulation/solver_stage.h"
 
 namespace clothstream::simulation {
 
@@ -28,11 +27,10 @@ inline bool sameTables(const model::Solver& a, const model::Solver& b) {
 
 // Everything on the device that follows from the solvers of the cloths.
 struct SolverStages {
-  std::vector<model::Solver> solvers;            // of the cloths
-  std::shared_ptr<SolveStage::Systems> systems;  // null if there are none
-  std::unique_ptr<XpbdStage> xpbd;               // null if no cloth uses it
-  std::unique_ptr<AssembledStage> assembled;     // null if no cloth uses it
-  std::uint64_t bytes = 0;                       // of their buffers
+  std::vector<model::Solver> solvers;                // of the cloths
+  std::shared_ptr<SolveStage::Systems> systems;      // null if there are none
+  std::vector<std::unique_ptr<SolverStage>> others;  // that the cloths use, in the order in which they act
+  std::uint64_t bytes = 0;                           // of their buffers
 };
 
 // Stages that cloths will need (ClothSimulation::makeStages). Each is absent if they need no new one.

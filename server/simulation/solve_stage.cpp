@@ -319,9 +319,9 @@ std::shared_ptr<SolveStage::Systems> SolveStage::makeSystems(std::span<const mod
   return tables.systems.empty() ? nullptr : std::make_shared<Systems>(device_, tables, state_, *kernels_);
 }
 
-std::shared_ptr<SolveStage::Systems> SolveStage::exchange(std::shared_ptr<Systems> systems) {
+void SolveStage::use(std::shared_ptr<Systems> systems) {
   outdate();
-  return std::exchange(systems_, std::move(systems));
+  systems_ = std::move(systems);
 }
 
 void SolveStage::recordTables(vulkan::Recorder& recorder) {

@@ -12,7 +12,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/solve_tables.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/solver_stage.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
@@ -24,7 +24,7 @@ namespace clothstream::simulation {
 // nodes by h times that change and lets them collide. Several workgroups solve a large cloth, with one or two
 // dispatches per iteration; these are empty after all systems have converged. The bits are those of a solve
 // by one workgroup.
-class SolveStage final : public Stage {
+class SolveStage final : public SolverStage {
  public:
   // Starts without systems. `workgroupSize` 0 and `wholeNodes` absent (nodes of the largest cloth that one
   // workgroup solves) mean the measured best for the device.
@@ -37,18 +37,17 @@ class SolveStage final : public Stage {
   // Makes the systems of these cloths; null if there are none. Kernels are kept. Throws std::runtime_error
   // and changes nothing if the device cannot take the systems.
   std::shared_ptr<Systems> makeSystems(std::span<const model::Cloth> cloths);
-  // Makes them current, and returns the former ones. No work of this stage may be in flight.
-  std::shared_ptr<Systems> exchange(std::shared_ptr<Systems> systems);
+  // Makes them current. No work of this stage may be in flight.
+  void use(std::shared_ptr<Systems> systems);
   // True if there is a system.
   bool active() const { return systems_ != nullptr; }
 
   // Corrects the free motion in place.
   void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
 
-  // Copies the records of the tick's last substep to the CPU, one per system; report() has them once the
-  // recording is complete.
   void recordReport(vulkan::Recorder& recorder, const Tick& tick) override;
-  std::span<const shared::SolveRecord> report() const;
+  std::span<const shared::SolveRecord> report() const override;
+  std::span<const std::uint32_t> cloths() const override;
 
   // Marks the springs that ACAD held in the last recorded substep, if a cloth has it. Begins with a barrier.
   // There must be a system.
@@ -59,9 +58,6 @@ class SolveStage final : public Stage {
   // Workgroups that look for stretched springs of the grids that follow these forces; 0 unless `follow` is a
   // mode of acad.
   std::uint32_t stretchGroups(Follow follow) const;
-
-  // The cloth of each system.
-  std::span<const std::uint32_t> cloths() const;
 
  private:
   struct Kernels;

@@ -6,6 +6,9 @@
 #include <iterator>
 #include <utility>
 
+#include "server/simulation/assembled/assembled_stage.h"
+#include "server/simulation/xpbd_stage.h"
+
 namespace clothstream::simulation {
 namespace {
 
@@ -14,6 +17,30 @@ std::vector<model::Solver> solversOf(std::span<const model::Cloth> cloths) {
   for (const model::Cloth& cloth : cloths) solvers.push_back(cloth.solver);
   return solvers;
 }
+
+// What the stage of a solver is made of.
+struct Ingredients {
+  const vulkan::Device& device;
+  std::span<const model::Cloth> cloths;
+  const StateBuffers& state;
+  const SolverSizes& sizes;
+};
+
+std::unique_ptr<SolverStage> makeAssembled(const Ingredients& of) {
+  if (!AssembledStage::isIn(of.cloths)) return nullptr;
+  return std::make_unique<AssembledStage>(of.device, of.cloths, of.state, of.sizes.askedWorkgroup,
+                                          of.sizes.solveWholeNodes);
+}
+
+std::unique_ptr<SolverStage> makeXpbd(const Ingredients& of) {
+  if (!XpbdStage::isIn(of.cloths)) return nullptr;
+  return std::make_unique<XpbdStage>(of.device, of.cloths, of.state, of.sizes.askedWorkgroup,
+                                     of.sizes.xpbdWholeNodes);
+}
+
+// Every solver besides those of SolveStage, in the order in which their stages act. Each function returns
+// null if no cloth has the solver.
+constexpr std::unique_ptr<SolverStage> (*kMakers[])(const Ingredients&) = {makeAssembled, makeXpbd};
 
 }  // namespace
 
@@ -48,26 +75,26 @@ SolverStages Solvers::makeSolvers(std::span<const model::Cloth> cloths) {
   SolverStages stages;
   stages.solvers = solversOf(cloths);
   stages.systems = solves_.makeSystems(cloths);
-  if (XpbdStage::isIn(cloths))
-    stages.xpbd =
-        std::make_unique<XpbdStage>(device_, cloths, state_, sizes_.askedWorkgroup, sizes_.xpbdWholeNodes);
-  if (AssembledStage::isIn(cloths))
-    stages.assembled = std::make_unique<AssembledStage>(device_, cloths, state_, sizes_.askedWorkgroup,
-                                                        sizes_.solveWholeNodes);
+  for (const auto maker : kMakers)
+    if (std::unique_ptr<SolverStage> stage = maker({device_, cloths, state_, sizes_}))
+      stages.others.push_back(std::move(stage));
   stages.bytes = vulkan::Buffer::bytesOfThread() - before;
   return stages;
 }
 
 SolverStages Solvers::exchange(SolverStages next) {
-  return {.solvers = std::exchange(solvers_, std::move(next.solvers)),
-          .systems = solves_.exchange(std::move(next.systems)),
-          .xpbd = std::exchange(xpbd_, std::move(next.xpbd)),
-          .assembled = std::exchange(assembled_, std::move(next.assembled)),
-          .bytes = std::exchange(bytes_, next.bytes)};
+  solves_.use(next.systems);
+  return std::exchange(present_, std::move(next));
+}
+
+std::vector<SolverStage*> Solvers::afterForces() {
+  std::vector<SolverStage*> stages{&solves_};
+  for (const auto& stage : present_.others) stages.push_back(stage.get());
+  return stages;
 }
 
 bool Solvers::needsSolvers(std::span<const model::Solver> wanted) const {
-  const bool has = haveSameTables(wanted, solvers_) || kept_.has(wanted) ||
+  const bool has = haveSameTables(wanted, present_.solvers) || kept_.has(wanted) ||
                    (taken_ && taken_->solvers && haveSameTables(wanted, taken_->solvers->solvers));
   return !has;
 }
@@ -100,7 +127,7 @@ bool Solvers::set(std::span<const model::Cloth> cloths) {
   const std::vector<model::Cloth> bent = bendingCloths(cloths);
   const bool takes = !bent.empty() && !needsBending(cloths);
   std::unique_ptr<BendingStage> bending = takes ? nullptr : makeBending(bent);
-  const bool changes = !haveSameTables(wanted, solvers_);
+  const bool changes = !haveSameTables(wanted, present_.solvers);
   if (changes) {
     std::optional<SolverStages> next = kept_.take(wanted);
     if (!next && !needsSolvers(wanted)) next = std::exchange(taken_->solvers, std::nullopt);
@@ -121,11 +148,11 @@ bool Solvers::set(std::span<const model::Cloth> cloths) {
 }
 
 void Solvers::prepare(std::span<const shared::ClothRecord> cloths) {
-  if (xpbd_) xpbd_->prepare(cloths);
+  for (SolverStage* stage : afterForces()) stage->prepare(cloths);
 }
 
 void Solvers::addTo(std::span<ClothReport> reports) const {
-  const auto add = [&](const auto& stage) {
+  const auto add = [&](const SolverStage& stage) {
     const std::span<const shared::SolveRecord> solves = stage.report();
     for (std::size_t i = 0; i < solves.size(); ++i) {
       ClothReport& report = reports[stage.cloths()[i]];
@@ -135,13 +162,13 @@ void Solvers::addTo(std::span<ClothReport> reports) const {
     }
   };
   add(solves_);
-  if (assembled_) add(*assembled_);
+  for (const auto& stage : present_.others) add(*stage);
 }
 
 std::vector<shared::SolveRecord> Solvers::records() const {
   std::vector<shared::SolveRecord> records;
   std::ranges::copy(solves_.report(), std::back_inserter(records));
-  if (assembled_) std::ranges::copy(assembled_->report(), std::back_inserter(records));
+  for (const auto& stage : present_.others) std::ranges::copy(stage->report(), std::back_inserter(records));
   return records;
 }
 
@@ -149,7 +176,7 @@ bool Solvers::recordActiveSprings(vulkan::Recorder& recorder) {
   if (!solves_.active()) return false;
   const std::uint64_t before = vulkan::Buffer::bytesOfThread();
   solves_.recordActiveSprings(recorder);
-  bytes_ += vulkan::Buffer::bytesOfThread() - before;
+  present_.bytes += vulkan::Buffer::bytesOfThread() - before;
   return true;
 }
 

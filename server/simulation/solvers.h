@@ -2,7 +2,6 @@
 // The stages that follow from the solvers and the bending of the cloths, which may change while a scene runs.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -50,9 +49,10 @@ class Solvers {
   void prepare(std::span<const shared::ClothRecord> cloths);
 
   const SolveStage& solves() const { return solves_; }
-  // In the order in which they act: before the forces, and after them. Null: the cloths need none.
+  // Acts before the forces. Null: no cloth bends.
   Stage* bending() { return bends_ ? bending_.get() : nullptr; }
-  std::array<Stage*, 3> afterForces() { return {&solves_, assembled_.get(), xpbd_.get()}; }
+  // Act after the forces, in this order.
+  std::vector<SolverStage*> afterForces();
 
   // Adds what the solves of a complete tick found to the reports of the cloths.
   void addTo(std::span<ClothReport> reports) const;
@@ -78,15 +78,12 @@ class Solvers {
   const StateBuffers state_;
   const SolverSizes sizes_;
   SolveStage solves_;
-  std::vector<model::Solver> solvers_;         // of the cloths in the tables
-  std::unique_ptr<XpbdStage> xpbd_;            // null if no cloth uses it
-  std::unique_ptr<AssembledStage> assembled_;  // null if no cloth uses it
-  std::uint64_t bytes_ = 0;                    // SolverStages::bytes of the present stages
-  std::unique_ptr<BendingStage> bending_;      // created when a cloth first bends
-  bool bends_ = false;                         // a cloth bends now
-  KeptStages kept_;                            // stages of earlier solvers
-  std::shared_ptr<NewStages> taken_;           // by take(); may be null
-  std::mutex making_;                          // of makeSolvers(): guards the kernels of `solves_`
+  SolverStages present_;                   // `solves_` uses its systems
+  std::unique_ptr<BendingStage> bending_;  // created when a cloth first bends
+  bool bends_ = false;                     // a cloth bends now
+  KeptStages kept_;                        // stages of earlier solvers
+  std::shared_ptr<NewStages> taken_;       // by take(); may be null
+  std::mutex making_;                      // of makeSolvers(): guards the kernels of `solves_`
   std::uint64_t made_ = 0;
 };
 

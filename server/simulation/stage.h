@@ -21,7 +21,7 @@ struct Tick {
   std::uint32_t substeps = 1;
   double substepSeconds = 0;
   float rate = 0;          // ticks/s
-  std::uint32_t slot = 0;  // of the readback that this tick writes: 0 or 1; ticks alternate
+  std::uint32_t slot = 0;  // of the uploads and readbacks of this tick: 0 or 1; ticks alternate
 };
 
 struct Substep {

@@ -10,7 +10,7 @@
 
 #include "server/model/scene.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/solver_stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/simulation/xpbd_tables.h"
@@ -24,7 +24,7 @@ namespace clothstream::simulation {
 // give. One or more Gauss-Seidel sweeps correct the springs in the order of model::springColours(), with
 // multipliers that start from zero. Then velocities follow from the displacement of the nodes, and the nodes
 // collide. The stage keeps no state between substeps.
-class XpbdStage final : public Stage {
+class XpbdStage final : public SolverStage {
  public:
   // At least one cloth must have the solver xpbd. `workgroupSize` 0 and `wholeNodes` absent (nodes of the
   // largest cloth that one workgroup corrects) mean the measured best for the device. Throws
@@ -34,8 +34,7 @@ class XpbdStage final : public Stage {
 
   static bool isIn(std::span<const model::Cloth> cloths);
 
-  // Creates the kernels that cloths with these records need now instead of at their first use.
-  void prepare(std::span<const shared::ClothRecord> cloths);
+  void prepare(std::span<const shared::ClothRecord> cloths) override;
   // Corrects the free motion in place.
   void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
 

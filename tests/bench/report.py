@@ -178,8 +178,10 @@ TABLES = {
                                 "mass-spring with 10", "XPBD with 10", "even with mass-spring", "with XPBD"], offload),
     "page": ("page", [], ["figure", "measured", "goal"], page),
 }
-# Suites that are not part of clothstream-bench. Their rows are kept in RESULTS, for plots.
+# Rows of earlier runs. PLOTTED are suites whose rows a plot reads from there.
 RESULTS = ROOT / "tests" / "bench" / "results"
+PLOTTED = {"offload"}
+# Suites that are not part of clothstream-bench.
 PROGRAMS = {"offload": ["node", "tests/bench/offload/offload.mjs"], "page": ["node", "tests/bench/page/page.mjs"]}
 
 
@@ -243,7 +245,7 @@ def report(program, suites):
                 sys.exit(output.stderr.strip())
             # Log lines of a suite may precede the rows.
             results[key] = json.loads(output.stdout[output.stdout.index("[\n"):])
-            if suite in PROGRAMS:
+            if suite in PLOTTED:
                 RESULTS.mkdir(exist_ok=True)
                 (RESULTS / f"{suite}.json").write_text(json.dumps(results[key], indent=2) + "\n")
         rows = results[key]

@@ -9,7 +9,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/assembled/assembled_tables.h"
 #include "server/simulation/device_table.h"
-#include "server/simulation/stage.h"
+#include "server/simulation/solver_stage.h"
 #include "server/simulation/state_bindings.h"
 #include "server/simulation/state_buffers.h"
 #include "server/vulkan/buffer.h"
@@ -27,7 +27,7 @@ namespace clothstream::simulation {
 // which is J in CSC format, moves the nodes by the multipliers (SpMVT), and the nodes collide. The paper adds
 // floats atomically; here each sum has one invocation and one order, so that its bits do not depend on the
 // device. The stage keeps no state between substeps.
-class AssembledStage final : public Stage {
+class AssembledStage final : public SolverStage {
  public:
   // At least one cloth must be assembled. `workgroupSize` 0 and `wholeNodes` absent (nodes of the largest
   // cloth that one workgroup solves) mean the measured best for the device. Throws std::runtime_error if the
@@ -41,13 +41,10 @@ class AssembledStage final : public Stage {
   // Corrects the free motion in place.
   void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
 
-  // Copies the records of the tick's last substep to the CPU, one per system; report() has them once the
-  // recording is complete. The residual is defined as in SolveStage.
   void recordReport(vulkan::Recorder& recorder, const Tick& tick) override;
-  std::span<const shared::SolveRecord> report() const;
-
-  // The cloth of each system.
-  std::span<const std::uint32_t> cloths() const { return tables_.cloths; }
+  // The residual is defined as in SolveStage.
+  std::span<const shared::SolveRecord> report() const override;
+  std::span<const std::uint32_t> cloths() const override { return tables_.cloths; }
 
  private:
   void recordTables(vulkan::Recorder& recorder) override;

@@ -155,8 +155,7 @@ void AttachmentStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick)
   assert(frames.empty() || frames.size() == startFrames_.size());
   assert(grabs.size() <= kMaxGrabs);
   if (!std::exchange(slackened_, true)) tethers_.recordUpload(recorder);
-  slot_ = 1 - slot_;
-  const Buffer& through = uploads_[slot_];
+  const Buffer& through = uploads_[tick.slot];
   const std::span<shared::FrameRecord> frameRecords = through.mapped<shared::FrameRecord>();
   for (std::size_t i = 0; i < startFrames_.size(); ++i)
     frameRecords[i] = frames.empty() ? startFrames_[i] : frameRecord(frames[i]);
@@ -223,12 +222,12 @@ void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, const Substep& s
                     invocations());
 }
 
-void AttachmentStage::recordReport(vulkan::Recorder& recorder, const Tick&) {
-  if (grabCount_ > 0) recorder.copy(reports_, readbacks_[slot_], grabCount_ * sizeof(shared::GrabReport));
+void AttachmentStage::recordReport(vulkan::Recorder& recorder, const Tick& tick) {
+  if (grabCount_ > 0) recorder.copy(reports_, readbacks_[tick.slot], grabCount_ * sizeof(shared::GrabReport));
 }
 
-std::span<const shared::GrabReport> AttachmentStage::report() const {
-  return readbacks_[slot_].mapped<const shared::GrabReport>().first(grabCount_);
+std::span<const shared::GrabReport> AttachmentStage::report(std::uint32_t slot) const {
+  return readbacks_[slot].mapped<const shared::GrabReport>().first(grabCount_);
 }
 
 void AttachmentStage::recordSave(vulkan::Recorder& recorder) {

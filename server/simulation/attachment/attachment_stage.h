@@ -41,8 +41,8 @@ class AttachmentStage final : public Stage {
   void recordSubstep(vulkan::Recorder& recorder, const Substep& substep) override;
   void recordReport(vulkan::Recorder& recorder, const Tick& tick) override;
 
-  // Reports of the grabs of the last recorded tick, once it is complete.
-  std::span<const shared::GrabReport> report() const;
+  // Reports of the grabs of the last recorded tick, which has this slot, once it is complete.
+  std::span<const shared::GrabReport> report(std::uint32_t slot) const;
 
   // Copies what the grabs of the last recorded tick hold to the CPU. collect() returns it once the recording
   // is complete. The caller records a barrier before and after each recording.
@@ -66,14 +66,14 @@ class AttachmentStage final : public Stage {
   bool hasTethers_;
   bool slackened_ = true;  // the tethers on the device have the present slack
   bool takes_ = false;     // a grab begins in this tick
-  std::uint32_t grabCount_ = 0, slot_ = 0;
+  std::uint32_t grabCount_ = 0;
 
   DeviceTable attached_, tethers_;
   std::vector<shared::TetherRecord> restTethers_;  // without slack
   std::vector<float> longer_;                      // factor of each cloth's tethers in the table
   std::vector<shared::FrameRecord> startFrames_;
   vulkan::Buffer frames_, grabs_, grabbed_, reports_;
-  // Used alternately, because a tick may be in flight while the next one is recorded.
+  // By Tick::slot, because a tick may be in flight while the next one is recorded.
   std::array<vulkan::Buffer, 2> uploads_;  // frames, then grabs
   std::array<vulkan::Buffer, 2> readbacks_;
   // Held nodes, then reports. Created when they are first needed.

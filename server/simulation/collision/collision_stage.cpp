@@ -78,8 +78,7 @@ void CollisionStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) 
   }
   fill(tables_, ordered_, solidTables_);
   nodeWork_ = static_cast<std::uint32_t>(work);
-  slot_ = 1 - slot_;
-  const Buffer& through = uploads_[slot_];
+  const Buffer& through = uploads_[tick.slot];
   std::size_t offset = upload(recorder, tables_.records, through, 0, colliders_, 0);
   offset = upload(recorder, tables_.planes, through, offset, colliders_, offset);
   upload(recorder, tables_.bounds, through, offset, bounds_, 0);
@@ -87,17 +86,17 @@ void CollisionStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) 
   if (reportsContacts_) recorder.fill(contactImpulses_, 0, contactBytes());
 }
 
-void CollisionStage::recordReport(vulkan::Recorder& recorder, const Tick&) {
+void CollisionStage::recordReport(vulkan::Recorder& recorder, const Tick& tick) {
   if (!reportsContacts_) return;
-  Buffer& readback = contactReadbacks_[slot_];
+  Buffer& readback = contactReadbacks_[tick.slot];
   if (readback.bytes() == 0) readback = Buffer(device_, BufferPurpose::readback, contactImpulses_.bytes());
   recorder.copy(contactImpulses_, readback, contactBytes());
 }
 
-std::vector<ContactStatus> CollisionStage::contacts() const {
+std::vector<ContactStatus> CollisionStage::contacts(std::uint32_t slot) const {
   std::vector<ContactStatus> statuses;
   if (!reportsContacts_) return statuses;
-  const auto units = contactReadbacks_[slot_].mapped<const std::uint32_t>();
+  const auto units = contactReadbacks_[slot].mapped<const std::uint32_t>();
   for (std::uint32_t i = 0; i < indices_.size() * clothCount_; ++i)
     if (units[i] != 0)
       statuses.push_back(

@@ -40,8 +40,8 @@ class CollisionStage final : public Stage {
   std::uint32_t solidCount() const { return static_cast<std::uint32_t>(indices_.size()) - count_; }
   shared::CollisionPush push(std::uint32_t substep, std::uint32_t substeps, float tickRate) const;
 
-  // Contacts of the last recorded tick, once it is complete.
-  std::vector<ContactStatus> contacts() const;
+  // Contacts of the last recorded tick, which has this slot, once it is complete.
+  std::vector<ContactStatus> contacts(std::uint32_t slot) const;
 
   // Values of the colliders of the last recorded tick, in the order of its inputs. `numbers` has them as the
   // device numbers colliders.
@@ -63,13 +63,11 @@ class CollisionStage final : public Stage {
   std::vector<const MovingCollider*> ordered_;  // while inputs are recorded: as the device numbers them
   std::vector<std::uint32_t> indices_;          // of these colliders among the inputs of the tick
   std::uint32_t nodeWork_ = 1;
-  std::uint32_t slot_ = 0;
   ColliderTables tables_;
   vulkan::Buffer colliders_, bounds_, nearLists_, contactImpulses_;
-  std::array<vulkan::Buffer, 2>
-      uploads_;  // used alternately: a tick may be in flight while the next one is recorded
-  std::array<vulkan::Buffer, 2>
-      contactReadbacks_;  // used alternately; created when contacts are first reported
+  // By Tick::slot: a tick may be in flight while the next one is recorded.
+  std::array<vulkan::Buffer, 2> uploads_;
+  std::array<vulkan::Buffer, 2> contactReadbacks_;  // created when contacts are first reported
   const vulkan::Device& device_;
   StateBindings gather_;
 };

@@ -103,8 +103,7 @@ void SkinStage::recordTables(vulkan::Recorder& recorder) {
 void SkinStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) {
   const std::vector<MovingCollider>& colliders = tick.inputs.colliders;
   moves_ = false;
-  slot_ = 1 - slot_;
-  const Buffer& upload = uploads_[slot_];
+  const Buffer& upload = uploads_[tick.slot];
   for (const SkinTables::Skinned& skinned : tables_.skinned) {
     const model::Solid& solid = solids_.solids[skinned.solid];
     const auto collider = std::ranges::find_if(colliders, [&](const MovingCollider& one) {

@@ -53,9 +53,8 @@ class SkinStage final : public Stage {
   SolidTables& solids_;
   DeviceTable rests_, fans_;
   vulkan::Buffer transformTexels_;
-  std::array<vulkan::Buffer, 2> uploads_;  // used alternately: a tick may be in flight
-  std::uint32_t slot_ = 0;
-  bool moves_ = false;  // a collider of the tick has one of the meshes
+  std::array<vulkan::Buffer, 2> uploads_;  // by Tick::slot: a tick may be in flight
+  bool moves_ = false;                     // a collider of the tick has one of the meshes
   std::vector<model::Transform>
       transforms_;  // of the joints of one mesh, at the start and at the end of a tick
   vulkan::Bindings skin_, weigh_, refit_;
