@@ -16,6 +16,7 @@
 #include "server/messages/cloth_numbers.h"
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
+#include "server/messages/shapes.h"
 #include "server/messages/solver_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
@@ -120,6 +121,11 @@ model::ColliderChange toColliderChange(Checks& checks, const Path& path, const v
   if (message.has_size()) {
     change.size = toVec3(checks, path / "size", message.size(), limits::kShapeSize);
     needs("size", "", std::holds_alternative<model::Box>(shape), "no box");
+  }
+  if (auto* capsule = std::get_if<model::Capsule>(&shape)) {
+    capsule->radius = change.radius.value_or(capsule->radius);
+    capsule->length = change.length.value_or(capsule->length);
+    checkEnds(checks, path / "topRadius", *capsule);
   }
   return change;
 }

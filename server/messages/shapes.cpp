@@ -30,14 +30,9 @@ model::Shape toSphere(Checks& checks, const Path& path, const v1::Sphere& messag
 model::Shape toCapsule(Checks& checks, const Path& path, const v1::Capsule& message, const Sizes& sizes) {
   model::Capsule capsule{.radius = checks.number(path / "radius", message.radius(), sizes.radius),
                          .length = checks.number(path / "length", message.length(), sizes.length)};
-  if (!message.has_top_radius()) return capsule;
-  const float top = checks.number(path / "topRadius", message.top_radius(), sizes.radius);
-  if (std::abs(top - capsule.radius) > model::kMostSlope * capsule.length)
-    checks.fail(path / "topRadius", fmt::format("{}", top),
-                fmt::format("must differ from \"radius\" by at most {} times \"length\", because one end "
-                            "would be inside the other; use a sphere",
-                            model::kMostSlope));
-  capsule.topRadius = top;
+  if (message.has_top_radius())
+    capsule.topRadius = checks.number(path / "topRadius", message.top_radius(), sizes.radius);
+  checkEnds(checks, path / "topRadius", capsule);
   return capsule;
 }
 
@@ -134,6 +129,16 @@ model::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantColl
   }
   checks.fail(path, "", "has no shape; must have \"sphere\", \"capsule\" or \"box\"");
   return {};
+}
+
+void checkEnds(Checks& checks, const Path& path, const model::Capsule& capsule) {
+  if (!capsule.topRadius ||
+      std::abs(*capsule.topRadius - capsule.radius) <= model::kMostSlope * capsule.length)
+    return;
+  checks.fail(path, fmt::format("{}", *capsule.topRadius),
+              fmt::format("must differ from \"radius\" by at most {} times \"length\", because one end would "
+                          "be inside the other; use a sphere",
+                          model::kMostSlope));
 }
 
 void write(const model::Shape& shape, v1::Collider& message) {

@@ -16,6 +16,9 @@ model::Shape toShape(Checks& checks, const Path& path, const v1::Collider& messa
                      const MeshReader& readMesh = {});
 model::Shape toShape(Checks& checks, const Path& path, const v1::ParticipantCollider& message);
 
+// Fails at `path` if one end of the capsule would be inside the other.
+void checkEnds(Checks& checks, const Path& path, const model::Capsule& capsule);
+
 // Replaces the shape of the message.
 void write(const model::Shape& shape, v1::Collider& message);
 // Replaces the shape of the message. Hulls and meshes are left out; the description has them.

@@ -37,11 +37,10 @@ float reachOf(const Shape& shape) {
 
 float largestDepth(const Shape& shape) {
   return std::visit(
-      ShapeVisitor{
-          [](const Sphere& sphere) { return sphere.radius; },
-          [](const Capsule& capsule) { return std::max(capsule.radius, topRadiusOf(capsule)); },
-          [](const Plane&) { return 0.0f; }, [](const Box& box) { return box.size.minCoeff() / 2; },
-          [](const Hull&) { return 0.0f; }, [](const Solid&) { return 0.0f; }},
+      ShapeVisitor{[](const Sphere& sphere) { return sphere.radius; },
+                   [](const Capsule& capsule) { return std::max(capsule.radius, topRadiusOf(capsule)); },
+                   [](const Plane&) { return 0.0f; }, [](const Box& box) { return box.size.minCoeff() / 2; },
+                   [](const Hull&) { return 0.0f; }, [](const Solid&) { return 0.0f; }},
       shape);
 }
 
@@ -67,13 +66,12 @@ Shape thinned(const Shape& shape, float depth) {
 
 float* radiusOf(Shape& shape) {
   using Radius = float*;
-  return std::visit(ShapeVisitor{[](Sphere& sphere) -> Radius { return &sphere.radius; },
-                                 [](Capsule& capsule) -> Radius { return &capsule.radius; },
-                                 [](Plane&) -> Radius { return nullptr; },
-                                 [](Box&) -> Radius { return nullptr; },
-                                 [](Hull&) -> Radius { return nullptr; },
-                                 [](Solid&) -> Radius { return nullptr; }},
-                    shape);
+  return std::visit(
+      ShapeVisitor{[](Sphere& sphere) -> Radius { return &sphere.radius; },
+                   [](Capsule& capsule) -> Radius { return &capsule.radius; },
+                   [](Plane&) -> Radius { return nullptr; }, [](Box&) -> Radius { return nullptr; },
+                   [](Hull&) -> Radius { return nullptr; }, [](Solid&) -> Radius { return nullptr; }},
+      shape);
 }
 
 }  // namespace clothstream::model

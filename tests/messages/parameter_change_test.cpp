@@ -64,6 +64,8 @@ TEST_F(ToParameterChange, AcceptsSizesOfTheShape) {
   model::applyChange(scene_, toParameterChange(message_, scene_, model::StabilityBound(scene_)).value());
   EXPECT_EQ(std::get<model::Capsule>(scene_.colliders[0].shape).length, 0.7f);
   EXPECT_EQ(std::get<model::Capsule>(scene_.colliders[0].shape).radius, 0.2f);
+  std::get<model::Capsule>(scene_.colliders[0].shape).topRadius = 1;
+  EXPECT_THAT(error(), StartsWith("parameterChange.colliders[0].topRadius = 1: must differ from \"radius\""));
 }
 
 TEST_F(ToParameterChange, ChangesSelfCollisionAndTethersOfClothsThatHaveThem) {

@@ -126,8 +126,11 @@ TEST_F(Report, HasTheSolverResultsOfEachCloth) {
 // A plane through the shape is handled after it and leaves nodes deep inside the shape. With more colliders
 // than a list of near colliders holds, the result is the same.
 TEST_F(Report, FindsTheDeepestPenetrationIntoEveryShape) {
-  const model::Shape shapes[] = {model::Sphere{0.1f}, model::Capsule{.radius = 0.06f, .length = 0.2f},
-                                 model::Box{model::Vec3(0.2f, 0.15f, 0.1f)}, octahedron(), model::Plane{},
+  const model::Shape shapes[] = {model::Sphere{0.1f},
+                                 model::Capsule{.radius = 0.06f, .length = 0.2f},
+                                 model::Box{model::Vec3(0.2f, 0.15f, 0.1f)},
+                                 octahedron(),
+                                 model::Plane{},
                                  model::Capsule{.radius = 0.1f, .length = 0.2f, .topRadius = 0.03f}};
   model::Cloth cloth = calmCloth(20, 20);
   cloth.thickness = 0;
