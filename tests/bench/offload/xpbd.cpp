@@ -239,8 +239,7 @@ class Xpbd final : public Solver {
 #pragma unroll
       for (std::size_t r = 0; r < kSize; ++r)
 #pragma unroll
-        for (std::size_t c = part; c < 3; c += 2)
-          spring(r * kSize + c, r * kSize + c + 1, rules_.alongRow);
+        for (std::size_t c = part; c < 3; c += 2) spring(r * kSize + c, r * kSize + c + 1, rules_.alongRow);
 #pragma unroll
     for (std::size_t k = 0; k < 12; ++k)
       spring(kInTurn[k / 4] * kSize + k % 4, (kInTurn[k / 4] + 1) * kSize + k % 4, rules_.alongColumn);
