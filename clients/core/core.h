@@ -352,8 +352,8 @@ typedef struct cs_collider {
    * without it. */
   int32_t yields;
   uint64_t participant_id; /* 0 for a collider of the scene */
-  /* Of a capsule: m, radius of its end at +Y. `radius` is that of its end at -Y; they differ if it is
-   * tapered. Else the same as `radius`. */
+  /* m. A tapered capsule has this radius at its end at +Y, and `radius` at its end at -Y. Other shapes have
+   * the value of `radius`. */
   float top_radius;
 } cs_collider;
 

@@ -24,7 +24,7 @@ struct Sphere {
 struct Capsule {
   float radius = 0.1f;  // of the ball at -Y
   float length = 0.2f;
-  // Of the ball at +Y; absent: `radius`. The capsule is tapered by at most kMostSlope: slopeOf().
+  // The ball at +Y has this radius, or `radius` if it is absent. slopeOf() limits the difference.
   std::optional<float> topRadius = {};
 };
 

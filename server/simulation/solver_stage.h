@@ -16,8 +16,8 @@ class SolverStage : public Stage {
   // Creates the kernels that cloths with these records need now instead of at their first use.
   virtual void prepare(std::span<const shared::ClothRecord>) {}
 
-  // What the solves of the last recorded tick found in its last substep, once it is complete: one record for
-  // each system. Empty if the solver has no systems.
+  // Returns what the last substep of the last recorded tick has solved, one record for each system, once the
+  // tick is complete. It is empty if the solver has no systems.
   virtual std::span<const shared::SolveRecord> report() const { return {}; }
   // The cloth of each system.
   virtual std::span<const std::uint32_t> cloths() const { return {}; }

@@ -18,7 +18,7 @@ std::vector<model::Solver> solversOf(std::span<const model::Cloth> cloths) {
   return solvers;
 }
 
-// What the stage of a solver is made of.
+// The stage of a solver is made of these.
 struct Ingredients {
   const vulkan::Device& device;
   std::span<const model::Cloth> cloths;
