@@ -59,7 +59,7 @@ int main(int argc, char** argv) {
     const program::Signals signals;
     telemetry::setUpLog(options.logLevel,
                         options.logFormat == "json" ? telemetry::LogFormat::json : telemetry::LogFormat::text,
-                        options.logRate);
+                        options.server.logRate);
     if (servesClients(options.command)) program::endWhenOutOfMemory(options);
     for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
     return run(options, signals);

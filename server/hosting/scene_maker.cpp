@@ -129,7 +129,7 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
                          "create the scene again");
         server_.metrics.refuse(telemetry::Refusal::creationTime);
         return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                       fmt::format("createScene: takes longer than {} s (--max-creation-time); make the "
+                       fmt::format("createScene: takes longer than {} s (--profile); make the "
                                    "scene smaller",
                                    schedule::seconds(server_.options.maxCreationTime)));
       }
@@ -237,7 +237,7 @@ tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateS
         server_.metrics.refuse(telemetry::Refusal::sceneSize);
         return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                        fmt::format("createScene: the uploaded Scene message would take more than {} bytes of "
-                                   "memory (--max-parsed-memory): send fewer elements",
+                                   "memory (--profile): send fewer elements",
                                    most));
       }
       cancellation.check();

@@ -45,7 +45,7 @@ class SceneMaker {
   // `uploaded` is the content that `request` names, if it names one. Its reservation ends before the answer.
   // `tenant` is that of the peer; empty if it has none.
   // While kMaxWaiting scenes wait it returns an error, and `done` is not called. Creating a scene ends early
-  // when the peer does not want it any more, after ServerOptions::maxCreationTime, and when the server stops.
+  // when the peer does not want it any more, after Limits::maxCreationTime, and when the server stops.
   [[nodiscard]] tl::expected<void, v1::Error> create(v1::CreateSceneRequest request,
                                                      std::optional<UploadedContent> uploaded,
                                                      std::string tenant, Wanted wanted, CreateDone done);

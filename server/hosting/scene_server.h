@@ -3,7 +3,7 @@
 #pragma once
 
 #include <chrono>
-#include <cstddef>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -15,6 +15,7 @@
 
 #include "server/delivery/envelope.h"
 #include "server/delivery/wire_types.h"
+#include "server/hosting/limits.h"
 #include "server/identity/identity.h"
 #include "server/messages/limits.h"
 #include "server/model/scene.h"
@@ -49,7 +50,7 @@ inline constexpr std::uint32_t kMaxParticipants =
 // Time at the start of an upload to which minUploadRate does not apply.
 inline constexpr std::chrono::seconds kUploadPatience{5};
 
-struct ServerOptions {
+struct ServerOptions : Limits {
   vulkan::DeviceOptions device;
   // Scene of peers that name none. Must be one of the scenes.
   std::string defaultScene;
@@ -69,35 +70,16 @@ struct ServerOptions {
   // Limit for each scene, disconnected participants included. At most kMaxParticipants. A peer that creates
   // a scene may set a lower limit.
   std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
-  // The same of one address, other than loopback; 0: half of maxParticipants.
-  std::uint32_t maxParticipantsPerAddress = 0;
+  // The same of one address, other than loopback.
   std::uint32_t placesOfAddress() const {
-    return maxParticipantsPerAddress > 0 ? maxParticipantsPerAddress : (maxParticipants + 1) / 2;
+    return static_cast<std::uint32_t>(std::ceil(placesPerAddress * maxParticipants));
   }
   // Scenes that peers may create, in addition to those that the server starts with.
   std::uint32_t maxCreatedScenes = 16;
-  // Nodes, springs and attachments of a scene that a peer creates, and springs of one node of its meshes.
-  std::uint64_t maxSceneNodes = 262'144, maxSceneSprings = 4'194'304;
-  std::uint32_t maxNodeSprings = messages::limits::kMaxNodeSprings;
-  std::uint32_t maxSceneAttachments = messages::limits::kMaxAttachments;
-  // Memory of the message of an uploaded scene once it is parsed.
-  std::size_t maxParsedBytes = messages::limits::kMaxParsedBytes;
-  // Creating a scene ends with an error after this time.
-  std::chrono::milliseconds maxCreationTime{60'000};
-  // A created scene is deleted when it has had no participant for this long; 0: never.
-  std::chrono::milliseconds sceneLifetime{3'600'000};
   // Limits what participants add by creating scenes and changing parameters.
   scene::BudgetLimits budget{};
   // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).
   std::uint32_t encoderThreads = 0;
-  // Limits of the uploads of all peers together, and of the peers of one address, in bytes.
-  std::size_t maxUploadBytes = std::size_t{64} << 20, maxUploadBytesOfAddress = std::size_t{32} << 20;
-  // An upload is dropped after this time, complete or not, unless a scene was created from it. Slower ones
-  // are dropped earlier: an upload must have this mean rate in kilobytes per second, after kUploadPatience.
-  std::chrono::milliseconds maxUploadTime{60'000};
-  double minUploadRate = 16;
-  // Megabytes per second that are read from one peer, with a burst of as many. A faster peer waits.
-  double maxReadRate = 16;
   // Returns the journal of a scene, or null for none. May be empty.
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};
   // Keeps scenes beyond the end of the server; null: nothing is kept.
@@ -108,18 +90,10 @@ struct ServerOptions {
   std::chrono::milliseconds drain{10'000};
   // A peer that sends nothing for this long is disconnected.
   std::chrono::milliseconds silence{30'000};
-  // A peer that has not joined a scene by then is disconnected, even if it sends messages. The time of an
-  // upload, at most maxUploadTime, and of creating a scene are added.
-  std::chrono::milliseconds helloTimeout{10'000};
   scene::ReconnectGrace reconnectGrace{};
   scene::Permissions participantsMay{};
-  // True: peers outside a scene may always pause, reset, record and delete it. False: only while it has no
-  // owner.
-  bool outsideControl = true;
   // Decides who peers are. Null: every peer counts as identity::local().
   std::shared_ptr<identity::Authenticator> authenticator{};
-  // Open connections with tokens of one subject.
-  std::uint32_t maxConnectionsPerToken = 16;
   // Created scenes of one tenant. Peers without a tenant share one number. Unset: if the authenticator has
   // keys for tokens, a quarter of maxCreatedScenes, but at least 1; else maxCreatedScenes.
   std::optional<std::uint32_t> maxScenesPerTenant{};

@@ -189,7 +189,7 @@ Families serverFamilies(hosting::SceneServer& server) {
           metrics.deviceRebuilds);
   counter("clothstream_quarantines_total", "Scenes stopped because they harmed others.", metrics.quarantines);
   addSample(add(families, MetricType::Counter, "clothstream_log_lines_omitted_total",
-                "Lines of the log that were left out (--log-rate)."),
+                "Lines of the log that were left out (--profile)."),
             static_cast<double>(telemetry::omittedLogLines()));
   constexpr double kMegabyte = 1e6;
   const scene::Budget::Usage usage = state.budget->usage();

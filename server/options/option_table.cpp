@@ -192,6 +192,16 @@ void OptionTable::exclude(CLI::Option* first, CLI::Option* second) {
   find(second)->excludes = first;
 }
 
+void OptionTable::retire(const std::vector<std::string>& names, const std::string& instead) {
+  for (const std::string& name : names) retired_[name] = instead;
+}
+
+std::string OptionTable::hint(const std::string& wrong, const std::vector<std::string>& known,
+                              std::string_view prefix) const {
+  const auto retired = retired_.find(wrong);
+  return retired == retired_.end() ? suggestion(wrong, known, prefix) : "; " + retired->second;
+}
+
 std::vector<std::string> OptionTable::applySources(const char* const* environment, const std::string& file) {
   for (Row& row : rows_)
     if (row.option->count() > 0) row.source = Source::commandLine;
@@ -220,8 +230,11 @@ void OptionTable::applyEnvironment(const char* const* environment, std::vector<s
            row->kind == Kind::list ? splitAtCommas(value) : std::vector<std::string>{value});
     } else if (rest != "CONFIG" &&
                std::ranges::find(kForeignVariables, rest) == std::end(kForeignVariables)) {
-      warnings.push_back(fmt::format("{} is not an option of this program and is ignored{}", name,
-                                     suggestion(name, variables)));
+      const auto isSame = [&](const auto& retired) { return toEnvironmentName(retired.first) == name; };
+      const auto retired = std::ranges::find_if(retired_, isSame);
+      warnings.push_back(
+          fmt::format("{} is not an option of this program and is ignored{}", name,
+                      retired == retired_.end() ? suggestion(name, variables) : "; " + retired->second));
     }
   }
 }
@@ -236,7 +249,7 @@ void OptionTable::applyFile(const std::string& file) {
     const auto row = std::ranges::find_if(rows_, matches);
     if (row == rows_.end())
       throw OptionError(
-          fmt::format("{}unknown key '{}'{}", place, entry.key, suggestion(entry.key, configurableNames())));
+          fmt::format("{}unknown key '{}'{}", place, entry.key, hint(entry.key, configurableNames())));
     if (row->kind != Kind::list && entry.values.size() != 1)
       throw OptionError(fmt::format("{}{}: use one value, not an array", place, entry.key));
     give(*row, Source::file, place + entry.key, entry.values);
@@ -343,10 +356,9 @@ std::string OptionTable::unexpected(const std::string& word) const {
   } else {
     for (const CLI::App* command : program_.get_subcommands({})) known.push_back(command->get_name());
   }
-  const std::string_view name =
-      std::string_view(word).substr(std::min(word.find_first_not_of('-'), word.size()));
+  const std::string name = word.substr(std::min(word.find_first_not_of('-'), word.size()));
   return fmt::format("{}: unknown {}{}", word, isOption ? "option" : "command",
-                     suggestion(name.substr(0, name.find('=')), known, isOption ? "--" : ""));
+                     hint(name.substr(0, name.find('=')), known, isOption ? "--" : ""));
 }
 
 }  // namespace clothstream

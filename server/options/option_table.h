@@ -106,6 +106,9 @@ class OptionTable {
   // Makes two options exclusive. One source may set only one of them. Of two sources, the stronger one wins.
   void exclude(CLI::Option* first, CLI::Option* second);
 
+  // Names that are no options any more. Errors about them end with `instead`, such as "use --profile".
+  void retire(const std::vector<std::string>& names, const std::string& instead);
+
   // Called after the command line was parsed: gives the options that are still unset their values from the
   // environment, then from the file. `environment` is a list of NAME=VALUE. An empty `file` means none.
   // Returns warnings. Throws OptionError.
@@ -137,6 +140,9 @@ class OptionTable {
                       const std::string& range = "");
   bool isConfigurable(const Row& row) const;
   std::vector<std::string> configurableNames() const;
+  // What to use instead of an option, without dashes, that the program does not have; "" if nothing is known.
+  std::string hint(const std::string& wrong, const std::vector<std::string>& known,
+                   std::string_view prefix = "") const;
   Row* find(const CLI::Option* option);
   void applyEnvironment(const char* const* environment, std::vector<std::string>& warnings);
   void applyFile(const std::string& file);
@@ -148,6 +154,7 @@ class OptionTable {
   CLI::App* app_;
   std::string group_;
   std::vector<Row> rows_;
+  std::map<std::string, std::string> retired_;  // what to do instead, by name
 };
 
 template <typename Store>

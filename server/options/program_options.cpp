@@ -14,8 +14,10 @@
 
 #include "proto/recording/verdict.h"
 #include "server/events/url.h"
+#include "server/hosting/limits.h"
 #include "server/hosting/scene_server.h"
 #include "server/options/option_table.h"
+#include "server/options/profile_table.h"
 #include "server/scene/roles.h"
 
 namespace clothstream {
@@ -27,6 +29,9 @@ constexpr NumberRange kDoctorSeconds{.min = 0, .max = 600};
 constexpr NumberRange kSubsteps{.min = 1, .max = 256};
 constexpr NumberRange kTicks{.min = 1, .max = 1e9};
 constexpr NumberRange kThreads{.min = 0, .max = 64};
+
+// Default, as the documentation shows it, of an option that sets a limit of the profile alone.
+constexpr const char* kOfProfile = "by profile";
 
 // The user's directory of a kind: that of the variable, or one in the home directory; empty without both.
 std::filesystem::path userDirectory(const char* variable, const char* inHome) {
@@ -44,9 +49,16 @@ struct Parsed {
   std::string record, recordings, config, tls = "off", announce = "auto", overload = "adapt",
                                           tokenValid = "8h", kernels = "auto";
   std::optional<scene::Role> anonymousRole, tokenRole;
+  std::optional<hosting::Profile> chosenProfile;
+  // Limits of the profile that are set alone.
+  std::optional<std::chrono::milliseconds> sceneLifetime;
+  std::optional<double> maxUploadMb;
   bool ownersAlone = false;
+  CLI::Option *sceneLifetimeOption = nullptr, *maxUploadOption = nullptr, *ownersAloneOption = nullptr;
   CLI::Option* stateDirectory = nullptr;
   bool listDevices = false, listMaterials = false, printConfig = false, printMarkdown = false;
+
+  hosting::Profile profile() const { return chosenProfile.value_or(hosting::Profile::home); }
 };
 
 void addBudgetOptions(OptionTable& table, scene::BudgetLimits& budget) {
@@ -55,15 +67,14 @@ void addBudgetOptions(OptionTable& table, scene::BudgetLimits& budget) {
   table.number(
       "--max-load", budget.load, loads,
       "Seconds of the device's time a second that clients may take in all by creating scenes and changing "
-      "parameters, by estimate. 1 means the whole time of the device");
-  table.number("--max-scene-load", budget.sceneLoad, loads, "The same for one scene");
+      "parameters, by estimate. 1 means the whole time of the device. --profile sets the share of one scene");
   table.number(
       "--max-tick-time", budget.tickSeconds, {.min = 0, .max = 3600, .type = "SECONDS"},
       "Time of the device that one tick of a created or changed scene may take, by estimate. 0 means no "
       "limit");
   table.number("--max-memory", budget.megabytes, megabytes,
-               "Memory that clients may take in all by creating scenes and changing parameters, by estimate");
-  table.number("--max-scene-memory", budget.sceneMegabytes, megabytes, "The same for one scene");
+               "Memory that clients may take in all by creating scenes and changing parameters, by estimate. "
+               "--profile sets the share of one scene");
 }
 
 void addSceneOptions(OptionTable& table, Parsed& parsed) {
@@ -72,16 +83,6 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
   table.text("--scene", options.server.defaultScene, "NAME", "Default scene, for clients that name none");
   table.list("--scene-file", options.sceneFiles, "FILE",
              "Additional scene as a JSON file; may be repeated. Replaces a built-in scene of the same name");
-  table.number("--rate", options.rate, kRate, "Ticks per second of --scene, instead of the scene's own rate");
-  table.number("--substeps", options.substeps, kSubsteps, "Integration steps per tick of --scene");
-  table.number("--max-error", options.maxError, {.type = "METRES"},
-               "Largest error of a streamed coordinate of --scene, in metres");
-  table.choice("--normals", options.normals,
-               std::map<std::string, model::Normals>{{"none", model::Normals::none},
-                                                     {"octahedral", model::Normals::octahedral}},
-               "Normals of --scene: none (clients compute them) or octahedral");
-  table.number("--qualities", options.qualities, {.min = 1, .max = 4},
-               "Quality levels of --scene. Clients with slow links receive coarser ones");
   table.flag(
       "--always-run", options.server.runAlways,
       "Keep simulating without clients: --scene from the start, other scenes after their first client");
@@ -105,22 +106,10 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                "Stop recording, and saving states of scenes, when the disk has this many megabytes left");
   table.number("--max-created-scenes", options.server.maxCreatedScenes, {.min = 0, .max = 1000},
                "Scenes that clients may create in addition. 0 allows none");
-  table.number("--max-scene-nodes", options.server.maxSceneNodes, {.min = 4, .max = 16'777'216},
-               "Nodes of a scene that clients create");
-  table.number("--max-scene-springs", options.server.maxSceneSprings, {.min = 1, .max = 1e9},
-               "Springs of a scene that clients create");
-  table.number("--max-node-springs", options.server.maxNodeSprings,
-               {.min = 4, .max = messages::limits::kMaxNodeSprings},
-               "Springs of one node of a mesh in a scene that clients create");
-  table.number("--max-scene-attachments", options.server.maxSceneAttachments,
-               {.min = 0, .max = messages::limits::kMaxAttachments},
-               "Attachments of a scene that clients create");
-  table.number("--max-creation-time", options.server.maxCreationTime,
-               {.min = 0.1, .max = 3600, .type = "SECONDS"},
-               "Seconds after which creating a scene ends with an error");
-  table.number(
-      "--scene-lifetime", options.server.sceneLifetime, {.min = 0, .max = 1e6, .type = "SECONDS"},
+  parsed.sceneLifetimeOption = table.number(
+      "--scene-lifetime", parsed.sceneLifetime, {.min = 0, .max = 1e6, .type = "SECONDS"},
       "Seconds without participants after which a scene that a client created is deleted. 0 keeps it");
+  table.showDefault(parsed.sceneLifetimeOption, kOfProfile);
   addBudgetOptions(table, options.server.budget);
   table.number("--encoder-threads", options.server.encoderThreads, kThreads,
                "CPU threads that predict large frames where the device does not. 0 means a quarter of the "
@@ -149,12 +138,6 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
                {.min = 1, .max = hosting::kMaxParticipants},
                "Participants per scene. When the scene is full, the participant that has been disconnected "
                "longest is evicted");
-  CLI::Option* ofAddress =
-      table.number("--max-participants-per-address", options.server.maxParticipantsPerAddress,
-                   {.min = 0, .max = hosting::kMaxParticipants},
-                   "Participants per scene from one address. 0 means half of --max-participants. Programs on "
-                   "this machine have no such limit");
-  table.showDefault(ofAddress, "half of --max-participants");
   CLI::Option* changeable = table.list(
       "--participants-change", parsed.changeable, "LIST",
       "Parameters that participants may change in a scene that another participant owns: a comma-separated "
@@ -172,8 +155,10 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
       checkChoice({"create", "delete", "control", "record", "own", "none"}));
   allowed->delimiter(',')->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)->default_str("none");
   table.showDefault(allowed, "none");
-  table.flag("--owners-alone", parsed.ownersAlone,
-             "Only its owners may pause, reset, record and delete a scene that has an owner");
+  parsed.ownersAloneOption =
+      table.flag("--owners-alone", parsed.ownersAlone,
+                 "Only its owners may pause, reset, record and delete a scene that has an owner");
+  table.showDefault(parsed.ownersAloneOption, kOfProfile);
 }
 
 const std::map<std::string, scene::Role> kRoles{{"viewer", scene::Role::viewer},
@@ -196,8 +181,6 @@ void addIdentityOptions(OptionTable& table, Parsed& parsed) {
   CLI::Option* role = table.choice("--anonymous-role", parsed.anonymousRole, kRoles,
                                    "Role of clients on other machines with --insecure");
   table.showDefault(role, "participant");
-  table.number("--max-connections-per-token", options.server.maxConnectionsPerToken,
-               {.min = 1, .max = 100'000}, "Open connections with tokens of one subject");
   CLI::Option* ofTenant =
       table.number("--max-scenes-per-tenant", options.server.maxScenesPerTenant, {.min = 0, .max = 1000},
                    "Created scenes of one tenant. Clients without a tenant share one number");
@@ -239,35 +222,31 @@ void addNetworkOptions(OptionTable& table, Parsed& parsed) {
       checkChoice({"auto", "on", "off"}));
   table.number("--max-connections", options.maxConnections, {.min = 1, .max = 100'000},
                "Connections to each port at a time");
-  table.number("--max-connections-per-address", options.maxConnectionsPerAddress, {.min = 1, .max = 100'000},
-               "Connections of one address to each port at a time, and its gRPC streams. Programs on this "
-               "machine have no "
-               "such limit");
-  table.number(
-      "--connections-per-second", options.connectionsPerSecond, {.min = 1, .max = 1e6},
-      "New connections to each port per second, with a burst of as many; the same for new gRPC streams");
-  table.number(
-      "--connections-per-second-per-address", options.connectionsPerSecondPerAddress, {.min = 1, .max = 1e6},
-      "The same of one address, TLS handshakes included. Programs on this machine have no such limit");
-  table.number("--hello-timeout", options.server.helloTimeout, {.min = 1, .max = 30, .type = "SECONDS"},
-               "Seconds after which a connection that has not joined a scene is closed, even if it sends "
-               "messages. The time of an upload is added");
-  table.number("--max-read-rate", options.server.maxReadRate, {.min = 0.1, .max = 1e6, .type = "MEGABYTES"},
-               "Megabytes per second that are read from one connection in a stream. A faster client waits");
-  table.number("--max-upload-time", options.server.maxUploadTime, {.min = 1, .max = 3600, .type = "SECONDS"},
-               "Seconds after which an upload is dropped, unless a scene was created from it");
-  table.number("--min-upload-rate", options.server.minUploadRate, {.min = 0, .max = 1e6, .type = "KILOBYTES"},
-               "Kilobytes per second that an upload must have from its fifth second on. 0 allows any");
-  table.number("--max-upload-memory", options.maxUploadMb, {.min = 0, .max = 1e6, .type = "MEGABYTES"},
-               "Memory of all uploads together, in megabytes");
-  table.number("--max-upload-memory-per-address", options.maxUploadMbPerAddress,
-               {.min = 0, .max = 1e6, .type = "MEGABYTES"},
-               "The same of one address. Programs on this machine have no such limit");
-  table.number("--max-parsed-memory", options.maxParsedMb, {.min = 0, .max = 1e5, .type = "MEGABYTES"},
-               "Memory of an uploaded scene once its message is parsed, in megabytes");
   table.number("--metrics-port", options.metricsPort, kPort,
                "Port of /metrics, /healthz and /readyz for operators. 0 picks a free port. Off by default");
   table.text("--metrics-host", options.metricsHost, "ADDRESS", "Address to listen on with --metrics-port");
+}
+
+std::map<std::string, hosting::Profile> profiles() {
+  std::map<std::string, hosting::Profile> profiles;
+  for (std::size_t i = 0; i < hosting::kProfileNames.size(); ++i)
+    profiles[hosting::kProfileNames[i]] = static_cast<hosting::Profile>(i);
+  return profiles;
+}
+
+void addLimitOptions(OptionTable& table, Parsed& parsed) {
+  table.group("Limits");
+  CLI::Option* profile = table.choice(
+      "--profile", parsed.chosenProfile, profiles(),
+      "Limits for the network of the server: home (a private network), public (the internet: smaller scenes "
+      "and uploads, fewer connections of one address, no control from outside) or fleet (behind a gateway: "
+      "no limits for one address). An option that is given wins over its profile");
+  profile->default_str(hosting::kProfileNames.front());
+  table.showDefault(profile, hosting::kProfileNames.front());
+  parsed.maxUploadOption =
+      table.number("--max-upload-memory", parsed.maxUploadMb, {.min = 0, .max = 1e6, .type = "MEGABYTES"},
+                   "Memory of all uploads together, in megabytes");
+  table.showDefault(parsed.maxUploadOption, kOfProfile);
 }
 
 void addTlsOptions(OptionTable& table, Parsed& parsed) {
@@ -317,9 +296,6 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
              checkChoice({"trace", "debug", "info", "warning", "error", "off"}, {"warn", "err", "critical"}));
   table.text("--log-format", parsed.options.logFormat, "FORMAT",
              "text, or json: one JSON object per line of the log", checkChoice({"text", "json"}));
-  table.number(
-      "--log-rate", parsed.options.logRate, {.min = 0, .max = 1e6, .type = "LINES"},
-      "Lines of each level that are logged per second. A line says how many were left out. 0 means no limit");
   table.number("--seconds", parsed.options.stopAfter,
                {.min = 0, .max = 1e9, .type = "SECONDS", .aboveMin = true}, "Stop after this time");
   table.number(
@@ -422,8 +398,8 @@ CLI::App& addStepCommand(OptionTable& table, Parsed& parsed) {
   table.showDefault(command.get_option("--ticks"), "");
   table.text("--out", options.step.out, "FILE", "Output file; FILE.json describes it")->required();
   table.number("--every", options.step.every, kTicks, "Write one state per this many ticks, from the start");
-  table.number("--rate", options.rate, kRate, "Ticks per second, instead of the scene's own rate");
-  table.number("--substeps", options.substeps, kSubsteps,
+  table.number("--rate", options.stepRate, kRate, "Ticks per second, instead of the scene's own rate");
+  table.number("--substeps", options.stepSubsteps, kSubsteps,
                "Integration steps per tick, instead of the scene's own number");
   addDeviceOptions(table, parsed);
   command.footer(fmt::format(
@@ -586,6 +562,35 @@ void allow(const std::vector<std::string>& allowed, scene::Permissions& permissi
   permissions.own = has("own");
 }
 
+// Gives the server the limits of the profile, and those that an option sets alone. Such an option that is not
+// given has the value of the profile.
+void setLimits(Parsed& parsed) {
+  hosting::ServerOptions& server = parsed.options.server;
+  hosting::Limits& limits = server;
+  limits = hosting::Limits(parsed.profile());
+  const double lifetime = std::chrono::duration<double>(limits.sceneLifetime).count();
+  parsed.sceneLifetimeOption->default_str(fmt::format("{}", lifetime));
+  parsed.maxUploadOption->default_str(fmt::format("{}", static_cast<double>(limits.maxUploadBytes) / 1e6));
+  parsed.ownersAloneOption->default_str(limits.outsideControl ? "false" : "true");
+  limits.sceneLifetime = parsed.sceneLifetime.value_or(limits.sceneLifetime);
+  if (parsed.maxUploadMb) limits.maxUploadBytes = static_cast<std::uint64_t>(*parsed.maxUploadMb * 1e6);
+  if (parsed.ownersAloneOption->count() > 0) limits.outsideControl = !parsed.ownersAlone;
+  server.budget.sceneLoad = limits.sceneShare * server.budget.load;
+  server.budget.sceneMegabytes = limits.sceneShare * server.budget.megabytes;
+}
+
+// Errors name what replaces an option that the server no longer has.
+void retireOptions(OptionTable& table) {
+  table.retire({"rate", "substeps", "max-error", "normals", "qualities"},
+               "set it in a scene file (--scene-file)");
+  table.retire({"max-scene-nodes", "max-scene-springs", "max-node-springs", "max-scene-attachments",
+                "max-creation-time", "max-scene-load", "max-scene-memory", "max-participants-per-address",
+                "max-connections-per-token", "max-connections-per-address", "connections-per-second",
+                "connections-per-second-per-address", "hello-timeout", "max-read-rate", "max-upload-time",
+                "min-upload-rate", "max-upload-memory-per-address", "max-parsed-memory", "log-rate"},
+               "use --profile, which sets this limit");
+}
+
 void printMarkdown(const OptionTable& table) {
   fmt::print(
       "# Options of clothstream-server\n\n"
@@ -604,8 +609,8 @@ void printMarkdown(const OptionTable& table) {
       "come from the command line only. In Kubernetes, set `enableServiceLinks: false`: a service named "
       "`clothstream`\n"
       "would otherwise define `CLOTHSTREAM_PORT`.\n"
-      "{}",
-      table.toMarkdown());
+      "{}{}",
+      profilesAsMarkdown(), table.toMarkdown());
 }
 
 }  // namespace
@@ -626,6 +631,8 @@ bool isReachable(const ProgramOptions& options) {
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
   Parsed parsed;
   ProgramOptions& options = parsed.options;
+  options.server.defaultScene = "veil";
+  options.server.serverName = kServerName;
   options.server.device.cacheDirectory = userDirectory("XDG_CACHE_HOME", ".cache");
   options.stateDirectory = userDirectory("XDG_STATE_HOME", ".local/state");
 
@@ -633,22 +640,25 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
                "clothstream-server"};
   app.set_version_flag("--version", kServerName);
   app.get_formatter()->column_width(34);
-  app.footer(
+  app.footer(fmt::format(
       "Options may also come from a TOML file (--config FILE, grpc-port = 50052) or from the environment\n"
       "(CLOTHSTREAM_GRPC_PORT=50052). The command line wins over the environment, the environment over the "
-      "file.");
+      "file.\n\n{}",
+      profilesAsText()));
   app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);  // scripts append to defaults
   OptionTable table(app);
   addSceneOptions(table, parsed);
   addParticipantOptions(table, parsed);
   addIdentityOptions(table, parsed);
   addNetworkOptions(table, parsed);
+  addLimitOptions(table, parsed);
   addTlsOptions(table, parsed);
   addFleetOptions(table, options);
   table.group("Device");
   addDeviceOptions(table, parsed);
   table.action("--list-devices", parsed.listDevices, "List the Vulkan devices, and exit");
   addProgramOptions(table, parsed);
+  retireOptions(table);
   const CLI::App& printScene = addPrintSceneCommand(table, options);
   const CLI::App& step = addStepCommand(table, parsed);
   const CLI::App& resimulate = addResimulateCommand(table, parsed);
@@ -673,10 +683,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     checkNats(options);
     options.announces = parsed.announce == "on" ||
                         (parsed.announce == "auto" && options.tlsSelf && !isLoopback(options.host));
-    options.server.maxUploadBytes = static_cast<std::size_t>(options.maxUploadMb * 1e6);
-    options.server.maxUploadBytesOfAddress = static_cast<std::size_t>(options.maxUploadMbPerAddress * 1e6);
-    options.server.maxParsedBytes = static_cast<std::size_t>(options.maxParsedMb * 1e6);
-    if (parsed.ownersAlone) options.server.outsideControl = false;
+    setLimits(parsed);
     allow(parsed.allowed, options.server.participantsMay);
     options.anonymousRole = parsed.anonymousRole.value_or(options.anonymousRole);
     options.token.role = parsed.tokenRole.value_or(options.token.role);
@@ -702,7 +709,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     fmt::print(stderr, "{}\n", error.what());
     return wrongArguments();
   }
-  if (parsed.printConfig) return fmt::print("{}", table.toToml()), 0;
+  if (parsed.printConfig) return fmt::print("{}{}", table.toToml(), limitsAsComments(parsed.profile())), 0;
   if (parsed.printMarkdown) return printMarkdown(table), 0;
 
   options.logLevel = CLI::detail::to_lower(options.logLevel);

@@ -57,15 +57,10 @@ struct DoctorOptions {
 struct ProgramOptions {
   Command command = Command::serve;
 
-  // Scenes, participants and device. `defaultScene` is also the scene of `step`; `device` is also the device
-  // of `step` and `resimulate`.
-  hosting::ServerOptions server{.device = {}, .defaultScene = "veil", .serverName = kServerName};
+  // Scenes, participants, device and limits. `defaultScene` is also the scene of `step`; `device` is also the
+  // device of `step` and `resimulate`.
+  hosting::ServerOptions server;
   std::vector<std::filesystem::path> sceneFiles;
-  // Overrides for the default scene; unset keeps the scene's own value.
-  std::optional<std::uint32_t> rate, substeps;
-  std::optional<float> maxError;
-  std::optional<model::Normals> normals;
-  std::optional<std::uint32_t> qualities;
   std::filesystem::path recordDirectory;  // empty: nothing is recorded
   bool recordsOnRequest = false;          // record only scenes that clients ask for
   double recordLimitMb = 0;               // megabytes per file; 0 means no limit
@@ -78,11 +73,7 @@ struct ProgramOptions {
   bool reflects = false;       // gRPC reflection
   std::filesystem::path page;  // empty: the directory next to the program, if it exists
   std::vector<std::string> publicNames, allowedOrigins;
-  // These limits hold for each endpoint.
-  std::uint32_t maxConnections = 256, maxConnectionsPerAddress = 64;
-  double connectionsPerSecond = 200, connectionsPerSecondPerAddress = 20;
-  double maxUploadMb = 64, maxUploadMbPerAddress = 32;  // megabytes of uploads
-  double maxParsedMb = 128;                             // megabytes of an upload once it is parsed
+  std::uint32_t maxConnections = 256;  // of each endpoint
   std::string metricsHost = "127.0.0.1";
   std::optional<std::uint16_t> metricsPort;  // unset: no monitoring
   bool announces = false;                    // by mDNS
@@ -109,7 +100,6 @@ struct ProgramOptions {
 
   // Program.
   std::string logLevel = "info", logFormat = "text";
-  double logRate = 100;  // lines per second of each level; 0 means no limit
   std::optional<std::chrono::nanoseconds> stopAfter;
   std::filesystem::path stateDirectory;  // what the server keeps for its next start
   bool keepsScenes = false;              // the directory was named: scenes are kept there too
@@ -118,6 +108,7 @@ struct ProgramOptions {
 
   // Commands.
   step::StepOptions step;
+  std::optional<std::uint32_t> stepRate, stepSubsteps;  // unset keeps the scene's own value
   recording::PlaybackOptions playback;
   std::string playSpeed = "1";  // of `play`: a number or "max"
   std::string recording;        // file of `play` and `resimulate`

@@ -94,9 +94,9 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Prog
     if (page.empty())
       spdlog::warn("no page found next to the program: build the target clothstream_page, or use --page DIR");
     const endpoint::ConnectionLimits limits{
-        .connectionsPerAddress = options.maxConnectionsPerAddress,
-        .connectionsPerSecond = options.connectionsPerSecond,
-        .connectionsPerSecondOfAddress = options.connectionsPerSecondPerAddress};
+        .connectionsPerAddress = options.server.connectionsPerAddress,
+        .connectionsPerSecond = options.server.connectionsPerSecond,
+        .connectionsPerSecondOfAddress = options.server.connectionsPerSecondPerAddress};
     const endpoint::WebEndpoint web(server, {.host = options.host,
                                              .port = options.port,
                                              .pageDirectory = page,

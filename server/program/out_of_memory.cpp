@@ -15,7 +15,7 @@ namespace {
 constexpr std::string_view kMessage =
     "memory ran out, so the server ends with status 71. A new start with the same --state-dir brings the "
     "scenes back. These options bound memory: --max-memory, --max-created-scenes, --max-participants, "
-    "--max-connections, --max-upload-memory and --max-parsed-memory (docs/limits.md)";
+    "--max-connections, --max-upload-memory and --profile (docs/limits.md)";
 static_assert(kOutOfMemoryStatus == 71);
 
 iovec partOf(std::string_view text) {

@@ -41,14 +41,11 @@ model::Scene loadScene(const std::string& nameOrPath) {
 }
 
 model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
-  if (options.rate) {
-    scene.streamRate = streamRateFor(scene, *options.rate);
-    scene.simulationRate = *options.rate;
+  if (options.stepRate) {
+    scene.streamRate = streamRateFor(scene, *options.stepRate);
+    scene.simulationRate = *options.stepRate;
   }
-  scene.substeps = options.substeps.value_or(scene.substeps);
-  scene.stream.maxError = options.maxError.value_or(scene.stream.maxError);
-  scene.stream.normals = options.normals.value_or(scene.stream.normals);
-  if (options.qualities) scene.stream.qualities = static_cast<std::uint8_t>(*options.qualities);
+  scene.substeps = options.stepSubsteps.value_or(scene.substeps);
   auto checked = messages::toScene(messages::toMessage(scene));
   if (!checked)
     throw std::runtime_error(
@@ -67,8 +64,6 @@ std::vector<model::Scene> loadScenes(const ProgramOptions& options, std::vector<
     std::erase(builtIn, scene.name);
     scenes.push_back(std::move(scene));
   }
-  for (model::Scene& scene : scenes)
-    if (scene.name == options.server.defaultScene) scene = adjusted(std::move(scene), options);
   return scenes;
 }
 

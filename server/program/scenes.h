@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Scenes of the program: loaded by name and from files, and adjusted by options. Every function throws
-// std::runtime_error if a scene is invalid.
+// Scenes of the program: loaded by name and from files, and adjusted by options of `step`. Every function
+// throws std::runtime_error if a scene is invalid.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ namespace clothstream::program {
 // Loads the built-in scene with that name, or the file with that path.
 model::Scene loadScene(const std::string& nameOrPath);
 
-// Returns the scene with the overrides for the default scene.
+// Returns the scene with the rate and the substeps that the options of `step` give it.
 model::Scene adjusted(model::Scene scene, const ProgramOptions& options);
 
 // Built-in scenes and those from files. A file replaces a built-in scene of the same name. `builtIn` gets the

@@ -196,8 +196,8 @@ std::string Charge::excessOf(const model::Scene& scene, double load, const Room&
         "(--max-tick-time)",
         load / scene.simulationRate, limits.tickSeconds);
   return fmt::format(
-      "would take {:.2f} s of the device's time a second, by estimate; one scene may take {:.2f} s "
-      "(--max-scene-load), and {:.2f} s of {:.2f} s (--max-load) are free",
+      "would take {:.2f} s of the device's time a second, by estimate; one scene may take {:.2f} s, "
+      "and {:.2f} s of {:.2f} s are free (--max-load, --profile)",
       load, limits.sceneLoad, room.free, limits.load);
 }
 
@@ -233,8 +233,8 @@ messages::Result<void> Charge::charge(const std::string& path, const model::Scen
   const double room = std::min(limits.sceneMegabytes, free);
   if (price.megabytes > charged_.megabytes && price.megabytes > room)
     return refuse(fmt::format(
-        "would take {:.0f} MB of memory, by estimate; one scene may take {:.0f} (--max-scene-memory), and "
-        "{:.0f} of {:.0f} (--max-memory) are free: {}",
+        "would take {:.0f} MB of memory, by estimate; one scene may take {:.0f}, and {:.0f} of "
+        "{:.0f} are free (--max-memory, --profile): {}",
         price.megabytes, limits.sceneMegabytes, free, limits.megabytes,
         made_ ? "nothing more would fit"
               : fmt::format("about {:.0f} nodes would fit", scene.nodeCount() * room / price.megabytes)));

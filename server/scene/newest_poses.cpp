@@ -106,7 +106,7 @@ messages::Result<void> NewestPoses::post(const delivery::Mailbox& mailbox, const
       v1::ERROR_CODE_RESOURCE_EXHAUSTED,
       fmt::format(
           "colliderPoses: {} of {} colliders act, hands and head first: the participants of a scene share "
-          "its room for colliders evenly (--max-scene-load, --max-load); send fewer or smaller ones",
+          "its room for colliders evenly (--max-load, --profile); send fewer or smaller ones",
           entry->acting, sent),
       telemetry::Refusal::colliders});
 }

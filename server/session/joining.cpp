@@ -42,7 +42,7 @@ bool Session::become(identity::Identity identity) {
   }
   if (!counted_) {
     fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-         fmt::format("your token has {} open connections, its maximum (--max-connections-per-token)",
+         fmt::format("your token has {} open connections, its maximum (--profile)",
                      server_.options.maxConnectionsPerToken));
     return false;
   }
@@ -121,7 +121,7 @@ void Session::failToJoin(scene::Roster::Refusal refusal, const scene::LiveScene&
       server_.metrics.refuse(telemetry::Refusal::participants);
       return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                   fmt::format("'{}' has {} participants from your address, its maximum "
-                              "(--max-participants-per-address); try again later",
+                              "(--profile); try again later",
                               scene.name(), server_.options.placesOfAddress()));
     case Refusal::full:
       server_.metrics.refuse(telemetry::Refusal::participants);

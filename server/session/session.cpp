@@ -215,9 +215,8 @@ void Session::checkSilence(Clock::time_point now) {
       options.helloTimeout + (uploads_ ? options.maxUploadTime : std::chrono::milliseconds(0));
   if (now - opened_ > time)
     cutOff(telemetry::Refusal::helloTimeout,
-           fmt::format(
-               "the client joined no scene within {} s: send hello soon after connecting (--hello-timeout)",
-               schedule::seconds(time)));
+           fmt::format("the client joined no scene within {} s: send hello soon after connecting (--profile)",
+                       schedule::seconds(time)));
 }
 
 void Session::cutOff(telemetry::Refusal reason, const std::string& text) {

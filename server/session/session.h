@@ -81,7 +81,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // messages per second count it, so that messages that were held up are not refused for coming together.
   void receive(std::span<const std::byte> message, Clock::time_point sent = Clock::now());
   // Time that the endpoint must wait before it reads the next message, because this peer sends more bytes a
-  // second than ServerOptions::maxReadRate. Usually 0.
+  // second than Limits::maxReadRate. Usually 0.
   Clock::duration readPause() const { return readPause_.load(); }
 
   // The peer has said goodbye: it leaves the scene for good.

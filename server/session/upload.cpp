@@ -52,7 +52,7 @@ messages::Result<void> Upload::add(const v1::Chunk& chunk, schedule::Clock::time
     return tl::unexpected(messages::FieldError{
         v1::ERROR_CODE_RESOURCE_EXHAUSTED,
         "upload: the server has no memory left for uploads (--max-upload-memory), or none for "
-        "this address (--max-upload-memory-per-address); try again later",
+        "this address (--profile); try again later",
         telemetry::Refusal::uploads});
   }
   contentId_ = chunk.content_id();
@@ -73,13 +73,13 @@ messages::Result<void> Upload::checkPace(const UploadPace& pace, schedule::Clock
   };
   if (time > pace.maxTime)
     return refuse(
-        fmt::format("upload: no scene was created from it within {} s (--max-upload-time), so it was "
+        fmt::format("upload: no scene was created from it within {} s (--profile), so it was "
                     "dropped; start again",
                     schedule::seconds(pace.maxTime)));
   const double least = pace.minBytesPerSecond * schedule::seconds(time - hosting::kUploadPatience);
   if (next_ < count_ && static_cast<double>(bytes_.size()) < least)
     return refuse(
-        fmt::format("upload: {} bytes in {:.1f} s are slower than {:.0f} bytes a second (--min-upload-rate), "
+        fmt::format("upload: {} bytes in {:.1f} s are slower than {:.0f} bytes a second (--profile), "
                     "so it was dropped",
                     bytes_.size(), schedule::seconds(time), pace.minBytesPerSecond));
   return {};

@@ -104,7 +104,7 @@ class LimitedSink final : public spdlog::sinks::sink {
 
   void sayOmitted(const spdlog::details::log_msg& before, std::uint64_t lines) {
     const LogSubject subject = std::exchange(subjectOfThread, {});
-    const std::string text = fmt::format("{} lines were left out here (--log-rate)", lines);
+    const std::string text = fmt::format("{} lines were left out here (--profile)", lines);
     to_->log(spdlog::details::log_msg(before.time, {}, before.logger_name, before.level, text));
     subjectOfThread = subject;
   }

@@ -63,7 +63,10 @@ std::string defaultOf(const std::string& option, const std::string& options) {
   const std::string text = options.substr(row, options.find("\n- ", row) - row);
   const std::size_t value = text.find("Default:");
   const std::size_t begin = text.find('`', value);
-  return text.substr(begin + 1, text.find('`', begin + 1) - begin - 1);
+  std::string found = text.substr(begin + 1, text.find('`', begin + 1) - begin - 1);
+  if (const std::size_t wrapped = found.find("\n  "); wrapped != std::string::npos)
+    found.replace(wrapped, 3, " ");
+  return found;
 }
 
 // The first number of a cell, without separators of thousands.
@@ -91,6 +94,7 @@ TEST(LimitsPage, NamesOptionsDefaultsAndCountersOfTheProgram) {
   for (const std::vector<std::string>& row : rows) {
     ASSERT_EQ(row.size(), 5u) << row.front();
     for (const std::string& option : codesOf(row[1])) {
+      if (option == "--profile") continue;  // sets many limits; the page of options has their table
       const std::string value = defaultOf(option, options);
       const bool isNumber = value.find_first_not_of("0123456789.") == std::string::npos;
       EXPECT_EQ(isNumber ? numberIn(row[2]) : textOf(row[2]), value) << row.front() << option;

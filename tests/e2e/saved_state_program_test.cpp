@@ -112,9 +112,8 @@ class SavedStateProgram : public RunningServer {
  protected:
   Arguments options(const Arguments& more = {}) const {
     Arguments all = kSmallScene;
-    all.insert(all.end(),
-               {"--state-dir", directory_.path().string(), "--max-load", "1000", "--max-scene-load", "1000",
-                "--max-tick-time", "0", "--keep-free", "0", "--overload", "keep", "--metrics-port", "0"});
+    all.insert(all.end(), {"--state-dir", directory_.path().string(), "--max-load", "1000", "--max-tick-time",
+                           "0", "--keep-free", "0", "--overload", "keep", "--metrics-port", "0"});
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
@@ -230,7 +229,7 @@ TEST_F(SavedStateProgram, ScenesComeBackAfterMemoryRanOut) {
   GTEST_SKIP() << "the sanitizer's allocator ends the program";
 #endif
   // Larger than the memory.
-  const Arguments budgets{"--max-memory", "10000", "--max-scene-memory", "10000"};
+  const Arguments budgets{"--max-memory", "10000"};
   startServer(options(budgets));
   if (address_.empty()) return;
   ASSERT_NO_FATAL_FAILURE(createScene("kept", SolverKind::massSpring));

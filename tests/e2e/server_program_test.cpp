@@ -113,15 +113,21 @@ TEST_F(ServerProgram, StopsAfterSecondsAndOnInterrupt) {
   EXPECT_EQ(interrupted.exitCode(), 0) << interrupted.output();
 }
 
-TEST_F(ServerProgram, OverridesRateSubstepsErrorAndNormalsOfTheScene) {
-  ServerProcess server(
-      options({"--rate", "50", "--substeps", "16", "--max-error", "0.002", "--normals", "octahedral"}));
+TEST_F(ServerProgram, ServesTheStreamThatAFileDescribes) {
+  model::Scene scene = smallScene("small");
+  scene.simulationRate = 50;
+  scene.streamRate = 25;
+  scene.substeps = 16;
+  scene.stream.maxError = 0.002f;
+  scene.stream.normals = model::Normals::octahedral;
+  std::ofstream(sceneFile()) << messages::toJson(scene);
+  ServerProcess server(options());
   WebSocketClient client(server.portIn(server.lineWith("page    http://")));
   client.send(hello());
   Viewer viewer;
   ASSERT_TRUE(client.watch(viewer, [&] { return viewer.frames >= 2; }));
   EXPECT_EQ(viewer.description.simulation_rate(), 50u);
-  EXPECT_EQ(viewer.description.stream_rate(), 25u);  // the largest divisor of 50 up to the scene's own 40
+  EXPECT_EQ(viewer.description.stream_rate(), 25u);
   EXPECT_EQ(viewer.description.definition().substeps(), 16u);
   EXPECT_EQ(viewer.description.normals(), v1::NORMALS_OCTAHEDRAL);
   EXPECT_FLOAT_EQ(viewer.description.max_error(), 0.002f);
@@ -147,9 +153,12 @@ TEST_F(ServerProgram, ListsTheScenesForAnUnknownName) {
 }
 
 TEST_F(ServerProgram, RefusesTooFewSubsteps) {
-  ServerProcess server(options({"--substeps", "1"}));
+  model::Scene scene = smallScene("small");
+  scene.substeps = 1;
+  std::ofstream(sceneFile()) << messages::toJson(scene);
+  ServerProcess server(options());
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(server.output(), HasSubstr("scene 'small' with these options: substeps"));
+  EXPECT_THAT(server.output(), HasSubstr("substeps"));
 }
 
 TEST_F(ServerProgram, NamesTheSceneFileThatCannotBeRead) {
@@ -213,6 +222,18 @@ TEST_F(ServerProgram, StepWritesAFileWithADescription) {
   EXPECT_THAT(description["server"].get<std::string>(), HasSubstr("clothstream-server 0."));
 }
 
+TEST_F(ServerProgram, StepChangesRateAndSubsteps) {
+  const std::filesystem::path out = sceneFile().replace_filename("other.f32");
+  ServerProcess server(
+      {"step", "--scene", sceneFile(), "--ticks", "1", "--out", out, "--rate", "50", "--substeps", "16"});
+  ASSERT_EQ(server.exitCode(), 0) << server.output();
+  const auto description = nlohmann::json::parse(std::ifstream(out.string() + ".json"));
+  EXPECT_EQ(description["scene"]["simulationRate"], 50);
+  // The largest divisor of 50 up to the scene's own 40.
+  EXPECT_EQ(description["scene"]["streamRate"], 25);
+  EXPECT_EQ(description["scene"]["substeps"], 16);
+}
+
 // The example of docs/simulation.md, with the standard library of Python.
 TEST_F(ServerProgram, PythonReadsTheFileOfAStep) {
   const std::filesystem::path out = sceneFile().replace_filename("state.f32");
@@ -264,7 +285,8 @@ TEST_F(ServerProgram, ExplainsWrongOptionsOfAStep) {
   fails({"step", "--scene", file, "--ticks", "0", "--out", out}, "--ticks");
   fails({"step", "--scene", "nowhere", "--ticks", "1", "--out", out}, "nowhere");
   fails({"step", "--scene", file, "--ticks", "1", "--out", "/nowhere/x.f32"}, "cannot write /nowhere/x.f32");
-  fails({"step", "--scene", file, "--ticks", "1", "--out", out, "--substeps", "1"}, "substeps");
+  fails({"step", "--scene", file, "--ticks", "1", "--out", out, "--substeps", "1"},
+        "scene 'small' with these options: substeps");
   ServerProcess help({"step", "--help"});
   EXPECT_EQ(help.exitCode(), 0);
   for (const char* word : {"--scene", "--ticks", "--out", "--every", "--device", "numpy"})
@@ -305,8 +327,8 @@ TEST_F(ServerProgram, ExplainsOptionsAndRefusesUnknownOnes) {
   ServerProcess help({"--help"});
   EXPECT_EQ(help.exitCode(), 0);
   for (const char* option :
-       {"--scene", "--scene-file", "--rate", "--substeps", "--max-error", "--normals", "--reports", "step",
-        "--host", "--port", "--grpc-port", "--page", "--device", "--list-devices", "--list-materials",
+       {"--scene", "--scene-file", "--profile", "--reports", "step", "Limits of --profile", "--host",
+        "--port", "--grpc-port", "--page", "--device", "--list-devices", "--list-materials",
         "--software-threads", "--kernels", "--log-level", "--seconds"})
     EXPECT_THAT(help.output(), HasSubstr(option));
   ServerProcess version({"--version"});
@@ -366,15 +388,15 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackUnchanged) {
       "page = \"a \\\"quoted\\\" \\\\ \\u00e9 directory\"\n"
       "allow-origin = [\n  \"https://a.example\", # first\n  \"https://b.example\",\n]\n"
       "participants-change = [\"cloths\"]\n"
-      "cache-dir = \"\"\nmax-error = 0.002\nnormals = \"octahedral\"\nhold = 2.5\nrecord-limit = 1_000\n"
+      "cache-dir = \"\"\nmax-load = 0.002\nanonymous-role = \"viewer\"\nhold = 2.5\nrecord-limit = 1_000\n"
       "recordings = \"records\"\nseconds = 3\n");
   const Result first = run({"--config", config, "--print-config"});
   ASSERT_EQ(first.exitCode, 0) << first.output;
-  for (const char* line :
-       {"\nscene = \"fl#ag\"\n", "\npage = \"a \\\"quoted\\\" \\\\ \u00e9 directory\"\n",
-        "\nallow-origin = [\"https://a.example\", \"https://b.example\"]\n", "\ncache-dir = \"\"\n",
-        "\nparticipants-change = [\"cloths\"]\n", "\nnormals = \"octahedral\"\n", "\nrecord-limit = 1000\n",
-        "\nrecordings = \"records\"\n", "\nseconds = 3\n", "\n# record is not set\n"})
+  for (const char* line : {"\nscene = \"fl#ag\"\n", "\npage = \"a \\\"quoted\\\" \\\\ \u00e9 directory\"\n",
+                           "\nallow-origin = [\"https://a.example\", \"https://b.example\"]\n",
+                           "\ncache-dir = \"\"\n", "\nparticipants-change = [\"cloths\"]\n",
+                           "\nanonymous-role = \"viewer\"\n", "\nrecord-limit = 1000\n",
+                           "\nrecordings = \"records\"\n", "\nseconds = 3\n", "\n# record is not set\n"})
     EXPECT_THAT("\n" + first.output, HasSubstr(line));
   EXPECT_EQ(run({"--config", file(first.output), "--print-config"}).output, first.output);
   const Result defaults = run({"--print-config"});
@@ -396,29 +418,21 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
     std::vector<std::string> arguments{"--scene=a \"scene\" \\ 'of' mine",
                                        "--scene-file=one.json",
                                        "--scene-file=two, three.json",
-                                       "--rate=50",
-                                       "--substeps=16",
-                                       "--max-error=.5e-3",
-                                       "--normals=Octahedral",
-                                       "--qualities=3",
+                                       "--profile=public",
                                        "--always-run",
                                        "--reports=0.25",
                                        "--record-limit=1e9",
                                        "--recordings-limit=500",
                                        "--keep-free=0",
                                        "--max-created-scenes=0",
-                                       "--max-scene-nodes=10000",
                                        "--scene-lifetime=0",
-                                       "--max-load=2",
-                                       "--max-scene-load=0.25",
+                                       "--max-load=.5e-3",
                                        "--max-tick-time=1.5",
                                        "--max-memory=1000",
-                                       "--max-scene-memory=100.5",
                                        "--encoder-threads=7",
                                        "--hold=0.000001",
                                        "--hold-page=3",
                                        "--max-participants=12",
-                                       "--max-participants-per-address=6",
                                        "--participants-change=cloths,colliders",
                                        "--participants-may=create,own",
                                        "--owners-alone",
@@ -427,7 +441,6 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--pairing",
                                        "--insecure",
                                        "--anonymous-role=viewer",
-                                       "--max-connections-per-token=3",
                                        "--max-scenes-per-tenant=2",
                                        "--host=::",
                                        "--port=0",
@@ -438,22 +451,8 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--allow-origin=https://a.example",
                                        "--allow-origin=https://b.example",
                                        "--max-connections=1000",
-                                       "--max-connections-per-address=10",
-                                       "--connections-per-second=12.5",
-                                       "--hello-timeout=5",
                                        "--announce=on",
-                                       "--connections-per-second-per-address=7",
-                                       "--log-rate=50",
-                                       "--max-creation-time=30",
-                                       "--max-read-rate=8",
-                                       "--max-scene-attachments=8",
-                                       "--max-scene-springs=5000",
-                                       "--max-node-springs=16",
-                                       "--max-parsed-memory=8",
-                                       "--max-upload-memory=32",
-                                       "--max-upload-memory-per-address=16",
-                                       "--max-upload-time=30",
-                                       "--min-upload-rate=2",
+                                       "--max-upload-memory=48",
                                        "--overload=keep",
                                        "--state-limit=500",
                                        "--tls-client-ca=ca.pem",
@@ -480,8 +479,9 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
     const Result first = run(arguments);
     ASSERT_EQ(first.exitCode, 0) << first.output;
     for (const char* line :
-         {"\nmax-error = 0.0005\n", "\nrecord-limit = 1000000000\n", "\nhold = 1e-06\n", "\nreports = 0.25\n",
-          "\nseconds = 1000000000\n", "\nscene-file = [\"one.json\", \"two, three.json\"]\n",
+         {"\nmax-load = 0.0005\n", "\nprofile = \"public\"\n", "\nrecord-limit = 1000000000\n",
+          "\nhold = 1e-06\n", "\nreports = 0.25\n", "\nseconds = 1000000000\n",
+          "\nscene-file = [\"one.json\", \"two, three.json\"]\n",
           "\nparticipants-change = [\"cloths\", \"colliders\"]\n",
           "\nnats = [\"nats://10.0.0.5:4222\", \"nats://10.0.0.6:4222\"]\n", "\ndevice = \"1\"\n"})
       EXPECT_THAT(first.output, HasSubstr(line));
@@ -522,14 +522,14 @@ TEST_F(ServerOptions, RefusesInfiniteAndTooLargeNumbers) {
   const std::string range = "use more than 0, at most 1000000000";
   for (const char* text : {"inf", "-inf", "nan", "infinity"}) {
     expectError(run({"--seconds", text}), std::string("--seconds: ") + text + " is not a number; " + range);
-    expectError(run({"--max-error", text}), std::string("--max-error: ") + text + " is not a number");
+    expectError(run({"--max-load", text}), std::string("--max-load: ") + text + " is not a number");
   }
   for (const char* text : {"1e10", "1e300", "1e999", "0", "-1"})
     expectError(run({"--seconds", text}), std::string("--seconds: ") + text + " is out of range; " + range);
   const std::string config = file("seconds = inf\n");
   expectError(run({"--config", config}), config + ":1: seconds: inf is not a number; " + range);
-  expectError(run({"--substeps", "99999999999999999999"}),
-              "--substeps: 99999999999999999999 is out of range; use 1 to 256");
+  expectError(run({"--max-participants", "99999999999999999999"}),
+              "--max-participants: 99999999999999999999 is out of range; use 1 to 135");
 }
 
 TEST_F(ServerOptions, StrongerOfTwoExclusiveOptionsWins) {
@@ -560,12 +560,45 @@ TEST_F(ServerOptions, NamesSourceAndAllowedRangeOfABadValue) {
   expectError(run({}, {"CLOTHSTREAM_PORT=70000"}), "CLOTHSTREAM_PORT: " + problem);
   const std::string config = file("scene = \"flag\"\nport = 70000\n");
   expectError(run({"--config", config}), config + ":2: port: " + problem);
-  expectError(run({"--substeps", "0"}), "--substeps: 0 is out of range; use 1 to 256");
-  expectError(run({"--substeps", "few"}), "--substeps: few is not a whole number; use 1 to 256");
-  expectError(run({"--normals", "octal"}), "--normals: 'octal' is not allowed; use none, octahedral");
+  expectError(run({"--max-participants", "0"}), "--max-participants: 0 is out of range; use 1 to 135");
+  expectError(run({"--max-participants", "few"}),
+              "--max-participants: few is not a whole number; use 1 to 135");
+  expectError(run({"--anonymous-role", "king"}),
+              "--anonymous-role: 'king' is not allowed; use owner, participant, viewer");
+  expectError(run({"--profile", "office"}), "--profile: 'office' is not allowed; use fleet, home, public");
   expectError(run({}, {"CLOTHSTREAM_ALWAYS_RUN=maybe"}),
               "CLOTHSTREAM_ALWAYS_RUN: 'maybe' is not allowed; use true");
   expectError(run({"--participants-change", "none,cloths"}), "--participants-change: 'none' excludes");
+}
+
+TEST_F(ServerOptions, ProfileSetsLimits) {
+  const Result home = run({"--print-config"}), open = run({"--print-config"}, {"CLOTHSTREAM_PROFILE=public"});
+  EXPECT_THAT(home.output, HasSubstr("\nprofile = \"home\"\nmax-upload-memory = 64\n"));
+  EXPECT_THAT(home.output, HasSubstr("\nowners-alone = false\n"));
+  EXPECT_THAT(home.output, HasSubstr("# Limits of the profile home\n"));
+  EXPECT_THAT(home.output, HasSubstr("\n# nodes of a created scene: 262144\n"));
+  EXPECT_THAT(open.output, HasSubstr("\nprofile = \"public\"\nmax-upload-memory = 32\n"));
+  EXPECT_THAT(open.output, HasSubstr("\nowners-alone = true\n"));
+  EXPECT_THAT(open.output, HasSubstr("\n# nodes of a created scene: 65536\n"));
+  EXPECT_EQ(run({"--config", file(open.output), "--print-config"}).output, open.output);
+}
+
+TEST_F(ServerOptions, ExplicitOptionBeatsItsProfile) {
+  const std::string config = file("max-upload-memory = 5\nowners-alone = false\n");
+  const Result result =
+      run({"--config", config, "--profile", "public", "--scene-lifetime", "7", "--print-config"});
+  for (const char* line : {"\nmax-upload-memory = 5\n", "\nowners-alone = false\n", "\nscene-lifetime = 7\n"})
+    EXPECT_THAT(result.output, HasSubstr(line));
+}
+
+TEST_F(ServerOptions, SaysWhatReplacesARemovedOption) {
+  expectError(run({"--substeps", "3"}), "--substeps: unknown option; set it in a scene file (--scene-file)");
+  const std::string config = file("max-parsed-memory = 8\n");
+  expectError(run({"--config", config}),
+              config + ":1: unknown key 'max-parsed-memory'; use --profile, which sets this limit");
+  EXPECT_THAT(
+      run({"--list-materials"}, {"CLOTHSTREAM_LOG_RATE=1"}).output,
+      HasSubstr("CLOTHSTREAM_LOG_RATE is not an option of this program and is ignored; use --profile"));
 }
 
 TEST_F(ServerOptions, NamesTheLineOfASyntaxError) {

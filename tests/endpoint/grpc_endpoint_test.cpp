@@ -457,7 +457,7 @@ TEST_F(GrpcEndpoint, LimitsNewStreamsPerSecond) {
   for (const char* method : {kJoin, kWatch}) {
     const grpc::Status status = openUntilRefused(channelTo(port()), method);
     EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
-    EXPECT_THAT(status.error_message(), HasSubstr("too many new streams (--connections-per-second)"));
+    EXPECT_THAT(status.error_message(), HasSubstr("too many new streams (--profile)"));
   }
   const auto reason = static_cast<std::size_t>(telemetry::Refusal::connectionRate);
   EXPECT_GE(server().state().metrics.refusals[reason].value(), 2U);
@@ -478,7 +478,7 @@ TEST_F(GrpcEndpoint, LimitsStreamsOfAnAddressOnOneConnection) {
         grpc::CreateChannel(fmt::format("{}:{}", *other, port()), grpc::InsecureChannelCredentials());
     const grpc::Status status = openUntilRefused(channel, method);
     EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
-    EXPECT_THAT(status.error_message(), HasSubstr("--max-connections-per-address"));
+    EXPECT_THAT(status.error_message(), HasSubstr("streams of this address are open (--profile)"));
   }
   EXPECT_EQ(openUntilRefused(channelTo(port()), kJoin).error_code(), grpc::StatusCode::OK);
 }

@@ -18,7 +18,7 @@ export async function startServer(port = 0, more = ["--scene", "curtain"]) {
   const options = ["--port", String(port), "--grpc-port", "0", "--hold", "30", ...more];
   if (!more.includes("--hold-page")) options.push("--hold-page", "0");
   // Prices depend on the speed of the machine.
-  for (const budget of ["--max-load", "--max-scene-load"]) if (!more.includes(budget)) options.push(budget, "1000");
+  if (!more.includes("--max-load")) options.push("--max-load", "1000");
   const child = spawn(program, options, { stdio: ["ignore", "pipe", "pipe"] });
   // The server ends with the test, whatever ends the test.
   process.once("exit", () => child.kill("SIGKILL"));

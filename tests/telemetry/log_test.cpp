@@ -127,7 +127,7 @@ TEST(Log, LimitsLinesOfEachLevelAndSaysHowManyWereLeftOut) {
   EXPECT_THAT(text, HasSubstr("flood 2\n"));
   EXPECT_THAT(text, testing::Not(HasSubstr("flood 3")));
   EXPECT_THAT(text, HasSubstr("a warning\n")) << "a flood of one level hides no other";
-  EXPECT_THAT(text, testing::ContainsRegex("7 lines were left out here \\(--log-rate\\)\n.*info later\n"));
+  EXPECT_THAT(text, testing::ContainsRegex("7 lines were left out here \\(--profile\\)\n.*info later\n"));
   EXPECT_THAT(text, HasSubstr("and again\n"));
   EXPECT_EQ(omittedLogLines() - before, 7u);
 }

@@ -23,6 +23,7 @@ const kServer = process.env.CLOTHSTREAM_SERVER;
 const kClient = process.env.CLOTHSTREAM;
 const kCommands = JSON.parse(process.env.TOGETHER);
 const kScene = "flag";
+const kMaxSceneBytes = 2 ** 26;
 const kFrames = 20; // of each client, before the scene is paused
 const kPatienceMs = 120_000;
 
@@ -37,7 +38,10 @@ before(async () => {
   const { stdout } = await run(kServer, ["token", "--key", key, "--role", "owner", "--subject", "ada"]);
   await writeFile(token, stdout, { mode: 0o600 });
   // One quality: a client that is slow, as under QEMU, would otherwise get a coarser one, which has other bits.
-  const options = ["--scene", kScene, "--qualities", "1", "--tls", "self", "--state-dir", join(folder, "state"), "--token-keys", join(folder, "keys")];
+  const scene = JSON.parse((await run(kServer, ["print-scene", kScene], { maxBuffer: kMaxSceneBytes })).stdout);
+  const sceneFile = join(folder, "scene.json");
+  await writeFile(sceneFile, JSON.stringify({ ...scene, stream: { ...scene.stream, qualities: 1 } }));
+  const options = ["--scene-file", sceneFile, "--scene", kScene, "--tls", "self", "--state-dir", join(folder, "state"), "--token-keys", join(folder, "keys")];
   server = await startServer(0, options);
   [, fingerprint] = await server.line(/^key +([0-9a-fA-F:]+)/);
   browser = await launchBrowser();

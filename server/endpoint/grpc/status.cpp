@@ -44,15 +44,11 @@ grpc::Status statusOf(telemetry::Refusal reason) {
   constexpr auto kCode = grpc::StatusCode::RESOURCE_EXHAUSTED;
   switch (reason) {
     case telemetry::Refusal::connectionsOfAddress:
-      return {
-          kCode,
-          "too many streams of this address are open (--max-connections-per-address): close others first"};
+      return {kCode, "too many streams of this address are open (--profile): close others first"};
     case telemetry::Refusal::connectionRateOfAddress:
-      return {kCode,
-              "too many new streams of this address (--connections-per-second-per-address): try again in a "
-              "second"};
+      return {kCode, "too many new streams of this address (--profile): try again in a second"};
     case telemetry::Refusal::connectionRate:
-      return {kCode, "too many new streams (--connections-per-second): try again in a second"};
+      return {kCode, "too many new streams (--profile): try again in a second"};
     default:
       return {kCode, "the server has no free stream; try again later"};
   }

@@ -16,7 +16,7 @@ namespace clothstream::endpoint {
 class FrameMeter {
  public:
   // Frames with less payload than kSmallBytes per second, and their burst. Those with more are limited by
-  // their bytes (--max-read-rate).
+  // their bytes (Limits::maxReadRate).
   static constexpr std::uint64_t kSmallBytes = 1024;
   static constexpr double kSmallFramesPerSecond = 2000, kSmallFramesAtOnce = 4000;
 

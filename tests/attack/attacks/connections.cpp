@@ -18,6 +18,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "server/hosting/limits.h"
 #include "tests/attack/attacks/attacker.h"
 
 namespace clothstream::attack {
@@ -90,10 +91,13 @@ std::string pingWithoutHello(const Target& target) {
 }
 
 std::string uploadSlowly(const Target& target) {
+  // The server waits for a hello, and for the time of an upload on top.
+  const hosting::Limits limits(hosting::Profile::open);
+  const auto wait = std::chrono::ceil<std::chrono::seconds>(limits.helloTimeout + limits.maxUploadTime);
   constexpr std::uint32_t kPieces = 1000;
   const std::string first(kPieceBytes, '\xff');
   std::string answer = floodWithoutHello(
-      target, 30,
+      {target.grpc, target.web, wait + std::chrono::seconds(2)}, 30,
       [&](int round) {
         v1::ClientMessage message;
         v1::Chunk& chunk = *message.mutable_upload();
@@ -198,10 +202,10 @@ constexpr Attack kAttacksConnection[] = {
     {"requests", "ask for /healthz on eight connections without end", &floodRequests,
      "[1-9][0-9]* requests answered"},
     {"pings_without_hello", "hold 30 streams open with pings and without hello", &pingWithoutHello,
-     "0 of 30 streams are open after .*", "--hello-timeout 2"},
+     "0 of 30 streams are open after .*", "--profile public"},
     {"slow_uploads", "begin 30 uploads and continue them a byte at a time", &uploadSlowly,
      "0 of 30 streams are open after .*; an honest upload: accepted.*",
-     "--max-upload-memory 2 --min-upload-rate 1000 --max-upload-time 3 --hello-timeout 1"},
+     "--max-upload-memory 2 --profile public"},
     {"half_handshakes", "hold 2,000 TLS handshakes that never end", &halfHandshakes,
      "[0-9]{1,3} of [0-9]+ connections.*; gRPC: [0-9]{1,3} of [0-9]+ connections.*",
      "--tls self --state-dir DIRECTORY"},

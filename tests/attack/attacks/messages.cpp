@@ -250,11 +250,11 @@ constexpr Attack kAttacksMessage[] = {
     {"outside_control", "pause, reset and delete the victim's scene from outside", &controlFromOutside,
      "[0-9]+ refused with code [0-9]+(, [0-9]+ refused with code [0-9]+)*", "--owners-alone"},
     {"control_characters", "join and create scenes with control characters in names", &controlCharacters,
-     "[1-9][0-9]* names sent", "--log-level debug --log-rate 50"},
+     "[1-9][0-9]* names sent", "--log-level debug --profile public"},
     {"look_alikes", "join with names that differ from another one only in invisible characters", &imitate,
      "8 participants with 1 names"},
     {"log_flood", "join and leave without end, with a log", &floodLog, "[1-9][0-9]* joins",
-     "--log-level info --log-rate 50"},
+     "--log-level info --profile public"},
 };
 
 }  // namespace

@@ -165,9 +165,9 @@ std::string solveAtTheEnd(const Target& target) {
 
 constexpr Attack kAttacksWork[] = {
     {"huge_solve", "create 512x512 constraints with 10,000 iterations and 64 substeps", &createHugeSolve,
-     "refused: .*--max-scene-load.*"},
+     "refused: .*--max-load.*"},
     {"many_cloths", "create 256 cloths of constraints with 1,000 iterations and 16 substeps",
-     &createManyCloths, "refused: .*--max-scene-load.*"},
+     &createManyCloths, "refused: .*--max-load.*"},
     {"huge_grid", "create 4,096x4,096 nodes", &createHugeGrid, "refused: .*"},
     {"hulls", "create and join a scene with 64 hulls of 128 faces", &createHulls,
      "(accepted.*|refused: .*--max-.*)"},

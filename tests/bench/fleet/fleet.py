@@ -104,7 +104,7 @@ class Fleet:
         return program
 
     def serve(self, name, port, more):
-        limits = ["--max-connections", 2000, "--connections-per-second", 5000]
+        limits = ["--max-connections", 2000, "--profile", "fleet"]
         command = [self.programs / "clothstream-server", "--port", port, "--grpc-port", port + 1, *limits, *self.options, *more]
         program = self.run(command, name, "gRPC ")
         program.address = f"127.0.0.1:{port + 1}"

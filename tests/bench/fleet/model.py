@@ -20,7 +20,7 @@ NATS_MESSAGE = 71e-6
 USED = 0.6
 # A network card, bit/s.
 CARD = 10e9
-# New connections that a port admits per second (--connections-per-second).
+# New connections that a port admits per second (profiles home and public).
 ADMITTED = 200
 
 

@@ -90,7 +90,7 @@ class Fleet:
         self.nats.wait_for("Server is ready")
         say(f"nats-server with JetStream: {self.nats_url}")
         self.sidecar = Sidecar(["participants", "created-scenes", "load"], ["scenes"])
-        origin = ["--device", self.arguments.device, "--insecure", "--drain", 3, "--max-load", 1000, "--max-scene-load", 1000]
+        origin = ["--device", self.arguments.device, "--insecure", "--drain", 3, "--max-load", 1000]
         agones = ["--public-name", "origin-2.example", "--agones"]
         environment = {**os.environ, "AGONES_SDK_HTTP_PORT": str(self.sidecar.port)}
         self.origins = [self.serve("origin-1", [*origin, "--public-name", "origin-1.example"])]

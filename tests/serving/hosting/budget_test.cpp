@@ -57,7 +57,7 @@ TEST(BudgetTest, RefusesSceneAboveItsLimitAndNamesIterationsThatFit) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   EXPECT_THAT(refused.error().text, HasSubstr("createScene.scene: would take "));
-  EXPECT_THAT(refused.error().text, HasSubstr("(--max-scene-load)"));
+  EXPECT_THAT(refused.error().text, HasSubstr("(--max-load, --profile)"));
   EXPECT_THAT(refused.error().text, HasSubstr("at most 17 iterations would fit"));
   // The number of iterations that the error names fits.
   EXPECT_TRUE(charge.charge("createScene.scene", small));
@@ -156,7 +156,7 @@ TEST(BudgetTest, LimitsMemoryOfASceneAndOfAll) {
   const auto refused = single.charge("x", scene);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text, HasSubstr("MB of memory"));
-  EXPECT_THAT(refused.error().text, HasSubstr("(--max-scene-memory)"));
+  EXPECT_THAT(refused.error().text, HasSubstr("(--max-memory, --profile)"));
   const auto budget = budgetOf({.sceneLoad = 100, .load = 100, .megabytes = megabytes * 1.5});
   Charge first(budget, scene, false), second(budget, scene, false);
   EXPECT_TRUE(first.charge("first", scene));

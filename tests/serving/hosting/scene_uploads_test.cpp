@@ -147,7 +147,7 @@ TEST_F(ScenesTest, OptionsLimitTheParsedSizeAndTheSpringsOfANode) {
   upload(maker, scene.SerializeAsString());
   const v1::Error parsed = createUploaded(maker).error();
   EXPECT_EQ(parsed.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
-  EXPECT_THAT(parsed.text(), HasSubstr("1000000 bytes of memory (--max-parsed-memory)"));
+  EXPECT_THAT(parsed.text(), HasSubstr("1000000 bytes of memory (--profile)"));
   EXPECT_EQ(
       server().state().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::sceneSize)].value(), 2u);
 }

@@ -476,7 +476,7 @@ TEST_F(IdentityTest, ConnectionsOfASubjectAreLimited) {
   TestPeer three(server(), with(token("ada", Role::participant)));
   const v1::Error error = three.readToTheEnd().error();
   EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
-  EXPECT_THAT(error.text(), HasSubstr("--max-connections-per-token"));
+  EXPECT_THAT(error.text(), HasSubstr("open connections, its maximum (--profile)"));
   TestPeer other(server(), with(token("ben", Role::participant)));
   other.join();
   two.vanish();
