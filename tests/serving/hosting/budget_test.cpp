@@ -131,7 +131,7 @@ TEST(BudgetTest, ScenesShareOneBudgetAndGiveItBack) {
     EXPECT_TRUE(first.charge("first", scene));
     const auto refused = second.charge("second", scene);
     ASSERT_FALSE(refused);
-    EXPECT_THAT(refused.error().text, HasSubstr("(--max-load)"));
+    EXPECT_THAT(refused.error().text, HasSubstr("(--max-load, --profile)"));
   }
   Charge third(budget, scene, false);
   EXPECT_TRUE(third.charge("third", scene));
