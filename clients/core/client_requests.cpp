@@ -69,10 +69,12 @@ void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
   const auto known =
       std::find_if(poses_.attachments.begin(), poses_.attachments.end(),
                    [&](const AttachmentPose& waiting) { return waiting.name == attachment.name; });
-  if (known != poses_.attachments.end())
+  if (known != poses_.attachments.end()) {
+    attachment.jumps = attachment.jumps || known->jumps;  // a pose that waits jumps when it is sent
     *known = std::move(attachment);
-  else
+  } else {
     poses_.attachments.push_back(std::move(attachment));
+  }
   sendPoses(nowUs);
 }
 
