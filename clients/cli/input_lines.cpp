@@ -154,12 +154,15 @@ InputLine::Hand handOf(const Json& joints, std::uint32_t side, const std::string
 }
 
 InputLine::Attachment attachmentOf(const Json& object, const std::string& where) {
-  allowOnly(object, where, {"name", "position", "orientation"});
+  allowOnly(object, where, {"name", "position", "orientation", "jumps"});
   if (!object.contains("name") || !object["name"].is_string())
     throw Wrong(fmt::format("{} must have a \"name\", a text", where));
+  const Json jumps = object.value("jumps", Json(false));
+  if (!jumps.is_boolean()) throw Wrong(fmt::format("{}.jumps must be true or false", where));
   return {.name = object["name"].get<std::string>(),
           .position = positionOf(object, where),
-          .orientation = orientationOf(object, where)};
+          .orientation = orientationOf(object, where),
+          .jumps = jumps.get<bool>()};
 }
 
 InputLine::Joints jointsOf(const Json& object, const std::string& where) {
@@ -239,7 +242,8 @@ void InputLine::send(cs_client* client, std::uint64_t nowUs) const {
                 nowUs);
   for (const Attachment& attachment : attachments)
     cs_move_attachment(client, attachment.name.c_str(), attachment.position.data(),
-                       attachment.orientation ? attachment.orientation->data() : nullptr, nowUs);
+                       attachment.orientation ? attachment.orientation->data() : nullptr,
+                       attachment.jumps ? 1 : 0, nowUs);
   for (const Joints& moved : joints)
     cs_move_joints(client, moved.collider.c_str(), moved.poses.data(),
                    static_cast<std::uint32_t>(moved.poses.size() / 7), nowUs);

@@ -32,6 +32,7 @@ struct InputLine {
     std::string name;
     std::array<float, 3> position{};                  // m
     std::optional<std::array<float, 4>> orientation;  // quaternion x y z w
+    bool jumps = false;
   };
 
   struct Joints {

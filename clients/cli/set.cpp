@@ -134,7 +134,7 @@ ExitCode set(const SetOptions& options) {
       if (round == 0)
         cs_move_attachment(client, options.attachment.c_str(), options.position.data(),
                            options.orientation.empty() ? nullptr : options.orientation.data(),
-                           NativeClient::nowUs());
+                           options.jumps ? 1 : 0, NativeClient::nowUs());
       cs_list_scenes(client);
       ++changes;
     });

@@ -27,6 +27,7 @@ struct SetOptions {
   // Collider of the scene or attachment that moves; at most one of them is not empty.
   std::string collider, attachment;
   std::vector<float> position, orientation;  // three and four numbers (quaternion x y z w); empty: no change
+  bool jumps = false;                        // of the attachment
   std::optional<float> radius;               // of the collider, m
 
   SetOptions() { cs_keep_cloth_settings(&settings); }

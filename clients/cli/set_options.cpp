@@ -97,6 +97,9 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
       ->expected(4)
       ->needs(attachment)
       ->group(placed);
+  app.add_flag("--jump", options.jumps, "The attachment jumps: its cloth goes along at once")
+      ->needs(attachment)
+      ->group(placed);
   app.add_option("--radius", options.radius, "Radius of the collider, 0.001 to 10 m")
       ->needs(collider)
       ->group(placed);

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "clients/core/stream/resume_token.h"
-#include "clients/core/wire/description.h"
 #include "proto/codec/packet_header.h"
 
 namespace clothstream::client {
@@ -15,51 +14,32 @@ namespace clothstream::client {
 // Request ids of a mirror differ from those of the client that it follows.
 constexpr std::uint64_t kFirstMirrorId = std::uint64_t{1} << 31;
 
-namespace {
-
-// True if the named constraints are between vertices of their cloths.
-bool namesVertices(const SimulationReport& report, std::span<const codec::ClothLayout> cloths) {
-  for (std::size_t i = 0; i < report.cloths.size(); ++i) {
-    const std::vector<std::uint32_t>& ends = report.cloths[i].constraintEnds;
-    const std::uint32_t vertices = i < cloths.size() ? cloths[i].vertexCount : 0;
-    if (ends.size() % 2 != 0 ||
-        std::any_of(ends.begin(), ends.end(), [&](auto end) { return end >= vertices; }))
-      return false;
-  }
-  return true;
-}
-
-}  // namespace
-
 Client::Client(Hello hello, Kind kind)
-    : kind_(kind),
-      hello_(std::move(hello)),
-      newest_(kind == Kind::mirror),
-      lastRequestId_(kind == Kind::mirror ? kFirstMirrorId : 0) {
+    : hello_(std::move(hello)),
+      stream_(kind == Kind::mirror),
+      requests_(kind == Kind::mirror ? kFirstMirrorId : 0) {
   sendHello();
 }
 
 void Client::sendHello() {
-  if (kind_ == Kind::mirror) return;
+  if (stream_.newest().isMirror()) return;
   std::string hello;
   std::string proof;
-  if (!proof_.token.empty() || !proof_.pairingCode.empty())
-    writeAuthenticate(proof, ++lastRequestId_, proof_);
+  if (!credentials_.empty()) writeAuthenticate(proof, requests_.nextId(), credentials_.proof());
   outbox_.setProof(std::move(proof));
-  writeHello(hello, ++lastRequestId_, hello_);
+  writeHello(hello, requests_.nextId(), hello_);
   outbox_.setHello(std::move(hello));
 }
 
 void Client::prove(Proof proof) {
-  proof_ = std::move(proof);
+  credentials_.set(std::move(proof));
   if (outbox_.helloWaits()) sendHello();
 }
 
 bool Client::renew(std::string_view token) {
   if (state_ != CS_STATE_JOINED || token.empty()) return false;
-  renewing_ = {.token = std::string(token), .pairingCode = {}};
   std::string message;
-  writeAuthenticate(message, ++lastRequestId_, renewing_);
+  writeAuthenticate(message, requests_.nextId(), credentials_.renew(token));
   send(std::move(message));
   return true;
 }
@@ -84,42 +64,38 @@ std::string Client::resumeToken() const {
 
 void Client::connecting(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
-  renewing_ = {};
-  if (welcomed_) disconnected(nowUs);
+  credentials_.forgetRenewal();
+  if (timer_.isWelcomed()) disconnected(nowUs);
   redirection_.attempting();
   outbox_.clear();
-  forgetRequests();
-  assembly_ = {};
-  keyFrameRequest_ = {};
-  nextServer_.clear();
+  requests_.forget();
+  stream_.connecting();
   ++hello_.attempt;
-  connectAtUs_ = reconnection_.attemptEnd(nowUs, std::uint64_t{1000} * welcome_.graceMs);
+  timer_.connecting(nowUs, std::uint64_t{1000} * welcome_.graceMs);
   sendHello();
 }
 
 void Client::disconnected(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
   if (!welcome_.token.empty()) state_ = CS_STATE_RECONNECTING;
-  welcomed_ = false;
   redirection_.ended();
-  unseenTick_.reset();
+  stream_.acknowledgements().connectionEnded();
   outbox_.clear();
-  forgetRequests();
+  requests_.forget();
   std::uint64_t seed = 0;
   for (const char byte : hello_.token) seed = seed * 257 + static_cast<unsigned char>(byte);
-  connectAtUs_ = reconnection_.lost(nowUs, std::uint64_t{1000} * welcome_.graceMs, seed);
+  timer_.lost(nowUs, std::uint64_t{1000} * welcome_.graceMs, seed);
 }
 
 std::uint64_t Client::connectAtUs() const {
-  if (state_ == CS_STATE_FAILED) return Reconnection::kNever;
-  return welcomed_ ? lastHeardUs_ + Reconnection::kSilenceUs : connectAtUs_;
+  return state_ == CS_STATE_FAILED ? Reconnection::kNever : timer_.connectAtUs();
 }
 
 std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded* decoded) {
   if (state_ == CS_STATE_FAILED) return 0;
   const std::optional<ServerMessage> message = readServerMessage(bytes);
   if (!message) return failMalformed("ServerMessage");
-  lastHeardUs_ = nowUs;
+  timer_.heard(nowUs);
   switch (message->kind) {
     case Body::welcome:
       return welcomed(message->body, nowUs);
@@ -167,15 +143,13 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
 }
 
 void Client::update(std::uint64_t nowUs) {
-  // A long pause between two updates does not count as silence: messages that arrived meanwhile are not read
-  // yet.
-  const std::uint64_t pauseUs = nowUs - std::exchange(updatedUs_, nowUs);
-  if (pauseUs > Reconnection::kLongestStepUs)
-    lastHeardUs_ = std::min(nowUs, lastHeardUs_ + pauseUs - Reconnection::kLongestStepUs);
-  upload_.update(nowUs);
-  if (kind_ == Kind::mirror || !welcomed_ || state_ == CS_STATE_FAILED || !clock_.pingDue(nowUs)) return;
+  timer_.update(nowUs);
+  requests_.update(nowUs);
+  if (stream_.newest().isMirror() || !timer_.isWelcomed() || state_ == CS_STATE_FAILED ||
+      !clock_.pingDue(nowUs))
+    return;
   std::string ping;
-  writePing(ping, ++lastRequestId_, nowUs);
+  writePing(ping, requests_.nextId(), nowUs);
   send(std::move(ping));
   clock_.pingSent(nowUs);
 }
@@ -186,7 +160,7 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   if (welcome->participants.size() > limits_.participants)
     return fail("The scene has more than " + std::to_string(limits_.participants) +
                 " participants, the limit of this client (cs_limits.max_participants).");
-  if (welcomed_) return fail("The server sent Welcome twice.");
+  if (timer_.isWelcomed()) return fail("The server sent Welcome twice.");
   if (welcome->protocolVersion != CS_PROTOCOL_VERSION)
     return fail("The server uses protocol version " + std::to_string(welcome->protocolVersion) +
                 "; this client uses version " + std::to_string(CS_PROTOCOL_VERSION) +
@@ -198,24 +172,21 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   // Whether this is the participant of an earlier client (resume).
   const bool inherited = !returned && welcome->resumed && !hello_.token.empty();
   // Whether the server resumed the participant and its description is still the one that this client has.
-  const bool known = returned && welcome->resumed && described() && hello_.contentId != 0 &&
+  const bool known = returned && welcome->resumed && stream_.begun() && hello_.contentId != 0 &&
                      welcome->contentId == hello_.contentId;
   welcome_ = std::move(*welcome);
-  welcomed_ = true;
   resumed_ = inherited || (returned && welcome_.resumed);
-  participants_ = std::move(welcome_.participants);
+  participants_.begin(std::move(welcome_.participants));
   hello_.token = welcome_.token;
   hello_.scene = welcome_.scene;
   hello_.contentId = known ? welcome_.contentId : 0;
-  reconnection_.joined(nowUs);
+  timer_.welcomed(nowUs);
   redirection_.welcomed();
-  quality_ = 0;
-  frameDivisor_ = 1;
-  acknowledgement_ = {};
+  stream_.welcomed();
   if (returned && !resumed_) clock_ = {};
   // The colliders and grabs of an earlier client end, even if this one has none yet.
   if (inherited || (returned && posed_)) sendPoses(nowUs);
-  const std::uint32_t events = participants_.empty() ? 0 : CS_EVENT_PARTICIPANTS;
+  const std::uint32_t events = participants_.all().empty() ? 0 : CS_EVENT_PARTICIPANTS;
   if (!known) return events;
   state_ = CS_STATE_JOINED;
   redirection_.joined();
@@ -225,17 +196,8 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
 std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
   std::optional<Presence> presence = readPresence(body);
   if (!presence) return failMalformed("Presence");
-  presence_ = std::move(*presence);
-  const Participant& who = presence_.participant;
-  const auto known = std::find_if(participants_.begin(), participants_.end(),
-                                  [&](const Participant& one) { return one.id == who.id; });
-  if (presence_.kind == CS_PRESENCE_LEFT) {
-    if (known != participants_.end()) participants_.erase(known);
-  } else if (known != participants_.end()) {
-    *known = who;
-  } else if (participants_.size() < limits_.participants) {
-    participants_.push_back(who);
-  }
+  participants_.change(std::move(*presence), limits_.participants);
+  const Participant& who = participants_.newest().participant;
   if (who.id == welcome_.participantId && who.role != welcome_.role) {
     welcome_.role = who.role;
     if (posed_) sendPoses(nowUs);
@@ -246,27 +208,14 @@ std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
 std::uint32_t Client::chunkReceived(Bytes body) {
   const std::optional<Chunk> chunk = readChunk(body);
   if (!chunk) return failMalformed("Chunk");
-  if (!welcomed_) return fail("The server sent a description before its Welcome.");
-  auto content = assembly_.add(*chunk, limits_.contentBytes);
-  if (!content) return fail("The server sent a wrong description: " + content.error() + ".");
-  if (!*content) return 0;
-  return described(**content);
+  if (!timer_.isWelcomed()) return fail("The server sent a description before its Welcome.");
+  auto begun = stream_.add(*chunk, limits_, resumed_);
+  if (!begun) return fail(std::move(begun.error()));
+  return *begun ? described() : 0;
 }
 
-std::uint32_t Client::described(Bytes content) {
-  auto description = readDescription(content, limits_);
-  if (!description)
-    return fail("The server's description of the scene is wrong: " + description.error() + ".");
-  if (!newest_.begin(description->layout))
-    return fail("The server's description of the scene is wrong: its layout is not possible.");
-  description_ = std::move(*description);
-  keyFrameRequest_.answered();
-  // After a resume the ticks continue, so frames missed during the outage count as dropped.
-  if (!resumed_) statistics_.forgetTicks();
-  report_ = {};
-  if (playOut_) playOut_->begin(description_);
-  if (contact_) contact_->begin(description_);
-  shown_ = {};
+std::uint32_t Client::described() {
+  display_.begin(stream_.description());
   hello_.contentId = welcome_.contentId;
   const bool returned = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
@@ -275,99 +224,32 @@ std::uint32_t Client::described(Bytes content) {
 }
 
 std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs, const cs_decoded* decoded) {
-  if (!readFrame(body, frame_)) return failMalformed("Frame");
   if (state_ != CS_STATE_JOINED) return fail("The server sent a frame before the description.");
-  description_.colliders.resize(frame_.colliders.size());
-  for (std::size_t i = 0; i < frame_.colliders.size(); ++i) {
-    if (!readCollider(frame_.colliders[i], description_.colliders[i])) return failMalformed("ColliderState");
+  const auto received = stream_.receive(body, decoded, nowUs);
+  if (!received) return failMalformed(received.error());
+  if (received->needsKeyFrame) requestKeyFrame(nowUs);
+  if (!received->isNew) return 0;
+  const std::uint64_t tick = stream_.newest().tick();
+  const bool isMirror = stream_.newest().isMirror();
+  if (!isMirror && stream_.acknowledgements().decoded(tick, inLockstep(), nowUs)) outbox_.setAck(tick);
+  stream_.measure(clock_, nowUs);
+  if (display_.playsOut()) {
+    const auto decodeUs = static_cast<std::uint64_t>(1000 * stream_.newest().decodeMs());
+    display_.add(stream_.displayable(received->isKey),
+                 clock_.known() ? clock_.serverTimeUs(nowUs) + decodeUs : 0);
   }
-  const std::uint32_t events = packetReceived(nowUs, decoded);
-  if (!frame_.report || (events & CS_EVENT_FRAME) == 0) return events;
-  if (!readReport(*frame_.report, report_) || !namesVertices(report_, description_.layout.cloths))
-    return failMalformed("SimulationReport");
-  reportTick_ = newest_.tick();
-  return events | CS_EVENT_REPORT;
-}
-
-std::uint32_t Client::packetReceived(std::uint64_t nowUs, const cs_decoded* given) {
-  const auto packet = std::as_bytes(std::span(frame_.packet.data(), frame_.packet.size()));
-  const auto parsed = codec::parsePacket(packet);
-  // Frames that the server omits are not lost. At a change of the divisor, the larger distance between frames
-  // counts.
-  statistics_.arrived(parsed ? std::optional(parsed->header.tick) : std::nullopt, packet.size(),
-                      description_.ticksPerFrame() * std::max(frameDivisor_, frame_.divisor), nowUs);
-  frameDivisor_ = frame_.divisor;
-  const bool isMirror = kind_ == Kind::mirror;
-  const cs_decoding decoding = !isMirror ? decode(packet)
-                               : parsed  ? newest_.take(given, parsed->header.tick)
-                                         : CS_DECODING_REFUSED;
-  if (decoding == CS_DECODING_SKIPPED) return 0;
-  if (decoding == CS_DECODING_REFUSED) {
-    statistics_.refused();
-    if (!isMirror) requestKeyFrame(nowUs);
-    return 0;
-  }
-  if (isMirror) decodeMs_ = given->decode_ms;
-  const DecodedFrame decoded{
-      .tick = newest_.tick(),
-      .key = parsed->header.kind == codec::PacketKind::key,
-      .hashMatches = newest_.hash() == frame_.reconstructionHash,
-      .vertexCount = description_.layout.vertexCount(),
-      .packetBytes = packet.size(),
-  };
-  statistics_.decoded(decoded, nowUs);
-  if (decoded.key) keyFrameRequest_.answered();
-  // A key frame makes the client's state equal to the server's again.
-  if (!isMirror && !decoded.hashMatches) requestKeyFrame(nowUs);
-  if (!isMirror) acknowledge(decoded.tick, nowUs);
-  timeFrame(decoded.key, nowUs);
-  return CS_EVENT_FRAME;
-}
-
-void Client::acknowledge(std::uint64_t tick, std::uint64_t nowUs) {
-  if (inLockstep() && holdsAcknowledgements_)
-    unseenTick_ = tick;
-  else if (inLockstep() || acknowledgement_.due(nowUs))
-    outbox_.setAck(tick);
+  return received->hasReport ? CS_EVENT_FRAME | CS_EVENT_REPORT : CS_EVENT_FRAME;
 }
 
 void Client::acknowledgeSeen() {
-  if (const auto tick = std::exchange(unseenTick_, std::nullopt)) outbox_.setAck(*tick);
-}
-
-void Client::timeFrame(bool key, std::uint64_t nowUs) {
-  const std::uint64_t arrivedUs = clock_.serverTimeUs(nowUs);
-  stages_ = {};
-  if (clock_.known()) {
-    stages_.server_ms = since(frame_.tickTimeUs, frame_.packetTimeUs) / 1000;
-    stages_.network_ms = since(frame_.packetTimeUs, arrivedUs) / 1000;
-    stages_.displayable_ms = since(frame_.tickTimeUs, arrivedUs) / 1000 + decodeMs_;
-  }
-  if (!playOut_) return;
-  const bool sendsNormals = description_.layout.normals != codec::NormalMode::none;
-  const auto decodeUs = static_cast<std::uint64_t>(1000 * decodeMs_);
-  playOut_->add({.tick = newest_.tick(),
-                 .timeUs = frame_.tickTimeUs,
-                 .key = key,
-                 .positions = newest_.positions(),
-                 .normals = sendsNormals ? newest_.normals() : std::span<const float>(),
-                 .colliders = description_.colliders},
-                clock_.known() ? arrivedUs + decodeUs : 0);
-}
-
-cs_decoding Client::decode(std::span<const std::byte> packet) {
-  if (!nowUs_) return newest_.decode(packet);
-  const std::uint64_t start = nowUs_();
-  const cs_decoding result = newest_.decode(packet);
-  decodeMs_ = static_cast<double>(nowUs_() - start) / 1000;
-  return result;
+  if (const auto tick = stream_.acknowledgements().seen()) outbox_.setAck(*tick);
 }
 
 void Client::requestKeyFrame(std::uint64_t nowUs, bool early) {
   // In lockstep the server waits for an answer to each frame: an acknowledgement or this request.
-  if (!keyFrameRequest_.wanted(nowUs) && (early || !inLockstep())) return;
+  if (!stream_.mayRequestKeyFrame(nowUs, !early && inLockstep())) return;
   std::string request;
-  writeKeyFrameRequest(request, description_.layout.epoch, early);
+  writeKeyFrameRequest(request, stream_.description().layout.epoch, early);
   send(std::move(request));
 }
 
@@ -375,10 +257,10 @@ std::uint32_t Client::pongReceived(Bytes body, std::uint64_t requestId, std::uin
   const std::optional<Pong> pong = readPong(body);
   if (!pong) return failMalformed("Pong");
   if (pong->clientTimeUs == 0) {  // the ping was part of an upload
-    upload_.pongReceived(requestId);
+    requests_.uploadPongReceived(requestId);
     return 0;
   }
-  if (kind_ == Kind::mirror) clock_.pingSent(pong->clientTimeUs);
+  if (stream_.newest().isMirror()) clock_.pingSent(pong->clientTimeUs);
   clock_.pongReceived(*pong, nowUs);
   return 0;
 }
@@ -408,7 +290,7 @@ std::uint32_t Client::noticeReceived(Bytes body) {
 std::uint32_t Client::parametersReceived(Bytes body) {
   const std::optional<ParameterChange> change = readParameterChanged(body);
   if (!change) return failMalformed("ParameterChanged");
-  apply(*change, description_);
+  stream_.apply(*change);
   parametersParticipant_ = change->participantId;
   return CS_EVENT_PARAMETERS;
 }
@@ -418,47 +300,30 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::ui
   if (!error) return failMalformed("Error");
   if (!error->fatal) {
     // Pieces that were under way when the server refused an upload are refused as well.
-    if (requestId != 0 && requestId == endedUploadId_) return 0;
-    if (const std::optional<cs_request> request = requests_.take(requestId)) {
-      if (requestId == upload_.requestId()) {
-        endedUploadId_ = requestId;
-        upload_.end();
-      }
-      answer_ = {.requestId = requestId,
-                 .request = *request,
-                 .error = error->code,
-                 .errorText = std::move(error->text),
-                 .name = {},
-                 .bytes = 0,
-                 .repairs = {}};
-      return CS_EVENT_ANSWER;
-    }
+    if (requests_.isOfEndedUpload(requestId)) return 0;
+    if (requests_.refused(requestId, *error) == Requests::Outcome::answered) return CS_EVENT_ANSWER;
   }
   if (!error->fatal ||
       (error->code != field::ErrorCode::kNotFound && error->code != field::ErrorCode::kCutOff))
     error->server.clear();
   // A server that cuts off and names itself wants the client to come back.
-  const bool names = follows_ && !error->server.empty() &&
+  const bool names = redirection_.isEnabled() && !error->server.empty() &&
                      (error->code == field::ErrorCode::kNotFound || error->server != connectServer());
   const bool isRedirect = names && redirection_.follow(error->server, nowUs);
   if (error->fatal && !isRedirect && (names || !isTemporary(*error))) fail({});
-  errorCode_ = error->code;
-  errorText_ = std::move(error->text);
-  errorServer_ = std::move(error->server);
+  error_ = std::move(*error);
   return isRedirect ? 0 : CS_EVENT_ERROR;
 }
 
 std::uint32_t Client::movingReceived(Bytes body, std::uint64_t nowUs) {
   std::optional<std::string> server = readMoving(body);
   if (!server) return failMalformed("Moving");
-  if (!follows_ || server->empty() || !redirection_.announce(*server, nowUs)) return 0;
-  nextServer_ = std::move(*server);
-  return CS_EVENT_MOVING;
+  return redirection_.announce(std::move(*server), nowUs) ? CS_EVENT_MOVING : 0;
 }
 
 bool Client::isTemporary(const ServerError& error) const {
   using Code = field::ErrorCode;
-  const bool reconnects = state_ == CS_STATE_RECONNECTING && !welcomed_;
+  const bool reconnects = state_ == CS_STATE_RECONNECTING && !timer_.isWelcomed();
   // The client may try again if only the connection was cut off, or if a reconnect found the server full. It
   // also may if it has returned to its first server, and another one was named.
   return error.code == Code::kCutOff || (reconnects && error.code == Code::kResourceExhausted) ||
@@ -475,11 +340,9 @@ std::uint32_t Client::scenesReceived(Bytes body) {
 std::uint32_t Client::tokenReceived(Bytes body) {
   std::optional<std::string> token = readToken(body);
   if (!token) return failMalformed("AuthenticateResponse");
-  if (!renewing_.token.empty()) proof_ = std::exchange(renewing_, {});
-  if (token->empty()) return 0;
-  // The code has been used; the next connection needs the token.
-  proof_ = {.token = std::move(*token), .pairingCode = {}};
-  return CS_EVENT_TOKEN;
+  const std::uint32_t events = token->empty() ? 0 : CS_EVENT_TOKEN;
+  credentials_.accepted(std::move(*token));
+  return events;
 }
 
 std::uint32_t Client::pairingCodeReceived(Bytes body) {
@@ -492,29 +355,32 @@ std::uint32_t Client::pairingCodeReceived(Bytes body) {
 std::uint32_t Client::operatingPointReceived(Bytes body) {
   const std::optional<std::uint32_t> quality = readOperatingPoint(body);
   if (!quality) return failMalformed("OperatingPoint");
-  quality_ = *quality;
+  stream_.operatingPoint(*quality);
   return 0;
 }
 
 std::uint32_t Client::playbackReceived(Bytes body, std::uint64_t nowUs) {
   const std::optional<cs_playback> playback = readPlayback(body);
   if (!playback) return failMalformed("Playback");
-  playback_ = playback;
-  playbackUs_ = nowUs;
+  playback_.told(*playback, nowUs);
   return CS_EVENT_PLAYBACK;
 }
 
-std::optional<cs_playback> Client::playback(std::uint64_t nowUs) const {
-  if (!playback_ || playback_->paused != 0 || nowUs < playbackUs_) return playback_;
-  cs_playback now = *playback_;
-  now.position =
-      std::min(now.length, now.position + static_cast<double>(nowUs - playbackUs_) * 1e-6 * now.speed);
-  return now;
+std::uint32_t Client::answerReceived(const ServerMessage& message) {
+  switch (requests_.answered(message)) {
+    case Requests::Outcome::unknown:
+      return 0;
+    case Requests::Outcome::malformed:
+      return failMalformed("answer");
+    case Requests::Outcome::answered:
+      return CS_EVENT_ANSWER;
+  }
+  return 0;
 }
 
 const std::string* Client::nextOutgoing() {
   const std::string* message = outbox_.next();
-  if (!message && isConnected()) message = upload_.next(lastRequestId_);
+  if (!message && isConnected()) message = requests_.nextOfUpload();
   // Attachments and joints stay where they were moved, so each pose is sent once.
   if (outbox_.poses().empty() && isConnected() && mayCollide()) {
     poses_.attachments.clear();
@@ -523,54 +389,34 @@ const std::string* Client::nextOutgoing() {
   return message;
 }
 
-std::span<const float> Client::positions() const {
-  if (newest_.present()) return newest_.positions();
-  return description_.restPositions;
-}
-
-std::span<const float> Client::normals() const {
-  if (newest_.present()) return newest_.normals();
-  return description_.restNormals;
-}
-
 std::span<const float> Client::playedPositions() const {
-  if (!shown_.empty()) return shown_;
-  return playOut_ && playOut_->shows() ? playOut_->positions() : positions();
+  return display_.shows() ? display_.positions() : stream_.positions();
 }
 
 std::span<const float> Client::playedNormals() const {
-  if (!shown_.empty()) return contact_->normals(description_.layout);
-  return playOut_ && playOut_->shows() ? playOut_->normals(description_.layout) : normals();
-}
-
-std::uint64_t Client::shownTick() const {
-  if (playOut_) return playOut_->shows() ? playedTick_ : 0;
-  return newest_.present() ? newest_.tick() : 0;
+  return display_.shows() ? display_.normals(stream_.description().layout) : stream_.normals();
 }
 
 const std::vector<Collider>& Client::playedColliders() const {
-  return playOut_ && playOut_->shows() ? playOut_->colliders() : colliders();
+  return display_.shows() ? display_.colliders() : colliders();
+}
+
+std::uint64_t Client::shownTick() const {
+  if (display_.playsOut()) return display_.shows() ? display_.tick() : 0;
+  return stream_.newest().present() ? stream_.newest().tick() : 0;
 }
 
 cs_stage_statistics Client::stages() const {
-  cs_stage_statistics stages = stages_;
-  stages.version = CS_STAGE_STATISTICS_VERSION;
-  stages.decode_ms = decodeMs_;
-  if (playOut_) playOut_->report(stages);
+  cs_stage_statistics stages = stream_.stages();
+  display_.report(stages);
   return stages;
-}
-
-std::uint64_t Client::reconstructionHash() const {
-  return newest_.present() ? newest_.hash() : 0;
 }
 
 std::uint32_t Client::fail(std::string text, std::uint32_t code) {
   state_ = CS_STATE_FAILED;
-  errorCode_ = code;
-  errorText_ = std::move(text);
-  errorServer_.clear();
+  error_ = {.code = code, .text = std::move(text), .fatal = true, .server = {}};
   outbox_.clear();
-  forgetRequests();
+  requests_.forget();
   return CS_EVENT_ERROR;
 }
 

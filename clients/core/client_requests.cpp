@@ -34,7 +34,7 @@ void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
   poses_.grabs.clear();
   for (const cs_grab& grab : grabs) {
     OwnGrab& own = poses_.grabs.emplace_back(OwnGrab{grab, std::nullopt});
-    if (grab.has_place == 1) own.place = triangleOf(grab.place.triangle, description_);
+    if (grab.has_place == 1) own.place = triangleOf(grab.place.triangle, stream_.description());
   }
   sendPoses(nowUs);
 }
@@ -45,14 +45,15 @@ std::optional<cs_cloth_point> Client::seen(std::optional<cs_cloth_point> point) 
 }
 
 std::optional<cs_cloth_point> Client::nearestPoint(const Vec3& point, float maxDistance) const {
-  return seen(client::nearestPoint({description_.triangles, playedPositions()},
+  return seen(client::nearestPoint({stream_.description().triangles, playedPositions()},
                                    {point[0], point[1], point[2]}, maxDistance));
 }
 
 std::optional<cs_cloth_point> Client::castRay(const Vec3& origin, const Vec3& direction,
                                               float maxDistance) const {
-  return seen(client::castRay({description_.triangles, playedPositions()}, {origin[0], origin[1], origin[2]},
-                              {direction[0], direction[1], direction[2]}, maxDistance));
+  return seen(client::castRay({stream_.description().triangles, playedPositions()},
+                              {origin[0], origin[1], origin[2]}, {direction[0], direction[1], direction[2]},
+                              maxDistance));
 }
 
 void Client::wantContacts(bool wants, std::uint64_t nowUs) {
@@ -69,10 +70,12 @@ void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
   const auto known =
       std::find_if(poses_.attachments.begin(), poses_.attachments.end(),
                    [&](const AttachmentPose& waiting) { return waiting.name == attachment.name; });
-  if (known != poses_.attachments.end())
+  if (known != poses_.attachments.end()) {
+    attachment.jumps = attachment.jumps || known->jumps;  // a pose that waits jumps when it is sent
     *known = std::move(attachment);
-  else
+  } else {
     poses_.attachments.push_back(std::move(attachment));
+  }
   sendPoses(nowUs);
 }
 
@@ -88,12 +91,12 @@ void Client::move(ColliderJoints joints, std::uint64_t nowUs) {
 }
 
 bool Client::mayCollide() const {
-  return (welcomed_ ? welcome_.role : hello_.role) != CS_ROLE_VIEWER;
+  return (timer_.isWelcomed() ? welcome_.role : hello_.role) != CS_ROLE_VIEWER;
 }
 
 void Client::sendPoses(std::uint64_t nowUs) {
   posed_ = true;
-  if (contact_) ownCapsules_.add(ownCapsules(poses_), nowUs);
+  display_.moved(poses_, nowUs);
   if (state_ == CS_STATE_FAILED || !isConnected()) return;
   const std::uint64_t serverUs = clock_.serverTimeUs(nowUs);
   if (mayCollide()) return writeColliderPoses(outbox_.poses(), poses_, nowUs, serverUs);
@@ -105,82 +108,57 @@ void Client::sendPoses(std::uint64_t nowUs) {
 }
 
 bool Client::setPlayOut(const cs_play_out_options* options) {
-  if (options && !isAllowed(*options)) return false;
-  playOut_ = options ? std::make_unique<PlayOut>(*options) : nullptr;
-  if (playOut_ && described()) playOut_->begin(description_);
-  return true;
-}
-
-std::optional<cs_played> Client::play(std::uint64_t nowUs, std::uint64_t displayUs) {
-  if (!playOut_) return std::nullopt;
-  shown_ = {};
-  const cs_played played = playOut_->play(clock_.serverTimeUs(nowUs), clock_.serverTimeUs(displayUs));
-  playedTick_ = played.tick;
-  if (contact_) correct(played, displayUs);
-  return played;
+  return display_.setPlayOut(options, stream_.begun() ? &stream_.description() : nullptr);
 }
 
 void Client::setLocalContact(bool on) {
-  shown_ = {};
-  ownCapsules_ = {};
-  contact_ = on ? std::make_unique<Contact>() : nullptr;
-  if (contact_ && described()) contact_->begin(description_);
+  display_.setLocalContact(on, stream_.begun() ? &stream_.description() : nullptr);
 }
 
-// The frame states where the server saw the capsules. If they are not recognised, they are taken as they were
-// when the frame was simulated, less the way of the message to the server.
-void Client::correct(const cs_played& played, std::uint64_t displayUs) {
-  if (ownCapsules_.empty() || !mayCollide() || played.server_time_us == 0 || !playOut_->shows()) return;
-  const double ageUs =
-      since(played.server_time_us, clock_.serverTimeUs(displayUs)) + 500 * clock_.roundTripMs();
-  const auto age = static_cast<std::uint64_t>(std::clamp(ageUs, 0.0, static_cast<double>(displayUs)));
-  const OwnCapsules sent = ownCapsules_.at(displayUs - age);
-  const OwnCapsules answered = capsulesOf(playedColliders(), welcome_.participantId, sent).value_or(sent);
-  const std::span<const float> positions = playOut_->positions();
-  const std::span<const float> shown = contact_->apply(positions, answered, ownCapsules_.newest(), displayUs);
-  if (contact_->largest() > 0) shown_ = shown;
+std::optional<cs_played> Client::play(std::uint64_t nowUs, std::uint64_t displayUs) {
+  return display_.play(clock_, nowUs, displayUs, mayCollide() ? welcome_.participantId : 0);
 }
 
 void Client::change(const ParameterChange& change) {
   std::string message;
-  writeParameterChange(message, ++lastRequestId_, change);
+  writeParameterChange(message, requests_.nextId(), change);
   send(std::move(message));
 }
 
 void Client::changeCollider(std::string_view collider, const cs_collider_change& change) {
   std::string message;
-  writeColliderChange(message, ++lastRequestId_, collider, change);
+  writeColliderChange(message, requests_.nextId(), collider, change);
   send(std::move(message));
 }
 
 void Client::control(const SceneControl& control) {
   if (state_ != CS_STATE_JOINED) return;
   std::string message;
-  writeControlScene(message, ++lastRequestId_, welcome_.scene, control);
+  writeControlScene(message, requests_.nextId(), welcome_.scene, control);
   send(std::move(message));
 }
 
 void Client::listScenes() {
   std::string message;
-  writeListScenes(message, ++lastRequestId_);
+  writeListScenes(message, requests_.nextId());
   send(std::move(message));
 }
 
 void Client::setRole(std::uint64_t participant, std::uint32_t role) {
   std::string message;
-  writeSetRole(message, ++lastRequestId_, participant, role);
+  writeSetRole(message, requests_.nextId(), participant, role);
   send(std::move(message));
 }
 
 void Client::remove(std::uint64_t participant, bool ban) {
   std::string message;
-  writeRemoveParticipant(message, ++lastRequestId_, participant, ban);
+  writeRemoveParticipant(message, requests_.nextId(), participant, ban);
   send(std::move(message));
 }
 
 void Client::createPairingCode(std::uint32_t role) {
   std::string message;
-  writeCreatePairingCode(message, ++lastRequestId_, role);
+  writeCreatePairingCode(message, requests_.nextId(), role);
   send(std::move(message));
 }
 

@@ -621,9 +621,10 @@ int cs_cast_ray(const cs_client* client, const float* origin3, const float* dire
 
 /* Replaces the grabs of this participant. At most CS_MAX_GRABS are used; the rest is ignored. */
 void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
-/* Moves an attachment of the scene; it stays there. orientation4 may be NULL: no rotation. */
+/* Moves an attachment of the scene; it stays there. orientation4 may be NULL: no rotation. If it jumps, its
+ * cloth goes along at once, however short the way is: use this for teleports and cuts of an animation. */
 void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,
-                        const float* orientation4, uint64_t now_us) CS_NOEXCEPT;
+                        const float* orientation4, int jumps, uint64_t now_us) CS_NOEXCEPT;
 /* Moves the joints of a collider of the scene that is a mesh with joints; they stay there. `poses` has seven
  * numbers for each joint: position and quaternion x, y, z, w, relative to its parent. At most 128 joints are
  * used; the rest is ignored. */

@@ -11,49 +11,50 @@
 using namespace clothstream::client;
 
 uint32_t cs_stream_rate(const cs_client* client) noexcept {
-  return client->client.description().streamRate;
+  return client->client.stream().description().streamRate;
 }
 
 uint32_t cs_simulation_rate(const cs_client* client) noexcept {
-  return client->client.description().simulationRate;
+  return client->client.stream().description().simulationRate;
 }
 
 uint32_t cs_frame_divisor(const cs_client* client) noexcept {
-  return client->client.frameDivisor();
+  return client->client.stream().frameDivisor();
 }
 
 uint32_t cs_vertex_count(const cs_client* client) noexcept {
-  return client->client.description().layout.vertexCount();
+  return client->client.stream().description().layout.vertexCount();
 }
 
 const float* cs_positions(const cs_client* client) noexcept {
-  return client->client.positions().data();
+  return client->client.stream().positions().data();
 }
 
 const float* cs_normals(const cs_client* client) noexcept {
-  return client->client.normals().data();
+  return client->client.stream().normals().data();
 }
 
 int cs_sends_normals(const cs_client* client) noexcept {
-  return client->client.description().layout.normals != clothstream::codec::NormalMode::none ? 1 : 0;
+  return client->client.stream().description().layout.normals != clothstream::codec::NormalMode::none ? 1 : 0;
 }
 
 uint64_t cs_reconstruction_hash(const cs_client* client) noexcept {
-  return client->client.reconstructionHash();
+  const NewestFrame& newest = client->client.stream().newest();
+  return newest.present() ? newest.hash() : 0;
 }
 
 const uint32_t* cs_triangles(const cs_client* client, uint32_t* index_count) noexcept {
-  const std::vector<std::uint32_t>& triangles = client->client.description().triangles;
+  const std::vector<std::uint32_t>& triangles = client->client.stream().description().triangles;
   *index_count = static_cast<std::uint32_t>(triangles.size());
   return triangles.data();
 }
 
 uint32_t cs_cloth_count(const cs_client* client) noexcept {
-  return static_cast<std::uint32_t>(client->client.description().cloths.size());
+  return static_cast<std::uint32_t>(client->client.stream().description().cloths.size());
 }
 
 int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out) noexcept {
-  const Description& description = client->client.description();
+  const Description& description = client->client.stream().description();
   const Cloth* cloth = at(description.cloths, index);
   if (!cloth) return 0;
   const clothstream::codec::ClothLayout& layout = description.layout.cloths[index];
@@ -68,24 +69,24 @@ int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out) noexcep
 }
 
 const float* cs_uvs(const cs_client* client, uint32_t cloth, uint32_t* count) noexcept {
-  const Cloth* found = at(client->client.description().cloths, cloth);
+  const Cloth* found = at(client->client.stream().description().cloths, cloth);
   *count = found ? static_cast<std::uint32_t>(found->uvs.size() / 2) : 0;
   return *count > 0 ? found->uvs.data() : nullptr;
 }
 
 const uint32_t* cs_uv_indices(const cs_client* client, uint32_t cloth, uint32_t* count) noexcept {
-  const Cloth* found = at(client->client.description().cloths, cloth);
+  const Cloth* found = at(client->client.stream().description().cloths, cloth);
   *count = found ? static_cast<std::uint32_t>(found->uvIndices.size()) : 0;
   return *count > 0 ? found->uvIndices.data() : nullptr;
 }
 
 uint32_t cs_submesh_count(const cs_client* client, uint32_t cloth) noexcept {
-  const Cloth* found = at(client->client.description().cloths, cloth);
+  const Cloth* found = at(client->client.stream().description().cloths, cloth);
   return found ? static_cast<std::uint32_t>(found->submeshes.size()) : 0;
 }
 
 int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_submesh* out) noexcept {
-  const Cloth* found = at(client->client.description().cloths, cloth);
+  const Cloth* found = at(client->client.stream().description().cloths, cloth);
   const Submesh* submesh = found ? at(found->submeshes, index) : nullptr;
   if (!submesh) return 0;
   *out = {
@@ -104,7 +105,7 @@ int cs_get_collider(const cs_client* client, uint32_t index, cs_collider* out) n
 const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vertex_count,
                          const uint32_t** triangles, uint32_t* index_count) noexcept {
   const Collider* collider = at(client->client.colliders(), index);
-  const Hull* hull = collider ? hullOf(*collider, client->client.description()) : nullptr;
+  const Hull* hull = collider ? hullOf(*collider, client->client.stream().description()) : nullptr;
   *vertex_count = hull ? static_cast<std::uint32_t>(hull->vertices.size() / 3) : 0;
   *index_count = hull ? static_cast<std::uint32_t>(hull->triangles.size()) : 0;
   *triangles = hull ? hull->triangles.data() : nullptr;

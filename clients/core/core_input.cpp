@@ -77,8 +77,8 @@ int cs_cast_ray(const cs_client* client, const float* origin3, const float* dire
 }
 
 void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,
-                        const float* orientation4, uint64_t now_us) noexcept {
-  AttachmentPose pose{.name = attachment};
+                        const float* orientation4, int jumps, uint64_t now_us) noexcept {
+  AttachmentPose pose{.name = attachment, .jumps = jumps != 0};
   std::copy(position3, position3 + 3, pose.position.begin());
   if (orientation4 != nullptr) std::copy(orientation4, orientation4 + 4, pose.orientation.begin());
   client->client.move(std::move(pose), now_us);

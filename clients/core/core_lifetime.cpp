@@ -146,15 +146,15 @@ cs_state cs_get_state(const cs_client* client) noexcept {
 }
 
 const char* cs_error_text(const cs_client* client) noexcept {
-  return client->client.errorText().c_str();
+  return client->client.error().text.c_str();
 }
 
 uint32_t cs_error_code(const cs_client* client) noexcept {
-  return client->client.errorCode();
+  return client->client.error().code;
 }
 
 const char* cs_error_server(const cs_client* client) noexcept {
-  return client->client.errorServer().c_str();
+  return client->client.error().server.c_str();
 }
 
 const char* cs_notice_text(const cs_client* client) noexcept {

@@ -88,8 +88,8 @@ ClothChange changeOf(const Cloth& cloth, const cs_cloth_settings& settings) {
 }  // namespace
 
 int cs_get_environment(const cs_client* client, cs_environment* out) noexcept {
-  if (!client->client.described()) return 0;
-  const Environment& environment = client->client.description().environment;
+  if (!client->client.stream().begun()) return 0;
+  const Environment& environment = client->client.stream().description().environment;
   copy(environment.gravity, out->gravity);
   copy(environment.wind, out->wind);
   out->air_density = environment.airDensity;
@@ -99,7 +99,7 @@ int cs_get_environment(const cs_client* client, cs_environment* out) noexcept {
 }
 
 int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out) noexcept {
-  const Cloth* cloth = at(client->client.description().cloths, index);
+  const Cloth* cloth = at(client->client.stream().description().cloths, index);
   if (!cloth) return 0;
   cs_cloth_settings settings;
   cs_keep_cloth_settings(&settings);
@@ -114,7 +114,7 @@ int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_pa
 }
 
 int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_settings* out) noexcept {
-  const Cloth* cloth = at(client->client.description().cloths, index);
+  const Cloth* cloth = at(client->client.stream().description().cloths, index);
   if (!cloth || out->version != CS_CLOTH_SETTINGS_VERSION) return 0;
   const ClothParameters& parameters = cloth->parameters;
   cs_keep_cloth_settings(out);
@@ -135,16 +135,16 @@ int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_sett
 }
 
 uint32_t cs_material_count(const cs_client* client) noexcept {
-  return static_cast<std::uint32_t>(client->client.description().materials.size());
+  return static_cast<std::uint32_t>(client->client.stream().description().materials.size());
 }
 
 const char* cs_material(const cs_client* client, uint32_t index) noexcept {
-  const std::string* material = at(client->client.description().materials, index);
+  const std::string* material = at(client->client.stream().description().materials, index);
   return material ? material->c_str() : "";
 }
 
 const char* cs_cloth_material(const cs_client* client, uint32_t cloth) noexcept {
-  const Cloth* found = at(client->client.description().cloths, cloth);
+  const Cloth* found = at(client->client.stream().description().cloths, cloth);
   return found ? found->parameters.material.c_str() : "";
 }
 
@@ -193,7 +193,7 @@ int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_setting
   if (settings->version != CS_CLOTH_SETTINGS_VERSION) return 0;
   ParameterChange change;
   const std::string_view name = cloth;
-  for (const Cloth& present : client->client.description().cloths)
+  for (const Cloth& present : client->client.stream().description().cloths)
     if (clothstream::parameters::isFor(name, present.name))
       change.cloths.push_back(changeOf(present, *settings));
   if (change.cloths.empty()) return 0;

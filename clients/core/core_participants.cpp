@@ -28,18 +28,18 @@ uint32_t cs_get_role(const cs_client* client) noexcept {
 }
 
 uint32_t cs_participant_count(const cs_client* client) noexcept {
-  return static_cast<std::uint32_t>(client->client.participants().size());
+  return static_cast<std::uint32_t>(client->client.participants().all().size());
 }
 
 int cs_get_participant(const cs_client* client, uint32_t index, cs_participant* out) noexcept {
-  const Participant* participant = at(client->client.participants(), index);
+  const Participant* participant = at(client->client.participants().all(), index);
   if (!participant) return 0;
   *out = toC(*participant);
   return 1;
 }
 
 int cs_get_presence(const cs_client* client, cs_presence* out) noexcept {
-  const Presence& presence = client->client.presence();
+  const Presence& presence = client->client.participants().newest();
   if (presence.kind == 0) return 0;
   *out = {.kind = presence.kind,
           .reason = presence.reason,

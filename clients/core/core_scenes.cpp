@@ -42,7 +42,7 @@ int cs_get_scene(const cs_client* client, uint32_t index, cs_scene_summary* out)
 }
 
 int cs_get_answer(const cs_client* client, cs_answer* out) noexcept {
-  const Answer& answer = client->client.answer();
+  const Answer& answer = client->client.requests().answer();
   if (out->version != CS_ANSWER_VERSION || answer.requestId == 0) return 0;
   *out = {.version = CS_ANSWER_VERSION,
           .request = answer.request,
@@ -66,7 +66,7 @@ uint64_t cs_copy_scene(cs_client* client, const char* source, const char* name,
 }
 
 int cs_get_upload(const cs_client* client, uint64_t* sent_bytes, uint64_t* bytes) noexcept {
-  const Upload& upload = client->client.upload();
+  const Upload& upload = client->client.requests().currentUpload();
   if (!upload.isActive()) return 0;
   *sent_bytes = upload.sent();
   *bytes = upload.bytes();
@@ -98,7 +98,7 @@ uint64_t cs_request_definition(cs_client* client, const char* scene) noexcept {
 }
 
 const uint8_t* cs_definition(const cs_client* client, size_t* bytes) noexcept {
-  const std::string& definition = client->client.definition();
+  const std::string& definition = client->client.requests().definition();
   *bytes = definition.size();
   return definition.empty() ? nullptr : reinterpret_cast<const uint8_t*>(definition.data());
 }
@@ -112,11 +112,11 @@ uint64_t cs_lift_ban(cs_client* client, const char* scene, const char* subject) 
 }
 
 uint32_t cs_ban_count(const cs_client* client) noexcept {
-  return static_cast<std::uint32_t>(client->client.bans().size());
+  return static_cast<std::uint32_t>(client->client.requests().bans().size());
 }
 
 int cs_get_ban(const cs_client* client, uint32_t index, cs_ban* out) noexcept {
-  const Ban* ban = at(client->client.bans(), index);
+  const Ban* ban = at(client->client.requests().bans(), index);
   if (!ban) return 0;
   *out = {.subject = ban->subject.c_str(),
           .display_name = ban->displayName.c_str(),

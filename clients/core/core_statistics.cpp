@@ -7,7 +7,7 @@
 using namespace clothstream::client;
 
 void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) noexcept {
-  const FrameStatistics& frames = client->client.statistics();
+  const FrameStatistics& frames = client->client.stream().statistics();
   *out = {};
   out->tick = frames.tick();
   out->frames = frames.frames();
@@ -21,16 +21,16 @@ void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* 
   out->bits_per_vertex = frames.bitsPerVertex();
   out->round_trip_ms = client->client.clock().roundTripMs();
   out->clock_offset_us = client->client.clock().offsetUs(now_us);
-  out->decode_ms = client->client.decodeMs();
+  out->decode_ms = client->client.stream().newest().decodeMs();
 }
 
 int cs_get_quality(const cs_client* client, uint32_t* quality) noexcept {
-  *quality = client->client.quality();
-  return client->client.described() ? 1 : 0;
+  *quality = client->client.stream().quality();
+  return client->client.stream().begun() ? 1 : 0;
 }
 
 double cs_stream_seconds(const cs_client* client) noexcept {
-  return client->client.statistics().streamSeconds();
+  return client->client.stream().statistics().streamSeconds();
 }
 
 int cs_get_stage_statistics(const cs_client* client, cs_stage_statistics* out) noexcept {
@@ -40,7 +40,7 @@ int cs_get_stage_statistics(const cs_client* client, cs_stage_statistics* out) n
 }
 
 int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report* out) noexcept {
-  const SimulationReport& report = client->client.report();
+  const SimulationReport& report = client->client.stream().report();
   const ClothReport* cloth = at(report.cloths, index);
   if (!cloth || out->version != CS_CLOTH_REPORT_VERSION) return 0;
   *out = {.version = CS_CLOTH_REPORT_VERSION,
@@ -55,12 +55,12 @@ int cs_get_cloth_report(const cs_client* client, uint32_t index, cs_cloth_report
           .gravity_energy = cloth->gravityEnergy,
           .penetration = cloth->penetration,
           .device_ms = static_cast<float>(1000 * report.deviceSeconds),
-          .tick = client->client.reportTick()};
+          .tick = client->client.stream().reportTick()};
   return 1;
 }
 
 const uint32_t* cs_constraint_ends(const cs_client* client, uint32_t index, uint32_t* count) noexcept {
-  const ClothReport* cloth = at(client->client.report().cloths, index);
+  const ClothReport* cloth = at(client->client.stream().report().cloths, index);
   *count = cloth ? static_cast<std::uint32_t>(cloth->constraintEnds.size() / 2) : 0;
   return *count > 0 ? cloth->constraintEnds.data() : nullptr;
 }

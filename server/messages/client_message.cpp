@@ -96,7 +96,7 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
     for (int axis = 0; axis < 3; ++axis)
       checks.number(path / "pose", pose.position[axis],
                     {.min = origin[axis] - reach, .max = origin[axis] + reach});
-    to.attachments.push_back({static_cast<std::size_t>(found - known.begin()), pose});
+    to.attachments.push_back({static_cast<std::size_t>(found - known.begin()), pose, from.jumps()});
   }
 }
 

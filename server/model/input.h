@@ -45,6 +45,7 @@ struct Grab {
 struct AttachmentPose {
   std::size_t attachment = 0;  // index into all attachments of the scene, in the order of its cloths
   Pose pose = {};
+  bool jumps = false;  // however short the way is
 };
 
 // New poses of the joints of a collider that is a mesh with joints.

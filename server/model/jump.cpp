@@ -31,16 +31,19 @@ bool hasJumped(std::span<const Pose> before, std::span<const Pose> now, double t
   return false;
 }
 
-std::vector<Carry> carriesOf(const Scene& scene, std::span<const Pose> before, std::span<const Pose> now) {
+std::vector<Carry> carriesOf(const Scene& scene, std::span<const Pose> before, std::span<const Pose> now,
+                             std::span<const std::size_t> told) {
   std::vector<Carry> carries;
   std::size_t first = 0;
   for (std::uint32_t i = 0; i < scene.cloths.size(); ++i) {
     const std::size_t count = scene.cloths[i].attachments.size();
     const std::span<const Pose> starts = before.subspan(first, count), ends = now.subspan(first, count);
+    const bool isTold =
+        std::ranges::any_of(told, [&](std::size_t one) { return one >= first && one < first + count; });
     first += count;
     if (count == 0 || isPinned(scene.cloths[i])) continue;
     const Carry carry{i, starts[0], ends[0]};
-    if (!hasJumped(carry.from, carry.to, scene.tickSeconds())) continue;
+    if (!isTold && !hasJumped(carry.from, carry.to, scene.tickSeconds())) continue;
     bool together = true;
     for (std::size_t k = 1; k < count; ++k)
       together = together && !hasJumped(moved(carry, starts[k]), ends[k], scene.tickSeconds());

@@ -2,6 +2,7 @@
 // Poses that jump between two ticks, and cloth that goes along.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -28,9 +29,11 @@ struct Carry {
   Pose from, to;
 };
 
-// The cloths that attachments carry along in a tick. A cloth goes along if its first attachment jumps, if no
-// other attachment still jumps after that motion, and if it is not pinned. `before` and `now` are the poses
-// of all attachments at the tick's start and end, in the order of the cloths.
-std::vector<Carry> carriesOf(const Scene& scene, std::span<const Pose> before, std::span<const Pose> now);
+// The cloths that attachments carry along in a tick. A cloth goes along with its first attachment if that one
+// jumps, or any of its attachments is told to; if no other attachment is too fast after that motion; and if it
+// is not pinned. `before` and `now` are the poses of all attachments at the tick's start and end, in the order
+// of the cloths. `told` has the indices of those that are told to jump, however short their way is.
+std::vector<Carry> carriesOf(const Scene& scene, std::span<const Pose> before, std::span<const Pose> now,
+                             std::span<const std::size_t> told = {});
 
 }  // namespace clothstream::model

@@ -55,7 +55,10 @@ GrabsAndAttachments::Slot* GrabsAndAttachments::find(std::uint64_t participant, 
 
 void GrabsAndAttachments::place(std::uint64_t participant, std::span<const model::Grab> grabs,
                                 std::span<const model::AttachmentPose> attachments) {
-  for (const model::AttachmentPose& put : attachments) state_.moved[put.attachment] = put.pose;
+  for (const model::AttachmentPose& put : attachments) {
+    state_.moved[put.attachment] = put.pose;
+    if (put.jumps) toldToJump_.push_back(put.attachment);
+  }
   for (Slot& slot : state_.slots) {
     const bool wanted = std::ranges::find(grabs, slot.now.id, &model::Grab::id) != grabs.end();
     if (slot.phase == Slot::Phase::empty || slot.participant != participant || wanted) continue;
@@ -92,6 +95,7 @@ bool GrabsAndAttachments::isTouched() const {
 void GrabsAndAttachments::letGo() {
   std::ranges::for_each(state_.slots, release);
   std::ranges::fill(state_.moved, std::nullopt);
+  toldToJump_.clear();
 }
 
 float GrabsAndAttachments::forceOfEach(float most) const {
@@ -112,7 +116,9 @@ void GrabsAndAttachments::advance(const model::Scene& scene, double endSeconds,
       inputs.attachments.push_back(moved ? *moved : model::frameAt(scene, attachment, endSeconds));
     }
   inputs.carries.clear();
-  if (!state_.frames.empty()) inputs.carries = model::carriesOf(scene, state_.frames, inputs.attachments);
+  if (!state_.frames.empty())
+    inputs.carries = model::carriesOf(scene, state_.frames, inputs.attachments, toldToJump_);
+  toldToJump_.clear();
   state_.frames = inputs.attachments;
   while (!state_.slots.empty() && state_.slots.back().phase == Slot::Phase::empty) state_.slots.pop_back();
   inputs.grabs.clear();

@@ -221,15 +221,17 @@ TEST(Contacts, AreReportedOnRequest) {
 TEST(AttachmentPoses, AreSentOnceWithTheirLastValue) {
   JoinedClient joined;
   const float first[] = {1, 0, 0}, second[] = {2, 0, 0}, turned[] = {0, 0, 0, 1};
-  cs_move_attachment(joined.client.get(), "rod", first, nullptr, 1);
-  cs_move_attachment(joined.client.get(), "knot", first, nullptr, 1);
-  cs_move_attachment(joined.client.get(), "rod", second, turned, 1);
+  cs_move_attachment(joined.client.get(), "rod", first, nullptr, 1, 1);
+  cs_move_attachment(joined.client.get(), "knot", first, nullptr, 0, 1);
+  cs_move_attachment(joined.client.get(), "rod", second, turned, 0, 1);
   const v1::ColliderPoses poses = joined.sent().collider_poses();
   ASSERT_THAT(poses.attachments(), SizeIs(2));
   EXPECT_EQ(poses.attachments(0).name(), "rod");
   EXPECT_EQ(poses.attachments(0).pose().position().x(), 2);
   EXPECT_EQ(poses.attachments(0).pose().orientation().w(), 1);
+  EXPECT_TRUE(poses.attachments(0).jumps());
   EXPECT_EQ(poses.attachments(1).name(), "knot");
+  EXPECT_FALSE(poses.attachments(1).jumps());
   cs_set_colliders(joined.client.get(), nullptr, 0, 2);
   EXPECT_THAT(joined.sent().collider_poses().attachments(), SizeIs(0));
 }

@@ -200,7 +200,7 @@ TEST_F(JoinLines, SetMovesColliderAndAttachment) {
     "colliders": [{"name": "ball", "sphere": {"radius": 0.1}, "pose": {"position": {"z": 3}}}]})");
   startServer({"--scene", "rod", "--scene-file", scene});
   if (IsSkipped()) return;
-  const auto moved = clothstream({"set", address_, "--attachment", "pole", "--position", "1,2,0"});
+  const auto moved = clothstream({"set", address_, "--attachment", "pole", "--position", "1,2,0", "--jump"});
   EXPECT_EQ(moved->waitForEnd(kPatience), 0) << moved->errors();
   const auto ball =
       clothstream({"set", address_, "--collider", "ball", "--position", "0,0.5,2", "--radius", "0.25"});
@@ -273,6 +273,8 @@ TEST(InputLines, ErrorsNameThePartThatIsWrong) {
             "hands.left has 1 joints; use 26 (OpenXR) or 25 (WebXR)");
   EXPECT_EQ(errorOf(R"({"attachments": [{"position": [0, 0, 0]}]})"),
             "attachments[0] must have a \"name\", a text");
+  EXPECT_EQ(errorOf(R"({"attachments": [{"name": "rod", "position": [0, 0, 0], "jumps": 1}]})"),
+            "attachments[0].jumps must be true or false");
   std::string many = R"({"colliders": [)";
   for (int i = 0; i < 41; ++i) many += std::string(i == 0 ? "" : ",") + "{}";
   EXPECT_EQ(errorOf(many + "]}"), "colliders has 41 elements; at most 40 are allowed");

@@ -71,6 +71,7 @@ TEST(ToPoses, ReturnsGrabsWithDefaultsAndAttachmentsByIndex) {
   strong.set_slip_distance(1);
   message.add_attachments()->set_name("knot");
   message.mutable_attachments(0)->mutable_pose()->mutable_position()->set_x(7);
+  message.mutable_attachments(0)->set_jumps(true);
   const auto poses = toPoses(message, sceneWithAttachments());
   ASSERT_TRUE(poses) << poses.error().text;
   ASSERT_EQ(poses->grabs.size(), 2u);
@@ -93,6 +94,7 @@ TEST(ToPoses, ReturnsGrabsWithDefaultsAndAttachmentsByIndex) {
   ASSERT_EQ(poses->attachments.size(), 1u);
   EXPECT_EQ(poses->attachments[0].attachment, 1u);
   EXPECT_EQ(poses->attachments[0].pose.position, model::Vec3(7, 0, 0));
+  EXPECT_TRUE(poses->attachments[0].jumps);
 }
 
 TEST(ToPoses, RefusesInvalidGrabsAndAttachmentsWithTheirPath) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 namespace clothstream::client {
 
@@ -24,6 +25,28 @@ class Acknowledgement {
 
  private:
   std::optional<std::uint64_t> acknowledgedUs_;  // empty if the previous frame was skipped
+};
+
+// The ticks that the client acknowledges.
+class Acknowledgements {
+ public:
+  // In lockstep, frames are then acknowledged by seen() only.
+  void hold(bool on) { holds_ = on; }
+  void begin() { pace_ = {}; }
+  void connectionEnded() { unseen_.reset(); }
+
+  // Whether to acknowledge the frame that was decoded now.
+  bool decoded(std::uint64_t tick, bool lockstep, std::uint64_t nowUs) {
+    if (lockstep && holds_) unseen_ = tick;
+    return lockstep ? !holds_ : pace_.due(nowUs);
+  }
+  // The tick to acknowledge because the program has seen it; nothing if there is none.
+  std::optional<std::uint64_t> seen() { return std::exchange(unseen_, std::nullopt); }
+
+ private:
+  Acknowledgement pace_;
+  bool holds_ = false;
+  std::optional<std::uint64_t> unseen_;  // tick of a frame whose acknowledgement is held
 };
 
 // Limits key-frame requests to one per kShortestIntervalUs and one outstanding request. The server may refuse

@@ -22,7 +22,10 @@ bool NewestFrame::begin(const codec::StreamLayout& layout) {
 }
 
 cs_decoding NewestFrame::decode(std::span<const std::byte> packet) {
-  switch (decoder_->decode(packet)) {
+  const std::uint64_t start = nowUs_ ? nowUs_() : 0;
+  const codec::DecodeResult result = decoder_->decode(packet);
+  if (nowUs_) decodeMs_ = static_cast<double>(nowUs_() - start) / 1000;
+  switch (result) {
     case codec::DecodeResult::ok:
       return CS_DECODING_DONE;
     case codec::DecodeResult::stale:
@@ -44,6 +47,7 @@ cs_decoding NewestFrame::take(const cs_decoded* decoded, std::uint64_t tick) {
   if (decoded->vertex_count != vertices || !decoded->positions || (sendsNormals && !decoded->normals))
     return CS_DECODING_SKIPPED;
   isTaken_ = true;
+  decodeMs_ = decoded->decode_ms;
   taken_.tick = tick;
   taken_.hash = decoded->reconstruction_hash;
   taken_.positions.assign(decoded->positions, decoded->positions + 3 * vertices);

@@ -17,6 +17,10 @@ class NewestFrame {
  public:
   explicit NewestFrame(bool isMirror) : isMirror_(isMirror) {}
 
+  bool isMirror() const { return isMirror_; }
+  // Clock that measures decodeMs(), microseconds. Null: it is not measured.
+  void setClock(std::uint64_t (*nowUs)()) { nowUs_ = nowUs; }
+
   // Starts a stream. Returns false, and changes nothing, if the layout is not possible.
   [[nodiscard]] bool begin(const codec::StreamLayout& layout);
   bool begun() const { return begun_; }
@@ -26,6 +30,8 @@ class NewestFrame {
   // Copies what the other client decoded from the packet of this tick. Only for a mirror.
   cs_decoding take(const cs_decoded* decoded, std::uint64_t tick);
 
+  // Time of the last decode(), or what the other client has measured.
+  double decodeMs() const { return decodeMs_; }
   // Whether there is a frame since begin(). The functions below require it.
   bool present() const;
   std::uint64_t tick() const;
@@ -47,6 +53,8 @@ class NewestFrame {
   codec::StreamLayout layout_;  // of a mirror
   bool isTaken_ = false;
   Taken taken_;
+  std::uint64_t (*nowUs_)() = nullptr;
+  double decodeMs_ = 0;
 };
 
 }  // namespace clothstream::client

@@ -18,6 +18,10 @@ class Redirection {
   static constexpr std::uint64_t kWindowUs = 60'000'000;
   static constexpr std::uint32_t kAttemptsPerReturn = 4;
 
+  // Whether the program opens connections at server(). Default: no.
+  void enable(bool on) { enabled_ = on; }
+  bool isEnabled() const { return enabled_; }
+
   // Returns false, and changes nothing, if too many names were followed, or if the present server has named
   // itself.
   bool follow(std::string name, std::uint64_t nowUs) {
@@ -27,12 +31,17 @@ class Redirection {
     attempting_ = false;
     return true;
   }
-  // The scene moves to a server of this name soon. Returns false if the client must not connect there yet: it
-  // is the present one, or too many names were announced.
-  bool announce(const std::string& name, std::uint64_t nowUs) {
-    return name != server() && announced_.add(nowUs);
+  // The scene moves to a server of this name soon. Returns false, and changes nothing, if the client must not
+  // connect there yet: it is the present one, too many names were announced, or names are not followed.
+  bool announce(std::string name, std::uint64_t nowUs) {
+    if (!enabled_ || name.empty() || name == server() || !announced_.add(nowUs)) return false;
+    next_ = std::move(name);
+    return true;
   }
-  void attempting() { attempting_ = true; }
+  void attempting() {
+    attempting_ = true;
+    next_.clear();
+  }
   void welcomed() {
     if (isReturn()) server_.clear();
     attempting_ = false;
@@ -46,6 +55,8 @@ class Redirection {
 
   // Empty: the address of the program.
   const std::string& server() const { return isReturn() ? kNone : server_; }
+  // To which the scene moves soon; empty: none.
+  const std::string& next() const { return next_; }
   // Whether a server is named, but server() is empty.
   bool isReturn() const {
     return !server_.empty() && failures_ % kAttemptsPerReturn == kAttemptsPerReturn - 1;
@@ -67,7 +78,8 @@ class Redirection {
 
   inline static const std::string kNone;
 
-  std::string server_;
+  bool enabled_ = false;
+  std::string server_, next_;
   Names followed_, announced_;
   std::uint32_t failures_ = 0;  // attempts without Welcome since the last one, or since the newest name
   bool attempting_ = false;     // a connection without Welcome exists

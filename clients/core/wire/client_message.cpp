@@ -165,6 +165,7 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
       Writer attachment(message, F::kAttachments.number);
       attachment.add_string(field::AttachmentPose::kName.number, put.name.data(), put.name.size());
       addPose(attachment, field::AttachmentPose::kPose, put.position, put.orientation);
+      if (put.jumps) attachment.add_bool(field::AttachmentPose::kJumps.number, true);
     }
     for (const ColliderJoints& moved : poses.joints) {
       Writer joints(message, F::kJoints.number);

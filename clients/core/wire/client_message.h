@@ -42,6 +42,7 @@ struct AttachmentPose {
   std::string name;
   std::array<float, 3> position{};
   std::array<float, 4> orientation{};  // x y z w; all zero means no rotation
+  bool jumps = false;
 };
 
 // Joints of a collider of the scene, relative to their parents: kJointNumbers for each.

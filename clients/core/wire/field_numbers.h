@@ -614,6 +614,7 @@ struct GrabPlace {
 struct AttachmentPose {
   static constexpr Field kName{1, WireType::kBytes};
   static constexpr Field kPose{2, WireType::kBytes};
+  static constexpr Field kJumps{3, WireType::kVarint};
 };
 struct ParticipantCollider {
   static constexpr Field kId{1, WireType::kVarint};

@@ -225,7 +225,7 @@ void Program::call(const CoreInput::Call& call) {
     case 11: {
       const auto position = numbers.array<3>();
       const auto orientation = numbers.array<4>();
-      return cs_move_attachment(client(), text, position.data(), index == 0 ? nullptr : orientation.data(),
+      return cs_move_attachment(client(), text, position.data(), index == 0 ? nullptr : orientation.data(), index % 2,
                                 now_);
     }
     case 12:

@@ -259,6 +259,23 @@ TEST(GrabsAndAttachments, AJumpCarriesTheClothAlong) {
   EXPECT_TRUE(tick.carries.empty());
 }
 
+TEST(GrabsAndAttachments, AShortJumpOnRequest) {
+  const model::Scene scene = sceneWithRod();
+  GrabsAndAttachments holds(scene);
+  simulation::TickInputs tick;
+  const auto put = [&](float x, bool jumps) {
+    const model::Pose pose{Vec3(x, 0, 0), model::Quaternion::Identity()};
+    holds.place(7, {}, std::vector{model::AttachmentPose{0, pose, jumps}});
+    holds.advance(scene, 0.01, tick);
+  };
+  put(0.1f, true);
+  ASSERT_EQ(tick.carries.size(), 1u);
+  EXPECT_EQ(tick.carries[0].from.position, Vec3(0, 0, 0));
+  EXPECT_EQ(tick.carries[0].to.position, Vec3(0.1f, 0, 0));
+  put(0.2f, false);
+  EXPECT_TRUE(tick.carries.empty());
+}
+
 // After a reset the cloth is at the rod's first place.
 TEST(GrabsAndAttachments, AResetClothGoesToItsAttachments) {
   const model::Scene scene = sceneWithRod();

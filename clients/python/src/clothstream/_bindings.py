@@ -657,7 +657,7 @@ FUNCTIONS = {
     "cs_nearest_point": (c.c_int, [c.c_void_p, c.POINTER(c.c_float), c.c_float, c.POINTER(cs_cloth_point)]),
     "cs_cast_ray": (c.c_int, [c.c_void_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_float, c.POINTER(cs_cloth_point)]),
     "cs_set_grabs": (None, [c.c_void_p, c.POINTER(cs_grab), c.c_uint32, c.c_uint64]),
-    "cs_move_attachment": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_uint64]),
+    "cs_move_attachment": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_int, c.c_uint64]),
     "cs_move_joints": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.c_uint32, c.c_uint64]),
     "cs_grab_event_count": (c.c_uint32, [c.c_void_p]),
     "cs_get_grab_event": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_grab_event)]),

@@ -214,10 +214,13 @@ class Stream(ClientState):
         with self._client() as client:
             lib.cs_set_grabs(client, structs, len(grabs), lib.clothstream_now_us())
 
-    def move_attachment(self, attachment: str, position: Vec3, orientation: Quaternion | None = None) -> None:
-        """Moves an attachment of the scene."""
+    def move_attachment(self, attachment: str, position: Vec3, orientation: Quaternion | None = None,
+                        jumps: bool = False) -> None:
+        """Moves an attachment of the scene; it stays there. If it jumps, its cloth goes along at once, however short the way
+        is: use this for teleports and cuts of an animation.
+        """
         with self._client() as client:
-            lib.cs_move_attachment(client, attachment.encode(), vector(position, 3), vector(orientation, 4),
+            lib.cs_move_attachment(client, attachment.encode(), vector(position, 3), vector(orientation, 4), int(jumps),
                                    lib.clothstream_now_us())
 
     def move_joints(self, collider: str, poses: Any) -> None:

@@ -63,11 +63,12 @@ namespace ClothStream.Core
 
         /// <summary>Moves an attachment of the scene; it stays there.</summary>
         /// <param name="orientation">Quaternion x y z w; null means no rotation.</param>
-        public void MoveAttachment(string attachment, float[] position, float[] orientation, ulong timeUs)
+        /// <param name="jumps">Whether its cloth goes along at once, however short the way is, as at a teleport.</param>
+        public void MoveAttachment(string attachment, float[] position, float[] orientation, bool jumps, ulong timeUs)
         {
             fixed (byte* name = Utf8.Bytes(attachment))
             fixed (float* at = position, turned = orientation)
-                lock (Gate) Native.cs_move_attachment(Handle, name, at, turned, timeUs);
+                lock (Gate) Native.cs_move_attachment(Handle, name, at, turned, jumps ? 1 : 0, timeUs);
             Flush();
         }
 

@@ -560,7 +560,7 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern int cs_nearest_point(IntPtr client, float* point3, float maxDistance, ClothPoint* @out);
         [DllImport(Library)] public static extern int cs_cast_ray(IntPtr client, float* origin3, float* direction3, float maxDistance, ClothPoint* @out);
         [DllImport(Library)] public static extern void cs_set_grabs(IntPtr client, Grab* grabs, uint count, ulong nowUs);
-        [DllImport(Library)] public static extern void cs_move_attachment(IntPtr client, byte* attachment, float* position3, float* orientation4, ulong nowUs);
+        [DllImport(Library)] public static extern void cs_move_attachment(IntPtr client, byte* attachment, float* position3, float* orientation4, int jumps, ulong nowUs);
         [DllImport(Library)] public static extern void cs_move_joints(IntPtr client, byte* collider, float* poses, uint count, ulong nowUs);
         [DllImport(Library)] public static extern uint cs_grab_event_count(IntPtr client);
         [DllImport(Library)] public static extern int cs_get_grab_event(IntPtr client, uint index, GrabEvent* @out);
