@@ -3,7 +3,9 @@
 #include "clients/core/stream/play_out.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "clients/core/stream/server_clock.h"
 #include "proto/codec/vertex_normals.h"
@@ -85,7 +87,8 @@ void PlayOut::begin(const Description& description) {
 }
 
 void PlayOut::forget() {
-  count_ = sampleCount_ = 0;
+  count_ = 0;
+  delay_.forget();
   plays_ = false;
   shown_ = {};
 }
@@ -100,7 +103,7 @@ const PlayOut::Frame& PlayOut::newest(std::size_t back) const {
 
 void PlayOut::add(const DisplayableFrame& frame, std::uint64_t displayableUs) {
   if (count_ > 0 && since(newest(0).timeUs, frame.timeUs) <= 0) forget();
-  if (count_ > 0 && displayableUs != 0) sample(since(newest(0).timeUs, displayableUs));
+  if (count_ > 0 && displayableUs != 0) delay_.sample(since(newest(0).timeUs, displayableUs));
   if (plays_ && since(timeUs_, frame.timeUs) < 0) ++lateFrames_;
   Frame& slot = frames_[count_++ % frames_.size()];
   slot.tick = frame.tick;
@@ -111,23 +114,6 @@ void PlayOut::add(const DisplayableFrame& frame, std::uint64_t displayableUs) {
   slot.colliders.assign(frame.colliders.begin(), frame.colliders.end());
 }
 
-void PlayOut::sample(double neededUs) {
-  samples_[sampleCount_++ % kSamples] = neededUs;
-  const std::size_t count = std::min(sampleCount_, kSamples);
-  const auto first = sorted_.begin(), last = first + static_cast<std::ptrdiff_t>(count);
-  std::copy_n(samples_.begin(), count, first);
-  const auto at = first + static_cast<std::ptrdiff_t>(kPercentile * static_cast<double>(count - 1));
-  std::nth_element(first, at, last);
-  neededUs_ = *at;
-}
-
-void PlayOut::moveDelay(double aheadUs, double elapsedUs) {
-  // A request for a later display time comes earlier, so it needs a longer delay.
-  wantedUs_ = std::clamp(neededUs_ + aheadUs, 1000 * options_.least_delay_ms, 1000 * options_.most_delay_ms);
-  const double most = kSlew * elapsedUs;
-  delayUs_ = plays_ ? delayUs_ + std::clamp(wantedUs_ - delayUs_, -most, most) : wantedUs_;
-}
-
 cs_played PlayOut::play(std::uint64_t nowUs, std::uint64_t displayUs) {
   cs_played played{};
   played.version = CS_PLAYED_VERSION;
@@ -135,18 +121,20 @@ cs_played PlayOut::play(std::uint64_t nowUs, std::uint64_t displayUs) {
   hasNormals_ = hasColliders_ = false;
   if (count_ == 0) return played;
   const bool adapts = std::isnan(options_.delay_ms);
-  if (displayUs == 0 || (adapts && sampleCount_ == 0)) {
+  if (displayUs == 0 || (adapts && !delay_.known())) {
     shown_.base = &newest(0);
     played.shown = CS_SHOWN_HELD;
     played.tick = shown_.base->tick;
     return played;
   }
   if (adapts) {
-    moveDelay(since(nowUs, displayUs), plays_ ? std::max(0.0, since(displayUs_, displayUs)) : 0);
+    const auto elapsedUs = plays_ ? std::optional(std::max(0.0, since(displayUs_, displayUs))) : std::nullopt;
+    delay_.move(since(nowUs, displayUs), elapsedUs, 1000 * options_.least_delay_ms,
+                1000 * options_.most_delay_ms);
   } else {
-    delayUs_ = wantedUs_ = 1000 * options_.delay_ms;
+    delay_.set(1000 * options_.delay_ms);
   }
-  const std::uint64_t timeUs = displayUs - static_cast<std::uint64_t>(std::llround(delayUs_));
+  const std::uint64_t timeUs = displayUs - static_cast<std::uint64_t>(std::llround(delay_.us()));
   played.shown = choose(timeUs);
   if (plays_ && since(newest(0).timeUs, timeUs) > 0)
     (played.shown == CS_SHOWN_LED_ON ? ledOnUs_ : heldUs_) += std::max(0.0, since(timeUs_, timeUs));
@@ -256,8 +244,8 @@ void PlayOut::report(cs_stage_statistics& out) const {
   out.late_frames = lateFrames_;
   out.led_on_ms = ledOnUs_ / 1000;
   out.held_ms = heldUs_ / 1000;
-  out.delay_ms = delayUs_ / 1000;
-  out.wanted_delay_ms = wantedUs_ / 1000;
+  out.delay_ms = delay_.us() / 1000;
+  out.wanted_delay_ms = delay_.wantedUs() / 1000;
 }
 
 }  // namespace clothstream::client

@@ -2,13 +2,13 @@
 // Keeps the newest frames and computes what to show at a time. See cs_play_out_options in core.h.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/core/stream/play_out_delay.h"
 #include "clients/core/wire/description.h"
 
 namespace clothstream::client {
@@ -51,9 +51,6 @@ class PlayOut {
   void report(cs_stage_statistics& out) const;
 
  private:
-  static constexpr std::size_t kSamples = 256;
-  static constexpr double kPercentile = 0.98, kSlew = 0.05;
-
   struct Frame {
     std::uint64_t tick = 0, timeUs = 0;
     bool key = false;
@@ -69,8 +66,6 @@ class PlayOut {
   void forget();
   std::size_t held() const;
   const Frame& newest(std::size_t back) const;
-  void sample(double neededUs);
-  void moveDelay(double aheadUs, double elapsedUs);
   cs_shown choose(std::uint64_t timeUs);
   cs_shown chooseBeyond(const Frame& frame, double pastUs);
   void blend(std::vector<float> Frame::*values, std::vector<float>& out) const;
@@ -82,12 +77,7 @@ class PlayOut {
   std::vector<Frame> frames_;  // ring buffer
   std::size_t count_ = 0;      // frames added; the newest are in the ring
 
-  // For each of the newest frames: time from the start of the previous tick until the frame could be
-  // displayed. With this delay the frame arrives just when interpolation towards it starts.
-  std::array<double, kSamples> samples_{}, sorted_{};
-  std::size_t sampleCount_ = 0;
-  double neededUs_ = 0;  // their percentile kPercentile
-  double delayUs_ = 0, wantedUs_ = 0;
+  PlayOutDelay delay_;
   bool plays_ = false;                        // whether the delay and the two times below are set
   std::uint64_t displayUs_ = 0, timeUs_ = 0;  // last play(): display time, and display time minus delay
 
