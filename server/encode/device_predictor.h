@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,8 @@
 #include "proto/codec/hierarchical/hierarchy.h"
 #include "proto/codec/hierarchical/weight_fitter.h"
 #include "server/encode/encode_stage.h"
+#include "server/encode/hierarchy_tables.h"
+#include "server/encode/normal_predictor.h"
 #include "server/vulkan/kernel.h"
 #include "shaders/encode/hierarchical/hierarchical.h"
 
@@ -49,9 +52,9 @@ class DevicePredictor {
   const codec::hierarchical::Hierarchy& hierarchy() const { return hierarchy_; }
 
  private:
-  // Buffers of one frame: the first five are read back, the others are written by the CPU.
+  // Buffers of one frame: the first four are read back, the others are written by the CPU.
   struct Slot {
-    vulkan::Buffer status, residuals, wideResiduals, normalResiduals, products;
+    vulkan::Buffer status, residuals, wideResiduals, products;
     vulkan::Buffer weights, chunks;
   };
   // Phases of one dispatch: a large phase, or several small phases in one workgroup.
@@ -60,30 +63,26 @@ class DevicePredictor {
     bool isSmall;
   };
 
-  void makeSteps();
-  void makeNormals(const vulkan::Device& device, const codec::StreamLayout& layout);
+  void makeSlots(const vulkan::Device& device);
+  void makeSteps(std::uint32_t smallPhasesWorkgroup);
   void makeBindings(const vulkan::Device& device);
-  void uploadTables(vulkan::Recorder& recorder);
+  void recordTables(vulkan::Recorder& recorder) const;
 
   const simulation::ClothSimulation& simulation_;
-  std::uint32_t vertices_;
-  bool hasNormals_;
-  codec::hierarchical::LatticeUnit unit_;
   codec::hierarchical::Hierarchy hierarchy_;
   std::vector<Step> steps_;
 
+  HierarchyTables tables_;
   std::array<vulkan::Buffer, 2> moments_;  // of the reference and of the frame, alternating
-  vulkan::Buffer links_, linksUpload_, slotTable_, slotTableUpload_, model_, modelUpload_;
-  vulkan::Buffer wanted_, status_, weights_, sentNormals_;
-  vulkan::Buffer faces_, facesUpload_, facesOf_, facesOfUpload_;  // only with normals
+  vulkan::Buffer wanted_, sentNormals_, status_, weights_;
   std::array<Slot, kFrameSlots> slots_;
-  vulkan::Kernel quantise_, predictPhase_, predictSmallPhases_, sumProducts_, predictNormals_, finish_;
+  std::optional<NormalPredictor> normals_;
   // Indexed by the present positions and then referenceIndex_; by referenceIndex_ and then the slot; or by
   // referenceIndex_.
   std::vector<vulkan::Bindings> quantiseBindings_, phaseBindings_, smallPhaseBindings_, sumBindings_,
-      normalBindings_, finishBindings_;
+      finishBindings_;
 
-  shared::PredictPush push_{};
+  shared::PredictPush push_;
   std::uint32_t referenceIndex_ = 0;  // index of the reference's moment
   bool started_ = false;
 };
