@@ -2,17 +2,12 @@
 #include "server/delivery/mailbox.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "clothstream/v1/session.pb.h"
 
 namespace clothstream::delivery {
 namespace {
-
-std::size_t costOf(const std::vector<std::byte>& message) {
-  return message.size() + Mailbox::kMessageOverhead;
-}
 
 SharedBytes operatingPoint(std::uint8_t quality) {
   v1::ServerMessage message;
@@ -22,25 +17,10 @@ SharedBytes operatingPoint(std::uint8_t quality) {
 
 }  // namespace
 
-bool Mailbox::push(Control& control, SharedBytes message) {
-  if (closed_) return true;
-  if (!control.messages.empty() && control.bytes + costOf(*message) > kMaxControlBytes) return false;
-  control.bytes += costOf(*message);
-  control.messages.push_back(std::move(message));
-  return true;
-}
-
-SharedBytes Mailbox::pop(Control& control) {
-  SharedBytes message = std::move(control.messages.front());
-  control.messages.pop_front();
-  control.bytes -= costOf(*message);
-  return message;
-}
-
 bool Mailbox::reply(SharedBytes message) {
   {
     const std::lock_guard lock(mutex_);
-    if (!push(replies_, std::move(message))) return false;
+    if (!closed_ && !control_.reply(std::move(message))) return false;
     endpointWaits_ = false;
   }
   wake();
@@ -56,20 +36,11 @@ void Mailbox::announce(SharedBytes message, SharedMerges& merges) {
   {
     const std::lock_guard lock(mutex_);
     if (closed_) return;
-    announcements_.bytes += costOf(*message);
-    announcements_.messages.push_back(std::move(message));
-    if (announcements_.bytes > mergeBeyond_) mergeAnnouncements(merges);
+    control_.announce(std::move(message), merges);
     if (!streaming_) return;
     endpointWaits_ = false;
   }
   wake();
-}
-
-void Mailbox::mergeAnnouncements(SharedMerges& merges) {
-  announcements_.messages = merges.of(announcements_.messages);
-  announcements_.bytes = 0;
-  for (const SharedBytes& message : announcements_.messages) announcements_.bytes += costOf(*message);
-  mergeBeyond_ = std::max(kMaxControlBytes, announcements_.bytes + kMinMergeBytes);
 }
 
 void Mailbox::subscribe(std::shared_ptr<const DescriptionChunks> description, const StreamShape& shape,
@@ -92,7 +63,7 @@ void Mailbox::subscribe(std::shared_ptr<const DescriptionChunks> description, co
 void Mailbox::deliver(const PublishedFrame& frame) {
   {
     const std::lock_guard lock(mutex_);
-    if (!streaming_ || closed_ || (frame.repeated && !needsKey_)) return;
+    if (!streaming_ || closed_ || (frame.repeated && !held_.needsKey())) return;
     adapt(frame.complete);
     if (frame.quality == quality_)
       adaptation_.made(frame.quality, frame.message->size(), frame.complete);
@@ -108,7 +79,7 @@ void Mailbox::deliver(const PublishedFrame& frame) {
 void Mailbox::deliver(std::span<const PublishedFrame> frames) {
   {
     const std::lock_guard lock(mutex_);
-    if (!streaming_ || closed_ || !needsKey_ || !endpointWaits_ || !hasRoom()) return;
+    if (!streaming_ || closed_ || !held_.needsKey() || !endpointWaits_ || !hasRoom()) return;
     if (shape_.qualities > 1 && frames.front().quality != chosenQuality()) return;
     if (!hold(frames.front())) return;
     sinceKey_ = 0;
@@ -124,40 +95,22 @@ std::uint8_t Mailbox::chosenQuality() const {
 
 void Mailbox::adapt(Clock::time_point now) {
   if (shape_.lockstep) return;
-  const bool behind = !held_.empty() || (needsKey_ && !(endpointWaits_ && hasRoom()));
+  const bool behind = !held_.empty() || (held_.needsKey() && !(endpointWaits_ && hasRoom()));
   const std::uint8_t before = adaptation_.quality();
   if (!adaptation_.update(behind, now)) return;
   (adaptation_.quality() < before ? metrics_->stepsUp : metrics_->stepsDown).add();
 }
 
 bool Mailbox::hold(const PublishedFrame& frame) {
-  if (decodable_ && frame.tick <= *decodable_) return false;
+  if (const auto newest = window_.newest(); newest && frame.tick <= *newest) return false;
+  const HeldFrames::Added added = held_.add(frame);
+  countDropped(added.dropped);
+  if (added.overflowed) adaptation_.dropped(frame.complete);
   if (frame.key) {
-    dropHeld();
     quality_ = frame.quality;
-    needsKey_ = requestsKey_ = false;
-  } else if (needsKey_ || frame.referenceTick != newest_) {
-    needsKey_ = true;
-    countDropped(1);
-    return false;
-  } else if (!held_.empty() &&
-             (held_.size() == kMaxHeld || heldBytes_ + frame.message->size() > kMaxHeldBytes)) {
-    adaptation_.dropped(frame.complete);
-    dropHeld();
-    needsKey_ = true;
-    countDropped(1);
-    return false;
+    requestsKey_ = false;
   }
-  held_.push_back(frame);
-  heldBytes_ += frame.message->size();
-  newest_ = frame.tick;
-  return true;
-}
-
-void Mailbox::dropHeld() {
-  countDropped(held_.size());
-  held_.clear();
-  heldBytes_ = 0;
+  return added.held;
 }
 
 RequestedFrames Mailbox::requested(Clock::time_point now) {
@@ -169,32 +122,24 @@ RequestedFrames Mailbox::requested(Clock::time_point now) {
     const auto bit = static_cast<std::uint8_t>(1u << quality);
     requested |= {.qualities = bit, .keyFrames = key ? bit : std::uint8_t{0}};
   };
-  if (!needsKey_) add(quality_, requestsKey_ && sinceKey_ >= kMinKeyFrameDistance);
-  if (needsKey_ ? endpointWaits_ && hasRoom() : chosenQuality() != quality_) add(chosenQuality(), true);
+  if (!held_.needsKey()) add(quality_, requestsKey_ && sinceKey_ >= kMinKeyFrameDistance);
+  if (held_.needsKey() ? endpointWaits_ && hasRoom() : chosenQuality() != quality_)
+    add(chosenQuality(), true);
   return requested;
 }
 
 std::uint8_t Mailbox::needsKeyFrame() const {
   const std::lock_guard lock(mutex_);
-  if (!streaming_ || closed_ || !needsKey_ || !endpointWaits_ || !hasRoom()) return 0;
+  if (!streaming_ || closed_ || !held_.needsKey() || !endpointWaits_ || !hasRoom()) return 0;
   return static_cast<std::uint8_t>(1u << chosenQuality());
 }
 
 bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
   {
     const std::lock_guard lock(mutex_);
-    if (tick > newestSent_) return false;
-    if (!sent_.empty() && sent_.front().tick <= tick) leavesOut_ = sent_.front().tick < tick;
-    while (!sent_.empty() && sent_.front().tick <= tick) {
-      adaptation_.delivered(sent_.front().bytes);
-      // A minimum that grows slowly (by half in about 200 frames), so that a longer route is noticed.
-      if (roundTrip_) *roundTrip_ *= 1.002;
-      if (sent_.front().tick == tick) {
-        const double sample = schedule::seconds(now - sent_.front().time);
-        roundTrip_ = roundTrip_ ? std::min(sample, *roundTrip_) : sample;
-      }
-      sent_.pop_front();
-    }
+    const std::optional<std::size_t> bytes = window_.acknowledge(tick, now);
+    if (!bytes) return false;
+    adaptation_.delivered(*bytes);
     if (held_.empty() || !hasRoom()) return true;
     endpointWaits_ = false;
   }
@@ -204,27 +149,25 @@ bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
 
 bool Mailbox::awaitsAcknowledgement() const {
   const std::lock_guard lock(mutex_);
-  return !closed_ && (!streaming_ || !held_.empty() || !sent_.empty());
+  return !closed_ && (!streaming_ || !held_.empty() || window_.oldest() != nullptr);
 }
 
 std::optional<std::uint64_t> Mailbox::overdue(Clock::time_point before) const {
   const std::lock_guard lock(mutex_);
-  if (!shape_.lockstep || closed_ || sent_.empty() || sent_.front().time >= before) return std::nullopt;
-  return sent_.front().tick;
+  const SendWindow::Sent* const oldest = window_.oldest();
+  if (!shape_.lockstep || closed_ || oldest == nullptr || oldest->time >= before) return std::nullopt;
+  return oldest->tick;
 }
 
 void Mailbox::restart() {
   const std::lock_guard lock(mutex_);
-  dropHeld();
-  sent_.clear();
-  decodable_.reset();
-  leavesOut_ = false;
-  needsKey_ = true;
+  countDropped(held_.restart());
+  window_.restart();
 }
 
 bool Mailbox::isRestarting() const {
   const std::lock_guard lock(mutex_);
-  return needsKey_ && !decodable_;
+  return held_.needsKey() && !window_.newest();
 }
 
 void Mailbox::requestKeyFrame() {
@@ -238,14 +181,9 @@ void Mailbox::close(SharedBytes last) {
     if (closed_) return;
     closed_ = true;
     held_.clear();
-    heldBytes_ = 0;
     description_.reset();
-    announcements_ = {};
     // Queued replies are still sent. Their memory stays bounded if the peer does not read them.
-    if (last) {
-      replies_.bytes += costOf(*last);
-      replies_.messages.push_back(std::move(last));
-    }
+    control_.end(std::move(last));
   }
   wake();
 }
@@ -265,7 +203,7 @@ std::optional<SharedBytes> Mailbox::next(Clock::time_point now) {
 }
 
 std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
-  if (!replies_.messages.empty()) return pop(replies_);
+  if (SharedBytes reply = control_.nextReply()) return reply;
   if (closed_) return std::nullopt;
   if (description_) {
     SharedBytes chunk = description_->chunk(nextChunk_++);
@@ -278,32 +216,20 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
   if (!streaming_) return std::nullopt;
   const bool hasFrame = !held_.empty() && hasRoom();
   // In lockstep, the order must not depend on whether a frame waits already when the endpoint looks.
-  const bool frameFirst = hasFrame && !shape_.lockstep && announcedBytes_ >= kMaxAnnouncedBytes;
-  if (!announcements_.messages.empty() && !frameFirst) {
-    SharedBytes message = pop(announcements_);
-    announcedBytes_ += message->size();
-    return message;
-  }
+  const bool frameFirst = hasFrame && !shape_.lockstep && control_.framesComeFirst();
+  if (SharedBytes announcement = frameFirst ? nullptr : control_.nextAnnouncement()) return announcement;
   if (!hasFrame) return std::nullopt;
   if (const std::uint8_t quality = held_.front().quality; quality != reported_) {
     reported_ = quality;
     return operatingPoint(quality);
   }
 
-  const PublishedFrame frame = std::move(held_.front());
-  held_.pop_front();
-  heldBytes_ -= frame.message->size();
-  sent_.push_back({frame.tick, frame.message->size(), now});
-  decodable_ = newestSent_ = frame.tick;
-  announcedBytes_ = 0;
+  const PublishedFrame frame = held_.take();
+  window_.send({frame.tick, frame.message->size(), now});
+  control_.frameSent();
   metrics_->framesTaken.add();
   metrics_->send.record(schedule::seconds(now - frame.complete));
   return frame.message;
-}
-
-std::size_t Mailbox::window() const {
-  const double inFlight = std::ceil(roundTrip_.value_or(0) * shape_.rate) + (leavesOut_ ? 1 : 0);
-  return kMinWindow + static_cast<std::size_t>(std::min(inFlight, double{kMaxWindow - kMinWindow}));
 }
 
 void Mailbox::countDropped(std::size_t frames) {

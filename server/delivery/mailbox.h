@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -12,53 +11,36 @@
 #include <span>
 #include <utility>
 
+#include "server/delivery/control_messages.h"
 #include "server/delivery/description_chunks.h"
 #include "server/delivery/envelope.h"
+#include "server/delivery/held_frames.h"
 #include "server/delivery/link_adaptation.h"
 #include "server/delivery/merged_announcements.h"
 #include "server/delivery/published_frame.h"
+#include "server/delivery/send_window.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::delivery {
 
 // Thread-safe.
 //
-// Memory per subscriber: replies and announcements of at most kMaxControlBytes each (or one larger message),
-// kMaxHeld frames of at most kMaxHeldBytes in all (or one larger frame), and one description. Frames and
+// Memory per subscriber: that of ControlMessages and of HeldFrames, and one description. Frames and
 // description are shared with the other subscribers.
 //
-// Announcements are sent before frames, but after kMaxAnnouncedBytes of them a frame that waits comes first,
-// except in lockstep.
+// Announcements are sent before frames, but after many of them a frame that waits comes first
+// (ControlMessages), except in lockstep. Announcements never close a mailbox.
 //
-// Announcements come from other peers, so they never close a mailbox. Beyond kMaxControlBytes the waiting
-// ones are merged (merged_announcements.h): the subscriber then gets the newest state instead of every step.
-//
-// Room for frames: at most window() frames are sent and not acknowledged. The window is 2, plus 1 for a peer
-// that acknowledges several frames at once, plus the frames sent in one round-trip time. The round-trip time
-// is the recent minimum of the time from sending a frame to its acknowledgement. A minimum is used because a
-// queue on the way must not enlarge the window that feeds it.
-//
-// A predicted frame is sent only if the frame that it refers to was sent. For a subscriber without room, up
-// to kMaxHeld frames are held. If more arrive, all held frames are dropped, and the subscriber continues with
-// the next key frame. It asks for that key frame once it has room and its endpoint waits for something to
-// write. A peer that does not read therefore asks for nothing.
+// SendWindow says whether the subscriber has room for a frame. Without room, a few frames are held, and a
+// subscriber that misses one continues with the next key frame (HeldFrames). It asks for that key frame once
+// it has room and its endpoint waits for something to write. A peer that does not read therefore asks for
+// nothing.
 //
 // LinkAdaptation chooses the quality; the peer gets an OperatingPoint message when it changes. A new quality
 // begins with a key frame; until then the former quality continues. A subscriber that was sent a tick in one
 // quality never gets a key frame of the same tick in another one, because decoders reject it as stale.
 class Mailbox {
  public:
-  static constexpr std::size_t kMaxControlBytes = 256 * 1024;
-  // Bytes counted for each control message in addition to its size.
-  static constexpr std::size_t kMessageOverhead = 128;
-  // If merged announcements are large, the next merge happens when this many bytes more wait.
-  static constexpr std::size_t kMinMergeBytes = 64 * 1024;
-  // Bytes of announcements that are sent while a frame waits for them.
-  static constexpr std::size_t kMaxAnnouncedBytes = 16 * 1024;
-  static constexpr std::size_t kMaxHeld = 3;
-  static constexpr std::size_t kMaxHeldBytes = 1024 * 1024;
-  static constexpr std::size_t kMinWindow = 2;
-  static constexpr std::size_t kMaxWindow = 24;
   // Minimum distance, in frames, from one key frame to the next one that a requestKeyFrame() causes.
   static constexpr std::uint32_t kMinKeyFrameDistance = 16;
 
@@ -84,7 +66,7 @@ class Mailbox {
                  telemetry::SceneMetrics& metrics, std::uint8_t finest = 0);
   void deliver(const PublishedFrame& frame);
   // If the subscriber needs a key frame and has room for it: gives it `frames`, which were published before:
-  // a key frame in its quality and those that follow, at most kMaxHeld in all.
+  // a key frame in its quality and those that follow, at most HeldFrames::kMax in all.
   void deliver(std::span<const PublishedFrame> frames);
   // Returns what the subscriber asks of the next frame. Call it whenever a frame is made, because it also
   // measures the time in which the subscriber gets no frames.
@@ -123,37 +105,22 @@ class Mailbox {
   void silence();
 
  private:
-  struct Sent {
-    std::uint64_t tick;
-    std::size_t bytes;
-    Clock::time_point time;
-  };
-  struct Control {
-    std::deque<SharedBytes> messages;
-    std::size_t bytes = 0;
-  };
-
   std::optional<SharedBytes> take(Clock::time_point now);
-  bool push(Control& control, SharedBytes message);
-  static SharedBytes pop(Control& control);
-  void mergeAnnouncements(SharedMerges& merges);
-  bool hasRoom() const { return sent_.size() < window(); }
-  std::size_t window() const;
+  bool hasRoom() const { return window_.hasRoom(shape_.rate); }
   // Quality that the adaptation chose; the present one if the stream has a single quality.
   std::uint8_t chosenQuality() const;
   void adapt(Clock::time_point now);
   // Queues a frame. Returns false if it cannot be decoded, or there is no room.
   bool hold(const PublishedFrame& frame);
-  void dropHeld();
   void countDropped(std::size_t frames);
 
   const bool atEdge_;
   mutable std::mutex mutex_;
   bool closed_ = false;
   bool endpointWaits_ = false;  // next() returned nothing, and nothing has arrived since
-  Control replies_, announcements_;
-  std::size_t mergeBeyond_ = kMaxControlBytes;  // bytes of announcements
-  std::size_t announcedBytes_ = 0;              // sent since the newest frame
+  ControlMessages control_;
+  HeldFrames held_;
+  SendWindow window_;
 
   std::shared_ptr<const DescriptionChunks> description_;
   std::size_t nextChunk_ = 0;
@@ -161,21 +128,11 @@ class Mailbox {
   telemetry::SceneMetrics* metrics_ = nullptr;
   StreamShape shape_;
   LinkAdaptation adaptation_{0, 0};
-  std::uint8_t reported_ = 0;  // newest quality in an OperatingPoint that the peer was sent
-  bool streaming_ = false;     // the description is sent
-  bool needsKey_ = true;
+  std::uint8_t reported_ = 0;   // newest quality in an OperatingPoint that the peer was sent
+  bool streaming_ = false;      // the description is sent
   bool requestsKey_ = false;    // the peer asked for a key frame and continues without it
   std::uint32_t sinceKey_ = 0;  // frames of quality_ since the newest key frame
   std::uint8_t quality_ = 0;
-  // Tick of the newest frame that is held, or else was sent, or was dropped while a key frame is awaited.
-  std::uint64_t newest_ = 0;
-  std::deque<PublishedFrame> held_;
-  std::size_t heldBytes_ = 0;
-  std::deque<Sent> sent_;  // frames that are not acknowledged
-  std::uint64_t newestSent_ = 0;
-  std::optional<std::uint64_t> decodable_;  // newest tick sent since the last restart()
-  bool leavesOut_ = false;                  // the newest acknowledgement covered more than one frame
-  std::optional<double> roundTrip_;         // s
 
   std::mutex wakeMutex_;
   std::function<void()> wake_;

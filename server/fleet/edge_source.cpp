@@ -109,7 +109,7 @@ void EdgeSource::keep(const delivery::PublishedFrame& frame) {
     return;
   }
   const bool follows = !kept.empty() && kept.back().tick == frame.referenceTick;
-  if (follows && kept.size() < delivery::Mailbox::kMaxHeld)
+  if (follows && kept.size() < delivery::HeldFrames::kMax)
     kept.push_back(frame);
   else
     kept.clear();

@@ -24,7 +24,7 @@ namespace clothstream::fleet {
 // Frames and events from NATS are checked and passed on as they are. Thread-safe.
 //
 // The newest key frame of each quality, and the frames since, are kept while there are at most
-// Mailbox::kMaxHeld: a viewer that joins gets them, and the origin encodes no other key frame for it.
+// HeldFrames::kMax: a viewer that joins gets them, and the origin encodes no other key frame for it.
 class EdgeSource final : public scene::FrameSource {
  public:
   // Opens a session with the origin, or returns null if it has no room.

@@ -82,7 +82,7 @@ TEST_F(MailboxTest, SendsRepliesThenDescriptionThenAnnouncementsThenFrames) {
 // Changes that others make again and again must not displace the frames.
 TEST_F(MailboxTest, FramesComeBetweenManyAnnouncements) {
   join();
-  const std::size_t half = Mailbox::kMaxAnnouncedBytes / 2;
+  const std::size_t half = ControlMessages::kMaxAnnouncedBytes / 2;
   for (std::uint64_t tick = 1; tick <= 5; ++tick) {
     for (int i = 0; i < 4; ++i) mailbox.announce(bytes(half));
     const PublishedFrame next = frame(tick, tick == 1);
@@ -102,11 +102,11 @@ TEST_F(MailboxTest, AnnouncementsComeBeforeTheFrameInLockstep) {
   shape.lockstep = true;
   join();
   for (const bool early : {false, true}) {
-    for (int i = 0; i < 4; ++i) mailbox.announce(bytes(Mailbox::kMaxAnnouncedBytes));
+    for (int i = 0; i < 4; ++i) mailbox.announce(bytes(ControlMessages::kMaxAnnouncedBytes));
     const PublishedFrame next = frame(early ? 2 : 1, !early);
     if (early) mailbox.deliver(next);
     for (int i = 0; i < 4; ++i)
-      EXPECT_EQ((*mailbox.next(now))->size(), Mailbox::kMaxAnnouncedBytes) << early << i;
+      EXPECT_EQ((*mailbox.next(now))->size(), ControlMessages::kMaxAnnouncedBytes) << early << i;
     if (!early) mailbox.deliver(next);
     EXPECT_EQ(mailbox.next(now), next.message) << early;
     EXPECT_TRUE(mailbox.acknowledge(next.tick, now));
@@ -159,7 +159,7 @@ TEST_F(MailboxTest, WindowGrowsWithTheMinimumRoundTripTime) {
     }
     return ticks;
   };
-  EXPECT_EQ(inFlight().size(), Mailbox::kMinWindow);
+  EXPECT_EQ(inFlight().size(), SendWindow::kMin);
   // A round trip of 50 ms takes 3.6 frames at 72 frames per second.
   mailbox.restart();
   mailbox.deliver(frame(++tick, true));
@@ -167,13 +167,13 @@ TEST_F(MailboxTest, WindowGrowsWithTheMinimumRoundTripTime) {
   now += milliseconds(50);
   ASSERT_TRUE(mailbox.acknowledge(tick, now));
   const Ticks sent = inFlight();
-  EXPECT_EQ(sent.size(), Mailbox::kMinWindow + 4);
+  EXPECT_EQ(sent.size(), SendWindow::kMin + 4);
 
   // A queue on the link makes the next round trip ten times as long. The window does not grow.
   now += milliseconds(500);
   ASSERT_TRUE(mailbox.acknowledge(sent.back(), now));
   mailbox.restart();
-  EXPECT_EQ(inFlight().size(), Mailbox::kMinWindow + 4);
+  EXPECT_EQ(inFlight().size(), SendWindow::kMin + 4);
 }
 
 // The acknowledgements of such a peer arrive one frame later than those of a peer that acknowledges each
@@ -201,9 +201,9 @@ TEST_F(MailboxTest, WindowGrowsByOneIfEverySecondFrameIsAcknowledged) {
     }
     return inFlight();
   };
-  EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);  // 1 ms is shorter than a frame interval
-  EXPECT_EQ(afterRoundTrips(2), Mailbox::kMinWindow + 2);
-  EXPECT_EQ(afterRoundTrips(1), Mailbox::kMinWindow + 1);
+  EXPECT_EQ(afterRoundTrips(1), SendWindow::kMin + 1);  // 1 ms is shorter than a frame interval
+  EXPECT_EQ(afterRoundTrips(2), SendWindow::kMin + 2);
+  EXPECT_EQ(afterRoundTrips(1), SendWindow::kMin + 1);
 }
 
 TEST_F(MailboxTest, LimitsFramesInFlightToTheLargestWindow) {
@@ -217,7 +217,7 @@ TEST_F(MailboxTest, LimitsFramesInFlightToTheLargestWindow) {
     mailbox.deliver(frame(tick, tick == 2));
     inFlight += mailbox.next(now).has_value();
   }
-  EXPECT_EQ(inFlight, Mailbox::kMaxWindow);
+  EXPECT_EQ(inFlight, SendWindow::kMax);
 }
 
 TEST_F(MailboxTest, PeerThatDoesNotReadRequestsNothing) {
@@ -349,13 +349,13 @@ TEST_F(MailboxTest, KeepsSendingFramesUntilTheRequestedKeyFrame) {
 TEST_F(MailboxTest, LimitsControlMessages) {
   std::size_t accepted = 0;
   while (mailbox.reply(bytes(1024))) ++accepted;
-  EXPECT_EQ(accepted, Mailbox::kMaxControlBytes / (1024 + Mailbox::kMessageOverhead));
+  EXPECT_EQ(accepted, ControlMessages::kMaxBytes / (1024 + ControlMessages::kMessageOverhead));
   ASSERT_TRUE(mailbox.next(now));
   EXPECT_TRUE(mailbox.reply(bytes(1024)));
 }
 
 TEST_F(MailboxTest, AcceptsOneMessageLargerThanTheLimit) {
-  EXPECT_TRUE(mailbox.reply(bytes(Mailbox::kMaxControlBytes * 2)));
+  EXPECT_TRUE(mailbox.reply(bytes(ControlMessages::kMaxBytes * 2)));
   EXPECT_FALSE(mailbox.reply(bytes(1)));
 }
 
@@ -367,11 +367,11 @@ TEST_F(MailboxTest, LimitsHeldBytes) {
     return made;
   };
   // A single frame is dropped too if it is larger than the limit.
-  std::vector<PublishedFrame> frames{large(1, 2 * Mailbox::kMaxHeldBytes), large(2, 1)};
+  std::vector<PublishedFrame> frames{large(1, 2 * HeldFrames::kMaxBytes), large(2, 1)};
   for (const PublishedFrame& each : frames) mailbox.deliver(each);
   EXPECT_EQ(frames[0].message.use_count(), 1);
   EXPECT_EQ(metrics.framesDropped.value(), 2u);
-  frames = {large(1, Mailbox::kMaxHeldBytes / 2), large(2, Mailbox::kMaxHeldBytes / 2), large(3, 1)};
+  frames = {large(1, HeldFrames::kMaxBytes / 2), large(2, HeldFrames::kMaxBytes / 2), large(3, 1)};
   for (const PublishedFrame& each : frames) mailbox.deliver(each);
   for (const PublishedFrame& each : frames) EXPECT_EQ(each.message.use_count(), 1) << each.tick;
   EXPECT_EQ(metrics.framesDropped.value(), 5u);

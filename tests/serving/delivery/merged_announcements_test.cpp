@@ -190,9 +190,9 @@ TEST(Subscribers, SilentOnesGetTheirAnnouncementsMergedOnceForAll) {
   }
   // More than twice what makes a mailbox merge.
   std::uint64_t tick = 0;
-  for (std::size_t bytes = 0; bytes <= 3 * Mailbox::kMaxControlBytes;) {
+  for (std::size_t bytes = 0; bytes <= 3 * ControlMessages::kMaxBytes;) {
     const SharedBytes message = contactsOf(++tick);
-    bytes += message->size() + Mailbox::kMessageOverhead;
+    bytes += message->size() + ControlMessages::kMessageOverhead;
     subscribers.announce(message);
   }
   std::vector<std::vector<SharedBytes>> all;
@@ -228,14 +228,14 @@ TEST(Subscribers, ChangesOfOthersNeverCloseASubscriberThatDoesNotRead) {
   v1::ParameterChange state;
   std::vector<std::uint64_t> present;
   while (const auto message = mailbox->next(Clock::now())) {
-    bytes += (*message)->size() + Mailbox::kMessageOverhead;
+    bytes += (*message)->size() + ControlMessages::kMessageOverhead;
     const v1::ServerMessage each = parsed(*message);
     if (each.has_parameter_changed()) messages::mergeChange(each.parameter_changed().change(), state);
     const std::uint64_t id = each.presence().participant().id();
     if (each.presence().kind() == v1::PRESENCE_KIND_JOINED) present.push_back(id);
     if (each.presence().kind() == v1::PRESENCE_KIND_LEFT) std::erase(present, id);
   }
-  EXPECT_LE(bytes, Mailbox::kMaxControlBytes);
+  EXPECT_LE(bytes, ControlMessages::kMaxBytes);
   EXPECT_EQ(state.air_density(), 0.5f);
   EXPECT_EQ(state.wind().value().x(), static_cast<float>(kChanges));
   EXPECT_TRUE(present.empty());

@@ -220,7 +220,7 @@ TEST_F(JoinTest, PeerThatNeverReadsDoesNotDelayOthers) {
   // The server holds only a few frames, for the other peer. All others belong to the reader alone.
   std::size_t held = 0;
   for (const SeenFrame& frame : reader.frames()) held += frame.message.use_count() > 1;
-  EXPECT_LE(held, Mailbox::kMaxHeld + 1);
+  EXPECT_LE(held, HeldFrames::kMax + 1);
   EXPECT_FALSE(dead.finished());
 }
 

@@ -115,10 +115,11 @@ TEST(Memory, MailboxStaysWithinItsLimits) {
     // Small messages, whose overhead is larger than their bytes.
     while (mailbox->reply(message(8))) {
     }
-    for (std::size_t sent = 0; sent < 2 * Mailbox::kMaxControlBytes; sent += Mailbox::kMessageOverhead)
+    for (std::size_t sent = 0; sent < 2 * ControlMessages::kMaxBytes;
+         sent += ControlMessages::kMessageOverhead)
       mailbox->announce(message(8));
-    for (std::uint64_t tick = 1; tick < 100 + Mailbox::kMaxHeld; ++tick)
-      mailbox->deliver({.message = message(Mailbox::kMaxHeldBytes / Mailbox::kMaxHeld),
+    for (std::uint64_t tick = 1; tick < 100 + HeldFrames::kMax; ++tick)
+      mailbox->deliver({.message = message(HeldFrames::kMaxBytes / HeldFrames::kMax),
                         .tick = tick,
                         .key = tick == 1 || tick % 10 == 0,
                         .referenceTick = tick - 1,
@@ -126,7 +127,7 @@ TEST(Memory, MailboxStaysWithinItsLimits) {
   }
   const double each = (allocatedBytes() - before) / kMailboxes;
   std::printf("a full mailbox: %.0f KiB\n", each / 1024);
-  EXPECT_LE(each, 2.0 * Mailbox::kMaxControlBytes + Mailbox::kMaxHeldBytes + (64 << 10));
+  EXPECT_LE(each, 2.0 * ControlMessages::kMaxBytes + HeldFrames::kMaxBytes + (64 << 10));
 }
 
 }  // namespace
