@@ -22,23 +22,24 @@ bool servesClients(Command command) {
 }
 
 int run(const ProgramOptions& options, const program::Signals& signals) {
+  const vulkan::DeviceOptions& device = options.serve.server.device;
   switch (options.command) {
     case Command::serve:
-      return program::serve(options, signals);
+      return program::serve(options.serve, signals);
     case Command::play:
-      return program::play(options, signals);
+      return program::play(options.serve, options.play, signals);
     case Command::edge:
-      return program::edge(options, signals);
+      return program::edge(options.serve, signals);
     case Command::resimulate:
-      return program::resimulate(options, signals);
+      return program::resimulate(options.resimulate, device, signals);
     case Command::step:
-      return program::runSteps(options, signals);
+      return program::runSteps(options.step, device, signals);
     case Command::printScene:
-      return program::printScene(options);
+      return program::printScene(options.printScene);
     case Command::token:
-      return program::runToken(options);
+      return program::runToken(options.token, options.serve.identity.tokenAudience);
     case Command::doctor:
-      return program::runDoctor(options, signals);
+      return program::runDoctor(options.serve, options.doctor, signals);
     case Command::listDevices:
       return program::listDevices();
     case Command::listMaterials:
@@ -57,10 +58,11 @@ int main(int argc, char** argv) {
     if (const int* code = std::get_if<int>(&parsed)) return *code;
     const ProgramOptions& options = std::get<ProgramOptions>(parsed);
     const program::Signals signals;
-    telemetry::setUpLog(options.logLevel,
-                        options.logFormat == "json" ? telemetry::LogFormat::json : telemetry::LogFormat::text,
-                        options.server.logRate);
-    if (servesClients(options.command)) program::endWhenOutOfMemory(options);
+    telemetry::setUpLog(
+        options.log.level,
+        options.log.format == "json" ? telemetry::LogFormat::json : telemetry::LogFormat::text,
+        options.serve.server.logRate);
+    if (servesClients(options.command)) program::endWhenOutOfMemory(options.log);
     for (const std::string& warning : options.warnings) spdlog::warn("{}", warning);
     return run(options, signals);
   } catch (const std::exception& error) {

@@ -46,8 +46,8 @@ std::filesystem::path userDirectory(const char* variable, const char* inHome) {
 struct Parsed {
   ProgramOptions options;
   std::vector<std::string> changeable, allowed;
-  std::string record, recordings, config, tls = "off", announce = "auto", overload = "adapt",
-                                          tokenValid = "8h", kernels = "auto";
+  std::string record, recordings, playSpeed = "1", config, tls = "off", announce = "auto", overload = "adapt",
+                                  tokenValid = "8h", kernels = "auto";
   std::optional<scene::Role> anonymousRole, tokenRole;
   std::optional<hosting::Profile> chosenProfile;
   // Limits of the profile that are set alone.
@@ -56,7 +56,8 @@ struct Parsed {
   bool ownersAlone = false;
   CLI::Option *sceneLifetimeOption = nullptr, *maxUploadOption = nullptr, *ownersAloneOption = nullptr;
   CLI::Option* stateDirectory = nullptr;
-  bool listDevices = false, listMaterials = false, printConfig = false, printMarkdown = false;
+  bool isGameServer = false, listDevices = false, listMaterials = false, printConfig = false,
+       printMarkdown = false;
 
   hosting::Profile profile() const { return chosenProfile.value_or(hosting::Profile::home); }
 };
@@ -78,7 +79,7 @@ void addBudgetOptions(OptionTable& table, scene::BudgetLimits& budget) {
 }
 
 void addSceneOptions(OptionTable& table, Parsed& parsed) {
-  ProgramOptions& options = parsed.options;
+  ServeOptions& options = parsed.options.serve;
   table.group("Scenes");
   table.text("--scene", options.server.defaultScene, "NAME", "Default scene, for clients that name none");
   table.list("--scene-file", options.sceneFiles, "FILE",
@@ -97,10 +98,10 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
                                    "Record every running scene, each to its own file in this directory");
   table.exclude(record, table.text("--recordings", parsed.recordings, "DIR",
                                    "Record scenes when a client asks for it, to files in this directory"));
-  table.number("--record-limit", options.recordLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
+  table.number("--record-limit", options.record.fileLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
                "Start a new file when a recording reaches this many megabytes. 0 means no limit");
   table.number(
-      "--recordings-limit", options.recordingsLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
+      "--recordings-limit", options.record.directoryLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
       "Stop recording when all recordings in the directory take this many megabytes. 0 means no limit");
   table.number("--keep-free", options.keepFreeMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
                "Stop recording, and saving states of scenes, when the disk has this many megabytes left");
@@ -127,7 +128,7 @@ std::string toText(const scene::Permissions& permissions) {
 }
 
 void addParticipantOptions(OptionTable& table, Parsed& parsed) {
-  ProgramOptions& options = parsed.options;
+  ServeOptions& options = parsed.options.serve;
   table.group("Participants");
   table.number("--hold", options.server.reconnectGrace.place, {.min = 0, .max = 3600, .type = "SECONDS"},
                "Reconnect grace: seconds for which a disconnected participant keeps its place. 0 means none");
@@ -166,16 +167,17 @@ const std::map<std::string, scene::Role> kRoles{{"viewer", scene::Role::viewer},
                                                 {"owner", scene::Role::owner}};
 
 void addIdentityOptions(OptionTable& table, Parsed& parsed) {
-  ProgramOptions& options = parsed.options;
+  ServeOptions& options = parsed.options.serve;
   table.group("Identity");
-  table.text("--token-keys", options.tokenKeys, "DIR",
+  table.text("--token-keys", options.identity.tokenKeys, "DIR",
              "Require a token of every client, signed by a key in this directory: NAME.pem for ES256, "
              "NAME.secret for HS256. SIGHUP reads them again");
-  table.text("--token-audience", options.tokenAudience, "NAME", "Audience (aud) that tokens must have");
-  table.flag("--pairing", options.pairing,
+  table.text("--token-audience", options.identity.tokenAudience, "NAME",
+             "Audience (aud) that tokens must have");
+  table.flag("--pairing", options.identity.pairing,
              "Require a token, or a six-digit code that the server shows at its start and after SIGUSR2");
   table.flag(
-      "--insecure", options.insecure,
+      "--insecure", options.identity.insecure,
       "Let in everyone who reaches the server, although --host is not a loopback address or there is a "
       "--public-name");
   CLI::Option* role = table.choice("--anonymous-role", parsed.anonymousRole, kRoles,
@@ -188,43 +190,45 @@ void addIdentityOptions(OptionTable& table, Parsed& parsed) {
 }
 
 // Checks the options together.
-void checkIdentity(const ProgramOptions& options) {
-  const bool asks = options.pairing || !options.tokenKeys.empty();
-  if (options.insecure && asks)
+void checkIdentity(const IdentityOptions& identity, const NetworkOptions& network) {
+  const bool asks = identity.pairing || !identity.tokenKeys.empty();
+  if (identity.insecure && asks)
     throw OptionError("--insecure excludes --token-keys and --pairing: remove it, or both of them");
-  if (!asks && !options.insecure && isReachable(options))
+  if (!asks && !identity.insecure && isReachable(network))
     throw OptionError(fmt::format(
         "{}: {} is reachable from other machines, and no client would have to prove who it is; add "
         "--pairing or --token-keys DIR, or --insecure to let everyone in (docs/identity.md)",
-        isLoopback(options.host) ? "--public-name" : "--host",
-        isLoopback(options.host) ? options.publicNames.front() : options.host));
+        isLoopback(network.host) ? "--public-name" : "--host",
+        isLoopback(network.host) ? network.publicNames.front() : network.host));
 }
 
 void addNetworkOptions(OptionTable& table, Parsed& parsed) {
-  ProgramOptions& options = parsed.options;
+  ServeOptions& options = parsed.options.serve;
   table.group("Network");
-  table.text("--host", options.host, "ADDRESS", "Address to listen on; 0.0.0.0 means all addresses");
-  table.number("--port", options.port, kPort, "Port of the page and the WebSocket. 0 picks a free port");
-  table.number("--grpc-port", options.grpcPort, kPort, "Port of gRPC. 0 picks a free port");
-  table.text("--page", options.page, "DIR", "Directory of the page, instead of the one next to the program");
+  table.text("--host", options.network.host, "ADDRESS", "Address to listen on; 0.0.0.0 means all addresses");
+  table.number("--port", options.network.port, kPort,
+               "Port of the page and the WebSocket. 0 picks a free port");
+  table.number("--grpc-port", options.network.grpcPort, kPort, "Port of gRPC. 0 picks a free port");
+  table.text("--page", options.network.page, "DIR",
+             "Directory of the page, instead of the one next to the program");
   table.list(
-      "--public-name", options.publicNames, "NAME",
+      "--public-name", options.network.publicNames, "NAME",
       "Name under which browsers reach the page, such as cloth.example.org; may be repeated. Addresses, "
       "localhost and the name of the machine are always allowed");
-  table.flag("--reflection", options.reflects,
+  table.flag("--reflection", options.network.reflects,
              "Offer gRPC reflection, by which tools such as grpcurl learn the calls without session.proto");
-  table.list("--allow-origin", options.allowedOrigins, "ORIGIN",
+  table.list("--allow-origin", options.network.allowedOrigins, "ORIGIN",
              "Origin of another page that may connect, such as https://example.org; may be repeated");
   table.text(
       "--announce", parsed.announce, "WHEN",
       "Announce the server by mDNS to this network, where `clothstream discover` finds it: on, off, or "
       "auto: with --tls self and a --host that others reach",
       checkChoice({"auto", "on", "off"}));
-  table.number("--max-connections", options.maxConnections, {.min = 1, .max = 100'000},
+  table.number("--max-connections", options.network.maxConnections, {.min = 1, .max = 100'000},
                "Connections to each port at a time");
-  table.number("--metrics-port", options.metricsPort, kPort,
+  table.number("--metrics-port", options.metrics.port, kPort,
                "Port of /metrics, /healthz and /readyz for operators. 0 picks a free port. Off by default");
-  table.text("--metrics-host", options.metricsHost, "ADDRESS", "Address to listen on with --metrics-port");
+  table.text("--metrics-host", options.metrics.host, "ADDRESS", "Address to listen on with --metrics-port");
 }
 
 std::map<std::string, hosting::Profile> profiles() {
@@ -250,33 +254,33 @@ void addLimitOptions(OptionTable& table, Parsed& parsed) {
 }
 
 void addTlsOptions(OptionTable& table, Parsed& parsed) {
-  ProgramOptions& options = parsed.options;
+  ServeOptions& options = parsed.options.serve;
   table.group("TLS");
   table.text("--tls", parsed.tls, "KIND",
              "self: use a certificate of the server's own, for a home network; off",
              checkChoice({"self", "off"}));
   table.text(
-      "--tls-certificate", options.tlsCertificate, "FILE",
+      "--tls-certificate", options.tls.certificate, "FILE",
       "PEM file with the certificate of the server and the chain to its authority. Turns TLS on. SIGHUP "
       "reads it again");
-  table.text("--tls-key", options.tlsKey, "FILE", "PEM file with the private key of that certificate");
-  table.text("--tls-client-ca", options.tlsClientCa, "FILE",
+  table.text("--tls-key", options.tls.key, "FILE", "PEM file with the private key of that certificate");
+  table.text("--tls-client-ca", options.tls.clientCa, "FILE",
              "PEM file of authorities: clients with a certificate must have it from one of these. Clients "
              "without one are accepted");
 }
 
 // Checks the options together.
-void checkTls(const ProgramOptions& options) {
-  if (options.tlsCertificate.empty() != options.tlsKey.empty())
+void checkTls(const TlsOptions& tls) {
+  if (tls.certificate.empty() != tls.key.empty())
     throw OptionError("--tls-certificate and --tls-key belong together: give both");
-  if (options.tlsSelf && !options.tlsCertificate.empty())
+  if (tls.self && !tls.certificate.empty())
     throw OptionError("--tls self excludes --tls-certificate: use one of them");
-  if (!options.tlsClientCa.empty() && !options.tlsSelf && options.tlsCertificate.empty())
+  if (!tls.clientCa.empty() && !tls.self && tls.certificate.empty())
     throw OptionError("--tls-client-ca needs TLS: add --tls-certificate and --tls-key, or --tls self");
 }
 
 void addDeviceOptions(OptionTable& table, Parsed& parsed) {
-  ProgramOptions& options = parsed.options;
+  ServeOptions& options = parsed.options.serve;
   table.text("--device", options.server.device.select, "DEVICE",
              "Index of a Vulkan device, or part of its name. By default the best device is used");
   table.number("--software-threads", options.server.device.softwareThreads, kThreads,
@@ -292,23 +296,23 @@ void addDeviceOptions(OptionTable& table, Parsed& parsed) {
 
 void addProgramOptions(OptionTable& table, Parsed& parsed) {
   table.group("Program");
-  table.text("--log-level", parsed.options.logLevel, "LEVEL", "trace, debug, info, warning, error or off",
+  table.text("--log-level", parsed.options.log.level, "LEVEL", "trace, debug, info, warning, error or off",
              checkChoice({"trace", "debug", "info", "warning", "error", "off"}, {"warn", "err", "critical"}));
-  table.text("--log-format", parsed.options.logFormat, "FORMAT",
+  table.text("--log-format", parsed.options.log.format, "FORMAT",
              "text, or json: one JSON object per line of the log", checkChoice({"text", "json"}));
-  table.number("--seconds", parsed.options.stopAfter,
+  table.number("--seconds", parsed.options.serve.stopAfter,
                {.min = 0, .max = 1e9, .type = "SECONDS", .aboveMin = true}, "Stop after this time");
   table.number(
-      "--drain", parsed.options.server.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
+      "--drain", parsed.options.serve.server.drain, {.min = 0.1, .max = 600, .type = "SECONDS"},
       "Seconds after SIGINT or SIGTERM within which the server ends, even if the device or the disk does "
       "not answer. A second signal ends it at once");
   parsed.stateDirectory = table.text(
-      "--state-dir", parsed.options.stateDirectory, "DIR",
+      "--state-dir", parsed.options.serve.state.directory, "DIR",
       "Directory of what the server keeps for its next start: the key of --tls self and, if this option is "
       "given, scenes with their states and participants");
   table.showDefault(parsed.stateDirectory, "$XDG_STATE_HOME/clothstream or $HOME/.local/state/clothstream");
   table.number(
-      "--state-limit", parsed.options.stateLimitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
+      "--state-limit", parsed.options.serve.state.limitMb, {.min = 0, .max = 1e9, .type = "MEGABYTES"},
       "Megabytes of the kept scenes. Beyond it the states of the largest scenes are left out. 0 means no "
       "limit");
   table.text("--config", parsed.config, "FILE", "Read options from this TOML file");
@@ -316,42 +320,43 @@ void addProgramOptions(OptionTable& table, Parsed& parsed) {
   table.action("--help-markdown", parsed.printMarkdown, "Print this help as a page of Markdown, and exit");
 }
 
-void addFleetOptions(OptionTable& table, ProgramOptions& options) {
+void addFleetOptions(OptionTable& table, Parsed& parsed) {
+  ServeOptions& options = parsed.options.serve;
   table.group("Other servers");
   CLI::Option* servers = table.list(
-      "--nats", options.natsServers, "URL",
+      "--nats", options.nats.servers, "URL",
       "Offer the scenes of this server to edge servers through NATS, such as nats://10.0.0.5:4222; may "
       "be repeated, or a comma-separated list. Built-in scenes other than --scene are not offered");
   servers->delimiter(',')->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  table.text("--nats-credentials", options.natsCredentials, "FILE",
+  table.text("--nats-credentials", options.nats.credentials, "FILE",
              "Credentials of this server for NATS (JWT and seed)");
-  table.text("--nats-ca", options.natsAuthority, "FILE",
+  table.text("--nats-ca", options.nats.authority, "FILE",
              "Require TLS for NATS, with a certificate of an authority in this PEM file");
-  table.flag("--agones", options.isGameServer,
+  table.flag("--agones", parsed.isGameServer,
              "Be a game server of Agones in Kubernetes: tell its sidecar, at the port AGONES_SDK_HTTP_PORT "
              "(9358), that "
              "the server is ready, healthy or in use, and what it carries");
-  table.text("--events-url", options.eventsUrl, "URL",
+  table.text("--events-url", options.webhook.url, "URL",
              "Report who joins and leaves scenes, and what scenes use, to this webhook of a backend, such as "
              "https://backend.example.org/cloth. With http:// everyone on the way can read the events",
              [](const std::string& text) {
                const auto url = events::parseUrl(text);
                return url || text.empty() ? std::string() : url.error();
              });
-  table.text("--events-secret-file", options.eventsSecret, "FILE",
+  table.text("--events-secret-file", options.webhook.secret, "FILE",
              "Secret that signs the events: whsec_ and the base64 of 24 to 64 random bytes");
 }
 
 // Checks the options together.
-void checkEvents(const ProgramOptions& options) {
-  if (!options.eventsUrl.empty() && options.eventsSecret.empty())
+void checkWebhook(const WebhookOptions& webhook) {
+  if (!webhook.url.empty() && webhook.secret.empty())
     throw OptionError("--events-url needs a secret that signs the events: add --events-secret-file FILE");
-  if (options.eventsUrl.empty() && !options.eventsSecret.empty())
+  if (webhook.url.empty() && !webhook.secret.empty())
     throw OptionError("--events-secret-file has no effect without --events-url URL: give both");
 }
 
-void checkNats(const ProgramOptions& options) {
-  for (const std::string& url : options.natsServers)
+void checkNats(const NatsOptions& nats) {
+  for (const std::string& url : nats.servers)
     if (!url.starts_with("nats://") && !url.starts_with("tls://"))
       throw OptionError(
           fmt::format("--nats: '{}' begins with neither nats:// nor tls://; use nats://HOST:4222", url));
@@ -359,8 +364,9 @@ void checkNats(const ProgramOptions& options) {
 
 // Port of the sidecar. Throws OptionError.
 std::uint16_t agonesPort() {
+  constexpr std::uint16_t kDefaultPort = 9358;
   const char* const text = std::getenv("AGONES_SDK_HTTP_PORT");
-  if (text == nullptr || *text == '\0') return ProgramOptions().agonesPort;
+  if (text == nullptr || *text == '\0') return kDefaultPort;
   std::uint16_t port = 0;
   const std::string_view whole(text);
   const auto [rest, error] = std::from_chars(whole.data(), whole.data() + whole.size(), port);
@@ -379,27 +385,27 @@ CLI::App& addEdgeCommand(OptionTable& table) {
   return command;
 }
 
-CLI::App& addPrintSceneCommand(OptionTable& table, ProgramOptions& options) {
+CLI::App& addPrintSceneCommand(OptionTable& table, std::string& nameOrPath) {
   CLI::App& command = table.command(
       "print-scene", "Print a scene as JSON, with all defaults and the geometry of its meshes filled in");
-  table.word("SCENE", options.printScene, "Name of a scene, or a JSON file");
+  table.word("SCENE", nameOrPath, "Name of a scene, or a JSON file");
   return command;
 }
 
 CLI::App& addStepCommand(OptionTable& table, Parsed& parsed) {
-  ProgramOptions& options = parsed.options;
+  StepOptions& options = parsed.options.step;
   CLI::App& command =
       table.command("step", "Run a scene without clock or network, and write its states to a file");
-  table.text("--scene", options.server.defaultScene, "NAME", "Name of a scene, or a JSON file")
+  table.text("--scene", options.scene, "NAME", "Name of a scene, or a JSON file")
       ->required()
       ->default_str("");
   table.showDefault(command.get_option("--scene"), "");
-  table.number("--ticks", options.step.ticks, kTicks, "Number of ticks")->required()->default_str("");
+  table.number("--ticks", options.run.ticks, kTicks, "Number of ticks")->required()->default_str("");
   table.showDefault(command.get_option("--ticks"), "");
-  table.text("--out", options.step.out, "FILE", "Output file; FILE.json describes it")->required();
-  table.number("--every", options.step.every, kTicks, "Write one state per this many ticks, from the start");
-  table.number("--rate", options.stepRate, kRate, "Ticks per second, instead of the scene's own rate");
-  table.number("--substeps", options.stepSubsteps, kSubsteps,
+  table.text("--out", options.run.out, "FILE", "Output file; FILE.json describes it")->required();
+  table.number("--every", options.run.every, kTicks, "Write one state per this many ticks, from the start");
+  table.number("--rate", options.rate, kRate, "Ticks per second, instead of the scene's own rate");
+  table.number("--substeps", options.substeps, kSubsteps,
                "Integration steps per tick, instead of the scene's own number");
   addDeviceOptions(table, parsed);
   command.footer(fmt::format(
@@ -423,7 +429,7 @@ CLI::App& addDoctorCommand(OptionTable& table, Parsed& parsed) {
              "Also simulate a thousand ticks of each built-in scene, and compare the states with those that "
              "every device must reach. Takes about two minutes on two processors");
   table.text("--report", options.report, "FILE", "Write the findings to this file, as JSON");
-  table.flag("--json", parsed.options.json, "Print the findings as JSON");
+  table.flag("--json", options.json, "Print the findings as JSON");
   command.footer(
       fmt::format("Options of the server come before the command: clothstream-server --config FILE doctor.\n"
                   "Exit code: 0 without problems, 1 with problems, {} if interrupted.",
@@ -431,22 +437,22 @@ CLI::App& addDoctorCommand(OptionTable& table, Parsed& parsed) {
   return command;
 }
 
-void addRecordingLimits(OptionTable& table, ProgramOptions& options) {
+void addRecordingLimits(OptionTable& table, recording::ReadLimits& limits) {
   table.number(
-      "--max-vertices", options.recordingLimits.vertices, {.min = 1, .max = codec::kMaxVertices},
+      "--max-vertices", limits.vertices, {.min = 1, .max = codec::kMaxVertices},
       "Most vertices of the recording, and half of its most triangles, since the file decides how much "
       "memory is needed");
 }
 
 CLI::App& addResimulateCommand(OptionTable& table, Parsed& parsed) {
-  ProgramOptions& options = parsed.options;
+  ResimulateOptions& options = parsed.options.resimulate;
   CLI::App& command =
       table.command("resimulate", "Simulate a recording again, and compare each state with the recorded one");
   table.word("FILE", options.recording, "Recording that --record wrote");
   table.text("--states", options.states, "OUT",
              "Write positions and velocities of every tick to this file, in the format of `step`");
   table.flag("--json", options.json, "Print the result as one JSON object");
-  addRecordingLimits(table, options);
+  addRecordingLimits(table, options.limits);
   addDeviceOptions(table, parsed);
   command.footer(
       fmt::format("Exit code: 0 if every state is bitwise equal, 1 for other bits although the kernels are "
@@ -464,14 +470,15 @@ constexpr NumberRange kSpeedRange{.min = recording::kMinSpeed, .max = recording:
 constexpr const char* kMaxSpeedWord = "max";
 constexpr double kMaxSeed = std::numeric_limits<std::uint32_t>::max();
 
-CLI::App& addPlayCommand(OptionTable& table, ProgramOptions& options) {
+CLI::App& addPlayCommand(OptionTable& table, Parsed& parsed) {
+  PlayOptions& options = parsed.options.play;
   CLI::App& command =
       table.command("play", "Serve a recording as a scene that clients join, pause, seek, speed up and loop");
   table.word("FILE", options.recording, "Recording that --record or `clothstream record` wrote");
   table.number("--from", options.playback.from, {.min = 0, .type = "SECONDS"},
                "Start this many seconds after the beginning");
   table.text(
-      "--speed", options.playSpeed, "N|max",
+      "--speed", parsed.playSpeed, "N|max",
       "Recorded seconds per second, 0.1 to 8. In lockstep also max: as fast as frames are acknowledged",
       [](const std::string& text) {
         return text == kMaxSpeedWord ? std::string() : checkNumber(kSpeedRange, false)(text);
@@ -483,21 +490,20 @@ CLI::App& addPlayCommand(OptionTable& table, ProgramOptions& options) {
                "Participants that must be there before the first frame");
   table.number("--faults", options.playback.faults, {.min = 0, .max = kMaxSeed, .type = "SEED"},
                "Drop and delay frames. The same seed gives the same faults");
-  addRecordingLimits(table, options);
+  addRecordingLimits(table, options.limits);
   command.footer(
       "Options of clothstream-server for participants, network and log apply too. No device is needed.");
   command.fallthrough();
   return command;
 }
 
-double playbackSpeed(const ProgramOptions& options) {
-  if (options.playSpeed == kMaxSpeedWord) {
-    if (!options.playback.lockstep)
-      throw OptionError("--speed: max requires --lockstep; use 0.1 to 8 without it");
+double playbackSpeed(const std::string& text, bool lockstep) {
+  if (text == kMaxSpeedWord) {
+    if (!lockstep) throw OptionError("--speed: max requires --lockstep; use 0.1 to 8 without it");
     return recording::kUnpaced;
   }
   double speed = 1;
-  std::from_chars(options.playSpeed.data(), options.playSpeed.data() + options.playSpeed.size(), speed);
+  std::from_chars(text.data(), text.data() + text.size(), speed);
   return speed;
 }
 
@@ -534,7 +540,8 @@ CLI::App& addTokenCommand(OptionTable& table, Parsed& parsed) {
                return parseTime(text) ? std::string()
                                       : fmt::format("'{}' is not a time; use 90s, 30m, 8h or 7d", text);
              });
-  table.text("--token-audience", parsed.options.tokenAudience, "NAME", "Audience (aud), as for the server");
+  table.text("--token-audience", parsed.options.serve.identity.tokenAudience, "NAME",
+             "Audience (aud), as for the server");
   return command;
 }
 
@@ -565,7 +572,7 @@ void allow(const std::vector<std::string>& allowed, scene::Permissions& permissi
 // Gives the server the limits of the profile, and those that an option sets alone. Such an option that is not
 // given has the value of the profile.
 void setLimits(Parsed& parsed) {
-  hosting::ServerOptions& server = parsed.options.server;
+  hosting::ServerOptions& server = parsed.options.serve.server;
   hosting::Limits& limits = server;
   limits = hosting::Limits(parsed.profile());
   const double lifetime = std::chrono::duration<double>(limits.sceneLifetime).count();
@@ -624,17 +631,18 @@ bool isLoopback(const std::string& host) {
   return host == "localhost";
 }
 
-bool isReachable(const ProgramOptions& options) {
-  return !isLoopback(options.host) || !options.publicNames.empty();
+bool isReachable(const NetworkOptions& network) {
+  return !isLoopback(network.host) || !network.publicNames.empty();
 }
 
 std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv) {
   Parsed parsed;
   ProgramOptions& options = parsed.options;
-  options.server.defaultScene = "veil";
-  options.server.serverName = kServerName;
-  options.server.device.cacheDirectory = userDirectory("XDG_CACHE_HOME", ".cache");
-  options.stateDirectory = userDirectory("XDG_STATE_HOME", ".local/state");
+  ServeOptions& serve = options.serve;
+  serve.server.defaultScene = "veil";
+  serve.server.serverName = kServerName;
+  serve.server.device.cacheDirectory = userDirectory("XDG_CACHE_HOME", ".cache");
+  serve.state.directory = userDirectory("XDG_STATE_HOME", ".local/state");
 
   CLI::App app{"Simulates cloth with Vulkan and streams it to browsers and gRPC clients.",
                "clothstream-server"};
@@ -653,16 +661,16 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   addNetworkOptions(table, parsed);
   addLimitOptions(table, parsed);
   addTlsOptions(table, parsed);
-  addFleetOptions(table, options);
+  addFleetOptions(table, parsed);
   table.group("Device");
   addDeviceOptions(table, parsed);
   table.action("--list-devices", parsed.listDevices, "List the Vulkan devices, and exit");
   addProgramOptions(table, parsed);
   retireOptions(table);
-  const CLI::App& printScene = addPrintSceneCommand(table, options);
+  const CLI::App& printScene = addPrintSceneCommand(table, options.printScene);
   const CLI::App& step = addStepCommand(table, parsed);
   const CLI::App& resimulate = addResimulateCommand(table, parsed);
-  const CLI::App& play = addPlayCommand(table, options);
+  const CLI::App& play = addPlayCommand(table, parsed);
   const CLI::App& edge = addEdgeCommand(table);
   const CLI::App& token = addTokenCommand(table, parsed);
   const CLI::App& doctor = addDoctorCommand(table, parsed);
@@ -672,31 +680,31 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   try {
     app.parse(argc, argv);
     options.warnings = table.applySources(environ, configFile(parsed));
-    if (!parsed.changeable.empty()) options.server.participantsMay = toPermissions(parsed.changeable);
-    options.tlsSelf = parsed.tls == "self";
-    options.server.device.kernels = parsed.kernels == "gpu"   ? vulkan::KernelSettings::gpu
-                                    : parsed.kernels == "cpu" ? vulkan::KernelSettings::cpu
-                                                              : vulkan::KernelSettings::automatic;
-    options.keepsScenes = parsed.stateDirectory->count() > 0 && !options.stateDirectory.empty();
-    checkTls(options);
-    checkEvents(options);
-    checkNats(options);
-    options.announces = parsed.announce == "on" ||
-                        (parsed.announce == "auto" && options.tlsSelf && !isLoopback(options.host));
+    if (!parsed.changeable.empty()) serve.server.participantsMay = toPermissions(parsed.changeable);
+    serve.tls.self = parsed.tls == "self";
+    serve.server.device.kernels = parsed.kernels == "gpu"   ? vulkan::KernelSettings::gpu
+                                  : parsed.kernels == "cpu" ? vulkan::KernelSettings::cpu
+                                                            : vulkan::KernelSettings::automatic;
+    serve.state.keepsScenes = parsed.stateDirectory->count() > 0 && !serve.state.directory.empty();
+    checkTls(serve.tls);
+    checkWebhook(serve.webhook);
+    checkNats(serve.nats);
+    serve.network.announces = parsed.announce == "on" || (parsed.announce == "auto" && serve.tls.self &&
+                                                          !isLoopback(serve.network.host));
     setLimits(parsed);
-    allow(parsed.allowed, options.server.participantsMay);
-    options.anonymousRole = parsed.anonymousRole.value_or(options.anonymousRole);
+    allow(parsed.allowed, serve.server.participantsMay);
+    serve.identity.anonymousRole = parsed.anonymousRole.value_or(serve.identity.anonymousRole);
     options.token.role = parsed.tokenRole.value_or(options.token.role);
-    options.playback.speed = playbackSpeed(options);
+    options.play.playback.speed = playbackSpeed(parsed.playSpeed, options.play.playback.lockstep);
     options.token.valid = parseTime(parsed.tokenValid).value_or(std::chrono::hours(8));
     const bool serves = app.get_subcommands().empty() || play.parsed() || edge.parsed();
     if (serves && !parsed.printConfig && !parsed.printMarkdown && !parsed.listDevices &&
         !parsed.listMaterials)
-      checkIdentity(options);
-    if (options.isGameServer) options.agonesPort = agonesPort();
-    if (edge.parsed() && options.natsServers.empty())
+      checkIdentity(serve.identity, serve.network);
+    if (parsed.isGameServer) serve.agonesPort = agonesPort();
+    if (edge.parsed() && serve.nats.servers.empty())
       throw OptionError("edge: --nats URL is missing: the NATS servers that the other servers use");
-    if (edge.parsed() && app.get_option("--scene")->count() == 0) options.server.defaultScene.clear();
+    if (edge.parsed() && app.get_option("--scene")->count() == 0) serve.server.defaultScene.clear();
     if (token.parsed() && options.token.key.empty() && options.token.newKey.empty())
       throw OptionError("token: give --key FILE to print a token, or --new-key FILE to make a key");
   } catch (const CLI::ExtrasError&) {
@@ -712,11 +720,11 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
   if (parsed.printConfig) return fmt::print("{}{}", table.toToml(), limitsAsComments(parsed.profile())), 0;
   if (parsed.printMarkdown) return printMarkdown(table), 0;
 
-  options.logLevel = CLI::detail::to_lower(options.logLevel);
-  options.logFormat = CLI::detail::to_lower(options.logFormat);
-  options.server.adaptsToLoad = CLI::detail::to_lower(parsed.overload) == "adapt";
-  options.recordsOnRequest = !parsed.recordings.empty();
-  options.recordDirectory = options.recordsOnRequest ? parsed.recordings : parsed.record;
+  options.log.level = CLI::detail::to_lower(options.log.level);
+  options.log.format = CLI::detail::to_lower(options.log.format);
+  serve.server.adaptsToLoad = CLI::detail::to_lower(parsed.overload) == "adapt";
+  serve.record.onRequest = !parsed.recordings.empty();
+  serve.record.directory = serve.record.onRequest ? parsed.recordings : parsed.record;
   options.command = step.parsed()          ? Command::step
                     : play.parsed()        ? Command::play
                     : edge.parsed()        ? Command::edge

@@ -21,9 +21,9 @@ bool isAddress(const std::string& text) {
   return ::inet_pton(AF_INET, text.c_str(), &v4) == 1 || ::inet_pton(AF_INET6, text.c_str(), &v6) == 1;
 }
 
-std::string addressInNetwork(const ProgramOptions& options) {
-  if (isLoopback(options.host)) return {};
-  if (options.host != "0.0.0.0" && options.host != "::") return options.host;
+std::string addressInNetwork(const NetworkOptions& network) {
+  if (isLoopback(network.host)) return {};
+  if (network.host != "0.0.0.0" && network.host != "::") return network.host;
   for (const std::string& name : tls::namesOfThisMachine())
     if (name.find('.') != std::string::npos && name.find_first_not_of("0123456789.") == std::string::npos &&
         !name.starts_with("127."))

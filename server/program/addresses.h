@@ -16,6 +16,6 @@ std::string localAddress(const std::string& host, std::uint16_t port);
 bool isAddress(const std::string& text);
 
 // The first address of this machine that others in its network can reach, or empty.
-std::string addressInNetwork(const ProgramOptions& options);
+std::string addressInNetwork(const NetworkOptions& network);
 
 }  // namespace clothstream::program

@@ -10,25 +10,25 @@
 
 namespace clothstream::program {
 
-std::shared_ptr<identity::Authenticator> makeAuthenticator(const ProgramOptions& options) {
-  const bool asks = options.pairing || !options.tokenKeys.empty();
-  if (!asks && !isReachable(options)) return nullptr;
-  if (!asks && isLoopback(options.host))
+std::shared_ptr<identity::Authenticator> makeAuthenticator(const ServeOptions& options) {
+  const bool asks = options.identity.pairing || !options.identity.tokenKeys.empty();
+  if (!asks && !isReachable(options.network)) return nullptr;
+  if (!asks && isLoopback(options.network.host))
     spdlog::warn(
         "--insecure: everyone who reaches {} through a program of this machine can join, and counts "
         "as a program of this machine (docs/identity.md)",
-        options.publicNames.front());
+        options.network.publicNames.front());
   else if (!asks)
     spdlog::warn("--insecure: everyone who reaches {} can join, with the role {} (docs/identity.md)",
-                 options.host, scene::nameOf(options.anonymousRole));
-  if (asks && !isLoopback(options.host) && !options.tlsSelf && options.tlsCertificate.empty())
+                 options.network.host, scene::nameOf(options.identity.anonymousRole));
+  if (asks && !isLoopback(options.network.host) && !options.tls.self && options.tls.certificate.empty())
     spdlog::warn("tokens and pairing codes travel without encryption: add --tls self or --tls-certificate");
   return std::make_shared<identity::Authenticator>(
-      identity::AuthenticatorOptions{.keyDirectory = options.tokenKeys,
-                                     .audience = options.tokenAudience,
-                                     .pairing = options.pairing,
-                                     .stateDirectory = options.stateDirectory,
-                                     .anonymousRole = options.anonymousRole});
+      identity::AuthenticatorOptions{.keyDirectory = options.identity.tokenKeys,
+                                     .audience = options.identity.tokenAudience,
+                                     .pairing = options.identity.pairing,
+                                     .stateDirectory = options.state.directory,
+                                     .anonymousRole = options.identity.anonymousRole});
 }
 
 void reload(identity::Authenticator& authenticator) {

@@ -12,7 +12,7 @@ namespace clothstream::program {
 
 // Null if every peer may act as an owner, because only programs of this machine reach the server. Logs
 // warnings about servers that others reach without tokens or without encryption.
-std::shared_ptr<identity::Authenticator> makeAuthenticator(const ProgramOptions& options);
+std::shared_ptr<identity::Authenticator> makeAuthenticator(const ServeOptions& options);
 
 // Reads the keys of tokens again. Logs the result; if it fails, the old keys stay in use.
 void reload(identity::Authenticator& authenticator);

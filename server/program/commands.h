@@ -3,29 +3,32 @@
 // explains why the command failed.
 #pragma once
 
+#include <string>
+
 #include "server/options/program_options.h"
 #include "server/program/signals.h"
+#include "server/vulkan/device.h"
 
 namespace clothstream::program {
 
 // Simulates and serves scenes.
-int serve(const ProgramOptions& options, const Signals& signals);
+int serve(const ServeOptions& options, const Signals& signals);
 // Serves a recording.
-int play(const ProgramOptions& options, const Signals& signals);
+int play(const ServeOptions& options, const PlayOptions& play, const Signals& signals);
 // Serves scenes of other servers.
-int edge(const ProgramOptions& options, const Signals& signals);
+int edge(const ServeOptions& options, const Signals& signals);
 // Simulates a recording again and compares the result.
-int resimulate(const ProgramOptions& options, const Signals& signals);
+int resimulate(const ResimulateOptions& options, const vulkan::DeviceOptions& device, const Signals& signals);
 // Writes ticks of a scene into a file.
-int runSteps(const ProgramOptions& options, const Signals& signals);
+int runSteps(const StepOptions& options, const vulkan::DeviceOptions& deviceOptions, const Signals& signals);
 
-// Makes a token or a key of tokens.
-int runToken(const ProgramOptions& options);
+// Makes a token for this audience, or a key of tokens.
+int runToken(const TokenOptions& token, const std::string& audience);
 
 // Checks the devices, the machine and the configuration.
-int runDoctor(const ProgramOptions& options, const Signals& signals);
+int runDoctor(const ServeOptions& options, const DoctorOptions& command, const Signals& signals);
 
-int printScene(const ProgramOptions& options);
+int printScene(const std::string& nameOrPath);
 int listDevices();
 int listMaterials();
 

@@ -13,7 +13,7 @@
 #include "server/doctor/device.h"
 #include "server/doctor/host.h"
 #include "server/program/commands.h"
-#include "server/program/devices.h"
+#include "server/simulation/software_threads.h"
 
 namespace clothstream::program {
 namespace {
@@ -22,18 +22,21 @@ void add(doctor::Findings& all, doctor::Findings more) {
   for (doctor::Finding& finding : more) all.push_back(std::move(finding));
 }
 
-doctor::Findings checkHost(const ProgramOptions& options) {
-  doctor::Findings findings = {doctor::checkPort(options.host, options.port, "--port"),
-                               doctor::checkPort(options.host, options.grpcPort, "--grpc-port")};
-  if (options.metricsPort)
-    findings.push_back(doctor::checkPort(options.metricsHost, *options.metricsPort, "--metrics-port"));
-  if (!options.tlsCertificate.empty())
-    findings.push_back(doctor::checkCertificate(options.tlsCertificate, options.tlsKey, options.publicNames));
-  if (!options.stateDirectory.empty())
-    findings.push_back(doctor::checkDirectory(options.stateDirectory, "--state-dir", options.keepFreeMb));
-  if (!options.recordDirectory.empty())
-    findings.push_back(doctor::checkDirectory(
-        options.recordDirectory, options.recordsOnRequest ? "--recordings" : "--record", options.keepFreeMb));
+doctor::Findings checkHost(const ServeOptions& options) {
+  doctor::Findings findings = {
+      doctor::checkPort(options.network.host, options.network.port, "--port"),
+      doctor::checkPort(options.network.host, options.network.grpcPort, "--grpc-port")};
+  if (options.metrics.port)
+    findings.push_back(doctor::checkPort(options.metrics.host, *options.metrics.port, "--metrics-port"));
+  if (!options.tls.certificate.empty())
+    findings.push_back(
+        doctor::checkCertificate(options.tls.certificate, options.tls.key, options.network.publicNames));
+  if (!options.state.directory.empty())
+    findings.push_back(doctor::checkDirectory(options.state.directory, "--state-dir", options.keepFreeMb));
+  if (!options.record.directory.empty())
+    findings.push_back(doctor::checkDirectory(options.record.directory,
+                                              options.record.onRequest ? "--recordings" : "--record",
+                                              options.keepFreeMb));
   findings.push_back(doctor::checkClock());
   return findings;
 }
@@ -46,21 +49,23 @@ void write(const std::filesystem::path& path, const nlohmann::ordered_json& repo
 
 }  // namespace
 
-int runDoctor(const ProgramOptions& options, const Signals& signals) {
+int runDoctor(const ServeOptions& options, const DoctorOptions& command, const Signals& signals) {
   doctor::Findings findings;
   bool interrupted = false;
   // Findings appear as they come, because some take long.
   const auto tell = [&](doctor::Findings more) {
-    if (!options.json) fmt::print("{}", doctor::toText(more));
+    if (!command.json) fmt::print("{}", doctor::toText(more));
     std::fflush(stdout);
     add(findings, std::move(more));
   };
   tell(checkHost(options));
-  const auto optionsFor = [&](std::uint32_t nodes) { return deviceOptions(options, nodes); };
+  const auto optionsFor = [&](std::uint32_t nodes) {
+    return simulation::suitedTo(nodes, options.server.device);
+  };
   tell(doctor::checkDevices(optionsFor(0)));
-  if (!doctor::hasProblem(findings) && options.doctor.seconds > 0)
-    tell(doctor::measureCapacity(optionsFor, std::chrono::duration<double>(options.doctor.seconds)));
-  if (options.doctor.accepts)
+  if (!doctor::hasProblem(findings) && command.seconds > 0)
+    tell(doctor::measureCapacity(optionsFor, std::chrono::duration<double>(command.seconds)));
+  if (command.accepts)
     for (const doctor::AcceptedState& expected : doctor::acceptedStates()) {
       const auto stop = [&] { return interrupted = interrupted || signals.interrupted(); };
       try {
@@ -73,8 +78,8 @@ int runDoctor(const ProgramOptions& options, const Signals& signals) {
       }
     }
   const nlohmann::ordered_json report{{"server", kServerName}, {"findings", doctor::toJson(findings)}};
-  if (options.json) fmt::print("{}\n", report.dump(1));
-  if (!options.doctor.report.empty()) write(options.doctor.report, report);
+  if (command.json) fmt::print("{}\n", report.dump(1));
+  if (!command.report.empty()) write(command.report, report);
   if (interrupted) return kInterrupted;
   return doctor::hasProblem(findings) ? 1 : 0;
 }

@@ -18,7 +18,7 @@
 
 namespace clothstream::program {
 
-int edge(const ProgramOptions& options, const Signals& signals) {
+int edge(const ServeOptions& options, const Signals& signals) {
   StartGuard start(signals, options.server.drain);
   const auto monitoring = openMonitoring(options);
   std::unique_ptr<EndGuard> guard;  // outlives the server
@@ -27,11 +27,11 @@ int edge(const ProgramOptions& options, const Signals& signals) {
   serverOptions.authenticator = authenticator;
   serverOptions.observer = openEvents(options);
   hosting::SceneServer server(serverOptions);
-  const fleet::Edge shown(server, natsOptions(options, "edge"), serverOptions.reconnectGrace.place);
+  const fleet::Edge shown(server, natsOptions(options.nats, "edge"), serverOptions.reconnectGrace.place);
   shown.waitForOffers();  // clients that come back to an edge that starts again find their scenes
   guard = openEndpoints(
       server, options, signals, start, authenticator, monitoring.get(),
-      fmt::format("shows   scenes of other servers, by {}\n", fmt::join(options.natsServers, ", ")),
+      fmt::format("shows   scenes of other servers, by {}\n", fmt::join(options.nats.servers, ", ")),
       [&] { return server.report(); });
   return 0;
 }

@@ -38,9 +38,9 @@ std::filesystem::path pageNextToProgram() {
 }
 
 // Prints what a person needs to reach the page from another device: address, QR code and fingerprint.
-void printHomeAddresses(const ProgramOptions& options, std::uint16_t port, const std::string& fingerprint) {
+void printHomeAddresses(const NetworkOptions& network, std::uint16_t port, const std::string& fingerprint) {
   fmt::print("key     {}\n", fingerprint);
-  const std::string host = addressInNetwork(options);
+  const std::string host = addressInNetwork(network);
   if (host.empty()) return;
   const std::string address = fmt::format("https://{}/", localAddress(host, port));
   fmt::print("type    {}\n{}", address, tls::qrCode(address));
@@ -55,7 +55,7 @@ void print(const std::string& text) {
 // SIGHUP reloads the certificate and the keys of tokens, SIGUSR1 prints the report, SIGUSR2 a pairing code.
 // Files are read and texts are printed elsewhere, so that SIGTERM is answered whatever they wait for. `tls`
 // and `authenticator` may be null.
-void waitForStop(const Signals& signals, const ProgramOptions& options,
+void waitForStop(const Signals& signals, const ServeOptions& options,
                  const std::shared_ptr<tls::ServerTls>& tls,
                  const std::shared_ptr<identity::Authenticator>& authenticator,
                  const std::function<std::string()>& report) {
@@ -68,20 +68,20 @@ void waitForStop(const Signals& signals, const ProgramOptions& options,
     const bool reloads = tls != nullptr || authenticator != nullptr;
     if (signal == SIGINT || signal == SIGTERM || (signal == SIGHUP && !reloads)) return;
     if (signal == SIGHUP)
-      work.post(signal, [tls, authenticator, readsKeys = !options.tokenKeys.empty()] {
+      work.post(signal, [tls, authenticator, readsKeys = !options.identity.tokenKeys.empty()] {
         if (tls) reload(*tls);
         if (readsKeys) reload(*authenticator);
       });
     else if (signal == SIGUSR1)
       work.post(signal, [text = report()] { print(text); });
-    else if (signal == SIGUSR2 && options.pairing)
+    else if (signal == SIGUSR2 && options.identity.pairing)
       work.post(signal, [authenticator] { print(pairingCodeLine(*authenticator)); });
   }
 }
 
 }  // namespace
 
-std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const ProgramOptions& options,
+std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const ServeOptions& options,
                                         const Signals& signals, StartGuard& start,
                                         const std::shared_ptr<identity::Authenticator>& authenticator,
                                         monitoring::MonitoringEndpoint* monitoring, const std::string& intro,
@@ -90,47 +90,48 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Prog
   std::unique_ptr<EndGuard> guard;
   const std::shared_ptr<tls::ServerTls> tls = openTls(options);
   {
-    const std::filesystem::path page = options.page.empty() ? pageNextToProgram() : options.page;
+    const std::filesystem::path page =
+        options.network.page.empty() ? pageNextToProgram() : options.network.page;
     if (page.empty())
       spdlog::warn("no page found next to the program: build the target clothstream_page, or use --page DIR");
     const endpoint::ConnectionLimits limits{
         .connectionsPerAddress = options.server.connectionsPerAddress,
         .connectionsPerSecond = options.server.connectionsPerSecond,
         .connectionsPerSecondOfAddress = options.server.connectionsPerSecondPerAddress};
-    const endpoint::WebEndpoint web(server, {.host = options.host,
-                                             .port = options.port,
+    const endpoint::WebEndpoint web(server, {.host = options.network.host,
+                                             .port = options.network.port,
                                              .pageDirectory = page,
-                                             .maxConnections = options.maxConnections,
+                                             .maxConnections = options.network.maxConnections,
                                              .connections = limits,
-                                             .publicNames = options.publicNames,
+                                             .publicNames = options.network.publicNames,
                                              .tls = tls,
-                                             .hostInNetwork = addressInNetwork(options),
-                                             .showsFingerprint = options.tlsSelf,
-                                             .allowedOrigins = options.allowedOrigins});
-    const endpoint::GrpcEndpoint rpc(server, {.host = options.host,
-                                              .port = options.grpcPort,
-                                              .maxStreams = options.maxConnections,
+                                             .hostInNetwork = addressInNetwork(options.network),
+                                             .showsFingerprint = options.tls.self,
+                                             .allowedOrigins = options.network.allowedOrigins});
+    const endpoint::GrpcEndpoint rpc(server, {.host = options.network.host,
+                                              .port = options.network.grpcPort,
+                                              .maxStreams = options.network.maxConnections,
                                               .connections = limits,
-                                              .reflects = options.reflects,
+                                              .reflects = options.network.reflects,
                                               .tls = tls});
 
     fmt::print("{}page    http{}://{}/\ngRPC    {}{}\n", intro, tls ? "s" : "",
-               localAddress(options.host, web.port()), tls ? "https://" : "",
-               localAddress(options.host, rpc.port()));
-    if (options.tlsSelf) printHomeAddresses(options, web.port(), tls->fingerprint());
+               localAddress(options.network.host, web.port()), tls ? "https://" : "",
+               localAddress(options.network.host, rpc.port()));
+    if (options.tls.self) printHomeAddresses(options.network, web.port(), tls->fingerprint());
     std::fflush(stdout);
-    if (options.pairing) print(pairingCodeLine(*authenticator));
+    if (options.identity.pairing) print(pairingCodeLine(*authenticator));
     const Monitored monitored(monitoring, server);
     std::optional<discovery::Announcement> announcement;
-    if (options.announces)
+    if (options.network.announces)
       announcement.emplace(
           discovery::AnnouncedServer{.pagePort = web.port(),
                                      .grpcPort = rpc.port(),
                                      .encrypted = tls != nullptr,
-                                     .fingerprint = options.tlsSelf ? tls->fingerprint() : "",
+                                     .fingerprint = options.tls.self ? tls->fingerprint() : "",
                                      .version = kServerName});
     std::optional<agones::Agones> gameServer;
-    if (options.isGameServer) gameServer.emplace(server, options.agonesPort);
+    if (options.agonesPort) gameServer.emplace(server, *options.agonesPort);
     const std::optional<SteadyTime> stopAt = start.finish();
     if (!stopAt) waitForStop(signals, options, tls, authenticator, report);
     guard = std::make_unique<EndGuard>(

@@ -21,7 +21,7 @@ namespace clothstream::program {
 // called before the peers are disconnected, and should return before the time that it is given. Returns what
 // limits the time until the process ends.
 [[nodiscard]] std::unique_ptr<EndGuard> openEndpoints(
-    hosting::SceneServer& server, const ProgramOptions& options, const Signals& signals, StartGuard& start,
+    hosting::SceneServer& server, const ServeOptions& options, const Signals& signals, StartGuard& start,
     const std::shared_ptr<identity::Authenticator>& authenticator, monitoring::MonitoringEndpoint* monitoring,
     const std::string& intro, const std::function<std::string()>& report,
     const std::function<void(std::chrono::steady_clock::time_point)>& leave = {});

@@ -23,13 +23,13 @@ std::string hostName() {
 
 }  // namespace
 
-std::shared_ptr<events::Events> openEvents(const ProgramOptions& options) {
-  if (options.eventsUrl.empty()) return nullptr;
-  const events::Url url = *events::parseUrl(options.eventsUrl);
+std::shared_ptr<events::Events> openEvents(const ServeOptions& options) {
+  if (options.webhook.url.empty()) return nullptr;
+  const events::Url url = *events::parseUrl(options.webhook.url);
   if (!url.encrypted && !isLoopback(url.host))
     spdlog::warn("--events-url: everyone on the way to {} can read the events; use https://", url.authority);
   events::EventsOptions eventsOptions{.sender = {.url = url,
-                                                 .key = events::readSecret(options.eventsSecret),
+                                                 .key = events::readSecret(options.webhook.secret),
                                                  .server = hostName(),
                                                  .agent = kServerName}};
   // States of scenes need a part of the time in which the server must end.

@@ -10,6 +10,6 @@
 namespace clothstream::program {
 
 // Null without --events-url. Throws std::runtime_error if the file of the secret cannot be used.
-std::shared_ptr<events::Events> openEvents(const ProgramOptions& options);
+std::shared_ptr<events::Events> openEvents(const ServeOptions& options);
 
 }  // namespace clothstream::program

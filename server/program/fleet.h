@@ -12,18 +12,18 @@
 namespace clothstream::program {
 
 // `role`: server or edge.
-inline fleet::NatsOptions natsOptions(const ProgramOptions& options, const char* role) {
-  return {.servers = options.natsServers,
-          .credentials = options.natsCredentials,
-          .authority = options.natsAuthority,
+inline fleet::NatsOptions natsOptions(const NatsOptions& nats, const char* role) {
+  return {.servers = nats.servers,
+          .credentials = nats.credentials,
+          .authority = nats.authority,
           .name = kServerName,
           .role = role};
 }
 
 // Clients of other servers are sent to the first public name; an address is none.
-inline fleet::OriginOptions originOptions(const ProgramOptions& options) {
-  const auto name = std::ranges::find_if_not(options.publicNames, &isAddress);
-  return {.publicName = name == options.publicNames.end() ? "" : *name, .version = kServerVersion};
+inline fleet::OriginOptions originOptions(const NetworkOptions& network) {
+  const auto name = std::ranges::find_if_not(network.publicNames, &isAddress);
+  return {.publicName = name == network.publicNames.end() ? "" : *name, .version = kServerVersion};
 }
 
 }  // namespace clothstream::program

@@ -10,8 +10,8 @@
 
 namespace clothstream::program {
 
-int printScene(const ProgramOptions& options) {
-  fmt::print("{}\n", messages::toJson(loadScene(options.printScene)));
+int printScene(const std::string& nameOrPath) {
+  fmt::print("{}\n", messages::toJson(loadScene(nameOrPath)));
   return 0;
 }
 

@@ -9,14 +9,14 @@
 
 namespace clothstream::program {
 
-std::unique_ptr<monitoring::MonitoringEndpoint> openMonitoring(const ProgramOptions& options) {
-  if (!options.metricsPort) return nullptr;
+std::unique_ptr<monitoring::MonitoringEndpoint> openMonitoring(const ServeOptions& options) {
+  if (!options.metrics.port) return nullptr;
   auto endpoint = std::make_unique<monitoring::MonitoringEndpoint>(
-      monitoring::MonitoringOptions{.host = options.metricsHost,
-                                    .port = *options.metricsPort,
+      monitoring::MonitoringOptions{.host = options.metrics.host,
+                                    .port = *options.metrics.port,
                                     .version = CLOTHSTREAM_VERSION,
-                                    .publicNames = options.publicNames});
-  fmt::print("metrics http://{}/metrics\n", localAddress(options.metricsHost, endpoint->port()));
+                                    .publicNames = options.network.publicNames});
+  fmt::print("metrics http://{}/metrics\n", localAddress(options.metrics.host, endpoint->port()));
   std::fflush(stdout);
   return endpoint;
 }

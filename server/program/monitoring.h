@@ -11,7 +11,7 @@ namespace clothstream::program {
 
 // Opens the endpoint for operators, before the scenes are loaded, and prints its address. Null without
 // --metrics-port.
-std::unique_ptr<monitoring::MonitoringEndpoint> openMonitoring(const ProgramOptions& options);
+std::unique_ptr<monitoring::MonitoringEndpoint> openMonitoring(const ServeOptions& options);
 
 // Makes a server visible to the monitoring endpoint while the object lives.
 class Monitored {

@@ -17,9 +17,9 @@
 #include "server/messages/scene_file.h"
 #include "server/model/scene.h"
 #include "server/program/commands.h"
-#include "server/program/devices.h"
 #include "server/program/scenes.h"
 #include "server/recording/resimulate.h"
+#include "server/simulation/software_threads.h"
 #include "server/step/state_file.h"
 #include "server/step/step.h"
 #include "server/vulkan/device.h"
@@ -84,7 +84,8 @@ int failedWith(int code, const std::string& error) {
   return code;
 }
 
-int runResimulation(const ProgramOptions& options, const Signals& signals) {
+int runResimulation(const ResimulateOptions& options, const vulkan::DeviceOptions& device,
+                    const Signals& signals) {
   std::error_code none;
   if (std::filesystem::equivalent(options.recording, options.states, none))
     return failedWith(recording::kWrongArguments,
@@ -97,8 +98,8 @@ int runResimulation(const ProgramOptions& options, const Signals& signals) {
   Progress progress;
   recording::ResimulateOptions resimulation{
       .path = options.recording,
-      .limits = options.recordingLimits,
-      .device = [&](std::uint32_t nodes) { return deviceOptions(options, nodes); },
+      .limits = options.limits,
+      .device = [&](std::uint32_t nodes) { return simulation::suitedTo(nodes, device); },
       .interrupted = [&] { return signals.interrupted(); },
       .progress = [&](double part) { progress.show(part); }};
   if (!options.states.empty()) resimulation.states = add;
@@ -111,9 +112,10 @@ int runResimulation(const ProgramOptions& options, const Signals& signals) {
 
 }  // namespace
 
-int resimulate(const ProgramOptions& options, const Signals& signals) {
+int resimulate(const ResimulateOptions& options, const vulkan::DeviceOptions& device,
+               const Signals& signals) {
   try {
-    return runResimulation(options, signals);
+    return runResimulation(options, device, signals);
   } catch (const step::FileError& error) {
     return failedWith(recording::kFileNotWritten, error.what());
   } catch (const std::exception& error) {
@@ -121,10 +123,10 @@ int resimulate(const ProgramOptions& options, const Signals& signals) {
   }
 }
 
-int runSteps(const ProgramOptions& options, const Signals& signals) {
-  const model::Scene scene = adjusted(loadScene(options.server.defaultScene), options);
-  vulkan::Device device(deviceOptions(options, scene.nodeCount()));
-  step::StepOptions stepOptions = options.step;
+int runSteps(const StepOptions& options, const vulkan::DeviceOptions& deviceOptions, const Signals& signals) {
+  const model::Scene scene = adjusted(loadScene(options.scene), options);
+  vulkan::Device device(simulation::suitedTo(scene.nodeCount(), deviceOptions));
+  step::StepOptions stepOptions = options.run;
   stepOptions.serverName = kServerName;
   switch (step::run(device, scene, stepOptions, [&] { return signals.interrupted(); })) {
     case step::Outcome::complete:

@@ -40,8 +40,8 @@ void endWithJson() {
 
 }  // namespace
 
-void endWhenOutOfMemory(const ProgramOptions& options) {
-  std::set_new_handler(options.logFormat == "json" ? endWithJson : endWithText);
+void endWhenOutOfMemory(const LogOptions& log) {
+  std::set_new_handler(log.format == "json" ? endWithJson : endWithText);
 }
 
 }  // namespace clothstream::program

@@ -11,6 +11,6 @@ inline constexpr int kOutOfMemoryStatus = 71;
 
 // From now on, an allocation of C++ that fails, on any thread, writes one line to standard error and ends the
 // process at once with kOutOfMemoryStatus. The line has the form of the log (--log-format), without a time.
-void endWhenOutOfMemory(const ProgramOptions& options);
+void endWhenOutOfMemory(const LogOptions& log);
 
 }  // namespace clothstream::program

@@ -38,38 +38,38 @@ void checkWhole(recording::RecordedStream& recording, const std::string& path) {
 
 }  // namespace
 
-int play(const ProgramOptions& options, const Signals& signals) {
+int play(const ServeOptions& options, const PlayOptions& play, const Signals& signals) {
   StartGuard start(signals, options.server.drain);
   const auto monitoring = openMonitoring(options);
-  auto recording = recording::RecordedStream::open(options.recording, options.recordingLimits);
+  auto recording = recording::RecordedStream::open(play.recording, play.limits);
   if (!recording) throw std::runtime_error(recording.error());
-  if (options.playback.from > recording->length())
+  if (play.playback.from > recording->length())
     throw std::runtime_error(fmt::format("--from: {} s is after the end of {}; use 0 to {:.3f}",
-                                         options.playback.from, options.recording, recording->length()));
-  if (options.playback.lockstep) checkWhole(*recording, options.recording);
+                                         play.playback.from, play.recording, recording->length()));
+  if (play.playback.lockstep) checkWhole(*recording, play.recording);
   if (recording->truncated())
-    spdlog::warn("{} is truncated or damaged at its end; the readable part is played", options.recording);
+    spdlog::warn("{} is truncated or damaged at its end; the readable part is played", play.recording);
   const std::string scene = recording->scene();
-  const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", options.recording,
+  const std::string intro = fmt::format("plays   {}, {:.1f} s of {}, recorded on {}\n", play.recording,
                                         recording->length(), scene, printable(recording->device()));
-  if (options.playback.faults)
-    spdlog::info("faults with the seed {}: frames are dropped and late on purpose", *options.playback.faults);
+  if (play.playback.faults)
+    spdlog::info("faults with the seed {}: frames are dropped and late on purpose", *play.playback.faults);
   std::unique_ptr<EndGuard> guard;  // outlives the server
   hosting::ServerOptions serverOptions = options.server;
   const std::shared_ptr<identity::Authenticator> authenticator = makeAuthenticator(options);
   serverOptions.authenticator = authenticator;
   serverOptions.observer = openEvents(options);
-  const auto playback = std::make_shared<recording::Playback>(std::move(*recording), options.playback);
+  const auto playback = std::make_shared<recording::Playback>(std::move(*recording), play.playback);
   hosting::SceneServer server(scene, playback, serverOptions);
   std::optional<fleet::Origin> origin;
-  if (!options.natsServers.empty())
-    origin.emplace(server, natsOptions(options, "server"), originOptions(options));
+  if (!options.nats.servers.empty())
+    origin.emplace(server, natsOptions(options.nats, "server"), originOptions(options.network));
   guard = openEndpoints(server, options, signals, start, authenticator, monitoring.get(), intro,
                         [&] { return server.report(); });
   const std::string damage = playback->damage();
   if (damage.empty()) return 0;
-  spdlog::error("{} is damaged: {}; clothstream recover {} OUT keeps what is whole", options.recording,
-                damage, options.recording);
+  spdlog::error("{} is damaged: {}; clothstream recover {} OUT keeps what is whole", play.recording, damage,
+                play.recording);
   return recording::kFileUnreadable;
 }
 

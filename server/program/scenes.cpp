@@ -40,12 +40,12 @@ model::Scene loadScene(const std::string& nameOrPath) {
   return loaded(messages::loadScene(nameOrPath, &repairs), repairs);
 }
 
-model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
-  if (options.stepRate) {
-    scene.streamRate = streamRateFor(scene, *options.stepRate);
-    scene.simulationRate = *options.stepRate;
+model::Scene adjusted(model::Scene scene, const StepOptions& options) {
+  if (options.rate) {
+    scene.streamRate = streamRateFor(scene, *options.rate);
+    scene.simulationRate = *options.rate;
   }
-  scene.substeps = options.stepSubsteps.value_or(scene.substeps);
+  scene.substeps = options.substeps.value_or(scene.substeps);
   auto checked = messages::toScene(messages::toMessage(scene));
   if (!checked)
     throw std::runtime_error(
@@ -53,7 +53,7 @@ model::Scene adjusted(model::Scene scene, const ProgramOptions& options) {
   return std::move(*checked);
 }
 
-std::vector<model::Scene> loadScenes(const ProgramOptions& options, std::vector<std::string>& builtIn) {
+std::vector<model::Scene> loadScenes(const ServeOptions& options, std::vector<std::string>& builtIn) {
   builtIn = messages::namedScenes();
   std::vector<model::Scene> scenes;
   for (const std::string& name : messages::namedScenes()) scenes.push_back(loadScene(name));

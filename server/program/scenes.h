@@ -15,10 +15,10 @@ namespace clothstream::program {
 model::Scene loadScene(const std::string& nameOrPath);
 
 // Returns the scene with the rate and the substeps that the options of `step` give it.
-model::Scene adjusted(model::Scene scene, const ProgramOptions& options);
+model::Scene adjusted(model::Scene scene, const StepOptions& options);
 
 // Built-in scenes and those from files. A file replaces a built-in scene of the same name. `builtIn` gets the
 // names of those that are not replaced.
-std::vector<model::Scene> loadScenes(const ProgramOptions& options, std::vector<std::string>& builtIn);
+std::vector<model::Scene> loadScenes(const ServeOptions& options, std::vector<std::string>& builtIn);
 
 }  // namespace clothstream::program

@@ -15,7 +15,6 @@
 #include "server/model/scene.h"
 #include "server/program/authentication.h"
 #include "server/program/commands.h"
-#include "server/program/devices.h"
 #include "server/program/endpoints.h"
 #include "server/program/events.h"
 #include "server/program/fleet.h"
@@ -24,6 +23,7 @@
 #include "server/program/scenes.h"
 #include "server/recording/recordings.h"
 #include "server/saved_state/saved_state.h"
+#include "server/simulation/software_threads.h"
 
 namespace clothstream::program {
 namespace {
@@ -34,7 +34,7 @@ std::uint64_t bytesOf(double megabytes) {
 
 }  // namespace
 
-int serve(const ProgramOptions& options, const Signals& signals) {
+int serve(const ServeOptions& options, const Signals& signals) {
   StartGuard start(signals, options.server.drain);
   const auto monitoring = openMonitoring(options);
   std::vector<std::string> builtIn;
@@ -48,25 +48,26 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   // Outlives the scenes, because it waits for their last records.
   std::optional<recording::Recordings> recordings;
   std::shared_ptr<saved_state::SavedState> savedState;
-  if (options.keepsScenes)
+  if (options.state.keepsScenes)
     savedState = std::make_shared<saved_state::SavedState>(
-        saved_state::SavedStateOptions{.directory = options.stateDirectory,
-                                       .maxBytes = bytesOf(options.stateLimitMb),
+        saved_state::SavedStateOptions{.directory = options.state.directory,
+                                       .maxBytes = bytesOf(options.state.limitMb),
                                        .minFreeBytes = bytesOf(options.keepFreeMb)});
-  if (!options.recordDirectory.empty())
+  if (!options.record.directory.empty())
     recordings.emplace(
         recording::RecorderOptions{
-            .directory = options.recordDirectory,
+            .directory = options.record.directory,
             .serverName = kServerName,
-            .maxBytes = bytesOf(options.recordLimitMb),
+            .maxBytes = bytesOf(options.record.fileLimitMb),
             .disk = std::make_shared<recording::DiskShare>(
-                options.recordDirectory, recording::DiskLimits{.maxBytes = bytesOf(options.recordingsLimitMb),
-                                                               .minFreeBytes = bytesOf(options.keepFreeMb)})},
-        !options.recordsOnRequest);
+                options.record.directory,
+                recording::DiskLimits{.maxBytes = bytesOf(options.record.directoryLimitMb),
+                                      .minFreeBytes = bytesOf(options.keepFreeMb)})},
+        !options.record.onRequest);
   const auto first = std::ranges::find(scenes, options.server.defaultScene, &model::Scene::name);
   const std::uint32_t nodes = first == scenes.end() ? 0 : first->nodeCount();
   hosting::ServerOptions serverOptions = options.server;
-  serverOptions.device = deviceOptions(options, nodes);
+  serverOptions.device = simulation::suitedTo(nodes, options.server.device);
   const std::shared_ptr<identity::Authenticator> authenticator = makeAuthenticator(options);
   serverOptions.authenticator = authenticator;
   serverOptions.journals = [&](const model::Scene& scene) {
@@ -77,8 +78,8 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   serverOptions.guestScenes = std::move(builtIn);
   hosting::SceneServer server(std::move(scenes), std::move(serverOptions));
   std::optional<fleet::Origin> origin;
-  if (!options.natsServers.empty())
-    origin.emplace(server, natsOptions(options, "server"), originOptions(options));
+  if (!options.nats.servers.empty())
+    origin.emplace(server, natsOptions(options.nats, "server"), originOptions(options.network));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
   guard =
       openEndpoints(server, options, signals, start, authenticator, monitoring.get(),

@@ -10,7 +10,7 @@
 namespace clothstream::program {
 
 // Null without TLS. Throws std::runtime_error that names the option or the file.
-std::shared_ptr<tls::ServerTls> openTls(const ProgramOptions& options);
+std::shared_ptr<tls::ServerTls> openTls(const ServeOptions& options);
 
 // Reads the certificate again. Logs the result; if it fails, the old certificate stays in use.
 void reload(tls::ServerTls& tls);

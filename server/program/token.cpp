@@ -11,8 +11,7 @@
 
 namespace clothstream::program {
 
-int runToken(const ProgramOptions& options) {
-  const TokenOptions& token = options.token;
+int runToken(const TokenOptions& token, const std::string& audience) {
   if (!token.newKey.empty()) {
     identity::makeTokenKey(token.newKey);
     return 0;
@@ -22,14 +21,13 @@ int runToken(const ProgramOptions& options) {
                                 .name = token.name,
                                 .subject = token.subject,
                                 .tenant = token.tenant,
-                                .audience = options.tokenAudience,
+                                .audience = audience,
                                 .expires = identity::WallClock::now() + token.valid,
                                 .notBefore = {}};
   const identity::TokenKey key = identity::readTokenKey(token.key);
   const std::string text = identity::sign(key, claims);
   // A server would refuse names that are too long, for example.
-  const auto checked =
-      identity::check(text, {{key.id, key}}, options.tokenAudience, identity::WallClock::now());
+  const auto checked = identity::check(text, {{key.id, key}}, audience, identity::WallClock::now());
   if (!checked) throw std::runtime_error(checked.error().text);
   fmt::print("{}\n", text);
   return 0;
