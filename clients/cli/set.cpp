@@ -2,6 +2,7 @@
 // Sends a parameter change and waits for the answer.
 #include "clients/cli/set.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <condition_variable>
@@ -12,7 +13,6 @@
 
 #include "clients/cli/error.h"
 #include "clients/grpc/grpc_client.h"
-#include "proto/parameters/settings.h"
 
 namespace clothstream::cli {
 namespace {
@@ -27,8 +27,10 @@ bool changesCloths(const SetOptions& options) {
   return std::bit_cast<Words>(none) != std::bit_cast<Words>(options.settings);
 }
 
-bool changesEnvironment(const SetOptions& options) {
-  return !options.gravity.empty() || !options.wind.empty() || options.airDensity;
+// Null if the option is not given.
+const float* given(const SetOptions& options, parameters::EnvironmentField field) {
+  const std::vector<float>& numbers = options.environment[field];
+  return numbers.empty() ? nullptr : numbers.data();
 }
 
 // Answers of the server to the changes of this client. The stream's thread adds them.
@@ -71,9 +73,10 @@ std::string noSuchCloth(const cs_client* client, const std::string& name) {
 }  // namespace
 
 bool changesAnything(const SetOptions& options) {
-  return changesCloths(options) || changesEnvironment(options) || !options.gust.empty() ||
-         !options.material.empty() || options.arealMass || !options.collider.empty() ||
-         !options.attachment.empty();
+  const bool changesEnvironment =
+      std::ranges::any_of(options.environment, [](const auto& numbers) { return !numbers.empty(); });
+  return changesCloths(options) || changesEnvironment || !options.material.empty() || options.arealMass ||
+         !options.collider.empty() || !options.attachment.empty();
 }
 
 ExitCode set(const SetOptions& options) {
@@ -109,10 +112,11 @@ ExitCode set(const SetOptions& options) {
       cs_set_areal_mass(client, options.cloth.c_str(), *options.arealMass);
       ++changes;
     }
-    if (changesEnvironment(options)) {
-      cs_set_environment(client, options.gravity.empty() ? nullptr : options.gravity.data(),
-                         options.wind.empty() ? nullptr : options.wind.data(),
-                         options.airDensity ? &*options.airDensity : nullptr);
+    const float* const gravity = given(options, parameters::kGravity);
+    const float* const wind = given(options, parameters::kWind);
+    const float* const airDensity = given(options, parameters::kAirDensity);
+    if (gravity != nullptr || wind != nullptr || airDensity != nullptr) {
+      cs_set_environment(client, gravity, wind, airDensity);
       ++changes;
     }
     if (!options.collider.empty()) {
@@ -121,9 +125,8 @@ ExitCode set(const SetOptions& options) {
                       options.radius ? &*options.radius : nullptr);
       ++changes;
     }
-    if (!options.gust.empty()) {
-      cs_set_gust(client, options.gust[0],
-                  options.gust.size() > 1 ? options.gust[1] : parameters::kGustSeconds.initial);
+    if (const std::vector<float>& gust = options.environment[parameters::kGust]; !gust.empty()) {
+      cs_set_gust(client, gust[0], gust.size() > 1 ? gust[1] : initial(parameters::kGust, 1));
       ++changes;
     }
   });

@@ -2,7 +2,9 @@
 // `clothstream set`: changes parameters of a running scene.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,18 +12,18 @@
 #include "clients/cli/exit_code.h"
 #include "clients/core/core.h"
 #include "clients/native/address.h"
+#include "proto/parameters/environment_parameters.h"
 
 namespace clothstream::cli {
 
 struct SetOptions {
   ServerAddress address = std::string(kDefaultAddress);
   std::string scene;
-  std::uint32_t maxVertices = 0;     // 0: the default of cs_limits
-  std::string cloth;                 // empty: every cloth
-  cs_cloth_settings settings;        // values that are not given stay as cs_keep_cloth_settings sets them
-  std::vector<float> gravity, wind;  // three numbers; empty: no change
-  std::optional<float> airDensity;
-  std::vector<float> gust;         // strength and optional seconds; empty: no change
+  std::uint32_t maxVertices = 0;  // 0: the default of cs_limits
+  std::string cloth;              // empty: every cloth
+  cs_cloth_settings settings;     // values that are not given stay as cs_keep_cloth_settings sets them
+  // Numbers of each field; empty: no change.
+  std::array<std::vector<float>, std::size(parameters::kEnvironmentParameters)> environment;
   std::string material;            // empty: no change
   std::optional<float> arealMass;  // kg/m^2
   // Collider of the scene or attachment that moves; at most one of them is not empty.

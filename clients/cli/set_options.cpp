@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Adds the options of `clothstream set`. The table of parameters gives those of a cloth's numbers, and the
-// ranges of the others.
+// Adds the options of `clothstream set`. The tables of parameters give those of the numbers of a cloth and of
+// the environment.
 #include "clients/cli/set_options.h"
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "proto/parameters/cloth_parameters.h"
+#include "proto/parameters/environment_parameters.h"
 #include "proto/parameters/settings.h"
 
 namespace clothstream::cli {
@@ -29,6 +31,22 @@ void addNumber(CLI::App& app, const parameters::ClothParameter& parameter, cs_cl
   app.add_option(fmt::format("--{}", parameter.option), settingOf(settings, parameter.number),
                  fmt::format("{}, {}", parameter.help, rangeOf(parameter)))
       ->group(std::string(parameter.optionGroup));
+}
+
+void addField(CLI::App& app, const parameters::EnvironmentParameter& parameter, std::vector<float>& numbers) {
+  std::string help;
+  int least = 0;
+  for (const parameters::EnvironmentNumber& number : parameter.numbers) {
+    if (!number.help.empty()) help += fmt::format("{} {}", number.help, rangeOf(number.setting));
+    if (number.isOptional)
+      help += fmt::format("; default {:g} {}", number.setting.initial, number.setting.unit);
+    else
+      ++least;
+  }
+  app.add_option(fmt::format("--{}", parameter.option), numbers, help)
+      ->delimiter(',')
+      ->expected(least, static_cast<int>(parameter.numbers.size()))
+      ->group("Environment");
 }
 
 }  // namespace
@@ -104,27 +122,8 @@ void addSetOptions(CLI::App& app, SetOptions& options) {
       ->needs(collider)
       ->group(placed);
 
-  const char* environment = "Environment";
-  app.add_option("--gravity", options.gravity, fmt::format("X,Y,Z, each {}", rangeOf(parameters::kGravity)))
-      ->delimiter(',')
-      ->expected(3)
-      ->group(environment);
-  app.add_option("--wind", options.wind, fmt::format("X,Y,Z, each {}", rangeOf(parameters::kWind)))
-      ->delimiter(',')
-      ->expected(3)
-      ->group(environment);
-  app.add_option(
-         "--gust", options.gust,
-         fmt::format(
-             "STRENGTH[,SECONDS]: maximum deviation of the wind, {}, and its duration, {}; default {:g} s",
-             rangeOf(parameters::kGustStrength), rangeOf(parameters::kGustSeconds),
-             parameters::kGustSeconds.initial))
-      ->delimiter(',')
-      ->expected(1, 2)
-      ->group(environment);
-  app.add_option("--air-density", options.airDensity,
-                 fmt::format("Density of the air, {}", rangeOf(parameters::kAirDensity)))
-      ->group(environment);
+  for (const parameters::EnvironmentParameter& parameter : parameters::kEnvironmentParameters)
+    addField(app, parameter, options.environment[parameter.row]);
 }
 
 void checkSetOptions(const SetOptions& options) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The part of the C interface that reads and changes parameters.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -10,21 +11,15 @@
 #include "proto/parameters/apply_change.h"
 
 using namespace clothstream::client;
-using clothstream::parameters::ClothNumber;
-using clothstream::parameters::ClothNumbers;
-using clothstream::parameters::ClothParameter;
-using clothstream::parameters::kClothParameters;
-using clothstream::parameters::settingOf;
+using namespace clothstream::parameters;
 
 namespace {
 
-std::optional<Vec3> vec3(const float* values) {
-  if (!values) return std::nullopt;
-  return Vec3{values[0], values[1], values[2]};
-}
-
-std::optional<float> scalar(const float* value) {
-  return value ? std::optional(*value) : std::nullopt;
+// Changes a field of the environment to these numbers; null: no change.
+void setField(ParameterChange& change, EnvironmentField field, const float* numbers) {
+  if (!numbers) return;
+  std::copy_n(numbers, kEnvironmentParameters[field].numbers.size(),
+              change.environment[field].emplace().data());
 }
 
 constexpr float kAsIs = std::numeric_limits<float>::quiet_NaN();
@@ -89,12 +84,12 @@ ClothChange changeOf(const Cloth& cloth, const cs_cloth_settings& settings) {
 
 int cs_get_environment(const cs_client* client, cs_environment* out) noexcept {
   if (!client->client.stream().begun()) return 0;
-  const Environment& environment = client->client.stream().description().environment;
-  copy(environment.gravity, out->gravity);
-  copy(environment.wind, out->wind);
-  out->air_density = environment.airDensity;
-  out->gust_strength = environment.gust.strength;
-  out->gust_seconds = environment.gust.seconds;
+  const EnvironmentValues& environment = client->client.stream().description().environment;
+  copy(environment[kGravity], out->gravity);
+  copy(environment[kWind], out->wind);
+  out->air_density = environment[kAirDensity][0];
+  out->gust_strength = environment[kGust][0];
+  out->gust_seconds = environment[kGust][1];
   return 1;
 }
 
@@ -155,15 +150,16 @@ uint64_t cs_parameters_participant(const cs_client* client) noexcept {
 void cs_set_environment(cs_client* client, const float* gravity3, const float* wind3,
                         const float* air_density) noexcept {
   ParameterChange change;
-  change.gravity = vec3(gravity3);
-  change.wind = vec3(wind3);
-  change.airDensity = scalar(air_density);
+  setField(change, kGravity, gravity3);
+  setField(change, kWind, wind3);
+  setField(change, kAirDensity, air_density);
   client->client.change(change);
 }
 
 void cs_set_gust(cs_client* client, float strength, float seconds) noexcept {
   ParameterChange change;
-  change.gust = Gust{strength, seconds};
+  const float numbers[] = {strength, seconds};
+  setField(change, kGust, numbers);
   client->client.change(change);
 }
 

@@ -29,16 +29,11 @@ void assign(T& value, const std::optional<T>& change) {
   if (change) value = *change;
 }
 
-// Applies a change to the environment, and with applyToCloth(clothChange, cloth) to each cloth that it is
-// for. Server and clients have their own types, whose members have the same names.
-template <typename Change, typename Environment, typename Cloths, typename ApplyToCloth>
-void applyChange(const Change& change, Environment& environment, Cloths& cloths,
-                 const ApplyToCloth& applyToCloth) {
-  assign(environment.gravity, change.gravity);
-  assign(environment.wind, change.wind);
-  assign(environment.airDensity, change.airDensity);
-  assign(environment.gust, change.gust);
-  for (const auto& clothChange : change.cloths)
+// Applies changes with applyToCloth(clothChange, cloth) to each cloth that they are for. Server and clients
+// have their own types, whose members have the same names.
+template <typename Changes, typename Cloths, typename ApplyToCloth>
+void applyToCloths(const Changes& changes, Cloths& cloths, const ApplyToCloth& applyToCloth) {
+  for (const auto& clothChange : changes)
     for (auto& cloth : cloths)
       if (isFor(clothChange.name, cloth.name)) applyToCloth(clothChange, cloth);
 }

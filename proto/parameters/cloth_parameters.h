@@ -39,9 +39,10 @@ struct Range {
   double min, max;
 };
 
-// Field numbers in the messages Cloth (scene.proto) and ClothChange (session.proto).
+// Field numbers in a message of scene.proto (Cloth, Environment) and in the one of session.proto that changes
+// it (ClothChange, ParameterChange).
 struct WireField {
-  std::uint32_t inCloth, inChange;
+  std::uint32_t inScene, inChange;
 };
 
 // Field of Cloth and ClothChange whose message holds several numbers.

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "server/messages/cloth_numbers.h"
+#include "server/messages/parameter_numbers.h"
 #include "server/messages/limits.h"
 #include "server/messages/node_selection.h"
 #include "server/messages/solver_message.h"

@@ -13,8 +13,8 @@
 #include "proto/parameters/apply_change.h"
 #include "server/messages/client_message.h"
 #include "server/messages/cloth_message.h"
-#include "server/messages/cloth_numbers.h"
 #include "server/messages/limits.h"
+#include "server/messages/parameter_numbers.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/solver_message.h"
@@ -224,15 +224,7 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
   Checks checks;
   const Path path("parameterChange");
   model::ParameterChange change;
-  if (message.has_gravity())
-    change.gravity =
-        toVec3(checks, path / "gravity" / "value", message.gravity().value(), parameters::kGravity.range);
-  if (message.has_wind())
-    change.wind = toVec3(checks, path / "wind" / "value", message.wind().value(), parameters::kWind.range);
-  if (message.has_air_density())
-    change.airDensity =
-        checks.number(path / "airDensity", message.air_density(), parameters::kAirDensity.range);
-  if (message.has_gust()) change.gust = toGust(checks, path / "gust", message.gust());
+  change.environment = readNumbers(checks, path, message);
   checks.count(path / "cloths", static_cast<std::size_t>(message.cloths_size()), 0, limits::kMaxCloths);
   checks.count(path / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,
                limits::kMaxColliders);

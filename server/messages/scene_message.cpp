@@ -11,12 +11,14 @@
 #include "server/messages/cloth_message.h"
 #include "server/messages/description.h"
 #include "server/messages/limits.h"
+#include "server/messages/parameter_numbers.h"
 #include "server/messages/shapes.h"
 #include "server/messages/solid_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 #include "server/model/coarse_level.h"
 #include "server/model/hinges.h"
+#include "server/model/input.h"
 #include "server/model/mesh.h"
 #include "server/model/origin.h"
 #include "server/model/springs.h"
@@ -54,18 +56,6 @@ model::Normals toNormals(Checks& checks, const Path& path, v1::Normals message) 
                   "must be NORMALS_NONE or NORMALS_OCTAHEDRAL");
       return {};
   }
-}
-
-model::Environment toEnvironment(Checks& checks, const Path& path, const v1::Environment& message) {
-  model::Environment environment;
-  if (message.has_gravity())
-    environment.gravity = toVec3(checks, path / "gravity", message.gravity(), parameters::kGravity.range);
-  environment.wind = toVec3(checks, path / "wind", message.wind(), parameters::kWind.range);
-  if (message.has_air_density())
-    environment.airDensity =
-        checks.number(path / "airDensity", message.air_density(), parameters::kAirDensity.range);
-  environment.gust = toGust(checks, path / "gust", message.gust());
-  return environment;
 }
 
 model::Collider toCollider(Checks& checks, const Path& path, const v1::Collider& message,
@@ -280,18 +270,6 @@ void checkSize(Checks& checks, const model::Scene& scene, const SceneLimits& mos
                     bytes, limits::kMaxGeometryBytes));
 }
 
-}  // namespace
-
-model::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message) {
-  model::Gust gust;
-  gust.strength = checks.number(path / "strength", message.strength(), parameters::kGustStrength.range);
-  if (message.has_seconds())
-    gust.seconds = checks.number(path / "seconds", message.seconds(), parameters::kGustSeconds.range);
-  return gust;
-}
-
-namespace {
-
 std::optional<std::string> unfitAssembly(const model::Scene& scene, const model::Cloth& cloth) {
   std::uint64_t nodes = 0;
   for (const model::Cloth& one : scene.cloths) nodes += model::isAssembled(one.solver) ? one.nodeCount() : 0;
@@ -371,7 +349,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   if (message.has_substeps()) scene.substeps = message.substeps();
   checkRates(checks, scene);
   scene.integrator = toIntegrator(checks, root / "integrator", message.integrator());
-  scene.environment = toEnvironment(checks, root / "environment", message.environment());
+  model::apply(readNumbers(checks, root / "environment", message.environment()), scene.environment);
 
   checks.count(root / "cloths", static_cast<std::size_t>(message.cloths_size()), 1, limits::kMaxCloths);
   checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,

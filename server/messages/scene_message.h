@@ -50,10 +50,6 @@ void applyChange(const v1::ParameterChange& change, v1::ParameterChange& all);
 // names each cloth and collider once. Safe for any messages; fields that this release does not know are kept.
 void mergeChange(const v1::ParameterChange& next, v1::ParameterChange& earlier);
 
-// Gust of an Environment or a ParameterChange.
-model::Gust toGust(Checks& checks, const Path& path, const v1::Gust& message);
-void write(const model::Gust& gust, v1::Gust& message);
-
 // Error text if the solver of a cloth cannot be used in this scene; nullopt if it can.
 std::optional<std::string> unfitSolver(const model::Scene& scene, const model::Cloth& cloth);
 

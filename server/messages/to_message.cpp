@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Converts a scene to its message.
-#include "server/messages/cloth_numbers.h"
 #include "server/messages/node_selection.h"
+#include "server/messages/parameter_numbers.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/solid_message.h"
@@ -11,13 +11,6 @@
 
 namespace clothstream::messages {
 namespace {
-
-void writeEnvironment(const model::Environment& environment, v1::Environment& message) {
-  write(environment.gravity, *message.mutable_gravity());
-  write(environment.wind, *message.mutable_wind());
-  message.set_air_density(environment.airDensity);
-  write(environment.gust, *message.mutable_gust());
-}
 
 void writeGrid(const model::Grid& grid, v1::Grid& message) {
   message.set_rows(grid.rows);
@@ -91,11 +84,6 @@ v1::Normals toMessage(model::Normals normals) {
   return normals == model::Normals::octahedral ? v1::NORMALS_OCTAHEDRAL : v1::NORMALS_NONE;
 }
 
-void write(const model::Gust& gust, v1::Gust& message) {
-  message.set_strength(gust.strength);
-  message.set_seconds(gust.seconds);
-}
-
 v1::Scene toMessage(const model::Scene& scene) {
   v1::Scene message = toMessageWithoutMeshes(scene);
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
@@ -115,7 +103,7 @@ v1::Scene toMessageWithoutMeshes(const model::Scene& scene) {
   message.set_stream_rate(scene.streamRate);
   message.set_substeps(scene.substeps);
   message.set_integrator(toMessage(scene.integrator));
-  writeEnvironment(scene.environment, *message.mutable_environment());
+  writeNumbers(scene.environment, *message.mutable_environment());
   for (const model::Cloth& cloth : scene.cloths) writeCloth(cloth, *message.add_cloths());
   for (const model::Collider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
   message.mutable_stream()->set_max_error(scene.stream.maxError);
@@ -126,10 +114,7 @@ v1::Scene toMessageWithoutMeshes(const model::Scene& scene) {
 
 v1::ParameterChange allParameters(const v1::Scene& scene, std::span<const double> areas) {
   v1::ParameterChange change;
-  *change.mutable_gravity()->mutable_value() = scene.environment().gravity();
-  *change.mutable_wind()->mutable_value() = scene.environment().wind();
-  change.set_air_density(scene.environment().air_density());
-  *change.mutable_gust() = scene.environment().gust();
+  copyNumbers(scene.environment(), change);
   for (std::size_t i = 0; i < static_cast<std::size_t>(scene.cloths_size()); ++i) {
     const v1::Cloth& cloth = scene.cloths(static_cast<int>(i));
     v1::ClothChange& all = *change.add_cloths();

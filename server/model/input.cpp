@@ -39,9 +39,17 @@ void apply(const ColliderChange& change, Collider& collider) {
 
 }  // namespace
 
+void apply(const parameters::EnvironmentChange& change, Environment& environment) {
+  for (const parameters::EnvironmentParameter& parameter : parameters::kEnvironmentParameters)
+    if (const auto& value = change[parameter.row])
+      for (std::uint32_t i = 0; i < parameter.numbers.size(); ++i)
+        numberOf(environment, parameter.row, i) = (*value)[i];
+}
+
 void applyChange(Scene& scene, const ParameterChange& change) {
-  parameters::applyChange(change, scene.environment, scene.cloths,
-                          [](const ClothChange& clothChange, Cloth& cloth) { apply(clothChange, cloth); });
+  apply(change.environment, scene.environment);
+  parameters::applyToCloths(change.cloths, scene.cloths,
+                            [](const ClothChange& clothChange, Cloth& cloth) { apply(clothChange, cloth); });
   for (const ColliderChange& colliderChange : change.colliders) {
     const auto collider = std::ranges::find(scene.colliders, colliderChange.name, &Collider::name);
     assert(collider != scene.colliders.end());

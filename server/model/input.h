@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "proto/parameters/cloth_parameters.h"
+#include "proto/parameters/environment_parameters.h"
 #include "server/model/scene.h"
 
 namespace clothstream::model {
@@ -87,12 +88,12 @@ struct ColliderChange {
 
 // The whole change takes effect at the start of one tick.
 struct ParameterChange {
-  std::optional<Vec3> gravity = {}, wind = {};
-  std::optional<float> airDensity = {};
+  parameters::EnvironmentChange environment = {};
   std::vector<ClothChange> cloths = {};
   std::vector<ColliderChange> colliders = {};
-  std::optional<Gust> gust = {};
 };
+
+void apply(const parameters::EnvironmentChange& change, Environment& environment);
 
 // The names in the change must exist in the scene.
 void applyChange(Scene& scene, const ParameterChange& change);

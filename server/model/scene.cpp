@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rest positions, masses and pins, computed from the numbers of a scene.
+// Numbers of the environment. Rest positions, masses and pins, computed from the numbers of a scene.
 #include "server/model/scene.h"
 
 #include <algorithm>
@@ -55,6 +55,20 @@ bool isAssembled(const Solver& solver) {
 
 std::uint32_t Cloth::nodeCount() const {
   return mesh ? mesh->nodeCount() : grid.nodeCount();
+}
+
+float& numberOf(Environment& environment, parameters::EnvironmentField field, std::uint32_t number) {
+  switch (field) {
+    case parameters::kGravity:
+      return environment.gravity[number];
+    case parameters::kWind:
+      return environment.wind[number];
+    case parameters::kAirDensity:
+      return environment.airDensity;
+    case parameters::kGust:
+      break;
+  }
+  return number == 0 ? environment.gust.strength : environment.gust.seconds;
 }
 
 double areaOf(const Cloth& cloth) {

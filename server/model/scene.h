@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/parameters/cloth_parameters.h"
+#include "proto/parameters/environment_parameters.h"
 #include "proto/parameters/settings.h"
 #include "server/model/collider.h"
 #include "server/model/pose.h"
@@ -214,18 +215,23 @@ inline bool boundsMotion(const Cloth& cloth) {
   return cloth.selfCollision && cloth.selfCollision->nothingPasses;
 }
 
+// Units, ranges and defaults of the following numbers are in proto/parameters/environment_parameters.h.
+
 // Variation of the wind; wind.h describes it.
 struct Gust {
-  float strength = parameters::kGustStrength.initial;  // maximum deviation of each component; 0: no gusts
-  float seconds = parameters::kGustSeconds.initial;    // time between two turning points of a component
+  float strength = initial(parameters::kGust, 0);  // maximum deviation of each component; 0: no gusts
+  float seconds = initial(parameters::kGust, 1);   // time between two turning points of a component
 };
 
 struct Environment {
-  Vec3 gravity = Vec3(0, parameters::kGravity.initial, 0);
-  Vec3 wind = Vec3::Zero();  // m/s; in a scene the mean, in a tick the wind at its time
-  float airDensity = parameters::kAirDensity.initial;  // 0 switches drag and lift off
-  Gust gust = {};                                      // in a scene only
+  Vec3 gravity = Vec3(0, initial(parameters::kGravity, 1), 0);
+  Vec3 wind = Vec3::Zero();                             // in a scene the mean, in a tick the wind at its time
+  float airDensity = initial(parameters::kAirDensity);  // 0 switches drag and lift off
+  Gust gust = {};                                       // in a scene only
 };
+
+// Where the environment keeps a number of the table of parameters. `number` is the index in its field.
+float& numberOf(Environment& environment, parameters::EnvironmentField field, std::uint32_t number);
 
 enum class Integrator : std::uint8_t { semiImplicitEuler, explicitEuler, rungeKutta4 };
 enum class Normals : std::uint8_t { none, octahedral };

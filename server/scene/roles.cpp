@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/messages/parameter_numbers.h"
 
 namespace clothstream::scene {
 namespace {
@@ -127,11 +128,9 @@ messages::Result<void> permit(Role role, const v1::ParameterChange& message,
   if (!message.cloths().empty()) permitted = permit(role, Action::changeCloths, participants);
   if (permitted && !message.colliders().empty())
     permitted = permit(role, Action::changeColliders, participants);
-  const bool environment =
-      message.has_gravity() || message.has_wind() || message.has_air_density() || message.has_gust();
   // An empty change is announced to all subscribers as well.
   const bool nothing = message.cloths().empty() && message.colliders().empty();
-  if (permitted && (environment || nothing))
+  if (permitted && (messages::changesEnvironment(message) || nothing))
     permitted = permit(role, Action::changeEnvironment, participants);
   return permitted;
 }

@@ -12,6 +12,7 @@
 #include "clients/core/core.h"
 #include "clothstream/v1/scene.pb.h"
 #include "proto/parameters/cloth_parameters.h"
+#include "proto/parameters/environment_parameters.h"
 #include "proto/parameters/settings.h"
 #include "tests/core/generated_file.h"
 
@@ -63,6 +64,21 @@ std::string camelCase(std::string_view name) {
   return out;
 }
 
+// The numbers of a vector have one range; the initial value is that of Y, which points up.
+std::string environmentText(const EnvironmentParameter& parameter) {
+  const auto& field = *clothstream::v1::Environment::descriptor()->FindFieldByNumber(
+      static_cast<int>(parameter.field.inScene));
+  const std::string name(field.name());
+  if (parameter.isVector) return settingText(camelCase(name), parameter.numbers[1].setting);
+  if (!parameter.isMessage()) return settingText(camelCase(name), parameter.numbers[0].setting);
+  std::string out;
+  for (std::size_t i = 0; i < parameter.numbers.size(); ++i)
+    out += settingText(
+        camelCase(name + "_" + std::string(field.message_type()->field(static_cast<int>(i))->name())),
+        parameter.numbers[i].setting);
+  return out;
+}
+
 std::string fieldsText(const google::protobuf::Descriptor& message) {
   std::string out = "export const " + std::string(message.name()) + "Fields = {";
   for (int i = 0; i < message.field_count(); ++i) {
@@ -93,10 +109,9 @@ std::string file() {
       "}\n\n"
       "export const kClothParameters: readonly ClothParameter[] = [\n";
   for (const ClothParameter& parameter : kClothParameters) out += parameterText(parameter);
-  out += "];\n\nexport const kSettings = {\n" + settingText("gravity", kGravity) +
-         settingText("wind", kWind) + settingText("airDensity", kAirDensity) +
-         settingText("gustStrength", kGustStrength) + settingText("gustSeconds", kGustSeconds) +
-         settingText("tolerance", kTolerance) + settingText("compliance", kCompliance) +
+  out += "];\n\nexport const kSettings = {\n";
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters) out += environmentText(parameter);
+  out += settingText("tolerance", kTolerance) + settingText("compliance", kCompliance) +
          settingText("activation", kActivation) + countText("iterations", kIterations) +
          countText("xpbdIterations", kXpbdIterations) + "} satisfies Record<string, NumberRange>;\n\n";
   namespace v1 = clothstream::v1;

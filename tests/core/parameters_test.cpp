@@ -112,6 +112,20 @@ TEST(Parameters, FollowTheDescriptionAndLaterChanges) {
   EXPECT_EQ(cloth.damping, 0.25f);
 }
 
+TEST(Parameters, FillWhatFieldsLeaveOut) {
+  JoinedClient joined;
+  v1::ServerMessage message;
+  v1::ParameterChange& change = *message.mutable_parameter_changed()->mutable_change();
+  change.mutable_gravity();
+  change.mutable_gust()->set_strength(3);
+  joined.client.receive(message.SerializeAsString());
+  cs_environment environment;
+  cs_get_environment(joined.client.get(), &environment);
+  EXPECT_EQ(environment.gravity[1], 0);
+  EXPECT_EQ(environment.gust_strength, 3);
+  EXPECT_EQ(environment.gust_seconds, 2);
+}
+
 TEST(Parameters, IncludeGustsAndMaterials) {
   ScriptedServer server;
   v1::StreamDescription description = server.description();

@@ -184,9 +184,19 @@ TEST_F(ToParameterChange, LeavesOutWhatIsAbsent) {
   message_.add_cloths();
   const auto change = toParameterChange(message_, scene_, model::StabilityBound(scene_));
   ASSERT_TRUE(change) << change.error().text;
-  EXPECT_FALSE(change->gravity || change->wind || change->airDensity);
+  EXPECT_EQ(change->environment, parameters::EnvironmentChange());
   EXPECT_FALSE(change->cloths[0].numbers.hasAnyOf(parameters::kStructural) ||
                change->cloths[0].numbers.has(parameters::ClothNumber::drag));
+}
+
+TEST_F(ToParameterChange, FillsWhatFieldsLeaveOut) {
+  scene_.environment.gust = {.strength = 1, .seconds = 7};
+  message_.mutable_gravity();
+  message_.mutable_gust()->set_strength(3);
+  applyChange(scene_, toParameterChange(message_, scene_, model::StabilityBound(scene_)).value());
+  EXPECT_EQ(scene_.environment.gravity, model::Vec3(0, 0, 0));
+  EXPECT_EQ(scene_.environment.gust.strength, 3);
+  EXPECT_EQ(scene_.environment.gust.seconds, 2);
 }
 
 TEST_F(ToParameterChange, ListsTheNamesOfTheScene) {

@@ -30,7 +30,11 @@ TEST(ApplyChange, ChangesNothingWhenEmpty) {
 
 TEST(ApplyChange, SetsTheEnvironment) {
   Scene scene = twoClothsAndABall();
-  applyChange(scene, {.gravity = Vec3(0, -1.62f, 0), .wind = Vec3(3, 0, 0), .airDensity = 0.02f});
+  ParameterChange change;
+  change.environment[parameters::kGravity] = {0, -1.62f, 0};
+  change.environment[parameters::kWind] = {3, 0, 0};
+  change.environment[parameters::kAirDensity] = {0.02f};
+  applyChange(scene, change);
   EXPECT_EQ(scene.environment.gravity, Vec3(0, -1.62f, 0));
   EXPECT_EQ(scene.environment.wind, Vec3(3, 0, 0));
   EXPECT_EQ(scene.environment.airDensity, 0.02f);

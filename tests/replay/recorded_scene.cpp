@@ -74,8 +74,8 @@ std::string recordScene(vulkan::Device& device, const std::string& name,
     live.inbox.postPoses(kParticipant, posesAt(tick, ticks, centre), now);
     if (tick == ticks / 2) {
       model::ParameterChange change;
-      change.wind = wind + model::Vec3(1, 0, -2);
-      change.gust = model::Gust{.strength = 1, .seconds = 0.2f};
+      change.environment[parameters::kWind] = {wind.x() + 1, wind.y(), wind.z() - 2};
+      change.environment[parameters::kGust] = {1, 0.2f};
       if (!live.inbox.postChange({.participant = kParticipant, .change = change}))
         throw std::runtime_error(name + ": the scene takes no change");
     }

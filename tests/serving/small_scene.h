@@ -43,13 +43,13 @@ inline model::Scene smallScene(std::string name = "small") {
 
 inline model::ParameterChange gravity(float y) {
   model::ParameterChange change;
-  change.gravity = model::Vec3(0, y, 0);
+  change.environment[parameters::kGravity] = {0, y, 0};
   return change;
 }
 
 inline model::ParameterChange wind(float x) {
   model::ParameterChange change;
-  change.wind = model::Vec3(x, 0, 0);
+  change.environment[parameters::kWind] = {x, 0, 0};
   return change;
 }
 

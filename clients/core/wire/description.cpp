@@ -74,25 +74,6 @@ bool readCloth(Bytes message, ClothMessage& cloth, std::size_t& submeshes) {
   });
 }
 
-// Reads the Environment of a Scene.
-bool readEnvironment(Bytes message, Environment& environment) {
-  using F = field::Environment;
-  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    switch (tag) {
-      case F::kGravity.tag:
-        return readVec3(reader.get_view(), environment.gravity);
-      case F::kWind.tag:
-        return readVec3(reader.get_view(), environment.wind);
-      case F::kAirDensity.tag:
-        return setFinite(environment.airDensity, reader);
-      case F::kGust.tag:
-        return readGust(reader.get_view(), environment.gust);
-      default:
-        return skip(reader);
-    }
-  });
-}
-
 bool readDefinition(Bytes message, Description& description) {
   using F = field::Scene;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
@@ -332,8 +313,9 @@ const Hull* hullOf(const Collider& collider, const Description& description) {
 }
 
 void apply(const ParameterChange& change, Description& description) {
-  parameters::applyChange(
-      change, description.environment, description.cloths,
+  parameters::apply(change.environment, description.environment);
+  parameters::applyToCloths(
+      change.cloths, description.cloths,
       [](const ClothChange& clothChange, Cloth& cloth) { apply(clothChange, cloth.parameters); });
 }
 

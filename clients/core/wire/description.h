@@ -32,13 +32,6 @@ struct Cloth {
   ClothParameters parameters;
 };
 
-struct Environment {
-  Vec3 gravity{0, parameters::kGravity.initial, 0};
-  Vec3 wind{};
-  float airDensity = parameters::kAirDensity.initial;
-  Gust gust;
-};
-
 struct Description {
   std::uint32_t codec = 0;
   std::string scene;
@@ -47,7 +40,7 @@ struct Description {
   std::vector<Cloth> cloths;
   std::vector<Collider> colliders;
   std::map<std::string, Hull> hulls;  // by the collider's name
-  Environment environment;
+  parameters::EnvironmentValues environment = parameters::initialEnvironment();
   std::vector<std::string> materials;             // names that the server offers
   std::vector<float> restPositions, restNormals;  // 3 floats per vertex
   std::vector<std::uint32_t> triangles;           // 3 indices per triangle

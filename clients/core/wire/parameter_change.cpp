@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reads, writes and applies parameter changes. The table of parameters gives the fields of a cloth's numbers.
+// Reads, writes and applies parameter changes. The tables of parameters give the fields of the numbers.
 #include "clients/core/wire/parameter_change.h"
 
 #include "proto/parameters/apply_change.h"
@@ -9,14 +9,19 @@ namespace {
 
 using parameters::ClothNumbers;
 using parameters::ClothParameter;
+using parameters::EnvironmentChange;
+using parameters::EnvironmentParameter;
+using parameters::EnvironmentValue;
+using parameters::EnvironmentValues;
 using parameters::Group;
 using parameters::kClothParameters;
+using parameters::kEnvironmentParameters;
 using parameters::WireField;
 using Writer = protozero::pbf_writer;
 
 constexpr std::size_t kMaxSolvers = 32;  // remembered solver kinds per cloth
 
-// Message that a field number belongs to: Cloth or ClothChange.
+// Message that a field number belongs to: that of the scene, or that of the change.
 using In = std::uint32_t WireField::*;
 
 bool readGroup(Bytes message, const Group& group, In in, ClothNumbers& numbers) {
@@ -42,13 +47,31 @@ bool readNumber(std::uint32_t tag, Reader& reader, In in, ClothNumbers& numbers)
   return skip(reader);
 }
 
-// The message is a Vec3Value.
-bool setVec3Value(std::optional<Vec3>& target, Reader& reader) {
-  using F = field::Vec3Value;
-  Vec3& value = target.emplace();
-  return readFields(reader.get_view(), [&](std::uint32_t tag, Reader& wrapped) {
-    return tag == F::kValue.tag ? readVec3(wrapped.get_view(), value) : skip(wrapped);
+// The message is a Vec3 or a Gust.
+bool readValue(Bytes message, const EnvironmentParameter& parameter, EnvironmentValue& value) {
+  value = emptyValue(parameter);
+  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    for (std::uint32_t i = 0; i < parameter.numbers.size(); ++i)
+      if (tag == fixed32(i + 1)) return setFinite(value[i], reader);
+    return skip(reader);
   });
+}
+
+// Skips a field that the table does not list.
+bool readNumber(std::uint32_t tag, Reader& reader, In in, EnvironmentChange& change) {
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters) {
+    const std::uint32_t number = parameter.field.*in;
+    if (tag != (parameter.isMessage() ? bytes(number) : fixed32(number))) continue;
+    EnvironmentValue& value = change[parameter.row].emplace();
+    if (!parameter.isMessage()) return setFinite(value[0], reader);
+    if (!parameter.isVector || in == &WireField::inScene)
+      return readValue(reader.get_view(), parameter, value);
+    return readFields(reader.get_view(), [&](std::uint32_t inner, Reader& wrapper) {
+      return inner == field::Vec3Value::kValue.tag ? readValue(wrapper.get_view(), parameter, value)
+                                                   : skip(wrapper);
+    });
+  }
+  return skip(reader);
 }
 
 bool readConstraintSolver(Bytes message, Solver& solver) {
@@ -112,10 +135,20 @@ bool readClothChange(Bytes message, ClothChange& change) {
   });
 }
 
-void addVec3Value(Writer& parent, field::Field wrapperField, const std::optional<Vec3>& value) {
-  if (!value) return;
-  Writer wrapper(parent, wrapperField.number);
-  addVec3(wrapper, field::Vec3Value::kValue, *value);
+void writeEnvironment(Writer& message, const EnvironmentChange& change) {
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters) {
+    const std::optional<EnvironmentValue>& value = change[parameter.row];
+    if (!value) continue;
+    if (!parameter.isMessage()) {
+      message.add_float(parameter.field.inChange, (*value)[0]);
+      continue;
+    }
+    Writer holder(message, parameter.field.inChange);
+    if (parameter.isVector)
+      addVec3(holder, field::Vec3Value::kValue, *value);
+    else
+      for (std::uint32_t i = 0; i < parameter.numbers.size(); ++i) holder.add_float(i + 1, (*value)[i]);
+  }
 }
 
 std::string constraintMessage(const Solver& solver) {
@@ -197,31 +230,19 @@ void writeCloth(Writer& cloth, const ClothChange& change) {
 bool readParameterChange(Bytes message, ParameterChange& change) {
   using F = field::ParameterChange;
   return readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    switch (tag) {
-      case F::kGravity.tag:
-        return setVec3Value(change.gravity, reader);
-      case F::kWind.tag:
-        return setVec3Value(change.wind, reader);
-      case F::kAirDensity.tag:
-        return setFinite(change.airDensity, reader);
-      case F::kCloths.tag:
-        return change.cloths.size() < kMaxClothChanges &&
-               readClothChange(reader.get_view(), change.cloths.emplace_back());
-      case F::kGust.tag:
-        return readGust(reader.get_view(), change.gust.emplace());
-      default:
-        return skip(reader);
-    }
+    if (tag != F::kCloths.tag) return readNumber(tag, reader, &WireField::inChange, change.environment);
+    return change.cloths.size() < kMaxClothChanges &&
+           readClothChange(reader.get_view(), change.cloths.emplace_back());
   });
 }
 
-bool readGust(Bytes message, Gust& out) {
-  using F = field::Gust;
-  out = {};
-  return readFields(message, [&](std::uint32_t tag, Reader& reader) {
-    if (tag == F::kStrength.tag) return setFinite(out.strength, reader);
-    return tag == F::kSeconds.tag ? setFinite(out.seconds, reader) : skip(reader);
+bool readEnvironment(Bytes message, EnvironmentValues& environment) {
+  EnvironmentChange given;
+  const bool isRead = readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    return readNumber(tag, reader, &WireField::inScene, given);
   });
+  parameters::apply(given, environment);
+  return isRead;
 }
 
 bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters) {
@@ -235,7 +256,7 @@ bool readClothParameters(Bytes message, std::string& name, ClothParameters& para
       case F::kMaterial.tag:
         return setText(parameters.material, reader);
       default:
-        return readNumber(tag, reader, &WireField::inCloth, parameters.numbers);
+        return readNumber(tag, reader, &WireField::inScene, parameters.numbers);
     }
   });
 }
@@ -272,14 +293,7 @@ void addVec3(Writer& parent, field::Field vec3Field, const Vec3& value) {
 
 void writeFields(Writer& message, const ParameterChange& change) {
   using F = field::ParameterChange;
-  addVec3Value(message, F::kGravity, change.gravity);
-  addVec3Value(message, F::kWind, change.wind);
-  if (change.airDensity) message.add_float(F::kAirDensity.number, *change.airDensity);
-  if (change.gust) {
-    Writer gust(message, F::kGust.number);
-    gust.add_float(field::Gust::kStrength.number, change.gust->strength);
-    gust.add_float(field::Gust::kSeconds.number, change.gust->seconds);
-  }
+  writeEnvironment(message, change.environment);
   for (const ClothChange& clothChange : change.cloths) {
     Writer cloth(message, F::kCloths.number);
     writeCloth(cloth, clothChange);

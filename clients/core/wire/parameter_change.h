@@ -15,6 +15,7 @@
 #include "clients/core/core.h"
 #include "clients/core/wire/wire.h"
 #include "proto/parameters/cloth_parameters.h"
+#include "proto/parameters/environment_parameters.h"
 #include "proto/parameters/settings.h"
 
 namespace clothstream::client {
@@ -32,11 +33,6 @@ struct Solver {
   std::uint32_t path = kMatrixFree;
   std::uint32_t acadMode = 0;  // AcadMode of scene.proto, as received
   std::string settings;        // message of the kind as received
-};
-
-struct Gust {
-  float strength = parameters::kGustStrength.initial;
-  float seconds = parameters::kGustSeconds.initial;
 };
 
 // Current parameters of a cloth.
@@ -59,9 +55,7 @@ struct ClothChange {
 };
 
 struct ParameterChange {
-  std::optional<Vec3> gravity, wind;
-  std::optional<float> airDensity;
-  std::optional<Gust> gust;
+  parameters::EnvironmentChange environment;
   std::vector<ClothChange> cloths;
   std::uint64_t participantId = 0;  // participant that made the change; 0 is the server
 };
@@ -70,9 +64,10 @@ struct ParameterChange {
 
 // Returns false also if there are more than kMaxClothChanges elements.
 [[nodiscard]] bool readParameterChange(Bytes message, ParameterChange& change);
+// Reads a Scene's Environment. Fields that it leaves out stay as they are.
+[[nodiscard]] bool readEnvironment(Bytes message, parameters::EnvironmentValues& environment);
 // Reads the parameters of a Scene's Cloth, and its name.
 [[nodiscard]] bool readClothParameters(Bytes message, std::string& name, ClothParameters& parameters);
-[[nodiscard]] bool readGust(Bytes message, Gust& out);
 [[nodiscard]] bool readSolver(Bytes message, Solver& out);
 
 // Writes a Vec3 as a submessage.

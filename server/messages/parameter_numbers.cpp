@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Reads and writes the numbers of a cloth by the field numbers in the table of parameters.
-#include "server/messages/cloth_numbers.h"
+// Reads and writes numbers by the field numbers in the tables of parameters.
+#include "server/messages/parameter_numbers.h"
+
+#include <algorithm>
 
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
@@ -16,10 +18,14 @@ using google::protobuf::Message;
 using parameters::ClothNumber;
 using parameters::ClothNumbers;
 using parameters::ClothParameter;
+using parameters::EnvironmentChange;
+using parameters::EnvironmentParameter;
+using parameters::EnvironmentValue;
 using parameters::kClothParameters;
+using parameters::kEnvironmentParameters;
 using parameters::WireField;
 
-// Message that a field number belongs to: Cloth or ClothChange.
+// Message that a field number belongs to: that of the scene, or that of the change.
 using In = std::uint32_t WireField::*;
 
 const FieldDescriptor& fieldOf(const Message& message, std::uint32_t number) {
@@ -77,17 +83,57 @@ ClothNumbers readAll(Checks& checks, const Path& path, const Message& message, I
   return numbers;
 }
 
+// Field number of a number in the message that has it as a field.
+std::uint32_t numberField(const EnvironmentParameter& parameter, std::uint32_t index, In in) {
+  return parameter.isMessage() ? index + 1 : parameter.field.*in;
+}
+
+EnvironmentChange readEnvironment(Checks& checks, const Path& path, const Message& message, In in) {
+  EnvironmentChange change;
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters) {
+    const FieldDescriptor& field = fieldOf(message, parameter.field.*in);
+    if (!has(message, field)) continue;
+    const Message* holder = parameter.isMessage() ? &groupIn(message, field) : &message;
+    const Path group = parameter.isMessage() ? path / field.json_name() : path;
+    const auto* wrapper = dynamic_cast<const v1::Vec3Value*>(holder);
+    const Path at = wrapper != nullptr ? group / "value" : group;
+    if (wrapper != nullptr) holder = &wrapper->value();
+    EnvironmentValue& value = change[parameter.row].emplace(parameters::emptyValue(parameter));
+    for (std::uint32_t i = 0; i < parameter.numbers.size(); ++i) {
+      const FieldDescriptor& number = fieldOf(*holder, numberField(parameter, i, in));
+      if (!number.has_presence() || has(*holder, number))
+        value[i] = checks.number(at / number.json_name(), holder->GetReflection()->GetFloat(*holder, &number),
+                                 parameter.numbers[i].setting.range);
+    }
+  }
+  return change;
+}
+
 }  // namespace
 
 ClothNumbers readNumbers(Checks& checks, const Path& path, const v1::Cloth& message,
                          const model::Cloth& cloth) {
   const model::Cloth* const only[] = {&cloth};
-  return readAll(checks, path, message, &WireField::inCloth, only);
+  return readAll(checks, path, message, &WireField::inScene, only);
 }
 
 ClothNumbers readNumbers(Checks& checks, const Path& path, const v1::ClothChange& message,
                          std::span<const model::Cloth* const> cloths) {
   return readAll(checks, path, message, &WireField::inChange, cloths);
+}
+
+EnvironmentChange readNumbers(Checks& checks, const Path& path, const v1::Environment& message) {
+  return readEnvironment(checks, path, message, &WireField::inScene);
+}
+
+EnvironmentChange readNumbers(Checks& checks, const Path& path, const v1::ParameterChange& message) {
+  return readEnvironment(checks, path, message, &WireField::inChange);
+}
+
+bool changesEnvironment(const v1::ParameterChange& message) {
+  return std::ranges::any_of(kEnvironmentParameters, [&](const EnvironmentParameter& parameter) {
+    return has(message, fieldOf(message, parameter.field.inChange));
+  });
 }
 
 void writeNumbers(const model::Cloth& cloth, v1::Cloth& message) {
@@ -97,8 +143,20 @@ void writeNumbers(const model::Cloth& cloth, v1::Cloth& message) {
     Message* holder = &message;
     if (parameter.group != nullptr)
       holder = message.GetReflection()->MutableMessage(&message,
-                                                       &fieldOf(message, parameter.group->field.inCloth));
-    holder->GetReflection()->SetFloat(holder, &fieldOf(*holder, parameter.field.inCloth), *value);
+                                                       &fieldOf(message, parameter.group->field.inScene));
+    holder->GetReflection()->SetFloat(holder, &fieldOf(*holder, parameter.field.inScene), *value);
+  }
+}
+
+void writeNumbers(model::Environment environment, v1::Environment& message) {
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters) {
+    Message* holder = &message;
+    if (parameter.isMessage())
+      holder = message.GetReflection()->MutableMessage(&message, &fieldOf(message, parameter.field.inScene));
+    for (std::uint32_t i = 0; i < parameter.numbers.size(); ++i)
+      holder->GetReflection()->SetFloat(holder,
+                                        &fieldOf(*holder, numberField(parameter, i, &WireField::inScene)),
+                                        model::numberOf(environment, parameter.row, i));
   }
 }
 
@@ -106,12 +164,27 @@ void copyNumbers(const v1::Cloth& cloth, v1::ClothChange& change) {
   const auto *from = cloth.GetReflection(), *to = change.GetReflection();
   for (const ClothParameter& parameter : kClothParameters) {
     const WireField& fields = parameter.group != nullptr ? parameter.group->field : parameter.field;
-    const FieldDescriptor &source = fieldOf(cloth, fields.inCloth),
+    const FieldDescriptor &source = fieldOf(cloth, fields.inScene),
                           &target = fieldOf(change, fields.inChange);
     if (parameter.group == nullptr)
       to->SetFloat(&change, &target, from->GetFloat(cloth, &source));
     else if (parameter.group->isReplaced || has(cloth, source))
       to->MutableMessage(&change, &target)->CopyFrom(from->GetMessage(cloth, &source));
+  }
+}
+
+void copyNumbers(const v1::Environment& environment, v1::ParameterChange& change) {
+  const auto *from = environment.GetReflection(), *to = change.GetReflection();
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters) {
+    const FieldDescriptor &source = fieldOf(environment, parameter.field.inScene),
+                          &target = fieldOf(change, parameter.field.inChange);
+    if (!parameter.isMessage()) {
+      to->SetFloat(&change, &target, from->GetFloat(environment, &source));
+      continue;
+    }
+    Message* holder = to->MutableMessage(&change, &target);
+    if (auto* wrapper = dynamic_cast<v1::Vec3Value*>(holder)) holder = wrapper->mutable_value();
+    holder->CopyFrom(from->GetMessage(environment, &source));
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Table of parameters compared with the messages, the model and the conversion between them.
-#include "server/messages/cloth_numbers.h"
+// Tables of parameters compared with the messages, the model and the conversion between them.
+#include "server/messages/parameter_numbers.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -25,8 +25,10 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using parameters::ClothNumber;
 using parameters::ClothParameter;
+using parameters::EnvironmentParameter;
 using parameters::Group;
 using parameters::kClothParameters;
+using parameters::kEnvironmentParameters;
 using parameters::WireField;
 
 using In = std::uint32_t WireField::*;
@@ -55,7 +57,7 @@ std::set<std::string> unlisted(const Descriptor* message, In in) {
 
 TEST(ParameterTable, HasTheFieldsOfBothMessages) {
   for (const ClothParameter& parameter : kClothParameters)
-    for (const auto& [message, in] : {std::pair{v1::Cloth::descriptor(), &WireField::inCloth},
+    for (const auto& [message, in] : {std::pair{v1::Cloth::descriptor(), &WireField::inScene},
                                       std::pair{v1::ClothChange::descriptor(), &WireField::inChange}}) {
       SCOPED_TRACE(fmt::format("--{} in {}", parameter.option, std::string(message->full_name())));
       const FieldDescriptor* field = fieldOf(parameter, message, in);
@@ -71,13 +73,13 @@ TEST(ParameterTable, ListsEveryFieldOfAChangeThatIsANumber) {
   EXPECT_THAT(unlisted(v1::ClothChange::descriptor(), &WireField::inChange),
               testing::UnorderedElementsAre("name", "solver", "material", "areal_mass"));
   EXPECT_THAT(
-      unlisted(v1::Cloth::descriptor(), &WireField::inCloth),
+      unlisted(v1::Cloth::descriptor(), &WireField::inScene),
       testing::UnorderedElementsAre("name", "grid", "mesh", "mass", "areal_mass", "pins", "pinned_vertices",
                                     "pinned_regions", "solver", "attachments", "material", "coarse"));
   for (const ClothParameter& parameter : kClothParameters) {
     if (parameter.group == nullptr) continue;
     const Descriptor* group = v1::Cloth::descriptor()
-                                  ->FindFieldByNumber(static_cast<int>(parameter.group->field.inCloth))
+                                  ->FindFieldByNumber(static_cast<int>(parameter.group->field.inScene))
                                   ->message_type();
     const auto isInGroup = [&](const ClothParameter& other) { return other.group == parameter.group; };
     int numbers = 0;
@@ -214,6 +216,71 @@ INSTANTIATE_TEST_SUITE_P(All, EveryNumber, testing::ValuesIn(kClothParameters), 
   for (const char c : instance.param.option) name += c == '-' ? '_' : c;
   return name;
 });
+
+// Fields of `message` that are numbers or messages of numbers.
+std::set<std::uint32_t> numberFields(const Descriptor* message) {
+  const auto isNumber = [](const FieldDescriptor* field) {
+    return field->cpp_type() == FieldDescriptor::CPPTYPE_FLOAT;
+  };
+  std::set<std::uint32_t> numbers;
+  for (int i = 0; i < message->field_count(); ++i) {
+    const FieldDescriptor* field = message->field(i);
+    const Descriptor* holder = field->message_type();
+    if (holder == v1::Vec3Value::descriptor()) holder = v1::Vec3::descriptor();
+    bool isOfNumbers = holder != nullptr;
+    for (int k = 0; isOfNumbers && k < holder->field_count(); ++k) isOfNumbers = isNumber(holder->field(k));
+    if (!field->is_repeated() && (isNumber(field) || isOfNumbers))
+      numbers.insert(static_cast<std::uint32_t>(field->number()));
+  }
+  return numbers;
+}
+
+TEST(EnvironmentTable, ListsEveryFieldThatIsANumber) {
+  std::set<std::uint32_t> inScene, inChange;
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters) {
+    inScene.insert(parameter.field.inScene);
+    inChange.insert(parameter.field.inChange);
+  }
+  EXPECT_EQ(numberFields(v1::Environment::descriptor()), inScene);
+  EXPECT_EQ(numberFields(v1::ParameterChange::descriptor()), inChange);
+}
+
+TEST(EnvironmentTable, HasTheFieldsOfBothMessages) {
+  std::size_t index = 0;
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters) {
+    SCOPED_TRACE(parameter.option);
+    EXPECT_EQ(parameter.row, index++);
+    const auto* field =
+        v1::Environment::descriptor()->FindFieldByNumber(static_cast<int>(parameter.field.inScene));
+    const auto* changed =
+        v1::ParameterChange::descriptor()->FindFieldByNumber(static_cast<int>(parameter.field.inChange));
+    ASSERT_TRUE(field != nullptr && changed != nullptr);
+    EXPECT_EQ(field->name(), changed->name());
+    EXPECT_TRUE(field->has_presence() && changed->has_presence());
+    EXPECT_EQ(changed->message_type(),
+              parameter.isVector ? v1::Vec3Value::descriptor() : field->message_type());
+    ASSERT_EQ(field->message_type() != nullptr, parameter.isMessage());
+    if (!parameter.isMessage()) continue;
+    EXPECT_EQ(field->message_type() == v1::Vec3::descriptor(), parameter.isVector);
+    ASSERT_EQ(static_cast<std::size_t>(field->message_type()->field_count()), parameter.numbers.size());
+    for (std::size_t i = 0; i < parameter.numbers.size(); ++i) {
+      const auto* number = field->message_type()->FindFieldByNumber(static_cast<int>(i + 1));
+      ASSERT_NE(number, nullptr);
+      EXPECT_EQ(number->has_presence(), parameter.numbers[i].isOptional);
+    }
+  }
+}
+
+TEST(EnvironmentTable, SetsTheDefaultsOfTheModel) {
+  model::Environment environment;
+  std::set<const float*> members;
+  for (const EnvironmentParameter& parameter : kEnvironmentParameters)
+    for (std::uint32_t i = 0; i < parameter.numbers.size(); ++i) {
+      const float& member = model::numberOf(environment, parameter.row, i);
+      EXPECT_TRUE(members.insert(&member).second) << parameter.option;
+      EXPECT_EQ(member, initial(parameter.row, i)) << parameter.option;
+    }
+}
 
 }  // namespace
 }  // namespace clothstream::messages
