@@ -15,18 +15,26 @@ file(CREATE_LINK ${SIMDE_INCLUDE}/simde ${wasmOut}/include/simde SYMBOLIC)
 set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=hidden -isystem ${wasmOut}/include -std=c++20
   -fno-rtti -fno-exceptions -Wall -Wextra -Wconversion -Wshadow ${CLOTHSTREAM_WERROR_FLAG} -I${PROJECT_SOURCE_DIR})
 
-# clothstream_wasm_exports(RESULT HEADER native...): linker flags that export all functions of a header, except those
-# that only the native library has because they take a path or a function pointer.
-function(clothstream_wasm_exports result header)
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${header})
-  file(READ ${header} text)
-  string(REGEX MATCHALL "cs_[a-z_]+\\(" exports "${text}")
-  list(TRANSFORM exports REPLACE "\\($" "")
-  list(REMOVE_ITEM exports ${ARGN})
-  list(TRANSFORM exports PREPEND -Wl,--export=)
+# clothstream_wasm_exports(RESULT PART): linker flags that export the functions of a header (PART of interface.json), except
+# those that only the native library has.
+set(interfacePath ${PROJECT_SOURCE_DIR}/clients/interface/interface.json)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${interfacePath})
+function(clothstream_wasm_exports result part)
+  file(READ ${interfacePath} interface)
+  string(JSON functions GET "${interface}" ${part} functions)
+  string(JSON native GET "${interface}" ${part} native)
+  string(JSON count LENGTH "${functions}")
+  math(EXPR last "${count} - 1")
+  set(exports)
+  foreach(i RANGE ${last})
+    string(JSON name MEMBER "${functions}" ${i})
+    if(NOT native MATCHES "\"${name}\"")
+      list(APPEND exports -Wl,--export=${name})
+    endif()
+  endforeach()
   set(${result} ${exports} PARENT_SCOPE)
 endfunction()
-clothstream_wasm_exports(coreExports ${PROJECT_SOURCE_DIR}/clients/core/core.h cs_set_clock)
+clothstream_wasm_exports(coreExports core)
 list(APPEND coreExports -Wl,--export=malloc -Wl,--export=free)
 set_property(GLOBAL PROPERTY CLOTHSTREAM_CORE_EXPORTS ${coreExports})
 
@@ -93,8 +101,7 @@ function(clothstream_recording_wasm)
     get_property(sources GLOBAL PROPERTY CLOTHSTREAM_${part}_SOURCES)
     list(APPEND recordingSources ${sources})
   endforeach()
-  clothstream_wasm_exports(recordingExports ${PROJECT_SOURCE_DIR}/clients/recording/recording.h
-    cs_recording_open cs_recording_open_bytes cs_recording_open_source)
+  clothstream_wasm_exports(recordingExports recording)
   set(module ${PROJECT_BINARY_DIR}/web-wasm/recording/clothstream_recording.wasm)
   clothstream_link_wasm(${module} FLAGS -msimd128 -I${PROJECT_BINARY_DIR}/include
     EXPORTS ${coreExports} ${recordingExports} -Wl,--export=cs_recording_open_host

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Writes src/clothstream/_bindings.py: structs, constants and functions of libclothstream for ctypes, from the headers
-core.h, recording.h and clothstream.h. Usage: generate_bindings.py [--check]. With --check it writes nothing, and fails if
-the file is out of date."""
+"""Writes src/clothstream/_bindings.py: structs, constants and functions of libclothstream for ctypes, from
+clients/interface/interface.json. Usage: generate_bindings.py [--check]. With --check it writes nothing, and fails if the
+file is out of date."""
+import json
 import pathlib
-import re
 import sys
 
 CLIENTS = pathlib.Path(__file__).resolve().parent.parent
-HEADERS = [CLIENTS / "core/core.h", CLIENTS / "recording/recording.h", CLIENTS / "library/clothstream.h"]
+INTERFACE = CLIENTS / "interface/interface.json"
 OUT = CLIENTS / "python/src/clothstream/_bindings.py"
 
 NUMBERS = {"uint8_t": "c_uint8", "uint32_t": "c_uint32", "int32_t": "c_int32", "uint64_t": "c_uint64", "int": "c_int",
@@ -21,72 +21,54 @@ import ctypes as c
 '''
 
 
-class Header:
-    def __init__(self, text: str):
-        code = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
-        self.constants = re.findall(r"#define ((?:CS|CLOTHSTREAM)_\w+) (0x[0-9a-f]+|\d+)u\b", code)
-        self.enums = set(re.findall(r"typedef enum (\w+)", code))
-        for body in re.findall(r"enum(?: \w+)? \{([^}]*)\}", code):
-            self.constants += re.findall(r"(\w+) = (-?\d+)", body)
-        structs = re.findall(r"typedef struct \w+ \{([^}]*)\} (\w+);", code)
-        self.structs = [(name, body) for body, name in structs]
-        self.opaque = set(re.findall(r"typedef struct (\w+) \w+;", code))
-        functions = re.findall(r"^([a-z][\w ]*?[ *]+)(\w+)\(([^()]*)\) CS_NOEXCEPT;", code, flags=re.M)
-        self.functions = [(name, result, parameters) for result, name, parameters in functions]
+class Types:
+    """ctypes types of C types."""
 
+    def __init__(self, headers: list):
+        self.structs = {name for header in headers for name in header["structs"]}
+        self.enums = {enum["name"] for header in headers for enum in header["enums"]}
+        self.opaque = {name for header in headers for name in header["opaque"]}
 
-def ctype(declared: str, structs: set, enums: set, opaque: set) -> str:
-    """The ctypes type of a C type without its name, such as `const float*`."""
-    stars = declared.count("*")
-    base = declared.replace("*", " ").replace("const ", " ").split()[-1]
-    if base == "char" and stars > 0:
-        inner, stars = "c.c_char_p", stars - 1
-    elif base == "void" or base in opaque:
-        if stars == 0:
-            return "None"
-        inner, stars = "c.c_void_p", stars - 1
-    elif base in structs:
-        inner = base
-    elif base in enums:
-        inner = "c.c_int"
-    else:
-        inner = "c." + NUMBERS[base]
-    return "c.POINTER(" * stars + inner + ")" * stars
+    def of(self, declared: str) -> str:
+        """The type of a parameter, result or field, such as `const float*`."""
+        if "(" in declared:
+            return "c.c_void_p"  # a function
+        stars = declared.count("*")
+        base = declared.replace("*", " ").replace("const ", " ").split()[-1]
+        if base == "char" and stars > 0:
+            inner, stars = "c.c_char_p", stars - 1
+        elif base == "void" or base in self.opaque:
+            if stars == 0:
+                return "None"
+            inner, stars = "c.c_void_p", stars - 1
+        elif base in self.structs:
+            inner = base
+        elif base in self.enums:
+            inner = "c.c_int"
+        else:
+            inner = "c." + NUMBERS[base]
+        return "c.POINTER(" * stars + inner + ")" * stars
 
 
 def bindings() -> str:
-    headers = [Header(path.read_text()) for path in HEADERS]
-    structs = {name for header in headers for name, _ in header.structs}
-    enums = set().union(*(header.enums for header in headers))
-    opaque = set().union(*(header.opaque for header in headers))
-
-    def of(declared: str) -> str:
-        return ctype(declared, structs, enums, opaque)
-
+    headers = list(json.loads(INTERFACE.read_text()).values())
+    types = Types(headers)
     out = HEAD
     for header in headers:
-        out += "".join(f"{name} = {value}\n" for name, value in header.constants)
+        out += "".join(f"{name} = {value}\n" for name, value in header["constants"].items())
+        out += "".join(f"{one['name']} = {one['value']}\n" for enum in header["enums"] for one in enum["values"])
     for header in headers:
-        for name, body in header.structs:
+        for name, struct in header["structs"].items():
             out += f"\n\nclass {name}(c.Structure):\n    _fields_ = [\n"
-            for declaration in filter(str.strip, body.split(";")):
-                if function := re.search(r"\(\*(\w+)\)", declaration):
-                    out += f'        ("{function[1]}", c.c_void_p),  # a function\n'
-                    continue
-                kind, names = re.match(r"\s*((?:const )?\w+[ *]+)(.*)", declaration, flags=re.S).groups()
-                for member in names.split(","):
-                    member = member.strip()
-                    stars = "*" * member.count("*")
-                    field, size = re.match(r"\**(\w+)(?:\[(\w+)\])?$", member).groups()
-                    array = f" * {size}" if size else ""
-                    out += f'        ("{field}", {of(kind + stars)}{array}),\n'
+            for field in struct["fields"]:
+                array = f" * {field['count']}" if "count" in field else ""
+                out += f'        ("{field["name"]}", {types.of(field["type"])}{array}),\n'
             out += "    ]\n"
     out += "\n\n# Name: type of the result, types of the arguments.\nFUNCTIONS = {\n"
     for header in headers:
-        for name, result, parameters in header.functions:
-            arguments = [] if parameters.strip() == "void" else [
-                of(re.sub(r"\w+$", "", " ".join(parameter.split()))) for parameter in parameters.split(",")]
-            out += f'    "{name}": ({of(result)}, [{", ".join(arguments)}]),\n'
+        for name, function in header["functions"].items():
+            arguments = ", ".join(types.of(parameter["type"]) for parameter in function["parameters"])
+            out += f'    "{name}": ({types.of(function["result"])}, [{arguments}]),\n'
     return out + "}\n"
 
 

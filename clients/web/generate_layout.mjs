@@ -1,87 +1,82 @@
 // SPDX-License-Identifier: MIT
-// Writes what other languages need to know of the C interface:
-//   client/src/layout.ts: sizes and offsets of the structs of clients/core/core.h and clients/recording/recording.h in
-//   WebAssembly memory;
+// Writes what other languages need to know of the C interface, from clients/interface/interface.json:
+//   client/src/layout.ts: versions, sizes and offsets of the structs of core.h and recording.h in WebAssembly memory;
+//   client/src/functions.ts: types of their functions in WebAssembly;
 //   ../unity/Runtime/Core/Native.cs: enums, structs and functions of core.h for C# on 64-bit machines.
-// The compiler computes sizes and offsets. Usage: node generate_layout.mjs CLANG [--check]. With --check it writes nothing,
-// and fails if a file is out of date.
-import { execFileSync } from "node:child_process";
-import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { basename, join } from "node:path";
+// Usage: node generate_layout.mjs [--check]. With --check it writes nothing, and fails if a file is out of date.
+import { readFileSync, writeFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import { writeCSharp } from "../unity/write_native.mjs";
 
-const [compiler, mode] = process.argv.slice(2);
-if (!compiler || (mode && mode !== "--check")) {
-  console.error("Usage: node generate_layout.mjs CLANG [--check]");
+const [mode] = process.argv.slice(2);
+if (mode && mode !== "--check") {
+  console.error("Usage: node generate_layout.mjs [--check]");
   process.exit(2);
 }
-const headerPaths = ["../core/core.h", "../recording/recording.h"].map((path) => fileURLToPath(new URL(path, import.meta.url)));
-const layoutPath = fileURLToPath(new URL("client/src/layout.ts", import.meta.url));
-const nativePath = fileURLToPath(new URL("../unity/Runtime/Core/Native.cs", import.meta.url));
+const pathOf = (path) => fileURLToPath(new URL(path, import.meta.url));
+const { core, recording } = JSON.parse(readFileSync(pathOf("../interface/interface.json"), "utf8"));
 
-// Struct names with the names of their members. A struct with a function pointer is only for native programs.
-function structs(header) {
-  const code = header.replaceAll(/\/\*[^]*?\*\//g, "");
-  const found = [...code.matchAll(/typedef struct \w+ \{([^}]*)\} (\w+);/g)].filter(([, body]) => !body.includes("("));
-  return found.map(([, body, name]) => {
-    const declarations = body.split(";").filter((text) => text.trim() !== "");
-    const members = declarations.flatMap((text) => text.split(",").map((part) => part.match(/(\w+)\s*(?:\[\w+\])?\s*$/)[1]));
-    return { name, members };
-  });
-}
+// A struct with a function pointer is only for native programs.
+const structs = Object.entries({ ...core.structs, ...recording.structs }).filter(([, { fields }]) => !fields.some(({ type }) => type.includes("(")));
+const constants = { ...core.constants, ...recording.constants };
+const versions = structs.map(([name]) => `${name.toUpperCase()}_VERSION`).filter((name) => name in constants);
 
-// Compiles C expressions for a target and returns their values. Each value is one larger in the assembly, because the
-// compiler writes zeros in another way.
-function evaluate(expressions, target) {
-  const folder = mkdtempSync(join(tmpdir(), "clothstream-layout-"));
-  try {
-    for (const path of headerPaths) cpSync(path, join(folder, "clothstream", basename(path)));
-    const values = expressions.map((expression) => `${expression} + 1`).join(",\n  ");
-    const source = `#include <clothstream/recording.h>\nconst unsigned values[] = {\n  ${values}};\n`;
-    const flags = ["-x", "c", "-std=c11", `--target=${target}`, "-ffreestanding", `-I${folder}`, "-S", "-o", "-", "-"];
-    const assembly = execFileSync(compiler, flags, { input: source, encoding: "utf8" });
-    const found = [...assembly.matchAll(/^\s*\.(?:long|int32)\s+(\d+)/gm)].map(([, value]) => Number(value) - 1);
-    if (found.length !== expressions.length) throw new Error(`${compiler} has written ${found.length} values for ${expressions.length} expressions`);
-    return found;
-  } finally {
-    rmSync(folder, { recursive: true });
+function writeLayout() {
+  const lines = versions.map((name) => `export const ${name} = ${constants[name]};`);
+  for (const [name, { size, fields }] of structs) {
+    lines.push(`export const ${name} = {`, `  sizeof: ${size.wasm32},`);
+    lines.push(...fields.map((field) => `  ${field.name}: ${field.offset.wasm32},`), "} as const;");
   }
-}
-
-const header = headerPaths.map((path) => readFileSync(path, "utf8")).join("\n");
-const found = structs(header);
-const versions = [...header.matchAll(/#define (CS_\w+_VERSION) /g)].map(([, name]) => name).filter((name) => !["CS_PROTOCOL_VERSION", "CS_RECORDING_SOURCE_VERSION"].includes(name));
-const expressions = [
-  ...versions,
-  ...found.flatMap(({ name, members }) => [`sizeof(${name})`, ...members.map((member) => `offsetof(${name}, ${member})`)]),
-];
-const values = evaluate(expressions, "wasm32");
-let next = 0;
-const lines = versions.map((name) => `export const ${name} = ${values[next++]};`);
-for (const { name, members } of found) {
-  lines.push(`export const ${name} = {`, `  sizeof: ${values[next++]},`);
-  lines.push(...members.map((member) => `  ${member}: ${values[next++]},`), "} as const;");
-}
-const text = `// SPDX-License-Identifier: MIT
+  return `// SPDX-License-Identifier: MIT
 // Versions, sizes and offsets (bytes) of the structs of clients/core/core.h and clients/recording/recording.h in
 // WebAssembly memory.
 // Generated by generate_layout.mjs. Do not edit.
 
 ${lines.join("\n")}
 `;
+}
 
-const evaluated64 = evaluate(expressions, "x86_64-linux-gnu");
-const native = writeCSharp(readFileSync(headerPaths[0], "utf8"), new Map(expressions.map((expression, i) => [expression, evaluated64[i]])));
+const camel = (text) => text.replaceAll(/_([a-z0-9])/g, (_, letter) => letter.toUpperCase());
+
+function wasmType(type) {
+  if (type.includes("*")) return "Pointer";
+  if (type === "void") return "void";
+  return type === "uint64_t" ? "bigint" : "number";
+}
+
+function writeInterface(name, { functions, native }) {
+  const lines = Object.entries(functions)
+    .filter(([called]) => !native.includes(called))
+    .map(([called, { result, parameters }]) => {
+      const list = parameters.map((parameter) => `${camel(parameter.name)}: ${wasmType(parameter.type)}`);
+      return `  ${called}(${list.join(", ")}): ${wasmType(result)};`;
+    });
+  return [`export interface ${name} {`, ...lines, "}"].join("\n");
+}
+
+function writeFunctions() {
+  return `// SPDX-License-Identifier: MIT
+// Functions of the C interface with WebAssembly types: size_t and pointers are numbers, uint64_t is bigint.
+// Generated by generate_layout.mjs. Do not edit.
+
+export type Pointer = number;
+
+// clients/core/core.h
+${writeInterface("CoreFunctions", core)}
+
+// clients/recording/recording.h, which only clothstream_recording.wasm has
+${writeInterface("RecordingFunctions", recording)}
+`;
+}
 
 for (const [path, wanted] of [
-  [layoutPath, text],
-  [nativePath, native],
+  ["client/src/layout.ts", writeLayout()],
+  ["client/src/functions.ts", writeFunctions()],
+  ["../unity/Runtime/Core/Native.cs", writeCSharp(core)],
 ]) {
-  if (mode !== "--check") writeFileSync(path, wanted);
-  else if (readFileSync(path, "utf8") !== wanted) {
-    console.error(`${path} is out of date. Run: node clients/web/generate_layout.mjs ${compiler}`);
+  if (mode !== "--check") writeFileSync(pathOf(path), wanted);
+  else if (readFileSync(pathOf(path), "utf8") !== wanted) {
+    console.error(`${pathOf(path)} is out of date. Run: node clients/web/generate_layout.mjs`);
     process.exit(1);
   }
 }

@@ -10,9 +10,8 @@ const { stepUs, playOutDelayMs, sessions } = JSON.parse(readFileSync(sessionsPat
 const golden = JSON.parse(readFileSync(goldenPath));
 
 assert.deepEqual(WebAssembly.Module.imports(module), [], "the core imports nothing");
-const header = readFileSync(new URL("../../clients/core/core.h", import.meta.url), "utf8");
-const declared = new Set(header.match(/cs_[a-z_]+(?=\()/g));
-declared.delete("cs_set_clock"); // takes a function pointer, so it is native only
+const { core: described } = JSON.parse(readFileSync(new URL("../../clients/interface/interface.json", import.meta.url), "utf8"));
+const declared = Object.keys(described.functions).filter((name) => !described.native.includes(name));
 const exported = new Set(WebAssembly.Module.exports(module).map(({ name }) => name));
 for (const name of [...declared, "memory", "_initialize", "malloc", "free"]) assert(exported.has(name), `${name} is exported`);
 

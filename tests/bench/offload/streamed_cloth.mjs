@@ -11,16 +11,15 @@ const kArrivalUs = 5_000;
 const kDelayMs = 5 + 500 / 72;
 const kBetween = 2; // cs_shown
 
+const { core } = JSON.parse(readFileSync(new URL("../../../clients/interface/interface.json", import.meta.url), "utf8"));
 // Offsets of members of a struct of core.h.
-const layout = readFileSync(new URL("../../../clients/web/client/src/layout.ts", import.meta.url), "utf8");
 function offsetsOf(struct) {
-  const body = layout.match(new RegExp(`const ${struct} = \\{([^}]*)\\}`))[1];
-  return Object.fromEntries([...body.matchAll(/(\w+): (\d+)/g)].map(([, name, at]) => [name, Number(at)]));
+  return Object.fromEntries(core.structs[struct].fields.map(({ name, offset }) => [name, offset.wasm32]));
 }
 const kOptions = offsetsOf("cs_play_out_options");
 const kPlayed = offsetsOf("cs_played");
 const kStatistics = offsetsOf("cs_statistics");
-const kPlayedVersion = Number(layout.match(/CS_PLAYED_VERSION = (\d+)/)[1]);
+const kPlayedVersion = core.constants.CS_PLAYED_VERSION;
 
 function varint(value) {
   const bytes = [];

@@ -14,7 +14,7 @@ CS_MAX_COLLIDERS = 40
 CS_MAX_GRABS = 10
 CS_HAND_JOINTS = 26
 CS_HAND_BONES = 20
-CS_HEAD_ID = 0x80000040
+CS_HEAD_ID = 2147483712
 CS_CLOTH_SETTINGS_VERSION = 1
 CS_COLLIDER_CHANGE_VERSION = 1
 CS_STAGE_STATISTICS_VERSION = 1
@@ -121,6 +121,7 @@ CLOTHSTREAM_REFUSED = 3
 CLOTHSTREAM_LOST = 4
 CLOTHSTREAM_FAILED = 5
 CLOTHSTREAM_LOG_INFO = 1
+CLOTHSTREAM_LOG_WARNING = 2
 CLOTHSTREAM_LOG_ERROR = 3
 
 
@@ -138,7 +139,7 @@ class cs_limits(c.Structure):
 class cs_scene_summary(c.Structure):
     _fields_ = [
         ("name", c.c_char_p),
-        ("description", c.POINTER(c.c_char_p)),
+        ("description", c.c_char_p),
         ("vertex_count", c.c_uint32),
         ("cloth_count", c.c_uint32),
         ("participants", c.c_uint32),
@@ -450,7 +451,7 @@ class cs_recording_source(c.Structure):
         ("max_vertices", c.c_uint32),
         ("size", c.c_uint64),
         ("user", c.c_void_p),
-        ("read", c.c_void_p),  # a function
+        ("read", c.c_void_p),
     ]
 
 
@@ -555,7 +556,7 @@ class clothstream_options(c.Structure):
         ("token", c.c_char_p),
         ("ca_file", c.c_char_p),
         ("fingerprint", c.c_char_p),
-        ("log", c.c_void_p),  # a function
+        ("log", c.c_void_p),
         ("log_context", c.c_void_p),
     ]
 
@@ -564,8 +565,8 @@ class clothstream_allocator(c.Structure):
     _fields_ = [
         ("version", c.c_uint32),
         ("context", c.c_void_p),
-        ("allocate", c.c_void_p),  # a function
-        ("release", c.c_void_p),  # a function
+        ("allocate", c.c_void_p),
+        ("release", c.c_void_p),
     ]
 
 
@@ -581,6 +582,7 @@ FUNCTIONS = {
     "cs_token": (c.c_char_p, [c.c_void_p]),
     "cs_resume_token": (c.c_char_p, [c.c_void_p]),
     "cs_set_resume_token": (c.c_int, [c.c_void_p, c.c_char_p]),
+    "cs_set_clock": (None, [c.c_void_p, c.c_void_p]),
     "cs_default_limits": (None, [c.POINTER(cs_limits)]),
     "cs_set_limits": (c.c_int, [c.c_void_p, c.POINTER(cs_limits)]),
     "cs_receive": (c.c_uint32, [c.c_void_p, c.POINTER(c.c_uint8), c.c_size_t, c.c_uint64]),
