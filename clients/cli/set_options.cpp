@@ -46,6 +46,7 @@ void addField(CLI::App& app, const parameters::EnvironmentParameter& parameter, 
   app.add_option(fmt::format("--{}", parameter.option), numbers, help)
       ->delimiter(',')
       ->expected(least, static_cast<int>(parameter.numbers.size()))
+      ->allow_extra_args(false)  // otherwise an option takes the address behind it
       ->group("Environment");
 }
 

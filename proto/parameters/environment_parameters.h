@@ -48,7 +48,7 @@ inline constexpr EnvironmentNumber kGustNumbers[] = {
     {{"m/s", {0, 100}}, "STRENGTH[,SECONDS]: maximum deviation of the wind,"},
     {{"s", {0.01, 3600}, 2}, ", and its duration,", true}};
 
-// Rows stand in the order of their fields in ParameterChange, which is the order on the wire.
+// Clients write the fields in this order.
 inline constexpr EnvironmentParameter kEnvironmentParameters[] = {
     {.row = kGravity, .field = {1, 1}, .numbers = kGravityNumbers, .isVector = true, .option = "gravity"},
     {.row = kWind, .field = {2, 2}, .numbers = kWindNumbers, .isVector = true, .option = "wind"},
@@ -61,7 +61,7 @@ using EnvironmentValues = std::array<EnvironmentValue, std::size(kEnvironmentPar
 // Absent fields stay as they are.
 using EnvironmentChange = std::array<std::optional<EnvironmentValue>, std::size(kEnvironmentParameters)>;
 
-inline void apply(const EnvironmentChange& change, EnvironmentValues& values) {
+inline void applyChange(const EnvironmentChange& change, EnvironmentValues& values) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = change[i].value_or(values[i]);
 }
 

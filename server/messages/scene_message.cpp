@@ -349,7 +349,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   if (message.has_substeps()) scene.substeps = message.substeps();
   checkRates(checks, scene);
   scene.integrator = toIntegrator(checks, root / "integrator", message.integrator());
-  model::apply(readNumbers(checks, root / "environment", message.environment()), scene.environment);
+  model::applyChange(scene.environment, readNumbers(checks, root / "environment", message.environment()));
 
   checks.count(root / "cloths", static_cast<std::size_t>(message.cloths_size()), 1, limits::kMaxCloths);
   checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,

@@ -39,7 +39,7 @@ void apply(const ColliderChange& change, Collider& collider) {
 
 }  // namespace
 
-void apply(const parameters::EnvironmentChange& change, Environment& environment) {
+void applyChange(Environment& environment, const parameters::EnvironmentChange& change) {
   for (const parameters::EnvironmentParameter& parameter : parameters::kEnvironmentParameters)
     if (const auto& value = change[parameter.row])
       for (std::uint32_t i = 0; i < parameter.numbers.size(); ++i)
@@ -47,7 +47,7 @@ void apply(const parameters::EnvironmentChange& change, Environment& environment
 }
 
 void applyChange(Scene& scene, const ParameterChange& change) {
-  apply(change.environment, scene.environment);
+  applyChange(scene.environment, change.environment);
   parameters::applyToCloths(change.cloths, scene.cloths,
                             [](const ClothChange& clothChange, Cloth& cloth) { apply(clothChange, cloth); });
   for (const ColliderChange& colliderChange : change.colliders) {

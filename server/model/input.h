@@ -93,9 +93,8 @@ struct ParameterChange {
   std::vector<ColliderChange> colliders = {};
 };
 
-void apply(const parameters::EnvironmentChange& change, Environment& environment);
-
 // The names in the change must exist in the scene.
 void applyChange(Scene& scene, const ParameterChange& change);
+void applyChange(Environment& environment, const parameters::EnvironmentChange& change);
 
 }  // namespace clothstream::model

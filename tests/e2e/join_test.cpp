@@ -358,7 +358,7 @@ TEST_F(Join, SetsParametersForAllClients) {
   EXPECT_EQ(cloths[1]["solver"], "massSpring");
 
   const auto made = clothstream(
-      {"set", address_, "--cloth", cloth, "--material", "silk", "--friction", "0.9", "--gust", "2,0.5"});
+      {"set", "--cloth", cloth, "--material", "silk", "--friction", "0.9", "--gust", "2,0.5", address_});
   ASSERT_EQ(made->waitForEnd(kPatience), 0) << made->errors();
   const auto none = clothstream({"set", address_, "--material", "velvet"});
   EXPECT_EQ(none->waitForEnd(kPatience), 4);

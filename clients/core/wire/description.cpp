@@ -313,7 +313,7 @@ const Hull* hullOf(const Collider& collider, const Description& description) {
 }
 
 void apply(const ParameterChange& change, Description& description) {
-  parameters::apply(change.environment, description.environment);
+  parameters::applyChange(change.environment, description.environment);
   parameters::applyToCloths(
       change.cloths, description.cloths,
       [](const ClothChange& clothChange, Cloth& cloth) { apply(clothChange, cloth.parameters); });

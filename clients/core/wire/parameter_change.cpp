@@ -241,7 +241,7 @@ bool readEnvironment(Bytes message, EnvironmentValues& environment) {
   const bool isRead = readFields(message, [&](std::uint32_t tag, Reader& reader) {
     return readNumber(tag, reader, &WireField::inScene, given);
   });
-  parameters::apply(given, environment);
+  parameters::applyChange(given, environment);
   return isRead;
 }
 
