@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
-#include <random>
 #include <utility>
 #include <vector>
 
@@ -73,10 +72,10 @@ void dropAbsent(const SavedRoster& roster, Checkpoint& checkpoint) {
   });
 }
 
-std::shared_ptr<const std::string> clothsOf(const v1::StreamDescription& description) {
+std::string clothsOf(const v1::StreamDescription& description) {
   v1::StreamDescription cloths;
   *cloths.mutable_cloths() = description.cloths();
-  return std::make_shared<const std::string>(cloths.SerializeAsString());
+  return cloths.SerializeAsString();
 }
 
 }  // namespace
@@ -90,11 +89,8 @@ LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<J
       poses(subscribers, inbox, this),
       roster(subscribers, poses, journal.get()),
       work(schedule::WorkLevel{1, definition.substeps}),
-      start_(std::move(definition)),
-      stability_(start_),
-      cloths_(std::make_shared<const std::string>(messages::clothsOfDescription(start_).SerializeAsString())),
-      definition_(start_),
-      charge_(budget ? std::move(budget) : std::make_shared<Budget>(), start_, !created) {}
+      definition_(std::move(definition)),
+      charge_(budget ? std::move(budget) : std::make_shared<Budget>(), start(), !created) {}
 
 LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::uint32_t most)
     : created(false),
@@ -103,11 +99,8 @@ LiveScene::LiveScene(std::string name, std::shared_ptr<FrameSource> from, std::u
       poses(subscribers, inbox),
       roster(subscribers, poses, nullptr),
       work(schedule::WorkLevel{}),
-      start_(nameAndRates(std::move(name), source->description())),
-      stability_(start_),
-      cloths_(clothsOf(source->description())),
-      definition_(start_),
-      charge_(std::make_shared<Budget>(), start_, true) {}
+      definition_(nameAndRates(std::move(name), source->description()), clothsOf(source->description())),
+      charge_(std::make_shared<Budget>(), start(), true) {}
 
 LiveScene::~LiveScene() {
   if (source) source->end();
@@ -123,33 +116,25 @@ void LiveScene::observe(std::unique_ptr<SceneObserver> observer) {
 
 model::Scene LiveScene::definition() const {
   const std::lock_guard lock(mutex_);
-  return definition_;
-}
-
-std::uint32_t LiveScene::leastSubsteps(const model::Scene& scene) const {
-  const std::uint32_t stable = stability_.substeps(scene);
-  return stable == 0 ? start_.substeps : std::min(stable, start_.substeps);
+  return definition_.accepted();
 }
 
 void LiveScene::restore(SavedScene saved, const ReconnectGrace& grace, Clock::time_point now) {
   if (saved.checkpoint) dropAbsent(saved.roster, *saved.checkpoint);
   {
     const std::lock_guard lock(mutex_);
-    if (saved.accepted)
-      definition_ = *saved.accepted;
-    else if (saved.checkpoint)
-      definition_ = saved.checkpoint->scene;
+    model::Scene definition = saved.accepted     ? *saved.accepted
+                              : saved.checkpoint ? saved.checkpoint->scene
+                                                 : definition_.accepted();
     // The correction fraction of an eased change of solver is the host's.
-    for (model::Cloth& cloth : definition_.cloths) cloth.solver.correctionFraction.reset();
+    for (model::Cloth& cloth : definition.cloths) cloth.solver.correctionFraction.reset();
+    definition_.restore(std::move(definition));
     if (saved.checkpoint) tick = saved.checkpoint->state.tick;
-    if (!created) charge_.restore(definition_);
+    if (!created) charge_.restore(definition_.accepted());
     if (saved.checkpoint || saved.accepted)
       restored_ =
           std::make_shared<const Restored>(Restored{std::move(saved.checkpoint), std::move(saved.accepted)});
-    // A participant may hold a description of the earlier run. Its number must not be given again.
-    std::random_device random;
-    contents_ = (std::uint64_t{random()} << 30) | (std::uint64_t{1} << 62);
-    definitionChanged();
+    comparePrice();
   }
   paused = saved.paused;
   resetRequested = saved.resetRequested;
@@ -168,34 +153,34 @@ void LiveScene::forgetRestored() {
 
 std::uint64_t LiveScene::version() const {
   const std::lock_guard lock(mutex_);
-  return version_;
+  return definition_.version();
 }
 
 messages::Result<void> LiveScene::charge(const std::string& path) {
   const std::lock_guard lock(mutex_);
-  return charge_.charge(path, definition_);
+  return charge_.charge(path, definition_.accepted());
 }
 
 double LiveScene::roomForHands() const {
   const std::lock_guard lock(mutex_);
-  return charge_.roomForHands(definition_);
+  return charge_.roomForHands(definition_.accepted());
 }
 
 double LiveScene::roomForOthers(double hands) const {
   const std::lock_guard lock(mutex_);
-  return charge_.roomForOthers(definition_, hands);
+  return charge_.roomForOthers(definition_.accepted(), hands);
 }
 
 messages::Result<void> LiveScene::chargeJoints() {
   const std::lock_guard lock(mutex_);
-  auto charged = charge_.chargeJoints("colliderPoses.joints", definition_);
-  isDearer_ = charge_.exceedsStart(definition_);
+  auto charged = charge_.chargeJoints("colliderPoses.joints", definition_.accepted());
+  comparePrice();
   return charged;
 }
 
 void LiveScene::chargeColliders(const ColliderLoad& load) {
   const std::lock_guard lock(mutex_);
-  charge_.chargeColliders(definition_, load);
+  charge_.chargeColliders(definition_.accepted(), load);
 }
 
 void LiveScene::setClothBounds(const ClothBounds& bounds) {
@@ -216,34 +201,30 @@ void LiveScene::discharge() {
 
 model::Work LiveScene::tickWork(std::size_t colliders) const {
   const std::lock_guard lock(mutex_);
-  return charge_.work(definition_, colliders);
+  return charge_.work(definition_.accepted(), colliders);
 }
 
 double LiveScene::price() const {
   const std::lock_guard lock(mutex_);
-  return charge_.load(definition_);
+  return charge_.load(definition_.accepted());
 }
 
 void LiveScene::quarantine(const std::string& why) {
   {
     const std::lock_guard lock(mutex_);
-    quarantined_ = why;
-    quarantinedUntil_.reset();
+    quarantine_.begin(why);
   }
   roster.close(delivery::error(v1::ERROR_CODE_RESOURCE_EXHAUSTED, why, true));
 }
 
 void LiveScene::refuseUntil(Clock::time_point until, const std::string& why) {
   const std::lock_guard lock(mutex_);
-  quarantined_ = why;
-  quarantinedUntil_ = until;
+  quarantine_.begin(why, until);
 }
 
 std::string LiveScene::quarantined(Clock::time_point now) const {
   const std::lock_guard lock(mutex_);
-  if (!quarantinedUntil_ || quarantined_.empty()) return quarantined_;
-  const auto left = std::chrono::ceil<std::chrono::seconds>(*quarantinedUntil_ - now).count();
-  return left > 0 ? fmt::format("{}; join again in {} s", quarantined_, left) : std::string();
+  return quarantine_.reason(now);
 }
 
 messages::Result<void> LiveScene::countChange(std::uint64_t participant, const char* call) {
@@ -276,9 +257,9 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   const std::lock_guard lock(mutex_);
   if (auto counted = countChangeLocked(participant, "parameterChange"); !counted) return counted;
   messages::Result<model::ParameterChange> change =
-      messages::toParameterChange(message, definition_, stability_);
+      messages::toParameterChange(message, definition_.accepted(), definition_.stability());
   if (!change) return tl::unexpected(std::move(change).error());
-  model::Scene changed = definition_;
+  model::Scene changed = definition_.accepted();
   model::applyChange(changed, *change);
   AcceptedChange accepted{participant, *change, messages::withMaterials(message, changed)};
   const std::size_t bytes = accepted.message.ByteSizeLong();
@@ -291,14 +272,14 @@ messages::Result<void> LiveScene::change(std::uint64_t participant, const v1::Pa
   if (const auto charged = charge_.charge("parameterChange", changed, pace); !charged)
     return tl::unexpected(charged.error());
   if (!inbox.postChange(std::move(accepted))) {
-    charge_.restore(definition_);
+    charge_.restore(definition_.accepted());
     return tl::unexpected(
         messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                              "parameterChange: too many changes for one tick; send it again later",
                              telemetry::Refusal::parameterChanges});
   }
-  definition_ = std::move(changed);
-  definitionChanged();
+  definition_.change(std::move(changed));
+  comparePrice();
   return {};
 }
 
@@ -307,18 +288,18 @@ std::uint32_t LiveScene::codec() const {
 }
 
 delivery::StreamShape LiveScene::shape() const {
-  if (!source) return {.rate = start_.streamRate, .qualities = start_.stream.qualities};
-  return {.rate = start_.streamRate, .qualities = source->qualities(), .lockstep = source->inLockstep()};
+  if (!source) return {.rate = start().streamRate, .qualities = start().stream.qualities};
+  return {.rate = start().streamRate, .qualities = source->qualities(), .lockstep = source->inLockstep()};
 }
 
 v1::ParameterChange LiveScene::restart() {
   const std::lock_guard lock(mutex_);
   inbox.dropChanges();
-  definition_ = start_;
+  definition_.change(start());
   restored_.reset();
   charge_.forgetJoints();
-  charge_.restore(definition_);
-  definitionChanged();
+  charge_.restore(start());
+  comparePrice();
   {
     const std::lock_guard boundsLock(boundsMutex_);
     clothBounds_.reset();
@@ -326,29 +307,29 @@ v1::ParameterChange LiveScene::restart() {
   tick = 0;
   ++restarts;
   resetRequested = false;
-  return allParameters(start_);
+  return allParameters(start());
 }
 
 v1::ParameterChange LiveScene::revertTo(const model::Scene& applied) {
   const std::lock_guard lock(mutex_);
-  definition_ = applied;
-  inbox.forEachChange([&](const model::ParameterChange& change) { model::applyChange(definition_, change); });
-  charge_.restore(definition_);
-  definitionChanged();
+  model::Scene definition = applied;
+  inbox.forEachChange([&](const model::ParameterChange& change) { model::applyChange(definition, change); });
+  definition_.change(std::move(definition));
+  charge_.restore(definition_.accepted());
+  comparePrice();
   return allParameters(applied);
 }
 
 std::shared_ptr<const delivery::DescriptionChunks> LiveScene::description() {
   const std::lock_guard lock(mutex_);
-  if (description_) return description_;
-  const double seconds = static_cast<double>(tick.load()) * definition_.tickSeconds();
+  if (auto description = definition_.description()) return description;
+  const double seconds = static_cast<double>(tick.load()) * definition_.accepted().tickSeconds();
   v1::StreamDescription message =
       source ? source->description()
-             : messages::descriptionWithoutCloths(definition_, kEpoch, codec(), seconds);
+             : messages::descriptionWithoutCloths(definition_.accepted(), kEpoch, codec(), seconds);
   message.set_scene(name());
   message.clear_cloths();
-  return description_ = std::make_shared<const delivery::DescriptionChunks>(++contents_, cloths_,
-                                                                            message.SerializeAsString());
+  return definition_.describe(message.SerializeAsString());
 }
 
 bool LiveScene::hasBeenEmptyFor(std::chrono::milliseconds time, Clock::time_point now) {

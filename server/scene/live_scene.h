@@ -15,7 +15,6 @@
 #include "server/messages/field_error.h"
 #include "server/model/price.h"
 #include "server/model/scene.h"
-#include "server/model/stability.h"
 #include "server/scene/budget.h"
 #include "server/scene/change_limits.h"
 #include "server/scene/checkpoint.h"
@@ -25,7 +24,9 @@
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/newest_poses.h"
+#include "server/scene/quarantine.h"
 #include "server/scene/roster.h"
+#include "server/scene/scene_definition.h"
 #include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
 #include "server/schedule/overload_policy.h"
@@ -50,9 +51,9 @@ class LiveScene : private ColliderBudget {
             std::uint32_t maxParticipants = kDefaultMaxParticipants);
   ~LiveScene() override;
 
-  const std::string& name() const { return start_.name; }
+  const std::string& name() const { return definition_.start().name; }
   // Definition at the start.
-  const model::Scene& start() const { return start_; }
+  const model::Scene& start() const { return definition_.start(); }
   // Codec and shape of the stream.
   std::uint32_t codec() const;
   delivery::StreamShape shape() const;
@@ -96,11 +97,10 @@ class LiveScene : private ColliderBudget {
   // Price of the scene as it is: seconds of the device's time per second, by estimate.
   double price() const;
 
-  // Minimum number of substeps with which `scene` is stable, at most start().substeps. `scene` is start()
-  // with other parameters.
-  std::uint32_t leastSubsteps(const model::Scene& scene) const;
+  // See SceneDefinition.
+  std::uint32_t leastSubsteps(const model::Scene& scene) const { return definition_.leastSubsteps(scene); }
   // Work of the scene if no overload reduces it.
-  schedule::WorkLevel allWork() const { return {1, start_.substeps}; }
+  schedule::WorkLevel allWork() const { return {1, start().substeps}; }
 
   // Ends the scene for good because it harms others: `why` is the last message to its participants, and every
   // later join is refused with it.
@@ -128,9 +128,6 @@ class LiveScene : private ColliderBudget {
   // Counts a change of parameters, a pause or a reset by this participant, 0 for peers outside the scene, or
   // returns why there are too many (ChangeLimits). `call` begins the text.
   messages::Result<void> countChange(std::uint64_t participant, const char* call);
-
-  // Epoch of the stream; a server has only one.
-  static constexpr std::uint32_t kEpoch = 1;
 
   const bool created;
   // Tenant of the peer that created it; empty if it has none. Set before other threads know the scene.
@@ -175,29 +172,17 @@ class LiveScene : private ColliderBudget {
   messages::Result<void> countChangeLocked(std::uint64_t participant, const char* call);
   // Error for what ChangeLimits has counted; nothing if there are not too many.
   messages::Result<void> tooMany(ChangeLimits::Exceeded exceeded, const char* call, const char* what) const;
-  // The definition has changed. The caller holds the lock.
-  void definitionChanged() {
-    description_.reset();
-    ++version_;
-    isDearer_ = charge_.exceedsStart(definition_);
-  }
-
-  const model::Scene start_;
-  const model::StabilityBound stability_;            // of start_
-  const std::shared_ptr<const std::string> cloths_;  // part of all descriptions
+  // The definition has changed, or its price. The caller holds the lock.
+  void comparePrice() { isDearer_ = charge_.exceedsStart(definition_.accepted()); }
 
   mutable std::mutex mutex_;
-  model::Scene definition_;
-  std::uint64_t version_ = 0;  // of definition_
+  SceneDefinition definition_;
   std::shared_ptr<const Restored> restored_;
-  Charge charge_;                      // of definition_
-  std::atomic<bool> isDearer_{false};  // definition_ costs more than start_
-  std::string quarantined_;
-  std::optional<Clock::time_point> quarantinedUntil_;  // absent: for good
+  Charge charge_;                      // of definition_.accepted()
+  std::atomic<bool> isDearer_{false};  // that costs more than start()
+  Quarantine quarantine_;
   ChangeLimits changes_;
-  std::optional<Clock::time_point> emptySince_;                     // of the newest call of hasBeenEmptyFor()
-  std::shared_ptr<const delivery::DescriptionChunks> description_;  // null after a change of the definition
-  std::uint64_t contents_ = 0;                                      // newest content id
+  std::optional<Clock::time_point> emptySince_;  // of the newest call of hasBeenEmptyFor()
 
   mutable std::mutex boundsMutex_;
   std::optional<ClothBounds> clothBounds_;  // after the newest tick

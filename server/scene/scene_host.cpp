@@ -138,7 +138,7 @@ void SceneHost::beginJournal(const simulation::StateSnapshot& state) {
   const model::Scene& scene = parameters_.scene();
   const double seconds = static_cast<double>(tick_) * scene.tickSeconds();
   live_.journal->begin(onDevice_->device.info(), scene,
-                       messages::toDescription(scene, LiveScene::kEpoch, live_.codec(), seconds), state,
+                       messages::toDescription(scene, kEpoch, live_.codec(), seconds), state,
                        onDevice_->start);
 }
 

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "server/scene/live_scene.h"
+#include "server/scene/scene_definition.h"
 #include "server/schedule/clock.h"
 
 namespace clothstream::scene {
@@ -25,7 +25,7 @@ SceneOnDevice::SceneOnDevice(vulkan::Device& device_, const model::Scene& scene,
                              const std::stop_token& stop)
     : device(device_),
       simulation(device_, scene),
-      encoders(device_, simulation, encode::streamLayout(scene, LiveScene::kEpoch), &workers),
+      encoders(device_, simulation, encode::streamLayout(scene, kEpoch), &workers),
       recorder(device_),
       slices(device_, recorder) {
   const std::uint32_t most = device.limits().maxAllocations;

@@ -77,7 +77,7 @@ DecodedFrames decode(const std::string& path) {
       EXPECT_TRUE(scene) << scene.error().text;
       if (!scene) return decoded;
       decoded.maxError = scene->stream.maxError;
-      decoder = codec::Decoder::make(encode::streamLayout(*scene, scene::LiveScene::kEpoch));
+      decoder = codec::Decoder::make(encode::streamLayout(*scene, scene::kEpoch));
     }
     if ((*message)->topic != Topic::frames) continue;
     v1::Frame frame;

@@ -43,7 +43,7 @@ class HostedScene {
       while (mailboxes.back()->next(now)) {
       }
     }
-    decoder = codec::Decoder::make(encode::streamLayout(live.start(), scene::LiveScene::kEpoch));
+    decoder = codec::Decoder::make(encode::streamLayout(live.start(), scene::kEpoch));
   }
   ~HostedScene() { publisher.drain(); }
 

@@ -45,7 +45,7 @@ class QualitySubscriber {
         mailbox_(std::make_shared<Mailbox>([this, endpoint] {
           if (endpoint == Endpoint::quick) take();
         })),
-        decoder_(codec::Decoder::make(encode::streamLayout(hosted.live.start(), LiveScene::kEpoch))) {
+        decoder_(codec::Decoder::make(encode::streamLayout(hosted.live.start(), kEpoch))) {
     hosted.live.subscribers.add(mailbox_);
     mailbox_->subscribe(nullptr, hosted.live.shape(), hosted.live.metrics, quality);
     take();
