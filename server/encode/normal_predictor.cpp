@@ -15,7 +15,7 @@ namespace {
 using vulkan::Buffer;
 using vulkan::BufferPurpose;
 
-constexpr std::uint32_t kWorkgroupSize = 64;
+constexpr std::uint32_t kNormalsWorkgroup = 64;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ NormalPredictor::NormalPredictor(const vulkan::Device& device, const codec::Stre
   std::ranges::copy(facesOf, upload_.mapped().subspan(faces_.bytes()).begin());
   for (Buffer& residuals : residuals_)
     residuals = Buffer(device, BufferPurpose::readback, layout.vertexCount() * sizeof(std::uint32_t));
-  const vulkan::Kernel kernel(device, kernels::predict_normals, kWorkgroupSize);
+  const vulkan::Kernel kernel(device, kernels::predict_normals, kNormalsWorkgroup);
   for (const Buffer& moment : moments) {
     for (const Buffer& residuals : residuals_)
       bindings_.emplace_back(

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "server/model/tethers.h"
+#include "server/simulation/attachment/grabbed_nodes.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
@@ -385,6 +386,28 @@ TEST_F(Attachments, GiveTheSameBitsForEveryPartitionOfWork) {
   const std::vector<std::uint64_t> expected = hashesOf({});
   EXPECT_EQ(hashesOf({.rowsPerInvocation = 3, .workgroupSize = 32}), expected);
   EXPECT_EQ(hashesOf({.workgroupSize = 8}), expected);
+}
+
+TEST(HeldNodes, ReturnUnchangedFromTheirRecords) {
+  const simulation::HeldNodes held{
+      .nodes = {{.node = 1, .grab = 1, .place = {1, 2, 3}}, {.node = 3, .grab = 0, .place = {0, 0, -1}}},
+      .grabs = {{.taken = 1, .slipped = 2, .offset = {4, 5, 6}}, {.taken = 7}}};
+  std::array<shared::GrabbedNode, 4> nodes;
+  nodes.fill({.place = {9, 9, 9}, .grabber = 2});
+  std::array<shared::GrabReport, 2> reports;
+  simulation::setHeldNodes(held, nodes, reports);
+  const simulation::HeldNodes again = simulation::heldNodes(nodes, reports);
+  EXPECT_EQ(again.nodes, held.nodes);
+  EXPECT_EQ(again.grabs, held.grabs);
+}
+
+TEST(HeldNodes, LeaveOutNodesOfUnknownGrabs) {
+  const std::array<shared::GrabbedNode, 3> nodes{{{{}, 0}, {{}, 2}, {{}, 1}}};
+  const std::array<shared::GrabReport, 1> reports{};
+  const simulation::HeldNodes held = simulation::heldNodes(nodes, reports);
+  ASSERT_EQ(held.nodes.size(), 1u);
+  EXPECT_EQ(held.nodes[0].node, 2u);
+  EXPECT_EQ(held.nodes[0].grab, 0u);
 }
 
 }  // namespace

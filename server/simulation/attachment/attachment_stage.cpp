@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cstring>
-#include <utility>
 
 #include "kernels/aim_attachments.h"
 #include "kernels/begin_grabs.h"
@@ -22,7 +21,6 @@ using vulkan::BufferPurpose;
 
 constexpr float kNoSlip = 1e18f;  // m, more than any distance in the world; its square is finite
 constexpr std::size_t kGrabBytes = kMaxGrabs * sizeof(shared::GrabRecord);
-constexpr std::size_t kReportBytes = kMaxGrabs * sizeof(shared::GrabReport);
 
 float stateOf(const Grab& grab) {
   switch (grab.state) {
@@ -63,32 +61,21 @@ shared::GrabRecord recordOf(const Grab& grab) {
 
 }  // namespace
 
-GrabStatus statusOf(const shared::GrabReport& report) {
-  return {report.grabbed, report.slipped, {report.offset.x, report.offset.y, report.offset.z}};
-}
-
 AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentTables& tables,
                                  const StateBuffers& state, std::span<const std::uint32_t> clothOffsets,
                                  std::uint32_t workgroupSize)
-    : device_(device),
-      clothOffsets_(clothOffsets.begin(), clothOffsets.end()),
-      workgroupSize_(workgroupSize),
+    : clothOffsets_(clothOffsets.begin(), clothOffsets.end()),
       nodeCount_(clothOffsets.back()),
       attachedCount_(static_cast<std::uint32_t>(tables.attached.size())),
-      hasTethers_(!tables.tethers.empty()),
       attached_(device, tables.attached),
       tethers_(device, tables.tethers),
-      restTethers_(tables.tethers),
       startFrames_(tables.frames),
       frames_(device, BufferPurpose::texels,
               std::max<std::size_t>(1, tables.frames.size()) * sizeof(shared::FrameRecord)),
       grabs_(device, BufferPurpose::texels, kGrabBytes),
-      grabbed_(device, BufferPurpose::state, nodeCount_ * sizeof(shared::GrabbedNode)),
-      reports_(device, BufferPurpose::state, kReportBytes),
+      grabbed_(device, nodeCount_),
       uploads_{Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes),
                Buffer(device, BufferPurpose::upload, frames_.bytes() + kGrabBytes)},
-      readbacks_{Buffer(device, BufferPurpose::readback, kReportBytes),
-                 Buffer(device, BufferPurpose::readback, kReportBytes)},
       carry_(bindStates(device, {device, kernels::carry_nodes, workgroupSize},
                         [&](std::size_t from) {
                           return BufferList{state.positions[from], state.velocities[from]};
@@ -100,24 +87,29 @@ AttachmentStage::AttachmentStage(const vulkan::Device& device, const AttachmentT
           })),
       findNearest_(bindStates(device, {device, kernels::find_nearest_nodes, workgroupSize},
                               [&](std::size_t from) {
-                                return BufferList{&grabs_, &reports_, state.positions[from]};
+                                return BufferList{&grabs_, &grabbed_.reports(), state.positions[from]};
                               })),
-      beginGrabs_(bindStates(device, {device, kernels::begin_grabs, workgroupSize},
-                             [&](std::size_t from) {
-                               return BufferList{&grabs_, &reports_, state.positions[from], &grabbed_};
-                             })),
-      tie_(bindPull(device, state, false)),
-      pull_(bindPull(device, state, true)) {}
+      beginGrabs_(bindStates(
+          device, {device, kernels::begin_grabs, workgroupSize},
+          [&](std::size_t from) {
+            return BufferList{&grabs_, &grabbed_.reports(), state.positions[from], &grabbed_.nodes()};
+          })),
+      tie_(bindPull(device, state, workgroupSize, false)),
+      pull_(bindPull(device, state, workgroupSize, true)) {}
 
 // The buffers that do not have the substep's start have its result.
 StateBindings AttachmentStage::bindPull(const vulkan::Device& device, const StateBuffers& state,
-                                        bool grabs) const {
+                                        std::uint32_t workgroupSize, bool grabs) const {
   return bindStates(
-      device, {device, kernels::pull_nodes, workgroupSize_, {hasTethers_ ? 1u : 0u, grabs ? 1u : 0u}},
+      device, {device, kernels::pull_nodes, workgroupSize, {tethers_.empty() ? 0u : 1u, grabs ? 1u : 0u}},
       [&](std::size_t from) {
         const std::size_t to = 1 - from;
-        return BufferList{&grabs_,  &reports_, &tethers_.texels(), state.positions[to], state.velocities[to],
-                          &grabbed_};
+        return BufferList{&grabs_,
+                          &grabbed_.reports(),
+                          &tethers_.texels(),
+                          state.positions[to],
+                          state.velocities[to],
+                          &grabbed_.nodes()};
       });
 }
 
@@ -127,26 +119,12 @@ std::uint64_t AttachmentStage::invocations() const {
 }
 
 void AttachmentStage::setCloths(std::span<const model::Cloth> cloths) {
-  if (!hasTethers_) return;
-  std::vector<float> longer;
-  for (const model::Cloth& cloth : cloths) longer.push_back(1 + (cloth.tethers ? cloth.tethers->slack : 0));
-  if (longer == longer_) return;
-  std::vector<shared::TetherRecord> tethers = restTethers_;
-  std::size_t node = 0;
-  for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth)
-    for (std::uint32_t i = 0; i < cloths[cloth].nodeCount(); ++i, ++node) {
-      tethers[node].ends[0].distance *= longer[cloth];
-      tethers[node].ends[1].distance *= longer[cloth];
-    }
-  tethers_.set(tethers);
-  longer_ = std::move(longer);
-  slackened_ = false;
+  tethers_.setSlack(cloths);
 }
 
 void AttachmentStage::recordTables(vulkan::Recorder& recorder) {
   attached_.recordUpload(recorder);
-  recorder.fill(grabbed_, 0, grabbed_.bytes());
-  recorder.fill(reports_, 0, reports_.bytes());
+  grabbed_.recordClear(recorder);
 }
 
 void AttachmentStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) {
@@ -154,7 +132,7 @@ void AttachmentStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick)
   const std::vector<Grab>& grabs = tick.inputs.grabs;
   assert(frames.empty() || frames.size() == startFrames_.size());
   assert(grabs.size() <= kMaxGrabs);
-  if (!std::exchange(slackened_, true)) tethers_.recordUpload(recorder);
+  tethers_.recordUpload(recorder);
   const Buffer& through = uploads_[tick.slot];
   const std::span<shared::FrameRecord> frameRecords = through.mapped<shared::FrameRecord>();
   for (std::size_t i = 0; i < startFrames_.size(); ++i)
@@ -168,10 +146,7 @@ void AttachmentStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick)
     std::memcpy(through.mapped().data() + frames_.bytes() + i * sizeof(record), &record, sizeof(record));
     if (grabs[i].state != Grab::State::takes) continue;
     takes_ = true;
-    const std::size_t report = i * sizeof(shared::GrabReport);
-    recorder.fill(reports_, ~0u, sizeof(shared::uint32_t), report + offsetof(shared::GrabReport, nearest));
-    recorder.fill(reports_, 0, sizeof(shared::GrabReport) - offsetof(shared::GrabReport, grabbed),
-                  report + offsetof(shared::GrabReport, grabbed));
+    grabbed_.recordBegin(recorder, i);
   }
   recorder.copy(through, grabs_, grabs.size() * sizeof(shared::GrabRecord), frames_.bytes());
 }
@@ -209,7 +184,7 @@ void AttachmentStage::recordStart(vulkan::Recorder& recorder, const Tick& tick, 
 }
 
 void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
-  if (!hasTethers_ && grabCount_ == 0) return;
+  if (tethers_.empty() && grabCount_ == 0) return;
   const shared::CollisionPush& times = substep.collision;
   recorder.barrier();
   recorder.dispatch((grabCount_ > 0 ? pull_ : tie_)[substep.from],
@@ -223,70 +198,17 @@ void AttachmentStage::recordSubstep(vulkan::Recorder& recorder, const Substep& s
 }
 
 void AttachmentStage::recordReport(vulkan::Recorder& recorder, const Tick& tick) {
-  if (grabCount_ > 0) recorder.copy(reports_, readbacks_[tick.slot], grabCount_ * sizeof(shared::GrabReport));
+  grabbed_.recordReport(recorder, tick.slot, grabCount_);
 }
 
 std::span<const shared::GrabReport> AttachmentStage::report(std::uint32_t slot) const {
-  return readbacks_[slot].mapped<const shared::GrabReport>().first(grabCount_);
-}
-
-void AttachmentStage::recordSave(vulkan::Recorder& recorder) {
-  savedGrabs_ = grabCount_;
-  if (savedGrabs_ == 0) return;
-  if (heldReadback_.bytes() == 0)
-    heldReadback_ = Buffer(device_, BufferPurpose::readback, grabbed_.bytes() + kReportBytes);
-  recorder.copy(grabbed_, heldReadback_, grabbed_.bytes());
-  recorder.copy(reports_, heldReadback_, savedGrabs_ * sizeof(shared::GrabReport), 0, grabbed_.bytes());
-}
-
-HeldNodes AttachmentStage::collect() const {
-  HeldNodes held;
-  if (savedGrabs_ == 0) return held;
-  const std::span<const std::byte> bytes = heldReadback_.mapped();
-  for (std::uint32_t i = 0; i < savedGrabs_; ++i) {
-    shared::GrabReport report;
-    std::memcpy(&report, bytes.data() + grabbed_.bytes() + i * sizeof(report), sizeof(report));
-    held.grabs.push_back(statusOf(report));
-  }
-  for (std::uint32_t i = 0; i < nodeCount_; ++i) {
-    shared::GrabbedNode node;
-    std::memcpy(&node, bytes.data() + i * sizeof(node), sizeof(node));
-    // Nodes of no grab, or of a grab that the tick did not have, are left out.
-    if (node.grabber < 1 || node.grabber > static_cast<float>(savedGrabs_)) continue;
-    held.nodes.push_back({.node = i,
-                          .grab = static_cast<std::uint32_t>(node.grabber) - 1,
-                          .place = {node.place.x, node.place.y, node.place.z}});
-  }
-  return held;
+  return grabbed_.report(slot, grabCount_);
 }
 
 void AttachmentStage::recordRestore(vulkan::Recorder& recorder, const HeldNodes& held) {
   // A state that is saved before the next tick has the same grabs.
   grabCount_ = static_cast<std::uint32_t>(held.grabs.size());
-  if (held.grabs.empty()) {
-    recorder.fill(grabbed_, 0, grabbed_.bytes());
-    return;
-  }
-  if (heldUpload_.bytes() == 0)
-    heldUpload_ = Buffer(device_, BufferPurpose::upload, grabbed_.bytes() + kReportBytes);
-  const std::span<std::byte> bytes = heldUpload_.mapped();
-  std::memset(bytes.data(), 0, bytes.size());
-  for (const HeldNode& node : held.nodes) {
-    const shared::GrabbedNode record{.place = vectorOf(node.place),
-                                     .grabber = static_cast<float>(node.grab + 1)};
-    std::memcpy(bytes.data() + node.node * sizeof(record), &record, sizeof(record));
-  }
-  for (std::size_t i = 0; i < held.grabs.size(); ++i) {
-    const shared::GrabReport report{.nearest = 0,
-                                    .grabbed = held.grabs[i].taken,
-                                    .slipped = held.grabs[i].slipped,
-                                    .reserved0 = 0,
-                                    .offset = vectorOf(held.grabs[i].offset),
-                                    .reserved1 = 0};
-    std::memcpy(bytes.data() + grabbed_.bytes() + i * sizeof(report), &report, sizeof(report));
-  }
-  recorder.copy(heldUpload_, grabbed_, grabbed_.bytes());
-  recorder.copy(heldUpload_, reports_, held.grabs.size() * sizeof(shared::GrabReport), grabbed_.bytes());
+  grabbed_.recordRestore(recorder, held);
 }
 
 }  // namespace clothstream::simulation

@@ -5,12 +5,14 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "server/model/jump.h"
 #include "server/model/pose.h"
 #include "server/model/scene.h"
 #include "server/simulation/attachment/attachment_tables.h"
-#include "server/simulation/attachment/grab.h"
+#include "server/simulation/attachment/grabbed_nodes.h"
+#include "server/simulation/attachment/tether_table.h"
 #include "server/simulation/device_table.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
@@ -21,8 +23,6 @@
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::simulation {
-
-GrabStatus statusOf(const shared::GrabReport& report);
 
 // Moves attached nodes with their frames and grabbed ones with their grabs, and keeps tethered ones near.
 class AttachmentStage final : public Stage {
@@ -46,8 +46,8 @@ class AttachmentStage final : public Stage {
 
   // Copies what the grabs of the last recorded tick hold to the CPU. collect() returns it once the recording
   // is complete. The caller records a barrier before and after each recording.
-  void recordSave(vulkan::Recorder& recorder);
-  HeldNodes collect() const;
+  void recordSave(vulkan::Recorder& recorder) { grabbed_.recordSave(recorder, grabCount_); }
+  HeldNodes collect() const { return grabbed_.collect(); }
   // Replaces what grabs hold. Numbers of nodes and grabs must be in range. No earlier recording may be in
   // flight.
   void recordRestore(vulkan::Recorder& recorder, const HeldNodes& held);
@@ -56,29 +56,23 @@ class AttachmentStage final : public Stage {
   void recordTables(vulkan::Recorder& recorder) override;
   void recordCarries(vulkan::Recorder& recorder, std::uint32_t present,
                      std::span<const model::Carry> carries) const;
-  StateBindings bindPull(const vulkan::Device& device, const StateBuffers& state, bool grabs) const;
+  StateBindings bindPull(const vulkan::Device& device, const StateBuffers& state, std::uint32_t workgroupSize,
+                         bool grabs) const;
   // Number of invocations, which share the nodes.
   std::uint64_t invocations() const;
 
-  const vulkan::Device& device_;
   std::vector<std::uint32_t> clothOffsets_;
-  std::uint32_t workgroupSize_, nodeCount_, attachedCount_;
-  bool hasTethers_;
-  bool slackened_ = true;  // the tethers on the device have the present slack
-  bool takes_ = false;     // a grab begins in this tick
+  std::uint32_t nodeCount_, attachedCount_;
+  bool takes_ = false;  // a grab begins in this tick
   std::uint32_t grabCount_ = 0;
 
-  DeviceTable attached_, tethers_;
-  std::vector<shared::TetherRecord> restTethers_;  // without slack
-  std::vector<float> longer_;                      // factor of each cloth's tethers in the table
+  DeviceTable attached_;
+  TetherTable tethers_;
   std::vector<shared::FrameRecord> startFrames_;
-  vulkan::Buffer frames_, grabs_, grabbed_, reports_;
+  vulkan::Buffer frames_, grabs_;
+  GrabbedNodes grabbed_;
   // By Tick::slot, because a tick may be in flight while the next one is recorded.
   std::array<vulkan::Buffer, 2> uploads_;  // frames, then grabs
-  std::array<vulkan::Buffer, 2> readbacks_;
-  // Held nodes, then reports. Created when they are first needed.
-  vulkan::Buffer heldReadback_, heldUpload_;
-  std::uint32_t savedGrabs_ = 0;  // by the newest recordSave()
   StateBindings carry_, aim_, findNearest_, beginGrabs_, tie_, pull_;
 };
 

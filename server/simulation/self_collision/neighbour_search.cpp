@@ -11,6 +11,7 @@
 #include "kernels/measure_velocities.h"
 #include "kernels/sort_cells.h"
 #include "kernels/start_cells.h"
+#include "server/model/scene.h"
 #include "server/simulation/texel.h"
 
 namespace clothstream::simulation {
