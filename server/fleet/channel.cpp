@@ -2,7 +2,7 @@
 #include "server/fleet/channel.h"
 
 #include <algorithm>
-#include <memory>
+#include <utility>
 
 namespace clothstream::fleet {
 namespace {
@@ -39,11 +39,11 @@ void Channel::queue(v1::Segment segment) {
 }
 
 void Channel::transmit(v1::Segment& segment, Clock::time_point now, const Send& send) {
-  segment.set_acknowledged(whole_);
-  segment.set_consumed(usedUpTo_);
+  segment.set_acknowledged(assembly_.whole());
+  segment.set_consumed(assembly_.used());
   lastSent_ = now;
   answerAt_.reset();
-  announced_ = usedUpTo_;
+  announced_ = assembly_.used();
   send(segment);
 }
 
@@ -63,8 +63,8 @@ void Channel::poll(Clock::time_point now, const Send& send) {
     unused_.emplace_back(segment.sequence(), segment.data().size());
     transmit(segment, now, send);
   }
-  const bool isUseDue =
-      usedUpTo_ - announced_ >= kUsedAtOnce || (usedUpTo_ > announced_ && now - lastSent_ >= kAnswerTime);
+  const std::uint64_t news = assembly_.used() - announced_;
+  const bool isUseDue = news >= kUsedAtOnce || (news > 0 && now - lastSent_ >= kAnswerTime);
   if ((answerAt_ && now >= *answerAt_) || isUseDue || now - lastSent_ >= kKeepAlive) {
     v1::Segment answer;
     transmit(answer, now, send);
@@ -85,35 +85,14 @@ std::vector<Channel::Received> Channel::receive(const v1::Segment& segment, Cloc
   if (segment.sequence() == 0) return {};
   // Also a segment that is here already, because its sender has not heard of that.
   if (!answerAt_) answerAt_ = now + kAnswerTime;
-  if (segment.sequence() != received_ + 1) return {};
-  ++received_;
-  if (segment.end() != v1::TUNNEL_END_UNSPECIFIED) {
-    whole_ = received_;
-    return {{.message = nullptr, .end = segment.end(), .sequence = received_}};
-  }
-  if (partial_.size() + segment.data().size() <= kMaxMessageBytes) partial_ += segment.data();
-  if (segment.more()) {
-    use(usedUpTo_);
-    return {};
-  }
-  whole_ = received_;
-  const auto* const bytes = reinterpret_cast<const std::byte*>(partial_.data());
-  Received complete{.message = std::make_shared<std::vector<std::byte>>(bytes, bytes + partial_.size()),
-                    .sequence = received_,
-                    .timeUs = segment.time_us()};
-  partial_.clear();
-  return {std::move(complete)};
-}
-
-void Channel::use(std::uint64_t sequence) {
-  usedUpTo_ = std::max(usedUpTo_, sequence);
-  // A message that is longer than the window must not wait for its own end.
-  if (usedUpTo_ >= whole_) usedUpTo_ = received_;
+  std::vector<Received> complete;
+  if (auto message = assembly_.add(segment)) complete.push_back(std::move(*message));
+  return complete;
 }
 
 void Channel::restart() {
-  received_ = usedUpTo_ = whole_ = announced_ = 0;
-  partial_.clear();
+  assembly_ = MessageAssembly(0);
+  announced_ = 0;
   heard_ = false;
   progress_ = {};
 }

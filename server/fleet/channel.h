@@ -8,12 +8,12 @@
 #include <deque>
 #include <functional>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "clothstream/v1/fleet.pb.h"
 #include "server/delivery/envelope.h"
+#include "server/fleet/message_assembly.h"
 #include "server/schedule/clock.h"
 
 namespace clothstream::fleet {
@@ -23,27 +23,18 @@ namespace clothstream::fleet {
 class Channel {
  public:
   using Clock = schedule::Clock;
+  using Received = ReceivedMessage;
   using Send = std::function<void(const v1::Segment& segment)>;
 
   // Bytes that are sent and that the other end has not used; one message more fits always.
   static constexpr std::size_t kWindow = 256 * 1024;
   static constexpr std::size_t kMaxSegmentBytes = 64 * 1024;
   static constexpr std::size_t kSegmentCost = 128;
-  // A received message is at most this long.
-  static constexpr std::size_t kMaxMessageBytes = std::size_t{256} << 20;
   static constexpr std::chrono::milliseconds kFirstRepeat{250}, kLongestRepeat{1000}, kAnswerTime{20},
       kKeepAlive{1000};
 
-  struct Received {
-    delivery::SharedBytes message;  // null: the end
-    v1::TunnelEnd end = v1::TUNNEL_END_UNSPECIFIED;
-    std::uint64_t sequence = 0;  // for use()
-    std::uint64_t timeUs = 0;    // at which it was sent first, by the clock of the other end
-  };
-
   // `received`: newest segment that this end has used already, in a former life.
-  explicit Channel(std::uint64_t received = 0)
-      : received_(received), usedUpTo_(received), whole_(received), announced_(received) {}
+  explicit Channel(std::uint64_t received = 0) : assembly_(received), announced_(received) {}
 
   // Whether another message would be sent at once.
   bool hasRoom() const { return waiting_.empty() && windowBytes_ < kWindow; }
@@ -62,10 +53,10 @@ class Channel {
   // Handles a segment. Returns the messages that are complete now. Segments out of order are dropped.
   [[nodiscard]] std::vector<Received> receive(const v1::Segment& segment, Clock::time_point now);
   // The message of this number, and all before it, are used: the other end may send more.
-  void use(std::uint64_t sequence);
+  void use(std::uint64_t sequence) { assembly_.use(sequence); }
 
   // Newest segment whose message is complete. Another end continues after it.
-  std::uint64_t received() const { return whole_; }
+  std::uint64_t received() const { return assembly_.whole(); }
   // Whether anything has arrived.
   bool heard() const { return heard_; }
   // The other end is replaced by one that has received everything up to received(). Its own messages begin
@@ -84,9 +75,8 @@ class Channel {
   Clock::time_point progress_{}, lastSent_{};
   Clock::duration repeat_ = kFirstRepeat;
 
-  std::uint64_t received_, usedUpTo_, whole_;
-  std::uint64_t announced_ = 0;  // usedUpTo_ that the other end knows
-  std::string partial_;
+  MessageAssembly assembly_;
+  std::uint64_t announced_;  // used segment of which the other end knows
   std::optional<Clock::time_point> answerAt_;
   bool heard_ = false;
 };

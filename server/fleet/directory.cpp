@@ -23,22 +23,12 @@ using namespace std::chrono_literals;
 
 constexpr auto kPeriod = 500ms;
 constexpr auto kRetry = 2s;
-// A server that does not hear of its own renewals for this long does not hear of those of others.
-constexpr auto kSilence = 2s, kLongestSilence = 4s;
-// The name of a scene without server is free again after this time.
-constexpr auto kContinuedBy = 30s;
 // Entries of servers are deleted by NATS after this time without a renewal.
 constexpr auto kServerLifetime = 30s;
 constexpr auto kStateTime = 2s;  // that reading a state may take
 constexpr std::size_t kPartBytes = 512 * 1024;
 constexpr std::uint64_t kMaxCheckpointBytes = std::uint64_t{256} << 20;
 constexpr int kMaxParts = static_cast<int>(kMaxCheckpointBytes / kPartBytes) + 1;
-// Servers try to adopt a scene at different times.
-constexpr int kMaxDelay = 500;  // ms
-
-std::string keyOf(std::uint64_t origin) {
-  return fmt::format("{:016x}", origin);
-}
 
 std::string partKey(const std::string& scene, std::uint32_t slot, std::uint32_t part) {
   return fmt::format("{}.{}.{}", scene, slot, part);
@@ -66,7 +56,7 @@ struct Directory::Buckets {
 };
 
 Directory::Directory(Nats& nats, hosting::SceneServer& server, v1::ServerEntry self, Adopt adopt)
-    : nats_(nats), server_(server), self_(std::move(self)), adopt_(std::move(adopt)) {
+    : nats_(nats), server_(server), self_(std::move(self)), adopt_(std::move(adopt)), view_(self_.origin()) {
   thread_ = std::thread([this] { run(); });
   renewing_ = std::thread([this] { renew(); });
 }
@@ -88,10 +78,7 @@ void Directory::setScenes(std::vector<OwnScene> scenes) {
   {
     const std::lock_guard lock(mutex_);
     scenes_ = std::move(scenes);
-    for (const OwnScene& own : scenes_) {
-      arriving_.erase(own.scene->name());
-      had_.insert(own.scene->name());
-    }
+    for (const OwnScene& own : scenes_) own_.offer(own.scene->name());
   }
   changed_.notify_all();
 }
@@ -101,21 +88,10 @@ std::vector<Directory::OwnScene> Directory::scenesNow() const {
   return scenes_;
 }
 
-bool Directory::hears(Clock::time_point now) const {
-  const auto self = servers_.find(self_.origin());
-  return reads_ && now - readAt_ >= kLease && self != servers_.end() && now - self->second.renewed < kSilence;
-}
-
-bool Directory::isAlive(std::uint64_t origin, Clock::time_point now) const {
-  const auto found = servers_.find(origin);
-  return found != servers_.end() && (now - found->second.renewed < kLease || !hears(now));
-}
-
 bool Directory::isTakenLocked(const std::string& name) const {
-  const auto found = known_.find(name);
-  return found != known_.end() && found->second.entry.origin() != self_.origin() &&
-         !leaving_.contains(name) && !arriving_.contains(name) &&
-         isAlive(found->second.entry.origin(), Clock::now());
+  const FleetView::Scene* const known = view_.find(name);
+  return known != nullptr && known->entry.origin() != self_.origin() && !own_.moves(name) &&
+         view_.isAlive(known->entry.origin(), Clock::now());
 }
 
 bool Directory::isTaken(const std::string& name) const {
@@ -125,25 +101,24 @@ bool Directory::isTaken(const std::string& name) const {
 
 bool Directory::isRunElsewhere(const std::string& name) const {
   const std::lock_guard lock(mutex_);
-  return isTakenLocked(name) && servers_.at(known_.at(name).entry.origin()).isNew;
+  return isTakenLocked(name) && view_.server(view_.find(name)->entry.origin())->isNew;
 }
 
 bool Directory::owns(const std::string& name) const {
   const std::lock_guard lock(mutex_);
-  return revisionOf(name).has_value();
+  return view_.ownRevisionOf(name).has_value();
 }
 
 std::optional<std::string> Directory::publicNameOf(const std::string& scene) const {
   const std::lock_guard lock(mutex_);
-  const auto found = known_.find(scene);
-  if (found == known_.end() || found->second.entry.origin() == self_.origin()) return std::nullopt;
+  const FleetView::Scene* const known = view_.find(scene);
+  if (known == nullptr || known->entry.origin() == self_.origin()) return std::nullopt;
   const Clock::time_point now = Clock::now();
-  if (isAlive(found->second.entry.origin(), now))
-    return servers_.at(found->second.entry.origin()).entry.public_name();
-  if (!found->second.entry.created() || !found->second.entry.has_checkpoint()) return std::nullopt;
-  const auto waits = withoutServer_.find(scene);
-  return waits == withoutServer_.end() || now - waits->second < kContinuedBy ? std::optional(std::string())
-                                                                             : std::nullopt;
+  if (view_.isAlive(known->entry.origin(), now))
+    return view_.server(known->entry.origin())->entry.public_name();
+  const bool isContinued =
+      known->entry.created() && known->entry.has_checkpoint() && orphans_.mayContinue(scene, now);
+  return isContinued ? std::optional(std::string()) : std::nullopt;
 }
 
 void Directory::simulateLoss() {
@@ -156,16 +131,12 @@ void Directory::simulateLoss() {
 
 std::vector<v1::ServerEntry> Directory::others() const {
   const std::lock_guard lock(mutex_);
-  const Clock::time_point now = Clock::now();
-  std::vector<v1::ServerEntry> others;
-  for (const auto& [origin, server] : servers_)
-    if (origin != self_.origin() && isAlive(origin, now)) others.push_back(server.entry);
-  return others;
+  return view_.others(Clock::now());
 }
 
 bool Directory::isThere(std::uint64_t other) const {
   const std::lock_guard lock(mutex_);
-  return isAlive(other, Clock::now());
+  return view_.isAlive(other, Clock::now());
 }
 
 bool Directory::isStopping() const {
@@ -181,40 +152,34 @@ void Directory::setStopping() {
   changed_.notify_all();
 }
 
-std::optional<std::uint64_t> Directory::revisionOf(const std::string& name) const {
-  const auto found = known_.find(name);
-  if (found == known_.end() || found->second.entry.origin() != self_.origin()) return std::nullopt;
-  return found->second.revision;
-}
-
 std::optional<std::uint64_t> Directory::beginMove(const std::string& name) {
   std::unique_lock lock(mutex_);
-  leaving_.insert(name);
+  own_.beginMove(name);
   changed_.wait(lock, [&] { return saving_ != name; });
-  const std::optional<std::uint64_t> revision = revisionOf(name);
-  if (!revision) leaving_.erase(name);
+  const std::optional<std::uint64_t> revision = view_.ownRevisionOf(name);
+  if (!revision) own_.endMove(name);
   return revision;
 }
 
 void Directory::endMove(const std::string& name) {
   const std::lock_guard lock(mutex_);
-  leaving_.erase(name);
+  own_.endMove(name);
 }
 
 void Directory::expect(const std::string& name) {
   const std::lock_guard lock(mutex_);
-  arriving_.insert(name);
+  own_.expect(name);
 }
 
 void Directory::expectNoMore(const std::string& name) {
   const std::lock_guard lock(mutex_);
-  arriving_.erase(name);
+  own_.expectNoMore(name);
 }
 
 v1::StoredCheckpoint Directory::checkpointOf(const std::string& name) const {
   const std::lock_guard lock(mutex_);
-  const auto found = known_.find(name);
-  return found == known_.end() ? v1::StoredCheckpoint() : found->second.entry.checkpoint();
+  const FleetView::Scene* const known = view_.find(name);
+  return known == nullptr ? v1::StoredCheckpoint() : known->entry.checkpoint();
 }
 
 bool Directory::transfer(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision) {
@@ -235,8 +200,7 @@ void Directory::give(const std::string& name, const v1::SceneEntry& entry) {
 
 void Directory::know(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision) {
   const std::lock_guard lock(mutex_);
-  Known& known = known_[name];
-  if (revision >= known.revision) known = {entry, revision};
+  view_.learn(name, entry, revision);
 }
 
 v1::ServerEntry Directory::selfNow() const {
@@ -268,7 +232,7 @@ void Directory::run() {
       if (!buckets && nats_.connected() && !last) {
         buckets = std::make_unique<Buckets>(nats_);
         const std::lock_guard reading(mutex_);
-        readAt_ = {};
+        view_.beginReading();
       }
       if (buckets) pass(*buckets);
       if (buckets && last) {
@@ -286,7 +250,7 @@ void Directory::run() {
       wait = kRetry;
     }
     lock.lock();
-    reads_ = buckets && buckets->serversRead && buckets->scenesRead;
+    view_.setReads(buckets && buckets->serversRead && buckets->scenesRead);
     if (last) break;
     changed_.wait_for(lock, wait, [this] { return stopping_ || lost_; });
   }
@@ -333,10 +297,7 @@ void Directory::pass(Buckets& buckets) {
 
 void Directory::checkHearing() {
   const std::lock_guard lock(mutex_);
-  const auto self = servers_.find(self_.origin());
-  const Clock::time_point heard = self == servers_.end() ? readAt_ : self->second.renewed;
-  if (Clock::now() - heard > kLongestSilence)
-    throw std::runtime_error("NATS does not tell about changes any more");
+  if (view_.isSilent(Clock::now())) throw std::runtime_error("NATS does not tell about changes any more");
 }
 
 void Directory::readChanges(Buckets& buckets) {
@@ -348,22 +309,16 @@ void Directory::readChanges(Buckets& buckets) {
     v1::ServerEntry entry;
     if (!change->deleted && !entry.ParseFromString(change->value)) continue;
     const std::lock_guard lock(mutex_);
-    const Clock::time_point now = Clock::now();
-    if (change->deleted) {
-      std::erase_if(servers_, [&](const auto& known) { return keyOf(known.first) == change->key; });
-      continue;
-    }
-    Server& server = servers_[entry.origin()];
-    // Renewals that were not heard may have been made.
-    if (entry.origin() == self_.origin() && now - server.renewed >= kSilence) readAt_ = now;
-    server = {.entry = entry, .renewed = now, .isNew = buckets.serversRead};
+    if (change->deleted)
+      view_.removeServer(change->key);
+    else
+      view_.renew(entry, buckets.serversRead, Clock::now());
   }
   while (const auto change = buckets.scenes.next(1ms)) {
     if (change->key.empty()) {
       buckets.scenesRead = true;
       const std::lock_guard lock(mutex_);
-      std::erase_if(known_, [&](const auto& known) { return !buckets.read.contains(known.first); });
-      readAt_ = Clock::now();
+      view_.finishReading(buckets.read, Clock::now());
       continue;
     }
     v1::SceneEntry entry;
@@ -373,26 +328,27 @@ void Directory::readChanges(Buckets& buckets) {
       continue;
     }
     const std::lock_guard lock(mutex_);
-    if (!change->deleted) {  // also after NATS has lost everything, and counts from 1 again
-      known_[change->key] = {entry, change->revision};
-      buckets.read.insert(change->key);
+    if (change->deleted) {
+      view_.removeScene(change->key, change->revision);
       continue;
     }
-    if (known_[change->key].revision <= change->revision) known_.erase(change->key);
+    view_.replace(change->key, entry, change->revision);
+    buckets.read.insert(change->key);
   }
 }
 
 void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scenes) {
-  std::vector<std::pair<std::string, Known>> given;
+  std::vector<std::pair<std::string, FleetView::Scene>> given;
   for (const OwnScene& own : scenes) {
     const std::string& name = own.scene->name();
-    std::optional<Known> known;
+    std::optional<FleetView::Scene> known;
     {
       const std::lock_guard lock(mutex_);
-      if (leaving_.contains(name)) continue;
-      if (const auto found = known_.find(name); found != known_.end()) known = found->second;
+      if (own_.leaves(name)) continue;
+      if (const auto* const found = view_.find(name)) known = *found;
+      const Clock::time_point now = Clock::now();
       if (known && known->entry.origin() != self_.origin() &&
-          (isAlive(known->entry.origin(), Clock::now()) || Clock::now() - readAt_ < kLease))
+          (view_.isAlive(known->entry.origin(), now) || !view_.isSettled(now)))
         continue;
     }
     if (known && known->entry.origin() == self_.origin() && known->entry.stream() == own.stream) continue;
@@ -409,15 +365,13 @@ void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scene
   }
   {
     const std::lock_guard lock(mutex_);
-    for (const auto& [name, known] : known_)
-      if (known.entry.origin() == self_.origin() && had_.contains(name) && !arriving_.contains(name) &&
-          !leaving_.contains(name) &&
-          std::ranges::none_of(scenes_, [&](const OwnScene& own) { return own.scene->name() == name; }))
+    const auto isOffered = [&](const std::string& name) {
+      return std::ranges::any_of(scenes_, [&](const OwnScene& own) { return own.scene->name() == name; });
+    };
+    for (const auto& [name, known] : view_.scenes())
+      if (known.entry.origin() == self_.origin() && own_.had(name) && !own_.moves(name) && !isOffered(name))
         given.emplace_back(name, known);
-    std::erase_if(had_, [&](const std::string& name) {
-      return !revisionOf(name) &&
-             std::ranges::none_of(scenes_, [&](const OwnScene& own) { return own.scene->name() == name; });
-    });
+    own_.forgetIf([&](const std::string& name) { return !view_.ownRevisionOf(name) && !isOffered(name); });
   }
   for (const auto& [name, known] : given) {
     // Another server may have it by now.
@@ -448,7 +402,7 @@ void Directory::saveScenes(Buckets& buckets, const std::vector<OwnScene>& scenes
     if (!isFirst && stored == next) continue;
     {
       const std::lock_guard lock(mutex_);
-      if (leaving_.contains(own.scene->name())) continue;
+      if (own_.leaves(own.scene->name())) continue;
       saving_ = own.scene->name();
     }
     bool isSaved = false, isLost = false;
@@ -474,7 +428,7 @@ bool Directory::save(Buckets& buckets, const OwnScene& own) {
   std::optional<std::uint64_t> revision;
   {
     const std::lock_guard lock(mutex_);
-    revision = revisionOf(name);
+    revision = view_.ownRevisionOf(name);
   }
   if (!revision) return false;
   std::future<std::optional<scene::Checkpoint>> state = server_.state().device.read(own.scene);
@@ -493,11 +447,8 @@ bool Directory::save(Buckets& buckets, const OwnScene& own) {
     return false;
   }
   if (bytes.size() > kMaxCheckpointBytes) return false;
-  {
-    const std::lock_guard lock(mutex_);
-    const v1::StoredCheckpoint& former = known_[name].entry.checkpoint();
-    entry.mutable_checkpoint()->set_slot(former.parts() > 0 ? 1 - former.slot() : 0);
-  }
+  const v1::StoredCheckpoint former = checkpointOf(name);
+  entry.mutable_checkpoint()->set_slot(former.parts() > 0 ? 1 - former.slot() : 0);
   entry.set_origin(self_.origin());
   entry.set_stream(own.stream);
   entry.set_created(true);
@@ -532,27 +483,22 @@ std::optional<v1::SavedParts> Directory::load(Buckets& buckets, const std::strin
 
 void Directory::adoptScenes(Buckets& buckets) {
   const Clock::time_point now = Clock::now();
-  std::optional<std::pair<std::string, Known>> next;
+  std::optional<std::pair<std::string, FleetView::Scene>> next;
   {
     const std::lock_guard lock(mutex_);
-    if (leaves_ || stopping_ || now - readAt_ < kLease) return;
-    std::erase_if(adoptAt_, [&](const auto& waiting) { return !known_.contains(waiting.first); });
-    std::erase_if(withoutServer_, [&](const auto& waiting) { return !known_.contains(waiting.first); });
-    for (const auto& [name, known] : known_) {
+    if (leaves_ || stopping_ || !view_.isSettled(now)) return;
+    orphans_.eraseIf([&](const std::string& name) { return view_.find(name) == nullptr; });
+    for (const auto& [name, known] : view_.scenes()) {
       const v1::SceneEntry& entry = known.entry;
       // A claim of this server may have come through after it had given up.
-      const bool isOurs = entry.origin() == self_.origin() &&
-                          (had_.contains(name) || arriving_.contains(name) || leaving_.contains(name));
-      const bool isOthers = entry.origin() != self_.origin() && isAlive(entry.origin(), now);
+      const bool isOurs = entry.origin() == self_.origin() && (own_.had(name) || own_.moves(name));
+      const bool isOthers = entry.origin() != self_.origin() && view_.isAlive(entry.origin(), now);
       if (!entry.created() || !entry.has_checkpoint() || isOurs || isOthers) {
-        adoptAt_.erase(name);
-        withoutServer_.erase(name);
+        orphans_.erase(name);
         continue;
       }
-      withoutServer_.try_emplace(name, now);
-      const auto [waiting, isNew] = adoptAt_.try_emplace(name, now);
-      if (isNew) waiting->second += std::chrono::milliseconds(random_() % kMaxDelay);
-      if (now >= waiting->second && !next) next.emplace(name, known);
+      orphans_.add(name, now);
+      if (!next && orphans_.isDue(name, now)) next.emplace(name, known);
     }
   }
   if (!next) return;
@@ -573,7 +519,10 @@ void Directory::adoptScenes(Buckets& buckets) {
   if (problem.empty()) return;
   telemetry::log({name}, spdlog::level::warn, "the scene of a server that is gone is not continued here: {}",
                  problem);
-  adoptAt_[name] = Clock::now() + 10 * kRetry;
+  {
+    const std::lock_guard lock(mutex_);
+    orphans_.postpone(name, Clock::now() + 10 * kRetry);
+  }
   // Another server may try.
   if (claimed) std::ignore = buckets.scenes.update(name, known.entry.SerializeAsString(), *claimed);
   expectNoMore(name);

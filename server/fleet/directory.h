@@ -10,8 +10,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <random>
-#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -19,6 +17,9 @@
 
 #include "clothstream/v1/fleet.pb.h"
 #include "server/fleet/bucket.h"
+#include "server/fleet/fleet_view.h"
+#include "server/fleet/orphans.h"
+#include "server/fleet/own_names.h"
 #include "server/hosting/scene_server.h"
 #include "server/schedule/clock.h"
 
@@ -35,7 +36,6 @@ namespace clothstream::fleet {
 // Without JetStream there is no directory, and edges choose between scenes of the same name.
 class Directory {
  public:
-  static constexpr std::chrono::seconds kLease{5};
   // Interval of the checkpoints of created scenes.
   static constexpr std::chrono::seconds kCheckpointPeriod{3};
   static constexpr const char *kServers = "clothstream-servers", *kScenes = "clothstream-scenes",
@@ -97,21 +97,12 @@ class Directory {
  private:
   using Clock = schedule::Clock;
   struct Buckets;
-  struct Known {
-    v1::SceneEntry entry;
-    std::uint64_t revision = 0;
-  };
   struct Stored {
     Clock::time_point at{};
     // Newest saved state.
     std::uint64_t tick = 0, version = 0;
     std::uint32_t session = 0;  // CRC
     bool operator==(const Stored&) const = default;
-  };
-  struct Server {
-    v1::ServerEntry entry;
-    Clock::time_point renewed{};
-    bool isNew = false;  // heard of after the present entries were read
   };
 
   void run();
@@ -130,14 +121,8 @@ class Directory {
   void adoptScenes(Buckets& buckets);
   std::optional<v1::SavedParts> load(Buckets& buckets, const std::string& name,
                                      const v1::StoredCheckpoint& stored);
-  std::optional<std::uint64_t> revisionOf(const std::string& name) const;
   // Remembers an entry, unless a newer one is known.
   void know(const std::string& name, const v1::SceneEntry& entry, std::uint64_t revision);
-  // Whether this server has heard of renewals for long enough to know who is gone. Its own ones come back,
-  // too.
-  bool hears(Clock::time_point now) const;
-  // Whether the server has a lease. While this one cannot hear of renewals, every known server has one.
-  bool isAlive(std::uint64_t origin, Clock::time_point now) const;
   bool isTakenLocked(const std::string& name) const;
   std::vector<OwnScene> scenesNow() const;
 
@@ -149,22 +134,14 @@ class Directory {
   mutable std::mutex mutex_;  // protects the following
   std::condition_variable changed_;
   std::vector<OwnScene> scenes_;
-  std::map<std::uint64_t, Server> servers_;
-  std::map<std::string, Known> known_;
-  std::set<std::string> had_;  // names of scenes that this server has had
-  std::map<std::string, Clock::time_point>
-      withoutServer_;  // scenes that another server may continue, since when
-  std::set<std::string> leaving_, arriving_;
+  OwnNames own_;
+  FleetView view_;
+  Orphans orphans_;
   std::string saving_;  // scene whose entry the thread is about to change
   bool leaves_ = false, stopping_ = false, lost_ = false, leaseEnds_ = false;
 
-  bool reads_ = false;          // the newest round has worked
-  Clock::time_point readAt_{};  // all present entries are known since
-
   // Used by the thread.
   std::map<std::string, Stored> saved_;
-  std::map<std::string, Clock::time_point> adoptAt_;
-  std::minstd_rand random_{std::random_device{}()};
   bool logged_ = false;  // that there is no directory
 
   std::thread thread_, renewing_;

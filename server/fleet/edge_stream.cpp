@@ -22,11 +22,6 @@ using delivery::SharedBytes;
 using schedule::Clock;
 using namespace std::chrono_literals;
 
-// An interest is repeated after this time, and a request for a key frame earlier.
-constexpr auto kInterestPeriod = 1s;
-constexpr auto kKeyFramePeriod = 100ms;
-// A piece of a description is asked for again after this time.
-constexpr auto kAskAgain = 2s;
 // Frames of a quality that no viewer needs any more are received for this long.
 constexpr auto kQualityTime = 5s;
 // Events that wait for a description. Further ones are dropped.
@@ -61,7 +56,7 @@ EdgeStream::EdgeStream(EdgeContext context, std::uint64_t origin, const v1::Offe
       inbox_(edge_.nats.inbox()),
       tunnels_(std::make_shared<EdgeTunnels>(edge_.nats, edge_.edge, subject_)) {
   listen();
-  sendInterest(Clock::now());
+  tellInterest({}, false, Clock::now());
   askForDescription(Clock::now());
 }
 
@@ -91,7 +86,6 @@ void EdgeStream::listen() {
 }
 
 void EdgeStream::askForDescription(Clock::time_point now) {
-  received_ = 0;
   description_.clear();
   chunks_ =
       edge_.nats.subscribe(inbox_, [this](const auto&, const auto&, auto data) { edge_.arrive(id(), data); });
@@ -101,28 +95,16 @@ void EdgeStream::askForDescription(Clock::time_point now) {
 bool EdgeStream::receiveChunk(std::span<const std::byte> bytes, Clock::time_point now) {
   v1::ServerMessage message;
   if (!chunks_ || !parse(bytes, message) || !message.has_chunk()) return false;
-  const v1::Chunk& chunk = message.chunk();
-  if (chunk.index() == 0) {
-    content_ = chunk.content_id();
-    description_.clear();
-    received_ = 0;
-  }
-  if (chunk.content_id() != content_ || chunk.index() != received_ ||
-      chunk.total_bytes() > kMaxDescriptionBytes ||
-      description_.size() + chunk.data().size() > chunk.total_bytes())
-    return false;
-  description_ += chunk.data();
-  ++received_;
-  if (received_ == chunk.count()) return true;
-  ask(now);
-  return false;
+  const DescriptionDownload::Added added = description_.add(message.chunk());
+  if (added == DescriptionDownload::Added::incomplete) ask(now);
+  return added == DescriptionDownload::Added::complete;
 }
 
 bool EdgeStream::serve() {
   v1::StreamDescription description;
   std::string problem = "its description is not valid";
-  if (description.ParseFromString(description_)) problem = problemOf(description);
-  description_ = {};
+  if (description.ParseFromString(description_.bytes())) problem = problemOf(description);
+  description_.clear();
   chunks_.reset();
   if (scene_) {
     const std::lock_guard lock(mutex_);
@@ -159,23 +141,13 @@ void EdgeStream::end(const SharedBytes& last) {
 
 void EdgeStream::look(Clock::time_point now) {
   if (!isSuccessor()) tunnels_->poll();
-  if (chunks_ && now - asked_ > kAskAgain) ask(now);
-  if (!scene_) {
-    if (now - interestSent_ > kInterestPeriod) sendInterest(now);
-    return;
-  }
+  if (chunks_ && description_.isOverdue(now)) ask(now);
+  if (!scene_) return tellInterest({}, false, now);
   delivery::RequestedFrames needed = source_->needs(now);
   // Its first frames must not refer to those of the other stream.
   if (isSuccessor()) needed.keyFrames = needed.qualities;
   receiveFrames(needed.qualities, now);
-  const bool more = needed.qualities != sent_.qualities || (needed.keyFrames & ~sent_.keyFrames) != 0;
-  const bool asksOften = needed.keyFrames != 0 && !isSuccessor();
-  if (!more && now - interestSent_ < (asksOften ? Clock::duration(kKeyFramePeriod) : kInterestPeriod)) {
-    sent_.keyFrames &= needed.keyFrames;
-    return;
-  }
-  sent_ = needed;
-  sendInterest(now);
+  tellInterest(needed, !isSuccessor(), now);
 }
 
 void EdgeStream::learn(const v1::OfferedScene& offered) {
@@ -222,20 +194,17 @@ void EdgeStream::retire() {
 }
 
 void EdgeStream::ask(Clock::time_point now) {
-  v1::ChunkRequest request;
-  request.set_content_id(received_ > 0 ? content_ : 0);
-  request.set_index(received_);
-  asked_ = now;
-  edge_.nats.publish(descriptionSubject(subject_), toBytes(request), inbox_);
+  edge_.nats.publish(descriptionSubject(subject_), toBytes(description_.request(now)), inbox_);
 }
 
-void EdgeStream::sendInterest(Clock::time_point now) {
+void EdgeStream::tellInterest(const delivery::RequestedFrames& needed, bool asksOften,
+                              Clock::time_point now) {
+  if (!interest_.update(needed, asksOften, now)) return;
   v1::Interest interest;
   interest.set_edge(edge_.edge);
-  interest.set_qualities(sent_.qualities);
-  interest.set_key_frames(sent_.keyFrames);
+  interest.set_qualities(needed.qualities);
+  interest.set_key_frames(needed.keyFrames);
   interest.set_viewers(scene_ ? static_cast<std::uint32_t>(scene_->subscribers.size()) : 0);
-  interestSent_ = now;
   edge_.nats.publish(interestSubject(subject_), toBytes(interest));
 }
 

@@ -15,8 +15,10 @@
 
 #include "clothstream/v1/fleet.pb.h"
 #include "proto/codec/packet_header.h"
+#include "server/fleet/description_download.h"
 #include "server/fleet/edge_source.h"
 #include "server/fleet/edge_tunnel.h"
+#include "server/fleet/interest_times.h"
 #include "server/fleet/nats.h"
 #include "server/hosting/scene_server.h"
 #include "server/schedule/clock.h"
@@ -37,8 +39,6 @@ struct EdgeContext {
 // another one.
 class EdgeStream {
  public:
-  static constexpr std::size_t kMaxDescriptionBytes = std::size_t{256} << 20;
-
   EdgeStream(EdgeContext context, std::uint64_t origin, const v1::OfferedScene& offered);
   // A stream that continues another one, because the scene moves to its origin. Viewers get whatever comes
   // first of both, until replace().
@@ -90,7 +90,8 @@ class EdgeStream {
   void listen();
   void askForDescription(Clock::time_point now);
   void ask(Clock::time_point now);
-  void sendInterest(Clock::time_point now);
+  // Tells the origin what is needed, if it is time to do so.
+  void tellInterest(const delivery::RequestedFrames& needed, bool asksOften, Clock::time_point now);
   void receiveFrames(std::uint8_t qualities, Clock::time_point now);
   void receiveFrame(std::span<const std::byte> data);
   void event(std::span<const std::byte> data);
@@ -102,11 +103,8 @@ class EdgeStream {
   const std::string name_, subject_, inbox_;
   const bool continues_ = false;
 
-  std::uint64_t content_ = 0;
-  std::uint32_t received_ = 0;  // chunks
-  std::string description_;
-  Clock::time_point asked_{}, interestSent_{};
-  delivery::RequestedFrames sent_;
+  DescriptionDownload description_;
+  InterestTimes interest_;
   std::shared_ptr<scene::LiveScene> scene_;  // once it is served
 
   bool pauseIsOld_ = false;  // until the next offer

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <string_view>
 #include <utility>
 
@@ -64,7 +65,7 @@ constexpr HistogramRow kSceneHistograms[] = {
 struct CounterRow {
   const char* name;
   const char* help;
-  telemetry::Counter telemetry::SceneMetrics::*counter;
+  telemetry::Counter telemetry::SceneCounters::*counter;
 };
 
 constexpr CounterRow kSceneCounters[] = {
@@ -97,6 +98,8 @@ constexpr CounterRow kSceneCounters[] = {
     {"rejected_messages_total", "Messages answered by an error.", &Metrics::rejectedMessages},
     {"joins_total", "Joins, reconnections included.", &Metrics::joins},
 };
+static_assert(std::size(kSceneCounters) * sizeof(telemetry::Counter) == sizeof(telemetry::SceneCounters),
+              "each counter of a scene has a row");
 
 struct GaugeRow {
   const char* name;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <span>
 #include <utility>
 #include <vector>
@@ -21,14 +20,8 @@ using namespace std::chrono_literals;
 
 // Interval between checks for key-frame requests while playback is stopped.
 constexpr auto kLookAgain = 20ms;
-constexpr auto kAnnouncementPeriod = 1s;
-// Pause after a step that failed.
-// Maximum delay that playback catches up; a longer delay shifts the schedule.
-constexpr auto kMaxLateness = 250ms;
 // Maximum number of messages per step, so that control requests are handled in between.
 constexpr int kMaxMessages = 256;
-// Maximum first tick. Streams with larger ticks are renumbered, so that ticks cannot overflow.
-constexpr std::uint64_t kMaxFirstTick = std::uint64_t{1} << 62;
 
 messages::FieldError wrong(std::string text) {
   return {v1::ERROR_CODE_INVALID_ARGUMENT, "controlScene." + std::move(text)};
@@ -42,9 +35,10 @@ Playback::Playback(RecordedStream recording, const PlaybackOptions& options)
       loop_(options.loop),
       parameters_(recording.description()),
       options_(options),
-      faults_(options.faults ? std::optional<FaultPlan>(*options.faults) : std::nullopt),
       recording_(std::move(recording)),
-      ticksPerFrame_(std::max(1u, description().simulation_rate() / description().stream_rate())) {}
+      ticks_(std::max(1u, description().simulation_rate() / description().stream_rate())),
+      faults_(options.faults),
+      announcements_(options.lockstep) {}
 
 Playback::~Playback() {
   end();
@@ -148,14 +142,14 @@ std::optional<Playback::Clock::time_point> Playback::step(scene::LiveScene& scen
   const bool flows = here && !asleep_ && !paused_;
   scene.running = flows;
   if (flows) flow(scene, now);
-  if (here && (announcementDue_ || (flows && needsAnnouncement(now)))) {
-    nextAnnouncement_ = now + kAnnouncementPeriod;
-    announcePlayback(scene);
+  if (here && announcements_.isDue(position_, flows, now)) {
+    announcements_.announced(position_, now);
+    scene.subscribers.announce(scene::playbackMessage(*this));
   }
   if (!here) return std::nullopt;
   if (asleep_ || paused_ || !next_) return now + kLookAgain;
-  if (heldUntil_) return *heldUntil_;
-  return speed_ == kUnpaced ? now : due(timeOf(*next_));
+  if (faults_.heldUntil()) return *faults_.heldUntil();
+  return speed_ == kUnpaced ? now : pace_.due(timeOf(*next_), speed_);
 }
 
 bool Playback::needsJump(const scene::LiveScene& scene, Clock::time_point now) const {
@@ -167,11 +161,6 @@ bool Playback::needsJump(const scene::LiveScene& scene, Clock::time_point now) c
   return !options_.lockstep || !atEnd_ || asleep_ || scene.subscribers.anyRestarts();
 }
 
-bool Playback::needsAnnouncement(Clock::time_point now) const {
-  if (options_.lockstep) return std::floor(position_) != std::floor(announcedPosition_);
-  return now >= nextAnnouncement_;
-}
-
 void Playback::takeWanted(scene::LiveScene& scene, Clock::time_point now) {
   Wanted wanted;
   {
@@ -179,31 +168,29 @@ void Playback::takeWanted(scene::LiveScene& scene, Clock::time_point now) {
     wanted = std::exchange(wanted_, {});
     if (paused_ != scene.paused || wanted.speed) {
       paused_ = scene.paused;
-      origin_ = now;
-      originPosition_ = position_;
-      announcementDue_ = true;
+      pace_.start(position_, now);
+      announcements_.request();
     }
     speed_ = wanted.speed.value_or(speed_);
     loop_ = wanted.loop.value_or(loop_);
   }
   if (atEnd_ && !paused_ && !wanted.seek) wanted.seek = 0;
-  if (wanted.loop) announcementDue_ = true;
+  if (wanted.loop) announcements_.request();
   if (wanted.seek) jump(scene, *wanted.seek, now);
 }
 
 void Playback::jump(scene::LiveScene& scene, double seconds, Clock::time_point now) {
   recording_.seek(seconds);
   next_.reset();
-  heldSince_ = heldUntil_ = std::nullopt;
+  faults_.reset();
   atEnd_ = false;
-  announcementDue_ = true;
+  announcements_.request();
   moveTo(seconds);
   for (;;) {
     RecordedStream::Next next = recording_.next();
     if (auto* timed = std::get_if<RecordedStream::TimedMessage>(&next);
         timed != nullptr && timed->isFrame()) {
-      const bool begins = newest_ == 0 && timed->header.tick <= kMaxFirstTick;
-      shift_ = begins ? 0 : newest_ + ticksPerFrame_ - timed->header.tick;
+      ticks_.restart(timed->header.tick);
       announceParameters(scene, *timed);
       publishFrame(scene, *timed, Clock::now());
       break;
@@ -214,13 +201,7 @@ void Playback::jump(scene::LiveScene& scene, double seconds, Clock::time_point n
     }
     publish(scene, next, Clock::now());
   }
-  origin_ = now;
-  originPosition_ = position_;
-}
-
-Playback::Clock::time_point Playback::due(double seconds) const {
-  const std::chrono::duration<double> after((seconds - originPosition_) / speed_);
-  return origin_ + std::chrono::duration_cast<Clock::duration>(after);
+  pace_.start(position_, now);
 }
 
 double Playback::timeOf(const RecordedStream::Next& next) const {
@@ -233,62 +214,38 @@ void Playback::flow(scene::LiveScene& scene, Clock::time_point now) {
   for (int i = 0; i < kMaxMessages; ++i) {
     if (options_.lockstep && scene.subscribers.awaitAcknowledgement()) return;
     if (!next_) next_ = recording_.next();
-    if (!isDue(*next_, now)) return;
+    if (speed_ != kUnpaced && !pace_.reaches(timeOf(*next_), speed_, now)) return;
     if (std::holds_alternative<RecordedStream::End>(*next_)) return reachEnd(scene, now);
-    const Passage passage = passageOf(*next_, scene, now);
-    if (passage == Passage::held) return;
-    const Clock::time_point made = std::exchange(heldSince_, std::nullopt).value_or(Clock::now());
+    const FaultGate::Passage passage = passageOf(*next_, scene, now);
+    if (passage == FaultGate::Passage::held) return;
+    const Clock::time_point made = faults_.takeStart(Clock::now());
     // Publishing changes the message, so one that fails is left out. Clients miss it as they miss a lost
     // frame.
     RecordedStream::Next next = *std::exchange(next_, std::nullopt);
-    if (passage == Passage::free) publish(scene, next, made);
+    if (passage == FaultGate::Passage::free) publish(scene, next, made);
   }
   next_ = recording_.next();
 }
 
-bool Playback::isDue(const RecordedStream::Next& next, Clock::time_point now) {
-  if (speed_ == kUnpaced) return true;
-  const Clock::time_point dueAt = due(timeOf(next));
-  if (dueAt > now) return false;
-  if (now - dueAt > kMaxLateness) origin_ += now - dueAt - kMaxLateness;
-  return true;
-}
-
-Playback::Passage Playback::passageOf(const RecordedStream::Next& next, const scene::LiveScene& scene,
-                                      Clock::time_point now) {
+FaultGate::Passage Playback::passageOf(const RecordedStream::Next& next, const scene::LiveScene& scene,
+                                       Clock::time_point now) {
   const auto* timed = std::get_if<RecordedStream::TimedMessage>(&next);
-  if (!faults_ || timed == nullptr || !timed->isFrame()) return Passage::free;
-  if (heldUntil_) {
-    if (now < *heldUntil_) return Passage::held;
-    heldUntil_.reset();
-    return Passage::free;
-  }
-  const Fault fault = faults_->at(timed->header.tick);
-  if (fault.kind == Fault::Kind::none) return Passage::free;
-  if (fault.kind == Fault::Kind::drop) {
-    telemetry::log({scene.name()}, spdlog::level::debug, "fault: the frame at {:.3f} s is dropped",
-                   timed->time);
-    return Passage::dropped;
-  }
-  telemetry::log({scene.name()}, spdlog::level::debug, "fault: the frame at {:.3f} s waits {} ms",
-                 timed->time, fault.wait.count());
-  heldSince_ = now;
-  heldUntil_ = now + fault.wait;
-  return Passage::held;
+  if (timed == nullptr || !timed->isFrame()) return FaultGate::Passage::free;
+  return faults_.passageOf(timed->header.tick, now, scene.name(), timed->time);
 }
 
 void Playback::reachEnd(scene::LiveScene& scene, Clock::time_point now) {
   if (loop_) return jump(scene, 0, now);
   scene.paused = true;
   atEnd_ = true;
-  announcementDue_ = true;
+  announcements_.request();
   moveTo(recording_.length());
   {
     const std::lock_guard lock(mutex_);
     paused_ = true;
   }
   scene.subscribers.announce(
-      delivery::notice(v1::NOTICE_KIND_SCENE_PAUSED, "the recording is at its end", newest_));
+      delivery::notice(v1::NOTICE_KIND_SCENE_PAUSED, "the recording is at its end", ticks_.newest()));
 }
 
 void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next, Clock::time_point made) {
@@ -302,27 +259,24 @@ void Playback::publish(scene::LiveScene& scene, RecordedStream::Next& next, Cloc
     }
     if (lossesLogged_.insert(lost->start).second)
       telemetry::log({scene.name()}, spdlog::level::warn, "{}: {}", text, lost->reason);
-    scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RECORDING_DAMAGED, text, newest_));
+    scene.subscribers.announce(delivery::notice(v1::NOTICE_KIND_RECORDING_DAMAGED, text, ticks_.newest()));
     return;
   }
   auto& timed = std::get<RecordedStream::TimedMessage>(next);
   if (timed.isFrame()) {
-    // A frame that refers to the previous one has a larger tick. A key frame in a file from another program
-    // may not.
-    const std::uint64_t tick = timed.header.tick + shift_;
-    if (tick <= newest_ || tick - newest_ > kMaxTickStep) shift_ += newest_ + ticksPerFrame_ - tick;
+    ticks_.follow(timed.header.tick);
     return publishFrame(scene, timed, made);
   }
   if (timed.message.has_parameter_changed()) {
     v1::ParameterChanged& changed = *timed.message.mutable_parameter_changed();
-    changed.set_tick(changed.tick() + shift_);
+    changed.set_tick(ticks_.shifted(changed.tick()));
     const std::lock_guard lock(mutex_);
     parameters_.apply(changed.change());
   }
   if (timed.message.has_tick_events())
-    timed.message.mutable_tick_events()->set_tick(timed.message.tick_events().tick() + shift_);
+    timed.message.mutable_tick_events()->set_tick(ticks_.shifted(timed.message.tick_events().tick()));
   if (timed.message.has_notice())
-    timed.message.mutable_notice()->set_tick(timed.message.notice().tick() + shift_);
+    timed.message.mutable_notice()->set_tick(ticks_.shifted(timed.message.notice().tick()));
   scene.subscribers.announce(delivery::serialise(timed.message));
 }
 
@@ -330,8 +284,9 @@ void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessag
                             Clock::time_point made) {
   v1::Frame& frame = *timed.message.mutable_frame();
   codec::PacketHeader& header = timed.header;
-  header.tick += shift_;
-  for (std::size_t i = 0; i < header.referenceCount; ++i) header.references[i] += shift_;
+  header.tick = ticks_.shifted(header.tick);
+  for (std::size_t i = 0; i < header.referenceCount; ++i)
+    header.references[i] = ticks_.shifted(header.references[i]);
   const std::string recorded = std::move(*frame.mutable_packet());
   frame.clear_packet();
   const auto parsed = codec::parsePacket(std::as_bytes(std::span(recorded)));
@@ -344,7 +299,7 @@ void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessag
 
   const delivery::PublishedFrame published =
       delivery::publishedFrame(header, delivery::serialiseFrame(frame, packet), made);
-  newest_ = header.tick;
+  ticks_.send(header.tick);
   scene.tick = header.tick;
   scene.metrics.frames.add();
   if (published.key) scene.metrics.keyFrames.add();
@@ -353,19 +308,13 @@ void Playback::publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessag
   scene.subscribers.publish(published);
 }
 
-void Playback::announcePlayback(scene::LiveScene& scene) {
-  announcementDue_ = false;
-  announcedPosition_ = position_;
-  scene.subscribers.announce(scene::playbackMessage(*this));
-}
-
 void Playback::announceParameters(scene::LiveScene& scene, const RecordedStream::TimedMessage& frame) {
   ParametersInForce there = recording_.parametersAt(frame.time);  // may read the file
   {
     const std::lock_guard lock(mutex_);
     parameters_ = std::move(there);
   }
-  if (const auto message = scene::parametersMessage(*this, frame.header.tick + shift_))
+  if (const auto message = scene::parametersMessage(*this, ticks_.shifted(frame.header.tick)))
     scene.subscribers.announce(message);
 }
 

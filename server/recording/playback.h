@@ -10,8 +10,11 @@
 #include <string>
 #include <thread>
 
-#include "server/recording/fault_plan.h"
+#include "server/recording/announcement_times.h"
+#include "server/recording/fault_gate.h"
+#include "server/recording/pace.h"
 #include "server/recording/recorded_stream.h"
+#include "server/recording/tick_numbering.h"
 #include "server/scene/frame_source.h"
 #include "server/schedule/clock.h"
 
@@ -77,22 +80,16 @@ class Playback final : public scene::FrameSource {
   // Continues from the newest key frame at or before this time, and publishes it immediately.
   void jump(scene::LiveScene& scene, double seconds, Clock::time_point now);
   void flow(scene::LiveScene& scene, Clock::time_point now);
-  // Whether this message is due. A later one is then late by at most kMaxLateness.
-  bool isDue(const RecordedStream::Next& next, Clock::time_point now);
-  Clock::time_point due(double seconds) const;
   // Whether a subscriber waits for a key frame that only a jump can give it.
   bool needsJump(const scene::LiveScene& scene, Clock::time_point now) const;
-  bool needsAnnouncement(Clock::time_point now) const;
-  enum class Passage : std::uint8_t { free, dropped, held };
-  // Effect of the faults on the message now. A held message may pass from heldUntil_ on.
-  Passage passageOf(const RecordedStream::Next& next, const scene::LiveScene& scene, Clock::time_point now);
+  // Effect of the faults on the message now.
+  FaultGate::Passage passageOf(const RecordedStream::Next& next, const scene::LiveScene& scene,
+                               Clock::time_point now);
   double timeOf(const RecordedStream::Next& next) const;
   void publish(scene::LiveScene& scene, RecordedStream::Next& next, Clock::time_point made);
   // `made`: time of the frame in its message.
   void publishFrame(scene::LiveScene& scene, RecordedStream::TimedMessage& timed, Clock::time_point made);
   void reachEnd(scene::LiveScene& scene, Clock::time_point now);
-  // Announces position and settings.
-  void announcePlayback(scene::LiveScene& scene);
   // Announces the parameters in effect at this frame.
   void announceParameters(scene::LiveScene& scene, const RecordedStream::TimedMessage& frame);
   void moveTo(double seconds);
@@ -107,22 +104,16 @@ class Playback final : public scene::FrameSource {
   std::string damage_;
 
   const PlaybackOptions options_;
-  const std::optional<FaultPlan> faults_;
 
   // Used by step() only.
   RecordedStream recording_;
-  const std::uint64_t ticksPerFrame_;
+  TickNumbering ticks_;
+  FaultGate faults_;
+  Pace pace_;
+  AnnouncementTimes announcements_;
   std::optional<RecordedStream::Next> next_;
   bool begun_ = false;  // the first frame was published
   bool asleep_ = true, atEnd_ = false;
-  bool announcementDue_ = false;  // the state changed and must be announced
-  Clock::time_point origin_{}, nextAnnouncement_{};
-  double announcedPosition_ = 0;  // of the newest announcement, s
-  // Set while a fault holds next_.
-  std::optional<Clock::time_point> heldSince_, heldUntil_;
-  double originPosition_ = 0;      // position in the recording at the origin, s
-  std::uint64_t shift_ = 0;        // sent tick minus recorded tick, modulo 2^64
-  std::uint64_t newest_ = 0;       // newest tick sent
   std::set<double> lossesLogged_;  // start of each loss that was logged, s; each is logged once
 
   std::thread thread_;

@@ -94,12 +94,11 @@ SavedState::SavedState(SavedStateOptions options)
     if (!contents) {
       warnOfDamage(row.name, database_.file(), contents.error());
     } else if (!row.created) {
-      ofServer_.emplace(row.name, std::move(*contents));
+      earlier_.addOfServer(row.name, std::move(*contents));
     } else if (auto saved = toCreated(*contents); !saved) {
       warnOfDamage(row.name, database_.file(), saved.error());
     } else {
-      created_.push_back(std::move(*saved));
-      createdNames_.insert(row.name);
+      earlier_.addCreated(row.name, std::move(*saved));
     }
     rows_.emplace(row.name, std::move(row));
   }
@@ -118,36 +117,31 @@ SavedState::~SavedState() {
 
 std::vector<scene::SavedScene> SavedState::takeCreated() {
   const std::lock_guard lock(mutex_);
-  for (const scene::SavedScene& saved : created_) restored_.insert(saved.start.name);
-  for (const auto& [name, contents] : ofServer_) unused_.insert(name);
-  ofServer_.clear();
-  return std::exchange(created_, {});
+  return earlier_.takeCreated();
 }
 
 std::optional<scene::SavedScene> SavedState::take(const model::Scene& start) {
-  SceneContents contents;
+  std::optional<SceneContents> contents;
   {
     const std::lock_guard lock(mutex_);
-    const auto found = ofServer_.find(start.name);
-    if (found == ofServer_.end()) return {};
-    contents = std::move(found->second);
-    ofServer_.erase(found);
+    contents = earlier_.takeOfServer(start.name);
   }
+  if (!contents) return {};
   v1::SavedScene message;
-  const bool isParsed = contents.scene && message.ParseFromString(*contents.scene);
+  const bool isParsed = contents->scene && message.ParseFromString(*contents->scene);
   if (!isParsed) warnOfDamage(start.name, database_.file(), "its definition is damaged");
   scene::SavedScene saved{.start = start, .maxParticipants = message.max_participants()};
   if (isParsed && isOf(message, start)) {
-    addSessionAndCheckpoint(contents, saved);
+    addSessionAndCheckpoint(*contents, saved);
     const std::lock_guard lock(mutex_);
-    restored_.insert(start.name);
+    earlier_.setRestored(start.name);
     return saved;
   }
   if (isParsed)
     telemetry::log({start.name}, spdlog::level::info,
                    "its definition differs from that of the saved state: it starts from the beginning, and "
                    "keeps its bans");
-  saved.roster = toRoster(parseSession(start.name, contents));
+  saved.roster = toRoster(parseSession(start.name, *contents));
   saved.roster.participants.clear();
   if (saved.roster.bans.empty() && saved.roster.refusedTokenHashes.empty()) return {};
   return saved;
@@ -157,9 +151,9 @@ std::shared_ptr<scene::SceneKeeper> SavedState::keep(const std::shared_ptr<scene
   auto slot = std::make_shared<CheckpointSlot>(options_.checkpointInterval);
   {
     const std::lock_guard lock(mutex_);
-    if (!scene->created && createdNames_.contains(scene->name())) return nullptr;
-    unused_.erase(scene->name());
-    kept_[scene->name()] = std::make_shared<KeptScene>(scene, slot, restored_.contains(scene->name()));
+    if (!scene->created && earlier_.isCreated(scene->name())) return nullptr;
+    earlier_.eraseUnused(scene->name());
+    kept_[scene->name()] = std::make_shared<KeptScene>(scene, slot, earlier_.isRestored(scene->name()));
   }
   changed_.notify_all();
   return slot;
@@ -169,8 +163,7 @@ void SavedState::remove(const std::string& name) {
   {
     const std::lock_guard lock(mutex_);
     kept_.erase(name);
-    restored_.erase(name);
-    createdNames_.erase(name);
+    earlier_.remove(name);
     removed_.insert(name);
   }
   changed_.notify_all();
@@ -178,10 +171,10 @@ void SavedState::remove(const std::string& name) {
 
 bool SavedState::flush(std::chrono::milliseconds timeout, const std::string& name) {
   std::unique_lock lock(mutex_);
-  const std::uint64_t number = ++asked_;
-  flushed_.insert(name);
+  const std::uint64_t number = flushes_.add(name);
   changed_.notify_all();
-  if (!written_.wait_for(lock, timeout, [&] { return done_ >= number; }) || passFailed_) return false;
+  if (!written_.wait_for(lock, timeout, [&] { return flushes_.isServed(number); }) || flushes_.failed())
+    return false;
   return name.empty() ? retryAt_.empty() : !retryAt_.contains(name);
 }
 
@@ -201,9 +194,9 @@ void SavedState::run() {
     {
       std::unique_lock lock(mutex_);
       changed_.wait_for(lock, options_.lookInterval,
-                        [&] { return stopping_ || asked_ > done_ || (!failed && !removed_.empty()); });
+                        [&] { return stopping_ || flushes_.waits() || (!failed && !removed_.empty()); });
       last = stopping_;
-      asked = asked_;
+      asked = flushes_.newest();
     }
     failed = false;
     try {
@@ -215,8 +208,7 @@ void SavedState::run() {
     }
     if (!failed) logsNextFailure_ = true;
     const std::lock_guard lock(mutex_);
-    passFailed_ = failed;
-    done_ = asked;
+    flushes_.serve(asked, failed);
     written_.notify_all();
   }
 }
@@ -227,7 +219,7 @@ void SavedState::pass() {
   {
     const std::lock_guard lock(mutex_);
     kept = kept_;
-    flushed = std::exchange(flushed_, {});
+    flushed = flushes_.takeNames();
     toRemove_.merge(removed_);
     removed_.clear();
   }
@@ -370,7 +362,8 @@ bool SavedState::dropOldestUnused() {
   {
     const std::lock_guard lock(mutex_);
     for (auto row = rows_.begin(); row != rows_.end(); ++row)
-      if (unused_.contains(row->first) && (oldest == rows_.end() || row->second.order < oldest->second.order))
+      if (earlier_.isUnused(row->first) &&
+          (oldest == rows_.end() || row->second.order < oldest->second.order))
         oldest = row;
   }
   if (oldest == rows_.end()) return false;
@@ -381,7 +374,7 @@ bool SavedState::dropOldestUnused() {
                  "scenes need the room (--state-limit)");
   rows_.erase(oldest);
   const std::lock_guard lock(mutex_);
-  unused_.erase(name);
+  earlier_.eraseUnused(name);
   return true;
 }
 

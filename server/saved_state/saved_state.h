@@ -20,6 +20,8 @@
 
 #include "clothstream/v1/scene.pb.h"
 #include "server/saved_state/database.h"
+#include "server/saved_state/earlier_scenes.h"
+#include "server/saved_state/flush_requests.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/scene_store.h"
 
@@ -106,24 +108,17 @@ class SavedState final : public scene::SceneStore {
 
   const SavedStateOptions options_;
 
-  mutable std::mutex mutex_;  // protects the members down to ofServer_
+  mutable std::mutex mutex_;  // protects the members down to stopping_
   std::condition_variable changed_, written_;
   KeptScenes kept_;
-  std::set<std::string> restored_;      // scenes that were taken
-  std::set<std::string> createdNames_;  // scenes of earlier runs that peers created
-  std::set<std::string> unused_;        // scenes that earlier runs started with, and this one does not
-  std::set<std::string> removed_;       // since the newest pass
-  std::size_t failedRemovals_ = 0;      // at the end of the newest pass
-  std::set<std::string> flushed_;       // names of flush() since the newest pass began
-  std::uint64_t asked_ = 0;             // calls of flush()
-  std::uint64_t done_ = 0;              // those that a pass has served
-  bool passFailed_ = false;             // the newest pass ended early
+  EarlierScenes earlier_;
+  std::set<std::string> removed_;   // since the newest pass
+  std::size_t failedRemovals_ = 0;  // at the end of the newest pass
+  FlushRequests flushes_;
   // Scenes whose newest write failed, with the time of the next one.
   std::map<std::string, schedule::Clock::time_point> retryAt_;
   scene::StoreStatus status_;
   bool stopping_ = false;
-  std::vector<scene::SavedScene> created_;         // until taken
-  std::map<std::string, SceneContents> ofServer_;  // scenes that the server starts with, until taken
 
   // Belong to the writer after construction.
   Database database_;

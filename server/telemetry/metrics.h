@@ -24,19 +24,8 @@ class Counter {
   std::atomic<std::uint64_t> value_{0};
 };
 
-// Any thread may record and read. "Per subscriber" counts an event once for each subscriber that it concerns.
-struct SceneMetrics {
-  // Times in seconds.
-  Histogram tick;          // from the start of a tick to its status on the CPU
-  Histogram lateness;      // start of a tick behind its due time
-  Histogram deviceTotal;   // all stages of a tick on the device
-  StageHistograms device;  // each stage of a tick on the device
-  Histogram encode;  // from the end of a tick on the device to its packet, with the wait for entropy coding
-  Histogram send;    // from the packet to the moment an endpoint takes it
-  Histogram inputToPacket;  // from the arrival of a pose to the packet that shows its effect
-
-  Trace trace;
-
+// Any thread may count. "Per subscriber" counts an event once for each subscriber that it concerns.
+struct SceneCounters {
   Counter ticks;
   Counter lateTicks;          // ticks that started more than a quarter of a period late
   Counter slippedTicks;       // ticks by which simulated time fell behind real time
@@ -56,6 +45,20 @@ struct SceneMetrics {
   Counter crowdedBalls;       // self-collision: full neighbour lists, and balls with too many contacts
   Counter rejectedMessages;   // messages answered by an Error
   Counter joins;
+};
+
+// Any thread may record and read.
+struct SceneMetrics : SceneCounters {
+  // Times in seconds.
+  Histogram tick;          // from the start of a tick to its status on the CPU
+  Histogram lateness;      // start of a tick behind its due time
+  Histogram deviceTotal;   // all stages of a tick on the device
+  StageHistograms device;  // each stage of a tick on the device
+  Histogram encode;  // from the end of a tick on the device to its packet, with the wait for entropy coding
+  Histogram send;    // from the packet to the moment an endpoint takes it
+  Histogram inputToPacket;  // from the arrival of a pose to the packet that shows its effect
+
+  Trace trace;
 };
 
 // Connection to NATS.

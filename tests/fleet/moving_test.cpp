@@ -380,7 +380,7 @@ TEST_F(MovingTest, AfterAShortRestartOfNatsScenesStayWhereTheyAre) {
   ASSERT_TRUE(eventually([&] { return second_->origin->directory().checkpointOf("moves").parts() > 0; }));
   nats_->kill();
   nats_->restart();
-  std::this_thread::sleep_for(Directory::kLease + 7s);
+  std::this_thread::sleep_for(FleetView::kLease + 7s);
   EXPECT_EQ(second_->find("moves"), nullptr);
   EXPECT_NE(first_->find("moves"), nullptr);
   EXPECT_TRUE(first_->owns("moves"));
