@@ -80,12 +80,12 @@ int serve(const ProgramOptions& options, const Signals& signals) {
   if (!options.natsServers.empty())
     origin.emplace(server, natsOptions(options, "server"), originOptions(options));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  guard =
-      openEndpoints(server, options, signals, start, authenticator, monitoring.get(),
-                    fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.deviceInfo()), sceneList),
-                    report, [&](schedule::Clock::time_point until) {
-                      if (origin) origin->moveAll(until);
-                    });
+  guard = openEndpoints(
+      server, options, signals, start, authenticator, monitoring.get(),
+      fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.device.info()), sceneList), report,
+      [&](schedule::Clock::time_point until) {
+        if (origin) origin->moveAll(until);
+      });
   return 0;
 }
 
