@@ -7,7 +7,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/scene/live_scene.h"
 
 namespace clothstream::agones {
@@ -42,24 +42,23 @@ void Agones::run() {
 }
 
 void Agones::look(Clock::time_point now) {
-  hosting::SceneServer::State& state = server_.state();
-  state.device.wake();  // it otherwise sleeps while no scene runs; the next call of look() sees its answer
+  server_.device.wake();  // it otherwise sleeps while no scene runs; the next call of look() sees its answer
   std::map<std::string, Count> counts;
   std::set<std::string> names;
-  for (const auto& scene : state.scenesNow()) {
+  for (const auto& scene : server_.scenes.all()) {
     names.insert(scene->name());
     counts[kParticipants].count += static_cast<std::int64_t>(scene->subscribers.size());
     counts[kParticipants].capacity += scene->maxParticipants;
     counts[kCreatedScenes].count += scene->created ? 1 : 0;
   }
   const bool inUse = counts[kParticipants].count > 0 || counts[kCreatedScenes].count > 0;
-  counts[kCreatedScenes].capacity = state.options.maxCreatedScenes;
-  const scene::Budget::Usage usage = state.budget->usage();
+  counts[kCreatedScenes].capacity = server_.options.maxCreatedScenes;
+  const scene::Budget::Usage usage = server_.budget->usage();
   constexpr double kMilliseconds = 1e3;
   counts[kLoad] = {.count = std::llround(kMilliseconds * usage.load),
                    .capacity = std::llround(kMilliseconds * (usage.load + usage.freeLoad))};
 
-  const bool healthy = now - state.device.lastAnswer() <= deviceSilence_;
+  const bool healthy = now - server_.device.lastAnswer() <= deviceSilence_;
   if (phase_ == Phase::starting && !healthy) return;
   choosePhase(inUse, now);
   if (phase_ == Phase::starting) return;

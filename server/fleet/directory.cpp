@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/saved_state/contents.h"
 #include "server/saved_state/crc.h"
 #include "server/scene/live_scene.h"
@@ -205,16 +205,15 @@ void Directory::know(const std::string& name, const v1::SceneEntry& entry, std::
 
 v1::ServerEntry Directory::selfNow() const {
   v1::ServerEntry now = self_;
-  const hosting::SceneServer::State& state = server_.state();
-  for (const auto& scene : state.scenesNow()) {
+  for (const auto& scene : server_.scenes.all()) {
     now.set_participants(now.participants() + static_cast<std::uint32_t>(scene->subscribers.size()));
     now.set_created_scenes(now.created_scenes() + (scene->created ? 1 : 0));
   }
-  const scene::Budget::Usage usage = state.budget->usage();
+  const scene::Budget::Usage usage = server_.budget->usage();
   now.set_load(usage.load);
   now.set_max_load(usage.load + usage.freeLoad);
   // A server that plays a recording has no device.
-  now.set_max_created_scenes(state.device.info().name.empty() ? 0 : state.options.maxCreatedScenes);
+  now.set_max_created_scenes(server_.device.info().name.empty() ? 0 : server_.options.maxCreatedScenes);
   const std::lock_guard lock(mutex_);
   now.set_stopping(leaves_);
   return now;
@@ -431,7 +430,7 @@ bool Directory::save(Buckets& buckets, const OwnScene& own) {
     revision = view_.ownRevisionOf(name);
   }
   if (!revision) return false;
-  std::future<std::optional<scene::Checkpoint>> state = server_.state().device.read(own.scene);
+  std::future<std::optional<scene::Checkpoint>> state = server_.device.read(own.scene);
   if (state.wait_for(kStateTime) != std::future_status::ready) return false;
   std::string bytes;
   v1::SceneEntry entry;

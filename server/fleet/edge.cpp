@@ -15,7 +15,7 @@
 #include "server/fleet/message_bytes.h"
 #include "server/fleet/random_id.h"
 #include "server/fleet/subjects.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/messages/limits.h"
 #include "server/scene/live_scene.h"
 #include "server/telemetry/log.h"
@@ -65,7 +65,7 @@ EdgeContext Edge::context() {
 }
 
 Edge::Edge(hosting::SceneServer& server, const NatsOptions& options, Clock::duration keep)
-    : server_(server), id_(randomId()), keep_(keep), nats_(options, server.state().metrics.nats) {
+    : server_(server), id_(randomId()), keep_(keep), nats_(options, server.metrics.nats) {
   offers_ = nats_.subscribe(kOffers, [this](const auto&, const auto&, auto data) { arrive(0, data); });
   thread_ = std::thread([this] { run(); });
 }
@@ -87,7 +87,7 @@ void Edge::waitForOffers() const {
   const Clock::time_point start = Clock::now();
   const auto waited = [&] { return Clock::now() - start; };
   const auto waits = [&] {
-    return waited() < kFirstOffers || loads_ || (waited() < kPatience && server_.state().scenesNow().empty());
+    return waited() < kFirstOffers || loads_ || (waited() < kPatience && server_.scenes.all().empty());
   };
   while (waited() < kLongestWait && waits()) std::this_thread::sleep_for(kLookPeriod);
 }
@@ -95,7 +95,7 @@ void Edge::waitForOffers() const {
 void Edge::arrive(std::uint64_t stream, std::span<const std::byte> bytes) {
   {
     const std::lock_guard lock(mutex_);
-    if (arrivals_.size() >= kMaxArrivals) return server_.state().metrics.nats.dropped.add();
+    if (arrivals_.size() >= kMaxArrivals) return server_.metrics.nats.dropped.add();
     arrivals_.push_back({stream, std::make_shared<std::vector<std::byte>>(bytes.begin(), bytes.end())});
   }
   changed_.notify_all();

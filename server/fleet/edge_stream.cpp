@@ -11,7 +11,7 @@
 
 #include "server/fleet/message_bytes.h"
 #include "server/fleet/subjects.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/scene/live_scene.h"
 #include "server/telemetry/log.h"
 
@@ -226,7 +226,7 @@ void EdgeStream::receiveFrames(std::uint8_t qualities, Clock::time_point now) {
 }
 
 void EdgeStream::receiveFrame(std::span<const std::byte> data) {
-  if (!source_->receiveFrame(data)) return edge_.server.state().metrics.nats.refused.add();
+  if (!source_->receiveFrame(data)) return edge_.server.metrics.nats.refused.add();
   if (!arrived_.exchange(true) && isSuccessor()) edge_.wake();
 }
 
@@ -238,7 +238,7 @@ void EdgeStream::event(std::span<const std::byte> data) {
 }
 
 void EdgeStream::receive(std::span<const std::byte> data) {
-  if (!source_->receiveEvent(data)) edge_.server.state().metrics.nats.refused.add();
+  if (!source_->receiveEvent(data)) edge_.server.metrics.nats.refused.add();
 }
 
 }  // namespace clothstream::fleet

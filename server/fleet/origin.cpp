@@ -16,7 +16,7 @@
 #include "server/fleet/message_bytes.h"
 #include "server/fleet/random_id.h"
 #include "server/fleet/subjects.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/saved_state/contents.h"
 #include "server/scene/live_scene.h"
 #include "server/schedule/clock.h"
@@ -125,19 +125,19 @@ Origin::Origin(hosting::SceneServer& server, const NatsOptions& nats, OriginOpti
     : server_(server),
       id_(randomId()),
       options_(std::move(options)),
-      nats_(nats, server.state().metrics.nats),
+      nats_(nats, server.metrics.nats),
       tunnels_(server, nats_),
       departures_(std::make_unique<Worker>()),
       arrivals_(std::make_unique<Worker>()),
-      directory_(std::make_unique<Directory>(
-          nats_, server, entryOf(id_, options_, server.state().options.serverName),
-          [this](v1::SavedParts parts, const std::function<bool()>& claim) {
-            return adopt(std::move(parts), claim);
-          })),
+      directory_(
+          std::make_unique<Directory>(nats_, server, entryOf(id_, options_, server.options.serverName),
+                                      [this](v1::SavedParts parts, const std::function<bool()>& claim) {
+                                        return adopt(std::move(parts), claim);
+                                      })),
       requests_(nats_.subscribe(serverSubject(id_), [this](const auto&, const std::string& reply,
                                                            auto data) { hear(data, reply); })),
       thread_([this] { run(); }) {
-  server_.state().setOtherServers(
+  server_.scenes.setOtherServers(
       [this](const std::string& scene) { return directory_->publicNameOf(scene); });
 }
 
@@ -159,7 +159,7 @@ void Origin::endOffers() {
 
 Origin::~Origin() {
   tunnels_.deliverEnds();
-  server_.state().setOtherServers(nullptr);
+  server_.scenes.setOtherServers(nullptr);
   requests_.reset();
   endOffers();
   departures_.reset();
@@ -188,7 +188,7 @@ void Origin::run() {
 void Origin::lookForScenes() {
   // An older list must not replace a newer one: the directory gives up what is not in it.
   const std::lock_guard looking(looking_);
-  const auto scenes = server_.state().scenesNow();
+  const auto scenes = server_.scenes.all();
   std::vector<SharedStream> ended;
   std::vector<Directory::OwnScene> own;
   std::vector<std::shared_ptr<scene::LiveScene>> old;
@@ -231,7 +231,7 @@ void Origin::remove(const std::shared_ptr<scene::LiveScene>& scene, const std::s
   // The scene goes on, so nobody has left it.
   scene->roster.endObservation(false);
   const std::string where = server.empty() ? "another server" : server;
-  server_.state().removeCreated(
+  server_.created.remove(
       scene,
       delivery::error(v1::ERROR_CODE_CUT_OFF,
                       fmt::format("the scene has moved to {}: join again there", where), true, 0, server));
@@ -240,7 +240,7 @@ void Origin::remove(const std::shared_ptr<scene::LiveScene>& scene, const std::s
 void Origin::offer() {
   v1::Offer offer;
   offer.set_origin(id_);
-  offer.set_server_name(server_.state().options.serverName);
+  offer.set_server_name(server_.options.serverName);
   {
     const std::lock_guard lock(mutex_);
     for (const auto* streams : {&streams_, &prepared_})
@@ -257,7 +257,7 @@ Origin::SharedStream Origin::streamOf(const std::string& name) const {
 
 void Origin::hear(std::span<const std::byte> request, const std::string& reply) {
   v1::MoveRequest move;
-  if (!parse(request, move)) return server_.state().metrics.nats.refused.add();
+  if (!parse(request, move)) return server_.metrics.nats.refused.add();
   const bool queued = move.move() != 0 ? arrivals_->post([this, id = move.move()] { receiveScene(id); })
                                        : departures_->post([this, move, reply] {
                                            const v1::MoveResponse response =
@@ -421,14 +421,14 @@ std::string Origin::handOver(Conversation& talk, const OriginStream& stream, std
   if (!revision) return "it is not in the directory of the fleet (nats-server needs --jetstream)";
   const auto stay = [&](std::string why) {
     tunnels_.thaw(stream.subject());
-    server_.state().device.unhold(scene);
+    server_.device.unhold(scene);
     return why;
   };
   v1::MoveMessage message;
   try {
     // Inputs that were used before are in the state, and later ones go to the other server.
     const std::vector<v1::MovedTunnel> tunnels = tunnels_.freeze(stream.subject());
-    const std::optional<scene::Checkpoint> state = server_.state().device.hold(scene).get();
+    const std::optional<scene::Checkpoint> state = server_.device.hold(scene).get();
     stopped = Clock::now();
     *message.mutable_state()->mutable_scene() = saved_state::stateOf(*scene, state);
     message.mutable_state()->set_revision(*revision);
@@ -490,13 +490,13 @@ void Origin::receiveScene(std::uint64_t move) {
   auto saved = saved_state::toSaved(std::move(*asked->mutable_prepare()->mutable_scene()));
   if (!saved) return refuse(saved.error());
   const std::string name = saved->start.name;
-  auto arriving = server_.state().prepareArrival(std::move(*saved));
+  auto arriving = server_.created.prepareArrival(std::move(*saved));
   if (!arriving) return refuse(arriving.error());
-  const std::shared_ptr<scene::LiveScene> scene = *arriving;
+  const std::shared_ptr<scene::LiveScene> scene = arriving->scene();
   SharedStream stream;
   const auto giveUp = [&](const std::string& why) {
     if (stream) dropStream(stream);
-    server_.state().abandonArrival(scene);
+    arriving->abandon();
     directory_->expectNoMore(name);
     refuse(why);
   };
@@ -526,7 +526,7 @@ void Origin::receiveScene(std::uint64_t move) {
       return giveUp("the directory has another server for it");
     isOurs = true;
     try {
-      server_.state().startArrived(scene, std::move(*continued));
+      arriving->start(std::move(*continued));
     } catch (const std::exception& failure) {
       entry.set_origin(asked->prepare().origin());
       entry.set_stream(asked->prepare().stream());
@@ -564,7 +564,7 @@ void Origin::runStream(const SharedStream& stream) {
     streams_[stream->scene()->name()] = stream;
   }
   offer();
-  server_.state().wake(*stream->scene());
+  server_.device.wake(*stream->scene());
   lookForScenes();
 }
 
@@ -581,14 +581,14 @@ void Origin::dropStream(const SharedStream& stream) {
 std::string Origin::adopt(v1::SavedParts parts, const std::function<bool()>& claim) {
   auto saved = saved_state::toSaved(std::move(parts));
   if (!saved) return saved.error();
-  auto arriving = server_.state().prepareArrival(*saved);
+  auto arriving = server_.created.prepareArrival(*saved);
   if (!arriving) return arriving.error();
   try {
     if (stopping_) throw std::runtime_error("this server stops");
     if (!claim()) throw std::runtime_error("another server was faster");
-    server_.state().startArrived(*arriving, std::move(*saved));
+    arriving->start(std::move(*saved));
   } catch (const std::exception& failure) {
-    server_.state().abandonArrival(*arriving);
+    arriving->abandon();
     return failure.what();
   }
   lookForScenes();

@@ -12,7 +12,8 @@
 #include "server/fleet/message_bytes.h"
 #include "server/fleet/random_id.h"
 #include "server/fleet/subjects.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/answers.h"
+#include "server/hosting/scene_server.h"
 #include "server/scene/live_scene.h"
 
 namespace clothstream::fleet {
@@ -117,7 +118,7 @@ OriginStream::OriginStream(hosting::SceneServer& server, Nats& nats, OriginTunne
   interest_ = nats.subscribe(interestSubject(subject_), [this](const auto&, const auto&, auto data) {
     v1::Interest message;
     if (!parse(data, message)) return;
-    if (static_cast<SceneRelay&>(*relay_).hear(message, Clock::now())) server_.state().wake(*scene_);
+    if (static_cast<SceneRelay&>(*relay_).hear(message, Clock::now())) server_.device.wake(*scene_);
   });
   description_ = nats.subscribe(
       descriptionSubject(subject_), [this, &nats](const auto&, const std::string& reply, auto data) {
@@ -162,7 +163,7 @@ v1::OfferedScene OriginStream::offer() const {
   v1::OfferedScene offered;
   offered.set_stream(id_);
   *offered.mutable_summary() = hosting::summaryOf(*scene_);
-  offered.set_device_name(server_.state().deviceNameOf(*scene_));
+  offered.set_device_name(server_.deviceNameOf(*scene_));
   offered.set_continues(continues_);
   offered.set_prepared(prepared_);
   for (const scene::Ban& ban : scene_->roster.bans()) {

@@ -11,7 +11,7 @@
 #include "clothstream/v1/session.pb.h"
 #include "server/fleet/channel.h"
 #include "server/fleet/message_bytes.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/session/session.h"
 
 namespace clothstream::fleet {
@@ -128,7 +128,7 @@ void OriginTunnels::receive(const std::string& stream, const std::string& subjec
                             std::span<const std::byte> bytes) {
   const std::optional<TunnelId> id = tunnelOf(subject);
   v1::Segment segment;
-  if (!id || !parse(bytes, segment)) return server_.state().metrics.nats.refused.add();
+  if (!id || !parse(bytes, segment)) return server_.metrics.nats.refused.add();
   const Key key{stream, *id};
   std::shared_ptr<Tunnel> tunnel = find(key);
   if (!tunnel && segment.has_open()) tunnel = open(key, segment.open());

@@ -56,6 +56,13 @@ DeviceThread::~DeviceThread() {
   thread_.join();
 }
 
+void DeviceThread::wake(const scene::LiveScene& scene) {
+  if (scene.source)
+    scene.source->wake();
+  else
+    wake();
+}
+
 std::future<void> DeviceThread::add(std::shared_ptr<scene::LiveScene> scene) {
   return load(std::move(scene), false);
 }

@@ -54,8 +54,8 @@ using schedule::Clock;
 class DeviceThread {
  public:
   // Returns when the device and the first scene are ready, and the budget knows the device's speed. Without
-  // scenes there is no device, and none can be added. All arguments must outlive the thread. Throws what the
-  // device or the first scene throws.
+  // scenes there is no device, and none can be added. All arguments but the scenes must outlive the thread.
+  // Throws what the device or the first scene throws.
   DeviceThread(const vulkan::DeviceOptions& device,
                const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
                delivery::FramePublisher& publisher, telemetry::ServerMetrics& metrics, scene::Budget& budget,
@@ -67,6 +67,8 @@ class DeviceThread {
 
   // Call after a subscriber joined or left, or a scene was paused, resumed or reset.
   void wake() { inbox_.wake(); }
+  // The same for one scene. A scene that is not simulated has a source, which is woken instead.
+  void wake(const scene::LiveScene& scene);
 
   // Loads a scene that a peer created, and adds it. The future is ready when the scene is. It throws what the
   // device or the scene throws, or std::future_error if the thread ends first; then nothing has changed.

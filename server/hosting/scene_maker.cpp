@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <exception>
-#include <future>
 #include <memory>
 #include <span>
 #include <utility>
@@ -13,7 +12,7 @@
 #include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/answers.h"
 #include "server/messages/limits.h"
 #include "server/messages/parsed_size.h"
 #include "server/messages/scene_file.h"
@@ -24,16 +23,6 @@
 namespace clothstream::hosting {
 namespace {
 
-// Interval at which a scene that is being loaded is checked for cancellation.
-constexpr std::chrono::milliseconds kLoadingCheck{20};
-
-tl::unexpected<v1::Error> refused(v1::ErrorCode code, std::string text) {
-  v1::Error error;
-  error.set_code(code);
-  error.set_text(std::move(text));
-  return tl::unexpected(std::move(error));
-}
-
 // Returns the result of `work`. An exception, such as for a directory of recordings that cannot be written,
 // becomes an error for the peer that asked.
 template <class Work>
@@ -42,7 +31,7 @@ auto attempt(const char* call, const Work& work) -> decltype(work()) {
     return work();
   } catch (const std::exception& failure) {
     spdlog::error("{}: {}", call, failure.what());
-    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+    return refusal(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("{}: failed on the server: {}", call, failure.what()));
   }
 }
@@ -55,7 +44,9 @@ using Waiting = std::unique_ptr<std::atomic<std::uint32_t>, EndWaiting>;
 
 }  // namespace
 
-SceneMaker::SceneMaker(SceneServer::State& server) : server_(server) {
+SceneMaker::SceneMaker(const ServerOptions& options, telemetry::ServerMetrics& metrics,
+                       const SceneRegistry& scenes, const KeptScenes& kept, CreatedScenes& created)
+    : options_(options), metrics_(metrics), scenes_(scenes), kept_(kept), created_(created) {
   boost::asio::post(thread_, [this] { expireLater(); });
 }
 
@@ -69,7 +60,7 @@ SceneMaker::~SceneMaker() {
 }
 
 void SceneMaker::expireLater() {
-  const std::chrono::milliseconds lifetime = server_.options.sceneLifetime;
+  const std::chrono::milliseconds lifetime = options_.sceneLifetime;
   if (lifetime.count() == 0 || ended_) return;
   constexpr std::chrono::milliseconds kInterval{1000};
   const std::chrono::milliseconds interval = std::min(lifetime, kInterval);
@@ -82,7 +73,7 @@ void SceneMaker::expireLater() {
 }
 
 void SceneMaker::deleteUnused(std::chrono::milliseconds lifetime) {
-  for (const auto& scene : server_.scenesNow()) {
+  for (const auto& scene : scenes_.all()) {
     // A scene that waits for room cannot be used.
     if (!scene->created || scene->waitsForRoom || !scene->hasBeenEmptyFor(lifetime, Clock::now())) continue;
     v1::DeleteSceneRequest request;
@@ -102,8 +93,8 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
   const bool isFull = ++waiting_ > kMaxWaiting;
   Waiting waits(&waiting_);
   if (isFull) {
-    server_.metrics.refuse(telemetry::Refusal::waitingScenes);
-    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+    metrics_.refuse(telemetry::Refusal::waitingScenes);
+    return refusal(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("createScene: {} scenes wait to be created; try again later", kMaxWaiting));
   }
   boost::asio::post(thread_, [this, waits = std::move(waits), request = std::move(request),
@@ -111,7 +102,7 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
                               wanted = std::move(wanted), done = std::move(done)]() mutable {
     waits.reset();
     static const std::string nothing;
-    const auto end = Clock::now() + server_.options.maxCreationTime;
+    const auto end = Clock::now() + options_.maxCreationTime;
     const model::Cancellation cancellation(
         [&] { return stopping_ || (wanted && !wanted()) || Clock::now() > end; });
     auto made = attempt("createScene", [&]() -> tl::expected<v1::CreateSceneResponse, v1::Error> {
@@ -120,18 +111,18 @@ tl::expected<void, v1::Error> SceneMaker::create(v1::CreateSceneRequest request,
         return createNow(request, uploaded ? uploaded->bytes : nothing, tenant, cancellation);
       } catch (const model::Cancelled&) {
         if (stopping_)
-          return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+          return refusal(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                          "createScene: cancelled, because the server stops; create the scene again when the "
                          "server runs again");
         if (Clock::now() <= end)
-          return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+          return refusal(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                          "createScene: cancelled, because the peer that asked for it has left; connect and "
                          "create the scene again");
-        server_.metrics.refuse(telemetry::Refusal::creationTime);
-        return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        metrics_.refuse(telemetry::Refusal::creationTime);
+        return refusal(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                        fmt::format("createScene: takes longer than {} s (--profile); make the "
                                    "scene smaller",
-                                   schedule::seconds(server_.options.maxCreationTime)));
+                                   schedule::seconds(options_.maxCreationTime)));
       }
     });
     uploaded.reset();  // before the answer, so that the peer may upload again at once
@@ -145,8 +136,8 @@ tl::expected<void, v1::Error> SceneMaker::enqueue(const char* call, Work work, D
   const bool isFull = ++requests_ > kMaxWaiting;
   Waiting waits(&requests_);
   if (isFull) {
-    server_.metrics.refuse(telemetry::Refusal::waitingScenes);
-    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+    metrics_.refuse(telemetry::Refusal::waitingScenes);
+    return refusal(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("{}: {} requests about scenes wait; try again later", call, kMaxWaiting));
   }
   boost::asio::post(
@@ -165,14 +156,14 @@ tl::expected<void, v1::Error> SceneMaker::remove(v1::DeleteSceneRequest request,
 
 tl::expected<std::shared_ptr<scene::Journal>, v1::Error> SceneMaker::journalOf(
     const std::string& call, const std::string& name) const {
-  const std::shared_ptr<scene::LiveScene> scene = server_.find(name);
-  if (!scene) return tl::unexpected(SceneServer::State::noSuchScene(name));
+  const std::shared_ptr<scene::LiveScene> scene = scenes_.find(name);
+  if (!scene) return tl::unexpected(SceneRegistry::noSuchScene(name));
   if (scene->source)
-    return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+    return refusal(v1::ERROR_CODE_INVALID_ARGUMENT,
                    fmt::format("{}: '{}' is a recording that is played", call, scene->name()));
   if (!scene->journal) {
     messages::FieldError error = scene::noJournalError(call);
-    return refused(error.code, std::move(error.text));
+    return refusal(error.code, std::move(error.text));
   }
   return scene->journal;
 }
@@ -194,8 +185,8 @@ tl::expected<v1::StartRecordingResponse, v1::Error> SceneMaker::startNow(
   const auto journal = journalOf("startRecording", request.scene());
   if (!journal) return tl::unexpected(journal.error());
   auto file = (*journal)->start(request.name());
-  if (!file && file.error().limit) server_.metrics.refuse(*file.error().limit);
-  if (!file) return refused(file.error().code, std::move(file.error().text));
+  if (!file && file.error().limit) metrics_.refuse(*file.error().limit);
+  if (!file) return refusal(file.error().code, std::move(file.error().text));
   v1::StartRecordingResponse response;
   response.set_file(std::move(*file));
   return response;
@@ -206,54 +197,54 @@ tl::expected<v1::StopRecordingResponse, v1::Error> SceneMaker::stopNow(
   const auto journal = journalOf("stopRecording", request.scene());
   if (!journal) return tl::unexpected(journal.error());
   auto stopped = (*journal)->stop();
-  if (!stopped) return refused(stopped.error().code, std::move(stopped.error().text));
+  if (!stopped) return refusal(stopped.error().code, std::move(stopped.error().text));
   return std::move(*stopped);
 }
 
 tl::expected<model::Scene, v1::Error> SceneMaker::checked(messages::Result<model::Scene> scene) {
   if (scene) return std::move(*scene);
-  if (scene.error().limit) server_.metrics.refuse(*scene.error().limit);
-  return refused(scene.error().code, "createScene.scene: " + scene.error().text);
+  if (scene.error().limit) metrics_.refuse(*scene.error().limit);
+  return refusal(scene.error().code, "createScene.scene: " + scene.error().text);
 }
 
 tl::expected<model::Scene, v1::Error> SceneMaker::definitionOf(const v1::CreateSceneRequest& request,
                                                                const std::string& uploaded,
                                                                const model::Cancellation& cancellation,
                                                                std::vector<v1::MeshRepair>& repairs) {
-  const messages::SceneLimits limits{.nodes = server_.options.maxSceneNodes,
-                                     .nodeSprings = server_.options.maxNodeSprings,
-                                     .springs = server_.options.maxSceneSprings,
-                                     .attachments = server_.options.maxSceneAttachments,
+  const messages::SceneLimits limits{.nodes = options_.maxSceneNodes,
+                                     .nodeSprings = options_.maxNodeSprings,
+                                     .springs = options_.maxSceneSprings,
+                                     .attachments = options_.maxSceneAttachments,
                                      .cancellation = cancellation};
   switch (request.source_case()) {
     case v1::CreateSceneRequest::kScene:
       return checked(messages::toScene(request.scene(), {}, limits, &repairs));
     case v1::CreateSceneRequest::kUploadedContentId: {
       v1::Scene message;
-      const std::size_t most = server_.options.maxParsedBytes;
+      const std::size_t most = options_.maxParsedBytes;
       const auto size =
           messages::parsedSize(*v1::Scene::descriptor(), std::as_bytes(std::span(uploaded)), most);
       if (!size && size.error() == messages::SizeError::tooLarge) {
-        server_.metrics.refuse(telemetry::Refusal::sceneSize);
-        return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        metrics_.refuse(telemetry::Refusal::sceneSize);
+        return refusal(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                        fmt::format("createScene: the uploaded Scene message would take more than {} bytes of "
                                    "memory (--profile): send fewer elements",
                                    most));
       }
       cancellation.check();
       if (!size || !message.ParseFromString(uploaded))
-        return refused(v1::ERROR_CODE_MALFORMED_MESSAGE,
+        return refusal(v1::ERROR_CODE_MALFORMED_MESSAGE,
                        "createScene: the uploaded content is not a Scene message");
       cancellation.check();
       return checked(messages::toScene(message, {}, limits, &repairs));
     }
     case v1::CreateSceneRequest::kNamed:
-      if (const std::shared_ptr<scene::LiveScene> live = server_.find(request.named())) return live->start();
+      if (const std::shared_ptr<scene::LiveScene> live = scenes_.find(request.named())) return live->start();
       if (std::ranges::count(messages::namedScenes(), request.named()) > 0)
         return checked(messages::loadScene(request.named()));
-      return tl::unexpected(server_.noSuchScene(request.named(), identity::local()));
+      return tl::unexpected(scenes_.noSuchScene(request.named(), identity::local()));
     default:
-      return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+      return refusal(v1::ERROR_CODE_INVALID_ARGUMENT,
                      "createScene: must have one of \"scene\", \"uploadedContentId\" and \"named\"");
   }
 }
@@ -268,63 +259,33 @@ tl::expected<v1::CreateSceneResponse, v1::Error> SceneMaker::createNow(
     messages::Checks checks;
     definition->name = checks.name(messages::Path("createScene.name"), request.name());
     if (auto named = std::move(checks).result(true); !named)
-      return refused(named.error().code, named.error().text);
+      return refusal(named.error().code, named.error().text);
   }
-  const std::uint32_t most = server_.options.maxParticipants;
+  const std::uint32_t most = options_.maxParticipants;
   if (request.max_participants() > most)
-    return refused(v1::ERROR_CODE_INVALID_ARGUMENT,
+    return refusal(v1::ERROR_CODE_INVALID_ARGUMENT,
                    fmt::format("createScene.maxParticipants = {}: must be at most {}, the server's maximum",
                                request.max_participants(), most));
-  const auto place = server_.takePlace(definition->name, tenant, true);
-  if (!place) return tl::unexpected(place.error());
-  std::shared_ptr<scene::Journal> journal =
-      server_.options.journals ? server_.options.journals(*definition) : nullptr;
-  const auto scene = std::make_shared<scene::LiveScene>(
-      std::move(*definition), true, std::move(journal),
-      request.max_participants() > 0 ? request.max_participants() : most, server_.budget);
-  scene->tenant = tenant;
-  cancellation.check();
-  if (auto charged = scene->charge(); !charged) {
-    server_.metrics.refuse(telemetry::Refusal::budget);
-    return refused(charged.error().code, std::move(charged.error().text));
-  }
-  server_.keep(scene);
+  const auto scene = created_.create(std::move(*definition),
+                                     request.max_participants() > 0 ? request.max_participants() : most,
+                                     tenant, cancellation);
+  if (!scene) return tl::unexpected(scene.error());
+  kept_.flush(**scene);
+  telemetry::log({(*scene)->name()}, spdlog::level::info, "created, {} vertices",
+                 (*scene)->start().nodeCount());
   v1::CreateSceneResponse response;
-  try {
-    std::future<void> added = server_.device.add(scene);
-    while (added.wait_for(kLoadingCheck) != std::future_status::ready) cancellation.check();
-    added.get();
-    cancellation.check();
-    *response.mutable_scene() = summaryOf(*scene);
-    response.mutable_repairs()->Assign(repairs.begin(), repairs.end());
-    server_.insert(scene);
-  } catch (const model::Cancelled&) {
-    undoCreation(scene);
-    throw;
-  } catch (const std::exception& failure) {
-    undoCreation(scene);
-    return refused(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-                   fmt::format("createScene: the device cannot run it: {}", failure.what()));
-  }
-  server_.flushStore(*scene);
-  telemetry::log({scene->name()}, spdlog::level::info, "created, {} vertices", scene->start().nodeCount());
+  *response.mutable_scene() = summaryOf(**scene);
+  response.mutable_repairs()->Assign(repairs.begin(), repairs.end());
   return response;
-}
-
-void SceneMaker::undoCreation(const std::shared_ptr<scene::LiveScene>& scene) {
-  // Nothing waits for the device here, because it may be what takes too long.
-  server_.device.remove(scene);
-  scene->discharge();
-  server_.forget(*scene);
 }
 
 tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(const v1::DeleteSceneRequest& request,
                                                                        const std::string& why) {
   const std::shared_ptr<scene::LiveScene> scene =
-      request.name().empty() ? nullptr : server_.find(request.name());
-  if (!scene) return tl::unexpected(SceneServer::State::noSuchScene(request.name()));
+      request.name().empty() ? nullptr : scenes_.find(request.name());
+  if (!scene) return tl::unexpected(SceneRegistry::noSuchScene(request.name()));
   if (!scene->created)
-    return refused(
+    return refusal(
         v1::ERROR_CODE_INVALID_ARGUMENT,
         fmt::format("deleteScene.name = \"{}\": must be of a scene that was created; the server started "
                     "with this one",
@@ -333,8 +294,8 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(const v1:
       delivery::notice(v1::NOTICE_KIND_SCENE_DELETED, fmt::format("the scene '{}' {}", scene->name(), why),
                        scene->tick.load());
   // No later request finds the scene, so its deletion must be completed here.
-  server_.removeCreated(scene, last);
-  server_.flushStore(*scene);
+  created_.remove(scene, last);
+  kept_.flush(*scene);
   telemetry::log({scene->name()}, spdlog::level::info, "deleted");
   return v1::DeleteSceneResponse();
 }

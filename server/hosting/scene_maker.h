@@ -15,22 +15,35 @@
 #include <boost/asio/thread_pool.hpp>
 #include <tl/expected.hpp>
 
-#include "server/hosting/scene_server.h"
+#include "clothstream/v1/session.pb.h"
+#include "server/hosting/created_scenes.h"
+#include "server/hosting/kept_scenes.h"
+#include "server/hosting/scene_registry.h"
+#include "server/hosting/server_options.h"
 #include "server/hosting/upload_budget.h"
 #include "server/messages/field_error.h"
 #include "server/model/cancellation.h"
-
-namespace clothstream::scene {
-class LiveScene;
-}
+#include "server/model/scene.h"
+#include "server/scene/journal.h"
+#include "server/telemetry/metrics.h"
 
 namespace clothstream::hosting {
+
+// Returns whether the peer still waits for the answer. Called on any thread; must not block.
+using Wanted = std::function<bool()>;
+// Called once, on any thread. Must not block.
+using CreateDone = std::function<void(tl::expected<v1::CreateSceneResponse, v1::Error>)>;
+using StartRecordingDone = std::function<void(tl::expected<v1::StartRecordingResponse, v1::Error>)>;
+using StopRecordingDone = std::function<void(tl::expected<v1::StopRecordingResponse, v1::Error>)>;
+using DeleteDone = std::function<void(tl::expected<v1::DeleteSceneResponse, v1::Error>)>;
 
 // Thread-safe. Does one request at a time, on a worker thread, which also calls each `done`: checking a large
 // mesh and loading a scene take seconds. The caller has checked that the peer may do what it asks for.
 class SceneMaker {
  public:
-  explicit SceneMaker(SceneServer::State& server);
+  // The arguments must outlive this.
+  SceneMaker(const ServerOptions& options, telemetry::ServerMetrics& metrics, const SceneRegistry& scenes,
+             const KeptScenes& kept, CreatedScenes& created);
   // Cancels the scene that is being created, and refuses those that wait. Finishes all other requests.
   ~SceneMaker();
   SceneMaker(const SceneMaker&) = delete;
@@ -72,8 +85,6 @@ class SceneMaker {
   tl::expected<model::Scene, v1::Error> checked(messages::Result<model::Scene> scene);
   tl::expected<std::shared_ptr<scene::Journal>, v1::Error> journalOf(const std::string& call,
                                                                      const std::string& scene) const;
-  // Removes a scene that cannot be used, because its creation was cancelled or has failed.
-  void undoCreation(const std::shared_ptr<scene::LiveScene>& scene);
   // The scene's participants get a notice: "the scene 'name' " and then `why`.
   tl::expected<v1::DeleteSceneResponse, v1::Error> removeNow(const v1::DeleteSceneRequest& request,
                                                              const std::string& why);
@@ -85,7 +96,11 @@ class SceneMaker {
   void expireLater();
   void deleteUnused(std::chrono::milliseconds lifetime);
 
-  SceneServer::State& server_;
+  const ServerOptions& options_;
+  telemetry::ServerMetrics& metrics_;
+  const SceneRegistry& scenes_;
+  const KeptScenes& kept_;
+  CreatedScenes& created_;
   std::atomic<bool> stopping_ = false;
   std::atomic<std::uint32_t> waiting_ = 0;   // scenes to be created
   std::atomic<std::uint32_t> requests_ = 0;  // other requests that wait

@@ -4,16 +4,22 @@
 #include <algorithm>
 #include <cassert>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "clothstream/v1/session.pb.h"
-#include "server/hosting/server_state.h"
+#include "server/scene/scene_observer.h"
 
 namespace clothstream::hosting {
+namespace {
 
-SceneServer::SceneServer(std::vector<model::Scene> scenes, ServerOptions options) {
+// Viewers of a scene that is not simulated have numbers above this one, so that they differ from the
+// participants in its frames.
+constexpr std::uint64_t kFirstViewer = std::uint64_t{1} << 32;
+
+// The default scene comes first, because the first scene is loaded when the server's constructor returns.
+std::vector<model::Scene> defaultFirst(std::vector<model::Scene> scenes, const ServerOptions& options) {
   assert(options.maxParticipants <= kMaxParticipants);
   bool found = false;
   std::string known;
@@ -24,113 +30,119 @@ SceneServer::SceneServer(std::vector<model::Scene> scenes, ServerOptions options
   if (!found)
     throw std::runtime_error(
         fmt::format("there is no scene '{}'; there are {}", options.defaultScene, known));
-  // The first scene is loaded when the constructor returns.
   std::stable_partition(scenes.begin(), scenes.end(),
                         [&](const model::Scene& scene) { return scene.name == options.defaultScene; });
-  state_ = std::make_unique<State>(std::move(scenes), std::move(options));
+  return scenes;
 }
 
-SceneServer::SceneServer(std::string name, std::shared_ptr<scene::FrameSource> source,
-                         ServerOptions options) {
+ServerOptions withDefaultScene(ServerOptions options, const std::string& name) {
   options.defaultScene = name;
+  return options;
+}
+
+}  // namespace
+
+SceneServer::SceneServer(std::vector<model::Scene>&& definitions, ServerOptions&& given, std::uint64_t newest)
+    : options(std::move(given)),
+      uploads(options.maxUploadBytes, options.maxUploadBytesOfAddress),
+      budget(std::make_shared<scene::Budget>(options.budget)),
+      newestParticipant(newest),
+      kept(options, newestParticipant),
+      scenes(options, metrics, startScenes(std::move(definitions))),
+      connections(options, metrics),
+      authentication(options, metrics),
+      access(options, scenes),
+      publisher((scenes.all().size() + options.maxCreatedScenes) * codec::kMaxQualities *
+                    encode::FrameEncoder::kSlots,
+                [this] { checkPeers(); },
+                options.encoderThreads > 0
+                    ? options.encoderThreads
+                    : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),
+      device(options.device, scenes.all(), publisher, metrics, *budget, options.runAlways, options.reportRate,
+             options.adaptsToLoad),
+      created(options, metrics, budget, scenes, kept, device),
+      maker(options, metrics, scenes, kept, created),
+      requests(metrics, scenes, device),
+      unaryCalls(access, requests, maker) {
+  if (options.observer)
+    for (const auto& scene : scenes.all()) scene->observe(options.observer->observe(*scene));
+  created.restore();
+  // Participants of an earlier run cannot come back before this time, however long the start took.
+  for (const auto& scene : scenes.all()) scene->roster.restartGrace(options.reconnectGrace, Clock::now());
+  started_ = true;
+}
+
+SceneServer::SceneServer(std::vector<model::Scene> definitions, ServerOptions given)
+    : SceneServer(defaultFirst(std::move(definitions), given), std::move(given), 0) {}
+
+SceneServer::SceneServer(std::string name, std::shared_ptr<scene::FrameSource> source, ServerOptions given)
+    : SceneServer({}, withDefaultScene(std::move(given), name), kFirstViewer) {
   auto played =
       std::make_shared<scene::LiveScene>(std::move(name), std::move(source), options.maxParticipants);
-  state_ = std::make_unique<State>(std::move(played), std::move(options));
+  played->source->begin(*played);
+  scenes.insert(std::move(played));
 }
 
-SceneServer::SceneServer(ServerOptions options) {
-  state_ = std::make_unique<State>(std::vector<model::Scene>{}, std::move(options));
-  state_->participants = State::kFirstViewer;
-}
-
-std::shared_ptr<scene::LiveScene> SceneServer::add(std::string name,
-                                                   std::shared_ptr<scene::FrameSource> source) {
-  auto scene =
-      std::make_shared<scene::LiveScene>(std::move(name), std::move(source), state_->options.maxConnections);
-  scene->source->begin(*scene);
-  state_->insert(scene);
-  return scene;
-}
-
-void SceneServer::remove(const std::shared_ptr<scene::LiveScene>& scene, const delivery::SharedBytes& last) {
-  state_->erase(*scene);
-  scene->source->end();
-  scene->roster.close(last);
-}
+SceneServer::SceneServer(ServerOptions given) : SceneServer({}, std::move(given), kFirstViewer) {}
 
 SceneServer::~SceneServer() {
   stop();
 }
 
-v1::ListScenesResponse SceneServer::listScenes(const Identity& by) const {
-  return state_->listScenes(by);
-}
-
-tl::expected<v1::GetSceneResponse, v1::Error> SceneServer::getScene(const v1::GetSceneRequest& request,
-                                                                    const Identity& by) const {
-  if (const auto may = state_->mayUse(by, request.name()); !may)
-    return tl::unexpected(toMessage(may.error()));
-  return state_->getScene(request);
-}
-
-void SceneServer::createScene(const v1::CreateSceneRequest& request, const CreateDone& done,
-                              const Identity& by, Wanted wanted) {
-  if (const auto may = state_->mayCreate(by); !may) return done(tl::unexpected(toMessage(may.error())));
-  if (request.source_case() == v1::CreateSceneRequest::kUploadedContentId) {
-    v1::Error error;
-    error.set_code(v1::ERROR_CODE_NOT_FOUND);
-    error.set_text("createScene.uploadedContentId: upload the scene and create it in the same stream");
-    return done(tl::unexpected(std::move(error)));
+std::vector<std::shared_ptr<scene::LiveScene>> SceneServer::startScenes(
+    std::vector<model::Scene> definitions) const {
+  std::vector<std::shared_ptr<scene::LiveScene>> all;
+  all.reserve(definitions.size());
+  for (model::Scene& definition : definitions) {
+    std::shared_ptr<scene::Journal> journal = options.journals ? options.journals(definition) : nullptr;
+    const auto& scene = all.emplace_back(std::make_shared<scene::LiveScene>(
+        std::move(definition), false, std::move(journal), options.maxParticipants, budget));
+    scene->sharesAsGuest =
+        scene->name() != options.defaultScene && std::ranges::count(options.guestScenes, scene->name()) > 0;
+    kept.restore(scene);
   }
-  if (auto accepted = state_->maker.create(request, {}, by.subject.tenant, std::move(wanted), done);
-      !accepted)
-    done(tl::unexpected(std::move(accepted.error())));
+  return all;
 }
 
-void SceneServer::deleteScene(const v1::DeleteSceneRequest& request, DeleteDone done, const Identity& by) {
-  if (const auto may = state_->mayFromOutside(by, request.name(), scene::Action::deleteScene); !may)
-    return done(tl::unexpected(toMessage(may.error())));
-  if (auto accepted = state_->maker.remove(request, done); !accepted)
-    done(tl::unexpected(std::move(accepted.error())));
+void SceneServer::checkPeers() {
+  for (const auto& peer : connections.peers()) peer->checkSilence(Clock::now());
+  if (!started_) return;
+  for (const auto& scene : scenes.all()) {
+    scene->roster.expire(Clock::now());
+    scene->poses.divideRoom(Clock::now());
+  }
 }
 
-void SceneServer::startRecording(const v1::StartRecordingRequest& request, StartRecordingDone done,
-                                 const Identity& by) {
-  if (const auto may = state_->mayFromOutside(by, request.scene(), scene::Action::recordScene); !may)
-    return done(tl::unexpected(toMessage(may.error())));
-  if (auto accepted = state_->maker.startRecording(request, done); !accepted)
-    done(tl::unexpected(std::move(accepted.error())));
+std::shared_ptr<scene::LiveScene> SceneServer::add(std::string name,
+                                                   std::shared_ptr<scene::FrameSource> source) {
+  auto scene = std::make_shared<scene::LiveScene>(std::move(name), std::move(source), options.maxConnections);
+  scene->source->begin(*scene);
+  scenes.insert(scene);
+  return scene;
 }
 
-void SceneServer::stopRecording(const v1::StopRecordingRequest& request, StopRecordingDone done,
-                                const Identity& by) {
-  if (const auto may = state_->mayFromOutside(by, request.scene(), scene::Action::recordScene); !may)
-    return done(tl::unexpected(toMessage(may.error())));
-  if (auto accepted = state_->maker.stopRecording(request, done); !accepted)
-    done(tl::unexpected(std::move(accepted.error())));
-}
-
-tl::expected<v1::ControlSceneResponse, v1::Error> SceneServer::controlScene(
-    const v1::ControlSceneRequest& request, const Identity& by) {
-  if (const auto may = state_->mayFromOutside(by, request.name(), scene::Action::controlScene); !may)
-    return tl::unexpected(toMessage(may.error()));
-  return state_->controlScene(request, 0);
+void SceneServer::remove(const std::shared_ptr<scene::LiveScene>& scene, const delivery::SharedBytes& last) {
+  scenes.erase(*scene);
+  scene->source->end();
+  scene->roster.close(last);
 }
 
 void SceneServer::stop() {
-  state_->stop();
+  maker.stop();
+  connections.close();
+  kept.flush();
 }
 
-vulkan::DeviceInfo SceneServer::deviceInfo() const {
-  return state_->device.info();
+std::string SceneServer::deviceNameOf(const scene::LiveScene& scene) const {
+  return scene.source ? scene.source->deviceName() : device.info().name;
 }
 
 std::string SceneServer::report() const {
   std::string text;
-  for (const auto& scene : state_->scenesNow())
+  for (const auto& scene : scenes.all())
     if (scene->metrics.ticks.value() + scene->metrics.frames.value() > 0)
       text += telemetry::table(scene->name(), scene->metrics);
-  return text + telemetry::table(state_->metrics);
+  return text + telemetry::table(metrics);
 }
 
 }  // namespace clothstream::hosting

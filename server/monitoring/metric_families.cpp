@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/monitoring/process_usage.h"
 #include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
@@ -161,9 +161,8 @@ Families programFamilies(const std::string& version, const std::string& device) 
   return families;
 }
 
-Families serverFamilies(hosting::SceneServer& server) {
-  const hosting::SceneServer::State& state = server.state();
-  const telemetry::ServerMetrics& metrics = state.metrics;
+Families serverFamilies(const hosting::SceneServer& server) {
+  const telemetry::ServerMetrics& metrics = server.metrics;
   Families families;
   const auto gauge = [&](const char* name, const char* help, double value) {
     addSample(add(families, MetricType::Gauge, name, help), value);
@@ -171,8 +170,9 @@ Families serverFamilies(hosting::SceneServer& server) {
   const auto counter = [&](const char* name, const char* help, const telemetry::Counter& counted) {
     addSample(add(families, MetricType::Counter, name, help), static_cast<double>(counted.value()));
   };
-  gauge("clothstream_scenes", "Scenes of the server.", static_cast<double>(state.scenesNow().size()));
-  gauge("clothstream_open_connections", "Open connections.", static_cast<double>(state.peersNow().size()));
+  gauge("clothstream_scenes", "Scenes of the server.", static_cast<double>(server.scenes.all().size()));
+  gauge("clothstream_open_connections", "Open connections.",
+        static_cast<double>(server.connections.peers().size()));
   counter("clothstream_connections_total", "Connections admitted.", metrics.connections);
   MetricFamily& sent =
       add(families, MetricType::Counter, "clothstream_sent_bytes_total",
@@ -195,7 +195,7 @@ Families serverFamilies(hosting::SceneServer& server) {
                 "Lines of the log that were left out (--profile)."),
             static_cast<double>(telemetry::omittedLogLines()));
   constexpr double kMegabyte = 1e6;
-  const scene::Budget::Usage usage = state.budget->usage();
+  const scene::Budget::Usage usage = server.budget->usage();
   gauge("clothstream_budget_used_load", "Price of what participants have added, of --max-load.", usage.load);
   gauge("clothstream_budget_free_load", "What is free of --max-load.", usage.freeLoad);
   gauge("clothstream_budget_used_memory_bytes", "Memory of what participants have added, of --max-memory.",
@@ -203,12 +203,13 @@ Families serverFamilies(hosting::SceneServer& server) {
   gauge("clothstream_budget_free_memory_bytes", "What is free of --max-memory.",
         kMegabyte * usage.freeMegabytes);
   gauge("clothstream_device_memory_bytes", "Memory of all buffers on the device.",
-        static_cast<double>(state.device.deviceMemory()));
+        static_cast<double>(server.device.deviceMemory()));
   gauge("clothstream_device_silence_seconds", "Time since the last answer of the device thread.",
-        schedule::seconds(schedule::Clock::now() - state.device.lastAnswer()));
+        schedule::seconds(schedule::Clock::now() - server.device.lastAnswer()));
   gauge("clothstream_publisher_waiting_frames", "Frames that wait for the encoder thread.",
-        static_cast<double>(state.publisher.waiting()));
-  const scene::StoreStatus store = state.options.store ? state.options.store->status() : scene::StoreStatus();
+        static_cast<double>(server.publisher.waiting()));
+  const scene::StoreStatus store =
+      server.options.store ? server.options.store->status() : scene::StoreStatus();
   gauge("clothstream_state_bytes", "Size of the kept scenes on the disk.", static_cast<double>(store.bytes));
   gauge("clothstream_state_waiting", "Scenes with a state or a removal that is not on the disk yet.",
         static_cast<double>(store.waiting));
@@ -216,7 +217,7 @@ Families serverFamilies(hosting::SceneServer& server) {
         static_cast<double>(store.leftOut));
   gauge("clothstream_state_age_seconds",
         "Largest age of the newest state on the disk of a running scene; without one, the time it has run.",
-        oldestState(state.scenesNow()));
+        oldestState(server.scenes.all()));
   const auto total = [&](const char* name, const char* help, std::uint64_t value) {
     addSample(add(families, MetricType::Counter, name, help), static_cast<double>(value));
   };
@@ -236,7 +237,7 @@ Families serverFamilies(hosting::SceneServer& server) {
   addSample(natsBytes, static_cast<double>(metrics.nats.publishedBytes.value()), {{"kind", "sent"}});
   addSample(natsBytes, static_cast<double>(metrics.nats.receivedBytes.value()), {{"kind", "received"}});
   const scene::ObserverStatus told =
-      state.options.observer ? state.options.observer->status() : scene::ObserverStatus();
+      server.options.observer ? server.options.observer->status() : scene::ObserverStatus();
   MetricFamily& events =
       add(families, MetricType::Counter, "clothstream_events_total",
           "Events for a backend: delivered, dropped, and attempts that failed and are retried.");

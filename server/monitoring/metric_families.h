@@ -17,7 +17,7 @@ using Families = std::vector<prometheus::MetricFamily>;
 
 // Version, and the resources of this process. `device` is empty while there is none.
 Families programFamilies(const std::string& version, const std::string& device);
-Families serverFamilies(hosting::SceneServer& server);
+Families serverFamilies(const hosting::SceneServer& server);
 // Every family is present, also without scenes. A histogram has samples for scenes that recorded something.
 Families sceneFamilies(const std::vector<std::shared_ptr<scene::LiveScene>>& scenes);
 

@@ -24,7 +24,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/endpoint/listen/listen.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/monitoring/http_connection.h"
 #include "server/monitoring/metric_families.h"
 #include "server/monitoring/trace_events.h"
@@ -125,7 +125,7 @@ struct MonitoringEndpoint::State {
   void probe() {
     {
       const std::lock_guard lock(mutex);
-      if (server != nullptr) server->state().device.wake();
+      if (server != nullptr) server->device.wake();
     }
     probeTimer.expires_after(deviceSilence / kProbes);
     probeTimer.async_wait([this](boost::system::error_code) { probe(); });
@@ -147,7 +147,7 @@ struct MonitoringEndpoint::State {
           .status = http::status::bad_request,
           .body = fmt::format("Use /trace or /trace?seconds=N with N from 1 to {}.\n", kMostTraceSeconds)};
     std::vector<std::shared_ptr<scene::LiveScene>> scenes;
-    if (server != nullptr) scenes = server->state().scenesNow();
+    if (server != nullptr) scenes = server->scenes.all();
     return {.contentType = "application/json",
             .body = traceEvents(scenes, schedule::Clock::now() - std::chrono::seconds(*seconds))};
   }
@@ -161,17 +161,17 @@ struct MonitoringEndpoint::State {
   }
 
   std::string buildMetrics() const {
-    Families families = programFamilies(version, server != nullptr ? server->deviceInfo().name : "");
+    Families families = programFamilies(version, server != nullptr ? server->device.info().name : "");
     if (server != nullptr) {
       append(families, serverFamilies(*server));
-      append(families, sceneFamilies(server->state().scenesNow()));
+      append(families, sceneFamilies(server->scenes.all()));
     }
     return prometheus::TextSerializer().Serialize(families);
   }
 
   Answer health() const {
     if (server == nullptr) return {.body = "ok\n"};
-    const auto silence = schedule::Clock::now() - server->state().device.lastAnswer();
+    const auto silence = schedule::Clock::now() - server->device.lastAnswer();
     if (silence <= deviceSilence) return {.body = "ok\n"};
     return {.status = http::status::service_unavailable,
             .body = fmt::format("The device thread has not answered for {:.1f} s. The log has the reason if "
@@ -199,7 +199,7 @@ void MonitoringEndpoint::started(hosting::SceneServer& server) {
   const std::lock_guard lock(state_->mutex);
   state_->phase = State::Phase::serving;
   state_->server = &server;
-  server.state().device.wake();
+  server.device.wake();
 }
 
 void MonitoringEndpoint::stopping() {

@@ -15,7 +15,7 @@
 #include "proto/recording/verdict.h"
 #include "server/events/url.h"
 #include "server/hosting/limits.h"
-#include "server/hosting/scene_server.h"
+#include "server/hosting/server_options.h"
 #include "server/options/option_table.h"
 #include "server/options/profile_table.h"
 #include "server/scene/roles.h"

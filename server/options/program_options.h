@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "server/hosting/scene_server.h"
+#include "server/hosting/server_options.h"
 #include "server/model/scene.h"
 #include "server/recording/playback.h"
 #include "server/scene/roles.h"

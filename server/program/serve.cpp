@@ -81,12 +81,12 @@ int serve(const ServeOptions& options, const Signals& signals) {
   if (!options.nats.servers.empty())
     origin.emplace(server, natsOptions(options.nats, "server"), originOptions(options.network));
   const auto report = [&] { return server.report() + (recordings ? recordings->report() : ""); };
-  guard =
-      openEndpoints(server, options, signals, start, authenticator, monitoring.get(),
-                    fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.deviceInfo()), sceneList),
-                    report, [&](schedule::Clock::time_point until) {
-                      if (origin) origin->moveAll(until);
-                    });
+  guard = openEndpoints(
+      server, options, signals, start, authenticator, monitoring.get(),
+      fmt::format("device  {}\nscenes  {}\n", vulkan::describe(server.device.info()), sceneList), report,
+      [&](schedule::Clock::time_point until) {
+        if (origin) origin->moveAll(until);
+      });
   return 0;
 }
 

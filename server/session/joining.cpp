@@ -11,7 +11,7 @@
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
 #include "server/delivery/mailbox.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/messages/client_message.h"
 #include "server/scene/remote_session.h"
 #include "server/session/session.h"
@@ -24,7 +24,7 @@ void Session::identify(const std::string& token) {
   if (mailbox_->closed()) return;
   now_ = Clock::now();
   token_ = token;
-  messages::Result<identity::Identity> identity = server_.identify(token, address_.empty());
+  messages::Result<identity::Identity> identity = server_.authentication.identify(token, address_.empty());
   if (identity)
     become(std::move(*identity));
   else if (token.empty())
@@ -38,7 +38,7 @@ bool Session::become(identity::Identity identity) {
   const bool same = identity_ && identity_->verified && identity_->subject == identity.subject;
   if (!same) {
     counted_.reset();
-    counted_ = server_.countConnection(identity);
+    counted_ = server_.connections.count(identity);
   }
   if (!counted_) {
     fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
@@ -53,7 +53,7 @@ bool Session::become(identity::Identity identity) {
 void Session::authenticate(const v1::AuthenticateRequest& request) {
   v1::ServerMessage reply;
   messages::Result<identity::Identity> identity =
-      server_.authenticate(request, address_, now_, *reply.mutable_authenticate());
+      server_.authentication.authenticate(request, address_, now_, *reply.mutable_authenticate());
   if (!identity && scene_ != nullptr) return refuse(identity.error());
   if (!identity) return fail(identity.error().code, identity.error().text);
   if (scene_ != nullptr && identity->verified &&
@@ -71,7 +71,7 @@ scene::Rights Session::rightsIn(const scene::LiveScene& scene) const {
   using scene::Ownership;
   if (identity_->role == scene::Role::viewer || (scene.source && scene.source->onlyViewed()))
     return {.ownership = Ownership::never, .onlyViews = true};
-  if (hosting::SceneServer::State::isOfOtherTenant(*identity_, scene)) return {.ownership = Ownership::never};
+  if (hosting::Access::isOfOtherTenant(*identity_, scene)) return {.ownership = Ownership::never};
   if (identity_->isVerifiedOwner()) return {.ownership = Ownership::always};
   const bool mayOwn = identity_->role == scene::Role::owner || server_.options.participantsMay.own;
   return {.ownership = mayOwn ? Ownership::ifNone : Ownership::never};
@@ -82,16 +82,17 @@ std::shared_ptr<scene::LiveScene> Session::sceneOf(const v1::Hello& message,
   const auto refused = [&](v1::ErrorCode code, std::string text) {
     const bool mayBeElsewhere = code == v1::ERROR_CODE_NOT_FOUND && identity_->reaches(joining.scene);
     fail(code, std::move(text),
-         mayBeElsewhere ? server_.otherServerOf(joining.scene).value_or("") : std::string());
+         mayBeElsewhere ? server_.scenes.otherServerOf(joining.scene).value_or("") : std::string());
     return nullptr;
   };
-  if (const auto may = server_.mayUse(*identity_, joining.scene); !may)
-    return refused(server_.find(joining.scene) && identity_->reaches(joining.scene) ? v1::ERROR_CODE_REMOVED
-                                                                                    : may.error().code,
+  if (const auto may = server_.access.mayUse(*identity_, joining.scene); !may)
+    return refused(server_.scenes.find(joining.scene) && identity_->reaches(joining.scene)
+                       ? v1::ERROR_CODE_REMOVED
+                       : may.error().code,
                    may.error().text);
-  std::shared_ptr<scene::LiveScene> scene = server_.find(joining.scene);
+  std::shared_ptr<scene::LiveScene> scene = server_.scenes.find(joining.scene);
   if (!scene) {
-    const v1::Error error = server_.noSuchScene(joining.scene, *identity_);
+    const v1::Error error = server_.scenes.noSuchScene(joining.scene, *identity_);
     return refused(error.code(), error.text());
   }
   if (const std::string why = scene->quarantined(); !why.empty())
@@ -207,7 +208,7 @@ void Session::hello(const v1::Hello& message) {
                                        .attempt = message.attempt(),
                                        .address = address_,
                                        .placesOfAddress = server_.options.placesOfAddress()},
-                                      mailbox_, server_.participants, scene->maxParticipants, now_);
+                                      mailbox_, server_.newestParticipant, scene->maxParticipants, now_);
   if (!admission) return failToJoin(admission.error(), *scene);
   scene_ = scene;
   participant_ = admission->id;
@@ -223,7 +224,7 @@ void Session::hello(const v1::Hello& message) {
   if (!continues_) welcome(*admission, *joining, description->contentId());
   mailbox_->subscribe(known ? nullptr : description, scene->shape(), scene->metrics, joining->quality);
   tellPresentState(*scene);
-  server_.wake(*scene);
+  server_.device.wake(*scene);
   telemetry::log(
       {scene->name(), participant_}, spdlog::level::info, "{} {} as participant {}, {} ({}); {} in it", peer_,
       admission->resumed ? "came back" : "joined", participant_, scene::nameOf(admission->role),

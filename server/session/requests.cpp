@@ -13,7 +13,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "server/delivery/mailbox.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/messages/client_message.h"
 #include "server/session/session.h"
 
@@ -194,29 +194,33 @@ struct Session::Messages {
 
   static void createPairingCode(Session& session, const Message& message) {
     reply(session,
-          session.server_.createPairingCode(*session.identity_, message.create_pairing_code(), session.now_),
+          session.server_.authentication.createPairingCode(*session.identity_, message.create_pairing_code(),
+                                                           session.now_),
           &v1::ServerMessage::mutable_create_pairing_code);
   }
 
   static void listBans(Session& session, const Message& message) {
-    reply(session, session.server_.listBans(message.list_bans()), &v1::ServerMessage::mutable_list_bans);
+    reply(session, session.server_.requests.listBans(message.list_bans()),
+          &v1::ServerMessage::mutable_list_bans);
   }
 
   static void liftBan(Session& session, const Message& message) {
-    reply(session, session.server_.liftBan(message.lift_ban()), &v1::ServerMessage::mutable_lift_ban);
+    reply(session, session.server_.requests.liftBan(message.lift_ban()),
+          &v1::ServerMessage::mutable_lift_ban);
   }
 
   static void listScenes(Session& session, const Message& /*message*/) {
     v1::ServerMessage list;
-    *list.mutable_list_scenes() = session.server_.listScenes(*session.identity_);
+    *list.mutable_list_scenes() = session.server_.requests.list(*session.identity_);
     session.answer(list);
   }
 
   static void getScene(Session& session, const Message& message) {
-    hosting::SceneServer::State& server = session.server_;
-    if (const auto permitted = server.mayUse(*session.identity_, message.get_scene().name()); !permitted)
+    hosting::SceneServer& server = session.server_;
+    if (const auto permitted = server.access.mayUse(*session.identity_, message.get_scene().name());
+        !permitted)
       return session.refuse(permitted.error());
-    auto found = server.getScene(message.get_scene(), kMaxAnswerBytes);
+    auto found = server.requests.get(message.get_scene(), kMaxAnswerBytes);
     if (!found && found.error().code() == v1::ERROR_CODE_RESOURCE_EXHAUSTED)
       server.metrics.refuse(telemetry::Refusal::answerSize);
     reply(session, std::move(found), &v1::ServerMessage::mutable_get_scene);
@@ -253,7 +257,7 @@ struct Session::Messages {
   static void controlScene(Session& session, const Message& message) {
     const v1::ControlSceneRequest& request = message.control_scene();
     const std::uint64_t by = session.isIn(request.name()) ? session.participant_ : 0;
-    reply(session, session.server_.controlScene(request, by), &v1::ServerMessage::mutable_control_scene);
+    reply(session, session.server_.requests.control(request, by), &v1::ServerMessage::mutable_control_scene);
   }
 
   static void startRecording(Session& session, const Message& message) {
@@ -310,7 +314,7 @@ struct Session::Messages {
     if (!session.inLockstep() || !awaited || mailbox.awaitsAcknowledgement()) return;
     // Each frame permits one such acknowledgement, so they need no other limit.
     session.bucket(Rate::messages).giveBack();
-    session.server_.wake(*session.scene_);
+    session.server_.device.wake(*session.scene_);
   }
 
   static void keyFrameRequest(Session& session, const Message& message) {
@@ -320,7 +324,7 @@ struct Session::Messages {
     // In lockstep the key frame is a recorded one, which costs nothing.
     if (!session.inLockstep() && !session.allowed(Rate::keyFrames, "key frame requests")) return;
     session.mailbox_->restart();
-    if (session.inLockstep()) session.server_.wake(*session.scene_);
+    if (session.inLockstep()) session.server_.device.wake(*session.scene_);
   }
 };
 
@@ -346,7 +350,7 @@ void Session::dispatch(const v1::ClientMessage& message) {
   if (row->limit && !allowed(row->limit->rate, row->limit->what)) return;
   if (row->action) {
     const messages::Result<void> permitted = *row->action == Action::createScene
-                                                 ? server_.mayCreate(*identity_)
+                                                 ? server_.access.mayCreate(*identity_)
                                                  : may(*row->action, row->sceneOf(message));
     if (!permitted) return refuse(permitted.error());
   }
@@ -364,12 +368,12 @@ void Session::refuseUnlessQueued(const tl::expected<void, v1::Error>& queued) {
 }
 
 bool Session::isIn(const std::string& name) const {
-  return scene_ != nullptr && server_.find(name) == scene_;
+  return scene_ != nullptr && server_.scenes.find(name) == scene_;
 }
 
 messages::Result<void> Session::may(Action action, const std::string& name) const {
   return isIn(name) ? scene_->roster.permits(*mailbox_, action, server_.options.participantsMay)
-                    : server_.mayFromOutside(*identity_, name, action);
+                    : server_.access.mayFromOutside(*identity_, name, action);
 }
 
 }  // namespace clothstream::session

@@ -11,7 +11,7 @@
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/packet_header.h"
 #include "server/delivery/mailbox.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/identity/authenticator.h"
 #include "server/messages/client_message.h"
 #include "server/scene/remote_session.h"
@@ -30,7 +30,7 @@ constexpr std::size_t kMaxListBytes = 64;
 
 }  // namespace
 
-Session::Session(hosting::SceneServer::State& server, Arrival arrival, std::function<void()> wake)
+Session::Session(hosting::SceneServer& server, Arrival arrival, std::function<void()> wake)
     : server_(server),
       peer_(std::move(arrival.peer)),
       address_(std::move(arrival.address)),
@@ -44,8 +44,8 @@ Session::Session(hosting::SceneServer::State& server, Arrival arrival, std::func
 std::shared_ptr<Session> Session::open(hosting::SceneServer& server, Arrival arrival,
                                        std::function<void()> wake) {
   const std::string token = std::move(arrival.token);
-  std::shared_ptr<Session> session(new Session(server.state(), std::move(arrival), std::move(wake)));
-  if (SharedBytes refusal = server.state().admit(session))
+  std::shared_ptr<Session> session(new Session(server, std::move(arrival), std::move(wake)));
+  if (SharedBytes refusal = server.connections.admit(session))
     session->close(std::move(refusal));
   else
     session->identify(token);
@@ -250,7 +250,7 @@ void Session::disconnect(DisconnectReason reason) {
     scene_->roster.leave(
         *mailbox_, reason == DisconnectReason::left ? scene::LeaveReason::left : scene::LeaveReason::removed,
         now_);
-  server_.wake(*scene_);
+  server_.device.wake(*scene_);
   telemetry::log({scene_->name(), participant_}, spdlog::level::info, "{} {}; {} in it", peer_,
                  mayReturn ? "was disconnected" : "left", scene_->subscribers.size());
   scene_ = nullptr;

@@ -108,7 +108,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
  private:
   struct Messages;  // the table of messages and its handlers: requests.cpp
 
-  Session(hosting::SceneServer::State& server, Arrival arrival, std::function<void()> wake);
+  Session(hosting::SceneServer& server, Arrival arrival, std::function<void()> wake);
   void end();
   std::shared_ptr<scene::RemoteSession> remote() const;
   // Decides on the identity of a peer that has sent none in a message.
@@ -158,7 +158,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void cutOff(telemetry::Refusal reason, const std::string& text);
   void closeLocked(delivery::SharedBytes last, DisconnectReason reason);
 
-  hosting::SceneServer::State& server_;
+  hosting::SceneServer& server_;
   const std::string peer_, address_;
   const bool continues_;
   const std::shared_ptr<delivery::Mailbox> mailbox_;

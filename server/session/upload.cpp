@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/hosting/scene_server.h"
+#include "server/hosting/server_options.h"
 #include "server/messages/limits.h"
 
 namespace clothstream::session {

@@ -14,7 +14,6 @@
 
 #include "clients/core/core.h"
 #include "server/hosting/scene_server.h"
-#include "server/hosting/server_state.h"
 #include "server/messages/scene_file.h"
 #include "server/session/session.h"
 #include "tests/bench/simulated.h"
@@ -104,7 +103,7 @@ Rows runCurtain(vulkan::Device& device, const Settings& settings) {
   const model::Scene scene = *messages::loadScene("curtain");
   Simulated(device, scene, {}).check({scene.environment, {}});
   hosting::SceneServer server({scene}, {.device = settings.device, .defaultScene = scene.name});
-  const telemetry::SceneMetrics& metrics = server.state().scenes.front()->metrics;
+  const telemetry::SceneMetrics& metrics = server.scenes.all().front()->metrics;
   const double seconds = std::max(settings.seconds, kLeastSeconds);
   cs_statistics seen;
   {

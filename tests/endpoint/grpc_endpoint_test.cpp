@@ -32,7 +32,7 @@
 #include "server/endpoint/grpc/answer_budget.h"
 #include "server/endpoint/grpc/call_rate.h"
 #include "server/endpoint/grpc/caller.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/tls/certificate.h"
 #include "tests/endpoint/rpc_client.h"
 #include "tests/endpoint/small_server.h"
@@ -365,7 +365,7 @@ void makeMeshScene(hosting::SceneServer& server) {
   constexpr std::uint32_t kSide = 96;
   v1::GetSceneRequest get;
   get.set_name("other");
-  const auto other = server.getScene(get);
+  const auto other = server.unaryCalls.getScene(get);
   ASSERT_TRUE(other);
   v1::CreateSceneRequest request;
   request.set_name("mesh");
@@ -385,8 +385,8 @@ void makeMeshScene(hosting::SceneServer& server) {
         mesh.add_triangles(corner);
     }
   std::promise<std::string> made;
-  server.createScene(request,
-                     [&](const auto& answer) { made.set_value(answer ? "" : answer.error().text()); });
+  server.unaryCalls.createScene(
+      request, [&](const auto& answer) { made.set_value(answer ? "" : answer.error().text()); });
   ASSERT_EQ(made.get_future().get(), "");
 }
 
@@ -422,7 +422,7 @@ TEST_F(GrpcEndpoint, LimitsAnswersThatClientsDoNotRead) {
   const auto unread = getMeshWithoutReading(port());
   EXPECT_TRUE(eventually([&] { return isWithoutRoom(getMesh(port())); }));
   const auto reason = static_cast<std::size_t>(telemetry::Refusal::unreadCalls);
-  EXPECT_GE(server().state().metrics.refusals[reason].value(), 1U);
+  EXPECT_GE(server().metrics.refusals[reason].value(), 1U);
   unread->disconnect();
   EXPECT_TRUE(eventually([&] { return getMesh(port()).ok(); })) << "an ended call makes room";
 }
@@ -460,7 +460,7 @@ TEST_F(GrpcEndpoint, LimitsNewStreamsPerSecond) {
     EXPECT_THAT(status.error_message(), HasSubstr("too many new streams (--profile)"));
   }
   const auto reason = static_cast<std::size_t>(telemetry::Refusal::connectionRate);
-  EXPECT_GE(server().state().metrics.refusals[reason].value(), 2U);
+  EXPECT_GE(server().metrics.refusals[reason].value(), 2U);
 }
 
 // Needs an address of this machine other than loopback, which has no such limit.

@@ -12,7 +12,7 @@
 
 #include "clothstream/v1/session.grpc.pb.h"
 #include "server/endpoint/grpc/grpc_endpoint.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/identity/authenticator.h"
 #include "server/identity/token.h"
 #include "tests/endpoint/rpc_client.h"
@@ -174,7 +174,7 @@ TEST_F(GrpcIdentity, PairsWithoutAToken) {
 }
 
 TEST_F(GrpcIdentity, ListsAndLiftsBans) {
-  server().state().find("small")->roster.setBans(
+  server().scenes.find("small")->roster.setBans(
       {{.subject = {.tenant = "studio", .name = "eve"}, .displayName = "Eve"}});
   const auto lift = [&](scene::Role role) {
     grpc::ClientContext call;

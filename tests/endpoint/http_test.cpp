@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "server/endpoint/web/web_endpoint.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "tests/endpoint/page_directory.h"
 #include "tests/endpoint/small_server.h"
 #include "tests/endpoint/web_client.h"
@@ -103,7 +103,7 @@ TEST_F(HttpEndpoint, RefusesTooManyRequestsOnOneConnection) {
   EXPECT_EQ(response.body(), "Too many requests: try again in a second.\n");
   EXPECT_TRUE(client.closes());
   const auto reason = static_cast<std::size_t>(telemetry::Refusal::requestRate);
-  EXPECT_EQ(server().state().metrics.refusals[reason].value(), 1U);
+  EXPECT_EQ(server().metrics.refusals[reason].value(), 1U);
   EXPECT_NO_THROW(WebSocketClient(endpoint_->port())) << "the rate of connections limits WebSockets";
 }
 

@@ -18,7 +18,7 @@
 #include "server/delivery/envelope.h"
 #include "server/endpoint/grpc/grpc_endpoint.h"
 #include "server/endpoint/web/web_endpoint.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/tls/server_tls.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/endpoint/small_server.h"
@@ -42,13 +42,13 @@ class Redirects : public SmallServer, public ::testing::WithParamInterface<Endpo
   void SetUp() override {
     SmallServer::SetUp();
     if (IsSkipped()) return;
-    model::Scene small = server().state().find("small")->definition();
+    model::Scene small = server().scenes.find("small")->definition();
     hosting::ServerOptions options;
     options.budget = {
         .sceneLoad = 1e9, .load = 1e9, .sceneMegabytes = 1e9, .megabytes = 1e9, .tickSeconds = 0};
     options.defaultScene = small.name;
     first_ = std::make_unique<hosting::SceneServer>(std::vector{std::move(small)}, std::move(options));
-    first_->state().setOtherServers([](const std::string&) { return std::string(kSecond); });
+    first_->scenes.setOtherServers([](const std::string&) { return std::string(kSecond); });
   }
   void TearDown() override {
     closeEndpoints();
@@ -158,7 +158,7 @@ TEST_P(Redirects, FirstJoinGoesToTheServerThatHasTheScene) {
   auto joined = join(first(), "other");
   ASSERT_TRUE(joined) << joined.error().text;
   EXPECT_TRUE(streams());
-  EXPECT_EQ(server().state().find("other")->subscribers.size(), 1u);
+  EXPECT_EQ(server().scenes.find("other")->subscribers.size(), 1u);
   EXPECT_EQ(errors_, 0u) << "the program sees no error";
   joined->reset();
   EXPECT_THAT(log_, HasSubstr("another server: connecting to " + addressOf(kSecond)));
@@ -176,11 +176,11 @@ TEST_P(Redirects, JoinedClientFollowsCutOff) {
   const auto joined = join(first(), "small");
   ASSERT_TRUE(joined) << joined.error().text;
   EXPECT_TRUE(streams());
-  first_->state().find("small")->roster.close(
+  first_->scenes.find("small")->roster.close(
       delivery::error(v1::ERROR_CODE_CUT_OFF, "the scene has moved", true, 0, kSecond));
   EXPECT_TRUE(eventually([&] { return returns_ == 1; }));
   EXPECT_TRUE(streams());
-  EXPECT_EQ(server().state().find("small")->subscribers.size(), 1u);
+  EXPECT_EQ(server().scenes.find("small")->subscribers.size(), 1u);
   EXPECT_FALSE((*joined)->ended());
 }
 
@@ -190,12 +190,12 @@ TEST_P(Redirects, JoinedClientConnectsBeforeTheSceneMoves) {
   const auto joined = join(firstTrusted(), "small");
   ASSERT_TRUE(joined) << joined.error().text;
   ASSERT_THAT(clientsOfSecond(), IsEmpty());
-  scene::LiveScene& scene = *first_->state().find("small");
+  scene::LiveScene& scene = *first_->scenes.find("small");
   EXPECT_EQ(scene.subscribers.announceHere(delivery::moving(kSecond)), 1u);
   ASSERT_TRUE(eventually([&] { return clientsOfSecond().size() == 1; }));
   const auto prepared = clientsOfSecond();
   EXPECT_TRUE(streams()) << "the scene is still here";
-  EXPECT_EQ(server().state().find("small")->subscribers.size(), 0u);
+  EXPECT_EQ(server().scenes.find("small")->subscribers.size(), 0u);
   scene.roster.close(delivery::error(v1::ERROR_CODE_CUT_OFF, "the scene has moved", true, 0, kSecond));
   EXPECT_TRUE(eventually([&] { return returns_ == 1; }));
   EXPECT_TRUE(streams());
@@ -206,7 +206,7 @@ TEST_P(Redirects, FailedPreparationDoesNotStopTheMove) {
   listen();
   const auto joined = join(first(), "small");
   ASSERT_TRUE(joined) << joined.error().text;
-  scene::LiveScene& scene = *first_->state().find("small");
+  scene::LiveScene& scene = *first_->scenes.find("small");
   scene.subscribers.announceHere(delivery::moving("nowhere.invalid"));
   EXPECT_TRUE(streams());
   scene.subscribers.announceHere(delivery::moving(kSecond));
@@ -230,7 +230,7 @@ TEST_P(Redirects, CertificateWithTheNewNameIsTrusted) {
   const auto joined = join(firstTrusted(), "other");
   ASSERT_TRUE(joined) << joined.error().text;
   EXPECT_TRUE(streams());
-  EXPECT_EQ(server().state().find("other")->subscribers.size(), 1u);
+  EXPECT_EQ(server().scenes.find("other")->subscribers.size(), 1u);
 }
 
 TEST_P(Redirects, CertificateWithoutTheNewNameIsRefused) {
@@ -239,7 +239,7 @@ TEST_P(Redirects, CertificateWithoutTheNewNameIsRefused) {
   const auto joined = join(firstTrusted(), "other");
   ASSERT_FALSE(joined);
   EXPECT_THAT(joined.error().text, HasSubstr(addressOf(kSecond, true)));
-  EXPECT_EQ(server().state().find("other")->subscribers.size(), 0u);
+  EXPECT_EQ(server().scenes.find("other")->subscribers.size(), 0u);
   // The first server is trusted all the same.
   EXPECT_TRUE(join(firstTrusted(), "small"));
 }
@@ -264,7 +264,7 @@ TEST_P(Redirects, ServerWithoutTlsIsNotFollowed) {
   const auto joined = join(firstTrusted(), "other");
   ASSERT_FALSE(joined);
   EXPECT_THAT(joined.error().text, HasSubstr(addressOf(kSecond, true)));
-  EXPECT_EQ(server().state().find("other")->subscribers.size(), 0u);
+  EXPECT_EQ(server().scenes.find("other")->subscribers.size(), 0u);
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ class EdgeTest : public tests::ServerTest {
     EdgeServer(const NatsOptions& nats, std::chrono::milliseconds keep)
         : server(hosting::ServerOptions{}), edge(server, nats, keep) {}
     ~EdgeServer() { server.stop(); }
-    bool shows(const std::string& scene) { return server.state().find(scene) != nullptr; }
+    bool shows(const std::string& scene) { return server.scenes.find(scene) != nullptr; }
 
     hosting::SceneServer server;
     Edge edge;
@@ -128,7 +128,7 @@ TEST_F(EdgeTest, OneStreamServesAllViewers) {
   for (TestPeer* peer : {&first, &second, &third}) peer->join();
   third.readFrames(10);
   EXPECT_EQ(metrics().framesTaken.value(), 0u);  // by nobody at the origin
-  EXPECT_LE(server().state().metrics.nats.published.value(), metrics().frames.value() + 40);
+  EXPECT_LE(server().metrics.nats.published.value(), metrics().frames.value() + 40);
 }
 
 TEST_F(EdgeTest, AViewerGetsAKeptKeyFrameOfAPausedScene) {
@@ -139,7 +139,7 @@ TEST_F(EdgeTest, AViewerGetsAKeptKeyFrameOfAPausedScene) {
   first.join();
   v1::ControlSceneRequest pause;
   pause.set_paused(true);
-  ASSERT_TRUE(server().controlScene(pause));
+  ASSERT_TRUE(server().unaryCalls.controlScene(pause));
   noticeWith(first, "paused");
   // The first viewer that joins now needs a key frame of the origin, the second one gets the same.
   Viewer second(edge->server);
@@ -198,7 +198,7 @@ TEST_F(EdgeTest, ViewersLearnWhatChangedWhileNatsWasAway) {
   v1::ControlSceneRequest pause;
   pause.set_name("small");
   pause.set_paused(true);
-  ASSERT_TRUE(server().controlScene(pause));
+  ASSERT_TRUE(server().unaryCalls.controlScene(pause));
   nats_->restart();
   bool hasWind = false, isPaused = false;
   viewer.readUntil([&](const v1::ServerMessage& message) {
@@ -208,7 +208,7 @@ TEST_F(EdgeTest, ViewersLearnWhatChangedWhileNatsWasAway) {
   });
   nats_->kill();
   pause.set_paused(false);
-  ASSERT_TRUE(server().controlScene(pause));
+  ASSERT_TRUE(server().unaryCalls.controlScene(pause));
   nats_->restart();
   viewer.readUntil([](const v1::ServerMessage& message) {
     return message.notice().kind() == v1::NOTICE_KIND_SCENE_RESUMED;
@@ -225,9 +225,9 @@ TEST_F(EdgeTest, ASceneThatBeginsAgainIsFollowed) {
   viewer.readFrames(40);
   const std::uint64_t tick = viewer.frames().back().tick;
   // The device thread gives the scene up, and it runs from the beginning.
-  server().state().device.simulateDeviceLossIn("small");
-  ASSERT_TRUE(eventually([&] { return server().state().find("small")->restarts > 0; }));
-  server().state().device.simulateDeviceLossIn("");
+  server().device.simulateDeviceLossIn("small");
+  ASSERT_TRUE(eventually([&] { return server().scenes.find("small")->restarts > 0; }));
+  server().device.simulateDeviceLossIn("");
   EXPECT_EQ(viewer.readToTheEnd().error().code(), v1::ERROR_CODE_CUT_OFF);
   Viewer again(edge->server);
   again.join();
@@ -238,7 +238,7 @@ TEST_F(EdgeTest, ASceneThatBeginsAgainIsFollowed) {
 TEST_F(EdgeTest, OriginSleepsWithoutViewers) {
   ASSERT_NO_FATAL_FAILURE(startOrigin());
   if (IsSkipped()) return;
-  const auto scene = server().state().find("small");
+  const auto scene = server().scenes.find("small");
   auto edge = startEdge();
   {
     Viewer viewer(edge->server);
@@ -322,7 +322,7 @@ TEST_F(EdgeTest, ScenesCreatedLaterAreShownAndDeletedOnesEnd) {
   request.set_named("other");
   request.set_name("copy");
   std::atomic<bool> done = false;
-  server().createScene(request, [&](const auto& created) {
+  server().unaryCalls.createScene(request, [&](const auto& created) {
     EXPECT_TRUE(created);
     done = true;
   });
@@ -332,7 +332,7 @@ TEST_F(EdgeTest, ScenesCreatedLaterAreShownAndDeletedOnesEnd) {
   viewer.join("copy");
   v1::DeleteSceneRequest remove;
   remove.set_name("copy");
-  server().deleteScene(remove, [](const auto&) {});
+  server().unaryCalls.deleteScene(remove, [](const auto&) {});
   EXPECT_EQ(viewer.readToTheEnd().error().code(), v1::ERROR_CODE_NOT_FOUND);
 }
 
@@ -406,7 +406,7 @@ TEST_F(EdgeTest, MessagesThatDoNotBelongToAStreamAreDropped) {
     send(descriptionSubject(subject), bytes);
   }
   send(eventsSubject(subject), welcome.SerializeAsString());
-  EXPECT_TRUE(eventually([&] { return edge->server.state().metrics.nats.refused.value() >= 4; }));
+  EXPECT_TRUE(eventually([&] { return edge->server.metrics.nats.refused.value() >= 4; }));
   viewer.readFrames(10);
   EXPECT_FALSE(viewer.finished());
 }
@@ -414,7 +414,7 @@ TEST_F(EdgeTest, MessagesThatDoNotBelongToAStreamAreDropped) {
 TEST_F(EdgeTest, StartsWithoutNatsAndWithoutOrigin) {
   nats_->kill();
   EdgeServer edge(natsOptions(), 60s);
-  EXPECT_FALSE(edge.server.state().metrics.nats.connected);
+  EXPECT_FALSE(edge.server.metrics.nats.connected);
   TestPeer early(edge.server);
   early.hello("small");
   EXPECT_EQ(early.readToTheEnd().error().code(), v1::ERROR_CODE_NOT_FOUND);

@@ -12,7 +12,7 @@
 
 #include "server/fleet/edge.h"
 #include "server/fleet/origin.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "tests/fleet/nats_server.h"
 #include "tests/serving/small_scene.h"
 #include "tests/serving/test_peer.h"
@@ -54,19 +54,19 @@ class FleetTest : public ::testing::Test {
           origin(std::make_unique<fleet::Origin>(server, nats, std::move(originOptions))) {}
     ~OriginServer() { server.stop(); }
 
-    std::shared_ptr<scene::LiveScene> find(const std::string& scene) { return server.state().find(scene); }
+    std::shared_ptr<scene::LiveScene> find(const std::string& scene) { return server.scenes.find(scene); }
     // Creates a copy of "other". Returns why not; empty if it worked.
     std::string create(const std::string& name) {
       v1::CreateSceneRequest request;
       request.set_named("other");
       request.set_name(name);
-      return problemOf([&](const auto& done) { server.createScene(request, done); });
+      return problemOf([&](const auto& done) { server.unaryCalls.createScene(request, done); });
     }
     // The same for its end.
     std::string remove(const std::string& name) {
       v1::DeleteSceneRequest request;
       request.set_name(name);
-      return problemOf([&](const auto& done) { server.deleteScene(request, done); });
+      return problemOf([&](const auto& done) { server.unaryCalls.deleteScene(request, done); });
     }
     // Whether the directory says that this server has the scene, and can be asked to move it.
     bool owns(const std::string& scene) { return origin->directory().owns(scene); }
@@ -94,7 +94,7 @@ class FleetTest : public ::testing::Test {
   struct EdgeServer {
     EdgeServer(const fleet::NatsOptions& nats) : server(hosting::ServerOptions{}), edge(server, nats, keep) {}
     ~EdgeServer() { server.stop(); }
-    bool shows(const std::string& scene) { return server.state().find(scene) != nullptr; }
+    bool shows(const std::string& scene) { return server.scenes.find(scene) != nullptr; }
 
     static constexpr std::chrono::seconds keep{60};
     hosting::SceneServer server;

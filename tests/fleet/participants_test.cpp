@@ -48,7 +48,7 @@ TEST_F(EdgeParticipantsTest, TakePartAsAtTheOrigin) {
   EXPECT_EQ(peer.welcome().role(), v1::ROLE_PARTICIPANT);
   EXPECT_EQ(peer.welcome().participants_size(), 2);
   EXPECT_EQ(origin->find("small")->roster.size(), 2u);
-  EXPECT_EQ(edge->server.state().find("small")->roster.size(), 0u);
+  EXPECT_EQ(edge->server.scenes.find("small")->roster.size(), 0u);
 
   peer.poses({{0, 0.25F}});
   direct.readUntil([&](const v1::ServerMessage& message) {
@@ -139,7 +139,7 @@ TEST_F(EdgeParticipantsTest, BansOfTheOriginHoldOnEdges) {
   const auto origin = startOrigin();
   const auto edge = startEdge("small");
   const scene::Subject subject{.tenant = "theatre", .name = "anna"};
-  const auto shown = edge->server.state().find("small");
+  const auto shown = edge->server.scenes.find("small");
   EXPECT_FALSE(shown->roster.isBanned(subject));
   origin->find("small")->roster.setBans({{.subject = subject, .displayName = "Anna"}});
   EXPECT_TRUE(eventually([&] { return shown->roster.isBanned(subject); }));

@@ -24,7 +24,7 @@
 #include <netdb.h>
 
 #include "server/endpoint/web/web_endpoint.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/identity/authenticator.h"
 #include "server/tls/server_tls.h"
 #include "tests/e2e/link.h"

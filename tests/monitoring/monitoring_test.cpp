@@ -20,7 +20,7 @@
 #include <prometheus/text_serializer.h>
 
 #include "server/endpoint/web/web_endpoint.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/monitoring/connection_room.h"
 #include "server/monitoring/metric_families.h"
 #include "server/monitoring/monitoring_endpoint.h"
@@ -83,7 +83,7 @@ class MonitoringTest : public SmallServer {
     v1::ControlSceneRequest request;
     request.set_name("small");
     request.set_paused(true);
-    ASSERT_TRUE(server().controlScene(request));
+    ASSERT_TRUE(server().unaryCalls.controlScene(request));
   }
 
   std::unique_ptr<endpoint::WebEndpoint> web_;
@@ -145,7 +145,7 @@ TEST_F(MonitoringTest, MetricsAgreeWithWhatTheClientReceived) {
   EXPECT_EQ(during.value("clothstream_connections_total"), 1);
   EXPECT_EQ(during.value("clothstream_scenes"), 3);
   EXPECT_EQ(
-      during.value("clothstream_build_info", {{"version", "1.2.3"}, {"device", server().deviceInfo().name}}),
+      during.value("clothstream_build_info", {{"version", "1.2.3"}, {"device", server().device.info().name}}),
       1);
 
   // At rest, the numbers are exact.
@@ -187,7 +187,7 @@ TEST_F(MonitoringTest, MetricsAgreeWithWhatTheClientReceived) {
   EXPECT_EQ(atRest.value("clothstream_sent_bytes_total", {{"endpoint", "grpc"}}), 0);
   EXPECT_GT(of("price"), 0);
   EXPECT_FLOAT_EQ(static_cast<float>(of("price")),
-                  static_cast<float>(server().state().find("small")->price()));
+                  static_cast<float>(server().scenes.find("small")->price()));
 
   joined.client->leave();
   EXPECT_TRUE(eventually([&] { return scrape().value("clothstream_open_connections") == 0; }));
@@ -206,7 +206,7 @@ TEST_F(MonitoringTest, BudgetIsUsedByCreatedScenes) {
   request.set_named("large");
   request.set_name("copy");
   std::promise<bool> made;
-  server().createScene(request, [&](const auto& answer) { made.set_value(answer.has_value()); });
+  server().unaryCalls.createScene(request, [&](const auto& answer) { made.set_value(answer.has_value()); });
   ASSERT_TRUE(made.get_future().get());
   EXPECT_GT(used("memory_bytes"), before + 128 * 128 * 12);
   EXPECT_GT(used("load"), load);
@@ -221,7 +221,7 @@ TEST_F(MonitoringTest, MetricsOfADeletedSceneVanish) {
   create.set_named("small");
   create.set_name("mine");
   std::promise<bool> created, deleted;
-  server().createScene(create, [&](const auto& made) { created.set_value(made.has_value()); });
+  server().unaryCalls.createScene(create, [&](const auto& made) { created.set_value(made.has_value()); });
   ASSERT_TRUE(created.get_future().get());
   // The device thread publishes the memory before it waits for work again, so shortly after its answer.
   EXPECT_TRUE(eventually([&] { return deviceMemory() > before; }));
@@ -229,7 +229,7 @@ TEST_F(MonitoringTest, MetricsOfADeletedSceneVanish) {
   EXPECT_EQ(scrape().value("clothstream_scenes"), 4);
   v1::DeleteSceneRequest remove;
   remove.set_name("mine");
-  server().deleteScene(remove, [&](const auto& done) { deleted.set_value(done.has_value()); });
+  server().unaryCalls.deleteScene(remove, [&](const auto& done) { deleted.set_value(done.has_value()); });
   ASSERT_TRUE(deleted.get_future().get());
   EXPECT_FALSE(scrape().hasLabel("scene", "mine"));
   EXPECT_TRUE(eventually([&] { return deviceMemory() == before; }));
@@ -237,7 +237,7 @@ TEST_F(MonitoringTest, MetricsOfADeletedSceneVanish) {
 
 TEST_F(MonitoringTest, CountsDevicesThatWereRebuilt) {
   Joined joined(connect());
-  server().state().device.simulateDeviceLoss();
+  server().device.simulateDeviceLoss();
   EXPECT_TRUE(eventually([&] { return scrape().value("clothstream_device_rebuilds_total") == 1; }));
   EXPECT_TRUE(eventually([&] { return get("/healthz").result() == http::status::ok; }));
 }

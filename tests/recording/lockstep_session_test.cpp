@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "server/hosting/scene_server.h"
-#include "server/hosting/server_state.h"
 #include "server/recording/playback.h"
 #include "tests/recording/sample.h"
 #include "tests/recording/viewer.h"
@@ -45,7 +44,7 @@ TEST_F(LockstepSession, CutsOffAClientThatDoesNotAcknowledge) {
   peer.acknowledges = false;
   peer.join();
   const auto checkAfter = [&](Clock::duration time) {
-    for (const auto& known : server.state().peersNow()) known->checkSilence(Clock::now() + time);
+    for (const auto& known : server.connections.peers()) known->checkSilence(Clock::now() + time);
   };
   checkAfter(29s);
   EXPECT_FALSE(peer.finished());

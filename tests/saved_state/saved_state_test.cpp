@@ -55,23 +55,25 @@ class SavedStateTest : public tests::ServerTest {
     v1::CreateSceneRequest request;
     *request.mutable_scene() = messages::toMessage(scene);
     std::promise<std::string> done;
-    server().createScene(request, [&](const auto& made) { done.set_value(made ? "" : made.error().text()); });
+    server().unaryCalls.createScene(
+        request, [&](const auto& made) { done.set_value(made ? "" : made.error().text()); });
     ASSERT_EQ(done.get_future().get(), "");
   }
   void remove(const std::string& name) {
     v1::DeleteSceneRequest request;
     request.set_name(name);
     std::promise<std::string> done;
-    server().deleteScene(request, [&](const auto& made) { done.set_value(made ? "" : made.error().text()); });
+    server().unaryCalls.deleteScene(
+        request, [&](const auto& made) { done.set_value(made ? "" : made.error().text()); });
     ASSERT_EQ(done.get_future().get(), "");
   }
   std::vector<std::string> names() {
     std::vector<std::string> names;
-    const v1::ListScenesResponse list = server().listScenes();
+    const v1::ListScenesResponse list = server().unaryCalls.listScenes();
     for (const v1::SceneSummary& scene : list.scenes()) names.push_back(scene.name());
     return names;
   }
-  std::shared_ptr<scene::LiveScene> live(const std::string& name) { return server().state().find(name); }
+  std::shared_ptr<scene::LiveScene> live(const std::string& name) { return server().scenes.find(name); }
   static v1::Hello helloTo(const std::string& scene, const std::string& token) {
     v1::Hello hello;
     hello.set_scene(scene);
@@ -247,7 +249,7 @@ TEST_F(SavedStateTest, AnUnaffordableSceneIsKeptButDoesNotRun) {
   create(large);
   create(tests::smallScene("tiny"));
   const double load =
-      model::PriceModel(large).work(large).seconds(server().state().budget->speed()) * large.simulationRate;
+      model::PriceModel(large).work(large).seconds(server().budget->speed()) * large.simulationRate;
   end();
   // Room for many small scenes. The speed of the device is measured again.
   scene::BudgetLimits little = kNoLimits;

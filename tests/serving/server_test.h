@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "server/hosting/scene_server.h"
-#include "server/hosting/server_state.h"
 #include "tests/serving/small_scene.h"
 #include "tests/serving/test_peer.h"
 #include "tests/vulkan/gpu_test.h"
@@ -39,7 +38,7 @@ class ServerTest : public ::testing::Test {
 
   hosting::SceneServer& server() { return *server_; }
   void stop() { server_.reset(); }
-  telemetry::SceneMetrics& metrics() { return server_->state().scenes.front()->metrics; }
+  telemetry::SceneMetrics& metrics() { return server_->scenes.all().front()->metrics; }
 
  private:
   std::unique_ptr<hosting::SceneServer> server_;

@@ -26,7 +26,7 @@
 #include "clothstream/v1/session.pb.h"
 #include "proto/tls/fingerprint.h"
 #include "server/endpoint/web/web_endpoint.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/tls/server_tls.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/endpoint/page_directory.h"
@@ -62,7 +62,7 @@ class TlsEndpoint : public SmallServer {
   // Directory of the certificate that is loaded next.
   std::filesystem::path directory() const { return keys_.path() / key_; }
   telemetry::Counter& failedHandshakes() {
-    return server().state().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::handshake)];
+    return server().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::handshake)];
   }
 
   e2e::TemporaryDirectory keys_;

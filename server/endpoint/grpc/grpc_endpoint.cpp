@@ -26,7 +26,7 @@
 #include "server/endpoint/grpc/health.h"
 #include "server/endpoint/grpc/reflection.h"
 #include "server/endpoint/grpc/service.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/session/session.h"
 
 namespace clothstream::endpoint {
@@ -99,7 +99,7 @@ struct GrpcEndpoint::State {
         builder.experimental().AddExternalConnectionAcceptor(
             grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
             credentialsOf(options.tls.get())),
-        scenes.state().metrics);
+        scenes.metrics);
     builder.RegisterService(&service);
     builder.RegisterService(&health);
     if (options.reflects) builder.RegisterService(&reflection);
@@ -108,7 +108,7 @@ struct GrpcEndpoint::State {
     if (!server) throw std::runtime_error("gRPC cannot start a server");
     limits.connections = options.maxStreams;
     context.emplace(GrpcEndpointContext{.server = scenes,
-                                        .metrics = scenes.state().metrics,
+                                        .metrics = scenes.metrics,
                                         .loop = loop,
                                         .streams = Admission(limits),
                                         .watches = Admission(limits),

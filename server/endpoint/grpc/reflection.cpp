@@ -20,7 +20,8 @@
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/status.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/answers.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -93,7 +94,7 @@ class ReflectionStream final : public Call {
     endpoint::await<ReflectionStream>(endpoint_, service_);
     if (!endpoint_.refusal.ok()) return finish(endpoint_.refusal);
     address_ = addressKeyOf(context_.peer());
-    const auto identity = endpoint_.server.state().identify(tokenIn(context_), address_.empty());
+    const auto identity = endpoint_.server.authentication.identify(tokenIn(context_), address_.empty());
     if (!identity) return finish(statusOf(hosting::toMessage(identity.error())));
     auto ticket = admit(endpoint_.watches);
     if (!ticket) return finish(ticket.error());

@@ -8,7 +8,8 @@
 #include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/join_stream.h"
 #include "server/endpoint/grpc/unary_call.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/answers.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -23,30 +24,26 @@ tl::expected<Response, v1::Error> toAnswer(messages::Result<Response> result) {
 
 // Calls about identities and bans.
 void offerIdentity(GrpcEndpointContext& endpoint, Service& service) {
-  hosting::SceneServer::State& server = endpoint.server.state();
+  hosting::SceneServer& server = endpoint.server;
   offerToAll(endpoint, service, &Service::RequestAuthenticate,
              [&server](const auto& request, const grpc::ServerContext& context, auto answer) {
                v1::AuthenticateResponse response;
-               const auto identity = server.authenticate(request, addressKeyOf(context.peer()),
-                                                         schedule::Clock::now(), response);
+               const auto identity = server.authentication.authenticate(request, addressKeyOf(context.peer()),
+                                                                        schedule::Clock::now(), response);
                if (!identity) return answer(tl::unexpected(hosting::toMessage(identity.error())));
                answer(std::move(response));
              });
   offer(endpoint, service, &Service::RequestCreatePairingCode,
         [&server](const auto& request, const Identity& by, auto answer) {
-          answer(toAnswer(server.createPairingCode(by, request, schedule::Clock::now())));
+          answer(toAnswer(server.authentication.createPairingCode(by, request, schedule::Clock::now())));
         });
   offer(endpoint, service, &Service::RequestListBans,
         [&server](const auto& request, const Identity& by, auto answer) {
-          const auto may = server.mayFromOutside(by, request.scene(), scene::Action::manageBans);
-          if (!may) return answer(tl::unexpected(hosting::toMessage(may.error())));
-          answer(toAnswer(server.listBans(request)));
+          answer(server.unaryCalls.listBans(request, by));
         });
   offer(endpoint, service, &Service::RequestLiftBan,
         [&server](const auto& request, const Identity& by, auto answer) {
-          const auto may = server.mayFromOutside(by, request.scene(), scene::Action::manageBans);
-          if (!may) return answer(tl::unexpected(hosting::toMessage(may.error())));
-          answer(toAnswer(server.liftBan(request)));
+          answer(server.unaryCalls.liftBan(request, by));
         });
 }
 
@@ -54,8 +51,9 @@ void offerIdentity(GrpcEndpointContext& endpoint, Service& service) {
 
 void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::thread_pool& slowCalls) {
   hosting::SceneServer& server = endpoint.server;
-  offer(endpoint, service, &Service::RequestListScenes,
-        [&server](const auto&, const Identity& by, auto answer) { answer(server.listScenes(by)); });
+  offer(
+      endpoint, service, &Service::RequestListScenes,
+      [&server](const auto&, const Identity& by, auto answer) { answer(server.unaryCalls.listScenes(by)); });
   // Slow, since a scene may contain a mesh of millions of vertices.
   offer(
       endpoint, service, &Service::RequestGetScene,
@@ -64,7 +62,7 @@ void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::
         boost::asio::post(slowCalls,
                           [&server, request, by, wanted = std::move(wanted), answer = std::move(answer)] {
                             if (!wanted()) return;  // the client has cancelled the call
-                            answer(server.getScene(request, by));
+                            answer(server.unaryCalls.getScene(request, by));
                           });
       },
       CallRate::kSceneCost);
@@ -72,24 +70,24 @@ void offerService(GrpcEndpointContext& endpoint, Service& service, boost::asio::
       endpoint, service, &Service::RequestCreateScene,
       [&server](const auto& request, const Identity& by, auto answer) {
         auto wanted = answer.wanted();
-        server.createScene(request, std::move(answer), by, std::move(wanted));
+        server.unaryCalls.createScene(request, std::move(answer), by, std::move(wanted));
       },
       CallRate::kSceneCost);
   offer(endpoint, service, &Service::RequestDeleteScene,
         [&server](const auto& request, const Identity& by, auto answer) {
-          server.deleteScene(request, std::move(answer), by);
+          server.unaryCalls.deleteScene(request, std::move(answer), by);
         });
   offer(endpoint, service, &Service::RequestControlScene,
         [&server](const auto& request, const Identity& by, auto answer) {
-          answer(server.controlScene(request, by));
+          answer(server.unaryCalls.controlScene(request, by));
         });
   offer(endpoint, service, &Service::RequestStartRecording,
         [&server](const auto& request, const Identity& by, auto answer) {
-          server.startRecording(request, std::move(answer), by);
+          server.unaryCalls.startRecording(request, std::move(answer), by);
         });
   offer(endpoint, service, &Service::RequestStopRecording,
         [&server](const auto& request, const Identity& by, auto answer) {
-          server.stopRecording(request, std::move(answer), by);
+          server.unaryCalls.stopRecording(request, std::move(answer), by);
         });
   offerIdentity(endpoint, service);
   await<JoinStream>(endpoint, service);

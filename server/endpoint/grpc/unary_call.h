@@ -20,7 +20,8 @@
 #include "server/endpoint/grpc/call.h"
 #include "server/endpoint/grpc/caller.h"
 #include "server/endpoint/grpc/status.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/answers.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream::endpoint {
 
@@ -162,10 +163,10 @@ void offerToAll(GrpcEndpointContext& endpoint, Service& service, TakeMethod<Meth
 template <typename Service, typename Method, typename Request, typename Response, typename Handler>
 void offer(GrpcEndpointContext& endpoint, Service& service, TakeMethod<Method, Request, Response> take,
            Handler handler, double cost = 1) {
-  auto identified = [&state = endpoint.server.state(), handler = std::move(handler)](
+  auto identified = [&authentication = endpoint.server.authentication, handler = std::move(handler)](
                         const Request& request, const grpc::ServerContext& context,
                         typename UnaryCall<Request, Response>::Answer answer) {
-    const auto identity = state.identify(tokenIn(context), addressKeyOf(context.peer()).empty());
+    const auto identity = authentication.identify(tokenIn(context), addressKeyOf(context.peer()).empty());
     if (!identity) return answer(tl::unexpected(hosting::toMessage(identity.error())));
     handler(request, *identity, std::move(answer));
   };

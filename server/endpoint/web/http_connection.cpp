@@ -12,7 +12,7 @@
 
 #include "server/endpoint/web/request_body.h"
 #include "server/endpoint/web/web_socket_stream.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -79,13 +79,13 @@ void HttpConnection::detectTls() {
 }
 
 void HttpConnection::shakeHands() {
-  stream_.async_handshake(
-      endpoint_.tls->context(), buffer_.data(),
-      [self = shared_from_this()](beast::error_code error, std::size_t used) {
-        if (error) return self->endpoint_.server.state().metrics.refuse(telemetry::Refusal::handshake);
-        self->buffer_.consume(used);
-        self->read();
-      });
+  stream_.async_handshake(endpoint_.tls->context(), buffer_.data(),
+                          [self = shared_from_this()](beast::error_code error, std::size_t used) {
+                            if (error)
+                              return self->endpoint_.server.metrics.refuse(telemetry::Refusal::handshake);
+                            self->buffer_.consume(used);
+                            self->read();
+                          });
 }
 
 void HttpConnection::read() {
@@ -126,7 +126,7 @@ void HttpConnection::onHeader(beast::error_code error) {
   // A connection becomes a WebSocket once, so the rate of connections limits these.
   if (isStream && beast::websocket::is_upgrade(parser_->get())) return answerStream(parser_->get());
   if (!endpoint_.requestRate.take(slot_->address(), schedule::Clock::now())) {
-    endpoint_.server.state().metrics.refuse(telemetry::Refusal::requestRate);
+    endpoint_.server.metrics.refuse(telemetry::Refusal::requestRate);
     return refuse(http::status::too_many_requests, "Too many requests: try again in a second.\n");
   }
   write(isStream ? upgradeRequired(parser_->get()) : answer(parser_->get()));
@@ -201,7 +201,7 @@ void HttpConnection::write(Response&& response) {
   response_.set(http::field::server, "clothstream");
   if (response_.result() != http::status::not_modified) response_.content_length(response_.body().size());
   if (parser_->get().method() == http::verb::head) response_.body() = {};
-  endpoint_.server.state().metrics.webBytes.add(response_.body().size());
+  endpoint_.server.metrics.webBytes.add(response_.body().size());
   stream_.next_layer().expires_after(kResponseTimeout);
   http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code error, std::size_t) {
     self->onWritten(error);

@@ -21,7 +21,7 @@
 #include "server/endpoint/web/endpoint_context.h"
 #include "server/endpoint/web/http_connection.h"
 #include "server/endpoint/web/web_socket_stream.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/tls/qr_code.h"
 
 namespace clothstream::endpoint {
@@ -132,7 +132,7 @@ struct WebEndpoint::State {
     const tcp::endpoint peer = socket.remote_endpoint(error);
     if (error) return;  // the peer has disconnected
     auto ticket = admission.admit(peer.address(), schedule::Clock::now());
-    if (!ticket) return context.server.state().metrics.refuse(ticket.error());
+    if (!ticket) return context.server.metrics.refuse(ticket.error());
     sendFresh(socket);
     std::make_shared<HttpConnection>(std::move(socket), context, std::move(*ticket))->start();
   }

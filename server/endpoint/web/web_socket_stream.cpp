@@ -15,7 +15,7 @@
 
 #include "server/endpoint/listen/address_rate.h"
 #include "server/endpoint/web/frame_meter.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/session/closing.h"
 #include "server/session/wake.h"
 
@@ -123,7 +123,7 @@ void WebSocketStream::onAccepted(beast::error_code error) {
 
 void WebSocketStream::refuseFrames() {
   if (closing_) return;
-  telemetry::ServerMetrics& metrics = endpoint_.server.state().metrics;
+  telemetry::ServerMetrics& metrics = endpoint_.server.metrics;
   metrics.refuse(telemetry::Refusal::messageRate);
   metrics.droppedConnections.add();
   close({ws::close_code::policy_error,
@@ -169,7 +169,7 @@ void WebSocketStream::pump() {
   } else if (std::optional<delivery::SharedBytes> message = session_->next()) {
     outgoing_ = std::move(*message);
     writing_ = true;
-    endpoint_.server.state().metrics.webBytes.add(outgoing_->size());
+    endpoint_.server.metrics.webBytes.add(outgoing_->size());
     socket_.async_write(boost::asio::buffer(outgoing_->data(), outgoing_->size()),
                         handler(&WebSocketStream::onWritten));
   } else if (finished) {

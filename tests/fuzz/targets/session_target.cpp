@@ -13,7 +13,7 @@
 #include "inputs.pb.h"
 #include "proto/codec/stream_layout.h"
 #include "server/delivery/envelope.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/messages/limits.h"
 #include "server/model/input.h"
 #include "server/scene/interaction.h"
@@ -139,7 +139,7 @@ void waitForMaker() {
   std::promise<void> done;
   v1::DeleteSceneRequest request;
   request.set_name("nothing");
-  stillServer().deleteScene(request, [&](const auto&) { done.set_value(); });
+  stillServer().unaryCalls.deleteScene(request, [&](const auto&) { done.set_value(); });
   done.get_future().wait();
 }
 
@@ -171,9 +171,9 @@ void act(Peer& peer, const SessionInput::Step& step, Ticks& ticks) {
 }
 
 void run(const SessionInput& input) {
-  hosting::SceneServer::State& state = stillServer().state();
+  hosting::SceneRegistry& scenes = stillServer().scenes;
   const auto live = std::make_shared<scene::LiveScene>(scene(), false, nullptr, kPeers + 1);
-  state.insert(live);
+  scenes.insert(live);
   {
     Ticks ticks(*live);
     Peer honest;
@@ -194,7 +194,7 @@ void run(const SessionInput& input) {
     for (Peer& each : peers) each.read();
   }
   waitForMaker();  // the answer to one request may have started the next one
-  state.erase(*live);
+  scenes.erase(*live);
 }
 
 constexpr std::array<std::string_view, 16> kWords{

@@ -8,7 +8,7 @@
 
 #include "clothstream/v1/session.pb.h"
 #include "proto/codec/stream_layout.h"
-#include "server/hosting/server_state.h"
+#include "server/hosting/scene_server.h"
 #include "server/scene/frame_source.h"
 
 namespace clothstream::fuzz {
@@ -60,7 +60,7 @@ hosting::SceneServer& stillServer() {
     return options;
   }());
   static const bool hasSpeed = [] {
-    server.state().budget->setSpeed({.nodeStepSeconds = 1e-8, .dispatchSeconds = 2e-5, .workgroupFactor = 4});
+    server.budget->setSpeed({.nodeStepSeconds = 1e-8, .dispatchSeconds = 2e-5, .workgroupFactor = 4});
     return true;
   }();
   static_cast<void>(hasSpeed);

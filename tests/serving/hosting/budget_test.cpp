@@ -202,7 +202,7 @@ TEST_F(BudgetOfServerTest, RefusesSceneBeyondTheMemoryUntilAnotherIsDeleted) {
   EXPECT_EQ(refused.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   EXPECT_FALSE(refused.error().fatal());
   EXPECT_THAT(refused.error().text(), HasSubstr("createScene.scene: would take "));
-  EXPECT_EQ(server().listScenes().scenes_size(), 3);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes_size(), 3);
   v1::ClientMessage remove;
   remove.mutable_delete_scene()->set_name("one");
   ASSERT_TRUE(ask(peer, remove).has_delete_scene());
@@ -238,10 +238,9 @@ TEST_F(BudgetOfServerTest, SceneThatTakesFarMoreThanItsPriceIsStopped) {
   heavy.cloths[0].pins[0].lastColumn = 63;
   heavy.cloths[0].solver.tolerance = 0;
   START({}, {heavy});
-  if (server().state().device.info().kind != vulkan::DeviceKind::software)
+  if (server().device.info().kind != vulkan::DeviceKind::software)
     GTEST_SKIP() << "a GPU is too fast for this scene to harm others";
-  server().state().budget->setSpeed(
-      {.nodeStepSeconds = 1e-15, .dispatchSeconds = 1e-12, .workgroupFactor = 1});
+  server().budget->setSpeed({.nodeStepSeconds = 1e-15, .dispatchSeconds = 1e-12, .workgroupFactor = 1});
   TestPeer honest(server());
   honest.join("small");
   TestPeer peer(server());
@@ -249,7 +248,7 @@ TEST_F(BudgetOfServerTest, SceneThatTakesFarMoreThanItsPriceIsStopped) {
   // A scene of the server starts again first, with its own parameters.
   EXPECT_THAT(peer.readToTheEnd().error().text(),
               HasSubstr("join again to start it with its own parameters"));
-  EXPECT_EQ(server().state().metrics.quarantines.value(), 0u);
+  EXPECT_EQ(server().metrics.quarantines.value(), 0u);
   honest.readFrames(1);  // a client that is silent for 30 s is disconnected
   TestPeer again(server());
   again.hello("heavy");
@@ -258,14 +257,14 @@ TEST_F(BudgetOfServerTest, SceneThatTakesFarMoreThanItsPriceIsStopped) {
   EXPECT_TRUE(last.error().fatal());
   EXPECT_THAT(last.error().text(), HasSubstr("it harms other scenes: "));
   EXPECT_THAT(last.error().text(), HasSubstr("; join again in 10 s"));
-  EXPECT_EQ(server().state().metrics.quarantines.value(), 1u);
+  EXPECT_EQ(server().metrics.quarantines.value(), 1u);
   honest.readFrames(3);
   TestPeer later(server());
   later.hello("heavy");
   EXPECT_THAT(later.readToTheEnd().error().text(),
               ::testing::MatchesRegex("the scene 'heavy' is stopped because it harms other scenes: .*; join "
                                       "again in [0-9]+ s"));
-  const std::shared_ptr<LiveScene> live = server().state().find("heavy");
+  const std::shared_ptr<LiveScene> live = server().scenes.find("heavy");
   EXPECT_EQ(live->quarantined(Clock::now() + std::chrono::seconds(10)), "") << "it comes back";
 }
 

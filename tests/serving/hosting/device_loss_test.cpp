@@ -60,7 +60,7 @@ class NotingJournal : public scene::Journal {
 
 class DeviceLossTest : public tests::ServerTest {
  protected:
-  DeviceThread& device() { return server().state().device; }
+  DeviceThread& device() { return server().device; }
   // Says hello to the scene, and returns the text of the error that ends the session.
   std::string whyEnded(const std::string& scene) {
     TestPeer peer(server());
@@ -102,7 +102,7 @@ TEST_F(DeviceLossTest, RunsScenesAgainOneByOneDefaultFirst) {
   EXPECT_EQ(names[0], "small");
   EXPECT_EQ(names[1], "more-3") << "it has the most participants";
   EXPECT_THAT(names, testing::UnorderedElementsAre("small", "other", "more-0", "more-1", "more-2", "more-3"));
-  EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 1u);
+  EXPECT_EQ(server().metrics.deviceRebuilds.value(), 1u);
 }
 
 TEST_F(DeviceLossTest, AFailureThatBelongsToNoSceneRebuildsNothing) {
@@ -122,7 +122,7 @@ TEST_F(DeviceLossTest, AFailureThatBelongsToNoSceneRebuildsNothing) {
     second.readFrames(2);
   }
   EXPECT_THAT(order->names(), testing::IsEmpty());
-  EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 0u);
+  EXPECT_EQ(server().metrics.deviceRebuilds.value(), 0u);
 }
 
 TEST_F(DeviceLossTest, SceneThatIsLostWhileItLoadsIsGivenUpThenStopped) {
@@ -131,11 +131,11 @@ TEST_F(DeviceLossTest, SceneThatIsLostWhileItLoadsIsGivenUpThenStopped) {
   device().simulateDeviceLossIn("other");
   EXPECT_THAT(whyEnded("other"), HasSubstr("it harms other scenes: the device was lost twice"));
   EXPECT_THAT(whyEnded("other"), HasSubstr("the scene 'other' is stopped because it harms other scenes"));
-  EXPECT_EQ(server().state().metrics.quarantines.value(), 1u);
+  EXPECT_EQ(server().metrics.quarantines.value(), 1u);
   TestPeer honest(server());
   honest.join("small");
   honest.readFrames(3);
-  EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 3u);
+  EXPECT_EQ(server().metrics.deviceRebuilds.value(), 3u);
 }
 
 TEST_F(DeviceLossTest, SceneGivenUpOnceRunsAgainWithItsOwnParameters) {
@@ -153,9 +153,9 @@ TEST_F(DeviceLossTest, SceneGivenUpOnceRunsAgainWithItsOwnParameters) {
   device().simulateDeviceLossIn("");
   TestPeer again(server());
   again.join("other");
-  const model::Scene now = server().state().find("other")->definition();
+  const model::Scene now = server().scenes.find("other")->definition();
   EXPECT_EQ(now.environment.gravity.y(), tests::smallScene().environment.gravity.y());
-  EXPECT_EQ(server().state().metrics.quarantines.value(), 0u);
+  EXPECT_EQ(server().metrics.quarantines.value(), 0u);
 }
 
 TEST_F(DeviceLossTest, OnlyTheSceneThatLosesTheDeviceIsGivenUp) {
@@ -186,8 +186,8 @@ TEST_F(DeviceLossTest, RefusesACreatedSceneThatLosesTheDeviceWhileItLoads) {
   EXPECT_THAT(answer.error().text(),
               HasSubstr("the device cannot run it: the device was lost while the scene was being loaded"));
   peer.join("small");
-  EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 1u);
-  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+  EXPECT_EQ(server().metrics.deviceRebuilds.value(), 1u);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes_size(), 2);
 }
 
 }  // namespace

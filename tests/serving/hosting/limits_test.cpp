@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/hosting/scene_server.h"
+#include "server/hosting/server_options.h"
 #include "server/messages/limits.h"
 #include "server/scene/budget.h"
 

@@ -49,10 +49,10 @@ class OverloadTest : public tests::ServerTest {
           scene.name, recording::RecorderOptions{.directory = directory_.path(), .serverName = "test"}, true);
     };
     ServerTest::start(std::move(options), {overloadingScene()});
-    if (!IsSkipped() && server().state().device.info().kind != vulkan::DeviceKind::software)
+    if (!IsSkipped() && server().device.info().kind != vulkan::DeviceKind::software)
       GTEST_SKIP() << "a GPU is too fast for this scene to overload it";
   }
-  scene::LiveScene& heavy() { return *server().state().find("heavy"); }
+  scene::LiveScene& heavy() { return *server().scenes.find("heavy"); }
 
   e2e::TemporaryDirectory directory_;
 };
@@ -87,7 +87,7 @@ TEST_F(OverloadTest, ReducesFramesThenSubstepsAndItsRecordingSimulatesAgain) {
   light.readFrames(20);
   const std::uint64_t ticks = lightMetrics.ticks.value() - ticksBefore;
   EXPECT_LE(lightMetrics.slippedTicks.value() - slippedBefore, 3 * ticks);
-  EXPECT_EQ(server().state().find("small")->work.load(), server().state().find("small")->allWork());
+  EXPECT_EQ(server().scenes.find("small")->work.load(), server().scenes.find("small")->allWork());
 
   // A peer that joins later learns it.
   TestPeer later(server());

@@ -47,7 +47,7 @@ class HeavySceneTest : public tests::ServerTest {
     light->join("light");
     heavy->hello("heavy");
   }
-  bool heavyRuns() { return server().state().find("heavy")->running; }
+  bool heavyRuns() { return server().scenes.find("heavy")->running; }
 
   std::unique_ptr<TestPeer> light, heavy;
 };
@@ -71,7 +71,7 @@ TEST_F(HeavySceneTest, OtherScenesContinueWhileItLoads) {
 
 TEST_F(HeavySceneTest, IsLoadedAgainAfterADeviceLoss) {
   light->readFrames(2);
-  server().state().device.simulateDeviceLoss();
+  server().device.simulateDeviceLoss();
   light->readUntil(
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_DEVICE_REBUILT; });
   heavy->readFrames(1);
@@ -84,7 +84,7 @@ TEST_F(HeavySceneTest, ServerStopsWhileItLoads) {
   request.set_named("heavy");
   request.set_name("heavier");
   std::promise<void> answered;
-  server().createScene(request, [&](const auto&) { answered.set_value(); });
+  server().unaryCalls.createScene(request, [&](const auto&) { answered.set_value(); });
   light->vanish();
   heavy->vanish();
   stop();

@@ -36,13 +36,13 @@ TEST_F(ScenesTest, RefusesCreateSceneAtOnceWhileTooManyScenesWait) {
   std::promise<void> mayEnd;
   v1::CreateSceneRequest unknown;
   unknown.set_named("no such scene");
-  server().createScene(unknown, [began, end = mayEnd.get_future().share()](const auto&) {
+  server().unaryCalls.createScene(unknown, [began, end = mayEnd.get_future().share()](const auto&) {
     began->set_value();
     end.wait();  // the maker's thread stays busy, so all others wait
   });
   began->get_future().wait();
   for (std::uint32_t i = 0; i < SceneMaker::kMaxWaiting; ++i)
-    server().createScene(unknown, [](const auto&) {});
+    server().unaryCalls.createScene(unknown, [](const auto&) {});
   TestPeer peer(server());
   const v1::ServerMessage answer = createNamed(peer, "folds", "late");
   EXPECT_EQ(answer.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
@@ -56,7 +56,7 @@ TEST_F(ScenesTest, RefusesOtherRequestsWhileTooManyWait) {
   std::promise<void> mayEnd;
   v1::CreateSceneRequest unknown;
   unknown.set_named("no such scene");
-  server().createScene(unknown, [began, end = mayEnd.get_future().share()](const auto&) {
+  server().unaryCalls.createScene(unknown, [began, end = mayEnd.get_future().share()](const auto&) {
     began->set_value();
     end.wait();  // the maker's thread stays busy, so all others wait
   });
@@ -64,7 +64,7 @@ TEST_F(ScenesTest, RefusesOtherRequestsWhileTooManyWait) {
   v1::DeleteSceneRequest request;
   request.set_name("small");
   for (std::uint32_t i = 0; i < SceneMaker::kMaxWaiting; ++i)
-    server().deleteScene(request, [](const auto&) {});
+    server().unaryCalls.deleteScene(request, [](const auto&) {});
   TestPeer peer(server());
   EXPECT_THAT(deleteScene(peer, "small").error().text(),
               StartsWith("deleteScene: 64 requests about scenes wait; try again later"));
@@ -74,7 +74,7 @@ TEST_F(ScenesTest, RefusesOtherRequestsWhileTooManyWait) {
   message.mutable_stop_recording()->set_scene("small");
   EXPECT_THAT(ask(peer, message).error().text(), StartsWith("stopRecording: 64 requests about scenes wait"));
   const auto counter = static_cast<std::size_t>(telemetry::Refusal::waitingScenes);
-  EXPECT_EQ(server().state().metrics.refusals[counter].value(), 3u);
+  EXPECT_EQ(server().metrics.refusals[counter].value(), 3u);
   mayEnd.set_value();
 }
 
@@ -106,7 +106,7 @@ TEST_F(ScenesTest, ACancelledCreationIsNotKeptAndTheErrorSaysWhy) {
   const auto error = [&] {
     std::promise<std::string> done;
     // The peer leaves while the device loads the scene.
-    server().createScene(
+    server().unaryCalls.createScene(
         request, [&](const auto& made) { done.set_value(made ? "" : made.error().text()); },
         identity::local(), [&] { return !store->isKept; });
     return done.get_future().get();
@@ -198,7 +198,7 @@ TEST_F(ScenesTest, CancelsASceneThatTheDeviceDoesNotLoad) {
   v1::CreateSceneRequest request;
   request.set_named("small");
   request.set_name("stuck");
-  server().createScene(
+  server().unaryCalls.createScene(
       request, [&](const auto& created) { answered.set_value(created ? "" : created.error().text()); },
       identity::local(), [&] { return ++checks < kChecks; });
   const bool inTime = answer.wait_for(TestPeer::kPatience) == std::future_status::ready;
@@ -206,14 +206,14 @@ TEST_F(ScenesTest, CancelsASceneThatTheDeviceDoesNotLoad) {
   v1::StopRecordingRequest stopping;
   stopping.set_scene("nowhere");
   std::promise<void> stopped;
-  server().stopRecording(stopping, [&](const auto&) { stopped.set_value(); });
+  server().unaryCalls.stopRecording(stopping, [&](const auto&) { stopped.set_value(); });
   if (inTime) stopped.get_future().wait();
   journal->release();
   ASSERT_TRUE(inTime);
   EXPECT_THAT(answer.get(),
               StartsWith("createScene: cancelled, because the peer that asked for it has left"));
   peer.readFrames(3);
-  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes_size(), 2);
   EXPECT_TRUE(createNamed(peer, "small", "stuck").has_create_scene()) << "the name is free again";
 }
 

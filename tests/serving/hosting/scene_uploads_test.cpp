@@ -148,8 +148,7 @@ TEST_F(ScenesTest, OptionsLimitTheParsedSizeAndTheSpringsOfANode) {
   const v1::Error parsed = createUploaded(maker).error();
   EXPECT_EQ(parsed.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   EXPECT_THAT(parsed.text(), HasSubstr("1000000 bytes of memory (--profile)"));
-  EXPECT_EQ(
-      server().state().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::sceneSize)].value(), 2u);
+  EXPECT_EQ(server().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::sceneSize)].value(), 2u);
 }
 
 TEST_F(ScenesTest, InvalidSceneIsRefusedWithTheReason) {
@@ -180,7 +179,7 @@ TEST_F(ScenesTest, InvalidSceneIsRefusedWithTheReason) {
                 .error()
                 .code(),
             v1::ERROR_CODE_INVALID_ARGUMENT);
-  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes_size(), 2);
 }
 
 TEST_F(ScenesTest, InvalidChunksAreRefusedAndDropTheUpload) {
@@ -256,7 +255,7 @@ TEST_F(ScenesTest, LimitsScenesWaitingToBeCreated) {
   v1::CreateSceneRequest request;
   *request.mutable_scene() = discScene(60);
   for (int i = 0; i < kAsked; ++i) {
-    server().createScene(request, [&](const auto& answer) {
+    server().unaryCalls.createScene(request, [&](const auto& answer) {
       if (!answer && answer.error().text().find("wait to be created") != std::string::npos) {
         EXPECT_EQ(answer.error().code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
         ++refused;

@@ -16,7 +16,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/delivery/mailbox.h"
 #include "server/scene/checkpoint.h"
 #include "server/scene/live_scene.h"
 
@@ -39,7 +38,7 @@ TEST_F(ScenesTest, CreatedSceneLivesUntilDeleted) {
   START();
   TestPeer maker(server());
   ASSERT_TRUE(createNamed(maker, "small", "mine").has_create_scene());
-  EXPECT_EQ(server().listScenes().scenes_size(), 3);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes_size(), 3);
   EXPECT_THAT(createNamed(maker, "small", "mine").error().text(), HasSubstr("already"));
   EXPECT_EQ(createNamed(maker, "nowhere", "x").error().code(), v1::ERROR_CODE_NOT_FOUND);
   EXPECT_THAT(createNamed(maker, "small", "No Name").error().text(), StartsWith("createScene.name = "));
@@ -51,7 +50,7 @@ TEST_F(ScenesTest, CreatedSceneLivesUntilDeleted) {
   ASSERT_TRUE(deleteScene(maker, "mine").has_delete_scene());
   const v1::ServerMessage last = inside.readToTheEnd();
   EXPECT_EQ(last.notice().kind(), v1::NOTICE_KIND_SCENE_DELETED);
-  EXPECT_EQ(server().listScenes().scenes_size(), 2);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes_size(), 2);
   outside.readFrames(3);
   EXPECT_EQ(deleteScene(maker, "mine").error().code(), v1::ERROR_CODE_NOT_FOUND);
   EXPECT_THAT(deleteScene(maker, "small").error().text(), HasSubstr("must be of a scene that was created"));
@@ -71,7 +70,7 @@ TEST_F(ScenesTest, DeletesUnusedCreatedScene) {
   TestPeer user(server());
   user.join("used");
   ASSERT_TRUE(createNamed(maker, "small", "unused").has_create_scene());
-  const auto scenes = [&] { return server().listScenes().scenes_size(); };
+  const auto scenes = [&] { return server().unaryCalls.listScenes().scenes_size(); };
   while (scenes() > 3) user.readFrames(1);
   user.readFrames(40);  // a second of the scene
   EXPECT_EQ(scenes(), 3);
@@ -98,11 +97,11 @@ TEST_F(ScenesTest, ASceneThatIsBeingMadeHasItsNameAndItsPlace) {
   ServerOptions options;
   options.maxCreatedScenes = 2;
   START(options);
-  SceneServer::State& state = server().state();
+  SceneRegistry& scenes = server().scenes;
   TestPeer peer(server());
-  auto arrives = std::make_optional(state.takePlace("arrives", "", false));
+  auto arrives = std::make_optional(scenes.takePlace("arrives", "", false));
   ASSERT_TRUE(*arrives);
-  EXPECT_THAT(state.takePlace("arrives", "", true).error().text(), HasSubstr("'arrives' exists already"));
+  EXPECT_THAT(scenes.takePlace("arrives", "", true).error().text(), HasSubstr("'arrives' exists already"));
   EXPECT_THAT(createNamed(peer, "small", "arrives").error().text(), HasSubstr("'arrives' exists already"));
   EXPECT_TRUE(createNamed(peer, "small", "first").has_create_scene());
   EXPECT_THAT(createNamed(peer, "small", "second").error().text(),
@@ -111,21 +110,33 @@ TEST_F(ScenesTest, ASceneThatIsBeingMadeHasItsNameAndItsPlace) {
   EXPECT_TRUE(createNamed(peer, "small", "arrives").has_create_scene());
 }
 
-TEST_F(ScenesTest, AnAbandonedArrivalEndsNoPlaceOfAnotherScene) {
-  START();
-  SceneServer::State& state = server().state();
+TEST_F(ScenesTest, AbandonedArrivalFreesItsPlace) {
+  ServerOptions options;
+  options.maxCreatedScenes = 1;
+  START(options);
   const scene::SavedScene saved{.start = tests::smallScene("arrives"), .maxParticipants = 8};
-  const auto arrived = state.prepareArrival(saved);
-  ASSERT_TRUE(arrived) << arrived.error();
-  state.startArrived(*arrived, saved);
-  // The name is free as soon as the scene is not listed any more. Another scene takes it at once.
-  std::optional<tl::expected<SceneServer::State::HeldPlace, v1::Error>> other;
-  (*arrived)->subscribers.add(std::make_shared<delivery::Mailbox>([&] {
-    if (!other) other.emplace(state.takePlace("arrives", "", false));
-  }));
-  state.abandonArrival(*arrived);
-  ASSERT_TRUE(other && *other);
-  EXPECT_FALSE(state.takePlace("arrives", "", true));
+  {
+    auto arriving = server().created.prepareArrival(saved);
+    ASSERT_TRUE(arriving) << arriving.error();
+    EXPECT_FALSE(server().scenes.find("arrives")) << "no peer can join it yet";
+    EXPECT_FALSE(server().scenes.takePlace("arrives", "", true));
+  }
+  EXPECT_EQ(server().budget->usage().load, 0);
+  EXPECT_TRUE(server().scenes.takePlace("arrives", "", true));
+}
+
+TEST_F(ScenesTest, StartedArrivalStays) {
+  START();
+  const scene::SavedScene saved{.start = tests::smallScene("arrives"), .maxParticipants = 8};
+  {
+    auto arriving = server().created.prepareArrival(saved);
+    ASSERT_TRUE(arriving) << arriving.error();
+    arriving->start(saved);
+    arriving->abandon();
+  }
+  TestPeer peer(server());
+  peer.join("arrives");
+  EXPECT_FALSE(server().scenes.takePlace("arrives", "", true));
 }
 
 TEST_F(ScenesTest, SceneHasItsOwnParticipantLimit) {
@@ -157,10 +168,10 @@ TEST_F(ScenesTest, BuiltInScenesShareTheDeviceAsGuests) {
   START(std::move(options), {tests::smallScene("own")});
   TestPeer peer(server());
   ASSERT_TRUE(createNamed(peer, "small", "mine").has_create_scene());
-  EXPECT_FALSE(server().state().find("small")->isGuest()) << "it is the default scene";
-  EXPECT_TRUE(server().state().find("other")->isGuest());
-  EXPECT_FALSE(server().state().find("own")->isGuest());
-  EXPECT_TRUE(server().state().find("mine")->isGuest());
+  EXPECT_FALSE(server().scenes.find("small")->isGuest()) << "it is the default scene";
+  EXPECT_TRUE(server().scenes.find("other")->isGuest());
+  EXPECT_FALSE(server().scenes.find("own")->isGuest());
+  EXPECT_TRUE(server().scenes.find("mine")->isGuest());
 }
 
 TEST_F(ScenesTest, LimitsPausesAndResetsOfOneParticipant) {
@@ -169,12 +180,12 @@ TEST_F(ScenesTest, LimitsPausesAndResetsOfOneParticipant) {
   request.set_paused(false);
   std::string text;
   for (int i = 0; i <= 10 * scene::ChangeLimits::kOfParticipantPerSecond && text.empty(); ++i)
-    if (const auto controlled = server().state().controlScene(request, 1); !controlled)
+    if (const auto controlled = server().requests.control(request, 1); !controlled)
       text = controlled.error().text();
   EXPECT_EQ(
       text,
       "controlScene: too many changes of 'small' by one participant in one second; send it again later");
-  EXPECT_TRUE(server().state().controlScene(request, 2)) << "another participant may";
+  EXPECT_TRUE(server().requests.control(request, 2)) << "another participant may";
 }
 
 TEST_F(ScenesTest, PausedSceneStandsStillAndContinues) {
@@ -190,7 +201,7 @@ TEST_F(ScenesTest, PausedSceneStandsStillAndContinues) {
   const std::uint64_t ticks = metrics().ticks.value();
   other.readFrames(10);
   EXPECT_EQ(metrics().ticks.value(), ticks);
-  EXPECT_FALSE(server().listScenes().scenes(0).running());
+  EXPECT_FALSE(server().unaryCalls.listScenes().scenes(0).running());
   // Also announced to a peer that joins now.
   TestPeer late(server());
   late.hello();
@@ -231,7 +242,7 @@ TEST_F(ScenesTest, ResetSceneRestartsWithItsPresentParameters) {
   // The cloth is at rest without gravity, except where the ball pushes it.
   EXPECT_NEAR(lowest(), -1.1f, 0.02f);
   EXPECT_EQ(peer.description().definition().name(), "small");
-  EXPECT_EQ(server().getScene({}).value().scene().environment().gravity().y(), 0);
+  EXPECT_EQ(server().unaryCalls.getScene({}).value().scene().environment().gravity().y(), 0);
 }
 
 TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
@@ -258,7 +269,7 @@ TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
       [](const v1::ServerMessage& m) { return m.notice().kind() == v1::NOTICE_KIND_SCENE_PAUSED; });
   // Frames in flight at the start of the pause arrive within a few ticks of another scene.
   other.readFrames(4);
-  const telemetry::SceneMetrics& metrics = server().state().find("sparse")->metrics;
+  const telemetry::SceneMetrics& metrics = server().scenes.find("sparse")->metrics;
   const std::uint64_t ticks = metrics.ticks.value();
   const float before = farthest();
 
@@ -272,7 +283,7 @@ TEST_F(ScenesTest, ResetOfAPausedSceneIsShown) {
   EXPECT_LT(farthest(), before / 10);
   other.readFrames(4);
   EXPECT_EQ(metrics.ticks.value(), shown);
-  EXPECT_FALSE(server().state().find("sparse")->running);
+  EXPECT_FALSE(server().scenes.find("sparse")->running);
 }
 
 }  // namespace

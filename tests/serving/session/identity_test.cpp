@@ -142,7 +142,7 @@ TEST_F(IdentityTest, PeerWithoutTokenGetsNothingButAnError) {
   ping.mutable_ping()->set_client_time_us(7);
   peer.send(ping);
   EXPECT_EQ(peer.readUntil(Body::kPong).pong().client_time_us(), 7u);
-  EXPECT_EQ(server().listScenes().scenes(0).participants(), 0u);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes(0).participants(), 0u);
 }
 
 TEST_F(IdentityTest, TokenWorksWithTheConnectionAndInAMessage) {
@@ -176,8 +176,7 @@ TEST_F(IdentityTest, WrongTokenClosesTheStream) {
       EXPECT_THAT(error.text(), HasSubstr(wrong.why));
     }
   }
-  EXPECT_GT(server().state().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::token)].value(),
-            5u);
+  EXPECT_GT(server().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::token)].value(), 5u);
 }
 
 TEST_F(IdentityTest, TokenOfOneSceneReachesNoOther) {
@@ -242,7 +241,7 @@ TEST_F(IdentityTest, OnlyOwnersByTokenOwnScenes) {
     left += message.presence().kind() == v1::PRESENCE_KIND_LEFT ? 1 : 0;
     return left == 2;
   });
-  EXPECT_FALSE(server().state().find("small")->roster.owned());
+  EXPECT_FALSE(server().scenes.find("small")->roster.owned());
 }
 
 TEST_F(IdentityTest, ParticipantsControlNothingUnlessTheServerAllowsIt) {
@@ -582,9 +581,7 @@ TEST_F(IdentityTest, WrongCodesCloseTheStreamAndLockTheAddressOut) {
   EXPECT_THAT(locked.readToTheEnd().error().text(), HasSubstr("try again in a minute"));
   TestPeer other(server(), from("b"));
   EXPECT_TRUE(ask(other, pair(code)).has_authenticate());
-  EXPECT_EQ(
-      server().state().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::pairingCode)].value(),
-      6u);
+  EXPECT_EQ(server().metrics.refusals[static_cast<std::size_t>(telemetry::Refusal::pairingCode)].value(), 6u);
 }
 
 TEST_F(IdentityTest, WithoutIdentitiesOtherMachinesDoNotOwn) {

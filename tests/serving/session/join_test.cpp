@@ -55,7 +55,7 @@ TEST_F(JoinTest, SendsWelcomeDescriptionAndFramesFromAKeyFrame) {
   EXPECT_EQ(peer.welcome().protocol_version(), 1u);
   EXPECT_EQ(peer.welcome().codec(), codec::kCodecHierarchical);
   EXPECT_GT(peer.welcome().participant_id(), 0u);
-  EXPECT_EQ(peer.welcome().device_name(), server().deviceInfo().name);
+  EXPECT_EQ(peer.welcome().device_name(), server().device.info().name);
   EXPECT_EQ(peer.description().simulation_rate(), 40u);
   ASSERT_EQ(peer.description().cloths_size(), 1);
   EXPECT_EQ(peer.description().cloths(0).vertex_count(), 120u);
@@ -164,7 +164,7 @@ TEST_F(JoinTest, ASceneThatIsStoppedWhileAPeerJoinsRefusesIt) {
   ServerOptions options;
   options.observer = observer;
   START(std::move(options));
-  const std::shared_ptr<scene::LiveScene> other = server().state().find("other");
+  const std::shared_ptr<scene::LiveScene> other = server().scenes.find("other");
   *observer->whenJoined = [&] {
     other->refuseUntil(Clock::now() + std::chrono::seconds(60), "it is stopped");
   };
@@ -188,7 +188,7 @@ TEST_F(JoinTest, SceneSleepsWithoutSubscribersAndContinues) {
   TestPeer other(server());  // keeps the server busy meanwhile
   other.join("other");
   other.readFrames(20);
-  EXPECT_FALSE(server().listScenes().scenes(0).running());
+  EXPECT_FALSE(server().unaryCalls.listScenes().scenes(0).running());
   TestPeer again(server());
   again.join();
   EXPECT_GT(again.frames().front().tick, left);
@@ -202,7 +202,7 @@ TEST_F(JoinTest, AlwaysRunningServerNeedsNoSubscribers) {
   const auto ticks = [&] { return metrics().ticks.value(); };
   for (int i = 0; i < 1000 && ticks() < 5; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_GE(ticks(), 5u);
-  EXPECT_TRUE(server().listScenes().scenes(0).running());
+  EXPECT_TRUE(server().unaryCalls.listScenes().scenes(0).running());
 }
 
 TEST_F(JoinTest, PeerThatNeverReadsDoesNotDelayOthers) {
@@ -300,7 +300,7 @@ TEST_F(JoinTest, ClientClockJumpOfAnHourKeepsItsColliders) {
     EXPECT_EQ(shownAt(), x) << off;
   }
   EXPECT_FALSE(peer.finished());
-  EXPECT_EQ(server().listScenes().scenes(0).participants(), 1u);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes(0).participants(), 1u);
 }
 
 TEST_F(JoinTest, PosesMoveCollidersForAllPeersUntilTheParticipantLeaves) {
@@ -371,7 +371,7 @@ TEST_F(JoinTest, UnhealthyStateIsAnnouncedAndTheStreamContinues) {
   TestPeer peer(server());
   peer.join();
   // Messages cannot carry this value. The state becomes unhealthy, is rolled back, and then reset.
-  ASSERT_TRUE(server().state().scenes.front()->inbox.postChange({.change = tests::gravity(-1e30f)}));
+  ASSERT_TRUE(server().scenes.all().front()->inbox.postChange({.change = tests::gravity(-1e30f)}));
   EXPECT_EQ(peer.readUntil(Body::kNotice).notice().kind(), v1::NOTICE_KIND_ROLLED_BACK);
   peer.readUntil(Body::kNotice);
   peer.readFrames(5);
@@ -386,12 +386,12 @@ TEST_F(JoinTest, LostDeviceIsReplacedAndTheStreamContinues) {
   peer.join();
   peer.readFrames(3);
   const std::uint64_t before = peer.frames().back().tick;
-  server().state().device.simulateDeviceLoss();
+  server().device.simulateDeviceLoss();
   EXPECT_EQ(peer.readUntil(Body::kNotice).notice().kind(), v1::NOTICE_KIND_DEVICE_REBUILT);
   peer.readFrames(5);
   EXPECT_TRUE(std::ranges::any_of(peer.frames().end() - 5, peer.frames().end(), &SeenFrame::key));
   EXPECT_GT(peer.frames().back().tick, before);
-  EXPECT_EQ(server().state().metrics.deviceRebuilds.value(), 1u);
+  EXPECT_EQ(server().metrics.deviceRebuilds.value(), 1u);
 }
 
 TEST_F(JoinTest, PeerThatDoesNotSayHelloIsDisconnected) {
@@ -421,7 +421,7 @@ TEST_F(JoinTest, SilentPeerIsDisconnected) {
   EXPECT_TRUE(silent.readToTheEnd().error().fatal());
   reader.readFrames(10);
   EXPECT_FALSE(reader.finished());
-  EXPECT_EQ(server().listScenes().scenes(0).participants(), 1u);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes(0).participants(), 1u);
 }
 
 TEST_F(JoinTest, FullSceneAndFullServerRefuseWithTheReason) {
@@ -461,7 +461,7 @@ class QualityTest : public ::testing::Test {
     hello.set_quality(quality);
     return hello;
   }
-  telemetry::SceneMetrics& metrics() { return server->state().scenes.front()->metrics; }
+  telemetry::SceneMetrics& metrics() { return server->scenes.all().front()->metrics; }
 
   std::unique_ptr<SceneServer> server;
 };
@@ -570,7 +570,7 @@ TEST_F(JoinTest, JoinOfAnExpiringSceneSaysWhyItEnds) {
   request.set_named("small");
   request.set_name("idle");
   std::promise<bool> created;
-  server().createScene(request, [&](const auto& made) { created.set_value(made.has_value()); });
+  server().unaryCalls.createScene(request, [&](const auto& made) { created.set_value(made.has_value()); });
   EXPECT_TRUE(created.get_future().get());
   auto arrival = joined.get_future();
   ASSERT_EQ(arrival.wait_for(TestPeer::kPatience), std::future_status::ready);

@@ -37,11 +37,11 @@ class PeerLimitsTest : public tests::ServerTest {
  protected:
   // As the server does once a second.
   void checkAt(Clock::time_point time) {
-    for (const auto& peer : server().state().peersNow()) peer->checkSilence(time);
+    for (const auto& peer : server().connections.peers()) peer->checkSilence(time);
   }
   void checkAfter(Clock::duration time) { checkAt(Clock::now() + time); }
   std::uint64_t refused(Refusal reason) {
-    return server().state().metrics.refusals[static_cast<std::size_t>(reason)].value();
+    return server().metrics.refusals[static_cast<std::size_t>(reason)].value();
   }
 };
 
@@ -190,7 +190,7 @@ TEST_F(PeerLimitsTest, CollidersOfParticipantsHaveAPrice) {
   // Each is near all cloth.
   const double all = loadOf(30 * scene::kMostWeight);
   START({}, {}, {.sceneLoad = (all - loadOf(0)) * 1.001, .load = 1e9, .tickSeconds = 0});
-  server().state().budget->setSpeed(kSpeed);
+  server().budget->setSpeed(kSpeed);
   TestPeer first(server()), second(server());
   first.join();
   second.join();
@@ -231,7 +231,7 @@ using Created = tl::expected<v1::CreateSceneResponse, v1::Error>;
 
 Created create(hosting::SceneServer& server, hosting::Wanted wanted) {
   std::promise<Created> done;
-  server.createScene(
+  server.unaryCalls.createScene(
       largeMesh(), [&](Created created) { done.set_value(std::move(created)); }, identity::local(),
       std::move(wanted));
   return done.get_future().get();
@@ -248,7 +248,7 @@ TEST_F(PeerLimitsTest, CreatingASceneEndsWhenThePeerDoesNotWantItAnyMore) {
     if (created) break;
     EXPECT_THAT(created.error().text(), HasSubstr("the peer that asked for it has left"));
     EXPECT_EQ(left, -1) << "no step follows the one in which the peer went";
-    EXPECT_EQ(server().listScenes().scenes_size(), 2);
+    EXPECT_EQ(server().unaryCalls.listScenes().scenes_size(), 2);
   }
   EXPECT_GE(refused, 4);
 }
@@ -270,7 +270,7 @@ TEST_F(PeerLimitsTest, EndOfTheServerCancelsTheSceneThatIsBeingCreated) {
   std::promise<Created> done;
   int steps = 0;
   std::atomic<bool> ending = false;
-  server().createScene(
+  server().unaryCalls.createScene(
       largeMesh(), [&](Created created) { done.set_value(std::move(created)); }, identity::local(),
       [&] {
         if (++steps == 2) begun.set_value();

@@ -112,7 +112,7 @@ TEST_F(MisbehaviourTest, ChangeWithAnInvalidValueChangesNothing) {
   const v1::ServerMessage answer = culprit->readUntil(Body::kError);
   EXPECT_EQ(answer.request_id(), 77u);
   EXPECT_THAT(answer.error().text(), HasSubstr("cloths[0].name = "));
-  EXPECT_EQ(server().state().find("small")->definition().environment.wind.x(), 0);
+  EXPECT_EQ(server().scenes.find("small")->definition().environment.wind.x(), 0);
 }
 
 TEST_F(MisbehaviourTest, UnknownSceneErrorListsTheScenes) {
@@ -131,7 +131,7 @@ TEST_F(MisbehaviourTest, SecondHelloIsOutOfOrder) {
   culprit->join();
   culprit->hello("other");
   EXPECT_EQ(fatalError().code(), v1::ERROR_CODE_OUT_OF_ORDER);
-  EXPECT_EQ(server().listScenes().scenes(0).participants(), 1u);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes(0).participants(), 1u);
 }
 
 TEST_F(MisbehaviourTest, RefusesUnsupportedVersion) {

@@ -143,9 +143,9 @@ TEST_F(ParticipantsTest, ForbiddenActionIsRefusedAndChangesNothing) {
       EXPECT_THAT(error.text(), HasSubstr(std::string("requires the role ") + tried.role));
       EXPECT_FALSE(error.fatal());
     }
-  const v1::Scene now = server().getScene({})->scene();
+  const v1::Scene now = server().unaryCalls.getScene({})->scene();
   EXPECT_EQ(now.environment().wind().x(), 0);
-  EXPECT_FALSE(server().listScenes().scenes(0).paused());
+  EXPECT_FALSE(server().unaryCalls.listScenes().scenes(0).paused());
   viewer.readFrames(2);
   for (const v1::ColliderState& collider : viewer.frames().back().colliders)
     EXPECT_EQ(collider.participant_id(), 0u);
@@ -192,7 +192,7 @@ TEST_F(ParticipantsTest, PauseIsAnnouncedWithItsOwner) {
   // A request from outside the scene, as `clothstream resume` sends it.
   v1::ControlSceneRequest goOn;
   goOn.set_paused(false);
-  ASSERT_TRUE(server().controlScene(goOn).has_value());
+  ASSERT_TRUE(server().unaryCalls.controlScene(goOn).has_value());
   EXPECT_EQ(viewer.readUntil(Body::kNotice).notice().participant_id(), 0u);
 }
 
@@ -202,10 +202,10 @@ TEST_F(ParticipantsTest, OnlyOwnersControlASceneWithoutOutsideControl) {
   START(options);
   v1::ControlSceneRequest reset;
   reset.set_reset(true);
-  EXPECT_TRUE(server().controlScene(reset).has_value());  // the scene has no owner
+  EXPECT_TRUE(server().unaryCalls.controlScene(reset).has_value());  // the scene has no owner
   TestPeer owner(server()), stranger(server());
   join(owner, "Ada");
-  const auto refused = server().controlScene(reset);
+  const auto refused = server().unaryCalls.controlScene(reset);
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code(), v1::ERROR_CODE_PERMISSION_DENIED);
   EXPECT_THAT(refused.error().text(), HasSubstr("not in the scene 'small'"));
@@ -246,7 +246,7 @@ TEST_F(ParticipantsTest, ReconnectResumesTheParticipantWithAKeyFrame) {
   watcher.readUntil(hasCollider);
   lost.vanish();
   EXPECT_TRUE(presence(watcher, v1::PRESENCE_KIND_DISCONNECTED).participant().away());
-  EXPECT_EQ(server().listScenes().scenes(0).participants(), 1u);
+  EXPECT_EQ(server().unaryCalls.listScenes().scenes(0).participants(), 1u);
 
   TestPeer back(server());
   back.inherit(lost);
@@ -305,8 +305,8 @@ TEST_F(ParticipantsTest, SecondConnectionTakesOver) {
   EXPECT_TRUE(fresh.readUntil(Body::kWelcome).welcome().resumed());
   EXPECT_EQ(old.readToTheEnd().error().code(), v1::ERROR_CODE_TAKEN_OVER);
   old.vanish();
-  EXPECT_EQ(server().state().scenes.front()->roster.size(), 1u);
-  EXPECT_EQ(server().state().scenes.front()->roster.away(), 0u);
+  EXPECT_EQ(server().scenes.all().front()->roster.size(), 1u);
+  EXPECT_EQ(server().scenes.all().front()->roster.away(), 0u);
 }
 
 TEST_F(ParticipantsTest, SilentParticipantKeepsItsPlaceAndReconnects) {
