@@ -17,10 +17,9 @@ set(wasmFlags --target=wasm32-wasi -O3 -DNDEBUG -ffp-contract=off -fvisibility=h
 
 # clothstream_wasm_exports(RESULT PART): linker flags that export the functions of a header (PART of interface.json), except
 # those that only the native library has.
-set(interfacePath ${PROJECT_SOURCE_DIR}/clients/interface/interface.json)
-set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${interfacePath})
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/clients/interface/interface.json)
 function(clothstream_wasm_exports result part)
-  file(READ ${interfacePath} interface)
+  file(READ ${PROJECT_SOURCE_DIR}/clients/interface/interface.json interface)
   string(JSON functions GET "${interface}" ${part} functions)
   string(JSON native GET "${interface}" ${part} native)
   string(JSON count LENGTH "${functions}")
