@@ -8,15 +8,11 @@
 #include <cstddef>
 #include <span>
 
-#include "kernels/box_branches.h"
-#include "kernels/box_faces.h"
 #include "kernels/find_faces.h"
 #include "kernels/find_pairs.h"
 #include "kernels/limit_pairs.h"
-#include "kernels/measure_depths.h"
 #include "kernels/shorten_motions.h"
 #include "kernels/slide_nodes.h"
-#include "server/simulation/collision/moving_collider.h"
 
 namespace clothstream::simulation {
 namespace {
@@ -103,26 +99,17 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
       touch_(touchOf(scene.cloths)),
       parts_(device, tables_.parts),
       faces_(device, tables_.faces),
-      branches_(device, tables_.branches),
-      boxes_(device, BufferPurpose::state,
-             std::size_t{tables_.boxCount} * CLOTHSTREAM_TREE_BOX_TEXELS * sizeof(shared::vec4)),
+      tree_(device, tables_, faces_.texels(), state, workgroupSize),
+      depths_(device, tables_.nodeCount, parts_.texels(), state, workgroupSize),
       corrections_(device, BufferPurpose::state, std::size_t{scene.nodeCount()} * 4 * sizeof(std::int32_t)),
       shares_(device, BufferPurpose::state, std::size_t{scene.nodeCount()} * sizeof(std::uint32_t)),
       report_(device, BufferPurpose::state, sizeof(Report)),
       reportReadback_(device, BufferPurpose::readback, 2 * sizeof(Report)),
-      depths_(device, BufferPurpose::state, kMaxColliders * sizeof(float)),
-      depthReadback_(device, BufferPurpose::readback, 2 * kMaxColliders * sizeof(float)),
       facePairs_(device, kFacePairs * tables_.nodeCount, workgroupSize),
       nodePairs_(device, kNodePairs * tables_.nodeCount, workgroupSize),
       edgePairs_(device, kEdgePairs * tables_.nodeCount, workgroupSize),
-      boxFaces_(bindStates(
-          device, {device, kernels::box_faces, workgroupSize},
-          [&](std::size_t from) {
-            return BufferList{&faces_.texels(), state.positions[from], state.positions[1 - from], &boxes_};
-          })),
-      boxBranches_(device, {device, kernels::box_branches, workgroupSize}, {&branches_.texels(), &boxes_}),
       findFaces_(device, {device, kernels::find_faces, workgroupSize},
-                 {&faces_.texels(), &boxes_, &facePairs_.pairs, &facePairs_.groups}),
+                 {&faces_.texels(), &tree_.boxes(), &facePairs_.pairs, &facePairs_.groups}),
       findPairs_(bindStates(device, {device, kernels::find_pairs, workgroupSize},
                             [&](std::size_t from) {
                               return BufferList{
@@ -139,18 +126,12 @@ MotionBoundStage::MotionBoundStage(const vulkan::Device& device, const model::Sc
                                                  state.velocities[to], &corrections_};
                              })),
       shortenMotions_(
-          bindStates(device, {device, kernels::shorten_motions, workgroupSize},
-                     [&](std::size_t from) {
-                       const std::size_t to = 1 - from;
-                       return BufferList{
-                           &parts_.texels(), state.positions[from], state.positions[to], state.velocities[to],
-                           &shares_,         &facePairs_.groups,    &nodePairs_.groups,  &edgePairs_.groups,
-                           &report_};
-                     })),
-      measureDepths_(
-          bindStates(device, {device, kernels::measure_depths, workgroupSize}, [&](std::size_t from) {
-            return BufferList{&parts_.texels(), state.positions[from], &depths_, &state.colliders,
-                              &state.nearColliders};
+          bindStates(device, {device, kernels::shorten_motions, workgroupSize}, [&](std::size_t from) {
+            const std::size_t to = 1 - from;
+            return BufferList{
+                &parts_.texels(), state.positions[from], state.positions[to], state.velocities[to],
+                &shares_,         &facePairs_.groups,    &nodePairs_.groups,  &edgePairs_.groups,
+                &report_};
           })) {
   assert(isIn(scene));
 }
@@ -163,14 +144,14 @@ void MotionBoundStage::setCloths(std::span<const model::Cloth> cloths) {
 void MotionBoundStage::recordTables(vulkan::Recorder& recorder) {
   parts_.recordUpload(recorder);
   faces_.recordUpload(recorder);
-  branches_.recordUpload(recorder);
+  tree_.recordUpload(recorder);
   recorder.fill(corrections_, 0, corrections_.bytes());
   recorder.fill(shares_, std::bit_cast<std::uint32_t>(1.0f), shares_.bytes());
 }
 
 void MotionBoundStage::recordInputs(vulkan::Recorder& recorder, const Tick&) {
   recorder.fill(report_, 0, report_.bytes());
-  recorder.fill(depths_, 0, depths_.bytes());
+  depths_.recordClear(recorder);
 }
 
 void MotionBoundStage::recordParts(vulkan::Recorder& recorder, const vulkan::Bindings& bindings,
@@ -184,16 +165,6 @@ void MotionBoundStage::recordParts(vulkan::Recorder& recorder, const vulkan::Bin
                               (shared::kPartSizes + 3 * std::size_t{part}) * sizeof(std::uint32_t), now,
                               pairs * work);
     expected -= now;
-  }
-}
-
-void MotionBoundStage::recordTree(vulkan::Recorder& recorder, std::uint32_t from) const {
-  const auto faces = static_cast<std::uint32_t>(tables_.faces.size());
-  recorder.dispatch(boxFaces_[from], shared::TreePush{0, faces, gap_}, faces);
-  for (std::size_t level = 0; level + 1 < tables_.levels.size(); ++level) {
-    const std::uint32_t first = tables_.levels[level], count = tables_.levels[level + 1] - first;
-    recorder.barrier();
-    recorder.dispatch(boxBranches_, shared::TreePush{first, count, gap_}, count);
   }
 }
 
@@ -223,7 +194,7 @@ void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, const Substep& 
   };
   recorder.barrier();
   for (const List* list : {&facePairs_, &nodePairs_, &edgePairs_}) list->recordClear(recorder);
-  recordTree(recorder, from);
+  tree_.recordFit(recorder, from, gap_);
   recorder.barrier();
   recorder.dispatch(findFaces_, push, faceCount, kSearchWork, kMostSearchWork);
   recorder.barrier();
@@ -239,27 +210,16 @@ void MotionBoundStage::recordSubstep(vulkan::Recorder& recorder, const Substep& 
 
 void MotionBoundStage::recordEnd(vulkan::Recorder& recorder, const Tick&, std::uint32_t present,
                                  const shared::CollisionPush& collision) {
-  if (collision.colliderCount == 0) return;
-  recorder.dispatch(measureDepths_[present],
-                    shared::DepthPush{.collision = collision,
-                                      .nodeCount = tables_.nodeCount,
-                                      .touch = touch_,
-                                      .reserved0 = 0,
-                                      .reserved1 = 0},
-                    tables_.nodeCount, collision.nodeWork);
+  depths_.record(recorder, present, touch_, collision);
 }
 
 void MotionBoundStage::recordReport(vulkan::Recorder& recorder, const Tick& tick) {
-  recorder.copy(depths_, depthReadback_, depths_.bytes(), 0, tick.slot * depths_.bytes());
+  depths_.recordReport(recorder, tick.slot);
   recorder.copy(report_, reportReadback_, report_.bytes(), 0, tick.slot * report_.bytes());
 }
 
 MotionBoundStage::Report MotionBoundStage::report(std::uint32_t slot) const {
   return reportReadback_.mapped<const Report>()[slot];
-}
-
-std::span<const float> MotionBoundStage::depths(std::uint32_t slot) const {
-  return depthReadback_.mapped<const float>().subspan(std::size_t{slot} * kMaxColliders, kMaxColliders);
 }
 
 }  // namespace clothstream::simulation

@@ -7,6 +7,8 @@
 
 #include "server/model/scene.h"
 #include "server/simulation/device_table.h"
+#include "server/simulation/motion_bound/box_tree.h"
+#include "server/simulation/motion_bound/depth_meter.h"
 #include "server/simulation/motion_bound/motion_bound_tables.h"
 #include "server/simulation/stage.h"
 #include "server/simulation/state_bindings.h"
@@ -52,7 +54,7 @@ class MotionBoundStage final : public Stage {
   Report report(std::uint32_t slot) const;
   // For each collider, as the device numbers them: depth inside any collider of the deepest node that touches
   // it, in metres. 0: none is inside.
-  std::span<const float> depths(std::uint32_t slot) const;
+  std::span<const float> depths(std::uint32_t slot) const { return depths_.depths(slot); }
 
  private:
   // A list of pairs, and its counts and dispatch sizes. A dispatch works on one part of the list, so that its
@@ -83,18 +85,18 @@ class MotionBoundStage final : public Stage {
   // `work` that of a pair (vulkan::Recorder::dispatch).
   static void recordParts(vulkan::Recorder& recorder, const vulkan::Bindings& bindings, shared::PairPush push,
                           const List& list, std::uint64_t expected, std::uint64_t work);
-  void recordTree(vulkan::Recorder& recorder, std::uint32_t from) const;
 
   MotionBoundTables tables_;
   float gap_, touch_;
-  DeviceTable parts_, faces_, branches_;
-  vulkan::Buffer boxes_, corrections_, shares_, report_, reportReadback_, depths_, depthReadback_;
+  DeviceTable parts_, faces_;
+  BoxTree tree_;
+  DepthMeter depths_;
+  vulkan::Buffer corrections_, shares_, report_, reportReadback_;
   List facePairs_, nodePairs_, edgePairs_;
-  StateBindings boxFaces_;
-  vulkan::Bindings boxBranches_, findFaces_;
+  vulkan::Bindings findFaces_;
   StateBindings findPairs_;
   Limits nodeLimits_, edgeLimits_;
-  StateBindings slideNodes_, shortenMotions_, measureDepths_;
+  StateBindings slideNodes_, shortenMotions_;
 };
 
 }  // namespace clothstream::simulation
