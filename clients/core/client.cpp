@@ -554,7 +554,6 @@ const std::vector<Collider>& Client::playedColliders() const {
 
 cs_stage_statistics Client::stages() const {
   cs_stage_statistics stages = stages_;
-  stages.version = CS_STAGE_STATISTICS_VERSION;
   stages.decode_ms = decodeMs_;
   if (playOut_) playOut_->report(stages);
   return stages;
