@@ -41,11 +41,11 @@ clothstream_package(client_group clothstream-client net "" ""
   "The command clothstream joins scenes of a ClothStream server, records and
 plays them, and converts recordings. The web page shows cloth in a browser
 and in headsets; clothstream-server serves it.")
-clothstream_package(library_group libclothstream${PROJECT_VERSION_MAJOR} libs "" ""
+clothstream_package(library_group libclothstream${CLOTHSTREAM_SOVERSION} libs "" ""
   "client library for cloth streams"
   "Programs join scenes of a ClothStream server, receive the positions and
 normals of cloth, and send the poses of hands and objects. The interface is C.")
-clothstream_package(development_group libclothstream-dev libdevel "libclothstream${PROJECT_VERSION_MAJOR} (= ${version})" ""
+clothstream_package(development_group libclothstream-dev libdevel "libclothstream${CLOTHSTREAM_SOVERSION} (= ${version})" ""
   "headers of the client library for cloth streams"
   "Headers, and files for CMake and pkg-config, of libclothstream. Also fixtures
 that read recordings in tests of other programs, and the packages for npm and

@@ -65,9 +65,10 @@ const char* nameOf(const cs_presence& presence) {
   }
 }
 
-std::string presenceLine(const cs_client* client, const cs_presence& presence) {
+std::string presenceLine(const cs_client* client, const cs_presence& presence,
+                         const cs_participant& participant) {
   Json object = event(client, nameOf(presence));
-  object["participant"] = participantOf(presence.participant);
+  object["participant"] = participantOf(participant);
   if (presence.by != 0) object["by"] = presence.by;
   return lineOf(object);
 }
@@ -158,11 +159,12 @@ std::string EventLines::of(cs_client* client, std::uint32_t events) {
     lines += lineOf(object);
   }
   cs_presence presence;
+  cs_participant participant;
   if (happened(CS_EVENT_PARTICIPANTS) && cs_participant_id(client) != joinedAs_) {
     joinedAs_ = cs_participant_id(client);
     lines += joinedLine(client);
-  } else if (happened(CS_EVENT_PRESENCE) && cs_get_presence(client, &presence) != 0) {
-    lines += presenceLine(client, presence);
+  } else if (happened(CS_EVENT_PRESENCE) && cs_get_presence(client, &presence, &participant) != 0) {
+    lines += presenceLine(client, presence, participant);
   }
   if (frames_ && happened(CS_EVENT_FRAME)) lines += frameLine(client);
   if (happened(CS_EVENT_FRAME)) lines += yieldLines(client);

@@ -102,12 +102,15 @@ cs_own_collider colliderOf(const Json& object, const std::string& where) {
     const std::string place = fmt::format("{}.{}", where, shape);
     const Json& numbersOf = object[shape];
     if (capsule)
-      allowOnly(numbersOf, place, {"radius", "length"});
+      allowOnly(numbersOf, place, {"radius", "length", "topRadius"});
     else
       allowOnly(numbersOf, place, {"radius"});
     collider.shape = capsule ? CS_SHAPE_CAPSULE : CS_SHAPE_SPHERE;
     collider.radius = number(numbersOf, "radius", place, std::nullopt);
-    if (capsule) collider.length = number(numbersOf, "length", place, std::nullopt);
+    if (capsule) {
+      collider.length = number(numbersOf, "length", place, std::nullopt);
+      collider.top_radius = number(numbersOf, "topRadius", place, 0);
+    }
   }
   return collider;
 }
@@ -229,7 +232,7 @@ InputLine lineOf(const Json& object) {
 
 void InputLine::send(cs_client* client, std::uint64_t nowUs) const {
   if (colliders)
-    cs_set_shapes(client, colliders->data(), static_cast<std::uint32_t>(colliders->size()), nowUs);
+    cs_set_colliders(client, colliders->data(), static_cast<std::uint32_t>(colliders->size()), nowUs);
   if (grabs) cs_set_grabs(client, grabs->data(), static_cast<std::uint32_t>(grabs->size()), nowUs);
   if (head) {
     const bool present = head->has_value();

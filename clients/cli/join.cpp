@@ -53,7 +53,8 @@ class Listener {
       say(fmt::format("error from the server: {}", cs_error_text(client)));
     if ((events & CS_EVENT_PRESENCE) != 0) {
       cs_presence presence;
-      if (cs_get_presence(client, &presence) != 0) say(text(client, presence));
+      cs_participant participant;
+      if (cs_get_presence(client, &presence, &participant) != 0) say(text(client, presence, participant));
     } else if ((events & CS_EVENT_PARTICIPANTS) != 0) {
       sayParticipants(client);
     }
@@ -89,7 +90,7 @@ void sendInput(NativeClient& client, const JoinOptions& options) {
   client.visit([&](cs_client* core) {
     if (options.events) cs_want_contacts(core, 1, NativeClient::nowUs());
     if (options.colliders.empty()) return;
-    cs_set_colliders(core, options.colliders[0].data(), static_cast<std::uint32_t>(options.colliders.size()),
+    cs_set_colliders(core, options.colliders.data(), static_cast<std::uint32_t>(options.colliders.size()),
                      NativeClient::nowUs());
   });
 }

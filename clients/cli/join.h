@@ -26,11 +26,11 @@ struct JoinOptions {
   std::string objPath;            // empty: no file
   bool json = false;
   bool hash = false;
-  bool report = false;                          // print each report of the simulation
-  bool events = false;                          // print events as lines of JSON (event_lines.h)
-  bool frames = false;                          // with events: a line for each frame too
-  std::string inputPath;                        // lines of input (input_lines.h); empty: none
-  std::vector<std::array<float, 4>> colliders;  // x, y, z and radius, m
+  bool report = false;    // print each report of the simulation
+  bool events = false;    // print events as lines of JSON (event_lines.h)
+  bool frames = false;    // with events: a line for each frame too
+  std::string inputPath;  // lines of input (input_lines.h); empty: none
+  std::vector<cs_own_collider> colliders;
 };
 
 // SIGINT and SIGTERM must be blocked in every thread; they end the stream like its time limit.

@@ -45,7 +45,7 @@ using namespace clothstream;
 using namespace clothstream::cli;
 
 // Parses "x,y,z" or "x,y,z,radius".
-std::array<float, 4> parseCollider(const std::string& text) {
+cs_own_collider parseCollider(const std::string& text) {
   constexpr float kDefaultRadius = 0.1f;
   std::array<float, 4> values{0, 0, 0, kDefaultRadius};
   std::size_t count = 0;
@@ -60,7 +60,10 @@ std::array<float, 4> parseCollider(const std::string& text) {
   if (count < 3 || at != end || values[3] <= 0)
     throw CLI::ValidationError(
         "--collider", fmt::format("\"{}\" is not a sphere; use X,Y,Z or X,Y,Z,RADIUS in metres", text));
-  return values;
+  cs_own_collider sphere{};
+  std::copy_n(values.begin(), 3, sphere.position);
+  sphere.radius = values[3];
+  return sphere;
 }
 
 // How to recognise a server with TLS, for all commands that connect.

@@ -30,9 +30,10 @@ class Answer {
   void heard(cs_client* client, std::uint32_t events) {
     const std::lock_guard lock(mutex_);
     cs_presence presence;
+    cs_participant participant;
     if ((events & CS_EVENT_ERROR) != 0) text_ = cs_error_text(client);
-    if ((events & CS_EVENT_PRESENCE) != 0 && cs_get_presence(client, &presence) != 0 &&
-        presence.kind == kind_ && presence.participant.id == participant_)
+    if ((events & CS_EVENT_PRESENCE) != 0 && cs_get_presence(client, &presence, &participant) != 0 &&
+        presence.kind == kind_ && participant.id == participant_)
       text_ = "";
     changed_.notify_all();
   }

@@ -44,20 +44,18 @@ std::string numberOf(const cs_participant& participant) {
   return *participant.name == '\0' ? "" : fmt::format(", number {}", participant.id);
 }
 
-std::string text(const cs_client* client, const cs_presence& presence) {
-  const std::string name = nameOf(presence.participant);
+std::string text(const cs_client* client, const cs_presence& presence, const cs_participant& participant) {
+  const std::string name = nameOf(participant);
   switch (presence.kind) {
     case CS_PRESENCE_JOINED:
-      return fmt::format("{} joined as {}{}", name, roleName(presence.participant.role),
-                         numberOf(presence.participant));
+      return fmt::format("{} joined as {}{}", name, roleName(participant.role), numberOf(participant));
     case CS_PRESENCE_LEFT:
       if (presence.reason == CS_LEAVE_TIMED_OUT) return name + " was disconnected and did not return";
       if (presence.reason == CS_LEAVE_REMOVED)
         return fmt::format("{} was removed{}", name, byWhom(client, presence.by));
       return name + " left";
     case CS_PRESENCE_ROLE_CHANGED:
-      return fmt::format("{} became {}{}", name, roleName(presence.participant.role),
-                         byWhom(client, presence.by));
+      return fmt::format("{} became {}{}", name, roleName(participant.role), byWhom(client, presence.by));
     case CS_PRESENCE_DISCONNECTED:
       return name + " was disconnected";
     case CS_PRESENCE_RETURNED:

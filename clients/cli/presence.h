@@ -23,7 +23,7 @@ std::string nameOf(const cs_client* client, std::uint64_t participant);
 // Number of a participant whose name does not contain it, such as ", number 3"; else "".
 std::string numberOf(const cs_participant& participant);
 
-// Text of a presence event, such as "Ada joined as participant, number 3".
-std::string text(const cs_client* client, const cs_presence& presence);
+// Text of a presence event of a participant, such as "Ada joined as participant, number 3".
+std::string text(const cs_client* client, const cs_presence& presence, const cs_participant& participant);
 
 }  // namespace clothstream::cli

@@ -58,10 +58,8 @@ Report Report::of(const cs_client* client, std::uint64_t nowUs) {
   cs_cloth cloth;
   for (std::uint32_t i = 0; cs_get_cloth(client, i, &cloth) != 0; ++i) {
     ClothFigures figures{.name = cloth.name, .solver = {}};
-    figures.report.version = CS_CLOTH_REPORT_VERSION;
     if (cs_get_cloth_report(client, i, &figures.report) == 0) break;
     cs_cloth_settings settings{};
-    settings.version = CS_CLOTH_SETTINGS_VERSION;
     if (cs_get_cloth_settings(client, i, &settings) != 0) figures.solver = solverName(settings.solver);
     report.cloths.push_back(std::move(figures));
   }

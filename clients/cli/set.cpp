@@ -104,7 +104,7 @@ ExitCode set(const SetOptions& options) {
   });
   changeBy([&](cs_client* client) {
     if (changesCloths(options)) {
-      if (cs_change_cloth(client, options.cloth.c_str(), &options.settings) == 0)
+      if (cs_set_cloth(client, options.cloth.c_str(), &options.settings) == 0)
         return void(refusal = noSuchCloth(client, options.cloth));
       ++changes;
     }
@@ -120,9 +120,11 @@ ExitCode set(const SetOptions& options) {
       ++changes;
     }
     if (!options.collider.empty()) {
-      cs_set_collider(client, options.collider.c_str(),
-                      options.position.empty() ? nullptr : options.position.data(),
-                      options.radius ? &*options.radius : nullptr);
+      cs_collider_change change;
+      cs_keep_collider(&change);
+      std::ranges::copy(options.position, change.position);
+      change.radius = options.radius.value_or(change.radius);
+      cs_set_collider(client, options.collider.c_str(), &change);
       ++changes;
     }
     if (const std::vector<float>& gust = options.environment[parameters::kGust]; !gust.empty()) {

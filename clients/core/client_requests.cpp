@@ -33,8 +33,12 @@ void Client::setHead(const std::optional<cs_own_collider>& head, std::uint64_t n
 void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
   poses_.grabs.clear();
   for (const cs_grab& grab : grabs) {
-    OwnGrab& own = poses_.grabs.emplace_back(OwnGrab{grab, std::nullopt});
-    if (grab.has_place == 1) own.place = triangleOf(grab.place.triangle, stream_.description());
+    OwnGrab& own = poses_.grabs.emplace_back();
+    own.given = grab;
+    own.given.place = nullptr;
+    if (!grab.place) continue;
+    own.point = *grab.place;
+    own.place = triangleOf(grab.place->triangle, stream_.description());
   }
   sendPoses(nowUs);
 }

@@ -23,8 +23,9 @@
  * A function that returns int returns 1 on success and 0 on failure. On failure it leaves *out
  * unchanged unless the function says otherwise.
  *
- * Structs with a `version`: set it to the CS_..._VERSION of this header before the call. A call with an
- * unknown version fails. Later versions add fields at the end.
+ * Structs with a `version`: set it to the CS_..._VERSION of this header before the call; in C++ it is set
+ * from the start. A call with an unknown version fails. Later versions add fields at the end. The elements of
+ * an array have the same version.
  *
  * Units are SI unless a comment or a name says otherwise. Coordinates are right-handed with +Y up, in metres.
  *
@@ -40,9 +41,11 @@
 /* No exception leaves a function. */
 #ifdef __cplusplus
 #define CS_NOEXCEPT noexcept
+#define CS_INIT(value) = value
 extern "C" {
 #else
 #define CS_NOEXCEPT
+#define CS_INIT(value)
 #endif
 
 /* NOLINTBEGIN(modernize-use-using): C has no using. */
@@ -99,12 +102,19 @@ typedef enum cs_role {
   CS_ROLE_OWNER = 3
 } cs_role;
 
-/* Creates a client that joins `scene`; "" means the server's default scene. client_name names the program.
- * The client's first outgoing message is Hello. Free the client with cs_destroy. */
-cs_client* cs_create(const char* scene, const char* client_name) CS_NOEXCEPT;
-/* Like cs_create, with a name that other participants see (may be "") and the requested cs_role. */
-cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name,
-                        uint32_t role) CS_NOEXCEPT;
+#define CS_CLIENT_OPTIONS_VERSION 1u
+/* Strings are copied. NULL means "". */
+typedef struct cs_client_options {
+  uint32_t version CS_INIT(CS_CLIENT_OPTIONS_VERSION);
+  uint32_t role;            /* requested cs_role */
+  const char* scene;        /* "" means the server's default scene */
+  const char* client_name;  /* name of the program */
+  const char* display_name; /* name for other participants; may be "" */
+} cs_client_options;
+
+/* Creates a client that joins a scene. Its first outgoing message is Hello. Free the client with cs_destroy.
+ * Returns NULL if the version is unknown. */
+cs_client* cs_create(const cs_client_options* options) CS_NOEXCEPT;
 /* Frees the client and all pointers it returned. NULL is allowed. */
 void cs_destroy(cs_client* client) CS_NOEXCEPT;
 /* Limits what the server sends. Call before the first cs_next_outgoing. A later call does not affect the
@@ -141,7 +151,7 @@ void cs_set_clock(cs_client* client, uint64_t (*now_us)(void)) CS_NOEXCEPT;
  * CS_STATE_FAILED before its geometry is allocated; cs_error_text names the limit. A vertex takes about 250
  * bytes, a triangle about 30. */
 typedef struct cs_limits {
-  uint32_t version;           /* CS_LIMITS_VERSION */
+  uint32_t version CS_INIT(CS_LIMITS_VERSION);
   uint32_t max_vertices;      /* of all cloths. 1 to 67108864. Default 1048576 */
   uint32_t max_triangles;     /* of all cloths. 1 to 134217728. Default 2097152 */
   uint32_t max_cloths;        /* 1 to 256. Default 256 */
@@ -225,7 +235,9 @@ const char* cs_scene_name(const cs_client* client) CS_NOEXCEPT;
  * "" is the one that the client has joined.
  */
 
+#define CS_SCENE_SUMMARY_VERSION 1u
 typedef struct cs_scene_summary {
+  uint32_t version CS_INIT(CS_SCENE_SUMMARY_VERSION);
   const char *name, *description;
   uint32_t vertex_count, cloth_count;      /* of all cloths */
   uint32_t participants, max_participants; /* connected ones; and including those that are away */
@@ -240,8 +252,6 @@ typedef struct cs_scene_summary {
 void cs_list_scenes(cs_client* client) CS_NOEXCEPT;
 /* Number of scenes in the last answer. */
 uint32_t cs_scene_count(const cs_client* client) CS_NOEXCEPT;
-/* Returns the name of a scene; "" if the index is out of range. */
-const char* cs_scene(const cs_client* client, uint32_t index) CS_NOEXCEPT;
 /* Fails if the index is out of range. */
 int cs_get_scene(const cs_client* client, uint32_t index, cs_scene_summary* out) CS_NOEXCEPT;
 
@@ -258,7 +268,7 @@ typedef enum cs_request {
 
 #define CS_ANSWER_VERSION 1u
 typedef struct cs_answer {
-  uint32_t version;       /* CS_ANSWER_VERSION */
+  uint32_t version CS_INIT(CS_ANSWER_VERSION);
   uint32_t request;       /* cs_request */
   uint64_t request_id;    /* id that the function returned */
   uint32_t error;         /* ErrorCode (session.proto); 0 if the request succeeded */
@@ -302,8 +312,10 @@ uint64_t cs_request_definition(cs_client* client, const char* scene) CS_NOEXCEPT
 /* The serialised Scene of the last answer, and its size in *bytes; NULL and 0 before the first. */
 const uint8_t* cs_definition(const cs_client* client, size_t* bytes) CS_NOEXCEPT;
 
+#define CS_BAN_VERSION 1u
 /* A subject that may not join a scene (docs/identity.md). */
 typedef struct cs_ban {
+  uint32_t version CS_INIT(CS_BAN_VERSION);
   const char* subject;
   const char* display_name; /* name when the ban began; may be "" */
   const char* tenant;       /* may be "" */
@@ -320,14 +332,18 @@ int cs_get_ban(const cs_client* client, uint32_t index, cs_ban* out) CS_NOEXCEPT
  * Frames: what the scene contains and the geometry of the newest frame.
  */
 
+#define CS_CLOTH_VERSION 1u
 typedef struct cs_cloth {
+  uint32_t version CS_INIT(CS_CLOTH_VERSION);
   const char* name;
   uint32_t first_vertex, vertex_count;
   uint32_t rows, columns;            /* 0 if the cloth is not a grid */
   uint32_t first_index, index_count; /* range in cs_triangles */
 } cs_cloth;
 
+#define CS_SUBMESH_VERSION 1u
 typedef struct cs_submesh {
+  uint32_t version CS_INIT(CS_SUBMESH_VERSION);
   const char* name;                  /* may be "" */
   uint32_t first_index, index_count; /* range in cs_triangles */
 } cs_submesh;
@@ -341,20 +357,21 @@ typedef enum cs_shape {
   CS_SHAPE_HULL = 4     /* convex hull or closed mesh; see cs_get_hull */
 } cs_shape;
 
+#define CS_COLLIDER_VERSION 1u
 typedef struct cs_collider {
-  const char* name; /* of a collider of a participant: its id in decimal */
-  uint32_t shape;   /* cs_shape */
+  uint32_t version CS_INIT(CS_COLLIDER_VERSION);
+  uint32_t shape;          /* cs_shape */
+  const char* name;        /* of a collider of a participant: its id in decimal */
+  uint64_t participant_id; /* 0 for a collider of the scene */
   float position[3];
   float orientation[4];          /* quaternion x y z w */
-  float radius, length, size[3]; /* 0 if the shape does not have them */
-  /* 1: the collider yields. It is not where its participant put it, because cloth that nothing passes through
-   * has no room there (docs/colliders.md). Else 0. The struct has the same size and offsets on 64 bits as
-   * without it. */
-  int32_t yields;
-  uint64_t participant_id; /* 0 for a collider of the scene */
+  float radius, length, size[3]; /* m; 0 if the shape does not have them */
   /* m. A tapered capsule has this radius at its end at +Y, and `radius` at its end at -Y. Other shapes have
    * the value of `radius`. */
   float top_radius;
+  /* 1: the collider yields. It is not where its participant put it, because cloth that nothing passes through
+   * has no room there (docs/colliders.md). Else 0. */
+  int32_t yields;
 } cs_collider;
 
 /* Frames per second of the stream, and ticks per second of the simulation; 0 before the description. */
@@ -410,8 +427,8 @@ const float* cs_get_hull(const cs_client* client, uint32_t index, uint32_t* vert
 
 #define CS_PLAY_OUT_OPTIONS_VERSION 1u
 typedef struct cs_play_out_options {
-  uint32_t version; /* CS_PLAY_OUT_OPTIONS_VERSION */
-  uint32_t frames;  /* number of newest frames to keep, 3 to 256; must cover the delay */
+  uint32_t version CS_INIT(CS_PLAY_OUT_OPTIONS_VERSION);
+  uint32_t frames; /* number of newest frames to keep, 3 to 256; must cover the delay */
   /* Delay from the start of a tick on the server to its display, 0 to 10000. NaN means adaptive: the shortest
    * delay with which 98 % of the last 256 frames would have arrived in time, within the two limits below. The
    * adaptive delay changes by at most 5 % of the elapsed time. */
@@ -432,7 +449,7 @@ typedef enum cs_shown {
 
 #define CS_PLAYED_VERSION 1u
 typedef struct cs_played {
-  uint32_t version;        /* CS_PLAYED_VERSION */
+  uint32_t version CS_INIT(CS_PLAYED_VERSION);
   uint32_t shown;          /* cs_shown */
   uint64_t tick;           /* tick of the frame that is shown, or from which interpolation starts */
   uint64_t server_time_us; /* display time minus delay, on the server's clock; 0 if the clock is unknown */
@@ -492,10 +509,10 @@ typedef enum cs_decoding {
   CS_DECODING_SKIPPED = 2 /* the program does not pass the result on, or the frame was older than its state */
 } cs_decoding;
 
-/* Result of the client for a message with a frame. */
 #define CS_DECODED_VERSION 1u
+/* Result of the client for a message with a frame. */
 typedef struct cs_decoded {
-  uint32_t version;             /* CS_DECODED_VERSION */
+  uint32_t version CS_INIT(CS_DECODED_VERSION);
   uint32_t decoding;            /* cs_decoding; the members below are read only for CS_DECODING_DONE */
   const float* positions;       /* cs_positions: 3 floats for each of vertex_count vertices */
   const float* normals;         /* cs_normals if the server sends normals; else ignored, may be NULL */
@@ -504,9 +521,8 @@ typedef struct cs_decoded {
   double decode_ms;             /* time that decoding took; 0: not measured */
 } cs_decoded;
 
-/* Like cs_create_as, for the mirror of a client with the same arguments. */
-cs_client* cs_create_mirror(const char* scene, const char* client_name, const char* display_name,
-                            uint32_t role) CS_NOEXCEPT;
+/* Like cs_create, for the mirror of a client with the same options. */
+cs_client* cs_create_mirror(const cs_client_options* options) CS_NOEXCEPT;
 /* Like cs_receive, for a mirror. `decoded` may be NULL for messages other than frames; a frame is then
  * skipped. A frame with an unknown version or another number of vertices is skipped too. */
 uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t bytes,
@@ -527,16 +543,21 @@ uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t by
 /* Id of the collider that is the participant's head (docs/protocol.md). */
 #define CS_HEAD_ID 0x80000040u
 
-/* Collider of this participant: sphere, capsule or box. */
+#define CS_OWN_COLLIDER_VERSION 1u
+/* Collider of this participant: sphere, capsule or box. Numbers that the shape does not have are ignored. */
 typedef struct cs_own_collider {
+  uint32_t version CS_INIT(CS_OWN_COLLIDER_VERSION);
   uint32_t shape; /* cs_shape */
   float position[3];
   float orientation[4];          /* quaternion x y z w; all zero means no rotation */
-  float radius, length, size[3]; /* m; numbers that the shape does not have are ignored */
+  float radius, length, size[3]; /* m */
+  float top_radius; /* m; of a tapered capsule, as in cs_collider; 0 means the value of `radius` */
 } cs_own_collider;
 
+#define CS_CLOTH_POINT_VERSION 1u
 /* Point on a cloth as it is shown. */
 typedef struct cs_cloth_point {
+  uint32_t version CS_INIT(CS_CLOTH_POINT_VERSION);
   uint32_t triangle;   /* its corners are the entries 3 * triangle to 3 * triangle + 2 of cs_triangles */
   float second, third; /* barycentric coordinates of the second and third corner */
   float position[3];   /* m */
@@ -544,19 +565,20 @@ typedef struct cs_cloth_point {
   uint64_t tick;       /* of the frame that is shown */
 } cs_cloth_point;
 
+#define CS_GRAB_VERSION 1u
 /* Grab of this participant (Grab in session.proto). NaN means the server's default. */
 typedef struct cs_grab {
+  uint32_t version CS_INIT(CS_GRAB_VERSION);
   uint32_t id; /* a new id takes hold; an id that is missing in the next call lets go */
   float position[3];
   float orientation[4]; /* quaternion x y z w; all zero means no rotation */
   float radius, reach;  /* m */
   float max_force;      /* N */
   float slip_distance;  /* m */
-  /* 1: the grab takes hold of `place`, wherever the cloth has moved on the server by then, and draws it to
-   * `position` within 0.2 s; `reach` has no effect. 0: it takes what is near `position` on the server. Only
-   * triangle, coordinates and tick of the place are used, and only when the grab starts. */
-  uint32_t has_place;
-  cs_cloth_point place;
+  /* The grab takes hold of this place, wherever the cloth has moved on the server by then, and draws it to
+   * `position` within 0.2 s; `reach` has no effect. NULL: it takes what is near `position` on the server.
+   * Only triangle, coordinates and tick of the place are used, and only when the grab starts. */
+  const cs_cloth_point* place;
 } cs_grab;
 
 /* HandSide of session.proto. */
@@ -569,7 +591,9 @@ typedef enum cs_grab_event_kind {
   CS_GRAB_RELEASED = 3 /* the participant let go or left */
 } cs_grab_event_kind;
 
+#define CS_GRAB_EVENT_VERSION 1u
 typedef struct cs_grab_event {
+  uint32_t version CS_INIT(CS_GRAB_EVENT_VERSION);
   uint64_t participant_id;
   uint32_t grab_id;
   uint32_t kind;     /* cs_grab_event_kind, or a newer kind */
@@ -583,9 +607,11 @@ typedef struct cs_grab_event {
 /* ContactEventKind of session.proto. */
 typedef enum cs_contact_event_kind { CS_CONTACT_BEGAN = 1, CS_CONTACT_ENDED = 2 } cs_contact_event_kind;
 
+#define CS_CONTACT_EVENT_VERSION 1u
 typedef struct cs_contact_event {
-  uint32_t kind;           /* cs_contact_event_kind, or a newer kind */
-  uint32_t collider_id;    /* participant's collider: index in cs_set_shapes, bone of a hand, or CS_HEAD_ID */
+  uint32_t version CS_INIT(CS_CONTACT_EVENT_VERSION);
+  uint32_t kind;        /* cs_contact_event_kind, or a newer kind */
+  uint32_t collider_id; /* participant's collider: index in cs_set_colliders, bone of a hand, or CS_HEAD_ID */
   uint64_t participant_id; /* 0 for a collider of the scene */
   const char* collider;    /* name of the scene's collider */
   const char* cloth;
@@ -593,12 +619,11 @@ typedef struct cs_contact_event {
   float seconds; /* duration of the contact; 0 if it began */
 } cs_contact_event;
 
-/* Replaces the colliders of this participant by `count` spheres {x, y, z, radius}; 0 removes all. At most
- * CS_MAX_COLLIDERS are used, and at most 20 if two hands are set; the rest is ignored. */
-void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
-/* Like cs_set_colliders, with any shape and orientation. */
-void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count,
-                   uint64_t now_us) CS_NOEXCEPT;
+/* Replaces the colliders of this participant; a count of 0 removes all. At most CS_MAX_COLLIDERS are used,
+ * and at most 20 if two hands are set; the rest is ignored. Fails, and changes nothing, if a version is
+ * unknown. */
+int cs_set_colliders(cs_client* client, const cs_own_collider* colliders, uint32_t count,
+                     uint64_t now_us) CS_NOEXCEPT;
 /* Replaces one tracked hand; 0 joints remove it. Each joint is {x, y, z, radius} in metres. `count` is
  * CS_HAND_JOINTS in the order of OpenXR's XrHandJointEXT (palm first), or one less in the order of WebXR's
  * XRHand (no palm). The server builds CS_HAND_BONES capsules from it, which count as colliders of this
@@ -619,8 +644,9 @@ int cs_nearest_point(const cs_client* client, const float* point3, float max_dis
 int cs_cast_ray(const cs_client* client, const float* origin3, const float* direction3, float max_distance,
                 cs_cloth_point* out) CS_NOEXCEPT;
 
-/* Replaces the grabs of this participant. At most CS_MAX_GRABS are used; the rest is ignored. */
-void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
+/* Replaces the grabs of this participant. At most CS_MAX_GRABS are used; the rest is ignored. Fails, and
+ * changes nothing, if a version is unknown. */
+int cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
 /* Moves an attachment of the scene; it stays there. orientation4 may be NULL: no rotation. If it jumps, its
  * cloth goes along at once, however short the way is: use this for teleports and cuts of an animation. */
 void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,
@@ -650,18 +676,15 @@ int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_eve
  * when it took effect. In changes, a NULL pointer keeps a value, and the cloth name "" means every cloth.
  */
 
+#define CS_ENVIRONMENT_VERSION 1u
 typedef struct cs_environment {
+  uint32_t version CS_INIT(CS_ENVIRONMENT_VERSION);
   float gravity[3];    /* m/s^2 */
   float wind[3];       /* m/s */
   float air_density;   /* kg/m^3 */
   float gust_strength; /* m/s; maximum deviation of each wind component; 0 means no gusts */
   float gust_seconds;  /* time between changes of the gust's direction */
 } cs_environment;
-
-typedef struct cs_cloth_parameters {
-  float structural[2], shear[2], bend[2]; /* {stiffness in N/m, damping in N s/m} */
-  float damping;                          /* 1/s */
-} cs_cloth_parameters;
 
 /* Solver.kind of scene.proto. */
 typedef enum cs_solver {
@@ -673,13 +696,13 @@ typedef enum cs_solver {
   CS_SOLVER_IMPLICIT_EULER = 5
 } cs_solver;
 
+#define CS_CLOTH_SETTINGS_VERSION 1u
 /* Cloth parameters that can change while the scene runs. In a change, these values keep a parameter: NaN for
  * a float, 0 for solver and iterations, -1 for bend_constraints and assembled. cs_get_cloth_settings uses the
  * same values for parameters that are not known, or that the cloth or its solver does not have. A compliance
- * that was set cannot be set back to the server's default with cs_change_cloth. */
-#define CS_CLOTH_SETTINGS_VERSION 1u
+ * that was set cannot be set back to the server's default with cs_set_cloth. */
 typedef struct cs_cloth_settings {
-  uint32_t version;                       /* CS_CLOTH_SETTINGS_VERSION */
+  uint32_t version CS_INIT(CS_CLOTH_SETTINGS_VERSION);
   float structural[2], shear[2], bend[2]; /* {stiffness in N/m, damping in N s/m} */
   float damping;                          /* 1/s */
   float drag, lift, friction;             /* coefficients */
@@ -699,8 +722,6 @@ typedef struct cs_cloth_settings {
 
 /* Fails before the description. */
 int cs_get_environment(const cs_client* client, cs_environment* out) CS_NOEXCEPT;
-/* Fails if the cloth index is out of range. */
-int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out) CS_NOEXCEPT;
 /* Fails if the cloth index is out of range or `out->version` is unknown. */
 int cs_get_cloth_settings(const cs_client* client, uint32_t index, cs_cloth_settings* out) CS_NOEXCEPT;
 /* Number of materials that the server offers; 0 before the description. */
@@ -717,29 +738,23 @@ void cs_set_environment(cs_client* client, const float* gravity3, const float* w
                         const float* air_density) CS_NOEXCEPT;
 /* Changes the gusts; see cs_environment for the units. */
 void cs_set_gust(cs_client* client, float strength, float seconds) CS_NOEXCEPT;
-/* Changes springs ({stiffness, damping}) and damping of a cloth. Each pointer except cloth may be NULL. */
-void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
-                  const float* bend2, const float* damping) CS_NOEXCEPT;
 /* Fills in settings that change nothing, as the start of a change. Sets the version. */
 void cs_keep_cloth_settings(cs_cloth_settings* out) CS_NOEXCEPT;
 /* Changes the settings of a cloth. A new kind of solver gets the settings that it last had in this scene,
  * else the defaults of scene.proto. Fails before the description, for an unknown version and for an unknown
  * cloth. */
-int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) CS_NOEXCEPT;
+int cs_set_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) CS_NOEXCEPT;
 /* Applies a material (see cs_material) to a cloth: springs, damping, drag, lift, friction, mass and
  * solver (XPBD; a cloth with implicit Euler keeps it). */
 void cs_set_material(cs_client* client, const char* cloth, const char* material) CS_NOEXCEPT;
 /* Changes the mass per area of a cloth: 0.0001 to 1000 kg/m^2. */
 void cs_set_areal_mass(cs_client* client, const char* cloth, float areal_mass) CS_NOEXCEPT;
-/* Changes position (m) and radius (m) of a collider of the scene. Both pointers may be NULL. */
-void cs_set_collider(cs_client* client, const char* collider, const float* position3,
-                     const float* radius) CS_NOEXCEPT;
 
+#define CS_COLLIDER_CHANGE_VERSION 1u
 /* Change of a collider of the scene. NaN as the first number of a member keeps the member. The server refuses
  * numbers that the shape does not have. */
-#define CS_COLLIDER_CHANGE_VERSION 1u
 typedef struct cs_collider_change {
-  uint32_t version;     /* CS_COLLIDER_CHANGE_VERSION */
+  uint32_t version CS_INIT(CS_COLLIDER_CHANGE_VERSION);
   float position[3];    /* m */
   float orientation[4]; /* quaternion x y z w */
   float radius;         /* m; sphere or capsule */
@@ -749,14 +764,16 @@ typedef struct cs_collider_change {
 } cs_collider_change;
 /* Fills in a change that changes nothing. Sets the version. */
 void cs_keep_collider(cs_collider_change* out) CS_NOEXCEPT;
-/* Fails if the version is unknown. */
-int cs_change_collider(cs_client* client, const char* collider, const cs_collider_change* change) CS_NOEXCEPT;
+/* Changes a collider of the scene. Fails if the version is unknown. */
+int cs_set_collider(cs_client* client, const char* collider, const cs_collider_change* change) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
  * Participants: people in the scene, and their roles.
  */
 
+#define CS_PARTICIPANT_VERSION 1u
 typedef struct cs_participant {
+  uint32_t version CS_INIT(CS_PARTICIPANT_VERSION);
   uint64_t id;
   const char* name;        /* may be "" */
   const char* client_name; /* may be "" */
@@ -780,11 +797,12 @@ typedef enum cs_leave_reason {
   CS_LEAVE_REMOVED = 3
 } cs_leave_reason;
 
+#define CS_PRESENCE_VERSION 1u
 typedef struct cs_presence {
-  uint32_t kind;              /* cs_presence_kind, or a newer kind */
-  uint32_t reason;            /* cs_leave_reason if the participant left, else 0 */
-  uint64_t by;                /* participant who caused it; 0 for the participant itself or the server */
-  cs_participant participant; /* current state; last state if the participant left */
+  uint32_t version CS_INIT(CS_PRESENCE_VERSION);
+  uint32_t kind;   /* cs_presence_kind, or a newer kind */
+  uint32_t reason; /* cs_leave_reason if the participant left, else 0 */
+  uint64_t by;     /* participant who caused it; 0 for the participant itself or the server */
 } cs_presence;
 
 /* Id of this participant; 0 before Welcome. */
@@ -795,8 +813,9 @@ uint32_t cs_get_role(const cs_client* client) CS_NOEXCEPT;
 uint32_t cs_participant_count(const cs_client* client) CS_NOEXCEPT;
 /* Participants are in the order in which they joined. Fails if the index is out of range. */
 int cs_get_participant(const cs_client* client, uint32_t index, cs_participant* out) CS_NOEXCEPT;
-/* The change that the newest CS_EVENT_PRESENCE reported. Fails before the first. */
-int cs_get_presence(const cs_client* client, cs_presence* out) CS_NOEXCEPT;
+/* The change that the newest CS_EVENT_PRESENCE reported, and the participant's current state, or its last
+ * state if it left. Fails before the first. participant may be NULL. */
+int cs_get_presence(const cs_client* client, cs_presence* out, cs_participant* participant) CS_NOEXCEPT;
 /* Requests for owners: change a participant's role, or remove a participant. On success all participants get
  * CS_EVENT_PRESENCE; on failure this client gets CS_EVENT_ERROR. */
 void cs_set_role(cs_client* client, uint64_t participant_id, uint32_t role) CS_NOEXCEPT;
@@ -805,8 +824,10 @@ void cs_remove_participant(cs_client* client, uint64_t participant_id) CS_NOEXCE
  * scene is deleted or an owner lifts the ban. Fails for a participant without a token. */
 void cs_ban_participant(cs_client* client, uint64_t participant_id) CS_NOEXCEPT;
 
+#define CS_PAIRING_CODE_VERSION 1u
 /* Code by which others pair with the server. */
 typedef struct cs_pairing_code {
+  uint32_t version CS_INIT(CS_PAIRING_CODE_VERSION);
   const char* code; /* six digits */
   uint32_t role;    /* cs_role of those who use it */
   uint32_t valid_s; /* seconds, counted from the event */
@@ -822,8 +843,10 @@ int cs_get_pairing_code(const cs_client* client, cs_pairing_code* out) CS_NOEXCE
  * Recording: control the clock of the scene, play recordings, and write the stream to a file.
  */
 
+#define CS_PLAYBACK_VERSION 1u
 /* State of a recording that the server plays. */
 typedef struct cs_playback {
+  uint32_t version CS_INIT(CS_PLAYBACK_VERSION);
   double length;        /* s */
   double position;      /* s from the start, at now_us */
   double speed;         /* 1 is real time; 0: as fast as the participants acknowledge frames */
@@ -861,7 +884,9 @@ void cs_set_loop(cs_client* client, int loop) CS_NOEXCEPT;
  * Statistics: how the stream, the connection and the simulation perform.
  */
 
+#define CS_STATISTICS_VERSION 1u
 typedef struct cs_statistics {
+  uint32_t version CS_INIT(CS_STATISTICS_VERSION);
   uint64_t tick;            /* tick of the newest decoded frame */
   uint64_t frames;          /* decoded frames */
   uint64_t key_frames;      /* decoded frames that are key frames */
@@ -877,10 +902,10 @@ typedef struct cs_statistics {
   double decode_ms;         /* decoding time of the newest frame; 0 without a clock (cs_set_clock) */
 } cs_statistics;
 
-/* Time that a frame spends in each stage. */
 #define CS_STAGE_STATISTICS_VERSION 1u
+/* Time that a frame spends in each stage. */
 typedef struct cs_stage_statistics {
-  uint32_t version; /* CS_STAGE_STATISTICS_VERSION */
+  uint32_t version CS_INIT(CS_STAGE_STATISTICS_VERSION);
   /* Play-out; 0 if it is off. */
   uint32_t frames_waiting; /* frames that arrived before their display time */
   uint64_t late_frames;    /* frames that arrived after their display time */
@@ -894,11 +919,11 @@ typedef struct cs_stage_statistics {
   double displayable_ms; /* sum of these three */
 } cs_stage_statistics;
 
+#define CS_CLOTH_REPORT_VERSION 1u
 /* Performance and state of a cloth's simulation (ClothReport in session.proto). The server sends it a few
  * times a second. */
-#define CS_CLOTH_REPORT_VERSION 1u
 typedef struct cs_cloth_report {
-  uint32_t version;                                     /* CS_CLOTH_REPORT_VERSION */
+  uint32_t version CS_INIT(CS_CLOTH_REPORT_VERSION);
   uint32_t active_constraints, iterations;              /* of the last solve; 0 for the mass-spring solver */
   float residual;                                       /* of the last solve, relative to its start */
   float strain_max, strain_p99, strain_mean;            /* fraction of the rest length */
@@ -908,7 +933,8 @@ typedef struct cs_cloth_report {
   uint64_t tick;                                        /* tick of these values */
 } cs_cloth_report;
 
-void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) CS_NOEXCEPT;
+/* Fails if `out->version` is unknown. */
+int cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) CS_NOEXCEPT;
 /* Quality that the server sends now. It depends on cs_want and on the connection. Fails before the
  * description; then the quality is 0. */
 int cs_get_quality(const cs_client* client, uint32_t* quality) CS_NOEXCEPT;

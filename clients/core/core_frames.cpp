@@ -56,9 +56,10 @@ uint32_t cs_cloth_count(const cs_client* client) noexcept {
 int cs_get_cloth(const cs_client* client, uint32_t index, cs_cloth* out) noexcept {
   const Description& description = client->client.stream().description();
   const Cloth* cloth = at(description.cloths, index);
-  if (!cloth) return 0;
+  if (!cloth || out->version != CS_CLOTH_VERSION) return 0;
   const clothstream::codec::ClothLayout& layout = description.layout.cloths[index];
-  *out = {.name = cloth->name.c_str(),
+  *out = {.version = CS_CLOTH_VERSION,
+          .name = cloth->name.c_str(),
           .first_vertex = cloth->firstVertex,
           .vertex_count = layout.vertexCount,
           .rows = layout.rows,
@@ -88,9 +89,11 @@ uint32_t cs_submesh_count(const cs_client* client, uint32_t cloth) noexcept {
 int cs_get_submesh(const cs_client* client, uint32_t cloth, uint32_t index, cs_submesh* out) noexcept {
   const Cloth* found = at(client->client.stream().description().cloths, cloth);
   const Submesh* submesh = found ? at(found->submeshes, index) : nullptr;
-  if (!submesh) return 0;
-  *out = {
-      .name = submesh->name.c_str(), .first_index = submesh->firstIndex, .index_count = submesh->indexCount};
+  if (!submesh || out->version != CS_SUBMESH_VERSION) return 0;
+  *out = {.version = CS_SUBMESH_VERSION,
+          .name = submesh->name.c_str(),
+          .first_index = submesh->firstIndex,
+          .index_count = submesh->indexCount};
   return 1;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -29,9 +30,15 @@ void copy(const Values& values, float* out) {
   std::copy(values.begin(), values.end(), out);
 }
 
-// Returns 0 and leaves *out unchanged if `collider` is nullptr, else 1.
+// Whether all elements of an array of the caller have the version of this library.
+template <typename Struct>
+bool haveVersion(std::span<const Struct> structs, std::uint32_t version) {
+  return std::ranges::all_of(structs, [&](const Struct& one) { return one.version == version; });
+}
+
+// Returns 0 and leaves *out unchanged if `collider` is nullptr or the version is unknown, else 1.
 inline int writeCollider(const Collider* collider, cs_collider* out) {
-  if (!collider) return 0;
+  if (!collider || out->version != CS_COLLIDER_VERSION) return 0;
   *out = {};
   out->name = collider->name.c_str();
   copy(collider->position, out->position);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // C interface: input of this participant, and events of grabs and contacts.
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -15,30 +14,21 @@ using namespace clothstream::client;
 
 namespace {
 
-// Returns 0 and leaves *out unchanged without a point, else 1.
+// Returns 0 and leaves *out unchanged without a point or for an unknown version, else 1.
 int write(const std::optional<cs_cloth_point>& point, cs_cloth_point* out) {
-  if (!point) return 0;
+  if (!point || out->version != CS_CLOTH_POINT_VERSION) return 0;
   *out = *point;
   return 1;
 }
 
 }  // namespace
 
-void cs_set_colliders(cs_client* client, const float* spheres, uint32_t count, uint64_t now_us) noexcept {
-  std::array<cs_own_collider, CS_MAX_COLLIDERS> colliders{};
-  count = std::min(count, CS_MAX_COLLIDERS);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const float* sphere = spheres + 4 * i;
-    colliders[i].shape = CS_SHAPE_SPHERE;
-    std::copy(sphere, sphere + 3, colliders[i].position);
-    colliders[i].radius = sphere[3];
-  }
-  cs_set_shapes(client, colliders.data(), count, now_us);
-}
-
-void cs_set_shapes(cs_client* client, const cs_own_collider* colliders, uint32_t count,
-                   uint64_t now_us) noexcept {
-  client->client.setColliders(std::span(colliders, std::min(count, CS_MAX_COLLIDERS)), now_us);
+int cs_set_colliders(cs_client* client, const cs_own_collider* colliders, uint32_t count,
+                     uint64_t now_us) noexcept {
+  const std::span used(colliders, std::min(count, CS_MAX_COLLIDERS));
+  if (!haveVersion(used, CS_OWN_COLLIDER_VERSION)) return 0;
+  client->client.setColliders(used, now_us);
+  return 1;
 }
 
 int cs_set_hand(cs_client* client, uint32_t side, const float* joints, uint32_t count,
@@ -60,8 +50,15 @@ void cs_set_head(cs_client* client, const float* position3, const float* orienta
   client->client.setHead(head, now_us);
 }
 
-void cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) noexcept {
-  client->client.setGrabs(std::span(grabs, std::min(count, CS_MAX_GRABS)), now_us);
+int cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) noexcept {
+  const std::span used(grabs, std::min(count, CS_MAX_GRABS));
+  const bool isKnown =
+      haveVersion(used, CS_GRAB_VERSION) && std::ranges::all_of(used, [](const cs_grab& grab) {
+        return !grab.place || grab.place->version == CS_CLOTH_POINT_VERSION;
+      });
+  if (!isKnown) return 0;
+  client->client.setGrabs(used, now_us);
+  return 1;
 }
 
 int cs_nearest_point(const cs_client* client, const float* point3, float max_distance,
@@ -96,7 +93,7 @@ uint32_t cs_grab_event_count(const cs_client* client) noexcept {
 
 int cs_get_grab_event(const cs_client* client, uint32_t index, cs_grab_event* out) noexcept {
   const cs_grab_event* event = at(client->client.grabEvents(), index);
-  if (!event) return 0;
+  if (!event || out->version != CS_GRAB_EVENT_VERSION) return 0;
   *out = *event;
   return 1;
 }
@@ -115,8 +112,9 @@ uint32_t cs_contact_event_count(const cs_client* client) noexcept {
 
 int cs_get_contact_event(const cs_client* client, uint32_t index, cs_contact_event* out) noexcept {
   const ContactEvent* event = at(client->client.contactEvents(), index);
-  if (!event) return 0;
-  *out = {.kind = event->kind,
+  if (!event || out->version != CS_CONTACT_EVENT_VERSION) return 0;
+  *out = {.version = CS_CONTACT_EVENT_VERSION,
+          .kind = event->kind,
           .collider_id = event->colliderId,
           .participant_id = event->participantId,
           .collider = event->collider.c_str(),

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // C interface: creating a client, its connection, messages and state.
-#include <cassert>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -12,14 +11,17 @@ using namespace clothstream::client;
 
 namespace {
 
-cs_client* create(const char* scene, const char* clientName, const char* displayName, std::uint32_t role,
-                  Client::Kind kind) {
-  assert(scene && clientName && displayName);
+const char* textOf(const char* text) {
+  return text ? text : "";
+}
+
+cs_client* create(const cs_client_options& options, Client::Kind kind) {
+  if (options.version != CS_CLIENT_OPTIONS_VERSION) return nullptr;
   // NOLINTNEXTLINE(bugprone-unhandled-exception-at-new): out of memory ends the program.
-  return new cs_client{Client({.scene = scene,
-                               .clientName = clientName,
-                               .displayName = displayName,
-                               .role = role,
+  return new cs_client{Client({.scene = textOf(options.scene),
+                               .clientName = textOf(options.client_name),
+                               .displayName = textOf(options.display_name),
+                               .role = options.role,
                                .quality = 0,
                                .token = {},
                                .contentId = 0},
@@ -32,18 +34,12 @@ Bytes bytesOf(const std::uint8_t* message, std::size_t bytes) {
 
 }  // namespace
 
-cs_client* cs_create(const char* scene, const char* client_name) noexcept {
-  return cs_create_as(scene, client_name, "", CS_ROLE_UNSPECIFIED);
+cs_client* cs_create(const cs_client_options* options) noexcept {
+  return create(*options, Client::Kind::whole);
 }
 
-cs_client* cs_create_as(const char* scene, const char* client_name, const char* display_name,
-                        uint32_t role) noexcept {
-  return create(scene, client_name, display_name, role, Client::Kind::whole);
-}
-
-cs_client* cs_create_mirror(const char* scene, const char* client_name, const char* display_name,
-                            uint32_t role) noexcept {
-  return create(scene, client_name, display_name, role, Client::Kind::mirror);
+cs_client* cs_create_mirror(const cs_client_options* options) noexcept {
+  return create(*options, Client::Kind::mirror);
 }
 
 void cs_destroy(cs_client* client) noexcept {

@@ -28,12 +28,6 @@ std::optional<float> given(float value) {
   return std::isnan(value) ? std::nullopt : std::optional(value);
 }
 
-void setSpring(ClothNumbers& numbers, ClothNumber stiffness, ClothNumber damping, const float* values) {
-  if (!values) return;
-  numbers[stiffness] = values[0];
-  numbers[damping] = values[1];
-}
-
 // Numbers that the settings change. The server replaces some groups as a whole: these get their current
 // numbers where the settings give none.
 ClothNumbers changed(const cs_cloth_settings& settings, const ClothNumbers& now) {
@@ -83,28 +77,13 @@ ClothChange changeOf(const Cloth& cloth, const cs_cloth_settings& settings) {
 }  // namespace
 
 int cs_get_environment(const cs_client* client, cs_environment* out) noexcept {
-  if (!client->client.stream().begun()) return 0;
+  if (!client->client.stream().begun() || out->version != CS_ENVIRONMENT_VERSION) return 0;
   const EnvironmentValues& environment = client->client.stream().description().environment;
   copy(environment[kGravity], out->gravity);
   copy(environment[kWind], out->wind);
   out->air_density = environment[kAirDensity][0];
   out->gust_strength = environment[kGust][0];
   out->gust_seconds = environment[kGust][1];
-  return 1;
-}
-
-int cs_get_cloth_parameters(const cs_client* client, uint32_t index, cs_cloth_parameters* out) noexcept {
-  const Cloth* cloth = at(client->client.stream().description().cloths, index);
-  if (!cloth) return 0;
-  cs_cloth_settings settings;
-  cs_keep_cloth_settings(&settings);
-  cs_get_cloth_settings(client, index, &settings);
-  for (int i = 0; i < 2; ++i) {
-    out->structural[i] = settings.structural[i];
-    out->shear[i] = settings.shear[i];
-    out->bend[i] = settings.bend[i];
-  }
-  out->damping = settings.damping;
   return 1;
 }
 
@@ -163,29 +142,15 @@ void cs_set_gust(cs_client* client, float strength, float seconds) noexcept {
   client->client.change(change);
 }
 
-void cs_set_cloth(cs_client* client, const char* cloth, const float* structural2, const float* shear2,
-                  const float* bend2, const float* damping) noexcept {
-  ParameterChange change;
-  ClothChange& clothChange = change.cloths.emplace_back();
-  clothChange.name = cloth;
-  ClothNumbers& numbers = clothChange.numbers;
-  setSpring(numbers, ClothNumber::structuralStiffness, ClothNumber::structuralDamping, structural2);
-  setSpring(numbers, ClothNumber::shearStiffness, ClothNumber::shearDamping, shear2);
-  setSpring(numbers, ClothNumber::bendStiffness, ClothNumber::bendDamping, bend2);
-  if (damping) numbers[ClothNumber::damping] = *damping;
-  client->client.change(change);
-}
-
 void cs_keep_cloth_settings(cs_cloth_settings* out) noexcept {
   *out = {};
-  out->version = CS_CLOTH_SETTINGS_VERSION;
   out->solver = CS_SOLVER_AS_IS;
   out->bend_constraints = out->assembled = -1;
   out->tolerance = out->compliance = out->activation = kAsIs;
   for (const ClothParameter& parameter : kClothParameters) settingOf(*out, parameter.number) = kAsIs;
 }
 
-int cs_change_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) noexcept {
+int cs_set_cloth(cs_client* client, const char* cloth, const cs_cloth_settings* settings) noexcept {
   if (settings->version != CS_CLOTH_SETTINGS_VERSION) return 0;
   ParameterChange change;
   const std::string_view name = cloth;
@@ -213,15 +178,6 @@ void cs_set_areal_mass(cs_client* client, const char* cloth, float areal_mass) n
   client->client.change(change);
 }
 
-void cs_set_collider(cs_client* client, const char* collider, const float* position3,
-                     const float* radius) noexcept {
-  cs_collider_change change;
-  cs_keep_collider(&change);
-  if (position3 != nullptr) std::copy(position3, position3 + 3, change.position);
-  if (radius != nullptr) change.radius = *radius;
-  client->client.changeCollider(collider, change);
-}
-
 void cs_keep_collider(cs_collider_change* out) noexcept {
   *out = {.version = CS_COLLIDER_CHANGE_VERSION,
           .position = {kAsIs, kAsIs, kAsIs},
@@ -232,7 +188,7 @@ void cs_keep_collider(cs_collider_change* out) noexcept {
           .friction = kAsIs};
 }
 
-int cs_change_collider(cs_client* client, const char* collider, const cs_collider_change* change) noexcept {
+int cs_set_collider(cs_client* client, const char* collider, const cs_collider_change* change) noexcept {
   if (change->version != CS_COLLIDER_CHANGE_VERSION) return 0;
   client->client.changeCollider(collider, *change);
   return 1;

@@ -10,7 +10,8 @@ using namespace clothstream::client;
 namespace {
 
 cs_participant toC(const Participant& participant) {
-  return {.id = participant.id,
+  return {.version = CS_PARTICIPANT_VERSION,
+          .id = participant.id,
           .name = participant.name.c_str(),
           .client_name = participant.clientName.c_str(),
           .role = participant.role,
@@ -33,18 +34,18 @@ uint32_t cs_participant_count(const cs_client* client) noexcept {
 
 int cs_get_participant(const cs_client* client, uint32_t index, cs_participant* out) noexcept {
   const Participant* participant = at(client->client.participants().all(), index);
-  if (!participant) return 0;
+  if (!participant || out->version != CS_PARTICIPANT_VERSION) return 0;
   *out = toC(*participant);
   return 1;
 }
 
-int cs_get_presence(const cs_client* client, cs_presence* out) noexcept {
+int cs_get_presence(const cs_client* client, cs_presence* out, cs_participant* participant) noexcept {
   const Presence& presence = client->client.participants().newest();
-  if (presence.kind == 0) return 0;
-  *out = {.kind = presence.kind,
-          .reason = presence.reason,
-          .by = presence.by,
-          .participant = toC(presence.participant)};
+  if (presence.kind == 0 || out->version != CS_PRESENCE_VERSION) return 0;
+  if (participant && participant->version != CS_PARTICIPANT_VERSION) return 0;
+  *out = {
+      .version = CS_PRESENCE_VERSION, .kind = presence.kind, .reason = presence.reason, .by = presence.by};
+  if (participant) *participant = toC(presence.participant);
   return 1;
 }
 
@@ -66,7 +67,10 @@ void cs_create_pairing_code(cs_client* client, uint32_t role) noexcept {
 
 int cs_get_pairing_code(const cs_client* client, cs_pairing_code* out) noexcept {
   const PairingCode& made = client->client.pairingCode();
-  if (made.code.empty()) return 0;
-  *out = {.code = made.code.c_str(), .role = made.role, .valid_s = made.validSeconds};
+  if (made.code.empty() || out->version != CS_PAIRING_CODE_VERSION) return 0;
+  *out = {.version = CS_PAIRING_CODE_VERSION,
+          .code = made.code.c_str(),
+          .role = made.role,
+          .valid_s = made.validSeconds};
   return 1;
 }

@@ -12,7 +12,7 @@ void cs_request_key_frame(cs_client* client, uint64_t now_us) noexcept {
 
 int cs_get_playback(const cs_client* client, uint64_t now_us, cs_playback* out) noexcept {
   const auto playback = client->client.playback(now_us);
-  if (!playback) return 0;
+  if (!playback || out->version != CS_PLAYBACK_VERSION) return 0;
   *out = *playback;
   return 1;
 }

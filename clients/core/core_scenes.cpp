@@ -19,15 +19,11 @@ uint32_t cs_scene_count(const cs_client* client) noexcept {
   return static_cast<std::uint32_t>(client->client.scenes().size());
 }
 
-const char* cs_scene(const cs_client* client, uint32_t index) noexcept {
-  const SceneSummary* scene = at(client->client.scenes(), index);
-  return scene ? scene->name.c_str() : "";
-}
-
 int cs_get_scene(const cs_client* client, uint32_t index, cs_scene_summary* out) noexcept {
   const SceneSummary* scene = at(client->client.scenes(), index);
-  if (!scene) return 0;
-  *out = {.name = scene->name.c_str(),
+  if (!scene || out->version != CS_SCENE_SUMMARY_VERSION) return 0;
+  *out = {.version = CS_SCENE_SUMMARY_VERSION,
+          .name = scene->name.c_str(),
           .description = scene->description.c_str(),
           .vertex_count = scene->vertices,
           .cloth_count = scene->cloths,
@@ -117,8 +113,9 @@ uint32_t cs_ban_count(const cs_client* client) noexcept {
 
 int cs_get_ban(const cs_client* client, uint32_t index, cs_ban* out) noexcept {
   const Ban* ban = at(client->client.requests().bans(), index);
-  if (!ban) return 0;
-  *out = {.subject = ban->subject.c_str(),
+  if (!ban || out->version != CS_BAN_VERSION) return 0;
+  *out = {.version = CS_BAN_VERSION,
+          .subject = ban->subject.c_str(),
           .display_name = ban->displayName.c_str(),
           .tenant = ban->tenant.c_str()};
   return 1;

@@ -6,7 +6,8 @@
 
 using namespace clothstream::client;
 
-void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) noexcept {
+int cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* out) noexcept {
+  if (out->version != CS_STATISTICS_VERSION) return 0;
   const FrameStatistics& frames = client->client.stream().statistics();
   *out = {};
   out->tick = frames.tick();
@@ -22,6 +23,7 @@ void cs_get_statistics(const cs_client* client, uint64_t now_us, cs_statistics* 
   out->round_trip_ms = client->client.clock().roundTripMs();
   out->clock_offset_us = client->client.clock().offsetUs(now_us);
   out->decode_ms = client->client.stream().newest().decodeMs();
+  return 1;
 }
 
 int cs_get_quality(const cs_client* client, uint32_t* quality) noexcept {

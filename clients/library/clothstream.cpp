@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The C interface over NativeClient.
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <exception>
@@ -25,14 +24,6 @@ using namespace clothstream;
 struct clothstream_stream {
   std::unique_ptr<NativeClient> client;
 };
-
-// First version of clothstream_options.
-struct clothstream_options_1 {
-  std::uint32_t version, role, quality;
-  const char *scene, *client_name, *display_name;
-  std::uint32_t join_timeout_ms, reconnect_for_ms;
-};
-static_assert(sizeof(clothstream_options_1) == offsetof(clothstream_options, token));
 
 namespace {
 
@@ -71,9 +62,6 @@ clothstream_result guarded(Body body) noexcept {
   return CLOTHSTREAM_FAILED;
 }
 
-constexpr std::uint32_t kJoinTimeoutMs = 10'000, kReconnectForMs = 60'000;
-constexpr const char* kClientName = "libclothstream";
-
 NativeClientOptions clientOptions(const clothstream_options& options) {
   NativeClientOptions client;
   client.scene = options.scene;
@@ -94,15 +82,15 @@ NativeClientOptions clientOptions(const clothstream_options& options) {
 
 }  // namespace
 
-void clothstream_default_options_2(clothstream_options* out) noexcept {
+void clothstream_default_options(clothstream_options* out) noexcept {
   *out = {.version = CLOTHSTREAM_OPTIONS_VERSION,
           .role = CS_ROLE_UNSPECIFIED,
           .quality = 0,
           .scene = "",
-          .client_name = kClientName,
+          .client_name = "libclothstream",
           .display_name = "",
-          .join_timeout_ms = kJoinTimeoutMs,
-          .reconnect_for_ms = kReconnectForMs,
+          .join_timeout_ms = 10'000,
+          .reconnect_for_ms = 60'000,
           .token = "",
           .ca_file = "",
           .fingerprint = "",
@@ -110,33 +98,12 @@ void clothstream_default_options_2(clothstream_options* out) noexcept {
           .log_context = nullptr};
 }
 
-// Programs that were built for version 1 have room for no more.
-#undef clothstream_default_options
-extern "C" void clothstream_default_options(clothstream_options_1* out) noexcept {
-  *out = {.version = 1,
-          .role = CS_ROLE_UNSPECIFIED,
-          .quality = 0,
-          .scene = "",
-          .client_name = kClientName,
-          .display_name = "",
-          .join_timeout_ms = kJoinTimeoutMs,
-          .reconnect_for_ms = kReconnectForMs};
-}
-
 clothstream_result clothstream_open(const char* address, const clothstream_options* options,
                                     clothstream_stream** out) noexcept {
-  return clothstream_open_with_token(address, "", options, out);
-}
-
-clothstream_result clothstream_open_with_token(const char* address, const char* token,
-                                               const clothstream_options* options,
-                                               clothstream_stream** out) noexcept {
   return guarded([&] {
     *out = nullptr;
-    if (!token) return fail(CLOTHSTREAM_INVALID, "The token is NULL; \"\" is allowed.");
-    auto wanted = readOptions(options);
-    if (!wanted) return fail(CLOTHSTREAM_INVALID, std::move(wanted).error());
-    if (*token != '\0') wanted->token = token;
+    const auto wanted = readOptions(options);
+    if (!wanted) return fail(CLOTHSTREAM_INVALID, wanted.error());
     const auto server = readAddress(address, *wanted, false);
     if (!server) return fail(CLOTHSTREAM_INVALID, server.error());
     auto joined = NativeClient::join(*server, makeLibraryTransport(*server), clientOptions(*wanted),
@@ -147,14 +114,8 @@ clothstream_result clothstream_open_with_token(const char* address, const char* 
   });
 }
 
-clothstream_result clothstream_pair(const char* address, const char* code, char* token,
-                                    size_t token_bytes) noexcept {
-  return clothstream_pair_with_options(address, code, nullptr, token, token_bytes);
-}
-
-clothstream_result clothstream_pair_with_options(const char* address, const char* code,
-                                                 const clothstream_options* options, char* token,
-                                                 size_t token_bytes) noexcept {
+clothstream_result clothstream_pair(const char* address, const char* code, const clothstream_options* options,
+                                    char* token, size_t token_bytes) noexcept {
   return guarded([&] {
     if (!code || !token) return fail(CLOTHSTREAM_INVALID, "The code or the token is NULL.");
     if (token_bytes < CLOTHSTREAM_TOKEN_BYTES)

@@ -5,7 +5,7 @@
  * frames, keeps the clock, and reconnects after a loss. Between clothstream_acquire and clothstream_release
  * that thread waits, and the caller may use the cs_client: its data does not change, so positions, normals
  * and triangles can be read without a copy. All functions of core.h are allowed, except those for programs
- * with their own connection: cs_create, cs_create_as, cs_want, cs_destroy, cs_set_clock, cs_receive,
+ * with their own connection: cs_create, cs_want, cs_destroy, cs_set_clock, cs_receive,
  * cs_update, cs_next_outgoing, cs_connecting, cs_disconnected, cs_follow_redirects.
  *
  * Threads: all functions may be called from any thread. On one stream, clothstream_close must be the last
@@ -54,8 +54,8 @@ typedef enum clothstream_log_level {
 
 #define CLOTHSTREAM_OPTIONS_VERSION 2u
 typedef struct clothstream_options {
-  uint32_t version; /* CLOTHSTREAM_OPTIONS_VERSION; later versions add fields at the end */
-  uint32_t role;    /* requested cs_role */
+  uint32_t version CS_INIT(CLOTHSTREAM_OPTIONS_VERSION);
+  uint32_t role; /* requested cs_role */
   /* Best quality level, 0 (finest) to 3, as in cs_want. cs_get_quality returns what the server sends. */
   uint32_t quality;
   const char* scene;        /* "" means the server's default scene */
@@ -64,7 +64,6 @@ typedef struct clothstream_options {
   uint32_t join_timeout_ms; /* at least 1 */
   /* How long to try to reconnect after a loss. 0 means the stream ends with its connection. */
   uint32_t reconnect_for_ms;
-  /* From here on: version 2. A struct of version 1 ends before. */
   /* Proof for a server that requires a token (docs/identity.md); "" means none. It is sent to other machines
    * only with TLS. */
   const char* token;
@@ -81,14 +80,9 @@ typedef struct clothstream_options {
   void* log_context; /* argument of log */
 } clothstream_options;
 
-/* Fills in the defaults and the version: client_name "libclothstream", other strings "", role unspecified,
- * the whole stream, 10 s to join, 60 s to reconnect, no log.
- *
- * In C and C++ the name means the function for the version of this header. A program that looks the functions
- * up by name gets version 1 from clothstream_default_options, as programs for earlier releases do, and
- * version 2 from clothstream_default_options_2. */
-void clothstream_default_options_2(clothstream_options* out) CS_NOEXCEPT;
-#define clothstream_default_options clothstream_default_options_2
+/* Fills in the version and the defaults: client_name "libclothstream", other strings "", role unspecified,
+ * the whole stream, 10 s to join, 60 s to reconnect, no log. */
+void clothstream_default_options(clothstream_options* out) CS_NOEXCEPT;
 
 /* Joins a scene. Returns when the description of the scene has arrived.
  * address: HOST or HOST:PORT of the server's page; the default port is 8080. wss:// or https:// before it
@@ -98,20 +92,13 @@ void clothstream_default_options_2(clothstream_options* out) CS_NOEXCEPT;
  * *out: the stream; NULL unless the result is CLOTHSTREAM_OK. Free it with clothstream_close. */
 clothstream_result clothstream_open(const char* address, const clothstream_options* options,
                                     clothstream_stream** out) CS_NOEXCEPT;
-/* Like clothstream_open with this token instead of options->token. token: "" means that of the options. */
-clothstream_result clothstream_open_with_token(const char* address, const char* token,
-                                               const clothstream_options* options,
-                                               clothstream_stream** out) CS_NOEXCEPT;
 /* Exchanges a pairing code, six digits that a server or an owner shows, for a token. Joins no scene.
- * address: as above. token: buffer of token_bytes, at least CLOTHSTREAM_TOKEN_BYTES; it gets the token with a
- * zero at its end, or "". Keep the token secret. The code is sent to other machines only with TLS. */
-clothstream_result clothstream_pair(const char* address, const char* code, char* token,
-                                    size_t token_bytes) CS_NOEXCEPT;
-/* Like clothstream_pair, with ca_file, fingerprint and join_timeout_ms of the options. NULL means the
- * defaults. */
-clothstream_result clothstream_pair_with_options(const char* address, const char* code,
-                                                 const clothstream_options* options, char* token,
-                                                 size_t token_bytes) CS_NOEXCEPT;
+ * address: as above. options: ca_file, fingerprint and join_timeout_ms are used; NULL means the defaults.
+ * token: buffer of token_bytes, at least CLOTHSTREAM_TOKEN_BYTES; it gets the token with a zero at its end,
+ * or
+ * "". Keep the token secret. The code is sent to other machines only with TLS. */
+clothstream_result clothstream_pair(const char* address, const char* code, const clothstream_options* options,
+                                    char* token, size_t token_bytes) CS_NOEXCEPT;
 /* Leaves the scene and frees the stream. Takes at most half a second. NULL is allowed. */
 void clothstream_close(clothstream_stream* stream) CS_NOEXCEPT;
 
@@ -129,8 +116,8 @@ void clothstream_release(clothstream_stream* stream) CS_NOEXCEPT;
 #define CLOTHSTREAM_ALLOCATOR_VERSION 1u
 /* Memory functions of the program. They must be thread-safe, and must not call functions of the library. */
 typedef struct clothstream_allocator {
-  uint32_t version; /* CLOTHSTREAM_ALLOCATOR_VERSION */
-  void* context;    /* argument of both functions */
+  uint32_t version CS_INIT(CLOTHSTREAM_ALLOCATOR_VERSION);
+  void* context; /* argument of both functions */
   /* Returns memory of `bytes` (at least 1) at a multiple of `alignment`, a power of two; NULL without memory.
    */
   void* (*allocate)(void* context, size_t bytes, size_t alignment);

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "clients/library/library_options.h"
 
-#include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -33,18 +31,17 @@ std::string error(const clothstream_options& options) {
 }  // namespace
 
 tl::expected<clothstream_options, std::string> readOptions(const clothstream_options* options) {
-  clothstream_options whole;
-  clothstream_default_options_2(&whole);
-  if (!options) return whole;
-  constexpr std::size_t kFirstVersionBytes = offsetof(clothstream_options, token);
-  if (options->version != 1 && options->version != CLOTHSTREAM_OPTIONS_VERSION)
+  if (!options) {
+    clothstream_options defaults;
+    clothstream_default_options(&defaults);
+    return defaults;
+  }
+  if (options->version != CLOTHSTREAM_OPTIONS_VERSION)
     return tl::unexpected("options->version is " + std::to_string(options->version) +
-                          "; this library accepts the versions 1 to " +
-                          std::to_string(CLOTHSTREAM_OPTIONS_VERSION) +
+                          "; this library accepts " + std::to_string(CLOTHSTREAM_OPTIONS_VERSION) +
                           ". Start from clothstream_default_options, with the header of this library.");
-  std::memcpy(&whole, options, options->version == 1 ? kFirstVersionBytes : sizeof whole);
-  if (std::string wrong = error(whole); !wrong.empty()) return tl::unexpected(std::move(wrong));
-  return whole;
+  if (std::string wrong = error(*options); !wrong.empty()) return tl::unexpected(std::move(wrong));
+  return *options;
 }
 
 tl::expected<ServerAddress, std::string> readAddress(const char* address, const clothstream_options& options,

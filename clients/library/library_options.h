@@ -11,8 +11,7 @@
 
 namespace clothstream {
 
-// Returns a copy of `options` in the version of this library, or what is wrong. nullptr means the defaults. A
-// struct of an earlier version may be shorter.
+// Returns a copy of `options`, or what is wrong. nullptr means the defaults.
 [[nodiscard]] tl::expected<clothstream_options, std::string> readOptions(const clothstream_options* options);
 
 // Address, trust and token of the server, or what is wrong. `address` may be nullptr. `pairs`: a pairing code

@@ -24,6 +24,15 @@ std::span<const std::byte> bytesOf(const std::string& text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
 
+cs_client* createCore(const ParticipantOptions& options) {
+  const cs_client_options core{
+      .role = static_cast<std::uint32_t>(options.moves ? CS_ROLE_PARTICIPANT : CS_ROLE_VIEWER),
+      .scene = options.scene.c_str(),
+      .client_name = "clothstream load",
+      .display_name = options.name.c_str()};
+  return cs_create(&core);
+}
+
 }  // namespace
 
 void Figures::add(const Figures& other) {
@@ -38,10 +47,7 @@ void Figures::add(const Figures& other) {
 }
 
 Participant::Participant(Links& links, const ParticipantOptions& options)
-    : options_(options),
-      core_(cs_create_as(options.scene.c_str(), "clothstream load", options.name.c_str(),
-                         options.moves ? CS_ROLE_PARTICIPANT : CS_ROLE_VIEWER),
-            &cs_destroy) {
+    : options_(options), core_(createCore(options), &cs_destroy) {
   cs_set_token(core_.get(), options.token.c_str());
   cs_set_clock(core_.get(), &nowUs);
   limitVertices(core_.get(), options.maxVertices);
@@ -172,7 +178,6 @@ void Participant::frameDecoded(const v1::Frame& frame) {
   const std::uint64_t beforeUs = std::exchange(decodedTickUs_, frame.tick_time_us());
   cs_play_out(core_.get(), decodedUs, decodedUs, nullptr);
   cs_stage_statistics stages{};
-  stages.version = CS_STAGE_STATISTICS_VERSION;
   cs_get_stage_statistics(core_.get(), &stages);
   cs_statistics statistics;
   cs_get_statistics(core_.get(), decodedUs, &statistics);
@@ -213,9 +218,12 @@ void Participant::move(std::uint64_t nowUs) {
   const float* const middle = at + 3 * std::size_t{count / 2};
   const double turns = options_.phase + static_cast<double>(nowUs) / (1e6 * kOrbitSeconds);
   const double turn = 2 * std::numbers::pi * turns;
-  const float sphere[]{middle[0] + 0.5f * static_cast<float>(std::cos(turn)), middle[1],
-                       middle[2] + 0.5f * static_cast<float>(std::sin(turn)), poseTiming_.nextRadius(nowUs)};
-  cs_set_colliders(core_.get(), sphere, 1, nowUs);
+  cs_own_collider sphere{};
+  sphere.position[0] = middle[0] + 0.5f * static_cast<float>(std::cos(turn));
+  sphere.position[1] = middle[1];
+  sphere.position[2] = middle[2] + 0.5f * static_cast<float>(std::sin(turn));
+  sphere.radius = poseTiming_.nextRadius(nowUs);
+  cs_set_colliders(core_.get(), &sphere, 1, nowUs);
 }
 
 void Participant::flush() {

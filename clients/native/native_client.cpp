@@ -36,6 +36,14 @@ std::string seconds(std::chrono::milliseconds time) {
   return {text.data(), end.ptr};
 }
 
+cs_client* createCore(const NativeClientOptions& options) {
+  const cs_client_options core{.role = options.role,
+                               .scene = options.scene.c_str(),
+                               .client_name = options.clientName.c_str(),
+                               .display_name = options.displayName.c_str()};
+  return cs_create(&core);
+}
+
 }  // namespace
 
 class NativeClient::Stream {
@@ -47,9 +55,7 @@ class NativeClient::Stream {
         options_(options),
         onEvents_(std::move(onEvents)),
         log_(options.onLog, address_.address),
-        core_(cs_create_as(options.scene.c_str(), options.clientName.c_str(), options.displayName.c_str(),
-                           options.role),
-              &cs_destroy),
+        core_(createCore(options), &cs_destroy),
         transport_(std::move(transport)) {
     cs_set_token(core_.get(), address_.token.c_str());
     cs_want(core_.get(), options.quality);

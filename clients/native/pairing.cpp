@@ -46,7 +46,8 @@ void sayGoodbye(Transport& transport) {
 Answer pairOver(Transport& transport, const ServerAddress& address, const std::string& code,
                 std::chrono::milliseconds timeout) {
   assert(!code.empty());
-  const std::unique_ptr<cs_client, decltype(&cs_destroy)> core(cs_create("", ""), &cs_destroy);
+  const cs_client_options options{};
+  const std::unique_ptr<cs_client, decltype(&cs_destroy)> core(cs_create(&options), &cs_destroy);
   cs_set_pairing_code(core.get(), code.c_str());
   const auto end = Clock::now() + timeout;
   std::optional<Answer> answer;

@@ -59,7 +59,10 @@ def bindings() -> str:
         out += "".join(f"{one['name']} = {one['value']}\n" for enum in header["enums"] for one in enum["values"])
     for header in headers:
         for name, struct in header["structs"].items():
-            out += f"\n\nclass {name}(c.Structure):\n    _fields_ = [\n"
+            out += f"\n\nclass {name}(c.Structure):\n"
+            if (version := f"{name.upper()}_VERSION") in header["constants"]:
+                out += f"    VERSION = {version}\n"
+            out += "    _fields_ = [\n"
             for field in struct["fields"]:
                 array = f" * {field['count']}" if "count" in field else ""
                 out += f'        ("{field["name"]}", {types.of(field["type"])}{array}),\n'

@@ -65,10 +65,16 @@ std::optional<codec::PacketHeader> headerOf(Bytes packet) {
   return parsed->header;
 }
 
+cs_client* createCore() {
+  cs_client_options options{};
+  options.client_name = "recording";
+  return cs_create(&options);
+}
+
 }  // namespace
 
 PlayedRecording::PlayedRecording(recording::RecordingReader reader)
-    : reader_(std::move(reader)), client_(cs_create("", "recording"), &cs_destroy) {}
+    : reader_(std::move(reader)), client_(createCore(), &cs_destroy) {}
 
 tl::expected<PlayedRecording, std::string> PlayedRecording::open(recording::RecordingReader reader) {
   PlayedRecording played(std::move(reader));

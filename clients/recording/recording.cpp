@@ -61,7 +61,6 @@ int seekWith(cs_recording* recording, Seek seek, Where where, cs_recorded* out) 
   }
   if (!out) return 1;
   *out = {};
-  out->version = CS_RECORDED_VERSION;
   if (*frame) write(*recording->played, **frame, *out);
   return 1;
 }
@@ -221,6 +220,7 @@ int cs_recording_get_tick(const cs_recording* recording, cs_recorded_tick* out) 
 
 int cs_recording_get_collider(const cs_recording* recording, uint32_t index,
                               cs_recorded_collider* out) noexcept {
+  if (out->version != CS_RECORDED_COLLIDER_VERSION) return 0;
   return writeElement(recording, &RecordedTick::colliders, index, out);
 }
 
@@ -230,6 +230,7 @@ int cs_recording_get_attachment(const cs_recording* recording, uint32_t index,
 }
 
 int cs_recording_get_grab(const cs_recording* recording, uint32_t index, cs_recorded_grab* out) noexcept {
+  if (out->version != CS_RECORDED_GRAB_VERSION) return 0;
   return writeElement(recording, &RecordedTick::grabs, index, out);
 }
 

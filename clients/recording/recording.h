@@ -55,7 +55,7 @@ cs_recording* cs_recording_open_bytes(const uint8_t* bytes, size_t count, uint32
 #define CS_RECORDING_SOURCE_VERSION 1u
 /* Bytes that a function of the program reads, for example from an archive or over a network. */
 typedef struct cs_recording_source {
-  uint32_t version; /* CS_RECORDING_SOURCE_VERSION */
+  uint32_t version CS_INIT(CS_RECORDING_SOURCE_VERSION);
   uint32_t max_vertices;
   uint64_t size; /* bytes */
   void* user;    /* first argument of `read`; may be NULL */
@@ -80,7 +80,7 @@ const cs_client* cs_recording_client(const cs_recording* recording) CS_NOEXCEPT;
 
 #define CS_RECORDING_INFO_VERSION 1u
 typedef struct cs_recording_info {
-  uint32_t version; /* CS_RECORDING_INFO_VERSION */
+  uint32_t version CS_INIT(CS_RECORDING_INFO_VERSION);
   /* 1: the file has its index. 0: it is cut or damaged at its end, and is read up to there. */
   int32_t complete;
   double seconds;    /* time from the first message to the last */
@@ -115,11 +115,11 @@ enum {
 
 #define CS_RECORDED_VERSION 1u
 typedef struct cs_recorded {
-  uint32_t version; /* CS_RECORDED_VERSION */
-  uint32_t kind;    /* one CS_RECORDED value; 0 if there is no message */
-  uint32_t events;  /* CS_EVENT bits: what changed in the client */
-  int32_t key;      /* 1 if it is a frame that can be decoded without earlier ones */
-  double seconds;   /* time since the start of the recording */
+  uint32_t version CS_INIT(CS_RECORDED_VERSION);
+  uint32_t kind;   /* one CS_RECORDED value; 0 if there is no message */
+  uint32_t events; /* CS_EVENT bits: what changed in the client */
+  int32_t key;     /* 1 if it is a frame that can be decoded without earlier ones */
+  double seconds;  /* time since the start of the recording */
   /* Tick of a frame, events, a tick or a checkpoint; the first tick with new parameters; else 0. */
   uint64_t tick;
   /* Frames: the hash that a decoder must have; compare with cs_reconstruction_hash. Else 0. */
@@ -152,7 +152,7 @@ int cs_recording_seek_tick(cs_recording* recording, uint64_t tick, cs_recorded* 
 #define CS_RECORDING_FAULTS_VERSION 1u
 /* Frames that were read so far. Frames that are read again after a seek count again. */
 typedef struct cs_recording_faults {
-  uint32_t version;     /* CS_RECORDING_FAULTS_VERSION */
+  uint32_t version CS_INIT(CS_RECORDING_FAULTS_VERSION);
   uint64_t frames;      /* all frames */
   uint64_t undecodable; /* frames that the decoder refused, or that refer to one that differs */
   uint64_t different;   /* frames that were decoded, but differ from their recorded hash */
@@ -181,7 +181,7 @@ typedef enum cs_recovery {
 
 #define CS_RECORDED_TICK_VERSION 1u
 typedef struct cs_recorded_tick {
-  uint32_t version;    /* CS_RECORDED_TICK_VERSION */
+  uint32_t version CS_INIT(CS_RECORDED_TICK_VERSION);
   uint32_t recovery;   /* cs_recovery, or a newer value */
   uint64_t tick;       /* grows by one per tick, also after a rollback or reset */
   uint64_t state_hash; /* hash of positions and velocities after the tick */
@@ -199,8 +199,10 @@ typedef struct cs_recorded_pose {
   float orientation[4]; /* quaternion x y z w */
 } cs_recorded_pose;
 
+#define CS_RECORDED_COLLIDER_VERSION 1u
 /* Collider that moves during a tick. */
 typedef struct cs_recorded_collider {
+  uint32_t version CS_INIT(CS_RECORDED_COLLIDER_VERSION);
   uint64_t participant_id;       /* 0: the scene */
   uint32_t id;                   /* among the colliders of the participant; of the scene: its index */
   uint32_t shape;                /* cs_shape */
@@ -217,7 +219,9 @@ typedef enum cs_grab_state {
   CS_GRAB_STATE_TAKES = 2  /* the grab takes the nodes near its start, or near its place */
 } cs_grab_state;
 
+#define CS_RECORDED_GRAB_VERSION 1u
 typedef struct cs_recorded_grab {
+  uint32_t version CS_INIT(CS_RECORDED_GRAB_VERSION);
   uint32_t state;                                /* cs_grab_state, or a newer state */
   cs_recorded_pose start, end;                   /* at the start and end of the tick */
   float radius, reach, max_force, slip_distance; /* m, m, N, m */

@@ -11,6 +11,8 @@ const kTypes = new Map([
 ]);
 // C# words that are names in core.h.
 const kWords = new Set(["fixed", "out", "in", "event", "object", "string", "params", "ref", "lock"]);
+// ClientOptions is a class of the package.
+const kRenamed = new Map([["cs_client_options", "NativeClientOptions"]]);
 const kAnonymous = ["Events", "Errors"];
 
 const pascal = (text) => text.toLowerCase().replaceAll(/(?:^|_)([a-z0-9])/g, (_, letter) => letter.toUpperCase());
@@ -18,7 +20,7 @@ const camel = (text) => {
   const name = text.replaceAll(/_([a-z0-9])/g, (_, letter) => letter.toUpperCase());
   return kWords.has(name) ? `@${name}` : name;
 };
-const typeName = (name) => pascal(name.replace(/^cs_/, ""));
+const typeName = (name) => kRenamed.get(name) ?? pascal(name.replace(/^cs_/, ""));
 
 // The type of a parameter, result or field, for example `const uint32_t**`. described: names of enums and structs.
 function csharpType(text, described) {

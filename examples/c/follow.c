@@ -11,10 +11,13 @@ int main(int argc, char** argv) {
   }
   cs_play_out_options smooth;
   cs_default_play_out(&smooth);
-  const float sphere[4] = {0, 1.5f, 0.3f, 0.1f}; /* x y z radius */
+  const cs_own_collider ball = {.version = CS_OWN_COLLIDER_VERSION,
+                                .shape = CS_SHAPE_SPHERE,
+                                .position = {0, 1.5f, 0.3f},
+                                .radius = 0.1f};
   cs_client* client = clothstream_acquire(stream);
   cs_set_play_out(client, &smooth);
-  cs_set_colliders(client, sphere, 1, clothstream_now_us());
+  cs_set_colliders(client, &ball, 1, clothstream_now_us());
   clothstream_release(stream);
 
   uint32_t events = 0;

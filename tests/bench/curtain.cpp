@@ -30,6 +30,12 @@ constexpr double kLeastSeconds = 10;
 // arrive at every phase of a tick.
 constexpr std::chrono::microseconds kPoseInterval{1'000'000 / 90};
 
+cs_client* createCore() {
+  cs_client_options options{};
+  options.client_name = "bench";
+  return cs_create(&options);
+}
+
 class Viewer {
  public:
   explicit Viewer(hosting::SceneServer& server)
@@ -77,16 +83,22 @@ class Viewer {
   // Moves the hand back and forth through the curtain.
   void moveHand(Clock::time_point now) {
     const double seconds = std::chrono::duration<double>(now.time_since_epoch()).count();
-    const float hand[4] = {0.6f, 1.2f, static_cast<float>(0.3 * std::sin(2 * seconds)), 0.1f};
+    const cs_own_collider hand{.shape = CS_SHAPE_SPHERE,
+                               .position = {0.6f, 1.2f, static_cast<float>(0.3 * std::sin(2 * seconds))},
+                               .orientation = {},
+                               .radius = 0.1f,
+                               .length = 0,
+                               .size = {},
+                               .top_radius = 0};
     if (cs_get_state(core_.get()) == CS_STATE_JOINED)
-      cs_set_colliders(core_.get(), hand, 1, microseconds(now));
+      cs_set_colliders(core_.get(), &hand, 1, microseconds(now));
   }
 
   std::mutex mutex_;
   std::condition_variable woken_;
   bool awake_ = false;
   Clock::time_point nextPose_{};
-  std::unique_ptr<cs_client, void (*)(cs_client*)> core_{cs_create("", "bench"), &cs_destroy};
+  std::unique_ptr<cs_client, void (*)(cs_client*)> core_{createCore(), &cs_destroy};
   std::shared_ptr<session::Session> session_;
 };
 

@@ -286,10 +286,11 @@ TEST(Interface, ReturnsErrorsInsteadOfExceptions) {
 #endif
   // Only a failed allocation throws.
   const auto runOutOfMemory = [] {
+    const cs_client_options options{};
     const rlimit none{};
     setrlimit(RLIMIT_DATA, &none);
     try {
-      for (;;) cs_create("curtain", "test");
+      for (;;) cs_create(&options);
     } catch (...) {
       std::_Exit(0);
     }

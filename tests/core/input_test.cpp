@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Colliders, hands, grabs and attachments sent to the server, and the events that it returns.
+#include <array>
 #include <limits>
 
 #include <gmock/gmock.h>
@@ -18,7 +19,7 @@ using ::testing::SizeIs;
 
 TEST(Colliders, AreSentWithTheirTime) {
   JoinedClient joined;
-  const float spheres[] = {1, 2, 3, 0.1f, 4, 5, 6, 0.2f};
+  const cs_own_collider spheres[] = {sphereAt(1, 2, 3, 0.1f), sphereAt(4, 5, 6, 0.2f)};
   cs_set_colliders(joined.client.get(), spheres, 2, 777);
   const v1::ColliderPoses poses = joined.sent().collider_poses();
   EXPECT_EQ(poses.client_time_us(), 777u);
@@ -30,14 +31,14 @@ TEST(Colliders, AreSentWithTheirTime) {
 
 TEST(Colliders, AreSentWithServerTimeOnceKnown) {
   JoinedClient joined;
-  const float sphere[] = {1, 2, 3, 0.1f};
-  cs_set_colliders(joined.client.get(), sphere, 1, 5000);
+  const cs_own_collider sphere = sphereAt(1, 2, 3, 0.1f);
+  cs_set_colliders(joined.client.get(), &sphere, 1, 5000);
   EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 0u);
   cs_update(joined.client.get(), 10'000);
   ASSERT_TRUE(joined.sent().has_ping());
   // Round trip of 8 ms: the server's clock was at 1'000'000 when the client's was at 14'000.
   joined.client.receive(ScriptedServer::pong(10'000, 1'000'000), 18'000);
-  cs_set_colliders(joined.client.get(), sphere, 1, 24'000);
+  cs_set_colliders(joined.client.get(), &sphere, 1, 24'000);
   EXPECT_EQ(joined.sent().collider_poses().server_time_us(), 1'010'000u);
   EXPECT_EQ(joined.client.statistics(24'000).clock_offset_us, 986'000);
 }
@@ -61,7 +62,7 @@ TEST(Colliders, HandsAreSentAsJoints) {
   EXPECT_EQ(both.hands(0).side(), v1::HAND_SIDE_LEFT);
   EXPECT_THAT(both.hands(0).radii(), SizeIs(25));
   // A server accepts 60 colliders; these two hands use 40.
-  const std::vector<float> spheres(4 * CS_MAX_COLLIDERS, 0.5f);
+  const std::vector<cs_own_collider> spheres(CS_MAX_COLLIDERS, sphereAt(0.5f, 0.5f, 0.5f, 0.5f));
   cs_set_colliders(joined.client.get(), spheres.data(), CS_MAX_COLLIDERS, 6);
   EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(20));
   EXPECT_EQ(cs_set_hand(joined.client.get(), CS_HAND_RIGHT, nullptr, 0, 7), 1);
@@ -83,7 +84,7 @@ TEST(Colliders, TheHeadHasItsOwnIdAndStaysWhenOthersChange) {
   EXPECT_EQ(alone.colliders(0).pose().position().y(), 2);
   EXPECT_EQ(alone.colliders(0).pose().orientation().w(), 0.8f);
   // A server accepts 60 colliders; these two hands and the head use 41.
-  const std::vector<float> spheres(4 * CS_MAX_COLLIDERS, 0.5f);
+  const std::vector<cs_own_collider> spheres(CS_MAX_COLLIDERS, sphereAt(0.5f, 0.5f, 0.5f, 0.5f));
   const std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
   cs_set_hand(joined.client.get(), CS_HAND_LEFT, joints.data(), CS_HAND_JOINTS, 6);
   cs_set_hand(joined.client.get(), CS_HAND_RIGHT, joints.data(), CS_HAND_JOINTS, 6);
@@ -104,18 +105,21 @@ TEST(Colliders, AreSentWithShapeAndOrientation) {
                                   .orientation = {0, 0.6f, 0, 0.8f},
                                   .radius = 0.01f,
                                   .length = 0.03f,
-                                  .size = {}},
+                                  .size = {},
+                                  .top_radius = 0.008f},
                                  {.shape = CS_SHAPE_BOX,
                                   .position = {},
                                   .orientation = {},
                                   .radius = 0,
                                   .length = 0,
-                                  .size = {0.1f, 0.2f, 0.3f}}};
-  cs_set_shapes(joined.client.get(), own, 2, 5);
+                                  .size = {0.1f, 0.2f, 0.3f},
+                                  .top_radius = 0}};
+  EXPECT_EQ(cs_set_colliders(joined.client.get(), own, 2, 5), 1);
   const v1::ColliderPoses poses = joined.sent().collider_poses();
   ASSERT_THAT(poses.colliders(), SizeIs(2));
   EXPECT_EQ(poses.colliders(0).capsule().radius(), 0.01f);
   EXPECT_EQ(poses.colliders(0).capsule().length(), 0.03f);
+  EXPECT_EQ(poses.colliders(0).capsule().top_radius(), 0.008f);
   EXPECT_EQ(poses.colliders(0).pose().orientation().w(), 0.8f);
   EXPECT_EQ(poses.colliders(1).box().size().z(), 0.3f);
   EXPECT_FALSE(poses.colliders(1).pose().has_orientation());
@@ -123,8 +127,8 @@ TEST(Colliders, AreSentWithShapeAndOrientation) {
 
 TEST(Colliders, OnlyTheNewestAreSentAndZeroRemovesAll) {
   JoinedClient joined;
-  const float sphere[] = {1, 2, 3, 0.1f};
-  cs_set_colliders(joined.client.get(), sphere, 1, 1);
+  const cs_own_collider sphere = sphereAt(1, 2, 3, 0.1f);
+  cs_set_colliders(joined.client.get(), &sphere, 1, 1);
   cs_set_colliders(joined.client.get(), nullptr, 0, 2);
   const v1::ClientMessage message = joined.sent();
   ASSERT_TRUE(message.has_collider_poses());
@@ -134,8 +138,8 @@ TEST(Colliders, OnlyTheNewestAreSentAndZeroRemovesAll) {
 
 TEST(Grabs, AreSentWithCollidersAndOmitDefaults) {
   JoinedClient joined;
-  const float sphere[] = {1, 2, 3, 0.1f};
-  cs_set_colliders(joined.client.get(), sphere, 1, 1);
+  const cs_own_collider sphere = sphereAt(1, 2, 3, 0.1f);
+  cs_set_colliders(joined.client.get(), &sphere, 1, 1);
   cs_grab grab{.id = 7,
                .position = {1, 2, 3},
                .orientation = {},
@@ -143,8 +147,7 @@ TEST(Grabs, AreSentWithCollidersAndOmitDefaults) {
                .reach = 0.5f,
                .max_force = kNan,
                .slip_distance = kNan,
-               .has_place = 0,
-               .place = {}};
+               .place = nullptr};
   cs_set_grabs(joined.client.get(), &grab, 1, 2);
   const v1::ColliderPoses both = joined.sent().collider_poses();
   EXPECT_THAT(both.colliders(), SizeIs(1));
@@ -158,7 +161,7 @@ TEST(Grabs, AreSentWithCollidersAndOmitDefaults) {
   EXPECT_FALSE(both.grabs(0).has_slip_distance());
   EXPECT_FALSE(both.grabs(0).has_place());
   // A change of colliders does not release the grab.
-  cs_set_colliders(joined.client.get(), sphere, 1, 3);
+  cs_set_colliders(joined.client.get(), &sphere, 1, 3);
   EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(1));
   cs_set_grabs(joined.client.get(), nullptr, 0, 4);
   EXPECT_THAT(joined.sent().collider_poses().grabs(), SizeIs(0));
@@ -238,9 +241,30 @@ TEST(AttachmentPoses, AreSentOnceWithTheirLastValue) {
 
 TEST(Colliders, DropsCollidersBeyondTheLimit) {
   JoinedClient joined;
-  const std::vector<float> spheres(4 * 50, 1.0f);
+  const std::vector<cs_own_collider> spheres(50, sphereAt(1, 1, 1, 1));
   cs_set_colliders(joined.client.get(), spheres.data(), 50, 1);
   EXPECT_THAT(joined.sent().collider_poses().colliders(), SizeIs(CS_MAX_COLLIDERS));
+}
+
+TEST(Colliders, RefuseUnknownVersions) {
+  JoinedClient joined;
+  std::array spheres{sphereAt(1, 2, 3, 0.1f), sphereAt(4, 5, 6, 0.2f)};
+  spheres[1].version = CS_OWN_COLLIDER_VERSION + 1;
+  EXPECT_EQ(cs_set_colliders(joined.client.get(), spheres.data(), 2, 1), 0);
+  EXPECT_THAT(joined.client.outgoing(), SizeIs(0));
+}
+
+TEST(Grabs, RefuseUnknownVersions) {
+  JoinedClient joined;
+  cs_cloth_point place{};
+  cs_grab grab{};
+  grab.place = &place;
+  place.version = CS_CLOTH_POINT_VERSION + 1;
+  EXPECT_EQ(cs_set_grabs(joined.client.get(), &grab, 1, 1), 0);
+  grab = {};
+  grab.version = CS_GRAB_VERSION + 1;
+  EXPECT_EQ(cs_set_grabs(joined.client.get(), &grab, 1, 1), 0);
+  EXPECT_THAT(joined.client.outgoing(), SizeIs(0));
 }
 
 TEST(Outgoing, FailsWhenTheTransportStopsSending) {

@@ -17,23 +17,23 @@ namespace {
 
 constexpr float kRadius = 0.1f;
 
-// A waving cloth in the plane z = 0, and a sphere of this participant that comes from behind the viewer.
+// A waving cloth in the plane z = 0, and a collider of this participant that comes from behind the viewer.
 struct Pushed {
   explicit Pushed(bool contact = true) : viewer(chosenDelay(50)) {
     cs_set_local_contact(viewer.client.get(), contact ? 1 : 0);
     viewer.learnClock();
   }
-  // The next 10 ms, at the end of which the sphere is at this depth behind z = 0.
+  // The next 10 ms, at the end of which the collider is at this depth behind z = 0.
   void step(float z) {
     ++tick;
     const std::uint64_t now = tick * kFrameUs;
     viewer.receive(tick, now - 5 * kMs, now);
-    const float sphere[] = {0.3f, -0.4f, z, kRadius};
-    cs_set_colliders(viewer.client.get(), sphere, 1, now);
+    collider.position[2] = z;
+    cs_set_colliders(viewer.client.get(), &collider, 1, now);
     viewer.client.outgoing();
     viewer.play(now);
   }
-  // Smallest distance of a shown vertex from the centre of the sphere.
+  // Smallest distance of a shown vertex from the centre of the sphere, or of the upper end of the limb.
   float nearest(float z) const {
     const Floats shown = viewer.playedPositions();
     float least = std::numeric_limits<float>::infinity();
@@ -42,8 +42,18 @@ struct Pushed {
     return least;
   }
   Viewer viewer;
+  cs_own_collider collider = sphereAt(0.3f, -0.4f, 0, kRadius);
   std::uint64_t tick = 0;
 };
+
+// A tapered capsule whose upper end is the sphere.
+cs_own_collider limb() {
+  cs_own_collider limb = sphereAt(0.3f, -0.5f, 0, 0.02f);
+  limb.shape = CS_SHAPE_CAPSULE;
+  limb.length = 0.2f;
+  limb.top_radius = kRadius;
+  return limb;
+}
 
 TEST(LocalContact, KeepsTheClothOutsideOfTheOwnSphere) {
   Pushed pushed, without(false);
@@ -78,6 +88,15 @@ TEST(LocalContact, KeepsTheClothOutsideOfTheOwnSphere) {
   EXPECT_TRUE(sameBits(pushed.viewer.playedPositions(), without.viewer.playedPositions()));
 }
 
+TEST(LocalContact, KeepsTheClothOutsideOfALimb) {
+  Pushed pushed;
+  pushed.collider = limb();
+  for (float z = 0.5f; z > -0.05f; z -= 0.01f) {
+    pushed.step(z);
+    EXPECT_GE(pushed.nearest(z), kRadius - 0.01f) << z;
+  }
+}
+
 TEST(LocalContact, ChangesNothingWithoutACollider) {
   Pushed pushed, without(false);
   for (int i = 0; i < 10; ++i) {
@@ -100,18 +119,23 @@ OwnCapsules twoCapsules(float x) {
 
 TEST(OwnCapsules, TheHeadIsTheLastAsInFrames) {
   Poses poses;
-  poses.head = cs_own_collider{.shape = CS_SHAPE_SPHERE,
-                               .position = {1, 2, 3},
-                               .orientation = {},
-                               .radius = 0.11f,
-                               .length = 0,
-                               .size = {}};
+  poses.head = sphereAt(1, 2, 3, 0.11f);
   poses.rightHand.assign(std::size_t{4} * CS_HAND_JOINTS, 0.01f);
   const OwnCapsules capsules = ownCapsules(poses);
   EXPECT_TRUE(capsules[kOwnCapsules - 2].present());
   EXPECT_EQ(capsules[kOwnCapsules - 1].radius, 0.11f);
   EXPECT_EQ(capsules[kOwnCapsules - 1].from.y, 2);
   EXPECT_FALSE(ownCapsules({}).back().present());
+}
+
+TEST(OwnCapsules, HaveTheirTopRadius) {
+  Poses poses;
+  poses.colliders = {limb(), limb()};
+  poses.colliders[1].top_radius = 0;
+  const OwnCapsules capsules = ownCapsules(poses);
+  EXPECT_EQ(capsules[0].radiusAt(0), 0.02f);
+  EXPECT_FLOAT_EQ(capsules[0].radiusAt(1), kRadius);
+  EXPECT_EQ(capsules[1].radiusAt(1), 0.02f);
 }
 
 TEST(OwnCapsules, AreRecognisedInAFrameByOrderAndSize) {

@@ -29,8 +29,12 @@ TEST(Parameters, SendOnlyGivenValues) {
   EXPECT_FALSE(change.has_air_density());
   EXPECT_EQ(change.wind().value().z(), -2);
 
-  const float bend[] = {20, 0.1f}, damping = 0.5f;
-  cs_set_cloth(joined.client.get(), "curtain", nullptr, nullptr, bend, &damping);
+  cs_cloth_settings settings;
+  cs_keep_cloth_settings(&settings);
+  settings.bend[0] = 20;
+  settings.bend[1] = 0.1f;
+  settings.damping = 0.5f;
+  ASSERT_EQ(cs_set_cloth(joined.client.get(), "curtain", &settings), 1);
   const v1::ParameterChange cloth = joined.sent().parameter_change();
   ASSERT_THAT(cloth.cloths(), SizeIs(1));
   EXPECT_EQ(cloth.cloths(0).name(), "curtain");
@@ -40,8 +44,10 @@ TEST(Parameters, SendOnlyGivenValues) {
   EXPECT_EQ(cloth.cloths(0).damping(), 0.5f);
   EXPECT_FALSE(cloth.cloths(0).has_friction());
 
-  const float radius = 0.3f;
-  cs_set_collider(joined.client.get(), "ball", nullptr, &radius);
+  cs_collider_change sphere;
+  cs_keep_collider(&sphere);
+  sphere.radius = 0.3f;
+  ASSERT_EQ(cs_set_collider(joined.client.get(), "ball", &sphere), 1);
   const v1::ParameterChange collider = joined.sent().parameter_change();
   ASSERT_THAT(collider.colliders(), SizeIs(1));
   EXPECT_EQ(collider.colliders(0).name(), "ball");
@@ -58,7 +64,7 @@ TEST(Parameters, ChangeOfColliderHasOnlyTheNumbersThatAreSet) {
   JoinedClient joined;
   cs_collider_change change;
   cs_keep_collider(&change);
-  ASSERT_EQ(cs_change_collider(joined.client.get(), "box", &change), 1);
+  ASSERT_EQ(cs_set_collider(joined.client.get(), "box", &change), 1);
   v1::ColliderChange nothing;
   nothing.set_name("box");
   EXPECT_EQ(joined.sent().parameter_change().colliders(0).SerializeAsString(), nothing.SerializeAsString());
@@ -69,7 +75,7 @@ TEST(Parameters, ChangeOfColliderHasOnlyTheNumbersThatAreSet) {
   change.radius = 0.5f;
   change.length = 0.7f;
   change.friction = 0;
-  ASSERT_EQ(cs_change_collider(joined.client.get(), "box", &change), 1);
+  ASSERT_EQ(cs_set_collider(joined.client.get(), "box", &change), 1);
   const v1::ColliderChange all = joined.sent().parameter_change().colliders(0);
   EXPECT_EQ(all.position().z(), 3);
   EXPECT_EQ(all.orientation().y(), 0.6f);
@@ -81,7 +87,7 @@ TEST(Parameters, ChangeOfColliderHasOnlyTheNumbersThatAreSet) {
   EXPECT_EQ(all.friction(), 0);
 
   change.version = CS_COLLIDER_CHANGE_VERSION + 1;
-  EXPECT_EQ(cs_change_collider(joined.client.get(), "box", &change), 0);
+  EXPECT_EQ(cs_set_collider(joined.client.get(), "box", &change), 0);
 }
 
 TEST(Parameters, FollowTheDescriptionAndLaterChanges) {
@@ -91,8 +97,8 @@ TEST(Parameters, FollowTheDescriptionAndLaterChanges) {
   EXPECT_EQ(environment.gravity[1], -9.81f);  // default, because the definition gives none
   EXPECT_EQ(environment.wind[0], 3);
   EXPECT_EQ(environment.air_density, 1.2f);
-  cs_cloth_parameters cloth;
-  ASSERT_EQ(cs_get_cloth_parameters(joined.client.get(), 0, &cloth), 1);
+  cs_cloth_settings cloth;
+  ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &cloth), 1);
   EXPECT_EQ(cloth.structural[0], 100);
   EXPECT_EQ(cloth.damping, 0.25f);
 
@@ -107,7 +113,7 @@ TEST(Parameters, FollowTheDescriptionAndLaterChanges) {
   EXPECT_EQ(environment.wind[0], 0);
   EXPECT_EQ(environment.wind[2], -1);
   EXPECT_EQ(environment.air_density, 1.2f);
-  cs_get_cloth_parameters(joined.client.get(), 0, &cloth);
+  cs_get_cloth_settings(joined.client.get(), 0, &cloth);
   EXPECT_EQ(cloth.structural[0], 50);
   EXPECT_EQ(cloth.damping, 0.25f);
 }
@@ -177,9 +183,9 @@ TEST(Parameters, IncludeGustsAndMaterials) {
 TEST(Parameters, AreAbsentBeforeTheDescription) {
   ClientUnderTest client;
   cs_environment environment;
-  cs_cloth_parameters cloth;
+  cs_cloth_settings cloth;
   EXPECT_EQ(cs_get_environment(client.get(), &environment), 0);
-  EXPECT_EQ(cs_get_cloth_parameters(client.get(), 0, &cloth), 0);
+  EXPECT_EQ(cs_get_cloth_settings(client.get(), 0, &cloth), 0);
   EXPECT_EQ(cs_vertex_count(client.get()), 0u);
 }
 
@@ -199,7 +205,6 @@ TEST(ClothSettings, ShowCurrentValuesAndChangeOnlyGivenOnes) {
   client.outgoing();
 
   cs_cloth_settings now{};
-  now.version = CS_CLOTH_SETTINGS_VERSION;
   ASSERT_EQ(cs_get_cloth_settings(client.get(), 0, &now), 1);
   EXPECT_EQ(now.structural[0], 100);
   EXPECT_EQ(now.friction, 0.5f);
@@ -221,7 +226,7 @@ TEST(ClothSettings, ShowCurrentValuesAndChangeOnlyGivenOnes) {
   cs_keep_cloth_settings(&change);
   change.structural[0] = 50;
   change.lift = 0.125f;
-  ASSERT_EQ(cs_change_cloth(client.get(), "", &change), 1);
+  ASSERT_EQ(cs_set_cloth(client.get(), "", &change), 1);
   const v1::ClothChange springs = sent();
   EXPECT_EQ(springs.name(), "curtain");
   EXPECT_EQ(springs.structural().stiffness(), 50);
@@ -232,7 +237,7 @@ TEST(ClothSettings, ShowCurrentValuesAndChangeOnlyGivenOnes) {
 
   cs_keep_cloth_settings(&change);
   change.iterations = 30;
-  cs_change_cloth(client.get(), "curtain", &change);
+  cs_set_cloth(client.get(), "curtain", &change);
   const v1::Solver solver = sent().solver();
   EXPECT_EQ(solver.acad().activation(), 0.25f);
   EXPECT_EQ(solver.acad().mode(), v1::ACAD_MODE_PAPER);  // does not change
@@ -240,9 +245,9 @@ TEST(ClothSettings, ShowCurrentValuesAndChangeOnlyGivenOnes) {
   EXPECT_EQ(solver.acad().constraint().tolerance(), 0.5f);
   EXPECT_FALSE(solver.acad().constraint().has_compliance());
 
-  EXPECT_EQ(cs_change_cloth(client.get(), "rug", &change), 0);
+  EXPECT_EQ(cs_set_cloth(client.get(), "rug", &change), 0);
   change.version = 99;
-  EXPECT_EQ(cs_change_cloth(client.get(), "", &change), 0);
+  EXPECT_EQ(cs_set_cloth(client.get(), "", &change), 0);
   EXPECT_THAT(client.outgoing(), SizeIs(0));
 }
 
@@ -260,7 +265,6 @@ TEST(ClothSettings, IncludeBendingSelfCollisionTethersAndPath) {
   client.receiveAll(chunksOf(description.SerializeAsString(), 1 << 18, 1));
   client.outgoing();
   cs_cloth_settings now{};
-  now.version = CS_CLOTH_SETTINGS_VERSION;
   ASSERT_EQ(cs_get_cloth_settings(client.get(), 0, &now), 1);
   EXPECT_EQ(now.dihedral_bending, 0.5f);
   EXPECT_EQ(now.ball_radius, 0.25f);
@@ -274,7 +278,7 @@ TEST(ClothSettings, IncludeBendingSelfCollisionTethersAndPath) {
   change.ball_friction = 0.5f;
   change.tether_slack = 0.0625f;
   change.iterations = 30;
-  ASSERT_EQ(cs_change_cloth(client.get(), "", &change), 1);
+  ASSERT_EQ(cs_set_cloth(client.get(), "", &change), 1);
   const auto messages = client.outgoing();
   ASSERT_THAT(messages, SizeIs(1));
   const v1::ClothChange& sent = messages[0].parameter_change().cloths(0);
@@ -307,7 +311,6 @@ TEST(ClothSettings, IncludeIterationsAndToleranceOfImplicitEuler) {
   client.receiveAll(chunksOf(description.SerializeAsString(), 1 << 18, 1));
   client.outgoing();
   cs_cloth_settings now{};
-  now.version = CS_CLOTH_SETTINGS_VERSION;
   ASSERT_EQ(cs_get_cloth_settings(client.get(), 0, &now), 1);
   EXPECT_EQ(now.solver, static_cast<std::uint32_t>(CS_SOLVER_IMPLICIT_EULER));
   EXPECT_EQ(now.iterations, 9u);
@@ -315,7 +318,7 @@ TEST(ClothSettings, IncludeIterationsAndToleranceOfImplicitEuler) {
   cs_cloth_settings change;
   cs_keep_cloth_settings(&change);
   change.iterations = 30;
-  ASSERT_EQ(cs_change_cloth(client.get(), "", &change), 1);
+  ASSERT_EQ(cs_set_cloth(client.get(), "", &change), 1);
   const auto messages = client.outgoing();
   ASSERT_THAT(messages, SizeIs(1));
   const v1::ImplicitEulerSolver& sent = messages[0].parameter_change().cloths(0).solver().implicit_euler();
@@ -357,7 +360,6 @@ TEST(ClothSettings, OmitSettingsThatTheSolverDoesNotHave) {
     JoinedClient joined;
     joined.client.receive(message.SerializeAsString());
     cs_cloth_settings now{};
-    now.version = CS_CLOTH_SETTINGS_VERSION;
     ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &now), 1);
     EXPECT_EQ(now.solver, static_cast<std::uint32_t>(row.kind));
     EXPECT_EQ(now.iterations != 0, row.iterations);
@@ -377,7 +379,7 @@ TEST(ClothSettings, CarryEveryNumberOfTheTable) {
     cs_cloth_settings change;
     cs_keep_cloth_settings(&change);
     settingOf(change, parameter.number) = 0.125f;
-    ASSERT_EQ(cs_change_cloth(joined.client.get(), "", &change), 1);
+    ASSERT_EQ(cs_set_cloth(joined.client.get(), "", &change), 1);
     v1::ServerMessage changed;
     *changed.mutable_parameter_changed()->mutable_change() = joined.sent().parameter_change();
 
@@ -390,7 +392,6 @@ TEST(ClothSettings, CarryEveryNumberOfTheTable) {
     EXPECT_EQ(holder->GetReflection()->GetFloat(*holder, field(parameter.field.inChange)), 0.125f);
 
     cs_cloth_settings now{};
-    now.version = CS_CLOTH_SETTINGS_VERSION;
     ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &now), 1);
     const float before = settingOf(now, parameter.number);
     const bool isKept = parameter.group != nullptr && !parameter.group->isReplaced;
@@ -422,7 +423,6 @@ TEST(ClothSettings, KeepSettingsOfPreviousSolvers) {
   receive(unknown, 3);
   EXPECT_EQ(cs_parameters_participant(joined.client.get()), 3u);
   cs_cloth_settings now{};
-  now.version = CS_CLOTH_SETTINGS_VERSION;
   ASSERT_EQ(cs_get_cloth_settings(joined.client.get(), 0, &now), 1);
   EXPECT_EQ(now.solver, 9u);
   receive(massSpring, 3);
@@ -430,12 +430,12 @@ TEST(ClothSettings, KeepSettingsOfPreviousSolvers) {
   cs_cloth_settings change;
   cs_keep_cloth_settings(&change);
   change.solver = CS_SOLVER_CONSTRAINT;
-  cs_change_cloth(joined.client.get(), "", &change);
+  cs_set_cloth(joined.client.get(), "", &change);
   const v1::Solver back = joined.sent().parameter_change().cloths(0).solver();
   EXPECT_EQ(back.constraint().iterations(), 9u);
   EXPECT_EQ(back.constraint().compliance(), 0.5f);
   change.solver = 9;
-  cs_change_cloth(joined.client.get(), "", &change);
+  cs_set_cloth(joined.client.get(), "", &change);
   EXPECT_EQ(joined.sent().parameter_change().cloths(0).solver().SerializeAsString(),
             unknown.SerializeAsString());
 }
@@ -445,7 +445,6 @@ TEST(Reports, AreAvailableWithTheirTick) {
   ClientUnderTest client;
   client.join(server);
   cs_cloth_report report{};
-  report.version = CS_CLOTH_REPORT_VERSION;
   client.receive(server.frame(1, codec::PacketKind::key));
   EXPECT_EQ(cs_get_cloth_report(client.get(), 0, &report), 0);
   v1::Frame frame = server.frameMessage(5, codec::PacketKind::predicted);
@@ -554,8 +553,10 @@ TEST(Scenes, AreListedInsideTheStream) {
   message.mutable_list_scenes()->add_scenes()->set_name("flag");
   EXPECT_EQ(joined.client.receive(message.SerializeAsString()), static_cast<std::uint32_t>(CS_EVENT_SCENES));
   ASSERT_EQ(cs_scene_count(joined.client.get()), 2u);
-  EXPECT_STREQ(cs_scene(joined.client.get(), 1), "flag");
-  EXPECT_STREQ(cs_scene(joined.client.get(), 2), "");
+  cs_scene_summary scene;
+  ASSERT_EQ(cs_get_scene(joined.client.get(), 1, &scene), 1);
+  EXPECT_STREQ(scene.name, "flag");
+  EXPECT_EQ(cs_get_scene(joined.client.get(), 2, &scene), 0);
 }
 
 }  // namespace

@@ -96,6 +96,8 @@ TEST(Pick, RefusesNumbersThatAreNotFiniteAndLeavesTheResult) {
   EXPECT_EQ(cs_cast_ray(shown.client.get(), nan, good, 10, &point), 0);
   EXPECT_EQ(cs_cast_ray(shown.client.get(), good, nan, 10, &point), 0);
   EXPECT_EQ(cs_cast_ray(shown.client.get(), good, none, 10, &point), 0);
+  point.version = CS_CLOTH_POINT_VERSION + 1;
+  EXPECT_EQ(cs_nearest_point(shown.client.get(), good, 10, &point), 0);
   EXPECT_EQ(point.triangle, 77u);
   const ClientUnderTest joining;
   EXPECT_EQ(cs_nearest_point(joining.get(), good, 10, &point), 0);
@@ -107,11 +109,12 @@ TEST(Grabs, NameThePlaceThatWasSeen) {
   client.outgoing();
   cs_grab grab{};
   grab.id = 3;
-  grab.has_place = 1;
+  cs_cloth_point point;
+  grab.place = &point;
   cs_cloth flag;
   ASSERT_EQ(cs_get_cloth(client.get(), 1, &flag), 1);
   const Vector target = shown.at(flag.first_index / 3 + 20, 0.25f, 0.5f);
-  ASSERT_EQ(cs_nearest_point(client.get(), &target.x, 1, &grab.place), 1);
+  ASSERT_EQ(cs_nearest_point(client.get(), &target.x, 1, &point), 1);
   const auto sent = [&] {
     cs_set_grabs(client.get(), &grab, 1, 5);
     return client.outgoing().at(0).collider_poses().grabs(0);
@@ -122,7 +125,7 @@ TEST(Grabs, NameThePlaceThatWasSeen) {
   EXPECT_NEAR(place.second(), 0.25, 1e-4);
   EXPECT_NEAR(place.third(), 0.5, 1e-4);
   EXPECT_EQ(place.seen_tick(), 31u);
-  grab.place.triangle = shown.corners / 3;  // not a triangle of the scene
+  point.triangle = shown.corners / 3;  // not a triangle of the scene
   EXPECT_FALSE(sent().has_place());
 }
 

@@ -71,7 +71,6 @@ class Viewer {
   cs_played play(std::uint64_t nowUs) { return play(nowUs, nowUs); }
   cs_played play(std::uint64_t nowUs, std::uint64_t displayUs) {
     cs_played played{};
-    played.version = CS_PLAYED_VERSION;
     EXPECT_EQ(cs_play_out(client.get(), nowUs, displayUs, &played), 1);
     return played;
   }
@@ -98,7 +97,6 @@ class Viewer {
   }
   cs_stage_statistics stages() const {
     cs_stage_statistics stages{};
-    stages.version = CS_STAGE_STATISTICS_VERSION;
     EXPECT_EQ(cs_get_stage_statistics(client.get(), &stages), 1);
     return stages;
   }

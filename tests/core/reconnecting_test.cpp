@@ -78,8 +78,8 @@ class Reconnecting : public ::testing::Test {
     return all;
   }
   void setCollider(float x) {
-    const float sphere[] = {x, 0, 0, 0.1f};
-    cs_set_colliders(client.get(), sphere, 1, now);
+    const cs_own_collider sphere = sphereAt(x, 0, 0, 0.1f);
+    cs_set_colliders(client.get(), &sphere, 1, now);
     cs_grab grab{};
     grab.id = 5;
     cs_set_grabs(client.get(), &grab, 1, now);
@@ -91,8 +91,10 @@ class Reconnecting : public ::testing::Test {
 };
 
 TEST_F(Reconnecting, SendsNameAndRequestedRole) {
-  const std::unique_ptr<cs_client, decltype(&cs_destroy)> named(
-      cs_create_as("flag", "test", "Ada", CS_ROLE_VIEWER), &cs_destroy);
+  cs_client_options options = optionsFor("flag");
+  options.display_name = "Ada";
+  options.role = CS_ROLE_VIEWER;
+  const std::unique_ptr<cs_client, decltype(&cs_destroy)> named(cs_create(&options), &cs_destroy);
   std::size_t bytes = 0;
   const std::uint8_t* message = cs_next_outgoing(named.get(), &bytes);
   v1::ClientMessage hello;
@@ -108,7 +110,8 @@ TEST_F(Reconnecting, TracksParticipants) {
   EXPECT_THAT(names(), ElementsAre("Ben", "Ada"));
   EXPECT_EQ(cs_get_role(client.get()), static_cast<std::uint32_t>(CS_ROLE_OWNER));
   cs_presence received;
-  EXPECT_EQ(cs_get_presence(client.get(), &received), 0);
+  cs_participant who;
+  EXPECT_EQ(cs_get_presence(client.get(), &received, &who), 0);
   constexpr auto kBoth = static_cast<std::uint32_t>(CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE);
   EXPECT_EQ(client.receive(presence(v1::PRESENCE_KIND_JOINED, 50)), kBoth);
   EXPECT_THAT(names(), ElementsAre("Ben", "Ada", "Cy"));
@@ -119,11 +122,12 @@ TEST_F(Reconnecting, TracksParticipants) {
   EXPECT_EQ(cs_get_participant(client.get(), 3, &participant), 0);
   client.receive(presence(v1::PRESENCE_KIND_LEFT, 50, v1::ROLE_PARTICIPANT, v1::LEAVE_REASON_REMOVED, 42));
   EXPECT_THAT(names(), ElementsAre("Ben", "Ada"));
-  ASSERT_EQ(cs_get_presence(client.get(), &received), 1);
+  ASSERT_EQ(cs_get_presence(client.get(), &received, &who), 1);
   EXPECT_EQ(received.kind, static_cast<std::uint32_t>(CS_PRESENCE_LEFT));
   EXPECT_EQ(received.reason, static_cast<std::uint32_t>(CS_LEAVE_REMOVED));
   EXPECT_EQ(received.by, 42u);
-  EXPECT_STREQ(received.participant.name, "Cy");
+  EXPECT_EQ(cs_get_presence(client.get(), &received, nullptr), 1);
+  EXPECT_STREQ(who.name, "Cy");
 }
 
 TEST_F(Reconnecting, SendsRoleChangesAndRemovals) {

@@ -80,19 +80,26 @@ export function readRecording(path) {
   return { before, frames };
 }
 
+const { core: described } = JSON.parse(readFileSync(new URL("../../clients/interface/interface.json", import.meta.url), "utf8"));
+const kStatistics = described.structs.cs_statistics.fields;
+const kScratchBytes = 256;
+
 export class Core {
   constructor(modulePath) {
     this.exports = new WebAssembly.Instance(new WebAssembly.Module(readFileSync(modulePath))).exports;
     this.exports._initialize();
-    this.scratch = this.exports.malloc(256);
+    this.scratch = this.exports.malloc(kScratchBytes);
+  }
+
+  // Prepares the scratch memory for a struct of this version: zeros after the version.
+  prepared(version) {
+    new Uint8Array(this.exports.memory.buffer, this.scratch, kScratchBytes).fill(0);
+    new DataView(this.exports.memory.buffer, this.scratch).setUint32(0, version, true);
+    return this.scratch;
   }
 
   client() {
-    const empty = this.exports.malloc(1);
-    new Uint8Array(this.exports.memory.buffer, empty, 1)[0] = 0;
-    const client = this.exports.cs_create(empty, empty);
-    this.exports.free(empty);
-    return client;
+    return this.exports.cs_create(this.prepared(described.constants.CS_CLIENT_OPTIONS_VERSION));
   }
 
   // Returns a set of CS_EVENT bits. Outgoing messages are ignored.
@@ -108,10 +115,10 @@ export class Core {
 
   // Number of decoded frames whose hash matches the encoder's.
   goodFrames(client) {
-    this.exports.cs_get_statistics(client, 0n, this.scratch);
+    this.exports.cs_get_statistics(client, 0n, this.prepared(described.constants.CS_STATISTICS_VERSION));
     const view = new DataView(this.exports.memory.buffer, this.scratch);
-    const [frames, mismatches] = [8, 48].map((offset) => Number(view.getBigUint64(offset, true)));
-    return frames - mismatches;
+    const read = (name) => Number(view.getBigUint64(kStatistics.find((field) => field.name === name).offset.wasm32, true));
+    return read("frames") - read("hash_mismatches");
   }
 
   floats(pointer, client) {

@@ -267,12 +267,11 @@ TEST_F(Redirect, StaysAtTheFirstServerIfItHasTheSceneAgain) {
 }
 
 TEST_F(Redirect, MirrorFollowsToo) {
-  const std::unique_ptr<cs_client, decltype(&cs_destroy)> mirror(
-      cs_create_mirror("curtain", "test", "", CS_ROLE_UNSPECIFIED), &cs_destroy);
+  const cs_client_options options = optionsFor("curtain");
+  const std::unique_ptr<cs_client, decltype(&cs_destroy)> mirror(cs_create_mirror(&options), &cs_destroy);
   cs_follow_redirects(mirror.get(), 1);
   const std::string message = ScriptedServer::error(v1::ERROR_CODE_NOT_FOUND, "elsewhere", true, "b.example");
   cs_decoded nothing{};
-  nothing.version = CS_DECODED_VERSION;
   EXPECT_EQ(cs_receive_decoded(mirror.get(), reinterpret_cast<const std::uint8_t*>(message.data()),
                                message.size(), &nothing, now),
             0u);

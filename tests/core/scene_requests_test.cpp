@@ -15,7 +15,6 @@ constexpr std::uint32_t kAnswer = CS_EVENT_ANSWER;
 
 cs_answer answerOf(const ClientUnderTest& client) {
   cs_answer answer{};
-  answer.version = CS_ANSWER_VERSION;
   EXPECT_EQ(cs_get_answer(client.get(), &answer), 1);
   return answer;
 }
@@ -120,7 +119,6 @@ TEST(SceneRequests, AnswerHasIdKindAndContent) {
   JoinedClient joined;
   cs_client* client = joined.client.get();
   cs_answer none{};
-  none.version = CS_ANSWER_VERSION;
   EXPECT_EQ(cs_get_answer(client, &none), 0);
 
   const std::uint64_t stops = cs_stop_recording(client, "");
@@ -400,8 +398,8 @@ TEST(CreateScene, LostConnectionEndsUploadAndRequests) {
 TEST(CreateScene, PiecesWaitForOtherMessages) {
   JoinedClient joined;
   create(joined.client, sceneOf(100'000), "large");
-  const float sphere[]{0, 1, 0, 0.1f};
-  cs_set_colliders(joined.client.get(), sphere, 1, 1000 * kMs);
+  const cs_own_collider sphere = sphereAt(0, 1, 0, 0.1f);
+  cs_set_colliders(joined.client.get(), &sphere, 1, 1000 * kMs);
   const std::vector<v1::ClientMessage> sent = joined.client.outgoing();
   ASSERT_GE(sent.size(), 2u);
   EXPECT_TRUE(sent[0].has_collider_poses());

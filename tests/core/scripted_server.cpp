@@ -188,6 +188,25 @@ std::string ScriptedServer::error(v1::ErrorCode code, const std::string& text, b
   return serialised(message);
 }
 
+cs_client_options optionsFor(const char* scene) {
+  return {.role = CS_ROLE_UNSPECIFIED, .scene = scene, .client_name = "test", .display_name = ""};
+}
+
+cs_own_collider sphereAt(float x, float y, float z, float radius) {
+  return {.shape = CS_SHAPE_SPHERE,
+          .position = {x, y, z},
+          .orientation = {},
+          .radius = radius,
+          .length = 0,
+          .size = {},
+          .top_radius = 0};
+}
+
+ClientUnderTest::ClientUnderTest(const char* scene) : client_(nullptr, &cs_destroy) {
+  const cs_client_options options = optionsFor(scene);
+  client_.reset(cs_create(&options));
+}
+
 std::uint32_t ClientUnderTest::receive(const std::string& message, std::uint64_t nowUs) {
   const auto exact = std::make_unique<std::uint8_t[]>(message.size());
   std::memcpy(exact.get(), message.data(), message.size());

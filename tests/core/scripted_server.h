@@ -69,10 +69,14 @@ class ScriptedServer {
 std::vector<std::string> chunksOf(const std::string& content, std::size_t pieceBytes,
                                   std::uint64_t contentId);
 
+// Options of a client named "test".
+cs_client_options optionsFor(const char* scene);
+cs_own_collider sphereAt(float x, float y, float z, float radius);
+
 // Client under test.
 class ClientUnderTest {
  public:
-  explicit ClientUnderTest(const char* scene = "curtain") : client_(cs_create(scene, "test"), &cs_destroy) {}
+  explicit ClientUnderTest(const char* scene = "curtain");
 
   cs_client* get() const { return client_.get(); }
   // Copies the bytes to a buffer of exactly their size, so that a sanitizer detects a read past the end.

@@ -18,6 +18,15 @@ for (const name of [...declared, "memory", "_initialize", "malloc", "free"]) ass
 const core = new WebAssembly.Instance(module).exports;
 core._initialize();
 
+// Offsets of members of a struct of core.h.
+function offsetsOf(struct) {
+  return Object.fromEntries(described.structs[struct].fields.map(({ name, offset }) => [name, offset.wasm32]));
+}
+const kOptions = offsetsOf("cs_client_options");
+const kPlayOut = offsetsOf("cs_play_out_options");
+const kCollider = offsetsOf("cs_collider");
+const kStatistics = offsetsOf("cs_statistics");
+
 const bytes = (pointer, count) => new Uint8Array(core.memory.buffer, pointer, count);
 const word = (pointer) => new DataView(core.memory.buffer).getUint32(pointer, true);
 
@@ -42,6 +51,8 @@ function fnv1a(data, hash = kBasis) {
 const hex64 = (value) => BigInt.asUintN(64, value).toString(16).padStart(16, "0");
 
 const scratch = core.malloc(256);
+// Prepares the scratch memory for a struct of this version.
+const setVersion = (version) => new DataView(core.memory.buffer, scratch).setUint32(0, version, true);
 
 function outgoingHash(client) {
   let hash = kBasis;
@@ -59,14 +70,17 @@ function floatsHash(pointer, vertices) {
 // Hashes positions and orientations.
 function playedCollidersHash(client) {
   let hash = kBasis;
-  for (let index = 0; core.cs_get_played_collider(client, index, scratch) !== 0; ++index) hash = fnv1a(bytes(scratch + 8, 28), hash);
+  setVersion(described.constants.CS_COLLIDER_VERSION);
+  for (let index = 0; core.cs_get_played_collider(client, index, scratch) !== 0; ++index)
+    hash = fnv1a(bytes(scratch + kCollider.position, 28), hash);
   return hash;
 }
 
 function observe(client, events) {
+  setVersion(described.constants.CS_STATISTICS_VERSION);
   core.cs_get_statistics(client, 0n, scratch);
   const view = new DataView(core.memory.buffer, scratch);
-  const [tick, decodeErrors, hashMismatches] = [0, 32, 48].map((offset) => view.getBigUint64(offset, true));
+  const [tick, decodeErrors, hashMismatches] = ["tick", "decode_errors", "hash_mismatches"].map((name) => view.getBigUint64(kStatistics[name], true));
   const vertices = core.cs_vertex_count(client);
   const colliders = hex64(playedCollidersHash(client));
   core.cs_triangles(client, scratch);
@@ -90,10 +104,15 @@ function observe(client, events) {
 
 function replay(session) {
   const names = [copyIn(Buffer.from("curtain\0")), copyIn(Buffer.from("test\0"))];
-  const client = core.cs_create(...names);
+  bytes(scratch, 256).fill(0);
+  setVersion(described.constants.CS_CLIENT_OPTIONS_VERSION);
+  const view = new DataView(core.memory.buffer, scratch);
+  view.setUint32(kOptions.scene, names[0], true);
+  view.setUint32(kOptions.client_name, names[1], true);
+  const client = core.cs_create(scratch);
   names.forEach(core.free);
   core.cs_default_play_out(scratch);
-  new DataView(core.memory.buffer, scratch).setFloat64(8, playOutDelayMs, true); // delay_ms
+  new DataView(core.memory.buffer, scratch).setFloat64(kPlayOut.delay_ms, playOutDelayMs, true);
   assert.equal(core.cs_set_play_out(client, scratch), 1);
   const observations = session.messages.map((message, index) => {
     const nowUs = BigInt(index * stepUs);

@@ -135,8 +135,14 @@ TEST_F(ImpairedLink, RemovesCollidersOfVanishedClient) {
   const auto watcher = join(address_);
   {
     auto doomed = joinThroughLink();
-    const float sphere[] = {0.4f, 1.7f, 0.3f, 0.1f};
-    doomed->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, NativeClient::nowUs()); });
+    const cs_own_collider sphere{.shape = CS_SHAPE_SPHERE,
+                                 .position = {0.4f, 1.7f, 0.3f},
+                                 .orientation = {},
+                                 .radius = 0.1f,
+                                 .length = 0,
+                                 .size = {},
+                                 .top_radius = 0};
+    doomed->visit([&](cs_client* core) { cs_set_colliders(core, &sphere, 1, NativeClient::nowUs()); });
     const auto seesCollider = [&] {
       bool there = false;
       watcher->visit([&](cs_client* core) {

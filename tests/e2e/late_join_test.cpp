@@ -52,7 +52,7 @@ struct Seen {
     const std::lock_guard lock(mutex);
     if ((events & CS_EVENT_PRESENCE) != 0) {
       cs_presence presence;
-      cs_get_presence(client, &presence);
+      cs_get_presence(client, &presence, nullptr);
       if (presence.kind == CS_PRESENCE_JOINED) {
         ++joins;
         tickAtJoin = newestTick;

@@ -274,8 +274,14 @@ TEST_F(LostDevice, SceneThatFailsTwiceIsGivenUpAndStartsFromTheBeginning) {
   ASSERT_TRUE(eventually([&] { return watcher.restarts >= 1; }));
   // Input that waits for the next tick must not reach the new scene.
   client->visit([](cs_client* core) {
-    const float sphere[]{0, 1, 0, 0.1f};
-    cs_set_colliders(core, sphere, 1, NativeClient::nowUs());
+    const cs_own_collider sphere{.shape = CS_SHAPE_SPHERE,
+                                 .position = {0, 1, 0},
+                                 .orientation = {},
+                                 .radius = 0.1f,
+                                 .length = 0,
+                                 .size = {},
+                                 .top_radius = 0};
+    cs_set_colliders(core, &sphere, 1, NativeClient::nowUs());
   });
   fail("memory");
   ASSERT_TRUE(controlScene(address_, "small", false, false));

@@ -50,7 +50,7 @@ struct Seen {
     }
     if ((events & CS_EVENT_PRESENCE) != 0) {
       cs_presence presence;
-      cs_get_presence(client, &presence);
+      cs_get_presence(client, &presence, nullptr);
       if (presence.kind == CS_PRESENCE_RETURNED) tickAtReturnOfOther = tick.load();
       lastPresence = presence.kind;
     }
@@ -124,8 +124,14 @@ TEST_P(ReconnectOver, ResumesAsTheSameParticipant) {
   Seen seen, watcherSeen;
   const auto watcher = join(served(), "Ben", watcherSeen);
   const auto client = join(through(link), "Ada", seen);
-  const float sphere[] = {0.4f, 1.7f, 0.3f, 0.1f};
-  client->visit([&](cs_client* core) { cs_set_colliders(core, sphere, 1, NativeClient::nowUs()); });
+  const cs_own_collider sphere{.shape = CS_SHAPE_SPHERE,
+                               .position = {0.4f, 1.7f, 0.3f},
+                               .orientation = {},
+                               .radius = 0.1f,
+                               .length = 0,
+                               .size = {},
+                               .top_radius = 0};
+  client->visit([&](cs_client* core) { cs_set_colliders(core, &sphere, 1, NativeClient::nowUs()); });
   const auto watcherSeesCollider = [&] {
     bool sees = false;
     watcher->visit([&](cs_client* core) {

@@ -10,7 +10,7 @@ cp -r "$source/examples/testing/." "$folder"
 cd "$folder"
 
 export CLOTHSTREAM_SERVER=$prefix/bin/clothstream-server
-library=$(find "$prefix" -name 'libclothstream.so.?')
+library=$(find "$prefix" -name 'libclothstream.so.?.?')
 case $example in
   gtest)
     "$cmake" -S gtest -B build -DCMAKE_PREFIX_PATH="$prefix" >/dev/null

@@ -15,11 +15,13 @@ static unsafe class Follow
         public uint version, role, quality;
         public IntPtr scene, clientName, displayName;
         public uint joinTimeoutMs, reconnectForMs;
+        public IntPtr token, caFile, fingerprint, log, logContext;
     }
 
     [StructLayout(LayoutKind.Sequential)]
     struct Statistics
     {
+        public uint version;
         public ulong tick, frames, keyFrames, dropped, decodeErrors, bytes, hashMismatches;
         public double framesPerSecond, kbitPerSecond, bitsPerVertex, roundTripMs, clockOffsetUs, decodeMs;
     }
@@ -27,13 +29,26 @@ static unsafe class Follow
     [StructLayout(LayoutKind.Sequential)]
     struct Collider
     {
+        public uint version, shape;
         public IntPtr name;
-        public uint shape;
+        public ulong participantId;
         public fixed float position[3];
         public fixed float orientation[4];
         public float radius, length;
         public fixed float size[3];
-        public ulong participantId;
+        public float topRadius;
+        public int yields;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    struct OwnCollider
+    {
+        public uint version, shape;
+        public fixed float position[3];
+        public fixed float orientation[4];
+        public float radius, length;
+        public fixed float size[3];
+        public float topRadius;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -62,10 +77,10 @@ static unsafe class Follow
     [DllImport(Library)] static extern IntPtr clothstream_error_text();
     [DllImport(Library)] static extern uint cs_vertex_count(IntPtr client);
     [DllImport(Library)] static extern float* cs_positions(IntPtr client);
-    [DllImport(Library)] static extern void cs_get_statistics(IntPtr client, ulong nowUs, out Statistics statistics);
-    [DllImport(Library)] static extern int cs_get_collider(IntPtr client, uint index, out Collider collider);
+    [DllImport(Library)] static extern int cs_get_statistics(IntPtr client, ulong nowUs, ref Statistics statistics);
+    [DllImport(Library)] static extern int cs_get_collider(IntPtr client, uint index, ref Collider collider);
     [DllImport(Library)] static extern ulong cs_participant_id(IntPtr client);
-    [DllImport(Library)] static extern void cs_set_colliders(IntPtr client, float[] spheres, uint count, ulong nowUs);
+    [DllImport(Library)] static extern int cs_set_colliders(IntPtr client, ref OwnCollider colliders, uint count, ulong nowUs);
     [DllImport(Library)] static extern void cs_default_play_out(out PlayOutOptions options);
     [DllImport(Library)] static extern int cs_set_play_out(IntPtr client, ref PlayOutOptions options);
     [DllImport(Library)] static extern int cs_play_out(IntPtr client, ulong nowUs, ulong displayUs, ref Played played);
@@ -89,12 +104,13 @@ static unsafe class Follow
         return hash;
     }
 
-    static bool HasOwn(IntPtr client, float[] sphere)
+    static bool HasOwn(IntPtr client, OwnCollider sphere)
     {
-        Collider collider;
-        for (uint i = 0; cs_get_collider(client, i, out collider) != 0; ++i)
-            if (collider.participantId == cs_participant_id(client) && collider.position[0] == sphere[0] &&
-                collider.position[1] == sphere[1] && collider.position[2] == sphere[2] && collider.radius == sphere[3])
+        var collider = new Collider { version = 1 };
+        for (uint i = 0; cs_get_collider(client, i, ref collider) != 0; ++i)
+            if (collider.participantId == cs_participant_id(client) && collider.position[0] == sphere.position[0] &&
+                collider.position[1] == sphere.position[1] && collider.position[2] == sphere.position[2] &&
+                collider.radius == sphere.radius)
                 return true;
         return false;
     }
@@ -104,7 +120,7 @@ static unsafe class Follow
         Options options;
         IntPtr stream;
         clothstream_default_options(out options);
-        Check(options.version == 1 && options.joinTimeoutMs == 10000, "options are as the header says");
+        Check(options.version == 2 && options.joinTimeoutMs == 10000, "options are as the header says");
         options.joinTimeoutMs = 3000;
         Check(clothstream_open(Utf8("127.0.0.1:1"), ref options, out stream) == Result.Unreachable, "an unreachable server is reported");
         Check(stream == IntPtr.Zero, "there is no stream");
@@ -119,19 +135,22 @@ static unsafe class Follow
         Marshal.FreeHGlobal(scene);
         Marshal.FreeHGlobal(name);
 
-        var sphere = new float[] { 0.75f, 3.75f, -0.25f, 0.5f };
+        var sphere = new OwnCollider { version = 1, radius = 0.5f };
+        sphere.position[0] = 0.75f;
+        sphere.position[1] = 3.75f;
+        sphere.position[2] = -0.25f;
         PlayOutOptions playOut;
         cs_default_play_out(out playOut);
         Check(playOut.version == 1 && double.IsNaN(playOut.delayMs), "the delay adapts");
         IntPtr client = clothstream_acquire(stream);
         Check(cs_set_play_out(client, ref playOut) == 1, "play-out is on");
-        cs_set_colliders(client, sphere, 1, clothstream_now_us());
+        Check(cs_set_colliders(client, ref sphere, 1, clothstream_now_us()) == 1, "the sphere is sent");
         clothstream_release(stream);
 
         ulong tick = 0, hash = 0, shownUs = 0, endUs = clothstream_now_us() + 60000000;
         int frames = 0, moved = 0;
         bool seen = false;
-        Statistics statistics = new Statistics();
+        var statistics = new Statistics { version = 1 };
         while (frames < 60 || !seen)
         {
             uint events;
@@ -139,7 +158,7 @@ static unsafe class Follow
             Check(clothstream_wait(stream, 1000, out events) == Result.Ok, "the stream goes on");
             client = clothstream_acquire(stream);
             uint count = 3 * cs_vertex_count(client);
-            cs_get_statistics(client, clothstream_now_us(), out statistics);
+            Check(cs_get_statistics(client, clothstream_now_us(), ref statistics) == 1, "there are statistics");
             if (statistics.frames > 0 && statistics.tick != tick)
             {
                 float* positions = cs_positions(client);

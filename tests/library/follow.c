@@ -58,7 +58,7 @@ static int refuses_an_unknown_scene(const char* address) {
 
 static int is_described(cs_client* client) {
   uint32_t indices = 0;
-  cs_cloth cloth;
+  cs_cloth cloth = {.version = CS_CLOTH_VERSION};
   CHECK(cs_get_state(client) == CS_STATE_JOINED);
   CHECK(strcmp(cs_scene_name(client), "small") == 0);
   CHECK(cs_get_role(client) == CS_ROLE_PARTICIPANT);
@@ -83,13 +83,14 @@ static int has_unit_vectors(const float* normals, uint32_t count) {
 
 typedef int get_collider(const cs_client* client, uint32_t index, cs_collider* out);
 
-static int has_own_collider(const cs_client* client, const float* sphere, get_collider* get) {
-  cs_collider collider;
+static int has_own_collider(const cs_client* client, const cs_own_collider* sphere, get_collider* get) {
+  cs_collider collider = {.version = CS_COLLIDER_VERSION};
   for (uint32_t i = 0; get(client, i, &collider) != 0; ++i) {
     if (collider.participant_id != cs_participant_id(client)) continue;
-    if (collider.shape != CS_SHAPE_SPHERE || fabsf(collider.radius - sphere[3]) > 1e-6f) continue;
-    if (fabsf(collider.position[0] - sphere[0]) < 1e-4f && fabsf(collider.position[1] - sphere[1]) < 1e-4f &&
-        fabsf(collider.position[2] - sphere[2]) < 1e-4f)
+    if (collider.shape != CS_SHAPE_SPHERE || fabsf(collider.radius - sphere->radius) > 1e-6f) continue;
+    if (fabsf(collider.position[0] - sphere->position[0]) < 1e-4f &&
+        fabsf(collider.position[1] - sphere->position[1]) < 1e-4f &&
+        fabsf(collider.position[2] - sphere->position[2]) < 1e-4f)
       return 1;
   }
   return 0;
@@ -101,10 +102,10 @@ struct seen {
   int own_collider, played_collider, gravity, grab, others;
 };
 
-static int look(cs_client* client, const float* sphere, struct seen* seen) {
+static int look(cs_client* client, const cs_own_collider* sphere, struct seen* seen) {
   const uint32_t count = cs_vertex_count(client);
   const float* positions = cs_positions(client);
-  cs_statistics statistics;
+  cs_statistics statistics = {.version = CS_STATISTICS_VERSION};
   cs_get_statistics(client, clothstream_now_us(), &statistics);
   if (statistics.frames == 0) return 0;
   if (statistics.tick != seen->tick) {
@@ -117,8 +118,7 @@ static int look(cs_client* client, const float* sphere, struct seen* seen) {
     seen->tick = statistics.tick;
     ++seen->frames;
   }
-  cs_played played;
-  played.version = CS_PLAYED_VERSION;
+  cs_played played = {.version = CS_PLAYED_VERSION};
   const uint64_t now_us = clothstream_now_us();
   CHECK(cs_play_out(client, now_us, now_us, &played) == 1);
   CHECK(played.server_time_us >= seen->shown_us);
@@ -141,14 +141,15 @@ static int follows(const char* address) {
   options.role = CS_ROLE_PARTICIPANT;
   CHECK(clothstream_open(address, &options, &stream) == CLOTHSTREAM_OK);
 
-  const float sphere[4] = {0.25f, 3.5f, -0.75f, 0.0625f};
+  const cs_own_collider sphere = {
+      .version = CS_OWN_COLLIDER_VERSION, .position = {0.25f, 3.5f, -0.75f}, .radius = 0.0625f};
   const float gravity[3] = {0, -8, 0};
   cs_play_out_options play_out;
   cs_default_play_out(&play_out);
   cs_client* client = clothstream_acquire(stream);
   CHECK(is_described(client) == 0);
   CHECK(cs_set_play_out(client, &play_out) == 1);
-  cs_set_colliders(client, sphere, 1, clothstream_now_us());
+  CHECK(cs_set_colliders(client, &sphere, 1, clothstream_now_us()) == 1);
   cs_set_environment(client, gravity, NULL, NULL);
   clothstream_release(stream);
 
@@ -161,36 +162,33 @@ static int follows(const char* address) {
     CHECK(clothstream_now_us() < end_us);
     CHECK(clothstream_wait(stream, 1000, &events) == CLOTHSTREAM_OK);
     client = clothstream_acquire(stream);
-    CHECK(look(client, sphere, &seen) == 0);
+    CHECK(look(client, &sphere, &seen) == 0);
     if (seen.frames == 10) { /* grabs a hanging corner */
-      cs_grab grab;
-      memset(&grab, 0, sizeof grab);
-      grab.id = 5;
+      cs_grab grab = {.version = CS_GRAB_VERSION, .id = 5};
       memcpy(grab.position, cs_positions(client) + 3 * (17 * 13 - 1), sizeof grab.position);
       grab.radius = grab.reach = grab.max_force = grab.slip_distance = NAN;
-      cs_set_grabs(client, &grab, 1, clothstream_now_us());
+      CHECK(cs_set_grabs(client, &grab, 1, clothstream_now_us()) == 1);
     }
     if (events & CS_EVENT_GRABS) {
-      cs_grab_event event;
+      cs_grab_event event = {.version = CS_GRAB_EVENT_VERSION};
       for (uint32_t i = 0; cs_get_grab_event(client, i, &event) != 0; ++i)
         seen.grab |= event.participant_id == cs_participant_id(client) && event.grab_id == 5 &&
                      event.kind == CS_GRAB_TAKEN && event.vertices > 0;
     }
     if (events & CS_EVENT_PARAMETERS) {
-      cs_environment environment;
+      cs_environment environment = {.version = CS_ENVIRONMENT_VERSION};
       CHECK(cs_get_environment(client, &environment) == 1);
       seen.gravity |= environment.gravity[1] == gravity[1];
     }
-    cs_participant participant;
+    cs_participant participant = {.version = CS_PARTICIPANT_VERSION};
     for (uint32_t i = 0; cs_get_participant(client, i, &participant) != 0; ++i)
       seen.others |= strcmp(participant.name, "watcher") == 0;
     clothstream_release(stream);
   }
   client = clothstream_acquire(stream);
-  cs_statistics statistics;
-  cs_stage_statistics stages;
-  stages.version = CS_STAGE_STATISTICS_VERSION;
-  cs_get_statistics(client, clothstream_now_us(), &statistics);
+  cs_statistics statistics = {.version = CS_STATISTICS_VERSION};
+  cs_stage_statistics stages = {.version = CS_STAGE_STATISTICS_VERSION};
+  CHECK(cs_get_statistics(client, clothstream_now_us(), &statistics) == 1);
   CHECK(cs_get_stage_statistics(client, &stages) == 1);
   clothstream_release(stream);
   CHECK(seen.moved > 50);
@@ -240,7 +238,7 @@ static int has_what_it_wants(const char* address) {
     CHECK(clothstream_now_us() < end_us);
     CHECK(clothstream_wait(stream, 1000, &events) == CLOTHSTREAM_OK);
     cs_client* client = clothstream_acquire(stream);
-    cs_statistics statistics;
+    cs_statistics statistics = {.version = CS_STATISTICS_VERSION};
     cs_get_statistics(client, clothstream_now_us(), &statistics);
     CHECK(cs_get_quality(client, &quality) == 1);
     clothstream_release(stream);

@@ -38,7 +38,7 @@ static int follow(clothstream_stream* stream, unsigned long frames) {
     if (clothstream_wait(stream, 1000, &events) != CLOTHSTREAM_OK) return fail("the stream ended");
     if (clothstream_now_us() > end_us) return fail("too few frames in two minutes");
     cs_client* client = clothstream_acquire(stream);
-    cs_statistics statistics;
+    cs_statistics statistics = {.version = CS_STATISTICS_VERSION};
     cs_get_statistics(client, clothstream_now_us(), &statistics);
     if (statistics.frames > 0 && statistics.tick != tick) {
       tick = statistics.tick;

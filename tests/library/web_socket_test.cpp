@@ -58,9 +58,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 using Clock = std::chrono::steady_clock;
 
-// clothstream_default_options() as programs for the first version of the options know it.
-extern "C" void firstDefaultOptions(clothstream_options* out) __asm__("clothstream_default_options");
-
 clothstream_options defaults() {
   clothstream_options options;
   clothstream_default_options(&options);
@@ -162,9 +159,15 @@ TEST_F(WebSocketLibrary, SendsInputAndLeavesAtOnce) {
   {
     Stream guest(address());
     ASSERT_EQ(guest.result(), CLOTHSTREAM_OK) << guest.error();
-    const float sphere[4] = {0.2f, 1, 0.3f, 0.1f};
+    const cs_own_collider sphere{.shape = CS_SHAPE_SPHERE,
+                                 .position = {0.2f, 1, 0.3f},
+                                 .orientation = {},
+                                 .radius = 0.1f,
+                                 .length = 0,
+                                 .size = {},
+                                 .top_radius = 0};
     guest.visit([&](cs_client* client) {
-      cs_set_colliders(client, sphere, 1, clothstream_now_us());
+      cs_set_colliders(client, &sphere, 1, clothstream_now_us());
       return 0;
     });
     EXPECT_TRUE(eventually([&] { return colliderOf(guest.id()); }));
@@ -172,7 +175,7 @@ TEST_F(WebSocketLibrary, SendsInputAndLeavesAtOnce) {
   EXPECT_TRUE(eventually([&] { return watcher.participants() == 1; }));
   const auto presence = watcher.visit([](cs_client* client) {
     cs_presence newest{};
-    cs_get_presence(client, &newest);
+    cs_get_presence(client, &newest, nullptr);
     return newest;
   });
   EXPECT_EQ(presence.kind, static_cast<std::uint32_t>(CS_PRESENCE_LEFT));
@@ -189,7 +192,7 @@ TEST_F(WebSocketLibrary, ResumesAfterItsConnectionWasCut) {
   const auto kind = [&] {
     return watcher.visit([](cs_client* client) {
       cs_presence presence{};
-      cs_get_presence(client, &presence);
+      cs_get_presence(client, &presence, nullptr);
       return presence.kind;
     });
   };
@@ -228,20 +231,6 @@ TEST_F(WebSocketLibrary, ReportsAServerThatStops) {
 
 // ---- Options
 
-TEST_F(WebSocketLibrary, AcceptsOptionsOfTheFirstVersion) {
-  clothstream_options options;
-  std::memset(&options, 0xab, sizeof options);
-  firstDefaultOptions(&options);
-  EXPECT_EQ(options.version, 1u);
-  // Programs of that time have no room for the later fields: they are neither written nor read.
-  const auto* const later = reinterpret_cast<const unsigned char*>(&options.token);
-  for (std::size_t i = 0; i < sizeof options - offsetof(clothstream_options, token); ++i)
-    EXPECT_EQ(later[i], 0xab);
-  options.join_timeout_ms = 60'000;
-  const Stream stream(address(), options);
-  EXPECT_EQ(stream.result(), CLOTHSTREAM_OK) << stream.error();
-}
-
 TEST(WebSocketLibraryOptions, AreRefusedWithTheReason) {
   const auto refused = [](const std::string& address,
                           const std::function<void(clothstream_options&)>& change) {
@@ -252,7 +241,7 @@ TEST(WebSocketLibraryOptions, AreRefusedWithTheReason) {
     return stream.error();
   };
   const std::string fingerprint(64, 'a');
-  EXPECT_THAT(refused("host", [](auto& options) { options.version = 3; }), HasSubstr("versions 1 to 2"));
+  EXPECT_THAT(refused("host", [](auto& options) { options.version = 3; }), HasSubstr("accepts 2"));
   EXPECT_THAT(refused("host", [](auto& options) { options.token = nullptr; }), HasSubstr("NULL"));
   EXPECT_THAT(refused("host", [&](auto& options) { options.fingerprint = fingerprint.c_str(); }),
               HasSubstr("need TLS: use https://host:8080"));
@@ -279,7 +268,7 @@ TEST(WebSocketLibraryOptions, SendNoSecretsToOtherMachinesWithoutTls) {
   EXPECT_THAT(stream.error(), AllOf(HasSubstr("others in the network"), HasSubstr("https://192.0.2.2:8080")));
   EXPECT_THAT(stream.error(), testing::Not(HasSubstr("secret")));
   char token[CLOTHSTREAM_TOKEN_BYTES];
-  EXPECT_EQ(clothstream_pair("192.0.2.2", "123456", token, sizeof token), CLOTHSTREAM_INVALID);
+  EXPECT_EQ(clothstream_pair("192.0.2.2", "123456", nullptr, token, sizeof token), CLOTHSTREAM_INVALID);
   EXPECT_THAT(clothstream_error_text(), HasSubstr("pairing code"));
 }
 
@@ -369,7 +358,8 @@ class WebSocketLibraryIdentity : public WebSocketLibrary {
   // Pairs with this code. Returns the token, or the error after its result.
   std::string pair(const std::string& code) {
     char token[CLOTHSTREAM_TOKEN_BYTES];
-    const clothstream_result result = clothstream_pair(address().c_str(), code.c_str(), token, sizeof token);
+    const clothstream_result result =
+        clothstream_pair(address().c_str(), code.c_str(), nullptr, token, sizeof token);
     return result == CLOTHSTREAM_OK ? token : std::to_string(result) + " " + clothstream_error_text();
   }
 
@@ -403,12 +393,12 @@ TEST_F(WebSocketLibraryIdentity, PairsWithoutJoiningAndJoinsWithTheToken) {
 
 TEST_F(WebSocketLibrary, SaysThatAServerNeedsNoPairing) {
   char token[CLOTHSTREAM_TOKEN_BYTES];
-  EXPECT_EQ(clothstream_pair(address().c_str(), "123456", token, sizeof token), CLOTHSTREAM_REFUSED);
+  EXPECT_EQ(clothstream_pair(address().c_str(), "123456", nullptr, token, sizeof token), CLOTHSTREAM_REFUSED);
   EXPECT_THAT(clothstream_error_text(), HasSubstr("pairing"));
   EXPECT_STREQ(token, "");
   clothstream_options options = defaults();
   options.version = 9;
-  EXPECT_EQ(clothstream_pair_with_options(address().c_str(), "123456", &options, token, sizeof token),
+  EXPECT_EQ(clothstream_pair(address().c_str(), "123456", &options, token, sizeof token),
             CLOTHSTREAM_INVALID);
 }
 

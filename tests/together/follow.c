@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
     cs_client* const client = clothstream_acquire(stream);
     const size_t count = (size_t)3 * cs_vertex_count(client);
     if ((events & CS_EVENT_FRAME) != 0) {
-      cs_statistics statistics;
+      cs_statistics statistics = {.version = CS_STATISTICS_VERSION};
       cs_get_statistics(client, clothstream_now_us(), &statistics);
       printf("frame %" PRIu64 " %016" PRIx64 "\n", statistics.tick, fnv1a(cs_positions(client), count));
       fflush(stdout);

@@ -153,7 +153,7 @@ static unsafe class Program
         int count = 0;
         lock (client.Gate)
         {
-            Collider collider;
+            var collider = new Collider { version = Native.CS_COLLIDER_VERSION };
             for (uint i = 0; Native.cs_get_collider(client.Handle, i, &collider) != 0; ++i)
                 if (collider.participantId != 0 && collider.participantId != client.ParticipantId) ++count;
         }
@@ -181,11 +181,11 @@ static unsafe class Program
         uint id = pinch.Grab.id;
         pinch.Update(client, 0.6f, corner, orientation);
         Check(pinch.IsHolding && pinch.Grab.id == id, "a weaker pinch holds on");
-        client.SetGrabs(new[] { pinch.Grab }, 1, Client.NowUs);
+        client.SetGrabs(new[] { pinch.Grab }, new[] { pinch.Place }, 1, Client.NowUs);
         AwaitGrab(other, id, GrabEventKind.Taken);
         pinch.Update(client, 0.3f, corner, orientation);
         Check(!pinch.IsHolding, "an open hand lets go");
-        client.SetGrabs(new Grab[0], 0, Client.NowUs);
+        client.SetGrabs(new Grab[0], null, 0, Client.NowUs);
         AwaitGrab(other, id, GrabEventKind.Released);
     }
 

@@ -116,7 +116,6 @@ void PlayOut::add(const DisplayableFrame& frame, std::uint64_t displayableUs) {
 
 cs_played PlayOut::play(std::uint64_t nowUs, std::uint64_t displayUs) {
   cs_played played{};
-  played.version = CS_PLAYED_VERSION;
   shown_ = {};
   hasNormals_ = hasColliders_ = false;
   if (count_ == 0) return played;

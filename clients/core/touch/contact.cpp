@@ -20,11 +20,18 @@ constexpr float kSweepMargin = 1.03f;
 
 constexpr float kBucket = 5e-4f, kLeast = 1e-5f;  // m
 
-// Part of the segment at which it is nearest to a point.
+// Part of the segment whose ball is nearest to a point.
 float nearestPart(const Capsule& capsule, const Vector& point) {
   const Vector along = capsule.to - capsule.from;
   const float squared = dot(along, along);
-  return squared > 0 ? std::clamp(dot(along, point - capsule.from) / squared, 0.0f, 1.0f) : 0;
+  const float level = squared > 0 ? dot(along, point - capsule.from) / squared : 0;
+  if (capsule.growth == 0) return std::clamp(level, 0.0f, 1.0f);
+  // The larger end ball contains the other.
+  const float slopeSquared = squared - capsule.growth * capsule.growth;
+  if (!(slopeSquared > 0)) return capsule.growth > 0 ? 1 : 0;
+  const float distance = length(point - capsule.from - level * along);
+  const float tilt = capsule.growth / std::sqrt(slopeSquared);
+  return std::clamp(level + tilt * distance / std::sqrt(squared), 0.0f, 1.0f);
 }
 
 // Any vector of length 1 across another one.
@@ -157,7 +164,7 @@ void Contact::box() {
     const Capsule& start = answered_[i];
     const Capsule& end = now_[i];
     if (!end.present()) continue;
-    const float reach = end.radius + farthestReach_ + kLeast;
+    const float reach = end.largestRadius() + farthestReach_ + kLeast;
     Box box;
     box.add(end, reach);
     ends_.add(i, box);
@@ -175,7 +182,6 @@ Vector Contact::swept(std::uint32_t vertex, const Vector& played) const {
   sweeps_.around(played, [&](std::size_t i) {
     const Capsule& start = answered_[i];
     const Capsule& end = now_[i];
-    const float kept = keptDistance(end.radius, vertex);
     // The point of the segment that comes nearest to the vertex on its way.
     float part = nearestPart(start, played), gone = 0;
     Vector from, way;
@@ -186,10 +192,11 @@ Vector Contact::swept(std::uint32_t vertex, const Vector& played) const {
       if (!(gone > kShortestWay && gone < kLongestWay) || round == 2) break;
       const float progress = std::clamp(dot(played - from, way) / (gone * gone), 0.0f, 1.0f);
       part = nearestPart({start.from + progress * (end.from - start.from),
-                          start.to + progress * (end.to - start.to), end.radius},
+                          start.to + progress * (end.to - start.to), end.radius, end.growth},
                          played);
     }
     if (!(gone > kShortestWay && gone < kLongestWay)) return;
+    const float kept = keptDistance(end.radiusAt(part), vertex);
     const Vector direction = (1 / gone) * way;
     const float along = dot(played - from, direction);
     const float beside = length(withoutPart(played - from, direction));
@@ -259,9 +266,10 @@ Vector Contact::keptOutside(std::uint32_t vertex, const Vector& shown) const {
     isMoved = false;
     ends_.around(at, [&](std::size_t i) {
       const Capsule& capsule = now_[i];
-      const Vector nearest = capsule.at(nearestPart(capsule, at));
+      const float part = nearestPart(capsule, at);
+      const Vector nearest = capsule.at(part);
       const Vector away = at - nearest;
-      const float kept = keptDistance(capsule.radius, vertex), distance = length(away);
+      const float kept = keptDistance(capsule.radiusAt(part), vertex), distance = length(away);
       if (!(distance < kept)) return;
       const Vector side =
           sizes_[vertex] > 0 ? (1 / sizes_[vertex]) * corrections_[vertex] : sideOf(capsule, away, distance);

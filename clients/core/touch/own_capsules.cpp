@@ -23,16 +23,17 @@ Vector yAxis(const float* q) {
 
 // Not present for a shape that is neither a sphere nor a capsule.
 Capsule capsuleOf(std::uint32_t shape, const float* position, const float* orientation, float radius,
-                  float length) {
+                  float topRadius, float length) {
   if (shape != CS_SHAPE_SPHERE && shape != CS_SHAPE_CAPSULE) return {};
   const Vector half = (shape == CS_SHAPE_CAPSULE ? length / 2 : 0) * yAxis(orientation);
   const Vector centre = vectorAt(position, 0);
-  return {centre - half, centre + half, radius};
+  const bool isTapered = shape == CS_SHAPE_CAPSULE && topRadius > 0;
+  return {centre - half, centre + half, radius, isTapered ? topRadius - radius : 0};
 }
 
 bool haveOneSize(const Capsule& a, const Capsule& b) {
   constexpr float kTolerance = 0.005f;  // m; joints of a tracked hand do not keep their distances exactly
-  return std::abs(a.radius - b.radius) <= kTolerance &&
+  return std::abs(a.radius - b.radius) <= kTolerance && std::abs(a.growth - b.growth) <= kTolerance &&
          std::abs(length(a.to - a.from) - length(b.to - b.from)) <= kTolerance;
 }
 
@@ -52,7 +53,7 @@ void addBones(const std::vector<float>& joints, Capsule* to) {
 OwnCapsules ownCapsules(const Poses& poses) {
   OwnCapsules capsules;
   const auto capsuleOfOwn = [](const cs_own_collider& own) {
-    return capsuleOf(own.shape, own.position, own.orientation, own.radius, own.length);
+    return capsuleOf(own.shape, own.position, own.orientation, own.radius, own.top_radius, own.length);
   };
   std::transform(poses.colliders.begin(), poses.colliders.end(), capsules.begin(), capsuleOfOwn);
   addBones(poses.leftHand, &capsules[CS_MAX_COLLIDERS]);
@@ -68,7 +69,7 @@ std::optional<OwnCapsules> capsulesOf(std::span<const Collider> frame, std::uint
   for (const Collider& collider : frame) {
     if (collider.participantId != participantId) continue;
     const Capsule capsule = capsuleOf(collider.shape, collider.position.data(), collider.orientation.data(),
-                                      collider.radius, collider.length);
+                                      collider.radius, collider.topRadius, collider.length);
     if (!capsule.present()) continue;
     while (next < kOwnCapsules && !sent[next].present()) ++next;
     if (next == kOwnCapsules || !haveOneSize(capsule, sent[next])) return std::nullopt;
@@ -102,7 +103,7 @@ OwnCapsules CapsuleHistory::at(std::uint64_t timeUs) const {
   for (std::size_t i = 0; i < kOwnCapsules; ++i) {
     const Capsule &a = from.capsules[i], &b = after->capsules[i];
     if (a.present() && b.present())
-      capsules[i] = {a.from + part * (b.from - a.from), a.to + part * (b.to - a.to), b.radius};
+      capsules[i] = {a.from + part * (b.from - a.from), a.to + part * (b.to - a.to), b.radius, b.growth};
   }
   return capsules;
 }

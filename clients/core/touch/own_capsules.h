@@ -15,12 +15,16 @@
 
 namespace clothstream::client {
 
-// Points within `radius` of a segment, m. The radius is negative if the participant has no such capsule.
+// Convex hull of the balls about the ends of a segment, m. The radius is negative if the participant has no
+// such capsule.
 struct Capsule {
   Vector from, to;
-  float radius = -1;
+  float radius = -1;  // at `from`
+  float growth = 0;   // of the radius, up to `to`
 
   bool present() const { return radius >= 0; }
+  float largestRadius() const { return growth > 0 ? radius + growth : radius; }
+  float radiusAt(float part) const { return radius + part * growth; }
   // Point of the segment; 0 is `from` and 1 is `to`.
   Vector at(float part) const { return from + part * (to - from); }
 };

@@ -72,9 +72,9 @@ void addGrab(Writer& poses, const OwnGrab& own) {
   Writer place(message, F::kPlace.number);
   place.add_uint32(P::kCloth.number, own.place->cloth);
   place.add_uint32(P::kTriangle.number, own.place->triangle);
-  place.add_float(P::kSecond.number, grab.place.second);
-  place.add_float(P::kThird.number, grab.place.third);
-  place.add_uint64(P::kSeenTick.number, grab.place.tick);
+  place.add_float(P::kSecond.number, own.point.second);
+  place.add_float(P::kThird.number, own.point.third);
+  place.add_uint64(P::kSeenTick.number, own.point.tick);
 }
 
 void addHand(Writer& poses, std::uint32_t side, const std::vector<float>& joints) {
@@ -99,6 +99,7 @@ void addShape(Writer& parent, const cs_own_collider& collider) {
     Writer capsule(parent, field::ParticipantCollider::kCapsule.number);
     capsule.add_float(field::Capsule::kRadius.number, collider.radius);
     capsule.add_float(field::Capsule::kLength.number, collider.length);
+    if (collider.top_radius != 0) capsule.add_float(field::Capsule::kTopRadius.number, collider.top_radius);
   } else if (collider.shape == CS_SHAPE_BOX) {
     Writer box(parent, field::ParticipantCollider::kBox.number);
     addVec3(box, field::Box::kSize, toVec3(collider.size));

@@ -52,7 +52,8 @@ struct ColliderJoints {
 };
 
 struct OwnGrab {
-  cs_grab given{};
+  cs_grab given{};                     // its pointer to a place is null
+  cs_cloth_point point{};              // copy of the place
   std::optional<ClothTriangle> place;  // absent: the grab has no place
 };
 

@@ -15,16 +15,17 @@ EVENT_FRAME = 1
 
 
 class Statistics(c.Structure):
-    _fields_ = [("tick", c.c_uint64), ("rest", c.c_byte * 128)]
+    _fields_ = [("version", c.c_uint32), ("tick", c.c_uint64), ("rest", c.c_byte * 128)]
 
 
 class Playback(c.Structure):
-    _fields_ = [(name, c.c_double) for name in ("length", "position", "speed")]
+    _fields_ = [("version", c.c_uint32)]
+    _fields_ += [(name, c.c_double) for name in ("length", "position", "speed")]
     _fields_ += [("loop", c.c_int32), ("paused", c.c_int32)]
 
 
 def load_library() -> c.CDLL:
-    library = c.CDLL(os.environ.get("LIBCLOTHSTREAM", "libclothstream.so.0"))
+    library = c.CDLL(os.environ.get("LIBCLOTHSTREAM", "libclothstream.so.0.3"))
     library.clothstream_now_us.restype = library.cs_reconstruction_hash.restype = c.c_uint64
     library.clothstream_acquire.restype = c.c_void_p
     library.clothstream_error_text.restype = c.c_char_p
@@ -42,7 +43,7 @@ def describe_frames(address: str) -> str:
     stream, events = c.c_void_p(), c.c_uint32()
     if library.clothstream_open(address.encode(), None, c.byref(stream)) != 0:
         raise ConnectionError(library.clothstream_error_text().decode())
-    statistics, playback = Statistics(), Playback()
+    statistics, playback = Statistics(version=1), Playback(version=1)
     lines = []
     while not playback.paused and library.clothstream_wait(stream, 10_000, c.byref(events)) == 0 and events.value:
         client = library.clothstream_acquire(stream)

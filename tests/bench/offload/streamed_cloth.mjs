@@ -19,7 +19,7 @@ function offsetsOf(struct) {
 const kOptions = offsetsOf("cs_play_out_options");
 const kPlayed = offsetsOf("cs_played");
 const kStatistics = offsetsOf("cs_statistics");
-const kPlayedVersion = core.constants.CS_PLAYED_VERSION;
+const { CS_CLIENT_OPTIONS_VERSION, CS_PLAYED_VERSION, CS_STATISTICS_VERSION } = core.constants;
 
 function varint(value) {
   const bytes = [];
@@ -39,9 +39,9 @@ export class StreamedCloth {
     this.of = of;
     this.frames = of.frames.map(of.bytes);
     this.scratch = module.malloc(256);
-    const name = copyIn(module, Uint8Array.of(0));
-    this.client = module.cs_create(name, name);
-    module.free(name);
+    new Uint8Array(module.memory.buffer, this.scratch, 256).fill(0);
+    this.view().setUint32(0, CS_CLIENT_OPTIONS_VERSION, true);
+    this.client = module.cs_create(this.scratch);
     this.send(kStartUs);
     of.before.map(of.bytes).forEach((message) => this.receive(message, kStartUs));
     this.send(kStartUs); // a ping among them
@@ -81,7 +81,7 @@ export class StreamedCloth {
     const nowUs = kStartUs + Math.round((index * 1e6) / this.of.rate) + kArrivalUs;
     this.receive(this.frames[index], nowUs);
     this.send(nowUs);
-    this.view().setUint32(kPlayed.version, kPlayedVersion, true);
+    this.view().setUint32(kPlayed.version, CS_PLAYED_VERSION, true);
     if (this.module.cs_play_out(this.client, BigInt(nowUs), BigInt(nowUs), this.scratch) !== 1)
       throw new Error("nothing is played");
     this.shown = this.view().getUint32(kPlayed.shown, true);
@@ -90,6 +90,7 @@ export class StreamedCloth {
   }
 
   statistics() {
+    this.view().setUint32(kStatistics.version, CS_STATISTICS_VERSION, true);
     this.module.cs_get_statistics(this.client, 0n, this.scratch);
     const view = this.view();
     return Object.fromEntries(

@@ -56,6 +56,13 @@ bool allFinite(const float* values, std::size_t count) {
   return true;
 }
 
+using Core = std::unique_ptr<cs_client, decltype(&cs_destroy)>;
+
+Core create(const char* scene, const char* name, std::uint32_t role) {
+  const cs_client_options options{.role = role, .scene = scene, .client_name = name, .display_name = name};
+  return {cs_create(&options), &cs_destroy};
+}
+
 class Program {
  public:
   explicit Program(const CoreInput& input) : input_(input) {}
@@ -132,7 +139,7 @@ class Program {
   void readAnswers();
 
   const CoreInput& input_;
-  const std::unique_ptr<cs_client, decltype(&cs_destroy)> client_{cs_create("curtain", "fuzz"), &cs_destroy};
+  const Core client_ = create("curtain", "fuzz", 0);
   std::uint64_t now_ = 0;  // us
   std::uint64_t content_ = 0;
 };
@@ -169,7 +176,6 @@ void Program::call(const CoreInput::Call& call) {
     }
     case 6: {
       cs_played played;
-      played.version = CS_PLAYED_VERSION;
       cs_play_out(client(), now_, now_ + index % 1'000'000, &played);
       const std::size_t count = 3 * std::size_t{cs_vertex_count(client())};
       require(allFinite(cs_played_positions(client()), count), "played positions are finite");
@@ -180,9 +186,11 @@ void Program::call(const CoreInput::Call& call) {
       return;
     }
     case 7: {
-      std::vector<float> spheres;
-      for (int i = 0; i < call.numbers_size(); ++i) spheres.push_back(call.numbers(i));
-      return cs_set_colliders(client(), spheres.data(), static_cast<std::uint32_t>(spheres.size() / 4), now_);
+      cs_own_collider collider{};
+      collider.version = index;
+      require(cs_set_colliders(client(), &collider, 1, now_) == (index == CS_OWN_COLLIDER_VERSION ? 1 : 0),
+              "the client refuses colliders of another version");
+      return;
     }
     case 8: {
       std::vector<cs_own_collider> shapes(index % (2 * CS_MAX_COLLIDERS));
@@ -193,8 +201,10 @@ void Program::call(const CoreInput::Call& call) {
         shape.radius = numbers.next();
         shape.length = numbers.next();
         numbers.write(shape.size);
+        shape.top_radius = numbers.next();
       }
-      return cs_set_shapes(client(), shapes.data(), static_cast<std::uint32_t>(shapes.size()), now_);
+      cs_set_colliders(client(), shapes.data(), static_cast<std::uint32_t>(shapes.size()), now_);
+      return;
     }
     case 9: {
       std::vector<float> joints(std::size_t{4} * CS_HAND_JOINTS);
@@ -206,7 +216,9 @@ void Program::call(const CoreInput::Call& call) {
     }
     case 10: {
       std::vector<cs_grab> grabs(index % (2 * CS_MAX_GRABS));
-      for (cs_grab& grab : grabs) {
+      std::vector<cs_cloth_point> places(grabs.size());
+      for (std::size_t i = 0; i < grabs.size(); ++i) {
+        cs_grab& grab = grabs[i];
         grab.id = index;
         numbers.write(grab.position);
         numbers.write(grab.orientation);
@@ -214,13 +226,14 @@ void Program::call(const CoreInput::Call& call) {
         grab.reach = numbers.next();
         grab.max_force = numbers.next();
         grab.slip_distance = numbers.next();
-        grab.has_place = index % 2;
+        grab.place = index % 2 == 1 ? &places[i] : nullptr;
         cs_set_local_contact(client(), static_cast<int>(index % 3));
         const auto point = numbers.array<3>(), direction = numbers.array<3>();
-        if (cs_nearest_point(client(), point.data(), grab.reach, &grab.place) == 0)
-          cs_cast_ray(client(), point.data(), direction.data(), grab.reach, &grab.place);
+        if (cs_nearest_point(client(), point.data(), grab.reach, &places[i]) == 0)
+          cs_cast_ray(client(), point.data(), direction.data(), grab.reach, &places[i]);
       }
-      return cs_set_grabs(client(), grabs.data(), static_cast<std::uint32_t>(grabs.size()), now_);
+      cs_set_grabs(client(), grabs.data(), static_cast<std::uint32_t>(grabs.size()), now_);
+      return;
     }
     case 11: {
       const auto position = numbers.array<3>();
@@ -240,10 +253,12 @@ void Program::call(const CoreInput::Call& call) {
       return cs_set_gust(client(), strength, numbers.next());
     }
     case 15: {
-      const auto structural = numbers.array<2>(), shear = numbers.array<2>(), bend = numbers.array<2>();
-      const float damping = numbers.next();
-      return cs_set_cloth(client(), text, structural.data(), index == 0 ? nullptr : shear.data(), bend.data(),
-                          &damping);
+      cs_cloth_settings settings;
+      cs_keep_cloth_settings(&settings);
+      numbers.write(settings.bend);
+      settings.damping = numbers.next();
+      cs_set_cloth(client(), text, &settings);
+      return;
     }
     case 16: {
       cs_cloth_settings settings;
@@ -254,15 +269,18 @@ void Program::call(const CoreInput::Call& call) {
       settings.tolerance = numbers.next();
       settings.compliance = numbers.next();
       settings.assembled = static_cast<int>(index % 3) - 1;
-      cs_change_cloth(client(), text, &settings);
+      cs_set_cloth(client(), text, &settings);
       return;
     }
     case 17:
       return cs_set_material(client(), text, cs_material(client(), index));
     case 18: {
-      const auto position = numbers.array<3>();
-      const float radius = numbers.next();
-      return cs_set_collider(client(), text, index == 0 ? nullptr : position.data(), &radius);
+      cs_collider_change change;
+      cs_keep_collider(&change);
+      if (index != 0) numbers.write(change.position);
+      change.radius = numbers.next();
+      cs_set_collider(client(), text, &change);
+      return;
     }
     case 19:
       return cs_set_role(client(), index, index / 4);
@@ -308,8 +326,7 @@ void Program::call(const CoreInput::Call& call) {
       return cs_set_clock(
           client(), index % 2 == 0 ? nullptr : +[] { return std::uint64_t{1}; });
     case 38: {
-      const std::unique_ptr<cs_client, decltype(&cs_destroy)> other(cs_create_as(text, text, text, index),
-                                                                    &cs_destroy);
+      const Core other = create(text, text, index);
       cs_connecting(other.get(), now_);
       require(cs_get_state(other.get()) == CS_STATE_JOINING, "a client that connects joins");
       return;
@@ -368,11 +385,9 @@ void Program::readGeometry() {
               "a part has existing triangles");
     }
     cs_cloth_settings settings;
-    settings.version = CS_CLOTH_SETTINGS_VERSION;
     cs_get_cloth_settings(client(), i, &settings);
     expectText(cs_cloth_material(client(), i));
     cs_cloth_report report;
-    report.version = CS_CLOTH_REPORT_VERSION;
     cs_get_cloth_report(client(), i, &report);
   }
   readColliders();
@@ -395,7 +410,6 @@ void Program::readLists() {
   for (const char* text : {cs_error_text(client()), cs_notice_text(client()), cs_server_name(client()),
                            cs_device_name(client()), cs_scene_name(client())})
     expectText(text);
-  for (std::uint32_t i = 0; i < cs_scene_count(client()); ++i) expectText(cs_scene(client(), i));
   for (std::uint32_t i = 0; i < cs_material_count(client()); ++i) expectText(cs_material(client(), i));
   cs_participant participant;
   for (std::uint32_t i = 0; cs_get_participant(client(), i, &participant) != 0; ++i) {
@@ -403,7 +417,7 @@ void Program::readLists() {
     expectText(participant.client_name);
   }
   cs_presence presence;
-  if (cs_get_presence(client(), &presence) != 0) expectText(presence.participant.name);
+  if (cs_get_presence(client(), &presence, &participant) != 0) expectText(participant.name);
   cs_grab_event grab;
   for (std::uint32_t i = 0; cs_get_grab_event(client(), i, &grab) != 0; ++i) continue;
   cs_contact_event contact;
@@ -414,7 +428,6 @@ void Program::readLists() {
   cs_statistics statistics;
   cs_get_statistics(client(), now_, &statistics);
   cs_stage_statistics stages;
-  stages.version = CS_STAGE_STATISTICS_VERSION;
   cs_get_stage_statistics(client(), &stages);
   cs_playback playback;
   cs_get_playback(client(), now_, &playback);
@@ -439,7 +452,6 @@ void Program::requestScene(std::uint32_t index, const char* text) {
 
 void Program::readAnswers() {
   cs_answer answer;
-  answer.version = CS_ANSWER_VERSION;
   if (cs_get_answer(client(), &answer) != 0) {
     require(answer.request_id != 0 && answer.request >= CS_REQUEST_CREATE_SCENE, "answers name a request");
     expectText(answer.error_text);
@@ -478,8 +490,6 @@ void Program::readNumbers() {
   require(cs_get_played_collider(client(), cs_played_collider_count(client()), &played) == 0,
           "there are no more colliders than their number");
   for (std::uint32_t i = 0; i < cs_cloth_count(client()); ++i) {
-    cs_cloth_parameters parameters;
-    cs_get_cloth_parameters(client(), i, &parameters);
     cs_submesh submesh;
     require(cs_get_submesh(client(), i, cs_submesh_count(client(), i), &submesh) == 0,
             "there are no more parts than their number");

@@ -228,7 +228,6 @@ void play(const std::string& bytes, const RecordingInput& input) {
 // Reads to the end through the C interface, as a client without a server does.
 void readToTheEnd(cs_recording* recording, std::size_t most) {
   cs_recorded message{};
-  message.version = CS_RECORDED_VERSION;
   // Every message and every chunk that cannot be read come once.
   for (std::size_t i = 0; i <= most; ++i) {
     const cs_recording_result result = cs_recording_next(recording, CS_RECORDED_ALL, &message);
@@ -239,7 +238,6 @@ void readToTheEnd(cs_recording* recording, std::size_t most) {
       continue;
     }
     cs_recorded_tick tick{};
-    tick.version = CS_RECORDED_TICK_VERSION;
     cs_recorded_collider collider{};
     if (cs_recording_get_tick(recording, &tick) == 1)
       require(cs_recording_get_collider(recording, tick.collider_count, &collider) == 0,

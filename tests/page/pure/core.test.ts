@@ -6,7 +6,7 @@ import { readFileSync } from "node:fs";
 import { afterEach, assert, beforeEach, test, vi } from "vitest";
 import { Client } from "../../../clients/web/client/src/client";
 import { Connection } from "../../../clients/web/client/src/connection";
-import { cs_cloth_point } from "../../../clients/web/client/src/layout";
+import { CS_CLOTH_POINT_VERSION, cs_cloth_point } from "../../../clients/web/client/src/layout";
 import type { FromWorker } from "../../../clients/web/client/src/thread_messages";
 import { ClientState, kMaxGrabs } from "../../../clients/web/client/src/types";
 import { CoreModule } from "../../../clients/web/client/src/wasm";
@@ -76,6 +76,7 @@ test("Hello names scene, program and person, and a token comes first", async () 
 test("more grabs than allowed are ignored, and bytes that are no message end the client with a reason", async () => {
   const client = new Client(await CoreModule.start(module), "whole", "", "test", kIdentity);
   const grab = { position: [0, 1, 0] as const, place: new Uint8Array(cs_cloth_point.sizeof) };
+  grab.place[cs_cloth_point.version] = CS_CLOTH_POINT_VERSION;
   client.input.setGrabs(Array.from({ length: kMaxGrabs + 5 }, (_, id) => ({ id: id + 1, ...grab })));
   assert.equal(client.state, ClientState.joining);
   client.receive(Uint8Array.of(255, 255, 255), 0n);

@@ -100,7 +100,7 @@ static unsafe class SceneProgram
         var found = new List<Collider>();
         lock (client.Gate)
         {
-            Collider collider;
+            var collider = new Collider { version = Native.CS_COLLIDER_VERSION };
             for (uint i = 0; Native.cs_get_collider(client.Handle, i, &collider) != 0; ++i)
                 if (collider.participantId == client.ParticipantId) found.Add(collider);
         }

@@ -4,9 +4,15 @@
 import ctypes as c
 
 CS_PROTOCOL_VERSION = 1
+CS_CLIENT_OPTIONS_VERSION = 1
 CS_LIMITS_VERSION = 1
+CS_SCENE_SUMMARY_VERSION = 1
 CS_ANSWER_VERSION = 1
 CS_MAX_SCENE_BYTES = 268435456
+CS_BAN_VERSION = 1
+CS_CLOTH_VERSION = 1
+CS_SUBMESH_VERSION = 1
+CS_COLLIDER_VERSION = 1
 CS_PLAY_OUT_OPTIONS_VERSION = 1
 CS_PLAYED_VERSION = 1
 CS_DECODED_VERSION = 1
@@ -15,8 +21,19 @@ CS_MAX_GRABS = 10
 CS_HAND_JOINTS = 26
 CS_HAND_BONES = 20
 CS_HEAD_ID = 2147483712
+CS_OWN_COLLIDER_VERSION = 1
+CS_CLOTH_POINT_VERSION = 1
+CS_GRAB_VERSION = 1
+CS_GRAB_EVENT_VERSION = 1
+CS_CONTACT_EVENT_VERSION = 1
+CS_ENVIRONMENT_VERSION = 1
 CS_CLOTH_SETTINGS_VERSION = 1
 CS_COLLIDER_CHANGE_VERSION = 1
+CS_PARTICIPANT_VERSION = 1
+CS_PRESENCE_VERSION = 1
+CS_PAIRING_CODE_VERSION = 1
+CS_PLAYBACK_VERSION = 1
+CS_STATISTICS_VERSION = 1
 CS_STAGE_STATISTICS_VERSION = 1
 CS_CLOTH_REPORT_VERSION = 1
 CS_STATE_JOINING = 0
@@ -93,6 +110,8 @@ CS_RECORDING_INFO_VERSION = 1
 CS_RECORDED_VERSION = 1
 CS_RECORDING_FAULTS_VERSION = 1
 CS_RECORDED_TICK_VERSION = 1
+CS_RECORDED_COLLIDER_VERSION = 1
+CS_RECORDED_GRAB_VERSION = 1
 CS_RECORDED_FRAME = 1
 CS_RECORDED_PARAMETERS = 2
 CS_RECORDED_EVENTS = 4
@@ -125,7 +144,19 @@ CLOTHSTREAM_LOG_WARNING = 2
 CLOTHSTREAM_LOG_ERROR = 3
 
 
+class cs_client_options(c.Structure):
+    VERSION = CS_CLIENT_OPTIONS_VERSION
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("role", c.c_uint32),
+        ("scene", c.c_char_p),
+        ("client_name", c.c_char_p),
+        ("display_name", c.c_char_p),
+    ]
+
+
 class cs_limits(c.Structure):
+    VERSION = CS_LIMITS_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("max_vertices", c.c_uint32),
@@ -137,7 +168,9 @@ class cs_limits(c.Structure):
 
 
 class cs_scene_summary(c.Structure):
+    VERSION = CS_SCENE_SUMMARY_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("name", c.c_char_p),
         ("description", c.c_char_p),
         ("vertex_count", c.c_uint32),
@@ -153,6 +186,7 @@ class cs_scene_summary(c.Structure):
 
 
 class cs_answer(c.Structure):
+    VERSION = CS_ANSWER_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("request", c.c_uint32),
@@ -166,7 +200,9 @@ class cs_answer(c.Structure):
 
 
 class cs_ban(c.Structure):
+    VERSION = CS_BAN_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("subject", c.c_char_p),
         ("display_name", c.c_char_p),
         ("tenant", c.c_char_p),
@@ -174,7 +210,9 @@ class cs_ban(c.Structure):
 
 
 class cs_cloth(c.Structure):
+    VERSION = CS_CLOTH_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("name", c.c_char_p),
         ("first_vertex", c.c_uint32),
         ("vertex_count", c.c_uint32),
@@ -186,7 +224,9 @@ class cs_cloth(c.Structure):
 
 
 class cs_submesh(c.Structure):
+    VERSION = CS_SUBMESH_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("name", c.c_char_p),
         ("first_index", c.c_uint32),
         ("index_count", c.c_uint32),
@@ -194,21 +234,24 @@ class cs_submesh(c.Structure):
 
 
 class cs_collider(c.Structure):
+    VERSION = CS_COLLIDER_VERSION
     _fields_ = [
-        ("name", c.c_char_p),
+        ("version", c.c_uint32),
         ("shape", c.c_uint32),
+        ("name", c.c_char_p),
+        ("participant_id", c.c_uint64),
         ("position", c.c_float * 3),
         ("orientation", c.c_float * 4),
         ("radius", c.c_float),
         ("length", c.c_float),
         ("size", c.c_float * 3),
-        ("yields", c.c_int32),
-        ("participant_id", c.c_uint64),
         ("top_radius", c.c_float),
+        ("yields", c.c_int32),
     ]
 
 
 class cs_play_out_options(c.Structure):
+    VERSION = CS_PLAY_OUT_OPTIONS_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("frames", c.c_uint32),
@@ -220,6 +263,7 @@ class cs_play_out_options(c.Structure):
 
 
 class cs_played(c.Structure):
+    VERSION = CS_PLAYED_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("shown", c.c_uint32),
@@ -230,6 +274,7 @@ class cs_played(c.Structure):
 
 
 class cs_decoded(c.Structure):
+    VERSION = CS_DECODED_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("decoding", c.c_uint32),
@@ -242,18 +287,23 @@ class cs_decoded(c.Structure):
 
 
 class cs_own_collider(c.Structure):
+    VERSION = CS_OWN_COLLIDER_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("shape", c.c_uint32),
         ("position", c.c_float * 3),
         ("orientation", c.c_float * 4),
         ("radius", c.c_float),
         ("length", c.c_float),
         ("size", c.c_float * 3),
+        ("top_radius", c.c_float),
     ]
 
 
 class cs_cloth_point(c.Structure):
+    VERSION = CS_CLOTH_POINT_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("triangle", c.c_uint32),
         ("second", c.c_float),
         ("third", c.c_float),
@@ -264,7 +314,9 @@ class cs_cloth_point(c.Structure):
 
 
 class cs_grab(c.Structure):
+    VERSION = CS_GRAB_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("id", c.c_uint32),
         ("position", c.c_float * 3),
         ("orientation", c.c_float * 4),
@@ -272,13 +324,14 @@ class cs_grab(c.Structure):
         ("reach", c.c_float),
         ("max_force", c.c_float),
         ("slip_distance", c.c_float),
-        ("has_place", c.c_uint32),
-        ("place", cs_cloth_point),
+        ("place", c.POINTER(cs_cloth_point)),
     ]
 
 
 class cs_grab_event(c.Structure):
+    VERSION = CS_GRAB_EVENT_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("participant_id", c.c_uint64),
         ("grab_id", c.c_uint32),
         ("kind", c.c_uint32),
@@ -289,7 +342,9 @@ class cs_grab_event(c.Structure):
 
 
 class cs_contact_event(c.Structure):
+    VERSION = CS_CONTACT_EVENT_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("kind", c.c_uint32),
         ("collider_id", c.c_uint32),
         ("participant_id", c.c_uint64),
@@ -301,7 +356,9 @@ class cs_contact_event(c.Structure):
 
 
 class cs_environment(c.Structure):
+    VERSION = CS_ENVIRONMENT_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("gravity", c.c_float * 3),
         ("wind", c.c_float * 3),
         ("air_density", c.c_float),
@@ -310,16 +367,8 @@ class cs_environment(c.Structure):
     ]
 
 
-class cs_cloth_parameters(c.Structure):
-    _fields_ = [
-        ("structural", c.c_float * 2),
-        ("shear", c.c_float * 2),
-        ("bend", c.c_float * 2),
-        ("damping", c.c_float),
-    ]
-
-
 class cs_cloth_settings(c.Structure):
+    VERSION = CS_CLOTH_SETTINGS_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("structural", c.c_float * 2),
@@ -345,6 +394,7 @@ class cs_cloth_settings(c.Structure):
 
 
 class cs_collider_change(c.Structure):
+    VERSION = CS_COLLIDER_CHANGE_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("position", c.c_float * 3),
@@ -357,7 +407,9 @@ class cs_collider_change(c.Structure):
 
 
 class cs_participant(c.Structure):
+    VERSION = CS_PARTICIPANT_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("id", c.c_uint64),
         ("name", c.c_char_p),
         ("client_name", c.c_char_p),
@@ -367,16 +419,19 @@ class cs_participant(c.Structure):
 
 
 class cs_presence(c.Structure):
+    VERSION = CS_PRESENCE_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("kind", c.c_uint32),
         ("reason", c.c_uint32),
         ("by", c.c_uint64),
-        ("participant", cs_participant),
     ]
 
 
 class cs_pairing_code(c.Structure):
+    VERSION = CS_PAIRING_CODE_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("code", c.c_char_p),
         ("role", c.c_uint32),
         ("valid_s", c.c_uint32),
@@ -384,7 +439,9 @@ class cs_pairing_code(c.Structure):
 
 
 class cs_playback(c.Structure):
+    VERSION = CS_PLAYBACK_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("length", c.c_double),
         ("position", c.c_double),
         ("speed", c.c_double),
@@ -394,7 +451,9 @@ class cs_playback(c.Structure):
 
 
 class cs_statistics(c.Structure):
+    VERSION = CS_STATISTICS_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("tick", c.c_uint64),
         ("frames", c.c_uint64),
         ("key_frames", c.c_uint64),
@@ -412,6 +471,7 @@ class cs_statistics(c.Structure):
 
 
 class cs_stage_statistics(c.Structure):
+    VERSION = CS_STAGE_STATISTICS_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("frames_waiting", c.c_uint32),
@@ -428,6 +488,7 @@ class cs_stage_statistics(c.Structure):
 
 
 class cs_cloth_report(c.Structure):
+    VERSION = CS_CLOTH_REPORT_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("active_constraints", c.c_uint32),
@@ -446,6 +507,7 @@ class cs_cloth_report(c.Structure):
 
 
 class cs_recording_source(c.Structure):
+    VERSION = CS_RECORDING_SOURCE_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("max_vertices", c.c_uint32),
@@ -456,6 +518,7 @@ class cs_recording_source(c.Structure):
 
 
 class cs_recording_info(c.Structure):
+    VERSION = CS_RECORDING_INFO_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("complete", c.c_int32),
@@ -468,6 +531,7 @@ class cs_recording_info(c.Structure):
 
 
 class cs_recorded(c.Structure):
+    VERSION = CS_RECORDED_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("kind", c.c_uint32),
@@ -481,6 +545,7 @@ class cs_recorded(c.Structure):
 
 
 class cs_recording_faults(c.Structure):
+    VERSION = CS_RECORDING_FAULTS_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("frames", c.c_uint64),
@@ -492,6 +557,7 @@ class cs_recording_faults(c.Structure):
 
 
 class cs_recorded_tick(c.Structure):
+    VERSION = CS_RECORDED_TICK_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("recovery", c.c_uint32),
@@ -517,7 +583,9 @@ class cs_recorded_pose(c.Structure):
 
 
 class cs_recorded_collider(c.Structure):
+    VERSION = CS_RECORDED_COLLIDER_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("participant_id", c.c_uint64),
         ("id", c.c_uint32),
         ("shape", c.c_uint32),
@@ -532,7 +600,9 @@ class cs_recorded_collider(c.Structure):
 
 
 class cs_recorded_grab(c.Structure):
+    VERSION = CS_RECORDED_GRAB_VERSION
     _fields_ = [
+        ("version", c.c_uint32),
         ("state", c.c_uint32),
         ("start", cs_recorded_pose),
         ("end", cs_recorded_pose),
@@ -544,6 +614,7 @@ class cs_recorded_grab(c.Structure):
 
 
 class clothstream_options(c.Structure):
+    VERSION = CLOTHSTREAM_OPTIONS_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("role", c.c_uint32),
@@ -562,6 +633,7 @@ class clothstream_options(c.Structure):
 
 
 class clothstream_allocator(c.Structure):
+    VERSION = CLOTHSTREAM_ALLOCATOR_VERSION
     _fields_ = [
         ("version", c.c_uint32),
         ("context", c.c_void_p),
@@ -572,8 +644,7 @@ class clothstream_allocator(c.Structure):
 
 # Name: type of the result, types of the arguments.
 FUNCTIONS = {
-    "cs_create": (c.c_void_p, [c.c_char_p, c.c_char_p]),
-    "cs_create_as": (c.c_void_p, [c.c_char_p, c.c_char_p, c.c_char_p, c.c_uint32]),
+    "cs_create": (c.c_void_p, [c.POINTER(cs_client_options)]),
     "cs_destroy": (None, [c.c_void_p]),
     "cs_want": (None, [c.c_void_p, c.c_uint32]),
     "cs_set_token": (None, [c.c_void_p, c.c_char_p]),
@@ -606,7 +677,6 @@ FUNCTIONS = {
     "cs_scene_name": (c.c_char_p, [c.c_void_p]),
     "cs_list_scenes": (None, [c.c_void_p]),
     "cs_scene_count": (c.c_uint32, [c.c_void_p]),
-    "cs_scene": (c.c_char_p, [c.c_void_p, c.c_uint32]),
     "cs_get_scene": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_scene_summary)]),
     "cs_get_answer": (c.c_int, [c.c_void_p, c.POINTER(cs_answer)]),
     "cs_create_scene": (c.c_uint64, [c.c_void_p, c.POINTER(c.c_uint8), c.c_size_t, c.c_char_p, c.c_uint32]),
@@ -650,15 +720,14 @@ FUNCTIONS = {
     "cs_played_normals": (c.POINTER(c.c_float), [c.c_void_p]),
     "cs_played_collider_count": (c.c_uint32, [c.c_void_p]),
     "cs_get_played_collider": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_collider)]),
-    "cs_create_mirror": (c.c_void_p, [c.c_char_p, c.c_char_p, c.c_char_p, c.c_uint32]),
+    "cs_create_mirror": (c.c_void_p, [c.POINTER(cs_client_options)]),
     "cs_receive_decoded": (c.c_uint32, [c.c_void_p, c.POINTER(c.c_uint8), c.c_size_t, c.POINTER(cs_decoded), c.c_uint64]),
-    "cs_set_colliders": (None, [c.c_void_p, c.POINTER(c.c_float), c.c_uint32, c.c_uint64]),
-    "cs_set_shapes": (None, [c.c_void_p, c.POINTER(cs_own_collider), c.c_uint32, c.c_uint64]),
+    "cs_set_colliders": (c.c_int, [c.c_void_p, c.POINTER(cs_own_collider), c.c_uint32, c.c_uint64]),
     "cs_set_hand": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_float), c.c_uint32, c.c_uint64]),
     "cs_set_head": (None, [c.c_void_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_float, c.c_uint64]),
     "cs_nearest_point": (c.c_int, [c.c_void_p, c.POINTER(c.c_float), c.c_float, c.POINTER(cs_cloth_point)]),
     "cs_cast_ray": (c.c_int, [c.c_void_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_float, c.POINTER(cs_cloth_point)]),
-    "cs_set_grabs": (None, [c.c_void_p, c.POINTER(cs_grab), c.c_uint32, c.c_uint64]),
+    "cs_set_grabs": (c.c_int, [c.c_void_p, c.POINTER(cs_grab), c.c_uint32, c.c_uint64]),
     "cs_move_attachment": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_int, c.c_uint64]),
     "cs_move_joints": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.c_uint32, c.c_uint64]),
     "cs_grab_event_count": (c.c_uint32, [c.c_void_p]),
@@ -667,7 +736,6 @@ FUNCTIONS = {
     "cs_contact_event_count": (c.c_uint32, [c.c_void_p]),
     "cs_get_contact_event": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_contact_event)]),
     "cs_get_environment": (c.c_int, [c.c_void_p, c.POINTER(cs_environment)]),
-    "cs_get_cloth_parameters": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_cloth_parameters)]),
     "cs_get_cloth_settings": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_cloth_settings)]),
     "cs_material_count": (c.c_uint32, [c.c_void_p]),
     "cs_material": (c.c_char_p, [c.c_void_p, c.c_uint32]),
@@ -675,19 +743,17 @@ FUNCTIONS = {
     "cs_parameters_participant": (c.c_uint64, [c.c_void_p]),
     "cs_set_environment": (None, [c.c_void_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.POINTER(c.c_float)]),
     "cs_set_gust": (None, [c.c_void_p, c.c_float, c.c_float]),
-    "cs_set_cloth": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.POINTER(c.c_float), c.POINTER(c.c_float)]),
     "cs_keep_cloth_settings": (None, [c.POINTER(cs_cloth_settings)]),
-    "cs_change_cloth": (c.c_int, [c.c_void_p, c.c_char_p, c.POINTER(cs_cloth_settings)]),
+    "cs_set_cloth": (c.c_int, [c.c_void_p, c.c_char_p, c.POINTER(cs_cloth_settings)]),
     "cs_set_material": (None, [c.c_void_p, c.c_char_p, c.c_char_p]),
     "cs_set_areal_mass": (None, [c.c_void_p, c.c_char_p, c.c_float]),
-    "cs_set_collider": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float)]),
     "cs_keep_collider": (None, [c.POINTER(cs_collider_change)]),
-    "cs_change_collider": (c.c_int, [c.c_void_p, c.c_char_p, c.POINTER(cs_collider_change)]),
+    "cs_set_collider": (c.c_int, [c.c_void_p, c.c_char_p, c.POINTER(cs_collider_change)]),
     "cs_participant_id": (c.c_uint64, [c.c_void_p]),
     "cs_get_role": (c.c_uint32, [c.c_void_p]),
     "cs_participant_count": (c.c_uint32, [c.c_void_p]),
     "cs_get_participant": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_participant)]),
-    "cs_get_presence": (c.c_int, [c.c_void_p, c.POINTER(cs_presence)]),
+    "cs_get_presence": (c.c_int, [c.c_void_p, c.POINTER(cs_presence), c.POINTER(cs_participant)]),
     "cs_set_role": (None, [c.c_void_p, c.c_uint64, c.c_uint32]),
     "cs_remove_participant": (None, [c.c_void_p, c.c_uint64]),
     "cs_ban_participant": (None, [c.c_void_p, c.c_uint64]),
@@ -702,7 +768,7 @@ FUNCTIONS = {
     "cs_seek": (None, [c.c_void_p, c.c_double]),
     "cs_set_speed": (None, [c.c_void_p, c.c_double]),
     "cs_set_loop": (None, [c.c_void_p, c.c_int]),
-    "cs_get_statistics": (None, [c.c_void_p, c.c_uint64, c.POINTER(cs_statistics)]),
+    "cs_get_statistics": (c.c_int, [c.c_void_p, c.c_uint64, c.POINTER(cs_statistics)]),
     "cs_get_quality": (c.c_int, [c.c_void_p, c.POINTER(c.c_uint32)]),
     "cs_stream_seconds": (c.c_double, [c.c_void_p]),
     "cs_get_stage_statistics": (c.c_int, [c.c_void_p, c.POINTER(cs_stage_statistics)]),
@@ -728,11 +794,9 @@ FUNCTIONS = {
     "cs_recording_get_attachment": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_recorded_pose)]),
     "cs_recording_get_grab": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_recorded_grab)]),
     "cs_recording_state": (c.POINTER(c.c_float), [c.c_void_p, c.POINTER(c.c_uint32), c.POINTER(c.c_uint64)]),
-    "clothstream_default_options_2": (None, [c.POINTER(clothstream_options)]),
+    "clothstream_default_options": (None, [c.POINTER(clothstream_options)]),
     "clothstream_open": (c.c_int, [c.c_char_p, c.POINTER(clothstream_options), c.POINTER(c.c_void_p)]),
-    "clothstream_open_with_token": (c.c_int, [c.c_char_p, c.c_char_p, c.POINTER(clothstream_options), c.POINTER(c.c_void_p)]),
-    "clothstream_pair": (c.c_int, [c.c_char_p, c.c_char_p, c.c_char_p, c.c_size_t]),
-    "clothstream_pair_with_options": (c.c_int, [c.c_char_p, c.c_char_p, c.POINTER(clothstream_options), c.c_char_p, c.c_size_t]),
+    "clothstream_pair": (c.c_int, [c.c_char_p, c.c_char_p, c.POINTER(clothstream_options), c.c_char_p, c.c_size_t]),
     "clothstream_close": (None, [c.c_void_p]),
     "clothstream_wait": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
     "clothstream_acquire": (c.c_void_p, [c.c_void_p]),

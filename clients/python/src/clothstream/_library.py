@@ -43,9 +43,11 @@ def text(value: bytes | None) -> str:
     return (value or b"").decode("utf-8", "replace")
 
 
-def versioned(struct: Type[T], version: int) -> T:
+def new(struct: Type[T]) -> T:
+    """A struct of the library, with its version if it has one."""
     made = struct()
-    made.version = version  # type: ignore[attr-defined]
+    if hasattr(struct, "VERSION"):
+        made.version = struct.VERSION  # type: ignore[attr-defined]
     return made
 
 

@@ -9,7 +9,7 @@ from typing import Type, TypeVar
 import numpy as np
 
 from . import _bindings as b
-from ._library import Error, array, lib, text, to, versioned
+from ._library import Error, array, lib, new, text, to
 from .types import (Cloth, ClothReport, ClothSettings, Collider, ContactEvent, Environment, GrabEvent, Participant, Presence,
                     Statistics)
 
@@ -79,7 +79,7 @@ class ClientState:
 
     def _list(self, count: str, get: str, struct: Type[c.Structure], kind: Type[T]) -> list[T]:
         with self._client() as client:
-            found = struct()
+            found = new(struct)
             return [to(kind, found) for index in range(getattr(lib, count)(client))
                     if getattr(lib, get)(client, index, c.byref(found))]
 
@@ -127,7 +127,7 @@ class ClientState:
     @property
     def environment(self) -> Environment:
         with self._client() as client:
-            found = b.cs_environment()
+            found = new(b.cs_environment)
             if not lib.cs_get_environment(client, c.byref(found)):
                 raise Error("The scene has no description yet.")
             return to(Environment, found)
@@ -135,7 +135,7 @@ class ClientState:
     def cloth_settings(self, cloth: int = 0) -> ClothSettings:
         """Current parameters of a cloth. Raises IndexError for an unknown index."""
         with self._client() as client:
-            found = versioned(b.cs_cloth_settings, b.CS_CLOTH_SETTINGS_VERSION)
+            found = new(b.cs_cloth_settings)
             if not lib.cs_get_cloth_settings(client, cloth, c.byref(found)):
                 raise IndexError(f"cloth {cloth}; the scene has {lib.cs_cloth_count(client)}")
             return to(ClothSettings, found)
@@ -160,10 +160,10 @@ class ClientState:
     def presence(self) -> Presence | None:
         """The newest change of the participants."""
         with self._client() as client:
-            found = b.cs_presence()
-            if not lib.cs_get_presence(client, c.byref(found)):
+            found, participant = new(b.cs_presence), new(b.cs_participant)
+            if not lib.cs_get_presence(client, c.byref(found), c.byref(participant)):
                 return None
-            return to(Presence, found, participant=to(Participant, found.participant))
+            return to(Presence, found, participant=to(Participant, participant))
 
     @property
     def grab_events(self) -> list[GrabEvent]:
@@ -184,7 +184,7 @@ class ClientState:
     def report(self, cloth: int = 0) -> ClothReport | None:
         """The server's newest measurements of a cloth; None before the first."""
         with self._client() as client:
-            found = versioned(b.cs_cloth_report, b.CS_CLOTH_REPORT_VERSION)
+            found = new(b.cs_cloth_report)
             return to(ClothReport, found) if lib.cs_get_cloth_report(client, cloth, c.byref(found)) else None
 
     def constraint_ends(self, cloth: int = 0) -> list[tuple[int, int]]:
@@ -198,6 +198,6 @@ class ClientState:
     @property
     def statistics(self) -> Statistics:
         with self._client() as client:
-            found = b.cs_statistics()
+            found = new(b.cs_statistics)
             lib.cs_get_statistics(client, lib.clothstream_now_us(), c.byref(found))
             return to(Statistics, found)

@@ -12,7 +12,7 @@ from typing import Iterator
 import numpy as np
 
 from . import _bindings as b
-from ._library import Error, array, lib, text, to, versioned
+from ._library import Error, array, lib, new, text, to
 from .client_state import ClientState, Frame
 from .types import Event, Quaternion, Vec3
 
@@ -186,14 +186,14 @@ class Recording(ClientState):
     @property
     def info(self) -> Info:
         """Length and size of the file."""
-        found = versioned(b.cs_recording_info, b.CS_RECORDING_INFO_VERSION)
+        found = new(b.cs_recording_info)
         lib.cs_recording_get_info(self._opened(), c.byref(found))
         return to(Info, found)
 
     @property
     def faults(self) -> Faults:
         """Counts of frames with faults. A recording that was read without an error has none."""
-        found = versioned(b.cs_recording_faults, b.CS_RECORDING_FAULTS_VERSION)
+        found = new(b.cs_recording_faults)
         lib.cs_recording_get_faults(self._opened(), c.byref(found))
         return to(Faults, found)
 
@@ -205,7 +205,7 @@ class Recording(ClientState):
         """Reads the next message of these kinds; None at the end. A frame is a RecordedFrame. Raises RecordingError for a
         damaged chunk, and for a frame that cannot be decoded or differs from its recorded hash; the next call continues
         after it. The frames that depend on such a frame are left out without a further error; `faults` counts them."""
-        recorded = versioned(b.cs_recorded, b.CS_RECORDED_VERSION)
+        recorded = new(b.cs_recorded)
         self._end_frame()
         result = lib.cs_recording_next(self._opened(), int(kinds), c.byref(recorded))
         if result == b.CS_RECORDING_ERROR:
@@ -237,7 +237,7 @@ class Recording(ClientState):
         return self._seek(lib.cs_recording_seek_tick, tick)
 
     def _seek(self, function: object, where: float) -> RecordedFrame | None:
-        recorded = versioned(b.cs_recorded, b.CS_RECORDED_VERSION)
+        recorded = new(b.cs_recorded)
         self._end_frame()
         if not function(self._opened(), where, c.byref(recorded)):  # type: ignore[operator]
             raise self._error()
@@ -254,12 +254,12 @@ class Recording(ClientState):
     @property
     def journal(self) -> RecordedTick | None:
         """The newest tick of the journal, which only servers write; None before the first."""
-        found = versioned(b.cs_recorded_tick, b.CS_RECORDED_TICK_VERSION)
+        found = new(b.cs_recorded_tick)
         if not lib.cs_recording_get_tick(self._opened(), c.byref(found)):
             return None
 
         def each(count: int, get: str, struct: type) -> Iterator[c.Structure]:
-            element = struct()
+            element = new(struct)
             for index in range(count):
                 getattr(lib, get)(self._opened(), index, c.byref(element))
                 yield element

@@ -8,7 +8,7 @@ import time
 from typing import Any, Iterator, Sequence
 
 from . import _bindings as b
-from ._library import Error, lib, text, vector, versioned
+from ._library import Error, lib, new, text, vector
 from .client_state import ClientState, Frame
 from .types import Event, Grab, OwnCollider, Quaternion, Role, SceneSummary, Vec3
 
@@ -44,7 +44,7 @@ def join(address: str, scene: str = "", *, role: str | Role = "", name: str = ""
     if isinstance(role, str) and role.lower() not in _ROLES:
         raise ValueError(f"role: '{role}'; use viewer, participant, owner or \"\"")
     options = b.clothstream_options()
-    lib.clothstream_default_options_2(c.byref(options))
+    lib.clothstream_default_options(c.byref(options))
     kept = [value.encode() for value in (scene, name, token, ca_file, fingerprint)]
     options.scene, options.display_name, options.token, options.ca_file, options.fingerprint = kept
     options.client_name = b"clothstream Python"
@@ -139,7 +139,7 @@ class Stream(ClientState):
         self.events, self._pending = self._pending, Event(0)
         assert self._handle is not None
         self._acquired = client = lib.clothstream_acquire(self._handle)
-        statistics = b.cs_statistics()
+        statistics = new(b.cs_statistics)
         lib.cs_get_statistics(client, lib.clothstream_now_us(), c.byref(statistics))
         rate = lib.cs_simulation_rate(client)
         self._frame = Frame(self, statistics.tick, statistics.tick / rate if rate else 0.0)
@@ -183,11 +183,12 @@ class Stream(ClientState):
             if not isinstance(given, OwnCollider):
                 x, y, z, radius = given
                 given = OwnCollider(position=(x, y, z), radius=radius)
-            struct.shape, struct.radius, struct.length = given.shape, given.radius, given.length
+            struct.version, struct.shape = b.CS_OWN_COLLIDER_VERSION, given.shape
             struct.position, struct.orientation = tuple(given.position), tuple(given.orientation)
+            struct.radius, struct.top_radius, struct.length = given.radius, given.top_radius, given.length
             struct.size = tuple(given.size)
         with self._client() as client:
-            lib.cs_set_shapes(client, shapes, len(colliders), lib.clothstream_now_us())
+            lib.cs_set_colliders(client, shapes, len(colliders), lib.clothstream_now_us())
 
     def set_hand(self, side: str, joints: Any) -> None:
         """Replaces a tracked hand. side: "left" or "right". joints: an array of shape (26, 4) in the order of OpenXR's
@@ -208,6 +209,7 @@ class Stream(ClientState):
         """Replaces the grabs of this participant. At most 10 are used."""
         structs = (b.cs_grab * max(1, len(grabs)))()
         for struct, grab in zip(structs, grabs):
+            struct.version = b.CS_GRAB_VERSION
             struct.id, struct.position, struct.orientation = grab.id, tuple(grab.position), tuple(grab.orientation)
             struct.radius, struct.reach, struct.max_force = grab.radius, grab.reach, grab.max_force
             struct.slip_distance = grab.slip_distance
@@ -268,7 +270,7 @@ class Stream(ClientState):
                 raise TypeError(f"cloths have no setting '{name}'; they have {', '.join(sorted(names))}")
             setattr(struct, name, tuple(value) if name in ("structural", "shear", "bend") else value)
         with self._client() as client:
-            if not lib.cs_change_cloth(client, cloth.encode(), c.byref(struct)):
+            if not lib.cs_set_cloth(client, cloth.encode(), c.byref(struct)):
                 raise ValueError(f"the scene has no cloth '{cloth}'")
 
     def set_material(self, material: str, cloth: str = "") -> None:
@@ -291,7 +293,7 @@ class Stream(ClientState):
                 raise TypeError(f"colliders have no '{name}'; they have {', '.join(sorted(names))}")
             setattr(struct, name, tuple(value) if name in ("position", "orientation", "size") else value)
         with self._client() as client:
-            lib.cs_change_collider(client, collider.encode(), c.byref(struct))
+            lib.cs_set_collider(client, collider.encode(), c.byref(struct))
 
     # Requests about scenes. They wait for the server's answer, which ends the current frame.
 
@@ -300,7 +302,7 @@ class Stream(ClientState):
             request = getattr(lib, function)(client, *arguments)
         if request == 0:
             raise Error("The request was not sent: the connection is lost, or too many requests wait.")
-        answer = versioned(b.cs_answer, b.CS_ANSWER_VERSION)
+        answer = new(b.cs_answer)
         end = time.monotonic() + timeout
         while True:
             if Event.ANSWER in self.wait(min(1.0, max(0.0, end - time.monotonic()))):

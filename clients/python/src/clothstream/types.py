@@ -217,6 +217,7 @@ class OwnCollider:
     radius: float = 0.1  # m
     length: float = 0  # m
     size: Vec3 = (0, 0, 0)  # m
+    top_radius: float = 0  # m; of a capsule: radius of its end at +Y; 0: the same as radius
 
 
 @dataclasses.dataclass(frozen=True)

@@ -49,7 +49,13 @@ namespace ClothStream.Core
             if (fingerprint != "" && !address.IsEncrypted)
                 throw new ArgumentException("A fingerprint needs TLS; use wss://" + address + ".");
             fixed (byte* scene = Utf8.Bytes(options.Scene), program = Utf8.Bytes(options.ClientName), name = Utf8.Bytes(options.DisplayName))
-                core = Native.cs_create_as(scene, program, name, (uint)options.Role);
+            {
+                var joining = new NativeClientOptions
+                {
+                    version = Native.CS_CLIENT_OPTIONS_VERSION, role = (uint)options.Role, scene = scene, clientName = program, displayName = name
+                };
+                core = Native.cs_create(&joining);
+            }
             Native.cs_want(Handle, options.Quality);
             fixed (byte* token = Utf8.Bytes(options.Token), code = Utf8.Bytes(options.PairingCode), resume = Utf8.Bytes(options.ResumeToken))
             {

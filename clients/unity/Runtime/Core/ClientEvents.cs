@@ -48,12 +48,12 @@ namespace ClothStream.Core
         {
             if ((news & Events.Grabs) != 0)
             {
-                GrabEvent grab;
+                var grab = new GrabEvent { version = Native.CS_GRAB_EVENT_VERSION };
                 for (uint i = 0; Native.cs_get_grab_event(Handle, i, &grab) != 0; ++i) Add(grabEvents, grab);
             }
             if ((news & Events.Contacts) != 0)
             {
-                ContactEvent contact;
+                var contact = new ContactEvent { version = Native.CS_CONTACT_EVENT_VERSION };
                 for (uint i = 0; Native.cs_get_contact_event(Handle, i, &contact) != 0; ++i)
                     Add(contacts, new Contact
                     {
@@ -61,11 +61,12 @@ namespace ClothStream.Core
                         Collider = Utf8.Text(contact.collider), Cloth = Utf8.Text(contact.cloth), Impulse = contact.impulse, Seconds = contact.seconds
                     });
             }
-            Presence change;
-            if ((news & Events.Presence) != 0 && Native.cs_get_presence(Handle, &change) != 0)
+            var change = new Presence { version = Native.CS_PRESENCE_VERSION };
+            var participant = new Participant { version = Native.CS_PARTICIPANT_VERSION };
+            if ((news & Events.Presence) != 0 && Native.cs_get_presence(Handle, &change, &participant) != 0)
                 Add(presence, new PresenceChange
                 {
-                    Kind = (PresenceKind)change.kind, Reason = (LeaveReason)change.reason, By = change.by, Person = new Person(change.participant)
+                    Kind = (PresenceKind)change.kind, Reason = (LeaveReason)change.reason, By = change.by, Person = new Person(participant)
                 });
         }
 

@@ -55,7 +55,7 @@ namespace ClothStream.Core
                     var cloths = new ClothRange[Native.cs_cloth_count(Handle)];
                     for (uint i = 0; i < cloths.Length; ++i)
                     {
-                        Cloth cloth;
+                        var cloth = new Cloth { version = Native.CS_CLOTH_VERSION };
                         Native.cs_get_cloth(Handle, i, &cloth);
                         cloths[i] = new ClothRange
                         {
@@ -75,7 +75,7 @@ namespace ClothStream.Core
         {
             lock (Gate)
             {
-                Cloth range;
+                var range = new Cloth { version = Native.CS_CLOTH_VERSION };
                 if (Native.cs_get_cloth(Handle, (uint)cloth, &range) == 0) throw new ArgumentOutOfRangeException("cloth");
                 for (uint i = 0; i < 2 * range.vertexCount; ++i) uvs[i] = 0;
                 uint pairs, corners, indices;
@@ -138,7 +138,7 @@ namespace ClothStream.Core
             {
                 lock (Gate)
                 {
-                    Statistics statistics;
+                    var statistics = new Statistics { version = Native.CS_STATISTICS_VERSION };
                     Native.cs_get_statistics(Handle, NowUs, &statistics);
                     return statistics;
                 }

@@ -6,11 +6,18 @@ namespace ClothStream.Core
 {
     public sealed unsafe partial class Client
     {
-        /// <summary>Replaces the colliders of this participant: at most 40, or 20 with two hands.</summary>
+        /// <summary>Replaces the colliders of this participant: at most 40, or 20 with two hands. Their version need not be
+        /// set.</summary>
         public void SetShapes(OwnCollider[] colliders, int count, ulong timeUs)
         {
-            fixed (OwnCollider* first = colliders)
-                lock (Gate) Native.cs_set_shapes(Handle, first, (uint)count, timeUs);
+            count = Math.Min(count, (int)Native.CS_MAX_COLLIDERS);
+            OwnCollider* first = stackalloc OwnCollider[count];
+            for (int i = 0; i < count; ++i)
+            {
+                first[i] = colliders[i];
+                first[i].version = Native.CS_OWN_COLLIDER_VERSION;
+            }
+            lock (Gate) Native.cs_set_colliders(Handle, first, (uint)count, timeUs);
             Flush();
         }
 
@@ -37,11 +44,22 @@ namespace ClothStream.Core
         }
 
         /// <summary>Replaces the grabs of this participant, at most 10. A new id takes hold; an id that is missing lets
-        /// go.</summary>
-        public void SetGrabs(Grab[] grabs, int count, ulong timeUs)
+        /// go. Version and place of a grab need not be set.</summary>
+        /// <param name="places">Place of each grab; null: the grabs take what is near them on the server.</param>
+        public void SetGrabs(Grab[] grabs, ClothPoint[] places, int count, ulong timeUs)
         {
-            fixed (Grab* first = grabs)
+            count = Math.Min(count, (int)Native.CS_MAX_GRABS);
+            Grab* first = stackalloc Grab[count];
+            fixed (ClothPoint* firstPlace = places)
+            {
+                for (int i = 0; i < count; ++i)
+                {
+                    first[i] = grabs[i];
+                    first[i].version = Native.CS_GRAB_VERSION;
+                    first[i].place = firstPlace == null ? null : firstPlace + i;
+                }
                 lock (Gate) Native.cs_set_grabs(Handle, first, (uint)count, timeUs);
+            }
             Flush();
         }
 
@@ -52,7 +70,7 @@ namespace ClothStream.Core
             from[0] = x;
             from[1] = y;
             from[2] = z;
-            ClothPoint found;
+            var found = new ClothPoint { version = Native.CS_CLOTH_POINT_VERSION };
             lock (Gate)
             {
                 bool succeeds = Native.cs_nearest_point(Handle, from, maxDistance, &found) != 0;

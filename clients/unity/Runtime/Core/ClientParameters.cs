@@ -10,7 +10,7 @@ namespace ClothStream.Core
         {
             lock (Gate)
             {
-                var found = new Environment();
+                var found = new Environment { version = Native.CS_ENVIRONMENT_VERSION };
                 bool succeeds = Native.cs_get_environment(Handle, &found) != 0;
                 environment = found;
                 return succeeds;
@@ -52,7 +52,7 @@ namespace ClothStream.Core
         {
             bool succeeds;
             fixed (byte* name = Utf8.Bytes(cloth))
-                lock (Gate) succeeds = Native.cs_change_cloth(Handle, name, &settings) != 0;
+                lock (Gate) succeeds = Native.cs_set_cloth(Handle, name, &settings) != 0;
             Flush();
             return succeeds;
         }

@@ -49,7 +49,7 @@ namespace ClothStream.Core
                     var people = new Person[Native.cs_participant_count(Handle)];
                     for (uint i = 0; i < people.Length; ++i)
                     {
-                        Participant participant;
+                        var participant = new Participant { version = Native.CS_PARTICIPANT_VERSION };
                         Native.cs_get_participant(Handle, i, &participant);
                         people[i] = new Person(participant);
                     }

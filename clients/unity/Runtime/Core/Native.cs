@@ -163,6 +163,31 @@ namespace ClothStream.Core
     }
 
     /// <summary>
+    /// Strings are copied. NULL means "".
+    /// </summary>
+    [StructLayout(LayoutKind.Explicit, Size = 32)]
+    public unsafe struct NativeClientOptions
+    {
+        [FieldOffset(0)] public uint version;
+        /// <summary>
+        /// requested cs_role
+        /// </summary>
+        [FieldOffset(4)] public uint role;
+        /// <summary>
+        /// "" means the server's default scene
+        /// </summary>
+        [FieldOffset(8)] public byte* scene;
+        /// <summary>
+        /// name of the program
+        /// </summary>
+        [FieldOffset(16)] public byte* clientName;
+        /// <summary>
+        /// name for other participants; may be ""
+        /// </summary>
+        [FieldOffset(24)] public byte* displayName;
+    }
+
+    /// <summary>
     /// Limits of what the client accepts from a server. A description that exceeds a limit leads to
     /// CS_STATE_FAILED before its geometry is allocated; cs_error_text names the limit. A vertex takes about 250
     /// bytes, a triangle about 30.
@@ -170,9 +195,6 @@ namespace ClothStream.Core
     [StructLayout(LayoutKind.Explicit, Size = 32)]
     public unsafe struct Limits
     {
-        /// <summary>
-        /// CS_LIMITS_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// of all cloths. 1 to 67108864. Default 1048576
@@ -196,55 +218,53 @@ namespace ClothStream.Core
         [FieldOffset(24)] public ulong maxContentBytes;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 56)]
+    [StructLayout(LayoutKind.Explicit, Size = 64)]
     public unsafe struct SceneSummary
     {
-        [FieldOffset(0)] public byte* name;
-        [FieldOffset(8)] public byte* description;
+        [FieldOffset(0)] public uint version;
+        [FieldOffset(8)] public byte* name;
+        [FieldOffset(16)] public byte* description;
         /// <summary>
         /// of all cloths
         /// </summary>
-        [FieldOffset(16)] public uint vertexCount;
+        [FieldOffset(24)] public uint vertexCount;
         /// <summary>
         /// of all cloths
         /// </summary>
-        [FieldOffset(20)] public uint clothCount;
+        [FieldOffset(28)] public uint clothCount;
         /// <summary>
         /// connected ones; and including those that are away
         /// </summary>
-        [FieldOffset(24)] public uint participants;
+        [FieldOffset(32)] public uint participants;
         /// <summary>
         /// connected ones; and including those that are away
         /// </summary>
-        [FieldOffset(28)] public uint maxParticipants;
+        [FieldOffset(36)] public uint maxParticipants;
         /// <summary>
         /// 1 if it is simulated now
         /// </summary>
-        [FieldOffset(32)] public int running;
+        [FieldOffset(40)] public int running;
         /// <summary>
         /// 1 if its clock is stopped
         /// </summary>
-        [FieldOffset(36)] public int paused;
+        [FieldOffset(44)] public int paused;
         /// <summary>
         /// 1 if a client made it; only then it can be deleted
         /// </summary>
-        [FieldOffset(40)] public int created;
+        [FieldOffset(48)] public int created;
         /// <summary>
         /// 1 if the server records it to a file
         /// </summary>
-        [FieldOffset(44)] public int recorded;
+        [FieldOffset(52)] public int recorded;
         /// <summary>
         /// 1 if it is a recording that is played
         /// </summary>
-        [FieldOffset(48)] public int isRecording;
+        [FieldOffset(56)] public int isRecording;
     }
 
     [StructLayout(LayoutKind.Explicit, Size = 56)]
     public unsafe struct Answer
     {
-        /// <summary>
-        /// CS_ANSWER_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// cs_request
@@ -280,112 +300,112 @@ namespace ClothStream.Core
     /// <summary>
     /// A subject that may not join a scene (docs/identity.md).
     /// </summary>
-    [StructLayout(LayoutKind.Explicit, Size = 24)]
+    [StructLayout(LayoutKind.Explicit, Size = 32)]
     public unsafe struct Ban
     {
-        [FieldOffset(0)] public byte* subject;
+        [FieldOffset(0)] public uint version;
+        [FieldOffset(8)] public byte* subject;
         /// <summary>
         /// name when the ban began; may be ""
         /// </summary>
-        [FieldOffset(8)] public byte* displayName;
+        [FieldOffset(16)] public byte* displayName;
         /// <summary>
         /// may be ""
         /// </summary>
-        [FieldOffset(16)] public byte* tenant;
+        [FieldOffset(24)] public byte* tenant;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 32)]
+    [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct Cloth
     {
-        [FieldOffset(0)] public byte* name;
-        [FieldOffset(8)] public uint firstVertex;
-        [FieldOffset(12)] public uint vertexCount;
+        [FieldOffset(0)] public uint version;
+        [FieldOffset(8)] public byte* name;
+        [FieldOffset(16)] public uint firstVertex;
+        [FieldOffset(20)] public uint vertexCount;
         /// <summary>
         /// 0 if the cloth is not a grid
         /// </summary>
-        [FieldOffset(16)] public uint rows;
+        [FieldOffset(24)] public uint rows;
         /// <summary>
         /// 0 if the cloth is not a grid
         /// </summary>
-        [FieldOffset(20)] public uint columns;
+        [FieldOffset(28)] public uint columns;
         /// <summary>
         /// range in cs_triangles
         /// </summary>
-        [FieldOffset(24)] public uint firstIndex;
+        [FieldOffset(32)] public uint firstIndex;
         /// <summary>
         /// range in cs_triangles
         /// </summary>
-        [FieldOffset(28)] public uint indexCount;
+        [FieldOffset(36)] public uint indexCount;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 16)]
+    [StructLayout(LayoutKind.Explicit, Size = 24)]
     public unsafe struct Submesh
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// may be ""
         /// </summary>
-        [FieldOffset(0)] public byte* name;
+        [FieldOffset(8)] public byte* name;
         /// <summary>
         /// range in cs_triangles
         /// </summary>
-        [FieldOffset(8)] public uint firstIndex;
+        [FieldOffset(16)] public uint firstIndex;
         /// <summary>
         /// range in cs_triangles
         /// </summary>
-        [FieldOffset(12)] public uint indexCount;
+        [FieldOffset(20)] public uint indexCount;
     }
 
     [StructLayout(LayoutKind.Explicit, Size = 80)]
     public unsafe struct Collider
     {
-        /// <summary>
-        /// of a collider of a participant: its id in decimal
-        /// </summary>
-        [FieldOffset(0)] public byte* name;
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// cs_shape
         /// </summary>
-        [FieldOffset(8)] public uint shape;
-        [FieldOffset(12)] public fixed float position[3];
+        [FieldOffset(4)] public uint shape;
         /// <summary>
-        /// quaternion x y z w
+        /// of a collider of a participant: its id in decimal
         /// </summary>
-        [FieldOffset(24)] public fixed float orientation[4];
-        /// <summary>
-        /// 0 if the shape does not have them
-        /// </summary>
-        [FieldOffset(40)] public float radius;
-        /// <summary>
-        /// 0 if the shape does not have them
-        /// </summary>
-        [FieldOffset(44)] public float length;
-        /// <summary>
-        /// 0 if the shape does not have them
-        /// </summary>
-        [FieldOffset(48)] public fixed float size[3];
-        /// <summary>
-        /// 1: the collider yields. It is not where its participant put it, because cloth that nothing passes through
-        /// has no room there (docs/colliders.md). Else 0. The struct has the same size and offsets on 64 bits as
-        /// without it.
-        /// </summary>
-        [FieldOffset(60)] public int yields;
+        [FieldOffset(8)] public byte* name;
         /// <summary>
         /// 0 for a collider of the scene
         /// </summary>
-        [FieldOffset(64)] public ulong participantId;
+        [FieldOffset(16)] public ulong participantId;
+        [FieldOffset(24)] public fixed float position[3];
+        /// <summary>
+        /// quaternion x y z w
+        /// </summary>
+        [FieldOffset(36)] public fixed float orientation[4];
+        /// <summary>
+        /// m; 0 if the shape does not have them
+        /// </summary>
+        [FieldOffset(52)] public float radius;
+        /// <summary>
+        /// m; 0 if the shape does not have them
+        /// </summary>
+        [FieldOffset(56)] public float length;
+        /// <summary>
+        /// m; 0 if the shape does not have them
+        /// </summary>
+        [FieldOffset(60)] public fixed float size[3];
         /// <summary>
         /// m. A tapered capsule has this radius at its end at +Y, and `radius` at its end at -Y. Other shapes have
         /// the value of `radius`.
         /// </summary>
         [FieldOffset(72)] public float topRadius;
+        /// <summary>
+        /// 1: the collider yields. It is not where its participant put it, because cloth that nothing passes through
+        /// has no room there (docs/colliders.md). Else 0.
+        /// </summary>
+        [FieldOffset(76)] public int yields;
     }
 
     [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct PlayOutOptions
     {
-        /// <summary>
-        /// CS_PLAY_OUT_OPTIONS_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// number of newest frames to keep, 3 to 256; must cover the delay
@@ -415,9 +435,6 @@ namespace ClothStream.Core
     [StructLayout(LayoutKind.Explicit, Size = 32)]
     public unsafe struct Played
     {
-        /// <summary>
-        /// CS_PLAYED_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// cs_shown
@@ -437,12 +454,12 @@ namespace ClothStream.Core
         [FieldOffset(24)] public double fraction;
     }
 
+    /// <summary>
+    /// Result of the client for a message with a frame.
+    /// </summary>
     [StructLayout(LayoutKind.Explicit, Size = 48)]
     public unsafe struct Decoded
     {
-        /// <summary>
-        /// CS_DECODED_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// cs_decoding; the members below are read only for CS_DECODING_DONE
@@ -471,32 +488,37 @@ namespace ClothStream.Core
     }
 
     /// <summary>
-    /// Collider of this participant: sphere, capsule or box.
+    /// Collider of this participant: sphere, capsule or box. Numbers that the shape does not have are ignored.
     /// </summary>
-    [StructLayout(LayoutKind.Explicit, Size = 52)]
+    [StructLayout(LayoutKind.Explicit, Size = 60)]
     public unsafe struct OwnCollider
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// cs_shape
         /// </summary>
-        [FieldOffset(0)] public uint shape;
-        [FieldOffset(4)] public fixed float position[3];
+        [FieldOffset(4)] public uint shape;
+        [FieldOffset(8)] public fixed float position[3];
         /// <summary>
         /// quaternion x y z w; all zero means no rotation
         /// </summary>
-        [FieldOffset(16)] public fixed float orientation[4];
+        [FieldOffset(20)] public fixed float orientation[4];
         /// <summary>
-        /// m; numbers that the shape does not have are ignored
+        /// m
         /// </summary>
-        [FieldOffset(32)] public float radius;
+        [FieldOffset(36)] public float radius;
         /// <summary>
-        /// m; numbers that the shape does not have are ignored
+        /// m
         /// </summary>
-        [FieldOffset(36)] public float length;
+        [FieldOffset(40)] public float length;
         /// <summary>
-        /// m; numbers that the shape does not have are ignored
+        /// m
         /// </summary>
-        [FieldOffset(40)] public fixed float size[3];
+        [FieldOffset(44)] public fixed float size[3];
+        /// <summary>
+        /// m; of a tapered capsule, as in cs_collider; 0 means the value of `radius`
+        /// </summary>
+        [FieldOffset(56)] public float topRadius;
     }
 
     /// <summary>
@@ -505,26 +527,27 @@ namespace ClothStream.Core
     [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct ClothPoint
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// its corners are the entries 3 * triangle to 3 * triangle + 2 of cs_triangles
         /// </summary>
-        [FieldOffset(0)] public uint triangle;
+        [FieldOffset(4)] public uint triangle;
         /// <summary>
         /// barycentric coordinates of the second and third corner
         /// </summary>
-        [FieldOffset(4)] public float second;
+        [FieldOffset(8)] public float second;
         /// <summary>
         /// barycentric coordinates of the second and third corner
         /// </summary>
-        [FieldOffset(8)] public float third;
+        [FieldOffset(12)] public float third;
         /// <summary>
         /// m
         /// </summary>
-        [FieldOffset(12)] public fixed float position[3];
+        [FieldOffset(16)] public fixed float position[3];
         /// <summary>
         /// m, from the given point or from the origin of the ray
         /// </summary>
-        [FieldOffset(24)] public float distance;
+        [FieldOffset(28)] public float distance;
         /// <summary>
         /// of the frame that is shown
         /// </summary>
@@ -534,146 +557,131 @@ namespace ClothStream.Core
     /// <summary>
     /// Grab of this participant (Grab in session.proto). NaN means the server's default.
     /// </summary>
-    [StructLayout(LayoutKind.Explicit, Size = 96)]
+    [StructLayout(LayoutKind.Explicit, Size = 64)]
     public unsafe struct Grab
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// a new id takes hold; an id that is missing in the next call lets go
         /// </summary>
-        [FieldOffset(0)] public uint id;
-        [FieldOffset(4)] public fixed float position[3];
+        [FieldOffset(4)] public uint id;
+        [FieldOffset(8)] public fixed float position[3];
         /// <summary>
         /// quaternion x y z w; all zero means no rotation
         /// </summary>
-        [FieldOffset(16)] public fixed float orientation[4];
+        [FieldOffset(20)] public fixed float orientation[4];
         /// <summary>
         /// m
         /// </summary>
-        [FieldOffset(32)] public float radius;
+        [FieldOffset(36)] public float radius;
         /// <summary>
         /// m
         /// </summary>
-        [FieldOffset(36)] public float reach;
+        [FieldOffset(40)] public float reach;
         /// <summary>
         /// N
         /// </summary>
-        [FieldOffset(40)] public float maxForce;
+        [FieldOffset(44)] public float maxForce;
         /// <summary>
         /// m
         /// </summary>
-        [FieldOffset(44)] public float slipDistance;
+        [FieldOffset(48)] public float slipDistance;
         /// <summary>
-        /// 1: the grab takes hold of `place`, wherever the cloth has moved on the server by then, and draws it to
-        /// `position` within 0.2 s; `reach` has no effect. 0: it takes what is near `position` on the server. Only
-        /// triangle, coordinates and tick of the place are used, and only when the grab starts.
+        /// The grab takes hold of this place, wherever the cloth has moved on the server by then, and draws it to
+        /// `position` within 0.2 s; `reach` has no effect. NULL: it takes what is near `position` on the server.
+        /// Only triangle, coordinates and tick of the place are used, and only when the grab starts.
         /// </summary>
-        [FieldOffset(48)] public uint hasPlace;
-        [FieldOffset(56)] public ClothPoint place;
+        [FieldOffset(56)] public ClothPoint* place;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 32)]
+    [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct GrabEvent
     {
-        [FieldOffset(0)] public ulong participantId;
-        [FieldOffset(8)] public uint grabId;
+        [FieldOffset(0)] public uint version;
+        [FieldOffset(8)] public ulong participantId;
+        [FieldOffset(16)] public uint grabId;
         /// <summary>
         /// cs_grab_event_kind, or a newer kind
         /// </summary>
-        [FieldOffset(12)] public uint kind;
+        [FieldOffset(20)] public uint kind;
         /// <summary>
         /// number of vertices that the grab holds now
         /// </summary>
-        [FieldOffset(16)] public uint vertices;
+        [FieldOffset(24)] public uint vertices;
         /// <summary>
         /// Only when a grab with a place took hold: distance between its position and the place at that moment, m,
         /// and ticks since the frame in which the place was seen (0: unknown).
         /// </summary>
-        [FieldOffset(20)] public float distance;
-        [FieldOffset(24)] public ulong ticksSinceSeen;
+        [FieldOffset(28)] public float distance;
+        [FieldOffset(32)] public ulong ticksSinceSeen;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 40)]
+    [StructLayout(LayoutKind.Explicit, Size = 48)]
     public unsafe struct ContactEvent
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// cs_contact_event_kind, or a newer kind
         /// </summary>
-        [FieldOffset(0)] public uint kind;
+        [FieldOffset(4)] public uint kind;
         /// <summary>
-        /// participant's collider: index in cs_set_shapes, bone of a hand, or CS_HEAD_ID
+        /// participant's collider: index in cs_set_colliders, bone of a hand, or CS_HEAD_ID
         /// </summary>
-        [FieldOffset(4)] public uint colliderId;
+        [FieldOffset(8)] public uint colliderId;
         /// <summary>
         /// 0 for a collider of the scene
         /// </summary>
-        [FieldOffset(8)] public ulong participantId;
+        [FieldOffset(16)] public ulong participantId;
         /// <summary>
         /// name of the scene's collider
         /// </summary>
-        [FieldOffset(16)] public byte* collider;
-        [FieldOffset(24)] public byte* cloth;
+        [FieldOffset(24)] public byte* collider;
+        [FieldOffset(32)] public byte* cloth;
         /// <summary>
         /// N s; in the first tick if the contact began, over the whole contact if it ended
         /// </summary>
-        [FieldOffset(32)] public float impulse;
+        [FieldOffset(40)] public float impulse;
         /// <summary>
         /// duration of the contact; 0 if it began
         /// </summary>
-        [FieldOffset(36)] public float seconds;
+        [FieldOffset(44)] public float seconds;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 36)]
+    [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct Environment
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// m/s^2
         /// </summary>
-        [FieldOffset(0)] public fixed float gravity[3];
+        [FieldOffset(4)] public fixed float gravity[3];
         /// <summary>
         /// m/s
         /// </summary>
-        [FieldOffset(12)] public fixed float wind[3];
+        [FieldOffset(16)] public fixed float wind[3];
         /// <summary>
         /// kg/m^3
         /// </summary>
-        [FieldOffset(24)] public float airDensity;
+        [FieldOffset(28)] public float airDensity;
         /// <summary>
         /// m/s; maximum deviation of each wind component; 0 means no gusts
         /// </summary>
-        [FieldOffset(28)] public float gustStrength;
+        [FieldOffset(32)] public float gustStrength;
         /// <summary>
         /// time between changes of the gust's direction
         /// </summary>
-        [FieldOffset(32)] public float gustSeconds;
+        [FieldOffset(36)] public float gustSeconds;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 28)]
-    public unsafe struct ClothParameters
-    {
-        /// <summary>
-        /// {stiffness in N/m, damping in N s/m}
-        /// </summary>
-        [FieldOffset(0)] public fixed float structural[2];
-        /// <summary>
-        /// {stiffness in N/m, damping in N s/m}
-        /// </summary>
-        [FieldOffset(8)] public fixed float shear[2];
-        /// <summary>
-        /// {stiffness in N/m, damping in N s/m}
-        /// </summary>
-        [FieldOffset(16)] public fixed float bend[2];
-        /// <summary>
-        /// 1/s
-        /// </summary>
-        [FieldOffset(24)] public float damping;
-    }
-
+    /// <summary>
+    /// Cloth parameters that can change while the scene runs. In a change, these values keep a parameter: NaN for
+    /// a float, 0 for solver and iterations, -1 for bend_constraints and assembled. cs_get_cloth_settings uses the
+    /// same values for parameters that are not known, or that the cloth or its solver does not have. A compliance
+    /// that was set cannot be set back to the server's default with cs_set_cloth.
+    /// </summary>
     [StructLayout(LayoutKind.Explicit, Size = 92)]
     public unsafe struct ClothSettings
     {
-        /// <summary>
-        /// CS_CLOTH_SETTINGS_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// {stiffness in N/m, damping in N s/m}
@@ -756,12 +764,13 @@ namespace ClothStream.Core
         [FieldOffset(88)] public float tetherSlack;
     }
 
+    /// <summary>
+    /// Change of a collider of the scene. NaN as the first number of a member keeps the member. The server refuses
+    /// numbers that the shape does not have.
+    /// </summary>
     [StructLayout(LayoutKind.Explicit, Size = 56)]
     public unsafe struct ColliderChange
     {
-        /// <summary>
-        /// CS_COLLIDER_CHANGE_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// m
@@ -789,160 +798,161 @@ namespace ClothStream.Core
         [FieldOffset(52)] public float friction;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 32)]
+    [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct Participant
     {
-        [FieldOffset(0)] public ulong id;
+        [FieldOffset(0)] public uint version;
+        [FieldOffset(8)] public ulong id;
         /// <summary>
         /// may be ""
         /// </summary>
-        [FieldOffset(8)] public byte* name;
+        [FieldOffset(16)] public byte* name;
         /// <summary>
         /// may be ""
         /// </summary>
-        [FieldOffset(16)] public byte* clientName;
+        [FieldOffset(24)] public byte* clientName;
         /// <summary>
         /// cs_role, or a newer role
         /// </summary>
-        [FieldOffset(24)] public uint role;
+        [FieldOffset(32)] public uint role;
         /// <summary>
         /// 1 if the connection is lost and the server waits for a reconnect, else 0
         /// </summary>
-        [FieldOffset(28)] public int away;
+        [FieldOffset(36)] public int away;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 48)]
+    [StructLayout(LayoutKind.Explicit, Size = 24)]
     public unsafe struct Presence
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// cs_presence_kind, or a newer kind
         /// </summary>
-        [FieldOffset(0)] public uint kind;
+        [FieldOffset(4)] public uint kind;
         /// <summary>
         /// cs_leave_reason if the participant left, else 0
         /// </summary>
-        [FieldOffset(4)] public uint reason;
+        [FieldOffset(8)] public uint reason;
         /// <summary>
         /// participant who caused it; 0 for the participant itself or the server
         /// </summary>
-        [FieldOffset(8)] public ulong by;
-        /// <summary>
-        /// current state; last state if the participant left
-        /// </summary>
-        [FieldOffset(16)] public Participant participant;
+        [FieldOffset(16)] public ulong by;
     }
 
     /// <summary>
     /// Code by which others pair with the server.
     /// </summary>
-    [StructLayout(LayoutKind.Explicit, Size = 16)]
+    [StructLayout(LayoutKind.Explicit, Size = 24)]
     public unsafe struct PairingCode
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// six digits
         /// </summary>
-        [FieldOffset(0)] public byte* code;
+        [FieldOffset(8)] public byte* code;
         /// <summary>
         /// cs_role of those who use it
         /// </summary>
-        [FieldOffset(8)] public uint role;
+        [FieldOffset(16)] public uint role;
         /// <summary>
         /// seconds, counted from the event
         /// </summary>
-        [FieldOffset(12)] public uint validS;
+        [FieldOffset(20)] public uint validS;
     }
 
     /// <summary>
     /// State of a recording that the server plays.
     /// </summary>
-    [StructLayout(LayoutKind.Explicit, Size = 32)]
+    [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct Playback
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// s
         /// </summary>
-        [FieldOffset(0)] public double length;
+        [FieldOffset(8)] public double length;
         /// <summary>
         /// s from the start, at now_us
         /// </summary>
-        [FieldOffset(8)] public double position;
+        [FieldOffset(16)] public double position;
         /// <summary>
         /// 1 is real time; 0: as fast as the participants acknowledge frames
         /// </summary>
-        [FieldOffset(16)] public double speed;
+        [FieldOffset(24)] public double speed;
         /// <summary>
         /// 0 or 1
         /// </summary>
-        [FieldOffset(24)] public int loop;
+        [FieldOffset(32)] public int loop;
         /// <summary>
         /// 0 or 1
         /// </summary>
-        [FieldOffset(28)] public int paused;
+        [FieldOffset(36)] public int paused;
     }
 
-    [StructLayout(LayoutKind.Explicit, Size = 104)]
+    [StructLayout(LayoutKind.Explicit, Size = 112)]
     public unsafe struct Statistics
     {
+        [FieldOffset(0)] public uint version;
         /// <summary>
         /// tick of the newest decoded frame
         /// </summary>
-        [FieldOffset(0)] public ulong tick;
+        [FieldOffset(8)] public ulong tick;
         /// <summary>
         /// decoded frames
         /// </summary>
-        [FieldOffset(8)] public ulong frames;
+        [FieldOffset(16)] public ulong frames;
         /// <summary>
         /// decoded frames that are key frames
         /// </summary>
-        [FieldOffset(16)] public ulong keyFrames;
+        [FieldOffset(24)] public ulong keyFrames;
         /// <summary>
         /// frames that never arrived, from gaps between ticks
         /// </summary>
-        [FieldOffset(24)] public ulong dropped;
+        [FieldOffset(32)] public ulong dropped;
         /// <summary>
         /// packets that the decoder refused
         /// </summary>
-        [FieldOffset(32)] public ulong decodeErrors;
+        [FieldOffset(40)] public ulong decodeErrors;
         /// <summary>
         /// bytes of received packets
         /// </summary>
-        [FieldOffset(40)] public ulong bytes;
+        [FieldOffset(48)] public ulong bytes;
         /// <summary>
         /// decoded frames whose hash differs from the server's
         /// </summary>
-        [FieldOffset(48)] public ulong hashMismatches;
+        [FieldOffset(56)] public ulong hashMismatches;
         /// <summary>
         /// over the last second
         /// </summary>
-        [FieldOffset(56)] public double framesPerSecond;
+        [FieldOffset(64)] public double framesPerSecond;
         /// <summary>
         /// over the last second
         /// </summary>
-        [FieldOffset(64)] public double kbitPerSecond;
+        [FieldOffset(72)] public double kbitPerSecond;
         /// <summary>
         /// packet bits per vertex and frame, over all frames
         /// </summary>
-        [FieldOffset(72)] public double bitsPerVertex;
+        [FieldOffset(80)] public double bitsPerVertex;
         /// <summary>
         /// minimum of the last 16 pings
         /// </summary>
-        [FieldOffset(80)] public double roundTripMs;
+        [FieldOffset(88)] public double roundTripMs;
         /// <summary>
         /// server's clock minus own clock, at now_us; 0 before the first pong
         /// </summary>
-        [FieldOffset(88)] public double clockOffsetUs;
+        [FieldOffset(96)] public double clockOffsetUs;
         /// <summary>
         /// decoding time of the newest frame; 0 without a clock (cs_set_clock)
         /// </summary>
-        [FieldOffset(96)] public double decodeMs;
+        [FieldOffset(104)] public double decodeMs;
     }
 
+    /// <summary>
+    /// Time that a frame spends in each stage.
+    /// </summary>
     [StructLayout(LayoutKind.Explicit, Size = 80)]
     public unsafe struct StageStatistics
     {
-        /// <summary>
-        /// CS_STAGE_STATISTICS_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// frames that arrived before their display time
@@ -986,12 +996,13 @@ namespace ClothStream.Core
         [FieldOffset(72)] public double displayableMs;
     }
 
+    /// <summary>
+    /// Performance and state of a cloth's simulation (ClothReport in session.proto). The server sends it a few
+    /// times a second.
+    /// </summary>
     [StructLayout(LayoutKind.Explicit, Size = 56)]
     public unsafe struct ClothReport
     {
-        /// <summary>
-        /// CS_CLOTH_REPORT_VERSION
-        /// </summary>
         [FieldOffset(0)] public uint version;
         /// <summary>
         /// of the last solve; 0 for the mass-spring solver
@@ -1049,9 +1060,15 @@ namespace ClothStream.Core
         const string Library = "clothstream_core";
 
         public const uint CS_PROTOCOL_VERSION = 1;
+        public const uint CS_CLIENT_OPTIONS_VERSION = 1;
         public const uint CS_LIMITS_VERSION = 1;
+        public const uint CS_SCENE_SUMMARY_VERSION = 1;
         public const uint CS_ANSWER_VERSION = 1;
         public const uint CS_MAX_SCENE_BYTES = 268435456;
+        public const uint CS_BAN_VERSION = 1;
+        public const uint CS_CLOTH_VERSION = 1;
+        public const uint CS_SUBMESH_VERSION = 1;
+        public const uint CS_COLLIDER_VERSION = 1;
         public const uint CS_PLAY_OUT_OPTIONS_VERSION = 1;
         public const uint CS_PLAYED_VERSION = 1;
         public const uint CS_DECODED_VERSION = 1;
@@ -1060,20 +1077,27 @@ namespace ClothStream.Core
         public const uint CS_HAND_JOINTS = 26;
         public const uint CS_HAND_BONES = 20;
         public const uint CS_HEAD_ID = 2147483712;
+        public const uint CS_OWN_COLLIDER_VERSION = 1;
+        public const uint CS_CLOTH_POINT_VERSION = 1;
+        public const uint CS_GRAB_VERSION = 1;
+        public const uint CS_GRAB_EVENT_VERSION = 1;
+        public const uint CS_CONTACT_EVENT_VERSION = 1;
+        public const uint CS_ENVIRONMENT_VERSION = 1;
         public const uint CS_CLOTH_SETTINGS_VERSION = 1;
         public const uint CS_COLLIDER_CHANGE_VERSION = 1;
+        public const uint CS_PARTICIPANT_VERSION = 1;
+        public const uint CS_PRESENCE_VERSION = 1;
+        public const uint CS_PAIRING_CODE_VERSION = 1;
+        public const uint CS_PLAYBACK_VERSION = 1;
+        public const uint CS_STATISTICS_VERSION = 1;
         public const uint CS_STAGE_STATISTICS_VERSION = 1;
         public const uint CS_CLOTH_REPORT_VERSION = 1;
 
         /// <summary>
-        /// Creates a client that joins `scene`; "" means the server's default scene. client_name names the program.
-        /// The client's first outgoing message is Hello. Free the client with cs_destroy.
+        /// Creates a client that joins a scene. Its first outgoing message is Hello. Free the client with cs_destroy.
+        /// Returns NULL if the version is unknown.
         /// </summary>
-        [DllImport(Library)] public static extern IntPtr cs_create(byte* scene, byte* clientName);
-        /// <summary>
-        /// Like cs_create, with a name that other participants see (may be "") and the requested cs_role.
-        /// </summary>
-        [DllImport(Library)] public static extern IntPtr cs_create_as(byte* scene, byte* clientName, byte* displayName, uint role);
+        [DllImport(Library)] public static extern IntPtr cs_create(NativeClientOptions* options);
         /// <summary>
         /// Frees the client and all pointers it returned. NULL is allowed.
         /// </summary>
@@ -1220,10 +1244,6 @@ namespace ClothStream.Core
         /// Number of scenes in the last answer.
         /// </summary>
         [DllImport(Library)] public static extern uint cs_scene_count(IntPtr client);
-        /// <summary>
-        /// Returns the name of a scene; "" if the index is out of range.
-        /// </summary>
-        [DllImport(Library)] public static extern byte* cs_scene(IntPtr client, uint index);
         /// <summary>
         /// Fails if the index is out of range.
         /// </summary>
@@ -1409,23 +1429,20 @@ namespace ClothStream.Core
         /// </summary>
         [DllImport(Library)] public static extern int cs_get_played_collider(IntPtr client, uint index, Collider* @out);
         /// <summary>
-        /// Like cs_create_as, for the mirror of a client with the same arguments.
+        /// Like cs_create, for the mirror of a client with the same options.
         /// </summary>
-        [DllImport(Library)] public static extern IntPtr cs_create_mirror(byte* scene, byte* clientName, byte* displayName, uint role);
+        [DllImport(Library)] public static extern IntPtr cs_create_mirror(NativeClientOptions* options);
         /// <summary>
         /// Like cs_receive, for a mirror. `decoded` may be NULL for messages other than frames; a frame is then
         /// skipped. A frame with an unknown version or another number of vertices is skipped too.
         /// </summary>
         [DllImport(Library)] public static extern uint cs_receive_decoded(IntPtr mirror, byte* message, UIntPtr bytes, Decoded* decoded, ulong nowUs);
         /// <summary>
-        /// Replaces the colliders of this participant by `count` spheres {x, y, z, radius}; 0 removes all. At most
-        /// CS_MAX_COLLIDERS are used, and at most 20 if two hands are set; the rest is ignored.
+        /// Replaces the colliders of this participant; a count of 0 removes all. At most CS_MAX_COLLIDERS are used,
+        /// and at most 20 if two hands are set; the rest is ignored. Fails, and changes nothing, if a version is
+        /// unknown.
         /// </summary>
-        [DllImport(Library)] public static extern void cs_set_colliders(IntPtr client, float* spheres, uint count, ulong nowUs);
-        /// <summary>
-        /// Like cs_set_colliders, with any shape and orientation.
-        /// </summary>
-        [DllImport(Library)] public static extern void cs_set_shapes(IntPtr client, OwnCollider* colliders, uint count, ulong nowUs);
+        [DllImport(Library)] public static extern int cs_set_colliders(IntPtr client, OwnCollider* colliders, uint count, ulong nowUs);
         /// <summary>
         /// Replaces one tracked hand; 0 joints remove it. Each joint is {x, y, z, radius} in metres. `count` is
         /// CS_HAND_JOINTS in the order of OpenXR's XrHandJointEXT (palm first), or one less in the order of WebXR's
@@ -1448,9 +1465,10 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern int cs_nearest_point(IntPtr client, float* point3, float maxDistance, ClothPoint* @out);
         [DllImport(Library)] public static extern int cs_cast_ray(IntPtr client, float* origin3, float* direction3, float maxDistance, ClothPoint* @out);
         /// <summary>
-        /// Replaces the grabs of this participant. At most CS_MAX_GRABS are used; the rest is ignored.
+        /// Replaces the grabs of this participant. At most CS_MAX_GRABS are used; the rest is ignored. Fails, and
+        /// changes nothing, if a version is unknown.
         /// </summary>
-        [DllImport(Library)] public static extern void cs_set_grabs(IntPtr client, Grab* grabs, uint count, ulong nowUs);
+        [DllImport(Library)] public static extern int cs_set_grabs(IntPtr client, Grab* grabs, uint count, ulong nowUs);
         /// <summary>
         /// Moves an attachment of the scene; it stays there. orientation4 may be NULL: no rotation. If it jumps, its
         /// cloth goes along at once, however short the way is: use this for teleports and cuts of an animation.
@@ -1487,10 +1505,6 @@ namespace ClothStream.Core
         /// </summary>
         [DllImport(Library)] public static extern int cs_get_environment(IntPtr client, Environment* @out);
         /// <summary>
-        /// Fails if the cloth index is out of range.
-        /// </summary>
-        [DllImport(Library)] public static extern int cs_get_cloth_parameters(IntPtr client, uint index, ClothParameters* @out);
-        /// <summary>
         /// Fails if the cloth index is out of range or `out->version` is unknown.
         /// </summary>
         [DllImport(Library)] public static extern int cs_get_cloth_settings(IntPtr client, uint index, ClothSettings* @out);
@@ -1519,10 +1533,6 @@ namespace ClothStream.Core
         /// </summary>
         [DllImport(Library)] public static extern void cs_set_gust(IntPtr client, float strength, float seconds);
         /// <summary>
-        /// Changes springs ({stiffness, damping}) and damping of a cloth. Each pointer except cloth may be NULL.
-        /// </summary>
-        [DllImport(Library)] public static extern void cs_set_cloth(IntPtr client, byte* cloth, float* structural2, float* shear2, float* bend2, float* damping);
-        /// <summary>
         /// Fills in settings that change nothing, as the start of a change. Sets the version.
         /// </summary>
         [DllImport(Library)] public static extern void cs_keep_cloth_settings(ClothSettings* @out);
@@ -1531,7 +1541,7 @@ namespace ClothStream.Core
         /// else the defaults of scene.proto. Fails before the description, for an unknown version and for an unknown
         /// cloth.
         /// </summary>
-        [DllImport(Library)] public static extern int cs_change_cloth(IntPtr client, byte* cloth, ClothSettings* settings);
+        [DllImport(Library)] public static extern int cs_set_cloth(IntPtr client, byte* cloth, ClothSettings* settings);
         /// <summary>
         /// Applies a material (see cs_material) to a cloth: springs, damping, drag, lift, friction, mass and
         /// solver (XPBD; a cloth with implicit Euler keeps it).
@@ -1542,17 +1552,13 @@ namespace ClothStream.Core
         /// </summary>
         [DllImport(Library)] public static extern void cs_set_areal_mass(IntPtr client, byte* cloth, float arealMass);
         /// <summary>
-        /// Changes position (m) and radius (m) of a collider of the scene. Both pointers may be NULL.
-        /// </summary>
-        [DllImport(Library)] public static extern void cs_set_collider(IntPtr client, byte* collider, float* position3, float* radius);
-        /// <summary>
         /// Fills in a change that changes nothing. Sets the version.
         /// </summary>
         [DllImport(Library)] public static extern void cs_keep_collider(ColliderChange* @out);
         /// <summary>
-        /// Fails if the version is unknown.
+        /// Changes a collider of the scene. Fails if the version is unknown.
         /// </summary>
-        [DllImport(Library)] public static extern int cs_change_collider(IntPtr client, byte* collider, ColliderChange* change);
+        [DllImport(Library)] public static extern int cs_set_collider(IntPtr client, byte* collider, ColliderChange* change);
         /// <summary>
         /// Id of this participant; 0 before Welcome.
         /// </summary>
@@ -1570,9 +1576,10 @@ namespace ClothStream.Core
         /// </summary>
         [DllImport(Library)] public static extern int cs_get_participant(IntPtr client, uint index, Participant* @out);
         /// <summary>
-        /// The change that the newest CS_EVENT_PRESENCE reported. Fails before the first.
+        /// The change that the newest CS_EVENT_PRESENCE reported, and the participant's current state, or its last
+        /// state if it left. Fails before the first. participant may be NULL.
         /// </summary>
-        [DllImport(Library)] public static extern int cs_get_presence(IntPtr client, Presence* @out);
+        [DllImport(Library)] public static extern int cs_get_presence(IntPtr client, Presence* @out, Participant* participant);
         /// <summary>
         /// Requests for owners: change a participant's role, or remove a participant. On success all participants get
         /// CS_EVENT_PRESENCE; on failure this client gets CS_EVENT_ERROR.
@@ -1632,7 +1639,10 @@ namespace ClothStream.Core
         /// Recordings only: whether playback starts again at the end.
         /// </summary>
         [DllImport(Library)] public static extern void cs_set_loop(IntPtr client, int loop);
-        [DllImport(Library)] public static extern void cs_get_statistics(IntPtr client, ulong nowUs, Statistics* @out);
+        /// <summary>
+        /// Fails if `out->version` is unknown.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_get_statistics(IntPtr client, ulong nowUs, Statistics* @out);
         /// <summary>
         /// Quality that the server sends now. It depends on cs_want and on the connection. Fails before the
         /// description; then the quality is 0.

@@ -21,6 +21,7 @@ namespace ClothStream.Core
         uint taken;
         bool isPinched;
         Grab grab;
+        ClothPoint place;
 
         /// <param name="number">Differs between the grabs of a client, 0 to 9.</param>
         public PinchGrab(uint number)
@@ -31,6 +32,8 @@ namespace ClothStream.Core
         public bool IsHolding { get; private set; }
         /// <summary>What to pass to Client.SetGrabs while IsHolding.</summary>
         public Grab Grab { get { return grab; } }
+        /// <summary>Place at which the grab took hold, for Client.SetGrabs.</summary>
+        public ClothPoint Place { get { return place; } }
 
         /// <summary>Takes the newest pose. Position (m) and orientation (quaternion) are those of the stream.</summary>
         /// <param name="strength">Of the pinch, 0 (open) to 1 (closed).</param>
@@ -38,9 +41,9 @@ namespace ClothStream.Core
         {
             bool begins = !isPinched && strength >= TakeAt;
             isPinched = strength >= (isPinched ? ReleaseAt : TakeAt);
-            ClothPoint place;
+            ClothPoint near;
             if (!isPinched) IsHolding = false;
-            else if (begins && client.TryFindNearest(position[0], position[1], position[2], Reach, out place)) Begin(place);
+            else if (begins && client.TryFindNearest(position[0], position[1], position[2], Reach, out near)) Begin(near);
             if (!IsHolding) return;
             fixed (Grab* moved = &grab)
             {
@@ -55,13 +58,13 @@ namespace ClothStream.Core
             isPinched = IsHolding = false;
         }
 
-        void Begin(ClothPoint place)
+        void Begin(ClothPoint near)
         {
             IsHolding = true;
+            place = near;
             grab = new Grab
             {
-                id = firstId + taken++ % IdsPerHand, radius = float.NaN, reach = float.NaN, maxForce = float.NaN, slipDistance = float.NaN,
-                hasPlace = 1, place = place
+                id = firstId + taken++ % IdsPerHand, radius = float.NaN, reach = float.NaN, maxForce = float.NaN, slipDistance = float.NaN
             };
         }
     }

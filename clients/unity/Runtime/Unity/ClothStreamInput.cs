@@ -34,6 +34,7 @@ namespace ClothStream
 
         readonly PinchGrab[] grabs = { new PinchGrab(0), new PinchGrab(1) };
         readonly Grab[] held = new Grab[2];
+        readonly ClothPoint[] heldPlaces = new ClothPoint[2];
         readonly float[] joints = new float[4 * Joints], position = new float[3], orientation = new float[4];
         readonly OwnCollider[] spheres = new OwnCollider[2];
         readonly Vector3[] places = new Vector3[Joints];
@@ -66,10 +67,12 @@ namespace ClothStream
                 }
                 if (isTracked) UpdateGrab(client, grabs[i], sample);
                 else grabs[i].Release();
-                if (grabs[i].IsHolding) held[count++] = grabs[i].Grab;
+                if (!grabs[i].IsHolding) continue;
+                held[count] = grabs[i].Grab;
+                heldPlaces[count++] = grabs[i].Place;
             }
             client.SetShapes(spheres, sphereCount, nowUs);
-            client.SetGrabs(held, count, nowUs);
+            client.SetGrabs(held, heldPlaces, count, nowUs);
             if (head == null) return;
             Store(connection.ToStream(head.position), connection.ToStream(head.rotation));
             client.SetHead(position, orientation, headRadius, nowUs);
@@ -83,7 +86,7 @@ namespace ClothStream
             ulong nowUs = Client.NowUs;
             foreach (HandSide side in Sides) client.SetHand(side, NoJoints, nowUs);
             client.SetShapes(spheres, 0, nowUs);
-            client.SetGrabs(held, 0, nowUs);
+            client.SetGrabs(held, null, 0, nowUs);
             client.SetHead(null, null, headRadius, nowUs);
         }
 

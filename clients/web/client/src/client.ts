@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // One client of the core, or a mirror of it (core.h): messages in and out, and what it knows of the scene.
 
-import { CS_DECODED_VERSION, cs_decoded } from "./layout";
+import { CS_CLIENT_OPTIONS_VERSION, CS_DECODED_VERSION, cs_client_options, cs_decoded } from "./layout";
 import { CoreHandle, nowUs } from "./handle";
 import { Frames } from "./frames";
 import { Input } from "./input";
@@ -47,9 +47,18 @@ export class Client {
     program: string,
     { name, role }: Identity,
   ) {
-    const { cs_create_as, cs_create_mirror } = core.exports;
-    const create = kind === "mirror" ? cs_create_mirror : cs_create_as;
-    const pointer = core.with([scene, program, name], (where, what, who) => create(where!, what!, who!, role));
+    const { cs_create, cs_create_mirror } = core.exports;
+    const options = core.allocate(cs_client_options.sizeof);
+    const pointer = core.with([scene, program, name], (where, what, who) => {
+      const view = core.view();
+      view.setUint32(options + cs_client_options.version, CS_CLIENT_OPTIONS_VERSION, true);
+      view.setUint32(options + cs_client_options.role, role, true);
+      view.setUint32(options + cs_client_options.scene, where!, true);
+      view.setUint32(options + cs_client_options.client_name, what!, true);
+      view.setUint32(options + cs_client_options.display_name, who!, true);
+      return kind === "mirror" ? cs_create_mirror(options) : cs_create(options);
+    });
+    core.exports.free(options);
     if (pointer === 0) throw new Error("The client core has no memory left for another client");
     this.handle = new CoreHandle(core, pointer);
     this.inbox = new Buffer(core, (pointer, count) => core.bytes(pointer, count));

@@ -40,8 +40,8 @@ export class Settings {
 
   // Settings of a cloth by its index; undefined before the description.
   of(cloth: number): ClothSettings | undefined {
-    this.handle.core.view().setUint32(this.handle.scratch + cs_cloth_settings.version, CS_CLOTH_SETTINGS_VERSION, true);
-    if (this.handle.core.exports.cs_get_cloth_settings(this.handle.pointer, cloth, this.handle.scratch) === 0) return undefined;
+    const at = this.handle.prepared(CS_CLOTH_SETTINGS_VERSION);
+    if (this.handle.core.exports.cs_get_cloth_settings(this.handle.pointer, cloth, at) === 0) return undefined;
     const view = this.handle.core.view();
     const real = (offset: number): number | undefined => {
       const value = view.getFloat32(this.handle.scratch + offset, true);
@@ -75,7 +75,7 @@ export class Settings {
     if (change.iterations !== undefined) view.setUint32(this.handle.scratch + cs_cloth_settings.iterations, change.iterations, true);
     for (const name of ["bendConstraints", "assembled"] as const)
       if (change[name] !== undefined) view.setInt32(this.handle.scratch + kFlags[name], change[name] ? 1 : 0, true);
-    this.handle.core.with([cloth], (name) => this.handle.core.exports.cs_change_cloth(this.handle.pointer, name!, this.handle.scratch));
+    this.handle.core.with([cloth], (name) => this.handle.core.exports.cs_set_cloth(this.handle.pointer, name!, this.handle.scratch));
   }
 
   changeAir({ gravity, wind, airDensity }: AirChange): void {

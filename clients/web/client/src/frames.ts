@@ -2,7 +2,19 @@
 // The geometry of the newest frame and of the frame that is shown, and points of it. Returned views point into the
 // core's memory, and are valid until the next call.
 
-import { CS_STAGE_STATISTICS_VERSION, cs_cloth, cs_cloth_point, cs_stage_statistics, cs_statistics, cs_submesh } from "./layout";
+import {
+  CS_CLOTH_POINT_VERSION,
+  CS_CLOTH_VERSION,
+  CS_COLLIDER_VERSION,
+  CS_STAGE_STATISTICS_VERSION,
+  CS_STATISTICS_VERSION,
+  CS_SUBMESH_VERSION,
+  cs_cloth,
+  cs_cloth_point,
+  cs_stage_statistics,
+  cs_statistics,
+  cs_submesh,
+} from "./layout";
 import { microseconds, nowUs, vec3, type CoreHandle } from "./handle";
 import { readCollider, ShownColliders } from "./shown_colliders";
 import { KeptView } from "./wasm";
@@ -51,9 +63,10 @@ export class Frames {
   }
   // Packets that the decoder refused.
   get decodeErrors(): number {
-    const { core, pointer, scratch } = this.handle;
-    core.exports.cs_get_statistics(pointer, 0n, scratch);
-    return Number(core.view().getBigUint64(scratch + cs_statistics.decode_errors, true));
+    const { core, pointer } = this.handle;
+    const at = this.handle.prepared(CS_STATISTICS_VERSION);
+    core.exports.cs_get_statistics(pointer, 0n, at);
+    return Number(core.view().getBigUint64(at + cs_statistics.decode_errors, true));
   }
 
   // Frames per second of the stream.
@@ -101,7 +114,8 @@ export class Frames {
   }
 
   cloths(): ClothLayout[] {
-    return this.handle.list(this.handle.core.exports.cs_cloth_count(this.handle.pointer), this.handle.core.exports.cs_get_cloth, (view, at) => ({
+    const { exports } = this.handle.core;
+    return this.handle.list(exports.cs_cloth_count(this.handle.pointer), CS_CLOTH_VERSION, exports.cs_get_cloth, (view, at) => ({
       name: this.handle.core.text(view.getUint32(at + cs_cloth.name, true)),
       firstVertex: view.getUint32(at + cs_cloth.first_vertex, true),
       vertexCount: view.getUint32(at + cs_cloth.vertex_count, true),
@@ -123,7 +137,7 @@ export class Frames {
     return {
       uvs: this.handle.core.floats(uvs, 2 * uvCount).slice(),
       uvIndices: this.handle.core.indices(uvIndices, indexCount).slice(),
-      submeshes: this.handle.list(exports.cs_submesh_count(this.handle.pointer, cloth), submesh, (view, at) => ({
+      submeshes: this.handle.list(exports.cs_submesh_count(this.handle.pointer, cloth), CS_SUBMESH_VERSION, submesh, (view, at) => ({
         name: this.handle.core.text(view.getUint32(at + cs_submesh.name, true)),
         firstIndex: view.getUint32(at + cs_submesh.first_index, true),
         indexCount: view.getUint32(at + cs_submesh.index_count, true),
@@ -134,7 +148,9 @@ export class Frames {
   // Colliders of the newest frame.
   colliders(): Collider[] {
     const { cs_collider_count, cs_get_collider } = this.handle.core.exports;
-    return this.handle.list(cs_collider_count(this.handle.pointer), cs_get_collider, (view, at, index) => readCollider(this.handle, view, at, index));
+    return this.handle.list(cs_collider_count(this.handle.pointer), CS_COLLIDER_VERSION, cs_get_collider, (view, at, index) =>
+      readCollider(this.handle, view, at, index),
+    );
   }
 
   // Colliders at the time of the last showAt(). The next call overwrites the list and its objects.
@@ -166,17 +182,17 @@ export class Frames {
 
   // Finds the first point of the shown cloth that a ray meets. The direction has length 1.
   castRay(origin: Vec3, direction: Vec3): ClothPoint | undefined {
-    const { core, pointer, scratch } = this.handle;
-    const found = core.with([origin, direction], (from, along) =>
-      core.exports.cs_cast_ray(pointer, from!, along!, kFarthestPoint, scratch),
-    );
+    const { core, pointer } = this.handle;
+    const out = this.handle.prepared(CS_CLOTH_POINT_VERSION);
+    const found = core.with([origin, direction], (from, along) => core.exports.cs_cast_ray(pointer, from!, along!, kFarthestPoint, out));
     return found ? this.point() : undefined;
   }
 
   // Finds the point of the shown cloth that is nearest to a point, within a distance in metres.
   nearestPoint(point: Vec3, maxDistance: number): ClothPoint | undefined {
-    const { core, pointer, scratch } = this.handle;
-    const found = core.with([point], (at) => core.exports.cs_nearest_point(pointer, at!, maxDistance, scratch));
+    const { core, pointer } = this.handle;
+    const out = this.handle.prepared(CS_CLOTH_POINT_VERSION);
+    const found = core.with([point], (at) => core.exports.cs_nearest_point(pointer, at!, maxDistance, out));
     return found ? this.point() : undefined;
   }
 
@@ -193,8 +209,7 @@ export class Frames {
   // Times of the newest frame and of play-out.
   stages(): Stages | undefined {
     const { scratch, pointer, core } = this.handle;
-    core.view().setUint32(scratch + cs_stage_statistics.version, CS_STAGE_STATISTICS_VERSION, true);
-    if (core.exports.cs_get_stage_statistics(pointer, scratch) === 0) return undefined;
+    if (core.exports.cs_get_stage_statistics(pointer, this.handle.prepared(CS_STAGE_STATISTICS_VERSION)) === 0) return undefined;
     const view = core.view();
     const real = (offset: number) => view.getFloat64(scratch + offset, true);
     return {
@@ -212,7 +227,7 @@ export class Frames {
   }
 
   statistics(): Statistics {
-    this.handle.core.exports.cs_get_statistics(this.handle.pointer, nowUs(), this.handle.scratch);
+    this.handle.core.exports.cs_get_statistics(this.handle.pointer, nowUs(), this.handle.prepared(CS_STATISTICS_VERSION));
     const view = this.handle.core.view();
     const count = (offset: number) => Number(view.getBigUint64(this.handle.scratch + offset, true));
     const real = (offset: number) => view.getFloat64(this.handle.scratch + offset, true);

@@ -6,8 +6,7 @@ export type Pointer = number;
 
 // clients/core/core.h
 export interface CoreFunctions {
-  cs_create(scene: Pointer, clientName: Pointer): Pointer;
-  cs_create_as(scene: Pointer, clientName: Pointer, displayName: Pointer, role: number): Pointer;
+  cs_create(options: Pointer): Pointer;
   cs_destroy(client: Pointer): void;
   cs_want(client: Pointer, quality: number): void;
   cs_set_token(client: Pointer, token: Pointer): void;
@@ -39,7 +38,6 @@ export interface CoreFunctions {
   cs_scene_name(client: Pointer): Pointer;
   cs_list_scenes(client: Pointer): void;
   cs_scene_count(client: Pointer): number;
-  cs_scene(client: Pointer, index: number): Pointer;
   cs_get_scene(client: Pointer, index: number, out: Pointer): number;
   cs_get_answer(client: Pointer, out: Pointer): number;
   cs_create_scene(client: Pointer, scene: Pointer, bytes: number, name: Pointer, maxParticipants: number): bigint;
@@ -83,15 +81,14 @@ export interface CoreFunctions {
   cs_played_normals(client: Pointer): Pointer;
   cs_played_collider_count(client: Pointer): number;
   cs_get_played_collider(client: Pointer, index: number, out: Pointer): number;
-  cs_create_mirror(scene: Pointer, clientName: Pointer, displayName: Pointer, role: number): Pointer;
+  cs_create_mirror(options: Pointer): Pointer;
   cs_receive_decoded(mirror: Pointer, message: Pointer, bytes: number, decoded: Pointer, nowUs: bigint): number;
-  cs_set_colliders(client: Pointer, spheres: Pointer, count: number, nowUs: bigint): void;
-  cs_set_shapes(client: Pointer, colliders: Pointer, count: number, nowUs: bigint): void;
+  cs_set_colliders(client: Pointer, colliders: Pointer, count: number, nowUs: bigint): number;
   cs_set_hand(client: Pointer, side: number, joints: Pointer, count: number, nowUs: bigint): number;
   cs_set_head(client: Pointer, position3: Pointer, orientation4: Pointer, radius: number, nowUs: bigint): void;
   cs_nearest_point(client: Pointer, point3: Pointer, maxDistance: number, out: Pointer): number;
   cs_cast_ray(client: Pointer, origin3: Pointer, direction3: Pointer, maxDistance: number, out: Pointer): number;
-  cs_set_grabs(client: Pointer, grabs: Pointer, count: number, nowUs: bigint): void;
+  cs_set_grabs(client: Pointer, grabs: Pointer, count: number, nowUs: bigint): number;
   cs_move_attachment(client: Pointer, attachment: Pointer, position3: Pointer, orientation4: Pointer, jumps: number, nowUs: bigint): void;
   cs_move_joints(client: Pointer, collider: Pointer, poses: Pointer, count: number, nowUs: bigint): void;
   cs_grab_event_count(client: Pointer): number;
@@ -100,7 +97,6 @@ export interface CoreFunctions {
   cs_contact_event_count(client: Pointer): number;
   cs_get_contact_event(client: Pointer, index: number, out: Pointer): number;
   cs_get_environment(client: Pointer, out: Pointer): number;
-  cs_get_cloth_parameters(client: Pointer, index: number, out: Pointer): number;
   cs_get_cloth_settings(client: Pointer, index: number, out: Pointer): number;
   cs_material_count(client: Pointer): number;
   cs_material(client: Pointer, index: number): Pointer;
@@ -108,19 +104,17 @@ export interface CoreFunctions {
   cs_parameters_participant(client: Pointer): bigint;
   cs_set_environment(client: Pointer, gravity3: Pointer, wind3: Pointer, airDensity: Pointer): void;
   cs_set_gust(client: Pointer, strength: number, seconds: number): void;
-  cs_set_cloth(client: Pointer, cloth: Pointer, structural2: Pointer, shear2: Pointer, bend2: Pointer, damping: Pointer): void;
   cs_keep_cloth_settings(out: Pointer): void;
-  cs_change_cloth(client: Pointer, cloth: Pointer, settings: Pointer): number;
+  cs_set_cloth(client: Pointer, cloth: Pointer, settings: Pointer): number;
   cs_set_material(client: Pointer, cloth: Pointer, material: Pointer): void;
   cs_set_areal_mass(client: Pointer, cloth: Pointer, arealMass: number): void;
-  cs_set_collider(client: Pointer, collider: Pointer, position3: Pointer, radius: Pointer): void;
   cs_keep_collider(out: Pointer): void;
-  cs_change_collider(client: Pointer, collider: Pointer, change: Pointer): number;
+  cs_set_collider(client: Pointer, collider: Pointer, change: Pointer): number;
   cs_participant_id(client: Pointer): bigint;
   cs_get_role(client: Pointer): number;
   cs_participant_count(client: Pointer): number;
   cs_get_participant(client: Pointer, index: number, out: Pointer): number;
-  cs_get_presence(client: Pointer, out: Pointer): number;
+  cs_get_presence(client: Pointer, out: Pointer, participant: Pointer): number;
   cs_set_role(client: Pointer, participantId: bigint, role: number): void;
   cs_remove_participant(client: Pointer, participantId: bigint): void;
   cs_ban_participant(client: Pointer, participantId: bigint): void;
@@ -135,7 +129,7 @@ export interface CoreFunctions {
   cs_seek(client: Pointer, seconds: number): void;
   cs_set_speed(client: Pointer, speed: number): void;
   cs_set_loop(client: Pointer, loop: number): void;
-  cs_get_statistics(client: Pointer, nowUs: bigint, out: Pointer): void;
+  cs_get_statistics(client: Pointer, nowUs: bigint, out: Pointer): number;
   cs_get_quality(client: Pointer, quality: Pointer): number;
   cs_stream_seconds(client: Pointer): number;
   cs_get_stage_statistics(client: Pointer, out: Pointer): number;

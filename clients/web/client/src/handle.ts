@@ -18,13 +18,21 @@ export class CoreHandle {
     this.scratch = core.allocate(kScratchBytes);
   }
 
-  // Calls `get` for each index, and reads the structs that it writes.
+  // Prepares the scratch memory for a struct of this version, and returns it.
+  prepared(version: number): number {
+    this.core.view().setUint32(this.scratch, version, true); // the first member of each struct
+    return this.scratch;
+  }
+
+  // Calls `get` for each index, and reads the structs of this version that it writes.
   list<Item>(
     count: number,
+    version: number,
     get: (client: number, index: number, out: number) => number,
     read: (view: DataView, at: number, index: number) => Item,
   ): Item[] {
     const items: Item[] = [];
+    this.prepared(version);
     for (let index = 0; index < count; ++index) {
       if (get(this.pointer, index, this.scratch) !== 0) items.push(read(this.core.view(), this.scratch, index));
     }
@@ -50,6 +58,10 @@ export function microseconds(milliseconds: number): bigint {
 export function readFloats<Numbers extends number[]>(view: DataView, at: number, out: Numbers): Numbers {
   for (let i = 0; i < out.length; ++i) out[i] = view.getFloat32(at + 4 * i, true);
   return out;
+}
+
+export function writeFloats(view: DataView, at: number, values: readonly number[]): void {
+  for (let i = 0; i < values.length; ++i) view.setFloat32(at + 4 * i, values[i]!, true);
 }
 
 export function vec3(view: DataView, at: number): [number, number, number] {

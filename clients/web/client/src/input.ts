@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Colliders, hands and grabs of this participant, and joints of the scene's colliders.
 
-import { cs_cloth_point, cs_grab, cs_grab_event, cs_own_collider } from "./layout";
-import { nowUs, type CoreHandle } from "./handle";
+import { CS_GRAB_EVENT_VERSION, CS_GRAB_VERSION, CS_OWN_COLLIDER_VERSION, cs_cloth_point, cs_grab, cs_grab_event, cs_own_collider } from "./layout";
+import { nowUs, writeFloats, type CoreHandle } from "./handle";
 import { HandSide, kMaxColliders, kMaxGrabs, type Grab, type GrabEvent, type Head, type OwnCollider } from "./types";
 
 const kJointFloats = 4; // x, y, z, radius
@@ -12,7 +12,7 @@ const kPoseFloats = 7; // position, quaternion x, y, z, w
 // Events of all participants' grabs in the newest ClientEvent.grabs.
 export function readGrabEvents(handle: CoreHandle): (GrabEvent & { participant: bigint })[] {
   const { core, pointer } = handle;
-  return handle.list(core.exports.cs_grab_event_count(pointer), core.exports.cs_get_grab_event, (view, at) => ({
+  return handle.list(core.exports.cs_grab_event_count(pointer), CS_GRAB_EVENT_VERSION, core.exports.cs_get_grab_event, (view, at) => ({
     participant: view.getBigUint64(at + cs_grab_event.participant_id, true),
     grab: view.getUint32(at + cs_grab_event.grab_id, true),
     vertices: view.getUint32(at + cs_grab_event.vertices, true),
@@ -22,12 +22,12 @@ export function readGrabEvents(handle: CoreHandle): (GrabEvent & { participant: 
 }
 
 export class Input {
-  // Arrays of structs for a call: as large as the largest of them.
+  // Arrays of structs for a call: as large as the largest of them. Places of grabs follow the grabs.
   private readonly array: number;
 
   constructor(private readonly handle: CoreHandle) {
     this.array = handle.core.allocate(
-      Math.max(kMaxColliders * cs_own_collider.sizeof, kMaxGrabs * cs_grab.sizeof, kHandJoints * kJointFloats * 4),
+      Math.max(kMaxColliders * cs_own_collider.sizeof, kMaxGrabs * (cs_grab.sizeof + cs_cloth_point.sizeof), kHandJoints * kJointFloats * 4),
     );
   }
 
@@ -44,14 +44,16 @@ export class Input {
     const view = core.view();
     grabs.slice(0, kMaxGrabs).forEach((grab, index) => {
       const at = this.array + index * cs_grab.sizeof;
+      const place = this.array + kMaxGrabs * cs_grab.sizeof + index * cs_cloth_point.sizeof;
+      view.setUint32(at + cs_grab.version, CS_GRAB_VERSION, true);
       view.setUint32(at + cs_grab.id, grab.id, true);
       writeFloats(view, at + cs_grab.position, grab.position);
       writeFloats(view, at + cs_grab.orientation, grab.orientation ?? kNoRotation);
       // NaN: the server's default.
       for (const offset of [cs_grab.radius, cs_grab.reach, cs_grab.max_force, cs_grab.slip_distance])
         view.setFloat32(at + offset, NaN, true);
-      view.setUint32(at + cs_grab.has_place, 1, true);
-      core.bytes(at + cs_grab.place, cs_cloth_point.sizeof).set(grab.place);
+      view.setUint32(at + cs_grab.place, place, true);
+      core.bytes(place, cs_cloth_point.sizeof).set(grab.place);
     });
     core.exports.cs_set_grabs(pointer, this.array, Math.min(grabs.length, kMaxGrabs), nowUs());
   }
@@ -62,14 +64,16 @@ export class Input {
     const view = core.view();
     colliders.slice(0, kMaxColliders).forEach((collider, index) => {
       const at = this.array + index * cs_own_collider.sizeof;
+      view.setUint32(at + cs_own_collider.version, CS_OWN_COLLIDER_VERSION, true);
       view.setUint32(at + cs_own_collider.shape, collider.shape, true);
       writeFloats(view, at + cs_own_collider.position, collider.position);
       writeFloats(view, at + cs_own_collider.orientation, collider.orientation ?? kNoRotation);
       view.setFloat32(at + cs_own_collider.radius, collider.radius ?? 0, true);
+      view.setFloat32(at + cs_own_collider.top_radius, collider.topRadius ?? 0, true);
       view.setFloat32(at + cs_own_collider.length, collider.length ?? 0, true);
       writeFloats(view, at + cs_own_collider.size, collider.size ?? kNoSize);
     });
-    core.exports.cs_set_shapes(pointer, this.array, Math.min(colliders.length, kMaxColliders), nowUs());
+    core.exports.cs_set_colliders(pointer, this.array, Math.min(colliders.length, kMaxColliders), nowUs());
   }
 
   // Replaces one tracked hand by 25 joints in the order of XRHand: x, y, z, radius of each. Undefined removes it.
@@ -104,7 +108,3 @@ export class Input {
 
 const kNoRotation = [0, 0, 0, 0] as const;
 const kNoSize = [0, 0, 0] as const;
-
-function writeFloats(view: DataView, at: number, values: readonly number[]): void {
-  for (let i = 0; i < values.length; ++i) view.setFloat32(at + 4 * i, values[i]!, true);
-}

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Environment, materials, solvers and reports of the cloths.
 
-import { CS_CLOTH_REPORT_VERSION, CS_CLOTH_SETTINGS_VERSION, cs_cloth_parameters, cs_cloth_report, cs_cloth_settings, cs_collider_change, cs_environment } from "./layout";
-import { nowUs, spring, vec3, type CoreHandle } from "./handle";
+import { CS_CLOTH_REPORT_VERSION, CS_CLOTH_SETTINGS_VERSION, CS_ENVIRONMENT_VERSION, cs_cloth_report, cs_cloth_settings, cs_collider_change, cs_environment } from "./layout";
+import { nowUs, spring, vec3, writeFloats, type CoreHandle } from "./handle";
 import type { ClothParameters, ClothReport, ColliderChange, Environment, Vec3 } from "./types";
 
 export class Parameters {
@@ -10,7 +10,7 @@ export class Parameters {
 
   // Current environment; undefined before the description.
   environment(): Environment | undefined {
-    if (this.handle.core.exports.cs_get_environment(this.handle.pointer, this.handle.scratch) === 0) return undefined;
+    if (this.handle.core.exports.cs_get_environment(this.handle.pointer, this.handle.prepared(CS_ENVIRONMENT_VERSION)) === 0) return undefined;
     const view = this.handle.core.view();
     return {
       gravity: vec3(view, this.handle.scratch + cs_environment.gravity),
@@ -24,18 +24,18 @@ export class Parameters {
   // Current parameters of each cloth.
   clothParameters(): ClothParameters[] {
     const count = this.handle.core.exports.cs_cloth_count(this.handle.pointer);
-    return this.handle.list(count, this.handle.core.exports.cs_get_cloth_parameters, (view, at) => ({
-      structural: spring(view, at + cs_cloth_parameters.structural),
-      shear: spring(view, at + cs_cloth_parameters.shear),
-      bend: spring(view, at + cs_cloth_parameters.bend),
-      damping: view.getFloat32(at + cs_cloth_parameters.damping, true),
+    return this.handle.list(count, CS_CLOTH_SETTINGS_VERSION, this.handle.core.exports.cs_get_cloth_settings, (view, at) => ({
+      structural: spring(view, at + cs_cloth_settings.structural),
+      shear: spring(view, at + cs_cloth_settings.shear),
+      bend: spring(view, at + cs_cloth_settings.bend),
+      damping: view.getFloat32(at + cs_cloth_settings.damping, true),
     }));
   }
 
   // Solver of a cloth as a cs_solver.
   solver(cloth: number): number {
-    this.handle.core.view().setUint32(this.handle.scratch + cs_cloth_settings.version, CS_CLOTH_SETTINGS_VERSION, true);
-    if (this.handle.core.exports.cs_get_cloth_settings(this.handle.pointer, cloth, this.handle.scratch) === 0) return 0;
+    const at = this.handle.prepared(CS_CLOTH_SETTINGS_VERSION);
+    if (this.handle.core.exports.cs_get_cloth_settings(this.handle.pointer, cloth, at) === 0) return 0;
     return this.handle.core.view().getUint32(this.handle.scratch + cs_cloth_settings.solver, true);
   }
 
@@ -43,7 +43,7 @@ export class Parameters {
   setSolver(cloth: string, solver: number): void {
     this.handle.core.exports.cs_keep_cloth_settings(this.handle.scratch);
     this.handle.core.view().setUint32(this.handle.scratch + cs_cloth_settings.solver, solver, true);
-    this.handle.core.with([cloth], (name) => this.handle.core.exports.cs_change_cloth(this.handle.pointer, name!, this.handle.scratch));
+    this.handle.core.with([cloth], (name) => this.handle.core.exports.cs_set_cloth(this.handle.pointer, name!, this.handle.scratch));
   }
 
   // Names of the available materials. material() is the material of a cloth, or "".
@@ -66,8 +66,8 @@ export class Parameters {
 
   // Newest report of a cloth; undefined before the first.
   report(cloth: number): ClothReport | undefined {
-    this.handle.core.view().setUint32(this.handle.scratch + cs_cloth_report.version, CS_CLOTH_REPORT_VERSION, true);
-    if (this.handle.core.exports.cs_get_cloth_report(this.handle.pointer, cloth, this.handle.scratch) === 0) return undefined;
+    const at = this.handle.prepared(CS_CLOTH_REPORT_VERSION);
+    if (this.handle.core.exports.cs_get_cloth_report(this.handle.pointer, cloth, at) === 0) return undefined;
     const view = this.handle.core.view();
     const real = (offset: number) => view.getFloat32(this.handle.scratch + offset, true);
     return {
@@ -107,10 +107,13 @@ export class Parameters {
 
   // Changes a cloth. An empty name means every cloth.
   setCloth(cloth: string, change: Partial<ClothParameters>): void {
-    const damping = change.damping === undefined ? undefined : [change.damping];
-    this.handle.core.with([cloth, change.structural, change.shear, change.bend, damping], (name, structural, shear, bend, rate) =>
-      this.handle.core.exports.cs_set_cloth(this.handle.pointer, name!, structural!, shear!, bend!, rate!),
-    );
+    const { scratch } = this.handle;
+    this.handle.core.exports.cs_keep_cloth_settings(scratch);
+    const view = this.handle.core.view();
+    for (const name of ["structural", "shear", "bend"] as const)
+      if (change[name]) writeFloats(view, scratch + cs_cloth_settings[name], change[name]);
+    if (change.damping !== undefined) view.setFloat32(scratch + cs_cloth_settings.damping, change.damping, true);
+    this.handle.core.with([cloth], (name) => this.handle.core.exports.cs_set_cloth(this.handle.pointer, name!, scratch));
   }
 
   // Changes the mass per area of a cloth, kg/m^2. An empty name means every cloth.
@@ -122,8 +125,7 @@ export class Parameters {
   setCollider(collider: string, change: ColliderChange): void {
     this.handle.core.exports.cs_keep_collider(this.handle.scratch);
     const view = this.handle.core.view();
-    const set = (offset: number, values: readonly number[]) =>
-      values.forEach((value, i) => view.setFloat32(this.handle.scratch + offset + 4 * i, value, true));
+    const set = (offset: number, values: readonly number[]) => writeFloats(view, this.handle.scratch + offset, values);
     const { position, orientation, radius, length, size, friction } = change;
     if (position) set(cs_collider_change.position, position);
     if (orientation) set(cs_collider_change.orientation, orientation);
@@ -131,6 +133,6 @@ export class Parameters {
     if (length !== undefined) set(cs_collider_change.length, [length]);
     if (size) set(cs_collider_change.size, size);
     if (friction !== undefined) set(cs_collider_change.friction, [friction]);
-    this.handle.core.with([collider], (name) => this.handle.core.exports.cs_change_collider(this.handle.pointer, name!, this.handle.scratch));
+    this.handle.core.with([collider], (name) => this.handle.core.exports.cs_set_collider(this.handle.pointer, name!, this.handle.scratch));
   }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Participants of the scene, and codes by which others join.
 
-import { cs_pairing_code, cs_participant } from "./layout";
+import { CS_PAIRING_CODE_VERSION, CS_PARTICIPANT_VERSION, cs_pairing_code, cs_participant } from "./layout";
 import type { CoreHandle } from "./handle";
 import type { PairingCode, Participant } from "./types";
 
@@ -14,7 +14,7 @@ export class People {
   }
   // The newest code.
   pairingCode(): PairingCode | undefined {
-    if (this.handle.core.exports.cs_get_pairing_code(this.handle.pointer, this.handle.scratch) === 0) return undefined;
+    if (this.handle.core.exports.cs_get_pairing_code(this.handle.pointer, this.handle.prepared(CS_PAIRING_CODE_VERSION)) === 0) return undefined;
     const view = this.handle.core.view();
     return {
       code: this.handle.core.text(view.getUint32(this.handle.scratch + cs_pairing_code.code, true)),
@@ -27,7 +27,7 @@ export class People {
   participants(): Participant[] {
     const own = this.handle.core.exports.cs_participant_id(this.handle.pointer);
     const count = this.handle.core.exports.cs_participant_count(this.handle.pointer);
-    return this.handle.list(count, this.handle.core.exports.cs_get_participant, (view, at) => {
+    return this.handle.list(count, CS_PARTICIPANT_VERSION, this.handle.core.exports.cs_get_participant, (view, at) => {
       const id = view.getBigUint64(at + cs_participant.id, true);
       const program = this.handle.core.text(view.getUint32(at + cs_participant.client_name, true));
       return {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The clock of the scene and of a recording.
 
-import { cs_playback } from "./layout";
+import { CS_PLAYBACK_VERSION, cs_playback } from "./layout";
 import { nowUs, type CoreHandle } from "./handle";
 import type { Playback } from "./types";
 
@@ -10,7 +10,7 @@ export class PlaybackControl {
 
   // State of the playback; undefined unless the scene is a recording.
   state(): Playback | undefined {
-    if (this.handle.core.exports.cs_get_playback(this.handle.pointer, nowUs(), this.handle.scratch) === 0) return undefined;
+    if (this.handle.core.exports.cs_get_playback(this.handle.pointer, nowUs(), this.handle.prepared(CS_PLAYBACK_VERSION)) === 0) return undefined;
     const view = this.handle.core.view();
     return {
       length: view.getFloat64(this.handle.scratch + cs_playback.length, true),

@@ -3,6 +3,8 @@
 
 import { decompress } from "fzstd";
 import {
+  CS_RECORDED_COLLIDER_VERSION,
+  CS_RECORDED_GRAB_VERSION,
   CS_RECORDED_TICK_VERSION,
   CS_RECORDED_VERSION,
   CS_RECORDING_FAULTS_VERSION,
@@ -196,7 +198,7 @@ export class Recording {
   }
 
   get info(): RecordingInfo {
-    const at = this.prepared(CS_RECORDING_INFO_VERSION);
+    const at = this.handle.prepared(CS_RECORDING_INFO_VERSION);
     this.core.exports.cs_recording_get_info(this.pointer, at);
     const view = this.core.view();
     return {
@@ -211,7 +213,7 @@ export class Recording {
 
   // Counts of frames with faults. A recording that was read without an error has none.
   get faults(): RecordingFaults {
-    const at = this.prepared(CS_RECORDING_FAULTS_VERSION);
+    const at = this.handle.prepared(CS_RECORDING_FAULTS_VERSION);
     this.core.exports.cs_recording_get_faults(this.pointer, at);
     const view = this.core.view();
     return {
@@ -232,7 +234,7 @@ export class Recording {
   // cannot be decoded or differs from its recorded hash; the next call continues after it. The frames that depend on
   // such a frame are left out without a further error; `faults` counts them.
   next(kinds: number = Recorded.frame): RecordedMessage | undefined {
-    const out = this.prepared(CS_RECORDED_VERSION);
+    const out = this.handle.prepared(CS_RECORDED_VERSION);
     const result = this.core.exports.cs_recording_next(this.pointer, kinds, out);
     if (result < 0) throw this.error();
     return result === 0 ? undefined : this.message(out);
@@ -241,14 +243,14 @@ export class Recording {
   // Goes to the newest frame at or before a time, in seconds since the start; undefined without such a
   // frame. Throws if it cannot be read, or if a frame between it and its key frame has a fault.
   seek(seconds: number): RecordedMessage | undefined {
-    const out = this.prepared(CS_RECORDED_VERSION);
+    const out = this.handle.prepared(CS_RECORDED_VERSION);
     if (this.core.exports.cs_recording_seek(this.pointer, seconds, out) === 0) throw this.error();
     return this.message(out);
   }
 
   // Like seek(), to the newest frame with this tick or an earlier one.
   seekTick(tick: bigint): RecordedMessage | undefined {
-    const out = this.prepared(CS_RECORDED_VERSION);
+    const out = this.handle.prepared(CS_RECORDED_VERSION);
     if (this.core.exports.cs_recording_seek_tick(this.pointer, tick, out) === 0) throw this.error();
     return this.message(out);
   }
@@ -276,7 +278,7 @@ export class Recording {
 
   // The newest tick of the journal; undefined before the first.
   tick(): RecordedTick | undefined {
-    const at = this.prepared(CS_RECORDED_TICK_VERSION);
+    const at = this.handle.prepared(CS_RECORDED_TICK_VERSION);
     const { exports } = this.core;
     if (exports.cs_recording_get_tick(this.pointer, at) === 0) return undefined;
     const view = this.core.view();
@@ -295,9 +297,9 @@ export class Recording {
     };
     return {
       ...tick,
-      colliders: this.list(colliders!, exports.cs_recording_get_collider, readCollider),
-      attachments: this.list(attachments!, exports.cs_recording_get_attachment, readPose),
-      grabs: this.list(grabs!, exports.cs_recording_get_grab, readGrab),
+      colliders: this.list(colliders!, this.handle.prepared(CS_RECORDED_COLLIDER_VERSION), exports.cs_recording_get_collider, readCollider),
+      attachments: this.list(attachments!, this.handle.scratch, exports.cs_recording_get_attachment, readPose),
+      grabs: this.list(grabs!, this.handle.prepared(CS_RECORDED_GRAB_VERSION), exports.cs_recording_get_grab, readGrab),
     };
   }
 
@@ -311,17 +313,18 @@ export class Recording {
     return { tick: view.getBigUint64(tickAt, true), nodes: this.core.floats(nodes, 6 * view.getUint32(scratch, true)) };
   }
 
-  private list<Item>(count: number, get: (recording: number, index: number, out: number) => number, read: (view: DataView, at: number) => Item): Item[] {
+  // `get` writes a struct to `out`.
+  private list<Item>(
+    count: number,
+    out: number,
+    get: (recording: number, index: number, out: number) => number,
+    read: (view: DataView, at: number) => Item,
+  ): Item[] {
     const items: Item[] = [];
     for (let index = 0; index < count; ++index) {
-      if (get(this.pointer, index, this.handle.scratch) !== 0) items.push(read(this.core.view(), this.handle.scratch));
+      if (get(this.pointer, index, out) !== 0) items.push(read(this.core.view(), out));
     }
     return items;
-  }
-
-  private prepared(version: number): number {
-    this.core.view().setUint32(this.handle.scratch, version, true); // the first member of each struct
-    return this.handle.scratch;
   }
 
   private message(at: number): RecordedMessage | undefined {

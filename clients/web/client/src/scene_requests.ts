@@ -2,7 +2,7 @@
 // Requests about the server's scenes. A function that returns an id sends a request; its answer
 // comes with ClientEvent.answer. 0n: the request could not be sent, because the page is not in a scene or many wait.
 
-import { CS_ANSWER_VERSION, cs_answer, cs_ban, cs_scene_summary } from "./layout";
+import { CS_ANSWER_VERSION, CS_BAN_VERSION, CS_SCENE_SUMMARY_VERSION, cs_answer, cs_ban, cs_scene_summary } from "./layout";
 import type { CoreHandle } from "./handle";
 
 // Scene in the list of the server (cs_scene_summary).
@@ -47,7 +47,7 @@ export class SceneRequests {
   // The newest list of scenes.
   scenes(): SceneSummary[] {
     const { exports } = this.core;
-    return this.handle.list(exports.cs_scene_count(this.handle.pointer), exports.cs_get_scene, (view, at) => {
+    return this.handle.list(exports.cs_scene_count(this.handle.pointer), CS_SCENE_SUMMARY_VERSION, exports.cs_get_scene, (view, at) => {
       const count = (offset: number) => view.getUint32(at + offset, true);
       const flag = (offset: number) => view.getInt32(at + offset, true) !== 0;
       return {
@@ -68,8 +68,7 @@ export class SceneRequests {
 
   // The newest answer.
   answer(): Answer | undefined {
-    this.core.view().setUint32(this.scratch + cs_answer.version, CS_ANSWER_VERSION, true);
-    if (this.core.exports.cs_get_answer(this.handle.pointer, this.scratch) === 0) return undefined;
+    if (this.core.exports.cs_get_answer(this.handle.pointer, this.handle.prepared(CS_ANSWER_VERSION)) === 0) return undefined;
     const view = this.core.view();
     return {
       id: view.getBigUint64(this.scratch + cs_answer.request_id, true),
@@ -127,7 +126,7 @@ export class SceneRequests {
   // The newest answer to listBans().
   bans(): Ban[] {
     const { exports } = this.core;
-    return this.handle.list(exports.cs_ban_count(this.handle.pointer), exports.cs_get_ban, (view, at) => ({
+    return this.handle.list(exports.cs_ban_count(this.handle.pointer), CS_BAN_VERSION, exports.cs_get_ban, (view, at) => ({
       subject: this.core.text(view.getUint32(at + cs_ban.subject, true)),
       displayName: this.core.text(view.getUint32(at + cs_ban.display_name, true)),
     }));

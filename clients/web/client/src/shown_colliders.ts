@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Colliders that are read for each drawn frame. Objects are used again, so that drawn frames allocate nothing for them.
 
-import { cs_collider } from "./layout";
+import { CS_COLLIDER_VERSION, cs_collider } from "./layout";
 import { readFloats, vec3, type CoreHandle } from "./handle";
 import { kHeadId, type Collider, type Quaternion, type Vec3 } from "./types";
 
@@ -48,7 +48,8 @@ export class ShownColliders {
 
   // The list and its objects are valid until the next call.
   read(count: number, get: Getter): readonly Collider[] {
-    const { core, pointer, scratch } = this.handle;
+    const { core, pointer } = this.handle;
+    const scratch = this.handle.prepared(CS_COLLIDER_VERSION);
     let found = 0;
     for (let index = 0; index < count; ++index) {
       if (get(pointer, index, scratch) === 0) continue;

@@ -229,6 +229,7 @@ export interface OwnCollider {
   position: Vec3;
   orientation?: Quaternion;
   radius?: number;
+  topRadius?: number; // of a capsule's end at +Y; absent: the same as radius
   length?: number; // of a capsule's segment, along its y axis
   size?: Vec3;
 }
