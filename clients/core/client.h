@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "clients/core/core.h"
+#include "clients/core/display.h"
 #include "clients/core/stream/connection_timer.h"
 #include "clients/core/stream/credentials.h"
-#include "clients/core/stream/display.h"
 #include "clients/core/stream/outbox.h"
 #include "clients/core/stream/participants.h"
 #include "clients/core/stream/playback_position.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "clients/core/stream/display.h"
+#include "clients/core/display.h"
 
 #include <algorithm>
 
