@@ -2,7 +2,6 @@
 // `clothstream join`: follows a stream and prints a summary.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>

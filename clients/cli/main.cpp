@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `clothstream`: command-line client of clothstream-server.
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
