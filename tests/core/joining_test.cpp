@@ -497,5 +497,36 @@ TEST(ContentAssembly, RefusesInconsistentChunks) {
               HasSubstr("more than 4"));
 }
 
+TEST(Interface, RefusesUnknownVersions) {
+  const JoinedClient joined;
+  const cs_client* client = joined.client.get();
+  cs_client_options options = optionsFor("curtain");
+  options.version = CS_CLIENT_OPTIONS_VERSION + 1;
+  EXPECT_EQ(cs_create(&options), nullptr);
+  EXPECT_EQ(cs_create_mirror(&options), nullptr);
+  cs_cloth cloth;
+  EXPECT_EQ(cs_get_cloth(client, 0, &cloth), 1);
+  cloth.version = CS_CLOTH_VERSION + 1;
+  EXPECT_EQ(cs_get_cloth(client, 0, &cloth), 0);
+  cs_environment environment;
+  EXPECT_EQ(cs_get_environment(client, &environment), 1);
+  environment.version = CS_ENVIRONMENT_VERSION + 1;
+  EXPECT_EQ(cs_get_environment(client, &environment), 0);
+  cs_statistics statistics;
+  EXPECT_EQ(cs_get_statistics(client, 0, &statistics), 1);
+  statistics.version = CS_STATISTICS_VERSION + 1;
+  EXPECT_EQ(cs_get_statistics(client, 0, &statistics), 0);
+}
+
+TEST(Interface, StringsOfOptionsMayBeNull) {
+  const cs_client_options options{};
+  const std::unique_ptr<cs_client, decltype(&cs_destroy)> client(cs_create(&options), &cs_destroy);
+  std::size_t bytes = 0;
+  const std::uint8_t* message = cs_next_outgoing(client.get(), &bytes);
+  v1::ClientMessage hello;
+  ASSERT_TRUE(hello.ParseFromArray(message, static_cast<int>(bytes)));
+  EXPECT_EQ(hello.hello().scene(), "");
+}
+
 }  // namespace
 }  // namespace clothstream::client
