@@ -61,7 +61,7 @@ codec::hierarchical::Hierarchy hierarchyOf(const vulkan::Device& device, const c
   return hierarchy;
 }
 
-// What is the same in each frame.
+// Push constants with the numbers that are the same in each frame.
 shared::PredictPush pushOf(const codec::StreamLayout& layout) {
   const codec::hierarchical::LatticeUnit unit = codec::hierarchical::latticeUnit(layout.maxError);
   int exponent;

@@ -11,7 +11,10 @@
 namespace clothstream::encode {
 namespace {
 
-using namespace codec::hierarchical;
+using codec::hierarchical::ChunkResiduals;
+using codec::hierarchical::kAlongNormal;
+using codec::hierarchical::kAlongU;
+using codec::hierarchical::kAlongV;
 
 constexpr std::uint32_t wordOf(std::int16_t low, std::uint32_t high) {
   return static_cast<std::uint16_t>(low) | high << 16;

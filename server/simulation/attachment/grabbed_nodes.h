@@ -18,9 +18,9 @@ namespace clothstream::simulation {
 
 GrabStatus statusOf(const shared::GrabReport& report);
 
-// What the grabs with these reports hold. Nodes of other grabs are left out.
+// Returns what the grabs with these reports hold. Nodes of other grabs are left out.
 HeldNodes heldNodes(std::span<const shared::GrabbedNode> nodes, std::span<const shared::GrabReport> reports);
-// The opposite. `held` must be in range; nodes that it does not have are free.
+// Writes the records for which heldNodes() returns `held`, which must be in range. All other nodes are free.
 void setHeldNodes(const HeldNodes& held, std::span<shared::GrabbedNode> nodes,
                   std::span<shared::GrabReport> reports);
 
