@@ -12,6 +12,7 @@
 #include "server/messages/grab_place.h"
 #include "server/messages/hands.h"
 #include "server/messages/limits.h"
+#include "server/messages/local_wind.h"
 #include "server/messages/shapes.h"
 #include "server/messages/skin_message.h"
 #include "server/messages/validation.h"
@@ -70,6 +71,19 @@ void readGrabs(Checks& checks, const Path& poses, const v1::ColliderPoses& messa
       grab.slipDistance = checks.number(path / "slipDistance", from.slip_distance(), limits::kSlipDistance);
     if (from.has_place()) grab.place = toGrabPlace(checks, path / "place", from.place(), scene);
     to.grabs.push_back(grab);
+  }
+}
+
+void readWinds(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
+               model::ParticipantPoses& to) {
+  checks.count(poses / "winds", static_cast<std::size_t>(message.winds_size()), 0,
+               limits::kMaxParticipantWinds);
+  std::unordered_set<std::uint32_t> ids;
+  for (int i = 0; i < message.winds_size() && !checks.failed(); ++i) {
+    const v1::HeldWind& from = message.winds(i);
+    const Path path = poses.at("winds", i);
+    checkNew(checks, path, from.id(), ids);
+    to.winds.push_back({toLocalWind(checks, path / "wind", from.wind()), from.id()});
   }
 }
 
@@ -173,6 +187,7 @@ Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const 
   model::ParticipantPoses poses;
   readColliders(checks, path, message, poses);
   readGrabs(checks, path, message, scene, poses);
+  readWinds(checks, path, message, poses);
   readAttachments(checks, path, message, scene, poses);
   readJoints(checks, path, message, scene, poses);
   poses.wantsContacts = message.contact_events();

@@ -15,60 +15,65 @@
 namespace clothstream::messages {
 namespace {
 
+using model::Cloth;
+using model::Scene;
+
 // Forces that bound the step.
 struct Cause {
   const char* what;  // before the name of the cloth
   // Multiplies the parameters of the forces.
-  void (*scale)(model::Environment&, model::Cloth&, float factor);
+  void (*scale)(Scene&, Cloth&, float factor);
   // Text of the parameters that the factor gave.
-  std::string (*limits)(const model::Environment&, const model::Cloth&, float factor);
+  std::string (*limits)(const Scene&, const Cloth&, float factor);
 };
 
-using Air = model::Environment;
-using model::Cloth;
-
-constexpr Cause kWind{"the wind on",
-                      [](Air& air, Cloth&, float factor) {
-                        air.wind *= factor;
-                        air.gust.strength *= factor;
-                      },
-                      [](const Air& air, const Cloth&, float) {
-                        return fmt::format("a wind of at most {:.3g} m/s and gusts of at most {:.3g} m/s",
-                                           air.wind.norm(), air.gust.strength);
-                      }};
+constexpr Cause kWind{
+    "the wind on",
+    [](Scene& scene, Cloth&, float factor) {
+      scene.environment.wind *= factor;
+      scene.environment.gust.strength *= factor;
+      for (model::SceneWind& wind : scene.winds) wind.speed *= factor;
+    },
+    [](const Scene& scene, const Cloth&, float) {
+      std::string text = fmt::format("a wind of at most {:.3g} m/s and gusts of at most {:.3g} m/s",
+                                     scene.environment.wind.norm(), scene.environment.gust.strength);
+      if (!scene.winds.empty())
+        text += fmt::format(", and local winds of at most {:.3g} m/s in all", model::speedOf(scene.winds));
+      return text;
+    }};
 
 constexpr Cause kCauses[] = {
     {"the springs of",
-     [](Air&, Cloth& cloth, float factor) {
+     [](Scene&, Cloth& cloth, float factor) {
        for (model::Spring* spring : {&cloth.structural, &cloth.shear, &cloth.bend}) {
          spring->stiffness *= factor;
          spring->damping *= factor;
        }
      },
-     [](const Air&, const Cloth&, float factor) {
+     [](const Scene&, const Cloth&, float factor) {
        return fmt::format("springs of at most {:.3g} times their stiffness and damping", factor);
      }},
     {"the drag and lift of",
-     [](Air&, Cloth& cloth, float factor) {
+     [](Scene&, Cloth& cloth, float factor) {
        cloth.drag *= factor;
        cloth.lift *= factor;
      },
-     [](const Air&, const Cloth& cloth, float) {
+     [](const Scene&, const Cloth& cloth, float) {
        return fmt::format("a drag of at most {:.3g} and a lift of at most {:.3g}", cloth.drag, cloth.lift);
      }},
-    {"the damping of", [](Air&, Cloth& cloth, float factor) { cloth.damping *= factor; },
-     [](const Air&, const Cloth& cloth, float) {
+    {"the damping of", [](Scene&, Cloth& cloth, float factor) { cloth.damping *= factor; },
+     [](const Scene&, const Cloth& cloth, float) {
        return fmt::format("a damping of at most {:.3g} 1/s", cloth.damping);
      }},
-    {"the dihedralBending of", [](Air&, Cloth& cloth, float factor) { cloth.dihedralBending *= factor; },
-     [](const Air&, const Cloth& cloth, float) {
+    {"the dihedralBending of", [](Scene&, Cloth& cloth, float factor) { cloth.dihedralBending *= factor; },
+     [](const Scene&, const Cloth& cloth, float) {
        return fmt::format("a dihedralBending of at most {:.3g} N m", cloth.dihedralBending);
      }}};
 
 // The cloth of a scene that needs the most substeps. The others have no forces here.
 class NeediestCloth {
  public:
-  NeediestCloth(const model::Scene& scene, const model::StabilityBound& bound)
+  NeediestCloth(const Scene& scene, const model::StabilityBound& bound)
       : bound_(bound), scene_(parametersOf(scene)) {
     find();
   }
@@ -78,7 +83,7 @@ class NeediestCloth {
 
   // More than limits::kMaxSubsteps if these are not enough.
   std::uint32_t neededWith(const Cause& cause, float factor) const {
-    return needed([&](model::Scene& scene) { cause.scale(scene.environment, scene.cloths[at_], factor); });
+    return needed([&](Scene& scene) { cause.scale(scene, scene.cloths[at_], factor); });
   }
 
   // Limits of the parameters with which the scene's substeps are enough, with 1 % to spare. Nothing if they
@@ -89,16 +94,15 @@ class NeediestCloth {
     };
     if (!fits(kLeastFactor)) return std::nullopt;
     const auto factor = static_cast<float>(kRoundedDown * boundary(fits, kLeastFactor, 1));
-    Air air = scene_.environment;
-    Cloth changed = cloth();
-    cause.scale(air, changed, factor);
-    return cause.limits(air, changed, factor);
+    Scene changed = scene_;
+    cause.scale(changed, changed.cloths[at_], factor);
+    return cause.limits(changed, changed.cloths[at_], factor);
   }
 
   // Least mass in kg with which the scene's substeps are enough, with 1 % to spare. Nothing if none is.
   std::optional<double> leastMass() const {
     const auto fits = [&](double mass) {
-      return needed([&](model::Scene& scene) { scene.cloths[at_].mass = static_cast<float>(mass); }) <=
+      return needed([&](Scene& scene) { scene.cloths[at_].mass = static_cast<float>(mass); }) <=
              scene_.substeps;
     };
     const double most = limits::kMass.max;
@@ -110,12 +114,13 @@ class NeediestCloth {
   static constexpr double kLeastFactor = 1e-6, kRoundedDown = 0.99;
 
   // The scene without lists of nodes and without colliders, which the bound does not need again.
-  static model::Scene parametersOf(const model::Scene& scene) {
-    model::Scene parameters;
+  static Scene parametersOf(const Scene& scene) {
+    Scene parameters;
     parameters.simulationRate = scene.simulationRate;
     parameters.substeps = scene.substeps;
     parameters.integrator = scene.integrator;
     parameters.environment = scene.environment;
+    parameters.winds = scene.winds;
     for (const Cloth& cloth : scene.cloths) {
       Cloth& copy = parameters.cloths.emplace_back();
       copy.name = cloth.name;
@@ -132,9 +137,9 @@ class NeediestCloth {
     return substeps == 0 ? limits::kMaxSubsteps + 1 : substeps;
   }
 
-  static void removeForces(model::Scene& scene, std::size_t first, std::size_t count) {
+  static void removeForces(Scene& scene, std::size_t first, std::size_t count) {
     for (std::size_t i = first; i < first + count; ++i)
-      for (const Cause& cause : kCauses) cause.scale(scene.environment, scene.cloths[i], 0);
+      for (const Cause& cause : kCauses) cause.scale(scene, scene.cloths[i], 0);
   }
 
   // Value between `fit`, which fits, and `over`, which does not, that nearly does not fit. Both are above 0.
@@ -155,7 +160,7 @@ class NeediestCloth {
     const std::uint32_t all = orMore(bound_.substeps(scene_));
     while (count > 1) {
       const std::size_t half = count / 2;
-      const std::uint32_t withoutFirst = needed([&](model::Scene& scene) { removeForces(scene, at_, half); });
+      const std::uint32_t withoutFirst = needed([&](Scene& scene) { removeForces(scene, at_, half); });
       if (withoutFirst < all) {
         removeForces(scene_, at_ + half, count - half);
         count = half;
@@ -169,13 +174,13 @@ class NeediestCloth {
 
   template <typename Change>
   std::uint32_t needed(const Change& change) const {
-    model::Scene changed = scene_;
+    Scene changed = scene_;
     change(changed);
     return orMore(bound_.substeps(changed));
   }
 
   const model::StabilityBound& bound_;
-  model::Scene scene_;
+  Scene scene_;
   std::size_t at_ = 0;
 };
 
@@ -200,7 +205,7 @@ std::string remedy(const NeediestCloth& cloth, const Cause& cause, double area, 
 
 }  // namespace
 
-std::optional<std::string> instability(const model::Scene& scene, const model::StabilityBound& bound) {
+std::optional<std::string> instability(const Scene& scene, const model::StabilityBound& bound) {
   const std::uint32_t needed = bound.substeps(scene);
   if (needed != 0 && needed <= scene.substeps) return std::nullopt;
   const NeediestCloth cloth(scene, bound);

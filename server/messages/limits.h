@@ -61,10 +61,14 @@ inline constexpr double kMaxHandReach = 0.5;           // m, distance of a joint
 inline constexpr Range kMotionTime{0, 86400};          // s
 inline constexpr Range kMaxError{0.00001, 0.1};        // m
 inline constexpr std::uint32_t kMaxQualities = 4;
-inline constexpr Range kGrabRadius{0.001, 1};                // m
-inline constexpr Range kGrabReach{0, 1};                     // m
-inline constexpr Range kGrabForce{0.001, 1e6};               // N
-inline constexpr Range kSlipDistance{0.001, 10};             // m
+inline constexpr Range kGrabRadius{0.001, 1};     // m
+inline constexpr Range kGrabReach{0, 1};          // m
+inline constexpr Range kGrabForce{0.001, 1e6};    // N
+inline constexpr Range kSlipDistance{0.001, 10};  // m
+inline constexpr Range kLocalSpeed{0, 100};       // m/s, of a local wind
+inline constexpr Range kWindRadius{0.05, 10};     // m, of a fan, or of the core of a vortex
+inline constexpr Range kWindReach{0.05, 1000};    // m
+inline constexpr Range kSpread{0, 1};
 inline constexpr std::uint32_t kMaxSolverNodes = 1'048'576;  // per cloth
 inline constexpr std::uint64_t kMaxAssembledNodes = 65'536;  // per scene, in cloths with an assembled system
 inline constexpr std::uint64_t kMaxAssembledEntries =
@@ -86,6 +90,7 @@ inline constexpr std::size_t kMaxMeshFileBytes = 512 * 1024 * 1024;
 inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
 inline constexpr std::size_t kMaxParticipantColliders = 60;  // includes the bones of hands
 inline constexpr std::size_t kMaxParticipantGrabs = 10;
+inline constexpr std::size_t kMaxParticipantWinds = 2;
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
 inline constexpr std::size_t kMaxParsedBytes = 128'000'000;  // of a content, in memory

@@ -11,6 +11,7 @@
 #include "server/messages/cloth_message.h"
 #include "server/messages/description.h"
 #include "server/messages/limits.h"
+#include "server/messages/local_wind.h"
 #include "server/messages/parameter_numbers.h"
 #include "server/messages/shapes.h"
 #include "server/messages/solid_message.h"
@@ -350,6 +351,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkRates(checks, scene);
   scene.integrator = toIntegrator(checks, root / "integrator", message.integrator());
   model::applyChange(scene.environment, readNumbers(checks, root / "environment", message.environment()));
+  scene.winds = toSceneWinds(checks, root / "environment", message.environment());
 
   checks.count(root / "cloths", static_cast<std::size_t>(message.cloths_size()), 1, limits::kMaxCloths);
   checks.count(root / "colliders", static_cast<std::size_t>(message.colliders_size()), 0,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Converts a scene to its message.
+#include "server/messages/local_wind.h"
 #include "server/messages/node_selection.h"
 #include "server/messages/parameter_numbers.h"
 #include "server/messages/scene_message.h"
@@ -104,6 +105,7 @@ v1::Scene toMessageWithoutMeshes(const model::Scene& scene) {
   message.set_substeps(scene.substeps);
   message.set_integrator(toMessage(scene.integrator));
   writeNumbers(scene.environment, *message.mutable_environment());
+  for (const model::SceneWind& wind : scene.winds) write(wind, *message.mutable_environment()->add_winds());
   for (const model::Cloth& cloth : scene.cloths) writeCloth(cloth, *message.add_cloths());
   for (const model::Collider& collider : scene.colliders) writeCollider(collider, *message.add_colliders());
   message.mutable_stream()->set_max_error(scene.stream.maxError);

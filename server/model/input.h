@@ -9,6 +9,7 @@
 
 #include "proto/parameters/cloth_parameters.h"
 #include "proto/parameters/environment_parameters.h"
+#include "server/model/local_wind.h"
 #include "server/model/scene.h"
 
 namespace clothstream::model {
@@ -59,6 +60,7 @@ struct ColliderJoints {
 struct ParticipantPoses {
   std::vector<ParticipantCollider> colliders = {};
   std::vector<Grab> grabs = {};
+  std::vector<HeldWind> winds = {};
   std::vector<AttachmentPose> attachments = {};
   std::vector<ColliderJoints> joints = {};
   bool wantsContacts = false;     // subscribes to contact events

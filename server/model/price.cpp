@@ -16,7 +16,7 @@ namespace {
 // A node of a grid has six springs.
 constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
 constexpr double kRungeKutta = 14;  // as a factor
-constexpr double kAir = 0.5, kHinge = 2, kSelfCollision = 20, kMotionBound = 120;
+constexpr double kAir = 0.5, kLocalWind = 0.3, kHinge = 2, kSelfCollision = 20, kMotionBound = 120;
 // Crowding of a few layers, which kSelfCollision and kMotionBound include. Beyond it each node costs
 // kCrowdedBall in each of the searches of a tick, and kCrowdedTriangle in a substep, for one more ball or
 // triangle in its cell. Both are limited, as the searches are (SelfCollisionStage, MotionBoundStage).
@@ -105,6 +105,11 @@ double skinBytes(const ClosedMesh& mesh) {
 double gridBytes(const ClosedMesh& mesh) {
   if (mesh.distanceCell == 0) return 0;
   return kDistancePointBytes * static_cast<double>(distanceGridOf(mesh, mesh.distanceCell).points());
+}
+
+// Whether the air moves the cloth.
+bool isBlown(const Scene& scene, const Cloth& cloth) {
+  return scene.environment.airDensity != 0 && (cloth.drag != 0 || cloth.lift != 0);
 }
 
 bool isSystem(SolverKind kind) {
@@ -221,7 +226,7 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
     double step = kNode * nodes + kSpring * static_cast<double>(counts.allSprings());
     if (cloth.mesh) step *= kMeshFactor;
     if (scene.integrator == Integrator::rungeKutta4) step *= kRungeKutta;
-    if (scene.environment.airDensity != 0 && (cloth.drag != 0 || cloth.lift != 0)) step += kAir * nodes;
+    if (isBlown(scene, cloth)) step += (kAir + kLocalWind * static_cast<double>(scene.winds.size())) * nodes;
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
     if (cloth.selfCollision)
       step += (boundsMotion(cloth) ? kSelfCollision + kMotionBound : kSelfCollision) * nodes;
@@ -244,6 +249,15 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
   work.dispatches +=
       (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
   work.dispatches += kBoundDispatches * substeps * any(boundsMotion);
+  return work;
+}
+
+Work PriceModel::heldWindWork(const Scene& scene, std::size_t winds) const {
+  double nodes = 0;
+  for (std::size_t i = 0; i < cloths_.size(); ++i)
+    if (isBlown(scene, scene.cloths[i])) nodes += static_cast<double>(cloths_[i].nodes);
+  Work work;
+  work.nodeSteps = kLocalWind * static_cast<double>(winds) * nodes * scene.substeps;
   return work;
 }
 

@@ -82,6 +82,8 @@ class PriceModel {
   Work work(const Scene& scene) const { return work(scene, static_cast<double>(scene.colliders.size())); }
   // Work of a tick in addition to that, while participants move the joints of colliders.
   Work movedJointsWork(const Scene& scene) const;
+  // Work of a tick in addition to that, while participants hold this number of local winds.
+  Work heldWindWork(const Scene& scene, std::size_t winds) const;
   // Memory on the device and on the host, in bytes.
   double bytes(const Scene& scene) const;
 

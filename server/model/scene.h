@@ -12,6 +12,7 @@
 #include "proto/parameters/environment_parameters.h"
 #include "proto/parameters/settings.h"
 #include "server/model/collider.h"
+#include "server/model/local_wind.h"
 #include "server/model/pose.h"
 
 namespace clothstream::model {
@@ -252,6 +253,7 @@ struct Scene {
   Environment environment;
   std::vector<Cloth> cloths;
   std::vector<Collider> colliders;
+  std::vector<SceneWind> winds;  // in addition to that of the environment
   StreamSettings stream;
 
   double tickSeconds() const { return 1.0 / simulationRate; }

@@ -113,9 +113,13 @@ double areaPerShare(const Cloth& cloth) {
 // ...), a function of the mean velocity of its three nodes. The symmetric part of its derivative is at most
 // 0.5 rho (2 C_D + C_L) |N| |u|. Each node gets a third of it, so a row sums to 0.5 rho (2 C_D + C_L) |u|
 // area / m.
-double airDamping(const Cloth& cloth, double areaPerShare, const Environment& environment) {
+// A local wind that changes from place to place adds no growth: the air draws the velocity of a node towards
+// its own, which is bounded.
+double airDamping(const Cloth& cloth, double areaPerShare, const Scene& scene, double added) {
+  const Environment& environment = scene.environment;
   const double gust = std::sqrt(3.0) * environment.gust.strength;
-  const double speed = environment.wind.cast<double>().norm() + gust + kAirSpeed;
+  const double local = double{speedOf(scene.winds)} + added;
+  const double speed = environment.wind.cast<double>().norm() + gust + local + kAirSpeed;
   return 0.5 * environment.airDensity * (2.0 * cloth.drag + cloth.lift) * speed * areaPerShare / cloth.mass;
 }
 
@@ -181,29 +185,50 @@ StabilityBound::StabilityBound(const Scene& scene) {
   }
 }
 
-std::uint32_t StabilityBound::substeps(const Scene& scene) const {
+StabilityBound::Criterion StabilityBound::criterionOf(const Scene& scene, std::size_t index) const {
   const auto stable = scene.integrator == Integrator::semiImplicitEuler ? semiImplicitStable
                       : scene.integrator == Integrator::rungeKutta4     ? rungeKuttaStable
                                                                         : explicitStable;
+  const ClothBound& bound = cloths_[index];
+  const double bending = scene.cloths[index].dihedralBending * bound.bendingRate / scene.cloths[index].mass;
+  return
+      [&scene, &bound, stable, bending, cloth = explicitPart(scene.cloths[index])](double h, double added) {
+        const double air = airDamping(cloth, bound.areaPerShare, scene, added);
+        return std::ranges::all_of(bound.nodes, [&](NodeSprings node) {
+          node.perMass /= cloth.mass;
+          return stable(cloth, node, air, bending, h);
+        });
+      };
+}
+
+std::uint32_t StabilityBound::substeps(const Scene& scene) const {
   // Smaller steps only make the criteria easier to meet.
   std::uint32_t substeps = 1;
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
-    const ClothBound& bound = cloths_[i];
-    const Cloth cloth = explicitPart(scene.cloths[i]);
-    const double air = airDamping(cloth, bound.areaPerShare, scene.environment);
-    const double bending = cloth.dihedralBending * bound.bendingRate / cloth.mass;
-    const auto stableAt = [&](double h) {
-      return std::ranges::all_of(bound.nodes, [&](NodeSprings node) {
-        node.perMass /= cloth.mass;
-        return stable(cloth, node, air, bending, h);
-      });
-    };
+    const Criterion stable = criterionOf(scene, i);
     substeps = *std::ranges::partition_point(
         std::views::iota(substeps, kMaxSubsteps + 1),
-        [&](std::uint32_t count) { return !stableAt(scene.tickSeconds() / count); });
+        [&](std::uint32_t count) { return !stable(scene.tickSeconds() / count, 0); });
     if (substeps > kMaxSubsteps) return 0;
   }
   return substeps;
+}
+
+float StabilityBound::roomForWind(const Scene& scene, std::uint32_t substeps) const {
+  constexpr int kBisections = 20;
+  const double h = scene.tickSeconds() / substeps;
+  double room = kMaxHeldSpeed;
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    const Criterion stable = criterionOf(scene, i);
+    if (stable(h, room)) continue;
+    double fits = 0;
+    for (int k = 0; k < kBisections; ++k) {
+      const double middle = (fits + room) / 2;
+      (stable(h, middle) ? fits : room) = middle;
+    }
+    room = fits;
+  }
+  return static_cast<float>(room);
 }
 
 double bearableStiffness(const Cloth& cloth, double h) {

@@ -2,7 +2,9 @@
 // Largest time step with which explicit integration of a cloth is stable.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "server/model/scene.h"
@@ -13,6 +15,9 @@ inline constexpr std::uint32_t kMaxSubsteps = 256;
 
 // Maximum speed of the cloth in still air for which the bound includes air damping, m/s.
 inline constexpr float kAirSpeed = 10;
+
+// Maximum speed of the air that participants move with local winds, m/s.
+inline constexpr float kMaxHeldSpeed = 800;
 
 // Maximum stretch for which the bound of explicit Euler includes spring tension. [Va21] 3.3 calls a spring
 // overstretched beyond it.
@@ -32,6 +37,10 @@ class StabilityBound {
   // motion across them is unstable.
   std::uint32_t substeps(const Scene& scene) const;
 
+  // Speed in m/s that the air may have in addition to the scene's own winds, at most kMaxHeldSpeed: with this
+  // number of substeps the scene is still stable. 0 if it is not stable without it.
+  float roomForWind(const Scene& scene, std::uint32_t substeps) const;
+
   // Number of springs of each kind at a node.
   struct NodeSprings {
     std::uint32_t structural, shear, bend;
@@ -44,6 +53,10 @@ class StabilityBound {
     double areaPerShare;             // largest area of a node divided by its share of the mass, m^2
     double bendingRate;              // bendingRate() of a cloth of 1 kg
   };
+  // Whether a cloth is stable with steps of h seconds, if the air moves faster than the scene's by `added`.
+  using Criterion = std::function<bool(double h, double added)>;
+  Criterion criterionOf(const Scene& scene, std::size_t cloth) const;
+
   std::vector<ClothBound> cloths_;
 };
 

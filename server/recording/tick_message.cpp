@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "server/messages/limits.h"
+#include "server/messages/local_wind.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/skin_message.h"
@@ -171,6 +172,19 @@ std::vector<model::Pose> jointsOf(Numbers& numbers, const google::protobuf::Repe
   return poses;
 }
 
+model::LocalWind windOf(Numbers& numbers, const v1::LocalWind& message) {
+  model::LocalWind wind{.pose = numbers.pose(message.pose()), .speed = numbers.number(message.speed())};
+  constexpr float kLeast = 0.01f;  // m; kernels divide by sizes
+  const auto size = [&](float value) { return numbers.number(value, kLeast, kMaxSize); };
+  numbers.require(message.kind_case() != v1::LocalWind::KIND_NOT_SET);
+  if (message.has_vortex())
+    wind.kind = model::Vortex{size(message.vortex().radius()), size(message.vortex().reach())};
+  else
+    wind.kind = model::Fan{size(message.fan().radius()), numbers.number(message.fan().spread(), 0, 1),
+                           size(message.fan().range())};
+  return wind;
+}
+
 std::size_t jointCountOf(const model::Shape& shape) {
   const auto* solid = std::get_if<model::Solid>(&shape);
   return solid != nullptr && (*solid)->skin ? (*solid)->skin->joints.size() : 0;
@@ -218,6 +232,7 @@ void write(const scene::AppliedTick& tick, v1::RecordedTick& message) {
   messages::write(tick.inputs.environment.gravity, *message.mutable_gravity());
   messages::write(tick.inputs.environment.wind, *message.mutable_wind());
   message.set_air_density(tick.inputs.environment.airDensity);
+  for (const model::LocalWind& wind : tick.inputs.winds) messages::write(wind, *message.add_winds());
   writeColliders(tick, message);
   for (const model::Pose& pose : tick.inputs.attachments) messages::write(pose, *message.add_attachments());
   for (const model::Carry& carry : tick.inputs.carries) {
@@ -239,14 +254,16 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
   if (static_cast<std::size_t>(message.attachments_size()) != attachments)
     return wrong("its attachments are not those of the scene");
   if (static_cast<std::size_t>(message.colliders_size()) > simulation::kMaxColliders ||
-      static_cast<std::size_t>(message.grips_size()) > simulation::kMaxGrabs)
-    return wrong("it has too many colliders or grabs");
+      static_cast<std::size_t>(message.grips_size()) > simulation::kMaxGrabs ||
+      static_cast<std::size_t>(message.winds_size()) > model::kMaxLocalWinds)
+    return wrong("it has too many colliders, grabs or local winds");
   if (message.substeps() > scene.substeps) return wrong("it has more substeps than the scene");
   Numbers numbers;
   simulation::TickInputs inputs;
   inputs.environment.gravity = numbers.vec3(message.gravity());
   inputs.environment.wind = numbers.vec3(message.wind());
   inputs.environment.airDensity = numbers.number(message.air_density());
+  for (const v1::LocalWind& wind : message.winds()) inputs.winds.push_back(windOf(numbers, wind));
   for (const v1::AppliedCollider& collider : message.colliders()) {
     bool known = true;
     const model::Shape shape = shapeOf(numbers, collider, scene, known);

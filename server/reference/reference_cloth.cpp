@@ -146,7 +146,10 @@ void ReferenceCloth::accumulateAirForces(const model::Environment& environment,
     const auto [p0, p1, p2] = triangle;
     const Vec3 velocity = (velocities_[p0] + velocities_[p1] + velocities_[p2]) / 3;
     const Vec3 N = (positions_[p1] - positions_[p0]).cross(positions_[p2] - positions_[p0]) / 2;
-    const Vec3 share = airForce(wind - velocity, N, density, drag, lift) / 3;
+    Vec3 u = wind - velocity;
+    if (!winds_.empty())
+      u += model::velocityAt(winds_, (positions_[p0] + positions_[p1] + positions_[p2]) / 3);
+    const Vec3 share = airForce(u, N, density, drag, lift) / 3;
     for (const std::uint32_t node : triangle) forces[node] += share;
   }
 }

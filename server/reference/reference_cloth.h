@@ -35,6 +35,8 @@ class ReferenceCloth {
   // Sets springs, bending, damping, drag, lift, friction, thickness, mass and solver. Shape and pins must
   // stay the same.
   void setParameters(const model::Cloth& cloth);
+  // Sets the local winds, which add to the wind of the environment; at first there are none.
+  void setWinds(std::span<const model::LocalWind> winds) { winds_.assign(winds.begin(), winds.end()); }
 
   std::span<Vec3> positions() { return positions_; }
   std::span<const Vec3> positions() const { return positions_; }
@@ -102,6 +104,7 @@ class ReferenceCloth {
   std::vector<Vec3> meshNormals() const;
 
   model::Cloth cloth_;
+  std::vector<model::LocalWind> winds_;
   std::vector<model::SpringLink> links_;
   std::vector<model::Triangle> triangles_;
   std::vector<model::Hinge> hinges_;  // created at first use

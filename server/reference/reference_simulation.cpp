@@ -13,6 +13,7 @@ namespace clothstream::reference {
 
 TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   TickInputs inputs{model::environmentAt(scene, tick), {}};
+  inputs.winds.assign(scene.winds.begin(), scene.winds.end());
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const model::Collider& collider : scene.colliders) {
@@ -74,6 +75,7 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
     ReferenceCloth& cloth = cloths_[i];
     for (const CoarseCorrection& level : coarse_[i]) correct(level, i, inputs, index);
     before_[i].assign(cloth.positions().begin(), cloth.positions().end());
+    cloth.setWinds(inputs.winds);
     cloth.integrate(inputs.environment, scene_.integrator, scene_.substepSeconds());
     collide(inputs, index, i, false);
   }

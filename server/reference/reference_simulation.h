@@ -30,9 +30,11 @@ struct TickInputs {
   std::vector<Pose> attachments = {};  // at the tick's end, in the order of the cloths; empty: the start
   std::vector<Grab> grabs = {};
   std::vector<Carry> carries = {};
+  std::vector<model::LocalWind> winds = {};
 };
 
-// Environment, colliders and attachments of the scene itself in a tick: from tick * dt to (tick + 1) * dt.
+// Environment, local winds, colliders and attachments of the scene itself in a tick: from tick * dt to (tick
+// + 1) * dt.
 TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick);
 
 class ReferenceSimulation {

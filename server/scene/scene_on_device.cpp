@@ -53,6 +53,7 @@ void SceneOnDevice::submitAndWait(const std::stop_token& stop) {
 
 void SceneOnDevice::warmUp(const model::Scene& scene, const std::stop_token& stop) {
   simulation::TickInputs inputs{scene.environment, {}};
+  inputs.winds.assign(scene.winds.begin(), scene.winds.end());
   recorder.beginRehearsal();
   for (int tick = 0; tick < 2; ++tick) {
     simulation.recordTick(recorder, inputs);

@@ -215,6 +215,7 @@ const TickInputs& ClothSimulation::Pipeline::nearby(const TickInputs& inputs) {
   moved = inputs;
   for (MovingCollider& collider : moved.colliders)
     for (model::Pose* pose : {&collider.start, &collider.end}) pose->position -= origin;
+  for (model::LocalWind& wind : moved.winds) wind.pose.position -= origin;
   for (model::Pose& pose : moved.attachments) pose.position -= origin;
   for (model::Carry& carry : moved.carries)
     for (model::Pose* pose : {&carry.from, &carry.to}) pose->position -= origin;

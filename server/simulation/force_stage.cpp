@@ -19,13 +19,15 @@ bool isBlown(const shared::ClothRecord& cloth) {
 }
 
 // Cloths collide in the advance kernel if no other stage follows.
-AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool colliders,
-                         Follow follow) {
+AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool localWinds,
+                         bool colliders, Follow follow) {
   const bool springs = follow != Follow::corrections;
+  const bool air = airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown);
   return {springs && std::any_of(cloths.begin(), cloths.end(), isDamped),
-          airDensity != 0 && std::any_of(cloths.begin(), cloths.end(), isBlown),
+          air,
           colliders && follow == Follow::nothing,
           springs,
+          air && localWinds,
           follow == Follow::limit || follow == Follow::paper,
           follow == Follow::paper};
 }
@@ -37,10 +39,12 @@ ForceStage::ForceStage(const vulkan::Device& device, const model::Scene& scene, 
     : solves_(solves),
       workgroupSize_(options.workgroupSize),
       airDensity_(scene.environment.airDensity),
-      grids_(device, scene.cloths, state, normals, scene.integrator, options) {
+      winds_(device, scene.winds.size()),
+      grids_(device, scene.cloths, state, winds_.texels(), normals, scene.integrator, options) {
   const MeshTables tables = meshTables(scene.cloths, workgroupSize_);
   if (!tables.nodes.empty())
-    meshes_ = std::make_unique<MeshStage>(device, tables, state, normals, scene.integrator, workgroupSize_);
+    meshes_ = std::make_unique<MeshStage>(device, tables, state, winds_.texels(), normals, scene.integrator,
+                                          workgroupSize_);
   if (scene.integrator == model::Integrator::rungeKutta4)
     rungeKutta_ = std::make_unique<RungeKuttaStage>(device, state, clothOffsets(scene.cloths));
 }
@@ -48,7 +52,7 @@ ForceStage::ForceStage(const vulkan::Device& device, const model::Scene& scene, 
 void ForceStage::prepare(std::span<const shared::ClothRecord> cloths) {
   for (const bool colliders : {false, true})
     for (const Follow follow : kFollows) {
-      const AdvanceVariant variant = variantOf(cloths, airDensity_, colliders, follow);
+      const AdvanceVariant variant = variantOf(cloths, airDensity_, winds_.count() > 0, colliders, follow);
       grids_.prepare(variant, follow);
       if (meshes_) meshes_->prepare(variant, follow);
     }
@@ -65,8 +69,9 @@ void ForceStage::recordTables(vulkan::Recorder& recorder) {
   if (meshes_) meshes_->recordTables(recorder);
 }
 
-void ForceStage::recordInputs(vulkan::Recorder&, const Tick& tick) {
+void ForceStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) {
   airDensity_ = tick.inputs.environment.airDensity;
+  winds_.recordUpload(recorder, tick.inputs.winds, tick.slot);
 }
 
 void ForceStage::recordSubstep(vulkan::Recorder& recorder, const Substep& substep) {
@@ -80,16 +85,18 @@ void ForceStage::recordSubstep(vulkan::Recorder& recorder, const Substep& subste
                            .firstTile = 0,
                            .stretchSize = 0,
                            .stretchGroups = 0,
-                           .firstMark = kFirstMark};
+                           .firstMark = kFirstMark,
+                           .localWinds = winds_.count()};
   recorder.barrier();
   if (!rungeKutta_) {
     const bool collides = substep.collision.colliderCount > 0;
     for (const Follow follow : kFollows)
-      recordAdvance(recorder, substep.from, variantOf(tick.cloths, environment.airDensity, collides, follow),
-                    follow, push);
+      recordAdvance(recorder, substep.from,
+                    variantOf(tick.cloths, airDensity_, winds_.count() > 0, collides, follow), follow, push);
     return;
   }
-  const AdvanceVariant variant = variantOf(tick.cloths, environment.airDensity, false, Follow::nothing);
+  const AdvanceVariant variant =
+      variantOf(tick.cloths, airDensity_, winds_.count() > 0, false, Follow::nothing);
   rungeKutta_->record(recorder, substep.from, push.collision, [&](std::uint32_t from, float part) {
     push.stepSeconds = part * static_cast<float>(tick.substepSeconds);
     recordAdvance(recorder, from, variant, Follow::nothing, push);

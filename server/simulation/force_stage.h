@@ -9,6 +9,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/advance_variant.h"
 #include "server/simulation/grid_stage.h"
+#include "server/simulation/local_wind_table.h"
 #include "server/simulation/mesh_stage.h"
 #include "server/simulation/runge_kutta_stage.h"
 #include "server/simulation/solve_stage.h"
@@ -48,7 +49,8 @@ class ForceStage final : public Stage {
 
   const SolveStage& solves_;
   std::uint32_t workgroupSize_;
-  float airDensity_;  // kg/m^3, of the newest tick
+  float airDensity_;      // kg/m^3, of the newest tick
+  LocalWindTable winds_;  // of the newest tick
   GridStage grids_;
   std::unique_ptr<MeshStage> meshes_;            // null if no cloth is a mesh
   std::unique_ptr<RungeKuttaStage> rungeKutta_;  // null for other integrators

@@ -22,10 +22,11 @@ GridStage::Cut GridStage::cutGrids(const vulkan::Device& device, std::span<const
 }
 
 GridStage::GridStage(const vulkan::Device& device, std::span<const model::Cloth> cloths,
-                     const StateBuffers& state, const vulkan::Buffer& normals, model::Integrator integrator,
-                     const GridOptions& options)
+                     const StateBuffers& state, const vulkan::Buffer& winds, const vulkan::Buffer& normals,
+                     model::Integrator integrator, const GridOptions& options)
     : device_(device),
       state_(state),
+      winds_(winds),
       integrator_(integrator),
       advanceCode_(options.advanceKernel == nullptr ? kernels::advance_mass_spring : *options.advanceKernel),
       cut_(cutGrids(device, cloths, options)),
@@ -48,7 +49,7 @@ const StateBindings& GridStage::advance(const AdvanceVariant& variant) {
                       return BufferList{&s.cloths,          &tiles_.texels(), s.positions[from],
                                         s.velocities[from], s.positions[to],  s.velocities[to],
                                         &s.colliders,       &s.nearColliders, &s.contactImpulses,
-                                        &s.stretches};
+                                        &s.stretches,       &winds_};
                     });
   return *made;
 }

@@ -30,7 +30,8 @@ class GridStage {
  public:
   // Throws std::runtime_error if the device has too little memory for the table.
   GridStage(const vulkan::Device& device, std::span<const model::Cloth> cloths, const StateBuffers& state,
-            const vulkan::Buffer& normals, model::Integrator integrator, const GridOptions& options);
+            const vulkan::Buffer& winds, const vulkan::Buffer& normals, model::Integrator integrator,
+            const GridOptions& options);
 
   // Replaces the tiles after solvers changed, for the same grids. No work of this stage may be in flight.
   void setTiles(std::span<const model::Cloth> cloths);
@@ -57,6 +58,7 @@ class GridStage {
 
   const vulkan::Device& device_;
   StateBuffers state_;
+  const vulkan::Buffer& winds_;  // LocalWindTable::texels()
   model::Integrator integrator_;
   const vulkan::KernelCode& advanceCode_;
   Cut cut_;

@@ -15,9 +15,11 @@ constexpr std::uint64_t kMeshWork = 2;
 }  // namespace
 
 MeshStage::MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
-                     const vulkan::Buffer& normals, model::Integrator integrator, std::uint32_t workgroupSize)
+                     const vulkan::Buffer& winds, const vulkan::Buffer& normals, model::Integrator integrator,
+                     std::uint32_t workgroupSize)
     : device_(device),
       state_(state),
+      winds_(winds),
       integrator_(integrator),
       workgroupSize_(workgroupSize),
       tileRanges_(tables.tiles.ranges),
@@ -35,14 +37,24 @@ const StateBindings& MeshStage::advance(const AdvanceVariant& variant) {
   std::optional<StateBindings>& made = advances_[variant.index()];
   if (made) return *made;
   const StateBuffers& s = state_;
-  made = bindStates(
-      device_, {device_, kernels::advance_mesh, workgroupSize_, variant.specialisation(1, integrator_)},
-      [&](std::size_t from) {
-        const std::size_t to = 1 - from;
-        return BufferList{&s.cloths,          &tiles_.texels(), s.positions[from],  s.velocities[from],
-                          s.positions[to],    s.velocities[to], &s.colliders,       &s.nearColliders,
-                          &s.contactImpulses, &nodes_.texels(), &corners_.texels(), &springEnds_.texels()};
-      });
+  made = bindStates(device_,
+                    {device_, kernels::advance_mesh, workgroupSize_, variant.specialisation(1, integrator_)},
+                    [&](std::size_t from) {
+                      const std::size_t to = 1 - from;
+                      return BufferList{&s.cloths,
+                                        &tiles_.texels(),
+                                        s.positions[from],
+                                        s.velocities[from],
+                                        s.positions[to],
+                                        s.velocities[to],
+                                        &s.colliders,
+                                        &s.nearColliders,
+                                        &s.contactImpulses,
+                                        &nodes_.texels(),
+                                        &corners_.texels(),
+                                        &springEnds_.texels(),
+                                        &winds_};
+                    });
   return *made;
 }
 

@@ -26,7 +26,8 @@ class MeshStage {
   // At least one cloth must be a mesh. Throws std::runtime_error if the device has too little memory for a
   // table.
   MeshStage(const vulkan::Device& device, const MeshTables& tables, const StateBuffers& state,
-            const vulkan::Buffer& normals, model::Integrator integrator, std::uint32_t workgroupSize);
+            const vulkan::Buffer& winds, const vulkan::Buffer& normals, model::Integrator integrator,
+            std::uint32_t workgroupSize);
 
   // Replaces the tiles after solvers changed, for the same meshes. No work of this stage may be in flight.
   void setTiles(const MeshTiles& tiles);
@@ -47,6 +48,7 @@ class MeshStage {
 
   const vulkan::Device& device_;
   StateBuffers state_;
+  const vulkan::Buffer& winds_;  // LocalWindTable::texels()
   model::Integrator integrator_;
   std::uint32_t workgroupSize_;
   TileRanges tileRanges_;

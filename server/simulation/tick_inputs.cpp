@@ -8,6 +8,7 @@ namespace clothstream::simulation {
 
 TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   TickInputs inputs{model::environmentAt(scene, tick), {}};
+  inputs.winds.assign(scene.winds.begin(), scene.winds.end());
   const double start = static_cast<double>(tick) * scene.tickSeconds();
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const model::Collider& collider : scene.colliders) {

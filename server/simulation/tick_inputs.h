@@ -16,8 +16,11 @@ namespace clothstream::simulation {
 struct TickInputs {
   model::Environment environment;
   std::vector<MovingCollider> colliders;  // at most kMaxColliders, in the order in which they act
-  bool reportsContacts = false;           // true: contacts() reports this tick
-  bool namesConstraints = false;          // true: a report of this tick has constraintEnds()
+  // At most model::kMaxLocalWinds, in addition to the wind of the environment, in the order in which they add
+  // up.
+  std::vector<model::LocalWind> winds = {};
+  bool reportsContacts = false;   // true: contacts() reports this tick
+  bool namesConstraints = false;  // true: a report of this tick has constraintEnds()
   // Pose of each attachment at the tick's end, in the order of the scene's cloths. Empty: the poses at the
   // start.
   std::vector<model::Pose> attachments = {};

@@ -11,6 +11,8 @@
 
 #extension GL_EXT_control_flow_attributes : require
 
+const int kLocalWindBinding = 10;
+
 #include "shaders/mass_spring/state.glsl"
 #include "shaders/shared/grid_strip.glsl"
 
@@ -127,7 +129,7 @@ void main() {
   Spring rightShear = where(hasRight, shear);
   precise float drag = push.airFactor * cloth.drag;
   precise float lift = push.airFactor * cloth.lift;
-  Air air = Air(push.wind, drag, lift);
+  Air air = Air(push.wind, drag, lift, push.localWinds);
 
   // The window has the columns left, centre and right, and the rows above, here and below.
   uint row = strip.row;

@@ -7,6 +7,8 @@
 
 #define CLOTHSTREAM_MESH_BINDING 9
 
+const int kLocalWindBinding = CLOTHSTREAM_MESH_BINDING + 3;
+
 #include "shaders/mass_spring/state.glsl"
 #include "shaders/shared/mesh_node.glsl"
 
@@ -41,7 +43,7 @@ vec3 springForces(Node here, MeshNode self, ClothRecord cloth) {
 vec3 airForces(Node here, MeshNode self, ClothRecord cloth) {
   precise float drag = push.airFactor * cloth.drag;
   precise float lift = push.airFactor * cloth.lift;
-  Air air = Air(push.wind, drag, lift);
+  Air air = Air(push.wind, drag, lift, push.localWinds);
   precise vec3 force = vec3(0.0);
   TexelRange triangles = trianglesOf(self);
   while (triangles.first < triangles.end) {

@@ -139,6 +139,7 @@ struct AdvancePush {
   uint32_t stretchSize;    // of grids with ACAD: index of the dispatch size that a stretched spring sets
   uint32_t stretchGroups;  // the x of that size
   uint32_t firstMark;      // index of the mark of the scene's first node (StateBuffers)
+  uint32_t localWinds;     // number of them
 };
 
 struct RungeKuttaPush {
@@ -269,7 +270,7 @@ static_assert(sizeof(SystemRecord) == CLOTHSTREAM_SYSTEM_TEXELS * sizeof(vec4) &
               sizeof(LinkRecord) == 16 && sizeof(SpringEndsRecord) == 16);
 static_assert(sizeof(XpbdGridTile) == 16 && sizeof(XpbdMeshTile) == 16 && sizeof(XpbdNodeTile) == 16 &&
               sizeof(ColourRecord) == 16 && sizeof(XpbdLinkRecord) == 16);
-static_assert(sizeof(AdvancePush) == 80 && offsetof(AdvancePush, wind) == 16 &&
+static_assert(sizeof(AdvancePush) == 84 && offsetof(AdvancePush, wind) == 16 &&
               offsetof(AdvancePush, collision) == 32 && offsetof(AdvancePush, firstTile) == 64);
 static_assert(sizeof(SolveRecord) == 36 && sizeof(PreparePush) == 48 && sizeof(SolvePush) == 24 &&
               sizeof(ApplyPush) == 64 && sizeof(RungeKuttaPush) == 48 && sizeof(XpbdPush) == 32 &&

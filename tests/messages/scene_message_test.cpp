@@ -659,6 +659,15 @@ TEST(Instability, NamesTheForcesThatBoundTheStepAndValuesThatFit) {
                 s.mutable_environment()->mutable_wind()->set_x(100);
               }),
               HasSubstr("because of the wind on \"light\""));
+  EXPECT_THAT(errorOf([&](v1::Scene& s) {
+                light(s).set_mass(0.2f);
+                light(s).set_drag(2);
+                v1::LocalWind& fan = *s.mutable_environment()->add_winds();
+                fan.set_name("fan");
+                fan.set_speed(100);
+                fan.mutable_fan();
+              }),
+              testing::ContainsRegex("the wind on \"light\".*local winds of at most [0-9.]+ m/s in all"));
   EXPECT_THAT(errorOf([&](v1::Scene& s) { s.mutable_cloths(0)->mutable_shear()->set_damping(1000); }),
               HasSubstr("because of the springs of \"sheet\""));
 }

@@ -143,6 +143,28 @@ TEST_F(Kernels, AirDragsAndLiftsMeshesAsInTheReference) {
   expectLikeReference(scene, {}, 25, {.extraForce = air});
 }
 
+// Winds from several sides over a grid and a disc. A place has three roundings of kExtent, so that the air's
+// velocity, whose gradient is at most 4 speed / radius, is as exact as the area of a triangle.
+TEST_F(Kernels, LocalWindsBlowAsInTheReference) {
+  const model::Quaternion ahead = turned(90, model::Vec3::UnitX());
+  const double pressure = 1.2 / 6 * 21 * 21 * (0.8 + 2 * 0.6);
+  const double gradient = 1.2 / 6 * 2 * 21 * (4 * 6 / 0.1) * 3 * kRounding * kExtent * 2e-4 * (0.8 + 2 * 0.6);
+  const double air = 6 * (kRounding * pressure * (2 * kExtent * 2 * 0.03 + 40 * 2e-4) + gradient);
+  for (model::Cloth cloth : {calmCloth(17, 23), discCloth(9)}) {
+    cloth.drag = 0.8f;
+    cloth.lift = 0.6f;
+    model::Scene scene = sceneOf({cloth});
+    scene.environment.wind = model::Vec3(3, -1, 8);
+    scene.winds = {
+        {{{model::Vec3(0.05f, -0.1f, -0.2f), ahead}, 5, model::Fan{.radius = 0.1f, .range = 1}}, "fan"},
+        {{{model::Vec3(-0.1f, -0.2f, 0.1f), turned(40, model::Vec3(1, 2, 0.5f))},
+          6,
+          model::Vortex{.radius = 0.1f, .reach = 0.5f}},
+         "vortex"}};
+    expectLikeReference(scene, {}, 26, {.extraForce = air});
+  }
+}
+
 TEST_F(Kernels, AirPushesStillClothWithoutSpringDamping) {
   model::Cloth cloth = calmCloth(12, 9);
   cloth.structural.damping = cloth.shear.damping = cloth.bend.damping = 0;

@@ -79,11 +79,14 @@ simulation::NodeState randomState(const model::Scene& scene, std::mt19937& rando
 
 simulation::TickInputs inputsOf(const model::Scene& scene,
                                 std::vector<simulation::MovingCollider> colliders) {
-  return {scene.environment, std::move(colliders)};
+  simulation::TickInputs inputs{scene.environment, std::move(colliders)};
+  inputs.winds.assign(scene.winds.begin(), scene.winds.end());
+  return inputs;
 }
 
 reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
   reference::TickInputs result{inputs.environment, {}};
+  result.winds = inputs.winds;
   for (const simulation::MovingCollider& collider : inputs.colliders)
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
                                 reference::toPose(collider.end), double{collider.friction},

@@ -71,10 +71,27 @@ struct Environment {
   static constexpr Field kWind{2, WireType::kBytes};
   static constexpr Field kAirDensity{3, WireType::kFixed32};
   static constexpr Field kGust{4, WireType::kBytes};
+  static constexpr Field kWinds{5, WireType::kBytes};
 };
 struct Gust {
   static constexpr Field kStrength{1, WireType::kFixed32};
   static constexpr Field kSeconds{2, WireType::kFixed32};
+};
+struct LocalWind {
+  static constexpr Field kName{1, WireType::kBytes};
+  static constexpr Field kPose{2, WireType::kBytes};
+  static constexpr Field kSpeed{3, WireType::kFixed32};
+  static constexpr Field kFan{4, WireType::kBytes};
+  static constexpr Field kVortex{5, WireType::kBytes};
+};
+struct Fan {
+  static constexpr Field kRadius{1, WireType::kFixed32};
+  static constexpr Field kSpread{2, WireType::kFixed32};
+  static constexpr Field kRange{3, WireType::kFixed32};
+};
+struct Vortex {
+  static constexpr Field kRadius{1, WireType::kFixed32};
+  static constexpr Field kReach{2, WireType::kFixed32};
 };
 struct Cloth {
   static constexpr Field kName{1, WireType::kBytes};
@@ -585,6 +602,11 @@ struct ColliderPoses {
   static constexpr Field kHands{61, WireType::kBytes};
   static constexpr Field kJoints{81, WireType::kBytes};
   static constexpr Field kActiveConstraints{82, WireType::kVarint};
+  static constexpr Field kWinds{90, WireType::kBytes};
+};
+struct HeldWind {
+  static constexpr Field kId{1, WireType::kVarint};
+  static constexpr Field kWind{2, WireType::kBytes};
 };
 struct ColliderJoints {
   static constexpr Field kCollider{1, WireType::kBytes};
@@ -830,6 +852,7 @@ struct RecordedTick {
   static constexpr Field kGrips{12, WireType::kBytes};
   static constexpr Field kCarries{13, WireType::kBytes};
   static constexpr Field kSubsteps{60, WireType::kVarint};
+  static constexpr Field kWinds{61, WireType::kBytes};
 };
 struct AppliedCarry {
   static constexpr Field kCloth{1, WireType::kVarint};
