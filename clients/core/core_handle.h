@@ -33,7 +33,8 @@ void copy(const Values& values, float* out) {
 // Whether all elements of an array of the caller have the version of this library.
 template <typename Struct>
 bool haveVersion(std::span<const Struct> structs, std::uint32_t version) {
-  return std::ranges::all_of(structs, [&](const Struct& one) { return one.version == version; });
+  return std::all_of(structs.begin(), structs.end(),
+                     [&](const Struct& one) { return one.version == version; });
 }
 
 // Returns 0 and leaves *out unchanged if `collider` is nullptr or the version is unknown, else 1.

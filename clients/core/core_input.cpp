@@ -53,7 +53,7 @@ void cs_set_head(cs_client* client, const float* position3, const float* orienta
 int cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) noexcept {
   const std::span used(grabs, std::min(count, CS_MAX_GRABS));
   const bool isKnown =
-      haveVersion(used, CS_GRAB_VERSION) && std::ranges::all_of(used, [](const cs_grab& grab) {
+      haveVersion(used, CS_GRAB_VERSION) && std::all_of(used.begin(), used.end(), [](const cs_grab& grab) {
         return !grab.place || grab.place->version == CS_CLOTH_POINT_VERSION;
       });
   if (!isKnown) return 0;
