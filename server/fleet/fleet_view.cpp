@@ -9,7 +9,7 @@ namespace {
 using namespace std::chrono_literals;
 
 // A server that does not hear of its own renewals for this long does not hear of those of others.
-constexpr auto kSilence = 2s, kLongestSilence = 4s;
+constexpr auto kSilenceOfServer = 2s, kLongestSilence = 4s;
 
 }  // namespace
 
@@ -25,7 +25,7 @@ void FleetView::finishReading(const std::set<std::string>& present, Clock::time_
 void FleetView::renew(const v1::ServerEntry& entry, bool isNew, Clock::time_point now) {
   Server& server = servers_[entry.origin()];
   // Renewals that were not heard may have been made.
-  if (entry.origin() == self_ && now - server.renewed >= kSilence) readAt_ = now;
+  if (entry.origin() == self_ && now - server.renewed >= kSilenceOfServer) readAt_ = now;
   server = {.entry = entry, .renewed = now, .isNew = isNew};
 }
 
@@ -64,7 +64,7 @@ std::optional<std::uint64_t> FleetView::ownRevisionOf(const std::string& scene) 
 
 bool FleetView::hears(Clock::time_point now) const {
   const Server* const self = server(self_);
-  return reads_ && isSettled(now) && self != nullptr && now - self->renewed < kSilence;
+  return reads_ && isSettled(now) && self != nullptr && now - self->renewed < kSilenceOfServer;
 }
 
 bool FleetView::isAlive(std::uint64_t origin, Clock::time_point now) const {

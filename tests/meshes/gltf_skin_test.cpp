@@ -20,7 +20,7 @@ using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr FileLimits kFileLimits{.bytes = 1'000'000, .vertices = 1000};
+constexpr FileLimits kSkinFileLimits{.bytes = 1'000'000, .vertices = 1000};
 
 JointRequest request(const std::string& animation = {}) {
   return {.animation = animation, .joints = 128, .keys = 1024, .poses = 16'384};
@@ -31,7 +31,7 @@ tl::expected<MeshSource, std::string> read(const SkinnedGlb& glb, const JointReq
   const std::filesystem::path path =
       std::filesystem::temp_directory_path() / ("clothstream_" + name + ".glb");
   std::ofstream(path, std::ios::binary) << glb.bytes();
-  auto source = readMeshFile(path, kFileLimits, joints);
+  auto source = readMeshFile(path, kSkinFileLimits, joints);
   std::filesystem::remove(path);
   return source;
 }
