@@ -87,7 +87,7 @@ LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<J
       maxParticipants(most),
       journal(std::move(kept)),
       subscribers(tapOf(journal)),
-      poses(subscribers, inbox, this),
+      poses(subscribers, inbox, this, model::kMaxLocalWinds - definition.winds.size()),
       roster(subscribers, poses, journal.get()),
       work(schedule::WorkLevel{1, definition.substeps}),
       start_(std::move(definition)),
@@ -189,6 +189,13 @@ double LiveScene::roomForOthers(double hands) const {
 messages::Result<void> LiveScene::chargeJoints() {
   const std::lock_guard lock(mutex_);
   auto charged = charge_.chargeJoints("colliderPoses.joints", definition_);
+  isDearer_ = charge_.exceedsStart(definition_);
+  return charged;
+}
+
+messages::Result<void> LiveScene::chargeWinds(std::size_t count) {
+  const std::lock_guard lock(mutex_);
+  auto charged = charge_.chargeWinds("colliderPoses.winds", definition_, count);
   isDearer_ = charge_.exceedsStart(definition_);
   return charged;
 }

@@ -99,6 +99,11 @@ class LiveScene : private ColliderBudget {
   // Minimum number of substeps with which `scene` is stable, at most start().substeps. `scene` is start()
   // with other parameters.
   std::uint32_t leastSubsteps(const model::Scene& scene) const;
+  // Speed in m/s that the winds of participants may add with this number of substeps
+  // (StabilityBound::roomForWind).
+  float roomForWind(const model::Scene& scene, std::uint32_t substeps) const {
+    return stability_.roomForWind(scene, substeps);
+  }
   // Work of the scene if no overload reduces it.
   schedule::WorkLevel allWork() const { return {1, start_.substeps}; }
 
@@ -169,6 +174,7 @@ class LiveScene : private ColliderBudget {
   double roomForHands() const override;
   double roomForOthers(double hands) const override;
   messages::Result<void> chargeJoints() override;
+  messages::Result<void> chargeWinds(std::size_t count) override;
   void chargeColliders(const ColliderLoad& load) override;
   bool boundsOfCloth(ClothBounds& bounds) const override;
   // The same; the caller holds the lock.
