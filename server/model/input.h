@@ -65,6 +65,9 @@ struct ParticipantPoses {
   std::vector<ColliderJoints> joints = {};
   bool wantsContacts = false;     // subscribes to contact events
   bool wantsConstraints = false;  // wants reports that name the active constraints
+
+  // Whether it has something that acts until the participant says otherwise.
+  bool acts() const { return !(colliders.empty() && grabs.empty() && winds.empty()); }
 };
 
 // Absent values leave the cloth as it is. A material sets its own numbers first, then `numbers` apply.

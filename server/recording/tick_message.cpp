@@ -173,15 +173,22 @@ std::vector<model::Pose> jointsOf(Numbers& numbers, const google::protobuf::Repe
 }
 
 model::LocalWind windOf(Numbers& numbers, const v1::LocalWind& message) {
-  model::LocalWind wind{.pose = numbers.pose(message.pose()), .speed = numbers.number(message.speed())};
   constexpr float kLeast = 0.01f;  // m; kernels divide by sizes
   const auto size = [&](float value) { return numbers.number(value, kLeast, kMaxSize); };
-  numbers.require(message.kind_case() != v1::LocalWind::KIND_NOT_SET);
-  if (message.has_vortex())
-    wind.kind = model::Vortex{size(message.vortex().radius()), size(message.vortex().reach())};
-  else
-    wind.kind = model::Fan{size(message.fan().radius()), numbers.number(message.fan().spread(), 0, 1),
-                           size(message.fan().range())};
+  model::LocalWind wind{.pose = numbers.pose(message.pose()), .speed = numbers.number(message.speed())};
+  switch (message.kind_case()) {
+    case v1::LocalWind::kFan:
+      wind.kind = model::Fan{.radius = size(message.fan().radius()),
+                             .spread = numbers.number(message.fan().spread(), 0, 1),
+                             .range = size(message.fan().range())};
+      break;
+    case v1::LocalWind::kVortex:
+      wind.kind =
+          model::Vortex{.radius = size(message.vortex().radius()), .reach = size(message.vortex().reach())};
+      break;
+    case v1::LocalWind::KIND_NOT_SET:
+      numbers.require(false);
+  }
   return wind;
 }
 

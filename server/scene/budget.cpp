@@ -126,6 +126,7 @@ double Charge::startSeconds(const model::Scene& scene) const {
 model::Work Charge::workWith(const model::Scene& scene, double colliders) const {
   model::Work work = model_.work(scene, colliders);
   if (movesJoints_) work += model_.movedJointsWork(scene);
+  work += model_.heldWindWork(scene, heldWinds_);
   return work;
 }
 
@@ -134,6 +135,15 @@ messages::Result<void> Charge::chargeJoints(const std::string& path, const model
   movesJoints_ = true;
   messages::Result<void> charged = charge(path, scene);
   if (!charged) movesJoints_ = false;
+  return charged;
+}
+
+messages::Result<void> Charge::chargeWinds(const std::string& path, const model::Scene& scene,
+                                           std::size_t count) {
+  const std::size_t before = std::exchange(heldWinds_, count);
+  if (released_) return {};
+  messages::Result<void> charged = charge(path, scene);
+  if (!charged) heldWinds_ = before;
   return charged;
 }
 

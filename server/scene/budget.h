@@ -78,6 +78,8 @@ class Charge {
   void chargeColliders(const model::Scene& scene, const ColliderLoad& colliders);
   // Charges the scene with participants that move the joints of its colliders, from now on, like charge().
   messages::Result<void> chargeJoints(const std::string& path, const model::Scene& scene);
+  // Charges the scene with this number of local winds that participants hold, like charge().
+  messages::Result<void> chargeWinds(const std::string& path, const model::Scene& scene, std::size_t count);
   // The scene starts again: nobody has moved joints.
   void forgetJoints() { movesJoints_ = false; }
   // Charges the scene with parameters that it had before, also beyond the budget.
@@ -127,6 +129,7 @@ class Charge {
   const model::PriceModel model_;
   ColliderLoad colliders_;  // of participants
   bool movesJoints_ = false;
+  std::size_t heldWinds_ = 0;  // of participants
   model::Work freeWork_;
   double freeMegabytes_ = 0;
   Amount charged_;

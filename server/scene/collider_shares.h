@@ -59,6 +59,9 @@ class ColliderBudget {
   virtual double roomForOthers(double hands) const = 0;
   // Charges that participants move the joints of colliders of the scene, or returns why there is no room.
   [[nodiscard]] virtual messages::Result<void> chargeJoints() { return {}; }
+  // Charges the local winds that participants hold, `count` together, or returns why there is no room for
+  // them. There is always room for fewer than before.
+  [[nodiscard]] virtual messages::Result<void> chargeWinds(std::size_t /*count*/) { return {}; }
   // Charges what the participants have, also beyond the room.
   virtual void chargeColliders(const ColliderLoad& load) = 0;
   // Place of the cloth after the newest tick. Returns false if there was none.

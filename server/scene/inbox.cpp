@@ -45,9 +45,7 @@ void Inbox::postPoses(std::uint64_t participant, model::ParticipantPoses poses, 
 }
 
 void Inbox::forgetOneThatHasLeft() {
-  const auto hasLeft = [](const Poses& poses) {
-    return poses.now.poses.colliders.empty() && poses.now.poses.grabs.empty();
-  };
+  const auto hasLeft = [](const Poses& poses) { return !poses.now.poses.acts(); };
   auto newest = inputs_.poses.end();
   for (auto poses = inputs_.poses.begin(); poses != inputs_.poses.end(); ++poses)
     if (hasLeft(*poses) && (newest == inputs_.poses.end() || poses->participant > newest->participant))

@@ -21,8 +21,7 @@ void Interaction::restore(ColliderSet::State colliders, GrabsAndAttachments::Sta
 
 void Interaction::add(Poses&& poses) {
   const model::ParticipantPoses& now = poses.now.poses;
-  const bool moves =
-      !now.colliders.empty() || !now.grabs.empty() || !now.attachments.empty() || !now.joints.empty();
+  const bool moves = now.acts() || !now.attachments.empty() || !now.joints.empty();
   if (moves && arrivals_.size() < kMaxPoseArrivals) arrivals_.push_back(poses.now.arrival);
   poses_.add(std::move(poses));
 }
@@ -32,6 +31,7 @@ void Interaction::place(Clock::time_point time) {
     colliders_.place(participant, poses.colliders);
     colliders_.placeJoints(poses.joints);
     grabs_.place(participant, poses.grabs, poses.attachments);
+    winds_.place(participant, poses.winds);
     contactRequests_.set(participant, poses.wantsContacts);
     constraintRequests_.set(participant, poses.wantsConstraints);
   });
@@ -40,10 +40,11 @@ void Interaction::place(Clock::time_point time) {
 void Interaction::letGo() {
   colliders_.letGo();
   grabs_.letGo();
+  winds_.letGo();
   poses_.repeat();
 }
 
-void Interaction::advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery) {
+void Interaction::advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery, float windRoom) {
   const double endSeconds = static_cast<double>(tick + 1) * scene.tickSeconds();
   colliders_.advance(scene, endSeconds, inputs_.colliders);
   if (recovery != Recovery::none) grabs_.clothsWentBack(scene, recovery == Recovery::reset);
@@ -51,6 +52,7 @@ void Interaction::advance(const model::Scene& scene, std::uint64_t tick, Recover
   inputs_.reportsContacts = contactRequests_.any();
   inputs_.namesConstraints = constraintRequests_.any();
   inputs_.environment = model::environmentAt(scene, tick);
+  winds_.advance(scene, windRoom, inputs_.winds);
 }
 
 void Interaction::takeArrivals(std::vector<Clock::time_point>& arrivals) {

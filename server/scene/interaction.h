@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Everything that acts on the cloths of a scene: colliders, grabs, attachments and the environment.
+// Everything that acts on the cloths of a scene: colliders, grabs, attachments, winds and the environment.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,7 @@
 #include "server/scene/collider_set.h"
 #include "server/scene/contact_log.h"
 #include "server/scene/grabs_and_attachments.h"
+#include "server/scene/held_winds.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/pose_history.h"
@@ -34,11 +35,12 @@ class Interaction {
   void place(Clock::time_point time);
   // Participants act on nothing until they send poses again.
   void letGo();
-  // Returns whether participants act on the cloth: by colliders, grabs, or what they moved.
-  bool isTouched() const { return colliders_.isTouched() || grabs_.isTouched(); }
+  // Returns whether participants act on the cloth: by colliders, grabs, winds, or what they moved.
+  bool isTouched() const { return colliders_.isTouched() || grabs_.isTouched() || !winds_.empty(); }
 
-  // Makes the inputs of the tick after `tick`, before which the cloths have this recovery.
-  void advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery);
+  // Makes the inputs of the tick after `tick`, before which the cloths have this recovery. The winds that
+  // participants hold have at most the speed `windRoom` together, m/s.
+  void advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery, float windRoom);
   // Inputs of the newest advance(), and the identities of their colliders.
   const simulation::TickInputs& inputs() const { return inputs_; }
   const ColliderSet& colliders() const { return colliders_; }
@@ -60,6 +62,7 @@ class Interaction {
  private:
   ColliderSet colliders_;
   GrabsAndAttachments grabs_;
+  HeldWinds winds_;
   ContactLog contacts_;
   Requests contactRequests_, constraintRequests_;
   PoseHistory poses_;

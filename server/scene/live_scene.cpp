@@ -86,7 +86,7 @@ LiveScene::LiveScene(model::Scene definition, bool wasCreated, std::shared_ptr<J
       maxParticipants(most),
       journal(std::move(kept)),
       subscribers(tapOf(journal)),
-      poses(subscribers, inbox, this),
+      poses(subscribers, inbox, this, model::kMaxLocalWinds - definition.winds.size()),
       roster(subscribers, poses, journal.get()),
       work(schedule::WorkLevel{1, definition.substeps}),
       definition_(std::move(definition)),
@@ -174,6 +174,13 @@ double LiveScene::roomForOthers(double hands) const {
 messages::Result<void> LiveScene::chargeJoints() {
   const std::lock_guard lock(mutex_);
   auto charged = charge_.chargeJoints("colliderPoses.joints", definition_.accepted());
+  comparePrice();
+  return charged;
+}
+
+messages::Result<void> LiveScene::chargeWinds(std::size_t count) {
+  const std::lock_guard lock(mutex_);
+  auto charged = charge_.chargeWinds("colliderPoses.winds", definition_.accepted(), count);
   comparePrice();
   return charged;
 }

@@ -99,6 +99,11 @@ class LiveScene : private ColliderBudget {
 
   // See SceneDefinition.
   std::uint32_t leastSubsteps(const model::Scene& scene) const { return definition_.leastSubsteps(scene); }
+  // Speed in m/s that the winds of participants may add with this number of substeps
+  // (StabilityBound::roomForWind).
+  float roomForWind(const model::Scene& scene, std::uint32_t substeps) const {
+    return definition_.stability().roomForWind(scene, substeps);
+  }
   // Work of the scene if no overload reduces it.
   schedule::WorkLevel allWork() const { return {1, start().substeps}; }
 
@@ -166,6 +171,7 @@ class LiveScene : private ColliderBudget {
   double roomForHands() const override;
   double roomForOthers(double hands) const override;
   messages::Result<void> chargeJoints() override;
+  messages::Result<void> chargeWinds(std::size_t count) override;
   void chargeColliders(const ColliderLoad& load) override;
   bool boundsOfCloth(ClothBounds& bounds) const override;
   // The same; the caller holds the lock.

@@ -56,10 +56,11 @@ void NewestPoses::resume(std::uint64_t participant, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   const auto entry = find(participant);
   if (entry == entries_.end() || entry->posed) return;
-  if (entry->poses.colliders.empty() && entry->poses.grabs.empty()) return;
+  if (!entry->poses.acts()) return;
   entry->posed = true;
   model::ParticipantPoses poses = entry->poses;
   limit(*entry, poses.colliders);
+  entry->windsRefused = !limitWinds(*entry, poses.winds);
   inbox_.postPoses(participant, std::move(poses), now);
 }
 
@@ -75,6 +76,7 @@ void NewestPoses::clear() {
   const std::lock_guard lock(mutex_);
   entries_.clear();
   inbox_.dropPoses();
+  if (budget_ != nullptr) static_cast<void>(budget_->chargeWinds(0));
   charge();
 }
 
@@ -94,12 +96,15 @@ messages::Result<void> NewestPoses::post(const delivery::Mailbox& mailbox, const
   entry->posed = true;
   entry->poses = {.colliders = poses.colliders,
                   .grabs = poses.grabs,
+                  .winds = poses.winds,
                   .wantsContacts = poses.wantsContacts,
                   .wantsConstraints = poses.wantsConstraints};
   const std::size_t sent = poses.colliders.size();
   limit(*entry, poses.colliders);
+  messages::Result<void> winds = limitWinds(*entry, poses.winds);
   inbox_.postPoses(entry->participant, std::move(poses), arrival, poseTime(message, arrival));
-  if (!joints) return joints;  // the next message may have the other error
+  if (!joints) return joints;  // the next message may have the other errors
+  if (!std::exchange(entry->windsRefused, !winds) && !winds) return winds;
   const bool wasLimited = std::exchange(entry->collidersLimited, entry->acting < sent);
   if (wasLimited || !entry->collidersLimited) return {};
   return tl::unexpected(messages::FieldError{
@@ -123,6 +128,7 @@ void NewestPoses::divideRoom(Clock::time_point now) {
     if (!entry.posed) continue;
     model::ParticipantPoses poses = entry.poses;
     trim(poses.colliders, share_, cloth);
+    poses.winds.resize(std::min(poses.winds.size(), entry.winds));
     entry.uses = loadOf(poses.colliders, cloth);
     if (poses.colliders.size() == std::exchange(entry.acting, poses.colliders.size())) continue;
     inbox_.postPoses(entry.participant, std::move(poses), now);
@@ -136,6 +142,9 @@ void NewestPoses::removeFromScene(Entry& entry, Clock::time_point now) {
   entry.posed = false;
   entry.needs = entry.uses = {};
   entry.acting = 0;
+  model::ParticipantPoses none;
+  // There is always room for fewer.
+  static_cast<void>(limitWinds(entry, none.winds));
   charge();
 }
 
@@ -163,6 +172,33 @@ void NewestPoses::limit(Entry& entry, std::vector<model::ParticipantCollider>& c
     if (uses != std::exchange(entry.uses, uses)) charge();
   }
   entry.acting = colliders.size();
+}
+
+messages::Result<void> NewestPoses::limitWinds(Entry& entry, std::vector<model::HeldWind>& winds) {
+  std::size_t others = 0;
+  for (const Entry& one : entries_) others += one.winds;
+  others -= entry.winds;
+  const std::size_t sent = winds.size(), room = windRoom_ - std::min(windRoom_, others);
+  messages::Result<void> limited;
+  if (sent > room) {
+    winds.resize(room);
+    limited = tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+        fmt::format("colliderPoses.winds: {} of {} winds act: a scene and its participants have at most {} "
+                    "local winds together",
+                    room, sent, model::kMaxLocalWinds),
+        telemetry::Refusal::colliders});
+  }
+  if (budget_ == nullptr || winds.size() == entry.winds) {
+    entry.winds = winds.size();
+    return limited;
+  }
+  if (auto charged = budget_->chargeWinds(others + winds.size()); !charged) {
+    winds.resize(std::min(winds.size(), entry.winds));
+    return charged;
+  }
+  entry.winds = winds.size();
+  return limited;
 }
 
 void NewestPoses::charge() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Newest poses of each participant, and its share of the room for colliders.
+// Newest poses of each participant, its share of the room for colliders, and the room for local winds.
 #pragma once
 
 #include <chrono>
@@ -19,7 +19,8 @@
 namespace clothstream::scene {
 
 // Puts poses into the inbox as far as they act. Participants share the budget of colliders evenly, hands and
-// heads first: colliders beyond a participant's share do not act.
+// heads first: colliders beyond a participant's share do not act. Local winds act in the order in which they
+// begin, as far as the scene and the budget have room for them.
 //
 // Thread-safe. The roster says which participants there are, and calls this class while it holds its own
 // lock; this class never calls the roster. Inbox, subscribers and budget are called under the lock of this
@@ -29,15 +30,17 @@ class NewestPoses {
   // Accepted range of pose times. Later times count as unknown, earlier ones as kMaxBehind.
   static constexpr std::chrono::milliseconds kMaxAhead{100}, kMaxBehind{10'000};
 
-  // All must outlive the object. Without `budget` there is room for all colliders.
-  NewestPoses(const delivery::Subscribers& subscribers, Inbox& inbox, ColliderBudget* budget = nullptr)
-      : subscribers_(subscribers), inbox_(inbox), budget_(budget) {}
+  // All must outlive the object. Without `budget` there is room for all colliders. `windRoom` is the number
+  // of local winds that participants may hold together.
+  NewestPoses(const delivery::Subscribers& subscribers, Inbox& inbox, ColliderBudget* budget = nullptr,
+              std::size_t windRoom = model::kMaxLocalWinds)
+      : subscribers_(subscribers), inbox_(inbox), budget_(budget), windRoom_(windRoom) {}
 
   // A participant joins. `posed`: the scene may have colliders or grabs of it, from a checkpoint.
   void add(std::uint64_t participant, Role role, bool posed = false);
   // A viewer's poses are removed and forgotten.
   void setRole(std::uint64_t participant, Role role, Clock::time_point now);
-  // Removes the participant's poses from the scene until resume() puts its colliders and grabs back.
+  // Removes the participant's poses from the scene until resume() puts its colliders, grabs and winds back.
   void withdraw(std::uint64_t participant, Clock::time_point now);
   void resume(std::uint64_t participant, Clock::time_point now);
   // The participant is gone.
@@ -47,7 +50,8 @@ class NewestPoses {
 
   // Puts the poses of the mailbox's participant into the inbox; without a participant it does nothing.
   // `poses` is the content of `message`. Returns an error if the role is too low. Another error says so when
-  // colliders begin to exceed the participant's share, or when the budget begins to refuse its joints.
+  // colliders begin to exceed the participant's share, when winds begin to exceed the room, or when the
+  // budget begins to refuse its joints.
   [[nodiscard]] messages::Result<void> post(const delivery::Mailbox& mailbox,
                                             const v1::ColliderPoses& message, model::ParticipantPoses poses,
                                             const Permissions& permissions, Clock::time_point arrival);
@@ -60,12 +64,14 @@ class NewestPoses {
   struct Entry {
     std::uint64_t participant = 0;
     Role role = Role::none;
-    bool posed = false;             // the scene may have colliders or grabs of it
+    bool posed = false;             // the scene may have colliders, grabs or winds of it
     model::ParticipantPoses poses;  // the newest, without attachments and joints
     ColliderLoad needs, uses;       // of the colliders in `poses`, while posed
     std::size_t acting = 0;         // number of them that the scene has
     bool collidersLimited = false;  // the newest message had more
     bool jointsRefused = false;     // joints of the newest message that had some
+    std::size_t winds = 0;          // number of its winds that the scene has
+    bool windsRefused = false;      // the newest message had more
   };
   using Entries = std::vector<Entry>;
 
@@ -76,11 +82,14 @@ class NewestPoses {
   ColliderLoad shareOfEach() const;
   // Removes colliders beyond the participant's share, and charges the others.
   void limit(Entry& entry, std::vector<model::ParticipantCollider>& colliders);
+  // Removes winds beyond the room, charges the others, and returns why it removed some.
+  messages::Result<void> limitWinds(Entry& entry, std::vector<model::HeldWind>& winds);
   void charge();
 
   const delivery::Subscribers& subscribers_;
   Inbox& inbox_;
   ColliderBudget* const budget_;
+  const std::size_t windRoom_;
 
   std::mutex mutex_;
   Entries entries_;     // in the order in which the participants joined

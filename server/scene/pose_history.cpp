@@ -64,7 +64,8 @@ void PoseHistory::add(Track& track, TimedPoses&& poses) {
               .clientTimeUs = poses.time.clientTimeUs,
               .timed = poses.time.trueAt.has_value(),
               .colliders = std::move(poses.poses.colliders),
-              .grabs = std::move(poses.poses.grabs)};
+              .grabs = std::move(poses.poses.grabs),
+              .winds = std::move(poses.poses.winds)};
   if (!entries.empty() && entry.timed && entries.back().timed) {
     const std::uint64_t newest = entries.back().clientTimeUs;
     if (entry.clientTimeUs < newest && newest - entry.clientTimeUs <= kLatestUs) return;
@@ -94,13 +95,15 @@ void PoseHistory::prune(Track& track, Clock::time_point time) {
 void PoseHistory::placeAt(Track& track, Clock::time_point time) {
   const std::vector<Entry>& entries = track.entries;
   const auto after = std::ranges::upper_bound(entries, time, {}, &Entry::trueAt);
-  // The newest pose at or before `time`, or else the first pose, says which colliders and grabs exist.
+  // The newest pose at or before `time`, or else the first pose, says what exists.
   const Entry& now = after == entries.begin() ? entries.front() : *(after - 1);
   placed_.colliders = now.colliders;
   placed_.grabs = now.grabs;
+  placed_.winds = now.winds;
   const auto moveAll = [&](const Entry& from, const Entry& to, double part, double stepSeconds) {
     move(placed_.colliders, from.colliders, to.colliders, static_cast<float>(part), stepSeconds);
     move(placed_.grabs, from.grabs, to.grabs, static_cast<float>(part), stepSeconds);
+    move(placed_.winds, from.winds, to.winds, static_cast<float>(part), stepSeconds);
   };
   if (after != entries.end()) {
     if (after == entries.begin()) return;
@@ -136,7 +139,8 @@ void PoseHistory::place(
     place(track.participant, placed_);
   }
   std::erase_if(tracks_, [](const Track& track) {
-    return track.settled && track.entries.back().colliders.empty() && track.entries.back().grabs.empty();
+    const Entry& newest = track.entries.back();
+    return track.settled && newest.colliders.empty() && newest.grabs.empty() && newest.winds.empty();
   });
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Poses of participants' colliders and grabs at the time of a tick, from poses with timestamps.
+// Poses of participants' colliders, grabs and local winds at the time of a tick, from poses with timestamps.
 #pragma once
 
 #include <cstddef>
@@ -36,12 +36,12 @@ class PoseHistory {
   // Adds the poses of a participant that arrived since the last tick.
   void add(Poses&& poses);
 
-  // Calls `place` for each participant whose colliders or grabs may differ from the previous call, with the
-  // poses at this time. Its attachments and joints are those moved since the previous call.
+  // Calls `place` for each participant whose colliders, grabs or winds may differ from the previous call,
+  // with the poses at this time. Its attachments and joints are those moved since the previous call.
   void place(Clock::time_point time,
              const std::function<void(std::uint64_t participant, const model::ParticipantPoses&)>& place);
 
-  // The next place() is called for all participants that have colliders or grabs.
+  // The next place() is called for all participants that have colliders, grabs or winds.
   void repeat();
 
  private:
@@ -51,6 +51,7 @@ class PoseHistory {
     bool timed = false;
     std::vector<model::ParticipantCollider> colliders = {};
     std::vector<model::Grab> grabs = {};
+    std::vector<model::HeldWind> winds = {};
   };
   struct Track {
     std::uint64_t participant = 0;

@@ -18,6 +18,8 @@ const char* nameOf(Action action) {
       return "colliderPoses.grabs";
     case Action::moveAttachments:
       return "colliderPoses: attachments and joints";
+    case Action::holdWinds:
+      return "colliderPoses.winds";
     case Action::changeEnvironment:
       return "parameterChange: gravity, wind, gust and airDensity";
     case Action::changeCloths:
@@ -51,6 +53,7 @@ Role roleFor(Action action, const Permissions& participants) {
     case Action::grab:
     case Action::moveAttachments:
       return Role::participant;
+    case Action::holdWinds:
     case Action::changeEnvironment:
       return lowest(participants.environment);
     case Action::changeCloths:
@@ -119,6 +122,7 @@ messages::Result<void> permit(Role role, const v1::ColliderPoses& message, const
   if (permitted && !message.grabs().empty()) permitted = permit(role, Action::grab, participants);
   if (permitted && (!message.attachments().empty() || !message.joints().empty()))
     permitted = permit(role, Action::moveAttachments, participants);
+  if (permitted && !message.winds().empty()) permitted = permit(role, Action::holdWinds, participants);
   return permitted;
 }
 

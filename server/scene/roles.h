@@ -16,6 +16,7 @@ enum class Action : std::uint8_t {
   collide,
   grab,
   moveAttachments,
+  holdWinds,
   changeEnvironment,
   changeCloths,
   changeColliders,  // the scene's own colliders
@@ -30,7 +31,7 @@ enum class Action : std::uint8_t {
 
 // Rights of the role participant in addition to colliders, grabs and attachments. Owners have all of them.
 struct Permissions {
-  bool environment = true, cloths = true, colliders = true;  // parameters that they may change
+  bool environment = true, cloths = true, colliders = true;  // parameters that they may change; winds
   bool create = false, remove = false;                       // scenes
   bool control = false, record = false;
   bool own = false;  // become the owner of a scene that has none, by joining first
@@ -47,7 +48,7 @@ const char* nameOf(Role role);
 
 // Returns PERMISSION_DENIED, with the action and the required role, if the role is too low.
 [[nodiscard]] messages::Result<void> permit(Role role, Action action, const Permissions& participants);
-// Poses without colliders, grabs and attachments need no role: they only ask for contact events.
+// Poses without colliders, grabs, attachments and winds need no role: they only ask for contact events.
 [[nodiscard]] messages::Result<void> permit(Role role, const v1::ColliderPoses& message,
                                             const Permissions& participants);
 [[nodiscard]] messages::Result<void> permit(Role role, const v1::ParameterChange& message,

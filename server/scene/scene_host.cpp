@@ -32,7 +32,8 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
       snapshot_{.state = onDevice_->start},
       wantedWork_(scene.allWork()),
       work_(wantedWork_),
-      leastSubsteps_(scene.leastSubsteps(scene.start())) {
+      leastSubsteps_(scene.leastSubsteps(scene.start())),
+      windRoom_(scene.roomForWind(scene.start(), work_.substeps)) {
   live_.work = work_;
   const std::shared_ptr<const LiveScene::Restored> restored = live_.restored();
   if (restored) continueFrom(*restored);
@@ -115,7 +116,7 @@ void SceneHost::begin(Clock::time_point now) {
   parameters_.endEasing(*onDevice_, tick_);
   applyInputs();
   applyWork();
-  interaction_.advance(parameters_.scene(), tick_, recovery_.next());
+  interaction_.advance(parameters_.scene(), tick_, recovery_.next(), windRoom_);
   record();
   current_.recording = Clock::now() - began;
   onDevice_->slices.begin();
@@ -189,9 +190,11 @@ void SceneHost::announceParameters() {
 
 void SceneHost::applyWork() {
   const model::Scene& scene = parameters_.scene();
-  if (parameters_.takeChanged()) leastSubsteps_ = live_.leastSubsteps(scene);
+  const bool changed = parameters_.takeChanged();
+  if (changed) leastSubsteps_ = live_.leastSubsteps(scene);
   schedule::WorkLevel work = wantedWork_;
   work.substeps = std::clamp(leastSubsteps_, work.substeps, scene.substeps);
+  if (changed || work.substeps != work_.substeps) windRoom_ = live_.roomForWind(scene, work.substeps);
   if (work == work_) return;
   if (work.substeps != work_.substeps) onDevice_->simulation.setSubsteps(work.substeps, scene.cloths);
   const bool more = work.frameDivisor < work_.frameDivisor || work.substeps > work_.substeps;

@@ -169,6 +169,7 @@ class SceneHost {
 
   schedule::WorkLevel wantedWork_, work_;
   std::uint32_t leastSubsteps_;
+  float windRoom_;  // LiveScene::roomForWind()
 
   // Tick that has begun, or else the newest complete one.
   struct Tick {

@@ -46,6 +46,7 @@ Tolerance toleranceOfTick(const model::Scene& scene, const simulation::NodeState
 
 reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
   reference::TickInputs result{inputs.environment, {}};
+  result.winds = inputs.winds;
   for (const simulation::MovingCollider& collider : inputs.colliders)
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
                                 reference::toPose(collider.end), double{collider.friction}});

@@ -2,6 +2,7 @@
 // Recordings that start and end while the scene runs.
 #include "server/recording/scene_journal.h"
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <iterator>
@@ -353,6 +354,39 @@ TEST_F(SceneJournalTest, CountsRecordingsOfRemovedScenesWithoutKeepingThem) {
   std::uintmax_t bytes = 0;
   for (const auto& entry : std::filesystem::directory_iterator(directory.path())) bytes += entry.file_size();
   EXPECT_THAT(recordings.report(), HasSubstr(fmt::format("complete 3  failed 0  bytes {}\n", bytes)));
+}
+
+TEST_F(SceneJournalTest, ResimulatesHeldWinds) {
+  const auto hold = [&](float x, float speed) {
+    model::HeldWind fan{{.pose = {.position = {x, -1.2f, 0.1f}}, .speed = speed}, 1};
+    live->inbox.postPoses(3, {.winds = {fan}}, now);
+    ticks(1);
+  };
+  const auto file = journal->start("winds");
+  ASSERT_TRUE(file) << file.error().text;
+  for (int i = 0; i < 20; ++i) hold(0.01f * static_cast<float>(i), 5);
+  live->inbox.postPoses(3, {}, now);
+  ticks(10);
+  for (int i = 0; i < 5; ++i) hold(0, 100);
+  publisher->drain();
+  ASSERT_TRUE(journal->stop());
+  EXPECT_EQ(live->metrics.rollbacks.value(), 0u);
+  const Resimulation result = again(*file);
+  EXPECT_EQ(result.ticks, 35u);
+  EXPECT_EQ(result.different, 0u) << toText(result);
+
+  auto reader = RecordingReader::open(pathOf(*file));
+  ASSERT_TRUE(reader);
+  std::vector<float> speeds;
+  for (auto message = reader->next(); message && *message; message = reader->next()) {
+    if ((*message)->topic != Topic::ticks) continue;
+    v1::RecordedTick tick;
+    ASSERT_TRUE(tick.ParseFromArray((*message)->bytes.data(), static_cast<int>((*message)->bytes.size())));
+    const float speed = tick.winds().empty() ? 0 : tick.winds(0).speed();
+    if (speeds.empty() || speeds.back() != speed) speeds.push_back(speed);
+  }
+  const float room = std::min(100.0f, live->roomForWind(live->start(), live->start().substeps));
+  EXPECT_THAT(speeds, ::testing::ElementsAre(5, 0, ::testing::FloatEq(room)));
 }
 
 // Changes of the substeps: in the middle of a recording, before it starts, around a rollback, and after the

@@ -57,7 +57,7 @@ class Ticks {
     }
     for (scene::Poses& poses : inputs_.poses) interaction_.add(std::move(poses));
     interaction_.place(schedule::Clock::now());
-    interaction_.advance(scene_, tick_, scene::Recovery::none);
+    interaction_.advance(scene_, tick_, scene::Recovery::none, model::kMaxHeldSpeed);
     const simulation::TickInputs& inputs = interaction_.inputs();
     require(inputs.colliders.size() <= simulation::kMaxColliders,
             "the simulation has room for all colliders");

@@ -264,6 +264,24 @@ TEST(ColliderShares, MovingJointsHasAPrice) {
   EXPECT_EQ(load, 0);
 }
 
+TEST(ColliderShares, HeldWindsHaveAPrice) {
+  const model::Scene scene = tests::smallScene();
+  const auto budget = std::make_shared<Budget>(BudgetLimits{.sceneLoad = 1, .load = 1, .tickSeconds = 0});
+  budget->setSpeed({.nodeStepSeconds = 1e-6, .dispatchSeconds = 0, .workgroupFactor = 1});
+  Charge charge(budget, scene, true);
+  ASSERT_TRUE(charge.chargeWinds("colliderPoses.winds", scene, 1));
+  const double one = budget->usage().load;
+  EXPECT_GT(one, 0);
+  ASSERT_TRUE(charge.chargeWinds("colliderPoses.winds", scene, 2));
+  EXPECT_NEAR(budget->usage().load, 2 * one, 1e-9);
+  const auto refused = charge.chargeWinds("colliderPoses.winds", scene, 1'000'000);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("colliderPoses.winds: would take"));
+  EXPECT_NEAR(budget->usage().load, 2 * one, 1e-9);
+  EXPECT_TRUE(charge.chargeWinds("colliderPoses.winds", scene, 0));
+  EXPECT_EQ(budget->usage().load, 0);
+}
+
 TEST(ColliderShares, AScenesCollidersLeaveHalfOfTheFreeLoadToTheNext) {
   const model::Scene scene = tests::smallScene();
   const auto budget = std::make_shared<Budget>(BudgetLimits{.sceneLoad = 1e9, .load = 1, .tickSeconds = 0});

@@ -114,6 +114,59 @@ TEST_F(NewestPosesTest, ForgetsThePosesOfAViewer) {
   EXPECT_THAT(inputs(), ElementsAre("1: 1"));
 }
 
+// Room for winds, and a price that grows with them.
+class WindBudget : public ColliderBudget {
+ public:
+  double roomForHands() const override { return 100; }
+  double roomForOthers(double) const override { return 100; }
+  messages::Result<void> chargeWinds(std::size_t count) override {
+    if (count > charged && count > most)
+      return tl::unexpected(messages::FieldError{v1::ERROR_CODE_RESOURCE_EXHAUSTED, "too dear"});
+    charged = count;
+    return {};
+  }
+  void chargeColliders(const ColliderLoad&) override {}
+  bool boundsOfCloth(ClothBounds&) const override { return false; }
+  std::size_t most = 8, charged = 0;
+};
+
+TEST_F(NewestPosesTest, WindsActAsFarAsThereIsRoom) {
+  WindBudget budget;
+  NewestPoses room(subscribers, inbox, &budget, 3);
+  const auto ada = add(1, Role::participant), bob = add(2, Role::participant);
+  room.add(1, Role::participant);
+  room.add(2, Role::participant);
+  const auto hold = [&](const delivery::Mailbox& mailbox, std::size_t count) {
+    model::ParticipantPoses poses;
+    for (std::uint32_t id = 0; id < count; ++id) poses.winds.push_back({{.speed = 1}, id});
+    const auto held = room.post(mailbox, {}, std::move(poses), {}, now);
+    return held ? std::string() : held.error().text;
+  };
+  const auto acting = [&] {
+    Inputs drained;
+    inbox.drain(drained);
+    return drained.poses.empty() ? 0u : drained.poses.back().now.poses.winds.size();
+  };
+  EXPECT_EQ(hold(*ada, 2), "");
+  EXPECT_EQ(acting(), 2u);
+  EXPECT_THAT(hold(*bob, 2), ::testing::HasSubstr("1 of 2 winds act"));
+  EXPECT_EQ(acting(), 1u);
+  EXPECT_EQ(hold(*bob, 2), "") << "said once";
+  EXPECT_EQ(acting(), 1u);
+  EXPECT_EQ(budget.charged, 3u);
+  room.remove(1, now);
+  EXPECT_EQ(acting(), 0u);
+  EXPECT_EQ(budget.charged, 1u);
+  EXPECT_EQ(hold(*bob, 2), "");
+  EXPECT_EQ(acting(), 2u);
+  EXPECT_EQ(hold(*bob, 0), "");
+  budget.most = 1;
+  acting();
+  EXPECT_EQ(hold(*bob, 2), "too dear");
+  EXPECT_EQ(acting(), 0u);
+  EXPECT_EQ(budget.charged, 0u);
+}
+
 TEST_F(NewestPosesTest, RemovesWhatACheckpointHas) {
   newest.add(1, Role::participant, true);
   newest.add(2, Role::participant);

@@ -214,6 +214,21 @@ TEST_F(PoseHistoryTest, AttachmentsAndContactRequestsActAtOnce) {
   EXPECT_TRUE(placed[kAda].attachments.empty()) << "they stay where they are put";
 }
 
+TEST_F(PoseHistoryTest, WindsMoveAndEndAtTheirTime) {
+  const auto hold = [&](double ms, float place) {
+    post(ms, {.winds = {{{.pose = {.position = Vec3(place, 0, 0)}, .speed = 3}, 1}}});
+  };
+  hold(0, 0);
+  hold(50, 0.5f);
+  post(80, {});
+  tick(25);
+  ASSERT_EQ(placed[kAda].winds.size(), 1u);
+  EXPECT_NEAR(placed[kAda].winds[0].pose.position.x(), 0.25f, 1e-5f);
+  EXPECT_EQ(placed[kAda].winds[0].speed, 3);
+  tick(80);
+  EXPECT_TRUE(placed[kAda].winds.empty());
+}
+
 TEST_F(PoseHistoryTest, ManyPosesAndParticipantsStaySeparate) {
   for (int i = 0; i <= 1000; ++i) {
     say(i, static_cast<float>(i) / 1000);

@@ -24,6 +24,7 @@ TEST(Roles, EachActionRequiresItsRole) {
       {Action::collide, Role::participant, Role::participant},
       {Action::grab, Role::participant, Role::participant},
       {Action::moveAttachments, Role::participant, Role::participant},
+      {Action::holdWinds, Role::participant, Role::owner},
       {Action::changeEnvironment, Role::participant, Role::owner},
       {Action::changeCloths, Role::participant, Role::owner},
       {Action::changeColliders, Role::participant, Role::owner},
@@ -71,13 +72,14 @@ TEST(Roles, ChangeRequiresTheRoleOfItsContent) {
 }
 
 TEST(Roles, ViewerMayRequestContactEvents) {
-  v1::ColliderPoses wish, hand, grab, knot;
+  v1::ColliderPoses wish, hand, grab, knot, fan;
   wish.set_contact_events(true);
   hand.add_colliders();
   grab.add_grabs();
   knot.add_attachments();
+  fan.add_winds();
   EXPECT_TRUE(permit(Role::viewer, wish, {}).has_value());
-  for (const v1::ColliderPoses* act : {&hand, &grab, &knot}) {
+  for (const v1::ColliderPoses* act : {&hand, &grab, &knot, &fan}) {
     EXPECT_FALSE(permit(Role::viewer, *act, {}).has_value());
     EXPECT_TRUE(permit(Role::participant, *act, {}).has_value());
   }
