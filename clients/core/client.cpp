@@ -247,7 +247,7 @@ void Client::acknowledgeSeen() {
 
 void Client::requestKeyFrame(std::uint64_t nowUs, bool early) {
   // In lockstep the server waits for an answer to each frame: an acknowledgement or this request.
-  if (!stream_.mayRequestKeyFrame(nowUs, !early && inLockstep())) return;
+  if (!stream_.takeKeyFrameRequest(nowUs, !early && inLockstep())) return;
   std::string request;
   writeKeyFrameRequest(request, stream_.description().layout.epoch, early);
   send(std::move(request));

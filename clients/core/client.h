@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -62,6 +61,7 @@ class Client {
   void setHand(std::uint32_t side, std::span<const float> joints, std::uint64_t nowUs);
   void setHead(const std::optional<cs_own_collider>& head, std::uint64_t nowUs);
   void setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs);
+  void setWinds(std::span<const cs_own_wind> winds, std::uint64_t nowUs);
   // Among the positions that are shown.
   std::optional<cs_cloth_point> nearestPoint(const Vec3& point, float maxDistance) const;
   std::optional<cs_cloth_point> castRay(const Vec3& origin, const Vec3& direction, float maxDistance) const;

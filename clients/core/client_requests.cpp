@@ -43,6 +43,11 @@ void Client::setGrabs(std::span<const cs_grab> grabs, std::uint64_t nowUs) {
   sendPoses(nowUs);
 }
 
+void Client::setWinds(std::span<const cs_own_wind> winds, std::uint64_t nowUs) {
+  poses_.winds.assign(winds.begin(), winds.end());
+  sendPoses(nowUs);
+}
+
 std::optional<cs_cloth_point> Client::seen(std::optional<cs_cloth_point> point) const {
   if (point) point->tick = shownTick();
   return point;

@@ -538,6 +538,7 @@ uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t by
 
 #define CS_MAX_COLLIDERS 40u
 #define CS_MAX_GRABS 10u
+#define CS_MAX_WINDS 2u
 #define CS_HAND_JOINTS 26u
 #define CS_HAND_BONES 20u
 /* Id of the collider that is the participant's head (docs/protocol.md). */
@@ -580,6 +581,22 @@ typedef struct cs_grab {
    * Only triangle, coordinates and tick of the place are used, and only when the grab starts. */
   const cs_cloth_point* place;
 } cs_grab;
+
+/* Kinds of LocalWind in scene.proto. */
+typedef enum cs_wind_kind { CS_WIND_FAN = 0, CS_WIND_VORTEX = 1 } cs_wind_kind;
+
+#define CS_OWN_WIND_VERSION 1u
+/* Local wind that this participant holds (LocalWind in scene.proto). NaN means the server's default. */
+typedef struct cs_own_wind {
+  uint32_t version CS_INIT(CS_OWN_WIND_VERSION);
+  uint32_t kind; /* cs_wind_kind */
+  float position[3];
+  float orientation[4]; /* quaternion x y z w that turns +Y to the axis; all zero means no rotation */
+  float speed;          /* m/s */
+  float radius;         /* m; of a fan's opening, or of a vortex's core */
+  float spread;         /* of a fan: growth of its radius for each metre of distance */
+  float reach;          /* m; a fan's range, or a vortex's reach */
+} cs_own_wind;
 
 /* HandSide of session.proto. */
 typedef enum cs_hand_side { CS_HAND_LEFT = 1, CS_HAND_RIGHT = 2 } cs_hand_side;
@@ -647,6 +664,9 @@ int cs_cast_ray(const cs_client* client, const float* origin3, const float* dire
 /* Replaces the grabs of this participant. At most CS_MAX_GRABS are used; the rest is ignored. Fails, and
  * changes nothing, if a version is unknown. */
 int cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
+/* Replaces the local winds of this participant, which needs the permission to change the environment. At most
+ * CS_MAX_WINDS are used; the rest is ignored. Fails, and changes nothing, if a version or kind is unknown. */
+int cs_set_winds(cs_client* client, const cs_own_wind* winds, uint32_t count, uint64_t now_us) CS_NOEXCEPT;
 /* Moves an attachment of the scene; it stays there. orientation4 may be NULL: no rotation. If it jumps, its
  * cloth goes along at once, however short the way is: use this for teleports and cuts of an animation. */
 void cs_move_attachment(cs_client* client, const char* attachment, const float* position3,

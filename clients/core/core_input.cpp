@@ -61,6 +61,17 @@ int cs_set_grabs(cs_client* client, const cs_grab* grabs, uint32_t count, uint64
   return 1;
 }
 
+int cs_set_winds(cs_client* client, const cs_own_wind* winds, uint32_t count, uint64_t now_us) noexcept {
+  const std::span used(winds, std::min(count, CS_MAX_WINDS));
+  const bool isKnown = haveVersion(used, CS_OWN_WIND_VERSION) &&
+                       std::all_of(used.begin(), used.end(), [](const cs_own_wind& wind) {
+                         return wind.kind == CS_WIND_FAN || wind.kind == CS_WIND_VORTEX;
+                       });
+  if (!isKnown) return 0;
+  client->client.setWinds(used, now_us);
+  return 1;
+}
+
 int cs_nearest_point(const cs_client* client, const float* point3, float max_distance,
                      cs_cloth_point* out) noexcept {
   return write(client->client.nearestPoint({point3[0], point3[1], point3[2]}, max_distance), out);

@@ -40,8 +40,8 @@ class Display {
   std::optional<cs_played> play(const ServerClock& clock, std::uint64_t nowUs, std::uint64_t displayUs,
                                 std::uint64_t participant);
 
-  // Whether the last play() chose what to show. The functions below require it.
-  bool shows() const { return !corrected_.empty() || (playOut_ && playOut_->shows()); }
+  // Whether the last play() chose what to show, and that is still known. The next four functions require it.
+  bool shows() const { return playOut_ && playOut_->shows(); }
   std::uint64_t tick() const { return tick_; }
   std::span<const float> positions() const;
   std::span<const float> normals(const codec::StreamLayout& layout) const;

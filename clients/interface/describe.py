@@ -11,7 +11,7 @@ The file has one object for each header:
   structs    by name: comment, size, and fields with type, count (arrays), offset and comment. Sizes and offsets are in
              bytes, for each of the TARGETS
   functions  by name: comment, result, and parameters with name and type
-  native     functions that WebAssembly does not have, because they take a path or a function"""
+  native     functions that WebAssembly does not have, because they take a path, bytes of the program or a function"""
 import json
 import pathlib
 import re

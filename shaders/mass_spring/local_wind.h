@@ -19,8 +19,8 @@ struct LocalWindRecord {
 
   float size;    // of a fan, m: the radius; of a vortex, 1/m^2: the inverse square of the radius
   float spread;  // of a fan
-  float
-      reach;  // of a fan, 1/m: the inverse of the range; of a vortex, 1/m^2: the inverse square of the reach
+  // Of a fan, 1/m: the inverse of the range; of a vortex, 1/m^2: the inverse square of the reach.
+  float reach;
   float behind;  // of a fan, 1/m: the inverse of the radius
 };
 

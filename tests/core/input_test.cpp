@@ -239,6 +239,35 @@ TEST(AttachmentPoses, AreSentOnceWithTheirLastValue) {
   EXPECT_THAT(joined.sent().collider_poses().attachments(), SizeIs(0));
 }
 
+TEST(Winds, AFanAndAVortexAreSent) {
+  JoinedClient joined;
+  cs_own_wind winds[2]{};
+  winds[0].position[1] = 2;
+  winds[0].orientation[0] = 1;
+  winds[0].speed = 8;
+  winds[0].radius = 0.25f;
+  winds[0].spread = kNan;
+  winds[0].reach = 3;
+  winds[1] = winds[0];
+  winds[1].kind = CS_WIND_VORTEX;
+  ASSERT_EQ(cs_set_winds(joined.client.get(), winds, 2, 1), 1);
+  const v1::ColliderPoses poses = joined.sent().collider_poses();
+  ASSERT_THAT(poses.winds(), SizeIs(2));
+  const v1::LocalWind &fan = poses.winds(0).wind(), &vortex = poses.winds(1).wind();
+  EXPECT_EQ(fan.pose().position().y(), 2);
+  EXPECT_EQ(fan.pose().orientation().x(), 1);
+  EXPECT_EQ(fan.speed(), 8);
+  EXPECT_EQ(fan.fan().radius(), 0.25f);
+  EXPECT_FALSE(fan.fan().has_spread());
+  EXPECT_EQ(fan.fan().range(), 3);
+  EXPECT_EQ(poses.winds(1).id(), 1u);
+  EXPECT_EQ(vortex.vortex().reach(), 3);
+  winds[1].kind = 2;
+  EXPECT_EQ(cs_set_winds(joined.client.get(), winds, 2, 2), 0) << "unknown kind";
+  ASSERT_EQ(cs_set_winds(joined.client.get(), nullptr, 0, 3), 1);
+  EXPECT_THAT(joined.sent().collider_poses().winds(), SizeIs(0));
+}
+
 TEST(Colliders, DropsCollidersBeyondTheLimit) {
   JoinedClient joined;
   const std::vector<cs_own_collider> spheres(50, sphereAt(1, 1, 1, 1));

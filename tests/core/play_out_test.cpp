@@ -57,8 +57,10 @@ TEST(PlayOut, RefusesInvalidOptions) {
   EXPECT_TRUE(refused([](auto& o) { o.lead_ms = 1001; }));
   EXPECT_FALSE(refused([](auto& o) { o.lead_ms = 0; }));
   cs_played played{};
+  played.version = CS_PLAYED_VERSION + 1;
   EXPECT_EQ(cs_play_out(viewer.client.get(), 1, 1, &played), 0) << "unknown version";
   cs_stage_statistics stages{};
+  stages.version = CS_STAGE_STATISTICS_VERSION + 1;
   EXPECT_EQ(cs_get_stage_statistics(viewer.client.get(), &stages), 0);
 }
 

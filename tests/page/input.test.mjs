@@ -43,6 +43,35 @@ async function withPage(options, use) {
   }
 }
 
+// The lower edge of the sheet is blown away from the camera, and falls back when the pointer leaves.
+test("a fan blows at the cloth", () =>
+  withPage({ query: "?scene=hanging", viewport: kPicture }, async (page) => {
+    await untilState(page, "live");
+    await untilFrames(page, 60);
+    const edge = 39 * 32 + 16;
+    const rest = vertexOf((await look(page)).positions, edge);
+    const [x, y] = await page.evaluate((at) => window.clothstream.project(at), rest);
+    await page.check('input[name="tool"][value="fan"]');
+    await page.mouse.move(x, y - 40);
+    await page.mouse.down();
+    await page.waitForFunction(
+      ([vertex, from]) => {
+        const at = window.clothstream.positions.slice(3 * vertex, 3 * vertex + 3);
+        return Math.hypot(at[0] - from[0], at[1] - from[1], at[2] - from[2]) > 0.02;
+      },
+      [edge, rest],
+    );
+    await page.mouse.up();
+    await page.check('input[name="tool"][value="hand"]');
+    await page.waitForFunction(
+      ([vertex, from]) => {
+        const at = window.clothstream.positions.slice(3 * vertex, 3 * vertex + 3);
+        return Math.hypot(at[0] - from[0], at[1] - from[1], at[2] - from[2]) < 0.02;
+      },
+      [edge, rest],
+    );
+  }));
+
 // The middle of the lower edge follows the mouse, and falls back when the mouse releases it.
 test("the cloth can be grabbed", () =>
   withPage({ query: "?scene=hanging", viewport: kPicture }, async (page) => {

@@ -98,7 +98,7 @@ bool ReceivedStream::readsReport(Bytes body) {
   return true;
 }
 
-bool ReceivedStream::mayRequestKeyFrame(std::uint64_t nowUs, bool always) {
+bool ReceivedStream::takeKeyFrameRequest(std::uint64_t nowUs, bool always) {
   return keyFrameRequest_.wanted(nowUs) || always;
 }
 

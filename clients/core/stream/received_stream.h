@@ -50,9 +50,9 @@ class ReceivedStream {
   // other client decoded.
   [[nodiscard]] tl::expected<Received, const char*> receive(Bytes body, const cs_decoded* decoded,
                                                             std::uint64_t nowUs);
-  // Whether to send a request for a key frame now, and then counts it as sent. `always` sends it although one
+  // Returns whether to send a request for a key frame now, and counts it as sent. `always`: also while one
   // waits.
-  bool mayRequestKeyFrame(std::uint64_t nowUs, bool always);
+  bool takeKeyFrameRequest(std::uint64_t nowUs, bool always);
   // Measures how long the newest frame, which arrived now, was under way.
   void measure(const ServerClock& clock, std::uint64_t nowUs);
   DisplayableFrame displayable(bool isKey) const;

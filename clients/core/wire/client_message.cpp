@@ -77,6 +77,25 @@ void addGrab(Writer& poses, const OwnGrab& own) {
   place.add_uint64(P::kSeenTick.number, own.point.tick);
 }
 
+void addWind(Writer& poses, std::uint32_t id, const cs_own_wind& from) {
+  Writer held(poses, field::ColliderPoses::kWinds.number);
+  held.add_uint32(field::HeldWind::kId.number, id);
+  using F = field::LocalWind;
+  Writer wind(held, field::HeldWind::kWind.number);
+  addPose(wind, F::kPose, from.position, from.orientation);
+  addGiven(wind, F::kSpeed, from.speed);
+  if (from.kind == CS_WIND_FAN) {
+    Writer fan(wind, F::kFan.number);
+    addGiven(fan, field::Fan::kRadius, from.radius);
+    addGiven(fan, field::Fan::kSpread, from.spread);
+    addGiven(fan, field::Fan::kRange, from.reach);
+  } else {
+    Writer vortex(wind, F::kVortex.number);
+    addGiven(vortex, field::Vortex::kRadius, from.radius);
+    addGiven(vortex, field::Vortex::kReach, from.reach);
+  }
+}
+
 void addHand(Writer& poses, std::uint32_t side, const std::vector<float>& joints) {
   if (joints.empty()) return;
   std::vector<float> positions, radii;
@@ -178,6 +197,8 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
                 std::span<const float, 4>(at + 3, 4));
       }
     }
+    for (std::size_t i = 0; i < poses.winds.size(); ++i)
+      addWind(message, static_cast<std::uint32_t>(i), poses.winds[i]);
     if (poses.wantsContacts) message.add_bool(F::kContactEvents.number, true);
     if (poses.wantsConstraints) message.add_bool(F::kActiveConstraints.number, true);
     if (serverTimeUs != 0) message.add_uint64(F::kServerTimeUs.number, serverTimeUs);

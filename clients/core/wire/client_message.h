@@ -65,6 +65,7 @@ struct Poses {
   std::vector<OwnGrab> grabs;
   std::vector<AttachmentPose> attachments;
   std::vector<ColliderJoints> joints;
+  std::vector<cs_own_wind> winds;  // the id of each is its index
   bool wantsContacts = false, wantsConstraints = false;
 };
 // Both times are the same instant, on the client's and on the server's clock. serverTimeUs is 0 if unknown.

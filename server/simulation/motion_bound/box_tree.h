@@ -28,7 +28,7 @@ class BoxTree {
   // Must be recorded before the first fit.
   void recordUpload(vulkan::Recorder& recorder) const { branches_.recordUpload(recorder); }
   // Fits the boxes to the motion from the state buffers `from` to the other ones. Half of `gap`, in metres,
-  // is the margin of each box. A barrier is before it.
+  // is the margin of each box. The caller records a barrier before it.
   void recordFit(vulkan::Recorder& recorder, std::uint32_t from, float gap) const;
 
   const vulkan::Buffer& boxes() const { return boxes_; }

@@ -18,12 +18,14 @@ CS_PLAYED_VERSION = 1
 CS_DECODED_VERSION = 1
 CS_MAX_COLLIDERS = 40
 CS_MAX_GRABS = 10
+CS_MAX_WINDS = 2
 CS_HAND_JOINTS = 26
 CS_HAND_BONES = 20
 CS_HEAD_ID = 2147483712
 CS_OWN_COLLIDER_VERSION = 1
 CS_CLOTH_POINT_VERSION = 1
 CS_GRAB_VERSION = 1
+CS_OWN_WIND_VERSION = 1
 CS_GRAB_EVENT_VERSION = 1
 CS_CONTACT_EVENT_VERSION = 1
 CS_ENVIRONMENT_VERSION = 1
@@ -84,6 +86,8 @@ CS_SHOWN_HELD = 4
 CS_DECODING_DONE = 0
 CS_DECODING_REFUSED = 1
 CS_DECODING_SKIPPED = 2
+CS_WIND_FAN = 0
+CS_WIND_VORTEX = 1
 CS_HAND_LEFT = 1
 CS_HAND_RIGHT = 2
 CS_GRAB_TAKEN = 1
@@ -325,6 +329,20 @@ class cs_grab(c.Structure):
         ("max_force", c.c_float),
         ("slip_distance", c.c_float),
         ("place", c.POINTER(cs_cloth_point)),
+    ]
+
+
+class cs_own_wind(c.Structure):
+    VERSION = CS_OWN_WIND_VERSION
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("kind", c.c_uint32),
+        ("position", c.c_float * 3),
+        ("orientation", c.c_float * 4),
+        ("speed", c.c_float),
+        ("radius", c.c_float),
+        ("spread", c.c_float),
+        ("reach", c.c_float),
     ]
 
 
@@ -728,6 +746,7 @@ FUNCTIONS = {
     "cs_nearest_point": (c.c_int, [c.c_void_p, c.POINTER(c.c_float), c.c_float, c.POINTER(cs_cloth_point)]),
     "cs_cast_ray": (c.c_int, [c.c_void_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_float, c.POINTER(cs_cloth_point)]),
     "cs_set_grabs": (c.c_int, [c.c_void_p, c.POINTER(cs_grab), c.c_uint32, c.c_uint64]),
+    "cs_set_winds": (c.c_int, [c.c_void_p, c.POINTER(cs_own_wind), c.c_uint32, c.c_uint64]),
     "cs_move_attachment": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_int, c.c_uint64]),
     "cs_move_joints": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.c_uint32, c.c_uint64]),
     "cs_grab_event_count": (c.c_uint32, [c.c_void_p]),

@@ -100,6 +100,15 @@ namespace ClothStream.Core
     }
 
     /// <summary>
+    /// Kinds of LocalWind in scene.proto.
+    /// </summary>
+    public enum WindKind : uint
+    {
+        Fan = 0,
+        Vortex = 1,
+    }
+
+    /// <summary>
     /// HandSide of session.proto.
     /// </summary>
     public enum HandSide : uint
@@ -594,6 +603,40 @@ namespace ClothStream.Core
         [FieldOffset(56)] public ClothPoint* place;
     }
 
+    /// <summary>
+    /// Local wind that this participant holds (LocalWind in scene.proto). NaN means the server's default.
+    /// </summary>
+    [StructLayout(LayoutKind.Explicit, Size = 52)]
+    public unsafe struct OwnWind
+    {
+        [FieldOffset(0)] public uint version;
+        /// <summary>
+        /// cs_wind_kind
+        /// </summary>
+        [FieldOffset(4)] public uint kind;
+        [FieldOffset(8)] public fixed float position[3];
+        /// <summary>
+        /// quaternion x y z w that turns +Y to the axis; all zero means no rotation
+        /// </summary>
+        [FieldOffset(20)] public fixed float orientation[4];
+        /// <summary>
+        /// m/s
+        /// </summary>
+        [FieldOffset(36)] public float speed;
+        /// <summary>
+        /// m; of a fan's opening, or of a vortex's core
+        /// </summary>
+        [FieldOffset(40)] public float radius;
+        /// <summary>
+        /// of a fan: growth of its radius for each metre of distance
+        /// </summary>
+        [FieldOffset(44)] public float spread;
+        /// <summary>
+        /// m; a fan's range, or a vortex's reach
+        /// </summary>
+        [FieldOffset(48)] public float reach;
+    }
+
     [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct GrabEvent
     {
@@ -1074,12 +1117,14 @@ namespace ClothStream.Core
         public const uint CS_DECODED_VERSION = 1;
         public const uint CS_MAX_COLLIDERS = 40;
         public const uint CS_MAX_GRABS = 10;
+        public const uint CS_MAX_WINDS = 2;
         public const uint CS_HAND_JOINTS = 26;
         public const uint CS_HAND_BONES = 20;
         public const uint CS_HEAD_ID = 2147483712;
         public const uint CS_OWN_COLLIDER_VERSION = 1;
         public const uint CS_CLOTH_POINT_VERSION = 1;
         public const uint CS_GRAB_VERSION = 1;
+        public const uint CS_OWN_WIND_VERSION = 1;
         public const uint CS_GRAB_EVENT_VERSION = 1;
         public const uint CS_CONTACT_EVENT_VERSION = 1;
         public const uint CS_ENVIRONMENT_VERSION = 1;
@@ -1469,6 +1514,11 @@ namespace ClothStream.Core
         /// changes nothing, if a version is unknown.
         /// </summary>
         [DllImport(Library)] public static extern int cs_set_grabs(IntPtr client, Grab* grabs, uint count, ulong nowUs);
+        /// <summary>
+        /// Replaces the local winds of this participant, which needs the permission to change the environment. At most
+        /// CS_MAX_WINDS are used; the rest is ignored. Fails, and changes nothing, if a version or kind is unknown.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_set_winds(IntPtr client, OwnWind* winds, uint count, ulong nowUs);
         /// <summary>
         /// Moves an attachment of the scene; it stays there. orientation4 may be NULL: no rotation. If it jumps, its
         /// cloth goes along at once, however short the way is: use this for teleports and cuts of an animation.

@@ -89,6 +89,7 @@ export interface CoreFunctions {
   cs_nearest_point(client: Pointer, point3: Pointer, maxDistance: number, out: Pointer): number;
   cs_cast_ray(client: Pointer, origin3: Pointer, direction3: Pointer, maxDistance: number, out: Pointer): number;
   cs_set_grabs(client: Pointer, grabs: Pointer, count: number, nowUs: bigint): number;
+  cs_set_winds(client: Pointer, winds: Pointer, count: number, nowUs: bigint): number;
   cs_move_attachment(client: Pointer, attachment: Pointer, position3: Pointer, orientation4: Pointer, jumps: number, nowUs: bigint): void;
   cs_move_joints(client: Pointer, collider: Pointer, poses: Pointer, count: number, nowUs: bigint): void;
   cs_grab_event_count(client: Pointer): number;

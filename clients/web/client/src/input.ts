@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Colliders, hands and grabs of this participant, and joints of the scene's colliders.
 
-import { CS_GRAB_EVENT_VERSION, CS_GRAB_VERSION, CS_OWN_COLLIDER_VERSION, cs_cloth_point, cs_grab, cs_grab_event, cs_own_collider } from "./layout";
+import { CS_GRAB_EVENT_VERSION, CS_GRAB_VERSION, CS_OWN_COLLIDER_VERSION, CS_OWN_WIND_VERSION, cs_cloth_point, cs_grab, cs_grab_event, cs_own_collider, cs_own_wind } from "./layout";
 import { nowUs, writeFloats, type CoreHandle } from "./handle";
-import { HandSide, kMaxColliders, kMaxGrabs, type Grab, type GrabEvent, type Head, type OwnCollider } from "./types";
+import { HandSide, kMaxColliders, kMaxGrabs, kMaxWinds, type Grab, type GrabEvent, type Head, type OwnCollider, type OwnWind } from "./types";
 
 const kJointFloats = 4; // x, y, z, radius
 const kHandJoints = 25; // of WebXR
@@ -74,6 +74,25 @@ export class Input {
       writeFloats(view, at + cs_own_collider.size, collider.size ?? kNoSize);
     });
     core.exports.cs_set_colliders(pointer, this.array, Math.min(colliders.length, kMaxColliders), nowUs());
+  }
+
+  // Replaces the local winds of this participant. The server refuses them without the permission to change the environment.
+  setWinds(winds: readonly OwnWind[]): void {
+    const { core, pointer } = this.handle;
+    const view = core.view();
+    winds.slice(0, kMaxWinds).forEach((wind, index) => {
+      const at = this.array + index * cs_own_wind.sizeof;
+      view.setUint32(at + cs_own_wind.version, CS_OWN_WIND_VERSION, true);
+      view.setUint32(at + cs_own_wind.kind, wind.kind, true);
+      writeFloats(view, at + cs_own_wind.position, wind.position);
+      writeFloats(view, at + cs_own_wind.orientation, wind.orientation ?? kNoRotation);
+      view.setFloat32(at + cs_own_wind.speed, wind.speed, true);
+      // NaN: the server's default.
+      view.setFloat32(at + cs_own_wind.radius, wind.radius ?? NaN, true);
+      view.setFloat32(at + cs_own_wind.spread, wind.spread ?? NaN, true);
+      view.setFloat32(at + cs_own_wind.reach, wind.reach ?? NaN, true);
+    });
+    core.exports.cs_set_winds(pointer, this.array, Math.min(winds.length, kMaxWinds), nowUs());
   }
 
   // Replaces one tracked hand by 25 joints in the order of XRHand: x, y, z, radius of each. Undefined removes it.

@@ -17,6 +17,7 @@ export const CS_DECODED_VERSION = 1;
 export const CS_OWN_COLLIDER_VERSION = 1;
 export const CS_CLOTH_POINT_VERSION = 1;
 export const CS_GRAB_VERSION = 1;
+export const CS_OWN_WIND_VERSION = 1;
 export const CS_GRAB_EVENT_VERSION = 1;
 export const CS_CONTACT_EVENT_VERSION = 1;
 export const CS_ENVIRONMENT_VERSION = 1;
@@ -176,6 +177,17 @@ export const cs_grab = {
   max_force: 44,
   slip_distance: 48,
   place: 52,
+} as const;
+export const cs_own_wind = {
+  sizeof: 52,
+  version: 0,
+  kind: 4,
+  position: 8,
+  orientation: 20,
+  speed: 36,
+  radius: 40,
+  spread: 44,
+  reach: 48,
 } as const;
 export const cs_grab_event = {
   sizeof: 40,

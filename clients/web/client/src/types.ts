@@ -234,6 +234,23 @@ export interface OwnCollider {
   size?: Vec3;
 }
 
+// Values are cs_wind_kind of clients/core/core.h.
+export enum WindKind {
+  fan = 0,
+  vortex = 1,
+}
+
+// Local wind that this participant holds. Lengths in metres; what is absent has the server's default.
+export interface OwnWind {
+  kind: WindKind;
+  position: Vec3;
+  orientation?: Quaternion; // turns +Y to the axis
+  speed: number; // m/s
+  radius?: number; // of a fan's opening, or of a vortex's core
+  spread?: number; // of a fan: growth of its radius for each metre of distance
+  reach?: number; // a fan's range, or a vortex's reach
+}
+
 // Head of this participant. Lengths in metres.
 export interface Head {
   position: Vec3;
@@ -249,6 +266,7 @@ export enum HandSide {
 export const kMaxColliders = 40;
 export const kHeadId = 0x80000040; // CS_HEAD_ID
 export const kMaxGrabs = 10;
+export const kMaxWinds = 2;
 
 // A joining participant: displayed name (may be empty) and requested role (key of Roles, or 0 for any).
 export interface Identity {

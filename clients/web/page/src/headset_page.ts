@@ -59,6 +59,7 @@ export class HeadsetPage {
       sceneChosen: (scene) => listener.sceneChosen(scene),
       doingChosen: (doing) => this.headset.do(doing),
       left: () => void this.headset.leave(),
+      fanToggled: () => this.holdFan(!this.headset.body.holdsFan),
       changed: () => this.show(),
     });
     this.headset.seat.add(this.panel.mesh);
@@ -88,7 +89,13 @@ export class HeadsetPage {
     this.isBefore = false;
     this.put(kPanelPlace, kPanelTurn, kPanelTilt);
     const words = current ? [current.title + ".", current.wait].join(" ").trim() : undefined;
-    this.panel.show(this.session.client.sceneName || "ClothStream", this.content.rows(this.headset.mode, this.headset.doing, words));
+    this.panel.show(this.session.client.sceneName || "ClothStream", this.content.rows(this.headset.mode, this.headset.doing, this.headset.body.holdsFan, words));
+  }
+
+  // Takes the fan in the hand, or puts it away.
+  holdFan(on: boolean): void {
+    this.headset.body.holdsFan = on;
+    this.show();
   }
 
   // Shows a message on the panel for a moment.

@@ -26,6 +26,7 @@ export interface HeadsetPanelListener {
   sceneChosen(scene: string): void;
   doingChosen(doing: Doing): void;
   left(): void;
+  fanToggled(): void;
   // The rows have changed by a press.
   changed(): void;
 }
@@ -48,12 +49,12 @@ export class HeadsetPanel {
   }
 
   // `words` replace the usual figures in the last row.
-  rows(mode: Mode | undefined, doing: Doing, words: string | undefined): PanelRow[] {
+  rows(mode: Mode | undefined, doing: Doing, holdsFan: boolean, words: string | undefined): PanelRow[] {
     const { listener } = this;
     const place = mode === "immersive-ar" ? "Place on a surface" : "Place before me";
     return [
       { buttons: kTabs.map((tab) => ({ text: tab, isChosen: tab === this.tab, action: () => this.open(tab) })) },
-      ...this.content(),
+      ...this.content(holdsFan),
       {
         buttons: [
           { text: place, action: () => listener.doingChosen("place") },
@@ -66,10 +67,10 @@ export class HeadsetPanel {
     ];
   }
 
-  private content(): PanelRow[] {
+  private content(holdsFan: boolean): PanelRow[] {
     switch (this.tab) {
       case "Scenes":
-        return [this.actions(), ...this.list(this.scenes(), kOnePage)];
+        return [this.actions(holdsFan), ...this.list(this.scenes(), kOnePage)];
       case "People":
         return this.list(this.people(), kOnePage + 1);
       case "Quality":
@@ -90,11 +91,12 @@ export class HeadsetPanel {
     this.listener.changed();
   }
 
-  private actions(): PanelRow {
+  private actions(holdsFan: boolean): PanelRow {
     const { scenes } = this.panel;
     const allowed = this.session.state.kind === "live" && scenes.mayAct;
     const button = (text: string, action: () => Promise<void>): PanelButton => ({ text, ...(allowed ? { action: () => void action() } : {}) });
-    return { buttons: [button("Reset", () => scenes.reset()), button(scenes.isPaused ? "Continue" : "Pause", () => scenes.pause())] };
+    const fan = { text: "Fan", isChosen: holdsFan, action: () => this.listener.fanToggled() };
+    return { buttons: [button("Reset", () => scenes.reset()), button(scenes.isPaused ? "Continue" : "Pause", () => scenes.pause()), fan] };
   }
 
   private scenes(): PanelRow[] {

@@ -89,6 +89,7 @@ async function start(): Promise<void> {
     },
     refused: (client) => {
       notify(client.errorText);
+      if (client.errorText.startsWith("colliderPoses.winds")) putFanAway();
       panel.refused(client);
     },
   };
@@ -144,6 +145,13 @@ async function start(): Promise<void> {
     window.history.replaceState(null, "", url);
     headset.headset.body.letGo();
     session.join(name);
+  }
+
+  // The server would refuse it in each frame.
+  function putFanAway(): void {
+    for (const tool of tools) tool.checked = tool.value === "hand";
+    pusher.tool = "hand";
+    headset.holdFan(false);
   }
 
   function notify(text: string): void {

@@ -1,18 +1,23 @@
 // SPDX-License-Identifier: MIT
-// A ball or a box of the user, moved by mouse or finger: it follows the pointer along the cloth, and a press pushes it in.
+// A ball, a box or a fan of the user, moved by mouse or finger. A ball or box follows the pointer along the cloth, and a
+// press pushes it in. A fan blows at what is under the pointer, and a press makes it stronger.
 
 import * as THREE from "three";
-import { Shape, type ClothPoint, type Input, type OwnCollider, type Vec3 } from "@clothstream/client";
+import { Shape, type ClothPoint, type Input, type OwnCollider, type OwnWind, type Vec3 } from "@clothstream/client";
+import { FanFigure, heldFan } from "@clothstream/three";
 import type { View } from "./view";
 
-export type Tool = "hand" | "ball" | "box";
+export type Tool = "hand" | "ball" | "box" | "fan";
 
 // Largest speed, m/s. The server takes faster motion for a jump above 30 m/s.
 const kSpeed = 3;
 // Depth behind the touched point to which a press pushes, in radii.
 const kPush = 1.6;
 const kLongestStep = 0.1; // s
+const kFanDistance = 0.7; // m, from the touched point to the fan
+const kStrong = 2; // strength of the fan while it is pressed
 const kNoColliders: readonly OwnCollider[] = [];
+const kNoWinds: readonly OwnWind[] = [];
 
 export class Pusher {
   radius = 0.12; // of the ball, and half the edge of the box, m
@@ -27,6 +32,8 @@ export class Pusher {
   private placed = false; // whether the collider is in the scene
   private drawnAt = 0; // ms
   private sent = false; // whether the server has the collider
+  private blows = false; // whether the server has the fan
+  private readonly fan = new FanFigure();
 
   // `castRay` finds the cloth under the pointer.
   constructor(
@@ -37,7 +44,7 @@ export class Pusher {
     this.mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>(undefined, material);
     this.mesh.castShadow = true;
     this.mesh.visible = false;
-    view.scene.add(this.mesh);
+    view.scene.add(this.mesh, this.fan.group);
     const canvas = view.canvas;
     canvas.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.aim(event));
@@ -54,23 +61,38 @@ export class Pusher {
     if (tool === this.chosen) return;
     this.chosen = tool;
     this.placed = this.isOver = this.pushes = false;
-    this.mesh.visible = false;
+    this.mesh.visible = this.fan.group.visible = false;
     this.mesh.geometry.dispose();
     this.mesh.geometry = tool === "box" ? new THREE.BoxGeometry(2, 2, 2) : new THREE.SphereGeometry(1, 48, 32);
   }
 
-  // Moves the collider and sends it, or its removal. Call once per drawn frame.
+  // Moves the collider or the fan and sends it, or its removal. Call once per drawn frame.
   send(input: Input, nowMs: number): void {
     const colliders = this.update(nowMs);
     if (colliders.length > 0 || this.sent) input.setColliders(colliders);
     this.sent = colliders.length > 0;
+    const winds = this.blow();
+    if (winds.length > 0 || this.blows) input.setWinds(winds);
+    this.blows = winds.length > 0;
+  }
+
+  // The fan as it is now; none while the pointer is elsewhere.
+  private blow(): readonly OwnWind[] {
+    this.fan.group.visible = this.isOver && this.chosen === "fan";
+    if (!this.fan.group.visible) return kNoWinds;
+    this.findGoal();
+    this.placed = true;
+    const { direction } = this.raycaster.ray;
+    const place = this.goal.clone().addScaledVector(direction, -kFanDistance);
+    this.fan.place(place, direction);
+    return [heldFan(place, direction, 1, this.pushes ? kStrong : 1)];
   }
 
   // The collider as it is now; none while the pointer is elsewhere.
   private update(nowMs: number): readonly OwnCollider[] {
-    this.mesh.visible = this.isOver && this.chosen !== "hand";
+    this.mesh.visible = this.isOver && (this.chosen === "ball" || this.chosen === "box");
     if (!this.mesh.visible) {
-      this.placed = false;
+      if (!this.isOver) this.placed = false;
       return kNoColliders;
     }
     const seconds = this.placed ? Math.min(kLongestStep, (nowMs - this.drawnAt) / 1000) : 0;

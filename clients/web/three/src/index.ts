@@ -6,6 +6,7 @@ export { Cloths } from "./cloths";
 export * from "./collider_meshes";
 export { ConstraintLines } from "./constraint_lines";
 export { type Detail, tiled } from "./fabric_material";
+export { FanFigure, heldFan } from "./fan";
 export { fabricNames, fabricOf, type Fabric } from "./fabrics";
 export * from "./people";
 export { hash, noise } from "./weave";

@@ -3,6 +3,7 @@
 
 import * as THREE from "three";
 import { HandSide, Shape, type Grab, type Head, type Input, type OwnCollider } from "@clothstream/client";
+import { heldFan } from "../fan";
 import { kReach, type Touchable } from "./grabber";
 import { Limb } from "./limb";
 
@@ -21,11 +22,21 @@ export class Body {
   private collides = false; // whether the server has colliders
   private heads = false; // whether the server has the head
   private grabs = 0; // number of grabs that the server has
+  private blows = false; // whether the server has the fan
+  // Whether the user holds a fan. It blows where its hand or controller points.
+  holdsFan = false;
   private readonly limbOf = new Map<XRInputSource, Limb>();
 
   // Inputs that are there or were a moment ago.
   *present(): Iterable<Limb> {
     for (const limb of this.limbs.values()) if (limb.present) yield limb;
+  }
+
+  // The right hand or controller that holds the fan, or else the left one.
+  get fanHolder(): Limb | undefined {
+    if (!this.holdsFan) return undefined;
+    const holders = [...this.present()].filter(({ side, pose }) => side !== "none" && pose.ray);
+    return holders.find(({ side }) => side === "right") ?? holders[0];
   }
 
   // Listens to presses of a session. Pinches and triggers are `select`, grips are `squeeze`.
@@ -72,7 +83,7 @@ export class Body {
     for (const limb of this.limbs.values()) limb.grabber.slipped(grab);
   }
 
-  // Sends colliders, hands and grabs. `scale` is metres of the room per metre of the scene.
+  // Sends colliders, hands, grabs and the fan. `scale` is metres of the room per metre of the scene.
   send(input: Input, scale: number): void {
     const colliders: OwnCollider[] = [];
     const grabs: Grab[] = [];
@@ -97,6 +108,9 @@ export class Body {
     this.collides = colliders.length > 0;
     if (grabs.length > 0 || this.grabs > 0) input.setGrabs(grabs);
     this.grabs = grabs.length;
+    const holder = this.fanHolder?.pose;
+    if (holder?.ray || this.blows) input.setWinds(holder?.ray ? [heldFan(holder.point, holder.ray.direction, 1 / scale)] : []);
+    this.blows = holder?.ray !== undefined;
   }
 
   // Removes everything from the scene, at the end of a session.

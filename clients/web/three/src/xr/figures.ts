@@ -2,6 +2,7 @@
 // Draws the user's own hands and controllers. In pass-through they only hide what is behind them.
 
 import * as THREE from "three";
+import { FanFigure } from "../fan";
 import type { Body } from "./body";
 import type { Limb } from "./limb";
 import { kJoints, type TrackedHand } from "./tracked_hand";
@@ -87,6 +88,11 @@ export class Figures {
   private readonly rayMaterial = new THREE.LineBasicMaterial({ color: 0xffffff, transparent: true, opacity: 0.5 });
   private readonly drawn = new Map<Limb, HandFigure | ControllerFigure>();
   private readonly rays = new Map<Limb, THREE.Line>();
+  private readonly fan = new FanFigure();
+
+  constructor() {
+    this.group.add(this.fan.group);
+  }
 
   // In pass-through, real hands are seen where nothing is drawn: the figures write only depth.
   set passThrough(on: boolean) {
@@ -98,6 +104,9 @@ export class Figures {
   place(body: Body, scale: number): void {
     for (const figure of this.drawn.values()) figure.group.visible = false;
     for (const ray of this.rays.values()) ray.visible = false;
+    const holder = body.fanHolder?.pose;
+    this.fan.group.visible = holder?.ray !== undefined;
+    if (holder?.ray) this.fan.place(holder.point, holder.ray.direction, 1 / scale);
     for (const limb of body.present()) {
       if (limb.side === "none") continue;
       const figure = this.figureOf(limb);
