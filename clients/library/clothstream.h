@@ -94,7 +94,7 @@ clothstream_result clothstream_open(const char* address, const clothstream_optio
                                     clothstream_stream** out) CS_NOEXCEPT;
 /* Exchanges a pairing code, six digits that a server or an owner shows, for a token. Joins no scene.
  * address: as above. options: ca_file, fingerprint and join_timeout_ms are used; NULL means the defaults.
- * token: buffer of token_bytes, at least CLOTHSTREAM_TOKEN_BYTES; it gets the token with a zero at its end, or
+ * token: buffer of token_bytes, at least CLOTHSTREAM_TOKEN_BYTES; gets the token, which ends with a zero, or
  * "". Keep the token secret. The code is sent to other machines only with TLS. */
 clothstream_result clothstream_pair(const char* address, const char* code, const clothstream_options* options,
                                     char* token, size_t token_bytes) CS_NOEXCEPT;

@@ -34,7 +34,7 @@ class ControlMessages {
   // Drops the announcements. `last` follows the replies, also without room for it; it may be null.
   void end(SharedBytes last);
 
-  // Take the oldest message; null if there is none.
+  // Take the oldest message, or return null.
   SharedBytes nextReply() { return pop(replies_); }
   SharedBytes nextAnnouncement();
 

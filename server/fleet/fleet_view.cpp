@@ -8,7 +8,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A server that does not hear of its own renewals for this long does not hear of those of others.
+// A server that has not heard of its renewals for this long does not hear of those of others.
 constexpr auto kSilenceOfServer = 2s, kLongestSilence = 4s;
 
 }  // namespace

@@ -19,7 +19,7 @@ namespace clothstream::fleet {
 std::string keyOf(std::uint64_t origin);
 
 // Entries of servers and scenes, as changes of the buckets tell them. A server is alive while its lease
-// lasts. This one's renewals come back too: without them nobody counts as gone. Not thread-safe.
+// lasts. This one's renewals come back too: without them no server counts as gone. Not thread-safe.
 class FleetView {
  public:
   using Clock = schedule::Clock;
@@ -71,7 +71,7 @@ class FleetView {
   bool isSilent(Clock::time_point now) const;
 
  private:
-  // Whether this server has heard of renewals for long enough to know who is gone.
+  // Whether this server has heard of renewals for long enough to know which servers are gone.
   bool hears(Clock::time_point now) const;
 
   const std::uint64_t self_;

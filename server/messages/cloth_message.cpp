@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "server/messages/parameter_numbers.h"
 #include "server/messages/limits.h"
 #include "server/messages/node_selection.h"
+#include "server/messages/parameter_numbers.h"
 #include "server/messages/solver_message.h"
 #include "server/messages/vectors.h"
 #include "server/model/mesh.h"

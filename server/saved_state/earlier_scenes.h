@@ -27,7 +27,7 @@ class EarlierScenes {
 
   // Scenes that peers created. Those of the server that have not been taken yet are not in use.
   std::vector<scene::SavedScene> takeCreated();
-  // A scene of the server; nothing if there is none.
+  // A scene of the server, or nothing.
   std::optional<SceneContents> takeOfServer(const std::string& name);
   // A scene that was taken goes on.
   void setRestored(const std::string& name) { restored_.insert(name); }

@@ -9,7 +9,8 @@
 
 namespace clothstream::saved_state {
 
-// Requests are numbered. A pass of the writer serves all that were made before it began. Not thread-safe.
+// Requests are numbered. A pass of the writer serves the requests that were made before it began. Not
+// thread-safe.
 class FlushRequests {
  public:
   // Returns the number of the request. `name` is the scene that it waits for; empty: all scenes.

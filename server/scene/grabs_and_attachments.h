@@ -79,7 +79,7 @@ class GrabsAndAttachments {
   float forceOfEach(float most) const;
 
   State state_;
-  std::vector<std::size_t> toldToJump_;  // attachments, in the next tick
+  std::vector<std::size_t> toldToJump_;                            // attachments, in the next tick
   std::uint64_t newest_ = 0;                                       // number of the newest grab
   std::vector<std::pair<std::uint64_t, std::uint32_t>> released_;  // in the current tick: participant, id
 };

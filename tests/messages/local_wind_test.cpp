@@ -26,7 +26,7 @@ v1::LocalWind& addFan(v1::Scene& scene, const char* name = "fan") {
   return wind;
 }
 
-TEST(LocalWinds, HaveTheDefaultsOfTheProto) {
+TEST(LocalWindMessages, HaveTheDefaultsOfTheProto) {
   v1::Scene message = smallScene();
   addFan(message);
   addFan(message, "whirl").mutable_vortex();
@@ -44,7 +44,7 @@ TEST(LocalWinds, HaveTheDefaultsOfTheProto) {
   EXPECT_EQ(vortex.reach, 2);
 }
 
-TEST(LocalWinds, StayThroughAMessage) {
+TEST(LocalWindMessages, StayThroughAMessage) {
   v1::Scene message = smallScene();
   v1::LocalWind& fan = addFan(message);
   fan.mutable_pose()->mutable_position()->set_y(2);
@@ -61,7 +61,7 @@ TEST(LocalWinds, StayThroughAMessage) {
   EXPECT_EQ(toMessage(toScene(once).value()).SerializeAsString(), once.SerializeAsString());
 }
 
-TEST(LocalWinds, AreRefusedWithPathAndRange) {
+TEST(LocalWindMessages, AreRefusedWithPathAndRange) {
   const auto errorOf = [](const std::function<void(v1::Scene&, v1::LocalWind&)>& spoil) {
     v1::Scene message = smallScene();
     v1::LocalWind& wind = addFan(message);

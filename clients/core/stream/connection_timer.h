@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Says when the program should open a connection: because there is none, or the present one is silent.
+// Says when the program should open a connection: because the last one has ended, or is silent.
 #pragma once
 
 #include <algorithm>

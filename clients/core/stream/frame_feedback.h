@@ -40,7 +40,7 @@ class Acknowledgements {
     if (lockstep && holds_) unseen_ = tick;
     return lockstep ? !holds_ : pace_.due(nowUs);
   }
-  // The tick to acknowledge because the program has seen it; nothing if there is none.
+  // The tick to acknowledge because the program has seen it, or nothing.
   std::optional<std::uint64_t> seen() { return std::exchange(unseen_, std::nullopt); }
 
  private:

@@ -238,8 +238,8 @@ void Program::call(const CoreInput::Call& call) {
     case 11: {
       const auto position = numbers.array<3>();
       const auto orientation = numbers.array<4>();
-      return cs_move_attachment(client(), text, position.data(), index == 0 ? nullptr : orientation.data(), index % 2,
-                                now_);
+      return cs_move_attachment(client(), text, position.data(), index == 0 ? nullptr : orientation.data(),
+                                index % 2, now_);
     }
     case 12:
       return cs_want_contacts(client(), static_cast<int>(index % 2), now_);
