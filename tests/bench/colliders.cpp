@@ -102,7 +102,7 @@ void measureBed(vulkan::Device& device, const Settings& settings, float lift, Ro
   touching.check({scene.environment, bed(lift, 0)});
   touching.restart();
   int tick = 0;
-  simulation::TickInputs inputs{scene.environment, {}, true};
+  simulation::TickInputs inputs{.environment = scene.environment, .colliders = {}, .reportsContacts = true};
   const auto next = [&] {
     inputs.colliders = bed(lift, tick++);
     touching.tick(inputs);
