@@ -65,7 +65,8 @@ class FleetView {
   bool isAlive(std::uint64_t origin, Clock::time_point now) const;
   // Other servers with a lease.
   std::vector<v1::ServerEntry> others(Clock::time_point now) const;
-  // Whether the present entries have been known for a lease, so that servers without one are gone.
+  // Whether the present entries have been known for a lease, so that servers without one are gone. Ask after
+  // finishReading().
   bool isSettled(Clock::time_point now) const { return now - readAt_ >= kLease; }
   // Whether the renewals of this server have not come back for so long that changes do not come any more.
   bool isSilent(Clock::time_point now) const;

@@ -30,7 +30,7 @@ class KeptScenes {
   void keep(const std::shared_ptr<scene::LiveScene>& scene) const;
   // Forgets one that was deleted.
   void forget(const scene::LiveScene& scene) const;
-  // Waits for a moment until either is on the disk.
+  // Waits for a moment until the scene, or its removal, is on the disk.
   void flush(const scene::LiveScene& scene) const;
   // Waits for a moment until all scenes are on the disk.
   void flush() const;

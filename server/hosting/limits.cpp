@@ -7,6 +7,7 @@ namespace clothstream::hosting {
 namespace {
 
 constexpr double kMegabyte = 1e6;
+static_assert(kUploadPatience == std::chrono::seconds(5));  // as a row says
 constexpr double kNone = 1e9;  // fits every field, and is more than a server can have of anything
 
 using Unit = LimitUnit;
@@ -28,7 +29,10 @@ constexpr LimitRow kTable[] = {
      Unit::number,
      &Limits::maxConnectionsPerToken,
      {16, 8, 16}},
-    {"places in a scene for one address", Unit::share, &Limits::placesPerAddress, {0.5, 0.25, 1}},
+    {"participants of one address in a scene, as a share of --max-participants",
+     Unit::share,
+     &Limits::placesPerAddress,
+     {0.5, 0.25, 1}},
     {"control of a scene with an owner from outside",
      Unit::allowed,
      &Limits::outsideControl,

@@ -17,12 +17,15 @@ namespace clothstream::hosting {
 enum class Profile : std::uint8_t { home, open, fleet };
 inline constexpr std::array kProfileNames{"home", "public", "fleet"};
 
-// Limits of one profile. Addresses of this machine have no limits of one address.
+// Time at the start of an upload to which minUploadRate does not apply.
+inline constexpr std::chrono::seconds kUploadPatience{5};
+
+// Limits of one profile. Limits of one address do not hold for loopback.
 struct Limits {
   Limits() : Limits(Profile::home) {}
   explicit Limits(Profile profile);
 
-  // Connections to each endpoint, and those of one address.
+  // Open connections of one address to each endpoint; new ones per second, of all addresses and of one.
   std::uint32_t connectionsPerAddress = 0;
   double connectionsPerSecond = 0, connectionsPerSecondPerAddress = 0;
   // A peer that has not joined a scene by then is disconnected, even if it sends messages. The time of an
@@ -32,7 +35,7 @@ struct Limits {
   double maxReadRate = 0;
   // Open connections with tokens of one subject.
   std::uint32_t maxConnectionsPerToken = 0;
-  // Share of the places in a scene that one address may take, rounded up. 1 means no limit.
+  // Share of maxParticipants that one address may have in a scene, rounded up. 1 means no limit.
   double placesPerAddress = 0;
   // True: peers outside a scene may always pause, reset, record and delete it. False: only while it has no
   // owner.

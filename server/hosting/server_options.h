@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -38,9 +39,6 @@ inline constexpr std::uint32_t kMaxParticipants =
     (simulation::kMaxColliders - messages::limits::kMaxColliders) /
     messages::limits::kMaxParticipantColliders;
 
-// Time at the start of an upload to which minUploadRate does not apply.
-inline constexpr std::chrono::seconds kUploadPatience{5};
-
 struct ServerOptions : Limits {
   vulkan::DeviceOptions device;
   // Scene of peers that name none. Must be one of the scenes.
@@ -63,6 +61,7 @@ struct ServerOptions : Limits {
   std::uint32_t maxParticipants = scene::kDefaultMaxParticipants;
   // The same of one address, other than loopback.
   std::uint32_t placesOfAddress() const {
+    if (placesPerAddress >= 1) return std::numeric_limits<std::uint32_t>::max();
     return static_cast<std::uint32_t>(std::ceil(placesPerAddress * maxParticipants));
   }
   // Scenes that peers may create, in addition to those that the server starts with.

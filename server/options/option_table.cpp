@@ -357,8 +357,8 @@ std::string OptionTable::unexpected(const std::string& word) const {
     for (const CLI::App* command : program_.get_subcommands({})) known.push_back(command->get_name());
   }
   const std::string name = word.substr(std::min(word.find_first_not_of('-'), word.size()));
-  return fmt::format("{}: unknown {}{}", word, isOption ? "option" : "command",
-                     hint(name.substr(0, name.find('=')), known, isOption ? "--" : ""));
+  if (!isOption) return fmt::format("{}: unknown command{}", word, suggestion(word, known));
+  return fmt::format("{}: unknown option{}", word, hint(name.substr(0, name.find('=')), known, "--"));
 }
 
 }  // namespace clothstream

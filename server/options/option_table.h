@@ -140,7 +140,7 @@ class OptionTable {
                       const std::string& range = "");
   bool isConfigurable(const Row& row) const;
   std::vector<std::string> configurableNames() const;
-  // What to use instead of an option, without dashes, that the program does not have; "" if nothing is known.
+  // Says what to use instead of an option (without dashes) that the program does not have, or returns "".
   std::string hint(const std::string& wrong, const std::vector<std::string>& known,
                    std::string_view prefix = "") const;
   Row* find(const CLI::Option* option);

@@ -87,7 +87,7 @@ struct RecordOptions {
   double directoryLimitMb = 10'000;
 };
 
-// What the server keeps for its next start.
+// Folder with what the server keeps for its next start.
 struct StateOptions {
   std::filesystem::path directory;
   bool keepsScenes = false;  // the directory was named: scenes are kept there too

@@ -142,6 +142,11 @@ messages::Result<void> Charge::chargeWinds(const std::string& path, const model:
                                            std::size_t count) {
   const std::size_t before = std::exchange(heldWinds_, count);
   if (released_) return {};
+  if (count <= before) {  // also on a device that is slower now
+    const std::lock_guard lock(budget_->mutex_);
+    replace(priceOf(scene));
+    return {};
+  }
   messages::Result<void> charged = charge(path, scene);
   if (!charged) heldWinds_ = before;
   return charged;

@@ -87,7 +87,7 @@ class Charge {
   // Returns whether a free scene would cost more than it did at first. Colliders of participants do not
   // count.
   bool exceedsStart(const model::Scene& scene) const;
-  // Gives the charge back. Until the scene is charged again, its colliders cost nothing.
+  // Gives the charge back. Until the scene is charged again, its colliders and winds cost nothing.
   void release();
 
   // Price of the scene with the colliders of its participants: seconds of the device's time per second. 0

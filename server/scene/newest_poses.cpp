@@ -41,10 +41,14 @@ void NewestPoses::setRole(std::uint64_t participant, Role role, Clock::time_poin
   const std::lock_guard lock(mutex_);
   const auto entry = find(participant);
   if (entry == entries_.end()) return;
-  entry->role = role;
-  if (role != Role::viewer) return;
-  removeFromScene(*entry, now);
-  entry->poses = {};
+  const Role before = std::exchange(entry->role, role);
+  if (role == Role::viewer) {
+    removeFromScene(*entry, now);
+    entry->poses = {};
+  } else if (role < before && !entry->poses.winds.empty()) {
+    entry->poses.winds.clear();
+    if (entry->posed) postAgain(*entry, now);
+  }
 }
 
 void NewestPoses::withdraw(std::uint64_t participant, Clock::time_point now) {
@@ -58,10 +62,7 @@ void NewestPoses::resume(std::uint64_t participant, Clock::time_point now) {
   if (entry == entries_.end() || entry->posed) return;
   if (!entry->poses.acts()) return;
   entry->posed = true;
-  model::ParticipantPoses poses = entry->poses;
-  limit(*entry, poses.colliders);
-  entry->windsRefused = !limitWinds(*entry, poses.winds);
-  inbox_.postPoses(participant, std::move(poses), now);
+  postAgain(*entry, now);
 }
 
 void NewestPoses::remove(std::uint64_t participant, Clock::time_point now) {
@@ -136,6 +137,15 @@ void NewestPoses::divideRoom(Clock::time_point now) {
   charge();
 }
 
+void NewestPoses::postAgain(Entry& entry, Clock::time_point now) {
+  model::ParticipantPoses poses = entry.poses;
+  limit(entry, poses.colliders);
+  // The answer to the next message says whether there is room.
+  entry.windsRefused = false;
+  static_cast<void>(limitWinds(entry, poses.winds));
+  inbox_.postPoses(entry.participant, std::move(poses), now);
+}
+
 void NewestPoses::removeFromScene(Entry& entry, Clock::time_point now) {
   if (!entry.posed) return;
   inbox_.postPoses(entry.participant, {}, now);
@@ -143,7 +153,7 @@ void NewestPoses::removeFromScene(Entry& entry, Clock::time_point now) {
   entry.needs = entry.uses = {};
   entry.acting = 0;
   model::ParticipantPoses none;
-  // There is always room for fewer.
+  // Fewer are never refused.
   static_cast<void>(limitWinds(entry, none.winds));
   charge();
 }

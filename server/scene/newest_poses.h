@@ -36,9 +36,11 @@ class NewestPoses {
               std::size_t windRoom = model::kMaxLocalWinds)
       : subscribers_(subscribers), inbox_(inbox), budget_(budget), windRoom_(windRoom) {}
 
-  // A participant joins. `posed`: the scene may have colliders or grabs of it, from a checkpoint.
+  // A participant joins. `posed`: the scene may have colliders or grabs of it, from a checkpoint, which has
+  // no winds.
   void add(std::uint64_t participant, Role role, bool posed = false);
-  // A viewer's poses are removed and forgotten.
+  // A viewer's poses are removed and forgotten. A lower role loses its winds, and sends them again if it may
+  // still hold some.
   void setRole(std::uint64_t participant, Role role, Clock::time_point now);
   // Removes the participant's poses from the scene until resume() puts its colliders, grabs and winds back.
   void withdraw(std::uint64_t participant, Clock::time_point now);
@@ -77,6 +79,8 @@ class NewestPoses {
 
   // The caller of the following holds the lock. Returns end() if nothing is found.
   Entries::iterator find(std::uint64_t participant);
+  // Puts the poses of the entry into the inbox, as far as there is room.
+  void postAgain(Entry& entry, Clock::time_point now);
   void removeFromScene(Entry& entry, Clock::time_point now);
   // Largest weight that the colliders of one participant may have.
   ColliderLoad shareOfEach() const;

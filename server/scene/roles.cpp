@@ -21,7 +21,7 @@ const char* nameOf(Action action) {
     case Action::holdWinds:
       return "colliderPoses.winds";
     case Action::changeEnvironment:
-      return "parameterChange: gravity, wind, gust and airDensity";
+      return "parameterChange: the environment";
     case Action::changeCloths:
       return "parameterChange.cloths";
     case Action::changeColliders:

@@ -31,8 +31,9 @@ enum class Action : std::uint8_t {
 
 // Rights of the role participant in addition to colliders, grabs and attachments. Owners have all of them.
 struct Permissions {
-  bool environment = true, cloths = true, colliders = true;  // parameters that they may change; winds
-  bool create = false, remove = false;                       // scenes
+  // Parameters that they may change. `environment` also lets them hold winds.
+  bool environment = true, cloths = true, colliders = true;
+  bool create = false, remove = false;  // scenes
   bool control = false, record = false;
   bool own = false;  // become the owner of a scene that has none, by joining first
 };

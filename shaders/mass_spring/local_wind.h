@@ -19,7 +19,7 @@ struct LocalWindRecord {
 
   float size;    // of a fan, m: the radius; of a vortex, 1/m^2: the inverse square of the radius
   float spread;  // of a fan
-  // Of a fan, 1/m: the inverse of the range; of a vortex, 1/m^2: the inverse square of the reach.
+  // A fan has the inverse of its range here (1/m), a vortex the inverse square of its reach (1/m^2).
   float reach;
   float behind;  // of a fan, 1/m: the inverse of the radius
 };

@@ -97,6 +97,18 @@ TEST(LocalContact, KeepsTheClothOutsideOfALimb) {
   }
 }
 
+// A frame whose time is earlier makes play-out forget what it showed, and so the correction too.
+TEST(LocalContact, EndsWhenTheServersTimeGoesBack) {
+  Pushed pushed;
+  for (float z = 0.5f; z > -0.05f; z -= 0.01f) pushed.step(z);
+  Viewer& viewer = pushed.viewer;
+  ASSERT_GT(cs_local_correction(viewer.client.get()), 0.05f);
+  ++pushed.tick;
+  viewer.receive(pushed.tick, kFrameUs, pushed.tick * kFrameUs);
+  EXPECT_TRUE(sameBits(viewer.playedPositions(), viewer.positions()));
+  EXPECT_EQ(cs_played_collider_count(viewer.client.get()), cs_collider_count(viewer.client.get()));
+}
+
 TEST(LocalContact, ChangesNothingWithoutACollider) {
   Pushed pushed, without(false);
   for (int i = 0; i < 10; ++i) {

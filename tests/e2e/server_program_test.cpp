@@ -544,6 +544,7 @@ TEST_F(ServerOptions, StrongerOfTwoExclusiveOptionsWins) {
 TEST_F(ServerOptions, SuggestsTheNearestNameForAnUnknownOne) {
   expectError(run({"--prot", "1"}), "--prot: unknown option; did you mean '--port'?");
   expectError(run({"ply", "x.mcap"}), "ply: unknown command; did you mean 'play'?");
+  expectError(run({"rate"}), "rate: unknown command");
   const std::string config = file("port = 1\n\ngrpc_port = 2\n");
   expectError(run({"--config", config}), config + ":3: unknown key 'grpc_port'; did you mean 'grpc-port'?");
   const Result warned = run({"--list-materials"}, {"CLOTHSTREAM_PROT=1", "CLOTHSTREAM_VALIDATION=1"});

@@ -28,7 +28,7 @@ TEST(LimitsTest, ProfilesHaveTheirColumns) {
   EXPECT_GT(fleet.connectionsPerAddress, 100'000u);
 }
 
-TEST(LimitsTest, EachFieldHasOneRow) {
+TEST(LimitsTest, NoFieldHasTwoRows) {
   std::set<std::string> names;
   for (const LimitRow& row : limitTable()) {
     EXPECT_TRUE(names.insert(row.what).second) << row.what;
@@ -63,8 +63,7 @@ TEST(LimitsTest, PlacesOfAnAddressAreRoundedUp) {
   options.maxParticipants = 1;
   EXPECT_EQ(options.placesOfAddress(), 1u);
   options.placesPerAddress = 1;
-  options.maxParticipants = 64;
-  EXPECT_EQ(options.placesOfAddress(), 64u);
+  EXPECT_GT(options.placesOfAddress(), kMaxParticipants) << "no limit";
 }
 
 // Servers without options have the budgets of the profile home.
@@ -82,7 +81,8 @@ TEST(LimitsTest, ValuesHaveUnits) {
   };
   EXPECT_EQ(textOf("memory of all uploads", Profile::open), "32 MB");
   EXPECT_EQ(textOf("memory of the uploads of one address", Profile::fleet), "none");
-  EXPECT_EQ(textOf("places in a scene for one address", Profile::home), "50 %");
+  EXPECT_EQ(textOf("participants of one address in a scene, as a share of --max-participants", Profile::home),
+            "50 %");
   EXPECT_EQ(textOf("new connections to each port", Profile::home), "200 a second");
 }
 

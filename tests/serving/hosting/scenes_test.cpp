@@ -125,6 +125,20 @@ TEST_F(ScenesTest, AbandonedArrivalFreesItsPlace) {
   EXPECT_TRUE(server().scenes.takePlace("arrives", "", true));
 }
 
+TEST_F(ScenesTest, ArrivalThatCannotStartFreesItsPlace) {
+  START();
+  scene::SavedScene saved{.start = tests::smallScene("arrives"), .maxParticipants = 8};
+  {
+    auto arriving = server().created.prepareArrival(saved);
+    ASSERT_TRUE(arriving) << arriving.error();
+    saved.checkpoint.emplace().scene = saved.start;  // its state has no nodes
+    EXPECT_ANY_THROW(arriving->start(saved));
+    EXPECT_FALSE(server().scenes.find("arrives"));
+  }
+  EXPECT_EQ(server().budget->usage().load, 0);
+  EXPECT_TRUE(server().scenes.takePlace("arrives", "", true));
+}
+
 TEST_F(ScenesTest, StartedArrivalStays) {
   START();
   const scene::SavedScene saved{.start = tests::smallScene("arrives"), .maxParticipants = 8};

@@ -130,6 +130,50 @@ class WindBudget : public ColliderBudget {
   std::size_t most = 8, charged = 0;
 };
 
+model::ParticipantPoses winds(std::size_t count) {
+  model::ParticipantPoses poses;
+  for (std::uint32_t id = 0; id < count; ++id) poses.winds.push_back({{.speed = 1}, id});
+  return poses;
+}
+
+TEST_F(NewestPosesTest, WindsEndWithTheRightToThem) {
+  const auto mailbox = add(1, Role::owner);
+  v1::ColliderPoses message;
+  message.add_winds();
+  const Permissions none{.environment = false};
+  model::ParticipantPoses poses = winds(1);
+  poses.grabs.emplace_back();
+  ASSERT_TRUE(newest.post(*mailbox, message, poses, none, now));
+  const auto taken = [&] {
+    Inputs drained;
+    inbox.drain(drained);
+    return drained.poses.empty() ? model::ParticipantPoses() : drained.poses.back().now.poses;
+  };
+  EXPECT_EQ(taken().winds.size(), 1u);
+  newest.setRole(1, Role::participant, now);
+  const model::ParticipantPoses left = taken();
+  EXPECT_TRUE(left.winds.empty());
+  EXPECT_EQ(left.grabs.size(), 1u) << "the other poses stay";
+  EXPECT_EQ(newest.post(*mailbox, message, winds(1), none, now).error().code,
+            v1::ERROR_CODE_PERMISSION_DENIED);
+  newest.withdraw(1, now);
+  taken();
+  newest.resume(1, now);
+  EXPECT_TRUE(taken().winds.empty());
+}
+
+TEST_F(NewestPosesTest, WindsWithoutRoomAfterAReturnAreTold) {
+  NewestPoses room(subscribers, inbox, nullptr, 1);
+  const auto ada = add(1, Role::participant), bob = add(2, Role::participant);
+  room.add(1, Role::participant);
+  room.add(2, Role::participant);
+  ASSERT_TRUE(room.post(*ada, {}, winds(1), {}, now));
+  room.withdraw(1, now);
+  ASSERT_TRUE(room.post(*bob, {}, winds(1), {}, now));
+  room.resume(1, now);
+  EXPECT_EQ(room.post(*ada, {}, winds(1), {}, now).error().code, v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+}
+
 TEST_F(NewestPosesTest, WindsActAsFarAsThereIsRoom) {
   WindBudget budget;
   NewestPoses room(subscribers, inbox, &budget, 3);
@@ -137,9 +181,7 @@ TEST_F(NewestPosesTest, WindsActAsFarAsThereIsRoom) {
   room.add(1, Role::participant);
   room.add(2, Role::participant);
   const auto hold = [&](const delivery::Mailbox& mailbox, std::size_t count) {
-    model::ParticipantPoses poses;
-    for (std::uint32_t id = 0; id < count; ++id) poses.winds.push_back({{.speed = 1}, id});
-    const auto held = room.post(mailbox, {}, std::move(poses), {}, now);
+    const auto held = room.post(mailbox, {}, winds(count), {}, now);
     return held ? std::string() : held.error().text;
   };
   const auto acting = [&] {
