@@ -48,8 +48,8 @@ void Agones::look(Clock::time_point now) {
   for (const auto& scene : server_.scenes.all()) {
     names.insert(scene->name());
     counts[kParticipants].count += static_cast<std::int64_t>(scene->subscribers.size());
-    counts[kParticipants].capacity += scene->maxParticipants;
-    counts[kCreatedScenes].count += scene->created ? 1 : 0;
+    counts[kParticipants].capacity += scene->terms.maxParticipants;
+    counts[kCreatedScenes].count += scene->terms.created ? 1 : 0;
   }
   const bool inUse = counts[kParticipants].count > 0 || counts[kCreatedScenes].count > 0;
   counts[kCreatedScenes].capacity = server_.options.maxCreatedScenes;

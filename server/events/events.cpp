@@ -52,7 +52,7 @@ class Events::ObservedScene final : public scene::SceneObserver {
   void push(const Make& make) {
     Event event{.time = std::chrono::system_clock::now(),
                 .scene = scene_.name(),
-                .tenant = scene_.tenant,
+                .tenant = scene_.terms.tenant,
                 .what = make()};
     const Usage* const usage = std::get_if<Usage>(&event.what);
     if (usage != nullptr && usage->deviceSeconds <= 0 && usage->sentBytes == 0) return;

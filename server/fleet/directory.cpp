@@ -207,7 +207,7 @@ v1::ServerEntry Directory::selfNow() const {
   v1::ServerEntry now = self_;
   for (const auto& scene : server_.scenes.all()) {
     now.set_participants(now.participants() + static_cast<std::uint32_t>(scene->subscribers.size()));
-    now.set_created_scenes(now.created_scenes() + (scene->created ? 1 : 0));
+    now.set_created_scenes(now.created_scenes() + (scene->terms.created ? 1 : 0));
   }
   const scene::Budget::Usage usage = server_.budget->usage();
   now.set_load(usage.load);
@@ -354,7 +354,7 @@ void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scene
     v1::SceneEntry entry;
     entry.set_origin(self_.origin());
     entry.set_stream(own.stream);
-    entry.set_created(own.scene->created);
+    entry.set_created(own.scene->terms.created);
     // A scene that was continued here, or came here, keeps its checkpoint until it has another one.
     if (known && known->entry.origin() == self_.origin())
       *entry.mutable_checkpoint() = known->entry.checkpoint();
@@ -387,7 +387,7 @@ void Directory::claimScenes(Buckets& buckets, const std::vector<OwnScene>& scene
 
 void Directory::saveScenes(Buckets& buckets, const std::vector<OwnScene>& scenes, bool all) {
   for (const OwnScene& own : scenes) {
-    if (!own.scene->created) continue;
+    if (!own.scene->terms.created) continue;
     Stored& stored = saved_[own.scene->name()];
     if (!all && Clock::now() - stored.at < kCheckpointPeriod) continue;
     // A scene that stands still may have other parameters or participants.

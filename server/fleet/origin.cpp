@@ -204,9 +204,9 @@ void Origin::lookForScenes() {
     }
     for (const auto& scene : scenes) {
       const bool isTaken = directory_->isTaken(scene->name());
-      if (isTaken && scene->created && directory_->isRunElsewhere(scene->name())) old.push_back(scene);
+      if (isTaken && scene->terms.created && directory_->isRunElsewhere(scene->name())) old.push_back(scene);
       const bool isOffered =
-          !scene->sharesAsGuest && !scene->shape().lockstep && scene->quarantined().empty() && !isTaken;
+          !scene->terms.sharesAsGuest && !scene->shape().lockstep && scene->quarantined().empty() && !isTaken;
       const auto known = streams_.find(scene->name());
       if (!isOffered && known != streams_.end()) {
         ended.push_back(std::move(known->second));
@@ -343,7 +343,7 @@ v1::MoveResponse Origin::tryMove(const std::string& name, std::uint64_t to, Cloc
   const SharedStream stream = streamOf(name);
   if (!stream) return refused(fmt::format("this server has no scene '{:.64}' that edges see", name));
   const std::shared_ptr<scene::LiveScene>& scene = stream->scene();
-  if (!scene->created) return refused("the server started with this scene; only created ones move");
+  if (!scene->terms.created) return refused("the server started with this scene; only created ones move");
   if (to == 0) to = target(*scene);
   if (to == 0) return refused("no other server has room for it");
   if (to == id_) return refused("this server has it already");

@@ -22,7 +22,7 @@ Access::Access(const ServerOptions& options, const SceneRegistry& scenes)
     : options_(options), scenes_(scenes) {}
 
 bool Access::isOfOtherTenant(const Identity& by, const scene::LiveScene& scene) {
-  return by.verified && scene.created && scene.tenant != by.subject.tenant;
+  return by.verified && scene.terms.created && scene.terms.tenant != by.subject.tenant;
 }
 
 messages::Result<void> Access::mayUse(const Identity& by, const std::string& name) const {

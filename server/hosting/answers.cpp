@@ -33,10 +33,10 @@ v1::SceneSummary summaryOf(const scene::LiveScene& scene) {
       *summary.mutable_playback() = std::move(*playback);
   }
   summary.set_participants(static_cast<std::uint32_t>(scene.subscribers.size()));
-  summary.set_max_participants(scene.maxParticipants);
+  summary.set_max_participants(scene.terms.maxParticipants);
   summary.set_running(scene.running);
   summary.set_paused(scene.paused);
-  summary.set_created(scene.created);
+  summary.set_created(scene.terms.created);
   summary.set_recorded(scene.journal && scene.journal->active());
   return summary;
 }

@@ -33,11 +33,12 @@ CreatedScenes::CreatedScenes(const ServerOptions& options, telemetry::ServerMetr
       device_(device) {}
 
 std::shared_ptr<scene::LiveScene> CreatedScenes::madeFrom(const scene::SavedScene& saved) const {
-  auto scene = std::make_shared<scene::LiveScene>(
-      saved.start, true, options_.journals ? options_.journals(saved.start) : nullptr,
-      std::min(saved.maxParticipants, options_.maxParticipants), budget_);
-  scene->tenant = saved.tenant;
-  return scene;
+  return std::make_shared<scene::LiveScene>(
+      saved.start,
+      scene::SceneTerms{.created = true,
+                        .tenant = saved.tenant,
+                        .maxParticipants = std::min(saved.maxParticipants, options_.maxParticipants)},
+      options_.journals ? options_.journals(saved.start) : nullptr, budget_);
 }
 
 void CreatedScenes::restore() {
@@ -67,7 +68,7 @@ void CreatedScenes::restore() {
           name, charged.error().text);
       telemetry::log({name}, spdlog::level::warn, "{}", why);
       scene->discharge();
-      scene->waitsForRoom = true;
+      scene->terms.waitsForRoom = true;
       scene->quarantine(why);
     } else {
       kept_.keep(scene);
@@ -83,9 +84,10 @@ tl::expected<std::shared_ptr<scene::LiveScene>, v1::Error> CreatedScenes::create
   const auto place = scenes_.takePlace(definition.name, tenant, true);
   if (!place) return tl::unexpected(place.error());
   std::shared_ptr<scene::Journal> journal = options_.journals ? options_.journals(definition) : nullptr;
-  auto scene = std::make_shared<scene::LiveScene>(std::move(definition), true, std::move(journal),
-                                                  maxParticipants, budget_);
-  scene->tenant = tenant;
+  auto scene = std::make_shared<scene::LiveScene>(
+      std::move(definition),
+      scene::SceneTerms{.created = true, .tenant = tenant, .maxParticipants = maxParticipants},
+      std::move(journal), budget_);
   cancellation.check();
   if (auto charged = scene->charge(); !charged) {
     metrics_.refuse(telemetry::Refusal::budget);

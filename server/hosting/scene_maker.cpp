@@ -75,7 +75,8 @@ void SceneMaker::expireLater() {
 void SceneMaker::deleteUnused(std::chrono::milliseconds lifetime) {
   for (const auto& scene : scenes_.all()) {
     // A scene that waits for room cannot be used.
-    if (!scene->created || scene->waitsForRoom || !scene->hasBeenEmptyFor(lifetime, Clock::now())) continue;
+    if (!scene->terms.created || scene->terms.waitsForRoom || !scene->hasBeenEmptyFor(lifetime, Clock::now()))
+      continue;
     v1::DeleteSceneRequest request;
     request.set_name(scene->name());
     spdlog::info("{}: unused for {} s", scene->name(), schedule::seconds(lifetime));
@@ -284,7 +285,7 @@ tl::expected<v1::DeleteSceneResponse, v1::Error> SceneMaker::removeNow(const v1:
   const std::shared_ptr<scene::LiveScene> scene =
       request.name().empty() ? nullptr : scenes_.find(request.name());
   if (!scene) return tl::unexpected(SceneRegistry::noSuchScene(request.name()));
-  if (!scene->created)
+  if (!scene->terms.created)
     return refusal(
         v1::ERROR_CODE_INVALID_ARGUMENT,
         fmt::format("deleteScene.name = \"{}\": must be of a scene that was created; the server started "

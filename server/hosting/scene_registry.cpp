@@ -73,15 +73,16 @@ tl::expected<SceneRegistry::Place, v1::Error> SceneRegistry::takePlace(const std
         fmt::format("createScene: another server of the fleet has a scene '{}'; choose another name", name));
   const std::lock_guard lock(mutex_);
   const auto created = static_cast<std::uint32_t>(
-      std::ranges::count_if(scenes_, [](const auto& scene) { return scene->created; }) + std::ssize(places_));
+      std::ranges::count_if(scenes_, [](const auto& scene) { return scene->terms.created; }) +
+      std::ssize(places_));
   if (created >= options_.maxCreatedScenes) {
     metrics_.refuse(telemetry::Refusal::createdScenes);
     return refusal(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                    fmt::format("the server has {} created scenes, its maximum: delete one first", created));
   }
   const auto ofTenant = static_cast<std::uint32_t>(
-      std::ranges::count_if(scenes_,
-                            [&](const auto& scene) { return scene->created && scene->tenant == tenant; }) +
+      std::ranges::count_if(
+          scenes_, [&](const auto& scene) { return scene->terms.created && scene->terms.tenant == tenant; }) +
       std::ranges::count(places_, tenant, &Taken::tenant));
   if (ofTenant >= options_.scenesPerTenant()) {
     metrics_.refuse(telemetry::Refusal::scenesOfTenant);

@@ -21,7 +21,7 @@ namespace clothstream::hosting {
 SceneRun::SceneRun(std::shared_ptr<scene::LiveScene> live)
     : TickSchedule(live->start().simulationRate, live->isGuest()),
       scene(std::move(live)),
-      harm(scene->created),
+      harm(scene->terms.created),
       overload(scene->start().streamRate, scene->start().substeps) {}
 
 void SceneRun::become(SceneState next) {

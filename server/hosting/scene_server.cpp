@@ -96,8 +96,9 @@ std::vector<std::shared_ptr<scene::LiveScene>> SceneServer::startScenes(
   for (model::Scene& definition : definitions) {
     std::shared_ptr<scene::Journal> journal = options.journals ? options.journals(definition) : nullptr;
     const auto& scene = all.emplace_back(std::make_shared<scene::LiveScene>(
-        std::move(definition), false, std::move(journal), options.maxParticipants, budget));
-    scene->sharesAsGuest =
+        std::move(definition), scene::SceneTerms{.maxParticipants = options.maxParticipants},
+        std::move(journal), budget));
+    scene->terms.sharesAsGuest =
         scene->name() != options.defaultScene && std::ranges::count(options.guestScenes, scene->name()) > 0;
     kept.restore(scene);
   }

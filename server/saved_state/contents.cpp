@@ -85,8 +85,7 @@ v1::SavedSession sessionOf(const scene::LiveScene& live, const scene::SavedRoste
 
 v1::SavedParts definitionOf(const scene::LiveScene& live) {
   v1::SavedParts parts;
-  parts.set_scene(
-      toMessage(live.start(), live.created, live.maxParticipants, live.tenant).SerializeAsString());
+  parts.set_scene(toMessage(live.start(), live.terms).SerializeAsString());
   return parts;
 }
 

@@ -151,7 +151,7 @@ std::shared_ptr<scene::SceneKeeper> SavedState::keep(const std::shared_ptr<scene
   auto slot = std::make_shared<CheckpointSlot>(options_.checkpointInterval);
   {
     const std::lock_guard lock(mutex_);
-    if (!scene->created && earlier_.isCreated(scene->name())) return nullptr;
+    if (!scene->terms.created && earlier_.isCreated(scene->name())) return nullptr;
     earlier_.eraseUnused(scene->name());
     kept_[scene->name()] = std::make_shared<KeptScene>(scene, slot, earlier_.isRestored(scene->name()));
   }
@@ -293,8 +293,7 @@ bool SavedState::write(const std::string& name, KeptScene& kept, const std::opti
   if (!kept.hasRow) {
     const std::shared_ptr<scene::LiveScene> live = kept.scene.lock();
     if (!live) return true;
-    contents.scene =
-        toMessage(live->start(), kept.created, live->maxParticipants, live->tenant).SerializeAsString();
+    contents.scene = toMessage(live->start(), live->terms).SerializeAsString();
   }
   if (checkpoint) contents.checkpoint = toMessage(checkpoint->checkpoint).SerializeAsString();
   Database::Row row = kept.hasRow ? rows_[name] : Database::Row{.name = name, .created = kept.created};

@@ -68,7 +68,7 @@ class SavedState final : public scene::SceneStore {
   struct KeptScene {
     KeptScene(const std::shared_ptr<scene::LiveScene>& live, std::shared_ptr<CheckpointSlot> checkpoints,
               bool exists)
-        : created(live->created), scene(live), slot(std::move(checkpoints)), hasRow(exists) {}
+        : created(live->terms.created), scene(live), slot(std::move(checkpoints)), hasRow(exists) {}
     const bool created;
     const std::weak_ptr<scene::LiveScene> scene;
     const std::shared_ptr<CheckpointSlot> slot;

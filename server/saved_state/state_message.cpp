@@ -197,13 +197,12 @@ bool readGrabs(const v1::SavedCheckpoint& message, const model::Scene& scene,
 
 }  // namespace
 
-v1::SavedScene toMessage(const model::Scene& start, bool created, std::uint32_t maxParticipants,
-                         const std::string& tenant) {
+v1::SavedScene toMessage(const model::Scene& start, const scene::SceneTerms& terms) {
   v1::SavedScene message;
-  message.set_max_participants(maxParticipants);
-  message.set_tenant(tenant);
+  message.set_max_participants(terms.maxParticipants);
+  message.set_tenant(terms.tenant);
   v1::Scene definition = messages::toMessage(start);
-  if (created) {
+  if (terms.created) {
     *message.mutable_definition() = std::move(definition);
     return message;
   }
@@ -214,7 +213,7 @@ v1::SavedScene toMessage(const model::Scene& start, bool created, std::uint32_t 
 }
 
 bool isOf(const v1::SavedScene& message, const model::Scene& start) {
-  const v1::SavedScene now = toMessage(start, false, 0, {});
+  const v1::SavedScene now = toMessage(start, scene::SceneTerms{});
   return message.definition_bytes() == now.definition_bytes() &&
          message.definition_crc() == now.definition_crc();
 }

@@ -9,6 +9,7 @@
 #include "clothstream/v1/saved_state.pb.h"
 #include "server/model/scene.h"
 #include "server/scene/checkpoint.h"
+#include "server/scene/scene_terms.h"
 
 namespace clothstream::saved_state {
 
@@ -16,8 +17,7 @@ template <typename T>
 using Read = tl::expected<T, std::string>;  // the error says what is wrong
 
 // Definition of a scene that a peer created, or size and CRC of one that the server starts with.
-v1::SavedScene toMessage(const model::Scene& start, bool created, std::uint32_t maxParticipants,
-                         const std::string& tenant);
+v1::SavedScene toMessage(const model::Scene& start, const scene::SceneTerms& terms);
 // Whether the message is of this scene, which the server starts with.
 bool isOf(const v1::SavedScene& message, const model::Scene& start);
 // Definition of a created scene.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene that participants share: definition, inbox, subscribers, poses, roster, metrics.
+// A scene that participants share.
 #pragma once
 
 #include <atomic>
@@ -16,40 +16,37 @@
 #include "server/model/price.h"
 #include "server/model/scene.h"
 #include "server/scene/budget.h"
-#include "server/scene/change_limits.h"
 #include "server/scene/checkpoint.h"
-#include "server/scene/collider_shares.h"
-#include "server/scene/defaults.h"
 #include "server/scene/frame_source.h"
 #include "server/scene/inbox.h"
 #include "server/scene/journal.h"
 #include "server/scene/newest_poses.h"
+#include "server/scene/priced_definition.h"
 #include "server/scene/quarantine.h"
 #include "server/scene/roster.h"
-#include "server/scene/scene_definition.h"
 #include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
+#include "server/scene/scene_terms.h"
 #include "server/schedule/overload_policy.h"
 #include "server/telemetry/metrics.h"
 
 namespace clothstream::scene {
 
 // Thread-safe. The endpoints' threads and the device's thread meet here.
-class LiveScene : private ColliderBudget {
+class LiveScene {
  public:
-  // A simulated scene. `definition` must be valid. `created`: a peer created it while the server runs.
-  // `journal` gets everything that happens in the scene; it may be null. `maxParticipants` includes
-  // disconnected ones. A created scene is charged to `budget` by charge(), other scenes only for changes;
-  // null means a separate budget.
-  explicit LiveScene(model::Scene definition, bool created = false,
-                     std::shared_ptr<Journal> journal = nullptr,
-                     std::uint32_t maxParticipants = kDefaultMaxParticipants,
-                     std::shared_ptr<Budget> budget = nullptr);
+  // A simulated scene. `definition` must be valid. `journal` gets everything that happens in the scene; it
+  // may be null. A created scene is charged to `budget` by charge(), other scenes only for changes; null
+  // means a separate budget.
+  explicit LiveScene(model::Scene definition, SceneTerms terms = {},
+                     std::shared_ptr<Journal> journal = nullptr, std::shared_ptr<Budget> budget = nullptr);
   // A scene that is not simulated. The caller starts the source. start() and definition() hold only name and
   // rates.
   LiveScene(std::string name, std::shared_ptr<FrameSource> source,
             std::uint32_t maxParticipants = kDefaultMaxParticipants);
-  ~LiveScene() override;
+  ~LiveScene();
+  LiveScene(const LiveScene&) = delete;
+  LiveScene& operator=(const LiveScene&) = delete;
 
   const std::string& name() const { return definition_.start().name; }
   // Definition at the start.
@@ -58,7 +55,7 @@ class LiveScene : private ColliderBudget {
   std::uint32_t codec() const;
   delivery::StreamShape shape() const;
   // Definition with all accepted changes, those of the next tick included.
-  model::Scene definition() const;
+  model::Scene definition() const { return definition_.accepted(); }
 
   // Continues a scene of an earlier run of the server; `saved` has this scene's start. Its participants are
   // disconnected since `now`. Colliders and grabs of other participants, which left after the checkpoint, are
@@ -80,22 +77,22 @@ class LiveScene : private ColliderBudget {
   void observe(std::unique_ptr<SceneObserver> observer);
 
   // Number of changes of definition(). Differs from that of an earlier definition.
-  std::uint64_t version() const;
+  std::uint64_t version() const { return definition_.version(); }
 
-  // Charges a created scene before it first runs, or returns why it exceeds the budget. `path` begins the
-  // text; without it the text begins with a verb, as in "would take".
-  messages::Result<void> charge(const std::string& path = "createScene.scene");
+  // Charges a created scene before it first runs (PricedDefinition::charge).
+  messages::Result<void> charge(const std::string& path = "createScene.scene") {
+    return definition_.charge(path);
+  }
   // Place of the cloth after a tick.
-  void setClothBounds(const ClothBounds& bounds);
+  void setClothBounds(const ClothBounds& bounds) { definition_.setClothBounds(bounds); }
   // Gives the charge back, because the scene has been deleted. Others may hold the object for longer.
-  void discharge();
-  // Returns whether the scene shares the device as a guest (schedule::TickSchedule): a peer created it, it is
-  // `sharesAsGuest`, or participants have made it more expensive than it was at its start.
-  bool isGuest() const { return created || sharesAsGuest || isDearer_; }
-  // Price of a tick with the accepted changes and this number of colliders.
-  model::Work tickWork(std::size_t colliders) const;
-  // Price of the scene as it is: seconds of the device's time per second, by estimate.
-  double price() const;
+  void discharge() { definition_.release(); }
+  // Returns whether the scene shares the device as a guest (schedule::TickSchedule): a peer created it, its
+  // terms say so, or participants have made it more expensive than it was at its start.
+  bool isGuest() const { return terms.created || terms.sharesAsGuest || definition_.isDearer(); }
+  // See PricedDefinition.
+  model::Work tickWork(std::size_t colliders) const { return definition_.tickWork(colliders); }
+  double price() const { return definition_.price(); }
 
   // See SceneDefinition.
   std::uint32_t leastSubsteps(const model::Scene& scene) const { return definition_.leastSubsteps(scene); }
@@ -132,17 +129,11 @@ class LiveScene : private ColliderBudget {
 
   // Counts a change of parameters, a pause or a reset by this participant, 0 for peers outside the scene, or
   // returns why there are too many (ChangeLimits). `call` begins the text.
-  messages::Result<void> countChange(std::uint64_t participant, const char* call);
+  messages::Result<void> countChange(std::uint64_t participant, const char* call) {
+    return definition_.countChange(participant, call);
+  }
 
-  const bool created;
-  // Tenant of the peer that created it; empty if it has none. Set before other threads know the scene.
-  std::string tenant;
-  // Whether it is a scene of an earlier run that has no room in this one. It does not run, and stays kept.
-  // Set before other threads know the scene.
-  bool waitsForRoom = false;
-  // Set before other threads know the scene.
-  bool sharesAsGuest = false;
-  const std::uint32_t maxParticipants;
+  SceneTerms terms;                           // set before other threads know the scene
   const std::shared_ptr<Journal> journal;     // null: the scene has none
   const std::shared_ptr<FrameSource> source;  // null: the scene is simulated
   // Takes checkpoints; null: the scene does not survive the end of the server. Set before the scene runs.
@@ -168,31 +159,13 @@ class LiveScene : private ColliderBudget {
       work;  // of the newest tick; less than allWork() while the device is overloaded
 
  private:
-  double roomForHands() const override;
-  double roomForOthers(double hands) const override;
-  messages::Result<void> chargeJoints() override;
-  messages::Result<void> chargeWinds(std::size_t count) override;
-  void chargeColliders(const ColliderLoad& load) override;
-  bool boundsOfCloth(ClothBounds& bounds) const override;
-  // The same; the caller holds the lock.
-  messages::Result<void> countChangeLocked(std::uint64_t participant, const char* call);
-  // Error for what ChangeLimits has counted; nothing if there are not too many.
-  messages::Result<void> tooMany(ChangeLimits::Exceeded exceeded, const char* call, const char* what) const;
-  // The definition has changed, or its price. The caller holds the lock.
-  void comparePrice() { isDearer_ = charge_.exceedsStart(definition_.accepted()); }
+  PricedDefinition definition_;
 
   mutable std::mutex mutex_;
-  SceneDefinition definition_;
   std::shared_ptr<const Restored> restored_;
-  Charge charge_;                      // of definition_.accepted()
-  std::atomic<bool> isDearer_{false};  // that costs more than start()
   Quarantine quarantine_;
-  ChangeLimits changes_;
+
   std::optional<Clock::time_point> emptySince_;  // of the newest call of hasBeenEmptyFor()
-
-  mutable std::mutex boundsMutex_;
-  std::optional<ClothBounds> clothBounds_;  // after the newest tick
-
   std::unique_ptr<SceneObserver> observer_;
 };
 

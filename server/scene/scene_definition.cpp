@@ -9,16 +9,11 @@
 
 namespace clothstream::scene {
 
-SceneDefinition::SceneDefinition(model::Scene start)
+SceneDefinition::SceneDefinition(model::Scene start, std::optional<std::string> cloths)
     : start_(std::move(start)),
       stability_(start_),
-      cloths_(std::make_shared<const std::string>(messages::clothsOfDescription(start_).SerializeAsString())),
-      accepted_(start_) {}
-
-SceneDefinition::SceneDefinition(model::Scene start, std::string cloths)
-    : start_(std::move(start)),
-      stability_(start_),
-      cloths_(std::make_shared<const std::string>(std::move(cloths))),
+      cloths_(std::make_shared<const std::string>(
+          cloths ? std::move(*cloths) : messages::clothsOfDescription(start_).SerializeAsString())),
       accepted_(start_) {}
 
 std::uint32_t SceneDefinition::leastSubsteps(const model::Scene& scene) const {

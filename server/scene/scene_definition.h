@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/delivery/description_chunks.h"
@@ -21,9 +22,8 @@ inline constexpr std::uint32_t kEpoch = 1;
 // Not thread-safe, except for start(), stability() and leastSubsteps(), which never change.
 class SceneDefinition {
  public:
-  explicit SceneDefinition(model::Scene start);
   // `cloths` is the serialised StreamDescription with the cloths, if they are not those of `start`.
-  SceneDefinition(model::Scene start, std::string cloths);
+  explicit SceneDefinition(model::Scene start, std::optional<std::string> cloths = {});
 
   const model::Scene& start() const { return start_; }
   const model::StabilityBound& stability() const { return stability_; }  // of start()

@@ -128,7 +128,7 @@ void Session::failToJoin(scene::Roster::Refusal refusal, const scene::LiveScene&
       server_.metrics.refuse(telemetry::Refusal::participants);
       return fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
                   fmt::format("'{}' has {} participants, its maximum; try again later", scene.name(),
-                              scene.maxParticipants));
+                              scene.terms.maxParticipants));
   }
 }
 
@@ -199,16 +199,17 @@ void Session::hello(const v1::Hello& message) {
   if (joining->scene.empty()) joining->scene = identity_->scene;
   const std::shared_ptr<scene::LiveScene> scene = sceneOf(message, *joining);
   if (!scene || joinRemotely(request, *joining, scene)) return;
-  auto admission = scene->roster.join({.clientName = joining->clientName,
-                                       .displayName = joining->displayName,
-                                       .role = scene::fromMessage(joining->role),
-                                       .token = message.resume_token(),
-                                       .subject = identity_->subject,
-                                       .rights = rightsIn(*scene),
-                                       .attempt = message.attempt(),
-                                       .address = address_,
-                                       .placesOfAddress = server_.options.placesOfAddress()},
-                                      mailbox_, server_.newestParticipant, scene->maxParticipants, now_);
+  auto admission =
+      scene->roster.join({.clientName = joining->clientName,
+                          .displayName = joining->displayName,
+                          .role = scene::fromMessage(joining->role),
+                          .token = message.resume_token(),
+                          .subject = identity_->subject,
+                          .rights = rightsIn(*scene),
+                          .attempt = message.attempt(),
+                          .address = address_,
+                          .placesOfAddress = server_.options.placesOfAddress()},
+                         mailbox_, server_.newestParticipant, scene->terms.maxParticipants, now_);
   if (!admission) return failToJoin(admission.error(), *scene);
   scene_ = scene;
   participant_ = admission->id;

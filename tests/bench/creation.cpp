@@ -70,8 +70,10 @@ Rows runCreation(vulkan::Device& device, const Settings& settings) {
         check.add(secondsOf([&] { checked = messages::toScene(message); }));
         if (!*checked) throw std::runtime_error(checked->error().text);
         std::unique_ptr<scene::LiveScene> live;
-        prepare.add(secondsOf(
-            [&] { live = std::make_unique<scene::LiveScene>(**checked, true, nullptr, 1, nullptr); }));
+        prepare.add(secondsOf([&] {
+          live = std::make_unique<scene::LiveScene>(**checked,
+                                                    scene::SceneTerms{.created = true, .maxParticipants = 1});
+        }));
         std::unique_ptr<scene::SceneOnDevice> loaded;
         load.add(
             secondsOf([&] { loaded = std::make_unique<scene::SceneOnDevice>(device, **checked, workers); }));

@@ -57,7 +57,7 @@ class EventsTest : public ::testing::Test {
 
   std::unique_ptr<scene::LiveScene> makeScene(const std::string& name = "small") {
     auto scene = std::make_unique<scene::LiveScene>(tests::smallScene(name));
-    scene->tenant = "acme";
+    scene->terms.tenant = "acme";
     scene->observe(events_->observe(*scene));
     return scene;
   }

@@ -46,7 +46,7 @@ class SceneJournalTest : public tests::GpuTest {
     options.directory = directory.path();
     options.serverName = "test";
     journal = std::make_shared<SceneJournal>("small", options, always);
-    live = std::make_unique<scene::LiveScene>(tests::smallScene(), false, journal);
+    live = std::make_unique<scene::LiveScene>(tests::smallScene(), scene::SceneTerms{}, journal);
     publisher = std::make_unique<delivery::FramePublisher>(encode::FrameEncoder::kSlots, [] {});
     host = std::make_unique<scene::SceneHost>(tests::device(), *live, *publisher);
   }
@@ -343,7 +343,8 @@ TEST_F(SceneJournalTest, CountsRecordingsOfRemovedScenesWithoutKeepingThem) {
     auto added = recordings.add("small");
     EXPECT_TRUE(gone.expired());
     gone = added;
-    live = std::make_unique<scene::LiveScene>(tests::smallScene(), true, std::move(added));
+    live = std::make_unique<scene::LiveScene>(tests::smallScene(), scene::SceneTerms{.created = true},
+                                              std::move(added));
     host = std::make_unique<scene::SceneHost>(tests::device(), *live, *publisher);
     ticks(3);
     publisher->drain();

@@ -64,7 +64,7 @@ std::string recordScene(vulkan::Device& device, const std::string& name,
   const auto recorder = std::make_shared<recording::Recorder>(
       recording::RecorderOptions{.directory = directory, .serverName = "clothstream replay"});
   delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
-  scene::LiveScene live(std::move(*scene), false, recorder);
+  scene::LiveScene live(std::move(*scene), {}, recorder);
   auto host = std::make_unique<scene::SceneHost>(device, live, publisher);
   model::Vec3 centre = model::Vec3::Zero();
   const std::vector<model::Vec3> rest = model::restPositions(live.start().cloths.front());

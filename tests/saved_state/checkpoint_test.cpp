@@ -257,7 +257,7 @@ TEST_F(CheckpointTest, HasTheEventsThatWereAnnounced) {
 TEST_F(CheckpointTest, StaysUntilAHostContinuesFromIt) {
   const model::Scene scene = tests::busyScene(SolverKind::massSpring);
   const auto journal = std::make_shared<FailingJournal>();
-  scene::LiveScene live(scene, false, journal);
+  scene::LiveScene live(scene, {}, journal);
   restore(live, savedScene(scene, checkpointAfter(5)));
   delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
   EXPECT_THROW(scene::SceneHost(tests::device(), live, publisher), vulkan::DeviceLost);

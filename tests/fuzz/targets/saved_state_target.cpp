@@ -62,7 +62,7 @@ void run(const SavedStateInput& input) {
   if (!messages::toScene(saved.definition(), {}, {.nodes = kMaxNodes})) return;
   const auto start = saved_state::toScene(saved.definition());
   if (!start) return require(!start.error().empty(), "an error has a text");
-  require(saved_state::isOf(saved_state::toMessage(*start, false, 1, ""), *start),
+  require(saved_state::isOf(saved_state::toMessage(*start, scene::SceneTerms{}), *start),
           "a scene is recognised by its size and checksum");
   static_cast<void>(saved_state::isOf(saved, *start));
   readSession(messageOf(input.raw_session(), input.session()), *start);

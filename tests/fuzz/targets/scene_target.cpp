@@ -72,7 +72,7 @@ void run(const v1::Scene& message) {
 
   const auto budget = std::make_shared<scene::Budget>();
   budget->setSpeed({.nodeStepSeconds = 1e-9, .dispatchSeconds = 1e-6, .workgroupFactor = 4});
-  scene::LiveScene live(*scene, true, nullptr, scene::kDefaultMaxParticipants, budget);
+  scene::LiveScene live(*scene, {.created = true}, nullptr, budget);
   if (!live.charge()) return;
   require(live.description()->count() > 0, "a scene has a description");
   const Tables tables(*scene);

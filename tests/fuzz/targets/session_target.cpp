@@ -172,7 +172,8 @@ void act(Peer& peer, const SessionInput::Step& step, Ticks& ticks) {
 
 void run(const SessionInput& input) {
   hosting::SceneRegistry& scenes = stillServer().scenes;
-  const auto live = std::make_shared<scene::LiveScene>(scene(), false, nullptr, kPeers + 1);
+  const auto live =
+      std::make_shared<scene::LiveScene>(scene(), scene::SceneTerms{.maxParticipants = kPeers + 1});
   scenes.insert(live);
   {
     Ticks ticks(*live);

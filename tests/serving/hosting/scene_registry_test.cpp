@@ -19,9 +19,8 @@ using testing::HasSubstr;
 
 std::shared_ptr<scene::LiveScene> live(const std::string& name, bool created = false,
                                        const std::string& tenant = {}) {
-  auto scene = std::make_shared<scene::LiveScene>(tests::smallScene(name), created);
-  scene->tenant = tenant;
-  return scene;
+  return std::make_shared<scene::LiveScene>(tests::smallScene(name),
+                                            scene::SceneTerms{.created = created, .tenant = tenant});
 }
 
 class SceneRegistryTest : public ::testing::Test {

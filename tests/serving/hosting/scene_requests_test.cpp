@@ -84,7 +84,7 @@ class NotingStore final : public scene::SceneStore {
   std::optional<scene::SavedScene> take(const model::Scene&) override { return {}; }
   std::vector<scene::SavedScene> takeCreated() override { return {}; }
   std::shared_ptr<scene::SceneKeeper> keep(const std::shared_ptr<scene::LiveScene>& scene) override {
-    if (scene->created) isKept = true;
+    if (scene->terms.created) isKept = true;
     return nullptr;
   }
   void remove(const std::string& name) override { removed = name; }

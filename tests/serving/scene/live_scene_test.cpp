@@ -180,7 +180,7 @@ TEST(LiveScene, BecomesAGuestWhileItCostsMoreThanAtItsStart) {
   model::Scene scene = smallScene();
   scene.cloths[0].solver.kind = model::SolverKind::constraint;
   scene.cloths[0].solver.iterations = 10;
-  LiveScene live(std::move(scene), false, nullptr, 8, budget);
+  LiveScene live(std::move(scene), {}, nullptr, budget);
   EXPECT_FALSE(live.isGuest());
   v1::ParameterChange change;
   v1::ClothChange& cloth = *change.add_cloths();

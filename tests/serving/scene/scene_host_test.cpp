@@ -40,7 +40,7 @@ class SceneHostTest : public tests::GpuTest {};
 
 TEST_F(SceneHostTest, RefusesASceneThatLeavesTooFewAllocations) {
   vulkan::Device few({.maxAllocations = SceneOnDevice::kSpareAllocations + 10});
-  LiveScene live(smallScene(), false);
+  LiveScene live(smallScene());
   delivery::FramePublisher publisher(1, [] {});
   try {
     const SceneHost host(few, live, publisher);
