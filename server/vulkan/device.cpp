@@ -15,6 +15,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "server/vulkan/batch_handles.h"
 #include "server/vulkan/handles.h"
 #include "server/vulkan/instance.h"
 #include "server/vulkan/recorder.h"
@@ -193,22 +194,31 @@ TimelineValue Device::submitSlice(Recorder& recorder, std::uint32_t slice) {
 }
 
 TimelineValue Device::submit(const Recorder& recorder, std::uint32_t first, std::uint32_t end) {
-  assert(executes_);
-  Recorder::Handles& recording = recorder.handles();
-  recording.submitted.clear();
+  std::vector<vk::CommandBuffer>& submitted = recorder.handles().submitted;
+  submitted.clear();
   for (std::uint32_t slice = first; slice < end; ++slice)
-    recording.submitted.push_back(*recording.slices[slice]);
+    submitted.push_back(*recorder.handles().slices[slice]);
+  return submitCommands(submitted.data(), submitted.size());
+}
+
+TimelineValue Device::submit(Batch& batch) {
+  batch.finish();
+  const std::vector<vk::CommandBuffer>& submitted = batch.handles().submitted;
+  return submitCommands(submitted.data(), submitted.size());
+}
+
+TimelineValue Device::submitCommands(const void* commands, std::size_t count) {
+  assert(executes_);
   const std::lock_guard lock(submitting_);
   const TimelineValue value = submitted_ + 1;
   const vk::TimelineSemaphoreSubmitInfo timeline{.signalSemaphoreValueCount = 1,
                                                  .pSignalSemaphoreValues = &value};
   try {
-    handles_->queue.submit(
-        vk::SubmitInfo{.pNext = &timeline,
-                       .commandBufferCount = static_cast<std::uint32_t>(recording.submitted.size()),
-                       .pCommandBuffers = recording.submitted.data(),
-                       .signalSemaphoreCount = 1,
-                       .pSignalSemaphores = &*handles_->timeline});
+    handles_->queue.submit(vk::SubmitInfo{.pNext = &timeline,
+                                          .commandBufferCount = static_cast<std::uint32_t>(count),
+                                          .pCommandBuffers = static_cast<const vk::CommandBuffer*>(commands),
+                                          .signalSemaphoreCount = 1,
+                                          .pSignalSemaphores = &*handles_->timeline});
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
   }
@@ -233,6 +243,10 @@ void Device::drain() {
     last = submitted_;
   }
   wait(last);
+}
+
+bool Device::sharesKernels() const {
+  return handles_->sharesKernels;
 }
 
 std::uint32_t Device::allocations() const {

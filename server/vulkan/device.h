@@ -20,6 +20,10 @@ enum class DeviceKind : std::uint8_t { discrete, integrated, virtualGpu, softwar
 // of the results do not depend on them. `automatic` means `cpu` for software devices and `gpu` for others.
 enum class KernelSettings : std::uint8_t { automatic, cpu, gpu };
 
+// Whether scenes that run together share dispatches (Batch). `automatic`: on GPUs, where a dispatch costs more
+// than the work of a small scene. The bits of the results do not depend on it.
+enum class KernelSharing : std::uint8_t { automatic, never, always };
+
 struct DeviceInfo {
   std::uint32_t index = 0;  // index in listDevices()
   std::string name = {};
@@ -43,6 +47,8 @@ struct DeviceOptions {
   // logged.
   std::filesystem::path cacheDirectory = {};
   KernelSettings kernels = KernelSettings::automatic;
+  // Ignored if the device cannot do it: it needs the feature bufferDeviceAddress.
+  KernelSharing sharing = KernelSharing::automatic;
   // Only compile kernels: buffers have no device memory, recordings hold rehearsals only, and nothing may be
   // submitted. A driver without a GPU is enough. Kernels keep the statistics of their compiler
   // (kernel_statistics.h).
@@ -70,6 +76,7 @@ struct Limits {
 // A value of the queue's timeline. It is reached when all earlier submissions are complete.
 using TimelineValue = std::uint64_t;
 
+class Batch;
 class Recorder;
 
 // No device, or none that matches `select`. what() says what to install or which devices there are.
@@ -104,12 +111,16 @@ class Device {
   bool hasGpuKernels() const { return gpuKernels_; }
   // False if the device was opened with DeviceOptions::compileOnly.
   bool executes() const { return executes_; }
+  // True if recordings of a batch share dispatches.
+  bool sharesKernels() const;
 
   // Submits a finished recording to the queue. Returns the timeline value that is reached when it is done.
   // The recorder must not begin again before that. Submissions of one thread run in order. Throws DeviceLost.
   TimelineValue submit(Recorder& recorder);
   // Submits one slice of a recording. The slices must be submitted in order, each once.
   TimelineValue submitSlice(Recorder& recorder, std::uint32_t slice);
+  // Submits all recordings of a batch. The batch must not begin again before the value is reached.
+  TimelineValue submit(Batch& batch);
 
   // Returns false on timeout. Throws DeviceLost.
   bool wait(TimelineValue value, std::chrono::nanoseconds timeout = std::chrono::nanoseconds::max()) const;
@@ -134,7 +145,6 @@ class Device {
   const Handles& handles() const { return *handles_; }
 
  private:
-  TimelineValue submit(const Recorder& recorder, std::uint32_t first, std::uint32_t end);
 
   std::unique_ptr<Handles> handles_;
   std::size_t pipelineCacheLoaded_ = 0;

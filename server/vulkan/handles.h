@@ -59,6 +59,7 @@ struct Device::Handles {
   bool sharesKernels = false;    // kernels have shared forms: shared_code.h
   mutable std::atomic<std::uint64_t> allocatedBytes{0};
   mutable std::atomic<std::uint32_t> allocations{0};
+  mutable std::atomic<std::uint64_t> batches{0};  // that have begun
   // Pipelines that kernels use.
   mutable std::mutex pipelinesMutex{};
   mutable std::map<PipelineKey, std::weak_ptr<const Kernel::Handles>> pipelines{};
@@ -89,8 +90,17 @@ struct Buffer::Handles {
   vk::raii::BufferView texelView = nullptr;
 };
 
+// The first bytes of a buffer, as a shared kernel sees it.
+struct BoundBufferAddress {
+  const Buffer::Handles* buffer = nullptr;
+  std::uint64_t bytes = 0;
+};
+
 struct Bindings::Handles {
-  std::vector<const Buffer::Handles*> buffers;  // in order
+  std::vector<BoundBufferAddress> buffers;  // in order
+  // Address of their record in the table of the newest batch that used them, and the number of that batch.
+  mutable vk::DeviceAddress record = 0;
+  mutable std::uint64_t batch = 0;
   vk::raii::DescriptorPool pool = nullptr;
   vk::raii::DescriptorSet set = nullptr;
 };

@@ -158,7 +158,7 @@ Bindings::Bindings(const Device& device, Kernel kernel, std::span<const Buffer* 
   const auto count = static_cast<std::uint32_t>(bindings.size());
   for (const Buffer* buffer : buffers) {
     buffers_.push_back({&buffer->handles(), buffer->bytes()});
-    handles_->buffers.push_back(&buffer->handles());
+    handles_->buffers.push_back({&buffer->handles(), buffer->bytes()});
   }
   if (count == 0 || !device.executes()) return;
 
