@@ -30,17 +30,18 @@ constexpr CommandAccess kAccess[] = {
 
 }  // namespace
 
-void CommandWriter::begin(vk::CommandBuffer commands) {
-  commands_ = commands;
+void CommandWriter::begin(const vk::raii::CommandBuffer& commands) {
+  commands_ = &commands;
   since_ = 0;
   before_.fill(0);
-  commands_.begin(vk::CommandBufferBeginInfo{});
+  commands_->begin(vk::CommandBufferBeginInfo{});
 }
 
 void CommandWriter::end() {
   const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses | Access::eHostRead};
-  commands_.pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr, nullptr);
-  commands_.end();
+  commands_->pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr,
+                             nullptr);
+  commands_->end();
 }
 
 void CommandWriter::write(const Command& command, const Recording& recording) {
@@ -51,15 +52,15 @@ void CommandWriter::writeOne(const Dispatch& dispatch, const Recording& recordin
   bind(*dispatch.kernel, *dispatch.bindings, dispatch.push, recording);
   // Synchronisation checks of the validation layer do not know vkCmdDispatchBase.
   if (dispatch.firstGroup == 0)
-    commands_.dispatch(dispatch.groups, 1, 1);
+    commands_->dispatch(dispatch.groups, 1, 1);
   else
-    commands_.dispatchBase(dispatch.firstGroup, 0, 0, dispatch.groups, 1, 1);
+    commands_->dispatchBase(dispatch.firstGroup, 0, 0, dispatch.groups, 1, 1);
 }
 
 void CommandWriter::writeOne(const IndirectDispatch& dispatch, const Recording& recording) {
   waitBefore(sizeCommand);
   bind(*dispatch.kernel, *dispatch.bindings, dispatch.push, recording);
-  commands_.dispatchIndirect(*dispatch.sizes->buffer, dispatch.offset);
+  commands_->dispatchIndirect(*dispatch.sizes->buffer, dispatch.offset);
 }
 
 void CommandWriter::writeOne(const Copy& copied, const Recording&) {
@@ -69,12 +70,12 @@ void CommandWriter::writeOne(const Copy& copied, const Recording&) {
 
 void CommandWriter::writeOne(const Fill& fill, const Recording&) {
   waitBefore(copyCommand);
-  commands_.fillBuffer(*fill.buffer->buffer, fill.offset, fill.bytes, fill.value);
+  commands_->fillBuffer(*fill.buffer->buffer, fill.offset, fill.bytes, fill.value);
 }
 
 void CommandWriter::writeOne(const Touch& touch, const Recording& recording) {
   bind(*touch.kernel, *touch.bindings, touch.push, recording);
-  commands_.dispatch(0, 1, 1);
+  commands_->dispatch(0, 1, 1);
   if (touch.kernel->device->sharesKernels) dispatchShared(*touch.kernel, 0, 0, 1);
 }
 
@@ -82,25 +83,25 @@ void CommandWriter::dispatchShared(const Kernel::Handles& kernel, vk::DeviceAddr
                                    std::uint32_t groups, std::uint32_t count) {
   waitBefore(kernelCommand);
   const Kernel::Handles::Shared& shared = kernel.shared();
-  commands_.bindPipeline(vk::PipelineBindPoint::eCompute, *shared.pipeline);
-  commands_.pushConstants<vk::DeviceAddress>(*shared.layout, vk::ShaderStageFlagBits::eCompute, 0, entries);
-  commands_.dispatch(groups, count, 1);
+  commands_->bindPipeline(vk::PipelineBindPoint::eCompute, *shared.pipeline);
+  commands_->pushConstants<vk::DeviceAddress>(*shared.layout, vk::ShaderStageFlagBits::eCompute, 0, entries);
+  commands_->dispatch(groups, count, 1);
 }
 
 void CommandWriter::copy(vk::Buffer from, vk::Buffer to, const vk::BufferCopy& range) {
   waitBefore(copyCommand);
-  commands_.copyBuffer(from, to, range);
+  commands_->copyBuffer(from, to, range);
 }
 
 void CommandWriter::bind(const Kernel::Handles& kernel, const Bindings::Handles& bindings, PushRange push,
                          const Recording& recording) {
   waitBefore(kernelCommand);
-  commands_.bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.pipeline);
+  commands_->bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.pipeline);
   if (*bindings.set)
-    commands_.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.layout, 0, *bindings.set, nullptr);
+    commands_->bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.layout, 0, *bindings.set, nullptr);
   if (push.bytes > 0)
-    commands_.pushConstants(*kernel.layout, vk::ShaderStageFlagBits::eCompute, 0, push.bytes,
-                            recording.push(push).data());
+    commands_->pushConstants<std::byte>(*kernel.layout, vk::ShaderStageFlagBits::eCompute, 0,
+                                        recording.push(push));
 }
 
 void CommandWriter::barrier() {
@@ -120,7 +121,7 @@ void CommandWriter::waitBefore(Type type) {
     writes |= kAccess[other].writes;
   }
   const vk::MemoryBarrier memory{.srcAccessMask = writes, .dstAccessMask = kAccess[type].uses};
-  commands_.pipelineBarrier(stages, kAccess[type].stage, {}, memory, nullptr, nullptr);
+  commands_->pipelineBarrier(stages, kAccess[type].stage, {}, memory, nullptr, nullptr);
 }
 
 }  // namespace clothstream::vulkan

@@ -16,7 +16,7 @@ namespace clothstream::vulkan {
 class CommandWriter {
  public:
   // Begins the command buffer.
-  void begin(vk::CommandBuffer commands);
+  void begin(const vk::raii::CommandBuffer& commands);
   // Ends it with a barrier towards the host and later submissions.
   void end();
 
@@ -32,7 +32,7 @@ class CommandWriter {
   // sizes.
   void barrier();
 
-  vk::CommandBuffer commands() const { return commands_; }
+  const vk::raii::CommandBuffer& commands() const { return *commands_; }
 
  private:
   void writeOne(const Dispatch& dispatch, const Recording& recording);
@@ -51,7 +51,7 @@ class CommandWriter {
   // Writes the barrier that a command of this type needs, if any.
   void waitBefore(Type type);
 
-  vk::CommandBuffer commands_;
+  const vk::raii::CommandBuffer* commands_ = nullptr;
   // Types of the commands since the last call of barrier(), and of those before it that a command of a type
   // has not waited for, as bits.
   std::uint8_t since_ = 0;

@@ -207,14 +207,14 @@ void Recorder::finish() {
   }
   std::uint32_t slice = 0;
   CommandWriter writer;
-  writer.begin(*on.slices[slice]);
+  writer.begin(on.slices[slice]);
   if (on.timer) on.timer->begin(writer.commands());
   for (const Command& command : recording_.commands()) {
     if (const auto* stage = std::get_if<StageStart>(&command)) {
       on.timer->mark(writer.commands(), stage->name);
     } else if (std::holds_alternative<SliceStart>(command)) {
       writer.end();
-      writer.begin(*on.slices[++slice]);
+      writer.begin(on.slices[++slice]);
     } else {
       writer.write(command, recording_);
     }

@@ -21,7 +21,7 @@ StageTimer::StageTimer(const Device& device, std::uint32_t marks, std::uint32_t 
   times_.reserve(stages);
 }
 
-void StageTimer::begin(vk::CommandBuffer commands) {
+void StageTimer::begin(const vk::raii::CommandBuffer& commands) {
   if (*queries_) commands.resetQueryPool(*queries_, 0, capacity_);
   marks_.clear();
 }
@@ -32,11 +32,11 @@ void StageTimer::mark(vk::CommandBuffer commands, std::string_view stage) {
   marks_.push_back(stage);
 }
 
-void StageTimer::end(vk::CommandBuffer commands) {
+void StageTimer::end(const vk::raii::CommandBuffer& commands) {
   if (!marks_.empty()) write(commands);
 }
 
-void StageTimer::write(vk::CommandBuffer commands) {
+void StageTimer::write(const vk::raii::CommandBuffer& commands) {
   if (*queries_)
     commands.writeTimestamp(vk::PipelineStageFlagBits::eBottomOfPipe, *queries_,
                             static_cast<std::uint32_t>(marks_.size()));

@@ -24,17 +24,17 @@ class StageTimer {
   StageTimer(const Device& device, std::uint32_t marks, std::uint32_t stages);
 
   // Begins a submission. The earlier one must be complete.
-  void begin(vk::CommandBuffer commands);
+  void begin(const vk::raii::CommandBuffer& commands);
   // What follows counts towards this stage. Marks beyond the limit are left out.
   void mark(vk::CommandBuffer commands, std::string_view stage);
-  void end(vk::CommandBuffer commands);
+  void end(const vk::raii::CommandBuffer& commands);
 
   // Times of the complete submission, in the order of first appearance. Empty if the device has no
   // timestamps. Valid until the next call or begin().
   std::span<const StageTime> times();
 
  private:
-  void write(vk::CommandBuffer commands);
+  void write(const vk::raii::CommandBuffer& commands);
 
   const Device* device_;
   vk::raii::QueryPool queries_ = nullptr;
