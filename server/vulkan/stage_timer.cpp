@@ -26,7 +26,7 @@ void StageTimer::begin(const vk::raii::CommandBuffer& commands) {
   marks_.clear();
 }
 
-void StageTimer::mark(vk::CommandBuffer commands, std::string_view stage) {
+void StageTimer::mark(const vk::raii::CommandBuffer& commands, std::string_view stage) {
   if (marks_.size() + 1 >= capacity_) return;
   write(commands);
   marks_.push_back(stage);

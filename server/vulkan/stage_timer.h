@@ -26,7 +26,7 @@ class StageTimer {
   // Begins a submission. The earlier one must be complete.
   void begin(const vk::raii::CommandBuffer& commands);
   // What follows counts towards this stage. Marks beyond the limit are left out.
-  void mark(vk::CommandBuffer commands, std::string_view stage);
+  void mark(const vk::raii::CommandBuffer& commands, std::string_view stage);
   void end(const vk::raii::CommandBuffer& commands);
 
   // Times of the complete submission, in the order of first appearance. Empty if the device has no
