@@ -63,6 +63,8 @@ class SceneHost {
   void begin(Clock::time_point now);
   // Returns whether the tick may be submitted in a batch.
   bool fitsIntoBatch() const { return onDevice_->slices.fitsIntoBatch(); }
+  // Returns whether no slice of the tick was submitted.
+  bool isUnsubmitted() const { return onDevice_->slices.isUnsubmitted(); }
   // Adds the tick to a batch. finish() may be called when the batch is complete.
   void join(vulkan::Batch& batch) { onDevice_->slices.join(batch); }
   // Work of the tick, in kernel invocations (vulkan::Recorder::work).

@@ -32,8 +32,10 @@ class Slices {
 
   // A tick is recorded.
   void begin();
+  // Returns whether no slice of the tick was submitted.
+  bool isUnsubmitted() const { return next_ == 0; }
   // Returns whether the tick may be submitted in a batch.
-  bool fitsIntoBatch() const { return next_ == 0 && recorder_.sliceCount() == 1; }
+  bool fitsIntoBatch() const { return isUnsubmitted() && recorder_.sliceCount() == 1; }
   // Adds the tick to a batch, which is submitted and waited for by the caller.
   void join(vulkan::Batch& batch);
   // Returns whether slices are not submitted yet.

@@ -171,10 +171,9 @@ bool Batch::shareDispatch(const Group& group, std::size_t command) {
     const auto& dispatch = commandOf<Dispatch>(group.first + i, command);
     assert(dispatch.kernel == first->kernel && dispatch.firstGroup == 0);
     const std::span<const std::byte> push = members_[group.first + i].recording->push(dispatch.push);
-    table.set(entries, i,
-              {.buffers = table.record(*dispatch.bindings),
-               .push = table.push(push),
-               .groups = dispatch.groups});
+    table.set(
+        entries, i,
+        {.buffers = table.record(*dispatch.bindings), .push = table.push(push), .groups = dispatch.groups});
     groups = std::max(groups, dispatch.groups);
   }
   handles_->writer.dispatchShared(*first->kernel, entries.address, groups,
@@ -186,7 +185,8 @@ bool Batch::shareMove(const Group& group, std::size_t command) {
   const auto commandAt = [&](std::size_t i) -> const Command& {
     return members_[group.first + i].recording->commands()[command];
   };
-  if (!std::holds_alternative<Copy>(commandAt(0)) && !std::holds_alternative<Fill>(commandAt(0))) return false;
+  if (!std::holds_alternative<Copy>(commandAt(0)) && !std::holds_alternative<Fill>(commandAt(0)))
+    return false;
   for (std::size_t i = 0; i < group.count; ++i)
     if (!hasWholeWords(commandAt(i))) return false;
   BatchTable& table = handles_->table;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Copies words from one buffer to another, or fills them with a value: a copy of a recording, as a kernel that
-// several recordings share. An invocation moves one word.
+// Copies words from one buffer to another, or fills them with a value: a copy of a recording, as a kernel
+// that several recordings share. An invocation moves one word.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

@@ -8,8 +8,8 @@
 CLOTHSTREAM_SHARED_BEGIN
 
 struct MovePush {
-  uint32_t from;   // first word that is copied
-  uint32_t to;     // first word that is written
+  uint32_t from;  // first word that is copied
+  uint32_t to;    // first word that is written
   uint32_t words;
   uint32_t fills;  // not 0: each word becomes `value`
   uint32_t value;

@@ -109,7 +109,8 @@ TEST_F(SceneHostTest, SlicesOfATickGiveTheSameStates) {
     SceneHost host(std::move(loaded), live, publisher, 0);
     std::vector<std::uint64_t> states;
     for (int tick = 0; tick < 3; ++tick) {
-      for (host.begin(Clock::now()); host.hasSlices(); ++slices) {
+      host.begin(Clock::now());
+      for (host.submitSlice(); host.hasSlices(); ++slices) {
         host.waitForSlice();
         host.submitSlice();
       }
