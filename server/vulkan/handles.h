@@ -3,20 +3,22 @@
 // bindings compile slowly.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include <vulkan/vulkan_raii.hpp>
 
 #include "server/vulkan/buffer.h"
+#include "server/vulkan/descriptor_pools.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/kernel.h"
+#include "server/vulkan/memory_blocks.h"
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::vulkan {
@@ -44,8 +46,8 @@ struct Device::Handles {
   vk::raii::PipelineCache pipelineCache = nullptr;
   std::uint32_t queueFamily = 0;
   bool keepsStatistics = false;  // of kernels: kernel_statistics.h
-  mutable std::atomic<std::uint64_t> allocatedBytes{0};
-  mutable std::atomic<std::uint32_t> allocations{0};
+  std::unique_ptr<MemoryBlocks> memory = {};
+  std::unique_ptr<DescriptorPools> descriptorPools = {};
   // Pipelines that kernels use.
   mutable std::mutex pipelinesMutex{};
   mutable std::map<PipelineKey, std::weak_ptr<const Kernel::Handles>> pipelines{};
@@ -55,30 +57,16 @@ struct Device::Handles {
   bool validates() const { return *messenger != vk::DebugUtilsMessengerEXT{}; }
 };
 
-inline thread_local std::uint64_t bufferBytesOfThread = 0;  // Buffer::bytesOfThread()
-
 struct Buffer::Handles {
-  explicit Handles(const Device& of) : device(of.handles()) {}
-  ~Handles() {
-    device.allocatedBytes -= bytes;
-    bufferBytesOfThread -= bytes;
-    if (counted) --device.allocations;
-  }
-  Handles(const Handles&) = delete;
-  Handles& operator=(const Handles&) = delete;
-
-  const Device::Handles& device;
-  std::uint64_t bytes = 0;  // of `memory`
-  bool counted = false;     // among the device's allocations
-  vk::raii::DeviceMemory memory = nullptr;
-  std::vector<std::byte> hostBytes;  // on a device that only compiles, which has no `memory`
+  std::optional<MemoryRange> range;
+  std::vector<std::byte> hostBytes;  // on a device that only compiles, which has no `range`
   vk::raii::Buffer buffer = nullptr;
   vk::raii::BufferView texelView = nullptr;
+  vk::DeviceAddress address = 0;  // of its first byte; 0 without Device::hasAddresses()
 };
 
 struct Bindings::Handles {
-  vk::raii::DescriptorPool pool = nullptr;
-  vk::raii::DescriptorSet set = nullptr;
+  PooledSet set;
 };
 
 struct Recorder::Handles {
