@@ -198,6 +198,7 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
 
 bool DeviceThread::waitForWork() {
   deviceMemory_ = device_.allocatedBytes();
+  reservedDeviceMemory_ = device_.reservedBytes();
   lastAnswer_ = Clock::now();
   Clock::time_point due = Clock::time_point::max();
   const Clock::time_point guestsFrom = scheduler_.guestsFrom(schedules(), lastAnswer_);

@@ -96,8 +96,9 @@ class DeviceThread {
 
   // Time at which the thread last looked for work. It does so after each wake().
   Clock::time_point lastAnswer() const { return lastAnswer_; }
-  // Memory of all buffers on the device at that time, in bytes.
+  // Memory of all buffers on the device at that time, and of the allocations that they share, in bytes.
   std::uint64_t deviceMemory() const { return deviceMemory_; }
+  std::uint64_t reservedDeviceMemory() const { return reservedDeviceMemory_; }
 
   // Treats the device as lost before the next tick. For tests.
   void simulateDeviceLoss() {
@@ -192,7 +193,7 @@ class DeviceThread {
   SimulatedFaults faults_;
   // Written by the thread alone.
   std::atomic<Clock::time_point> lastAnswer_{Clock::now()};
-  std::atomic<std::uint64_t> deviceMemory_{0};
+  std::atomic<std::uint64_t> deviceMemory_{0}, reservedDeviceMemory_{0};
 
   // Owned by the thread.
   OwnedDevice device_;

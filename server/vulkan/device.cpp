@@ -59,13 +59,20 @@ bool offersStatistics(const vk::raii::PhysicalDevice& physical) {
   });
 }
 
-vk::raii::Device openDevice(const Candidate& candidate, bool statistics) {
+bool offersAddresses(const vk::raii::PhysicalDevice& physical) {
+  return physical.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features>()
+      .get<vk::PhysicalDeviceVulkan12Features>()
+      .bufferDeviceAddress;
+}
+
+vk::raii::Device openDevice(const Candidate& candidate, bool statistics, bool addresses) {
   const float priority = 1;
   const vk::DeviceQueueCreateInfo queue{
       .queueFamilyIndex = candidate.queueFamily, .queueCount = 1, .pQueuePriorities = &priority};
   vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR executables{.pipelineExecutableInfo = VK_TRUE};
   const vk::PhysicalDeviceVulkan12Features features{.pNext = statistics ? &executables : nullptr,
-                                                    .timelineSemaphore = VK_TRUE};
+                                                    .timelineSemaphore = VK_TRUE,
+                                                    .bufferDeviceAddress = addresses};
   const char* extension = VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME;
   return {candidate.physical, vk::DeviceCreateInfo{.pNext = &features,
                                                    .queueCreateInfoCount = 1,
@@ -150,7 +157,8 @@ Device::Device(const DeviceOptions& options)
   pipelineCacheLoaded_ = cached.size();
   try {
     handles_->keepsStatistics = options.compileOnly && offersStatistics(chosen.physical);
-    handles_->device = openDevice(chosen, handles_->keepsStatistics);
+    addresses_ = offersAddresses(chosen.physical);
+    handles_->device = openDevice(chosen, handles_->keepsStatistics, addresses_);
     const vk::SemaphoreTypeCreateInfo timeline{.semaphoreType = vk::SemaphoreType::eTimeline};
     handles_->queue = handles_->device.getQueue(chosen.queueFamily, 0);
     // Drivers without a GPU have no semaphores.
@@ -171,6 +179,14 @@ Device::Device(const DeviceOptions& options)
   handles_->queueFamily = chosen.queueFamily;
   info_ = std::move(chosen.info);
   handles_->physical = std::move(chosen.physical);
+  handles_->memory =
+      std::make_unique<MemoryBlocks>(handles_->device, handles_->physical.getMemoryProperties(),
+                                     MemorySettings{.device = info_.name,
+                                                    .maxBlocks = limits_.maxAllocations,
+                                                    .largestBlock = options.largestBlock,
+                                                    .addresses = addresses_,
+                                                    .marksFreshMemory = validate});
+  handles_->descriptorPools = std::make_unique<DescriptorPools>(handles_->device);
 }
 
 Device::~Device() {
@@ -249,12 +265,16 @@ bool Device::sharesKernels() const {
   return handles_->sharesKernels;
 }
 
-std::uint32_t Device::allocations() const {
-  return handles_->allocations;
+std::uint64_t Device::allocatedBytes() const {
+  return handles_->memory->usedBytes();
 }
 
-std::uint64_t Device::allocatedBytes() const {
-  return handles_->allocatedBytes;
+std::uint32_t Device::allocations() const {
+  return handles_->memory->count();
+}
+
+std::uint64_t Device::reservedBytes() const {
+  return handles_->memory->bytes();
 }
 
 TimelineValue Device::completed() const {

@@ -40,7 +40,9 @@ struct DeviceOptions {
   // the environment, or else the measured default.
   std::optional<std::uint32_t> softwareThreads = {};
   // Enables VK_LAYER_KHRONOS_validation with synchronisation checks. Its messages are counted
-  // (validationMessages()) and logged. Tests enable it by the environment variable CLOTHSTREAM_VALIDATION=1.
+  // (validationMessages()) and logged. Where the CPU can, fresh memory of buffers is filled with ones, which
+  // are no numbers, so that work on contents that were never written shows. Tests enable it by the
+  // environment variable CLOTHSTREAM_VALIDATION=1.
   bool validation = false;
   // Directory of the pipeline cache, with one file per device and driver version; created if missing. Empty:
   // no cache. A damaged file, or one of another driver, is ignored and replaced. A failed write is only
@@ -53,8 +55,11 @@ struct DeviceOptions {
   // submitted. A driver without a GPU is enough. Kernels keep the statistics of their compiler
   // (kernel_statistics.h).
   bool compileOnly = false;
-  // Buffers that the device may have at a time; 0: as many as the driver allows. For tests.
+  // Allocations of memory that the device may have at a time; 0: as many as the driver allows. For tests.
   std::uint32_t maxAllocations = 0;
+  // Bytes of the largest allocation that buffers share; 0: automatic. 1: each buffer has one for itself. For
+  // tests.
+  std::uint64_t largestBlock = 0;
 };
 
 struct Limits {
@@ -70,7 +75,7 @@ struct Limits {
   std::uint32_t subgroupSize = 0;
   float timestampPeriod = 0;  // ns per tick of the timestamp counter
   std::uint64_t deviceMemoryBytes = 0;
-  std::uint32_t maxAllocations = 0;  // allocations of memory at a time; each buffer is one
+  std::uint32_t maxAllocations = 0;  // allocations of memory at a time, which buffers share
 };
 
 // A value of the queue's timeline. It is reached when all earlier submissions are complete.
@@ -113,6 +118,8 @@ class Device {
   bool executes() const { return executes_; }
   // True if recordings of a batch share dispatches.
   bool sharesKernels() const;
+  // True if kernels may read and write buffers by their addresses (bufferDeviceAddress of Vulkan 1.2).
+  bool hasAddresses() const { return addresses_; }
 
   // Submits a finished recording to the queue. Returns the timeline value that is reached when it is done.
   // The recorder must not begin again before that. Submissions of one thread run in order. Throws DeviceLost.
@@ -137,8 +144,9 @@ class Device {
 
   // Memory of all buffers on the device, in bytes.
   std::uint64_t allocatedBytes() const;
-  // Allocations of memory that buffers on the device have now.
+  // Allocations of memory that buffers on the device share now, and their bytes: at least allocatedBytes().
   std::uint32_t allocations() const;
+  std::uint64_t reservedBytes() const;
 
   // Only for this folder (handles.h).
   struct Handles;
@@ -152,7 +160,7 @@ class Device {
   TimelineValue submitted_ = 0;
   DeviceInfo info_;
   Limits limits_;
-  bool executes_ = true, gpuKernels_ = true;
+  bool executes_ = true, gpuKernels_ = true, addresses_ = false;
   std::filesystem::path pipelineCacheFile_;
 };
 

@@ -14,18 +14,6 @@
 namespace clothstream::vulkan {
 namespace {
 
-constexpr vk::DescriptorType typeOf(BindingKind kind) {
-  switch (kind) {
-    case BindingKind::texels:
-      return vk::DescriptorType::eUniformTexelBuffer;
-    case BindingKind::images:
-      return vk::DescriptorType::eStorageTexelBuffer;
-    case BindingKind::storage:
-      break;
-  }
-  return vk::DescriptorType::eStorageBuffer;
-}
-
 constexpr std::uint32_t kWord = sizeof(std::uint32_t);
 
 vk::raii::Pipeline pipelineOf(const Device::Handles& device, const Kernel::Handles& kernel,
@@ -162,7 +150,6 @@ Bindings::Bindings(const Device& device, Kernel kernel, std::span<const Buffer* 
   }
   if (count == 0 || !device.executes()) return;
 
-  std::vector<vk::DescriptorPoolSize> sizes;
   std::vector<vk::DescriptorBufferInfo> infos(count);
   std::vector<vk::WriteDescriptorSet> writes;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -174,30 +161,19 @@ Bindings::Bindings(const Device& device, Kernel kernel, std::span<const Buffer* 
           kernel_.name(), i, buffer.bytes(), device.limits().maxStorageRange, device.info().name));
     assert(bindings[i].kind == BindingKind::storage || *buffer.handles().texelView);
     infos[i] = vk::DescriptorBufferInfo{.buffer = *buffer.handles().buffer, .range = VK_WHOLE_SIZE};
-    sizes.push_back({.type = typeOf(bindings[i].kind), .descriptorCount = 1});
     writes.push_back({.dstBinding = i,
                       .descriptorCount = 1,
                       .descriptorType = typeOf(bindings[i].kind),
                       .pBufferInfo = &infos[i],
                       .pTexelBufferView = &*buffer.handles().texelView});
   }
-  const vk::raii::Device& vulkan = device.handles().device;
   try {
-    handles_->pool = vk::raii::DescriptorPool(
-        vulkan, vk::DescriptorPoolCreateInfo{.flags = vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet,
-                                             .maxSets = 1,
-                                             .poolSizeCount = count,
-                                             .pPoolSizes = sizes.data()});
-    vk::raii::DescriptorSets sets(
-        vulkan, vk::DescriptorSetAllocateInfo{.descriptorPool = *handles_->pool,
-                                              .descriptorSetCount = 1,
-                                              .pSetLayouts = &*kernel_.handles().setLayout});
-    handles_->set = std::move(sets.front());
+    handles_->set = PooledSet(*device.handles().descriptorPools, *kernel_.handles().setLayout, bindings);
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(fmt::format("kernel {} cannot be bound: {}", kernel_.name(), error.what()));
   }
   for (vk::WriteDescriptorSet& write : writes) write.dstSet = *handles_->set;
-  vulkan.updateDescriptorSets(writes, nullptr);
+  device.handles().device.updateDescriptorSets(writes, nullptr);
 }
 
 }  // namespace clothstream::vulkan
