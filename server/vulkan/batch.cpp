@@ -28,13 +28,16 @@ Move moveOf(const Copy& copy) {
            BoundBufferAddress{copy.to, copy.toOffset + copy.bytes}},
           {.from = static_cast<std::uint32_t>(copy.fromOffset / kWordBytes),
            .to = static_cast<std::uint32_t>(copy.toOffset / kWordBytes),
-           .words = static_cast<std::uint32_t>(copy.bytes / kWordBytes)}};
+           .words = static_cast<std::uint32_t>(copy.bytes / kWordBytes),
+           .fills = 0,
+           .value = 0}};
 }
 
 Move moveOf(const Fill& fill) {
   const BoundBufferAddress to{fill.buffer, fill.offset + fill.bytes};
   return {{to, to},
-          {.to = static_cast<std::uint32_t>(fill.offset / kWordBytes),
+          {.from = 0,
+           .to = static_cast<std::uint32_t>(fill.offset / kWordBytes),
            .words = static_cast<std::uint32_t>(fill.bytes / kWordBytes),
            .fills = 1,
            .value = fill.value}};
@@ -106,7 +109,7 @@ void Batch::finish() {
   on.submitted.clear();
   if (on.table.bytes() > 0) {
     CommandWriter upload;
-    upload.begin(*on.commands[0]);
+    upload.begin(on.commands[0]);
     upload.copy(on.table.staging(), on.table.onDevice(), {.size = on.table.bytes()});
     upload.end();
     on.submitted.push_back(*on.commands[0]);
@@ -118,7 +121,7 @@ bool Batch::write() {
   Handles& on = *handles_;
   on.pool.reset();
   on.table.begin();
-  on.writer.begin(*on.commands[1]);
+  on.writer.begin(on.commands[1]);
   on.timer.begin(on.writer.commands());
   for (Group& group : groups_) group.next = 0;
   for (bool goesOn = true; goesOn;) {
@@ -173,7 +176,7 @@ bool Batch::shareDispatch(const Group& group, std::size_t command) {
     const std::span<const std::byte> push = members_[group.first + i].recording->push(dispatch.push);
     table.set(
         entries, i,
-        {.buffers = table.record(*dispatch.bindings), .push = table.push(push), .groups = dispatch.groups});
+        {.record = table.record(*dispatch.bindings), .push = table.push(push), .groups = dispatch.groups});
     groups = std::max(groups, dispatch.groups);
   }
   handles_->writer.dispatchShared(*first->kernel, entries.address, groups,
@@ -197,7 +200,7 @@ bool Batch::shareMove(const Group& group, std::size_t command) {
     const Move move = copy != nullptr ? moveOf(*copy) : moveOf(std::get<Fill>(commandAt(i)));
     const std::uint32_t own = (move.push.words + kMoveWorkgroup - 1) / kMoveWorkgroup;
     table.set(entries, i,
-              {.buffers = table.record(move.buffers),
+              {.record = table.record(move.buffers),
                .push = table.push(std::as_bytes(std::span(&move.push, 1))),
                .groups = own});
     groups = std::max(groups, own);

@@ -8,9 +8,6 @@ namespace clothstream::vulkan {
 namespace {
 
 constexpr std::size_t kFirstBytes = 1 << 16;
-// Alignment of a std430 block.
-constexpr std::size_t kBlockAlignment = 16;
-
 }  // namespace
 
 void BatchTable::begin() {
@@ -46,7 +43,7 @@ void BatchTable::set(const Entries& entries, std::size_t index, const SharedEntr
 
 vk::DeviceAddress BatchTable::push(std::span<const std::byte> push) {
   if (push.empty()) return 0;
-  const std::size_t offset = reserve(push.size(), kBlockAlignment);
+  const std::size_t offset = reserve(push.size(), kSharedAlignment);
   write(offset, push.data(), push.size());
   return addressOf(offset);
 }
@@ -60,12 +57,12 @@ vk::DeviceAddress BatchTable::record(const Bindings::Handles& bindings) {
 }
 
 vk::DeviceAddress BatchTable::record(std::span<const BoundBufferAddress> buffers) {
-  const std::size_t offset = reserve(sharedRecordBytes(buffers.size()), kBlockAlignment);
+  const std::size_t offset = reserve(bytesOfRecord(buffers.size()), kSharedAlignment);
   for (std::size_t i = 0; i < buffers.size(); ++i) {
     const std::uint64_t address = buffers[i].buffer->address;
     const auto bytes = static_cast<std::uint32_t>(buffers[i].bytes);
-    write(offset + i * sizeof(address), &address, sizeof(address));
-    write(offset + buffers.size() * sizeof(address) + i * sizeof(bytes), &bytes, sizeof(bytes));
+    write(offset + addressInRecord(i), &address, sizeof(address));
+    write(offset + bytesInRecord(buffers.size(), i), &bytes, sizeof(bytes));
   }
   return addressOf(offset);
 }

@@ -177,6 +177,9 @@ Device::Device(const DeviceOptions& options)
   if (chosen.info.kind == DeviceKind::software) limits_.parallelWorkgroups = threads.count();
   if (options.maxAllocations > 0) limits_.maxAllocations = options.maxAllocations;
   handles_->queueFamily = chosen.queueFamily;
+  const bool shares = options.sharing == KernelSharing::automatic ? chosen.info.kind != DeviceKind::software
+                                                                  : options.sharing == KernelSharing::always;
+  handles_->sharesKernels = shares && executes_ && addresses_;
   info_ = std::move(chosen.info);
   handles_->physical = std::move(chosen.physical);
   handles_->memory =

@@ -153,6 +153,8 @@ class Device {
   const Handles& handles() const { return *handles_; }
 
  private:
+  TimelineValue submit(const Recorder& recorder, std::uint32_t first, std::uint32_t end);
+  TimelineValue submitCommands(const void* commands, std::size_t count);  // of vk::CommandBuffer
 
   std::unique_ptr<Handles> handles_;
   std::size_t pipelineCacheLoaded_ = 0;
