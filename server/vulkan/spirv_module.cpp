@@ -11,7 +11,7 @@
 namespace clothstream::vulkan {
 namespace {
 
-constexpr std::size_t kHeaderWords = 5;
+constexpr std::size_t kModuleHeaderWords = 5;
 constexpr std::uint32_t kMagic = 0x07230203;
 
 bool isAnnotation(std::uint32_t operation) {
@@ -41,13 +41,13 @@ std::string textOf(std::span<const std::uint32_t> words) {
 }
 
 SpirvModule::SpirvModule(std::span<const std::uint32_t> spirv) {
-  if (spirv.size() < kHeaderWords || spirv[0] != kMagic)
+  if (spirv.size() < kModuleHeaderWords || spirv[0] != kMagic)
     throw std::runtime_error("this is no SPIR-V: it does not begin with a header of SPIR-V");
   version = spirv[1];
   generator = spirv[2];
   bound = spirv[3];
   std::vector<Instruction>* part = &preamble;
-  for (std::size_t at = kHeaderWords; at < spirv.size();) {
+  for (std::size_t at = kModuleHeaderWords; at < spirv.size();) {
     const std::uint32_t operation = spirv[at] & 0xFFFF, length = spirv[at] >> 16;
     if (length == 0 || length > spirv.size() - at)
       throw std::runtime_error(
