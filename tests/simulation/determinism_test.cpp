@@ -3,10 +3,13 @@
 // device.
 #include <array>
 #include <cmath>
+#include <memory>
 #include <set>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "server/vulkan/batch.h"
 #include "server/vulkan/buffer.h"
 #include "tests/simulation/scenes.h"
 
@@ -138,6 +141,61 @@ model::Scene sceneOfAllStages() {
   }
   cloths[0].dihedralBending = 1e-5f;
   return sceneOf(cloths);
+}
+
+// Scenes of two shapes, two of each with different data, and one of a third shape.
+std::vector<model::Scene> companions() {
+  std::vector<model::Scene> scenes{sceneOfAllStages(), busyScene(), sceneOfAllStages(), busyScene(),
+                                   sceneOf({calmCloth(5, 70)})};
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    scenes[i].environment.gravity.x() = static_cast<float>(i);
+    scenes[i].cloths.front().drag = 0.1f * static_cast<float>(i + 1);
+  }
+  return scenes;
+}
+
+// The same ticks on the shared device, one scene after the other, and on `device`, all together.
+void expectTheSameInABatch(vulkan::Device& device) {
+  struct Member {
+    Member(vulkan::Device& on, const model::Scene& scene) : simulation(on, scene), recorder(on) {}
+    simulation::ClothSimulation simulation;
+    vulkan::Recorder recorder;
+  };
+  const std::vector<model::Scene> scenes = companions();
+  std::vector<std::unique_ptr<Running>> alone;
+  std::vector<std::unique_ptr<Member>> together;
+  for (const model::Scene& scene : scenes) {
+    alone.push_back(std::make_unique<Running>(scene));
+    together.push_back(std::make_unique<Member>(device, scene));
+  }
+  vulkan::Batch batch(device);
+  for (int tick = 0; tick < 4; ++tick) {
+    batch.begin();
+    for (std::size_t i = 0; i < scenes.size(); ++i) {
+      Member& member = *together[i];
+      member.recorder.begin();
+      member.simulation.recordTick(member.recorder, busyInputs(scenes[i], tick + static_cast<int>(i)));
+      member.simulation.recordNormals(member.recorder);
+      batch.add(member.recorder);
+    }
+    ASSERT_TRUE(device.wait(device.submit(batch)));
+    batch.shareTimes();
+    for (std::size_t i = 0; i < scenes.size(); ++i)
+      EXPECT_EQ(together[i]->simulation.status().stateHash,
+                alone[i]->tick(busyInputs(scenes[i], tick + static_cast<int>(i))).stateHash)
+          << "scene " << i << ", tick " << tick;
+  }
+}
+
+TEST_F(Determinism, ScenesSideBySideMoveAsAlone) {
+  vulkan::Device device({.sharing = vulkan::KernelSharing::never});
+  expectTheSameInABatch(device);
+}
+
+TEST_F(Determinism, ScenesThatShareDispatchesMoveAsAlone) {
+  vulkan::Device device({.sharing = vulkan::KernelSharing::always});
+  if (!device.sharesKernels()) GTEST_SKIP() << "the device has no addresses of buffers";
+  expectTheSameInABatch(device);
 }
 
 constexpr std::array kPurposes{vulkan::BufferPurpose::state, vulkan::BufferPurpose::texels,
