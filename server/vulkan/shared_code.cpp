@@ -23,7 +23,7 @@ using namespace spirv;
 using Words = std::vector<std::uint32_t>;
 
 constexpr std::uint32_t kSpirv15 = 0x00010500;
-constexpr std::uint32_t kTexelBytes = 16;
+constexpr std::uint32_t kTexelStride = 16;
 constexpr std::uint32_t kAddressBytes = sizeof(std::uint64_t);
 
 [[noreturn]] void refuse(const std::string& reason) {
@@ -358,7 +358,7 @@ class SharedForm {
 
   // The block that texels behind this type of pointer become.
   std::uint32_t addTexels(std::uint32_t pointer) {
-    const std::uint32_t block = addArrayBlock(texelType(), kTexelBytes);
+    const std::uint32_t block = addArrayBlock(texelType(), kTexelStride);
     for (const auto& [id, variable] : variables_)
       if (variable.type == pointer)
         for (const std::uint32_t access : {kCoherent, kVolatile})
@@ -519,7 +519,7 @@ class SharedForm {
     if (words[0] != texelType()) refuse("a fetch of a texel gives no vec4");
     const std::uint32_t pointer = pointerTo(words[0], kPhysicalStorageBufferClass);
     const std::uint32_t texel = emit(kAccessChain, pointer, {texelsOf(words[2]), constant(0), words[3]});
-    instruction = {kLoad, {words[0], words[1], texel, kAlignedBit, kTexelBytes}};
+    instruction = {kLoad, {words[0], words[1], texel, kAlignedBit, kTexelStride}};
   }
 
   // Memory of images is memory of buffers now.
