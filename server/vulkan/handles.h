@@ -25,12 +25,12 @@
 namespace clothstream::vulkan {
 
 struct Kernel::Handles {
-  // The form for several scenes at once (shared_code.h), made when it is first needed. Thread-safe.
   struct Shared {
     std::once_flag made;
     vk::raii::PipelineLayout layout = nullptr;
     vk::raii::Pipeline pipeline = nullptr;
   };
+  // The form for several scenes at once (shared_code.h), which the first call makes. Thread-safe.
   const Shared& shared() const;
 
   const Device::Handles* device = nullptr;
@@ -40,7 +40,8 @@ struct Kernel::Handles {
   vk::raii::DescriptorSetLayout setLayout = nullptr;
   vk::raii::PipelineLayout layout = nullptr;
   vk::raii::Pipeline pipeline = nullptr;
-  std::unique_ptr<Shared> sharedForm = std::make_unique<Shared>();
+  mutable Shared sharedForm;
+  mutable std::atomic<bool> ready{false};  // Kernel::isReady()
 };
 
 // Address of the embedded SPIR-V, and Kernel::Handles::constants.

@@ -93,10 +93,11 @@ Kernel::Kernel(const Device& device, const KernelCode& code, std::uint32_t workg
   std::weak_ptr<const Handles>& shared = device.handles().pipelines[{code.spirv.data(), constants}];
   handles_ = shared.lock();
   if (handles_) return;
-  const auto made = std::make_shared<Handles>(Handles{.device = &device.handles(),
-                                                      .code = code,
-                                                      .constants = std::move(constants),
-                                                      .interface = interfaceOf(code.spirv)});
+  const auto made = std::make_shared<Handles>();
+  made->device = &device.handles();
+  made->code = code;
+  made->constants = std::move(constants);
+  made->interface = interfaceOf(code.spirv);
   checkLimits(device, *made);
   try {
     makePipeline(device.handles(), *made);
@@ -109,15 +110,15 @@ Kernel::Kernel(const Device& device, const KernelCode& code, std::uint32_t workg
 }
 
 const Kernel::Handles::Shared& Kernel::Handles::shared() const {
-  std::call_once(sharedForm->made, [this] {
+  std::call_once(sharedForm.made, [this] {
     const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
                                      .size = sizeof(vk::DeviceAddress)};
-    sharedForm->layout = vk::raii::PipelineLayout(
+    sharedForm.layout = vk::raii::PipelineLayout(
         device->device,
         vk::PipelineLayoutCreateInfo{.pushConstantRangeCount = 1, .pPushConstantRanges = &push});
-    sharedForm->pipeline = pipelineOf(*device, *this, sharedCode(code.spirv), *sharedForm->layout);
+    sharedForm.pipeline = pipelineOf(*device, *this, sharedCode(code.spirv), *sharedForm.layout);
   });
-  return *sharedForm;
+  return sharedForm;
 }
 
 std::string_view Kernel::name() const {
@@ -131,6 +132,13 @@ std::span<const std::uint32_t> Kernel::specialisation() const {
 }
 const SpirvInterface& Kernel::interface() const {
   return handles_->interface;
+}
+
+bool Kernel::isReady() const {
+  return handles_->ready;
+}
+void Kernel::setReady() const {
+  handles_->ready = true;
 }
 
 Bindings::~Bindings() = default;
