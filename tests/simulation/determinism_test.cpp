@@ -128,7 +128,8 @@ model::Scene sceneOfAllStages() {
   cloths[2] = assembled(calmCloth(9, 7), true);
   cloths[3].solver.kind = model::SolverKind::acad;
   cloths[4].solver.kind = model::SolverKind::implicitEuler;
-  cloths[5].solver = {.kind = model::SolverKind::xpbd, .iterations = 3};
+  cloths[5].solver.kind = model::SolverKind::xpbd;
+  cloths[5].solver.iterations = 3;
   cloths[5].coarse = model::CoarseCorrection{};
   cloths[6] = discCloth(4);
   cloths[6].solver.kind = model::SolverKind::acad;
