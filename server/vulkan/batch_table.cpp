@@ -19,6 +19,7 @@ void BatchTable::grow() {
   const std::size_t bytes = std::max(kFirstBytes, 2 * std::max(used_, capacity()));
   staging_ = Buffer(*device_, BufferPurpose::upload, bytes);
   onDevice_ = Buffer(*device_, BufferPurpose::state, bytes);
+  first_ = onDevice_.handles().address;
   begin();
 }
 

@@ -49,10 +49,11 @@ class BatchTable {
   // Reserves bytes, and returns their offset. They exist only if they fit.
   std::size_t reserve(std::size_t bytes, std::size_t alignment);
   void write(std::size_t offset, const void* from, std::size_t bytes);
-  vk::DeviceAddress addressOf(std::size_t offset) const { return onDevice_.handles().address + offset; }
+  vk::DeviceAddress addressOf(std::size_t offset) const { return first_ + offset; }
 
   const Device* device_;
-  Buffer staging_, onDevice_;
+  Buffer staging_, onDevice_;    // none at first
+  vk::DeviceAddress first_ = 0;  // address of the table
   std::size_t used_ = 0;
   std::uint64_t number_ = 0;  // of the batch
 };
