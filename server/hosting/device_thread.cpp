@@ -199,9 +199,8 @@ bool DeviceThread::waitForWork() {
   deviceMemory_ = device_.allocatedBytes();
   lastAnswer_ = Clock::now();
   Clock::time_point due = Clock::time_point::max();
-  const Clock::time_point guestsFrom = scheduler_.guestsFrom(schedules(), lastAnswer_);
-  for (const auto& run : runs_)
-    due = std::min(due, run->guest && run->running ? std::max(run->due(), guestsFrom) : run->due());
+  scheduler_.observe(schedules(), lastAnswer_);
+  for (const auto& run : runs_) due = std::min(due, std::max(run->due(), scheduler_.earliest(*run)));
   const bool goesOn = inbox_.waitForWork(due);
   idle_ += Clock::now() - lastAnswer_.load();
   return goesOn;
@@ -306,11 +305,12 @@ void DeviceThread::runDueTicks() {
 
 void DeviceThread::runSlice() {
   const Clock::time_point before = Clock::now();
-  const bool guestsRun = scheduler_.guestsFrom(schedules(), before) <= before;
+  scheduler_.observe(schedules(), before);
   // The scene whose previous slice ended first.
   SceneRun* next = nullptr;
   for (const auto& run : runs_)
-    if (run->begun && (guestsRun || !run->guest) && (next == nullptr || run->tick.served < next->tick.served))
+    if (run->begun && scheduler_.earliest(*run) <= before &&
+        (next == nullptr || run->tick.served < next->tick.served))
       next = run.get();
   if (next == nullptr) return;
   const bool survived = survives(*next, [&] {
@@ -394,7 +394,7 @@ void DeviceThread::adaptToLoad(SceneRun& run, Clock::time_point now) {
       {.now = now,
        .slippedTicks = run.tick.slippedTicks,
        .own = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(own)),
-       .share = schedule::shareOf(run, schedules()),
+       .share = scheduler_.shareOf(run),
        .idle = idle_,
        .disturbed = isDisturbed() || isMaking()},
       leastSubsteps);
