@@ -279,7 +279,10 @@ void DeviceThread::encodePausedFrames() {
   for (const auto& run : runs_) {
     if (run->state() != SceneState::paused || now < run->nextPausedFrame) continue;
     run->nextPausedFrame = now + kPausedFramePeriod;
-    survives(*run, [&] { run->host->encodePausedFrame(now); });
+    survives(*run, [&] {
+      run->host->encodePausedFrame(now);
+      faults_.checkScene(run->scene->name());
+    });
   }
 }
 
@@ -411,7 +414,9 @@ bool DeviceThread::isMaking() const {
 }
 
 void DeviceThread::checkPrice(SceneRun& run, bool isLate) {
-  if (!isLate || !run.price.isExcessive(device_.slowdown())) return;
+  bool isExcessive = false;
+  const auto measure = [&] { isExcessive = run.price.isExcessive(device_.slowdown()); };
+  if (!isLate || !survives(run, measure) || !isExcessive) return;
   stop(run, run.harm.exceedsPrice(Clock::now()),
        fmt::format(
            "its ticks take far longer than their price of {:.3f} s; the newest one has taken {:.3f} s{}",
