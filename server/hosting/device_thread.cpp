@@ -201,9 +201,8 @@ bool DeviceThread::waitForWork() {
   reservedDeviceMemory_ = device_.reservedBytes();
   lastAnswer_ = Clock::now();
   Clock::time_point due = Clock::time_point::max();
-  const Clock::time_point guestsFrom = scheduler_.guestsFrom(schedules(), lastAnswer_);
-  for (const auto& run : runs_)
-    due = std::min(due, run->guest && run->running ? std::max(run->due(), guestsFrom) : run->due());
+  scheduler_.observe(schedules(), lastAnswer_);
+  for (const auto& run : runs_) due = std::min(due, std::max(run->due(), scheduler_.earliest(*run)));
   const bool goesOn = inbox_.waitForWork(due);
   idle_ += Clock::now() - lastAnswer_.load();
   return goesOn;
@@ -282,7 +281,10 @@ void DeviceThread::encodePausedFrames() {
   for (const auto& run : runs_) {
     if (run->state() != SceneState::paused || now < run->nextPausedFrame) continue;
     run->nextPausedFrame = now + kPausedFramePeriod;
-    survives(*run, [&] { run->host->encodePausedFrame(now); });
+    survives(*run, [&] {
+      run->host->encodePausedFrame(now);
+      faults_.checkScene(run->scene->name());
+    });
   }
 }
 
@@ -361,11 +363,12 @@ void DeviceThread::waitForBatch(TickBatches::Members& batch, Clock::time_point& 
 
 void DeviceThread::runSlice() {
   const Clock::time_point before = Clock::now();
-  const bool guestsRun = scheduler_.guestsFrom(schedules(), before) <= before;
+  scheduler_.observe(schedules(), before);
   // The scene whose previous slice ended first.
   SceneRun* next = nullptr;
   for (const auto& run : runs_)
-    if (run->begun && (guestsRun || !run->guest) && (next == nullptr || run->tick.served < next->tick.served))
+    if (run->begun && scheduler_.earliest(*run) <= before &&
+        (next == nullptr || run->tick.served < next->tick.served))
       next = run.get();
   if (next == nullptr) return;
   const bool survived = survives(*next, [&] {
@@ -449,7 +452,7 @@ void DeviceThread::adaptToLoad(SceneRun& run, Clock::time_point now) {
       {.now = now,
        .slippedTicks = run.tick.slippedTicks,
        .own = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(own)),
-       .share = schedule::shareOf(run, schedules()),
+       .share = scheduler_.shareOf(run),
        .idle = idle_,
        .disturbed = isDisturbed() || isMaking()},
       leastSubsteps);
@@ -466,7 +469,9 @@ bool DeviceThread::isMaking() const {
 }
 
 void DeviceThread::checkPrice(SceneRun& run, bool isLate) {
-  if (!isLate || !run.price.isExcessive(device_.slowdown())) return;
+  bool isExcessive = false;
+  const auto measure = [&] { isExcessive = run.price.isExcessive(device_.slowdown()); };
+  if (!isLate || !survives(run, measure) || !isExcessive) return;
   stop(run, run.harm.exceedsPrice(Clock::now()),
        fmt::format(
            "its ticks take far longer than their price of {:.3f} s; the newest one has taken {:.3f} s{}",

@@ -42,8 +42,8 @@ using schedule::Clock;
 // loaded again one by one, the default scene first, then those with the most subscribers. Each continues from
 // its newest snapshot on the CPU as soon as it is loaded, while others are still being loaded. If a tick
 // fails in another way, only its scene is rebuilt like this, or given up (RebuildPolicy): all participants
-// are dismissed, and the next join starts it from the beginning. Any other error of Vulkan, such as while the
-// speed of the device is measured, costs a short pause.
+// are dismissed, and the next join starts it from the beginning. Any other error belongs to no scene, and
+// costs a short pause.
 //
 // With `adaptsToLoad`, a scene whose ticks do not fit its share of the device does less work
 // (schedule::OverloadPolicy).
@@ -105,9 +105,11 @@ class DeviceThread {
     faults_.loseDevice();
     wake();
   }
-  // Treats the device as lost whenever it has loaded this scene or has worked on a tick of it. An empty name
-  // ends this. For tests.
+  // Treats the device as lost whenever it has loaded this scene, or has worked on a tick or a paused frame of
+  // it. An empty name ends this. For tests.
   void simulateDeviceLossIn(std::string scene) { faults_.loseDeviceIn(std::move(scene)); }
+  // Throws another error the next times that it has done so. For tests.
+  void simulateFailuresIn(std::string scene, int times) { faults_.failIn(std::move(scene), times); }
   // Throws an error that belongs to no scene, once before the next tick. For tests.
   void simulateFailure() {
     faults_.fail();
@@ -166,8 +168,8 @@ class DeviceThread {
   // Whether a change of any scene has held this thread up in that scene's present tick.
   bool isMaking() const;
   // Stops the scene if it takes far more than its price; it may be in the middle of a tick, with no slice in
-  // flight. `isLate`: PriceWatch says so, on a device of the speed that it assumes. Throws
-  // vulkan::DeviceLost.
+  // flight. `isLate`: PriceWatch says so, on a device of the speed that it assumes; that speed is then
+  // measured. Throws vulkan::DeviceLost.
   void checkPrice(SceneRun& run, bool isLate);
 
   // Stops a scene that harms others, for this time or for good (HarmPolicy).

@@ -29,22 +29,32 @@ class SimulatedFaults {
     const std::lock_guard lock(mutex_);
     losesDeviceIn_ = std::move(scene);
   }
+  // The next `times` calls of checkScene() for this scene throw another error.
+  void failIn(std::string scene, int times) {
+    const std::lock_guard lock(mutex_);
+    failsIn_ = std::move(scene);
+    failures_ = times;
+  }
 
   void check() {
     const std::lock_guard lock(mutex_);
     if (std::exchange(losesDevice_, false)) throw vulkan::DeviceLost("the loss of the device is simulated");
     if (std::exchange(fails_, false)) throw std::runtime_error("a failure is simulated");
   }
-  void checkScene(const std::string& name) const {
+  void checkScene(const std::string& name) {
     const std::lock_guard lock(mutex_);
     if (!losesDeviceIn_.empty() && losesDeviceIn_ == name)
       throw vulkan::DeviceLost("the loss of the device in a scene is simulated");
+    if (failures_ == 0 || failsIn_ != name) return;
+    --failures_;
+    throw std::runtime_error("a failure in a scene is simulated");
   }
 
  private:
-  mutable std::mutex mutex_;
+  std::mutex mutex_;
   bool losesDevice_ = false, fails_ = false;
-  std::string losesDeviceIn_;
+  std::string losesDeviceIn_, failsIn_;
+  int failures_ = 0;  // in failsIn_
 };
 
 }  // namespace clothstream::hosting

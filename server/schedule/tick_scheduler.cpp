@@ -35,30 +35,19 @@ class Periods {
   const TickSchedule* fastest_ = nullptr;
 };
 
-// Chooses among scenes of equal rights, and appends to `chosen`.
-void chooseAmongEquals(std::span<TickSchedule* const> schedules, Clock::time_point now,
-                       std::vector<TickSchedule*>& chosen) {
-  const Periods periods(schedules);
-  TickSchedule* nextLong = nullptr;
-  Clock::duration longest{};
-  const auto count = std::ranges::count_if(schedules, &TickSchedule::running);
-  for (TickSchedule* schedule : schedules) {
-    schedule->catchUp = {};
-    if (!schedule->running || schedule->begun) continue;
-    const bool due = schedule->pacer.due() <= now;
-    if (!periods.isLong(*schedule)) {
-      if (due) chosen.push_back(schedule);
-      continue;
-    }
-    longest = std::max(longest, schedule->cost);
-    if (due && (nextLong == nullptr || schedule->pacer.due() < nextLong->pacer.due())) nextLong = schedule;
-  }
-  std::ranges::sort(chosen, {}, [](const TickSchedule* schedule) { return schedule->pacer.due(); });
-  // Twice the average cost, because a single tick may take longer than the average.
-  for (TickSchedule* schedule : schedules)
-    if (!periods.isLong(*schedule)) schedule->catchUp = std::min<Clock::duration>(2 * longest, kMaxCatchUp);
-  if (nextLong != nullptr && (chosen.empty() || now - nextLong->ended >= count * nextLong->cost))
-    chosen.push_back(nextLong);
+Clock::time_point dueOf(const TickSchedule* schedule) {
+  return schedule->pacer.due();
+}
+
+// Time since which a guest waits for the device.
+Clock::time_point waitsSince(const TickSchedule* guest) {
+  return guest->begun ? guest->newestUse : std::max(guest->pacer.due(), guest->newestUse);
+}
+
+// Returns whether a long tick of one of `count` running scenes has waited as long as its equal share of the
+// device allows.
+bool hasWaited(const TickSchedule& schedule, std::int64_t count, Clock::time_point now) {
+  return now - schedule.ended >= count * schedule.cost;
 }
 
 }  // namespace
@@ -68,58 +57,123 @@ void TickSchedule::tickEnded(Clock::duration time, Clock::time_point now) {
   ended = now;
 }
 
-Clock::duration shareOf(const TickSchedule& schedule, std::span<const TickSchedule* const> schedules) {
-  std::int64_t own = 0, guests = 0;
-  for (const TickSchedule* other : schedules)
-    if (other->running) ++(other->guest ? guests : own);
-  if (!schedule.guest) return schedule.pacer.period() / std::max<std::int64_t>(own, 1);
-  return schedule.pacer.period() / ((own + 1) * std::max<std::int64_t>(guests, 1));
+TickSchedule* TickScheduler::collectDue(std::span<TickSchedule* const> schedules, Clock::time_point now,
+                                        std::vector<TickSchedule*>& due) {
+  const Periods periods(schedules);
+  TickSchedule* nextLong = nullptr;
+  Clock::duration longest{};
+  for (TickSchedule* schedule : schedules) {
+    schedule->catchUp = {};
+    if (!schedule->running || schedule->begun) continue;
+    const bool isDue = schedule->pacer.due() <= now;
+    if (!periods.isLong(*schedule)) {
+      if (isDue) due.push_back(schedule);
+      continue;
+    }
+    longest = std::max(longest, schedule->cost);
+    if (isDue && (nextLong == nullptr || dueOf(schedule) < dueOf(nextLong))) nextLong = schedule;
+  }
+  std::ranges::sort(due, {}, dueOf);
+  // Twice the average cost, because a single tick may take longer than the average.
+  for (TickSchedule* schedule : schedules)
+    if (!periods.isLong(*schedule)) schedule->catchUp = std::min<Clock::duration>(2 * longest, kMaxCatchUp);
+  return nextLong;
+}
+
+void TickScheduler::chooseAmongEquals(std::span<TickSchedule* const> schedules, Clock::time_point now,
+                                      std::vector<TickSchedule*>& chosen) {
+  TickSchedule* const nextLong = collectDue(schedules, now, chosen);
+  if (nextLong == nullptr) return;
+  const auto count = std::ranges::count_if(schedules, &TickSchedule::running);
+  if (chosen.empty() || hasWaited(*nextLong, count, now)) chosen.push_back(nextLong);
+}
+
+void TickScheduler::observe(std::span<const TickSchedule* const> schedules, Clock::time_point now) {
+  own_ = guests_ = 0;
+  Clock::time_point nextDue = Clock::time_point::max();
+  for (const TickSchedule* schedule : schedules) {
+    if (!schedule->running) continue;
+    ++(schedule->guest ? guests_ : own_);
+    if (!schedule->guest) nextDue = std::min(nextDue, schedule->begun ? now : schedule->pacer.due());
+  }
+  gap_ = nextDue - std::min(now, nextDue);
+  if (now > now_) excess_ = std::max(excess_ - (now - now_) / (own_ + 1), -slice_);
+  now_ = std::max(now_, now);
 }
 
 void TickScheduler::choose(std::span<TickSchedule* const> schedules, Clock::time_point now,
                            std::vector<TickSchedule*>& chosen) {
+  observe(schedules, now);
   chosen.clear();
-  std::vector<TickSchedule*> own, guests;
-  for (TickSchedule* schedule : schedules) (schedule->guest ? guests : own).push_back(schedule);
-  if (std::ranges::none_of(own, &TickSchedule::running)) return chooseAmongEquals(schedules, now, chosen);
-  chooseAmongEquals(own, now, chosen);
-  if (std::ranges::none_of(guests, &TickSchedule::running)) return;
-  for (TickSchedule* schedule : own)
+  if (own_ == 0) return chooseAmongEquals(schedules, now, chosen);
+  ownSchedules_.clear();
+  guestSchedules_.clear();
+  for (TickSchedule* schedule : schedules)
+    (schedule->guest ? guestSchedules_ : ownSchedules_).push_back(schedule);
+  chooseAmongEquals(ownSchedules_, now, chosen);
+  if (guests_ == 0) return;
+  for (TickSchedule* schedule : ownSchedules_)
     schedule->catchUp = std::min<Clock::duration>(std::max(schedule->catchUp, 2 * slice_), kMaxCatchUp);
-  std::vector<TickSchedule*> due;
-  chooseAmongEquals(guests, now, due);
-  if (!due.empty() && guestsFrom(schedules, now) <= now) chosen.push_back(due.front());
+  chooseGuests(now, chosen);
 }
 
-Clock::time_point TickScheduler::guestsFrom(std::span<TickSchedule* const> schedules, Clock::time_point now) {
-  std::int64_t others = 0;
-  Clock::time_point nextDue = Clock::time_point::max();
-  Clock::duration gap{};  // that the next slice of a guest may need
-  for (const TickSchedule* schedule : schedules) {
-    if (!schedule->running) continue;
-    if (schedule->guest) {
-      const bool isShort = schedule->cost > Clock::duration::zero() && schedule->cost < slice_;
-      gap = std::max(gap, isShort ? schedule->cost : std::max(slice_, longest_));
-    } else {
-      ++others;
-      nextDue = std::min(nextDue, schedule->begun ? now : schedule->pacer.due());
-    }
+void TickScheduler::chooseGuests(Clock::time_point now, std::vector<TickSchedule*>& chosen) {
+  waiting_.clear();
+  TickSchedule* const nextLong = collectDue(guestSchedules_, now, waiting_);
+  const bool longWaits = nextLong != nullptr && !waiting_.empty() && !hasWaited(*nextLong, guests_, now);
+  if (nextLong != nullptr && !longWaits) waiting_.push_back(nextLong);
+  for (TickSchedule* guest : guestSchedules_)
+    if (guest->begun) waiting_.push_back(guest);
+  if (waiting_.empty()) return;
+  std::ranges::sort(waiting_, {}, waitsSince);
+
+  Clock::duration room = std::max(gap_, -excess_);
+  const auto turn = std::ranges::find_if(waiting_, [&](const TickSchedule* guest) {
+    return excess_ <= Clock::duration::zero() || entitledFrom(*guest) <= now_;
+  });
+  if (turn != waiting_.end() && expectedUse(**turn) > room) {
+    // Nothing else fits beside it.
+    if (!(*turn)->begun) chosen.push_back(*turn);
+    return;
   }
-  grant(now, others);
-  if (others == 0 || excess_ <= Clock::duration::zero() || now + gap <= nextDue) return now;
-  return now + excess_ * (others + 1);
+  bool anyFits = false, sliceFollows = false;  // at most one slice of a tick that has begun follows
+  for (TickSchedule* guest : waiting_) {
+    const Clock::duration use = expectedUse(*guest);
+    if (use > room || (guest->begun && std::exchange(sliceFollows, true))) continue;
+    room -= use;
+    anyFits = true;
+    if (!guest->begun) chosen.push_back(guest);
+  }
+  if (longWaits && !anyFits && earliest(*nextLong) <= now_) chosen.push_back(nextLong);
 }
 
-void TickScheduler::used(const TickSchedule& schedule, Clock::duration time) {
+Clock::duration TickScheduler::expectedUse(const TickSchedule& guest) const {
+  const bool isShort = guest.cost > Clock::duration::zero() && guest.cost < slice_;
+  return isShort ? guest.cost : std::max(slice_, guest.longestUse);
+}
+
+Clock::time_point TickScheduler::entitledFrom(const TickSchedule& guest) const {
+  return waitsSince(&guest) + expectedUse(guest) * guests_ * (own_ + 1);
+}
+
+Clock::time_point TickScheduler::earliest(const TickSchedule& schedule) const {
+  if (!schedule.running || !schedule.guest) return now_;
+  if (excess_ <= Clock::duration::zero() || expectedUse(schedule) <= gap_) return now_;
+  return std::max(now_, std::min(now_ + excess_ * (own_ + 1), entitledFrom(schedule)));
+}
+
+Clock::duration TickScheduler::shareOf(const TickSchedule& schedule) const {
+  const std::int64_t parts =
+      schedule.guest ? (own_ + 1) * std::max<std::int64_t>(guests_, 1) : std::max<std::int64_t>(own_, 1);
+  return schedule.pacer.period() / parts;
+}
+
+void TickScheduler::used(TickSchedule& schedule, Clock::duration time) {
   if (!schedule.guest) return;
-  excess_ += time;
-  longest_ = std::max(time, longest_ - longest_ / kAveragedTicks);
-}
-
-// Guests may save at most one slice of their share.
-void TickScheduler::grant(Clock::time_point now, std::int64_t others) {
-  if (now > granted_) excess_ = std::max(excess_ - (now - granted_) / (others + 1), -slice_);
-  granted_ = std::max(granted_, now);
+  excess_ = std::min<Clock::duration>(excess_ + time, kMaxCatchUp);
+  schedule.longestUse = std::max(time, schedule.longestUse - schedule.longestUse / kAveragedTicks);
+  lastUse_ = std::max(lastUse_, now_) + time;
+  schedule.newestUse = lastUse_;
 }
 
 }  // namespace clothstream::schedule

@@ -15,13 +15,14 @@ using namespace std::chrono_literals;
 
 constexpr Clock::duration kSlice = 10ms;
 
-struct SimulatedScene {
-  SimulatedScene(std::uint32_t rate, Clock::duration tick, bool guest) : turn(rate, guest), cost(tick) {
-    turn.running = true;
-    turn.pacer.start({});
+struct SimulatedScene : TickSchedule {
+  SimulatedScene(std::uint32_t rate, Clock::duration tick, bool isGuest)
+      : TickSchedule(rate, isGuest), work(tick) {
+    running = true;
   }
-  TickSchedule turn;
-  Clock::duration cost, used{};
+  Clock::duration nextSlice() const { return guest ? std::min(work - used, slice) : work - used; }
+
+  Clock::duration work, used{};
   Clock::duration slice = kSlice;  // of a guest
   Clock::time_point served{};
   int ticks = 0;
@@ -31,77 +32,79 @@ struct SimulatedScene {
 
 class TickSchedulerTest : public ::testing::Test {
  protected:
-  // A tick of a guest is done in slices, other ticks are not interrupted.
-  SimulatedScene& add(std::uint32_t rate, Clock::duration cost, bool guest = false) {
-    return *scenes_.emplace_back(std::make_unique<SimulatedScene>(rate, cost, guest));
+  // A tick of a guest is done in slices, other ticks are not interrupted. `start`: its first tick is due.
+  SimulatedScene& add(std::uint32_t rate, Clock::duration cost, bool guest = false,
+                      Clock::duration start = {}) {
+    scenes_.push_back(std::make_unique<SimulatedScene>(rate, cost, guest));
+    scenes_.back()->pacer.start(now_ + start);
+    return *scenes_.back();
+  }
+  std::vector<SimulatedScene*> addGuests(int count, std::uint32_t rate, Clock::duration cost) {
+    std::vector<SimulatedScene*> guests;
+    for (int i = 0; i < count; ++i) guests.push_back(&add(rate, cost, true));
+    return guests;
   }
 
-  // Runs the scenes as the device thread does.
+  // Runs the scenes for this time, as the device thread does.
   void run(Clock::duration time) {
-    TickScheduler scheduler(kSlice);
     std::vector<TickSchedule*> turns, chosen;
-    for (const auto& scene : scenes_) turns.push_back(&scene->turn);
-    Clock::time_point now{};
-    const auto runSlice = [&](SimulatedScene& scene) {
-      const Clock::duration left = scene.cost - scene.used;
-      const Clock::duration slice = scene.turn.guest ? std::min(left, scene.slice) : left;
-      now += slice;
-      scene.used += slice;
-      scene.served = now;
-      scheduler.used(scene.turn, slice);
-      scene.turn.begun = scene.used < scene.cost;
-      if (!scene.turn.begun) scene.turn.tickEnded(scene.used, now);
-    };
+    for (const auto& scene : scenes_) turns.push_back(scene.get());
+    const Clock::time_point end = now_ + time;
     for (;;) {
+      scheduler_.observe(turns, now_);
       Clock::time_point due = Clock::time_point::max();
-      for (const TickSchedule* turn : turns) {
-        if (!turn->running) continue;
-        const Clock::time_point own = turn->begun ? now : turn->pacer.due();
-        due = std::min(due, turn->guest ? std::max(own, scheduler.guestsFrom(turns, now)) : own);
-      }
-      now = std::max(now, due);
-      if (now >= Clock::time_point{} + time) return;
-      scheduler.choose(turns, now, chosen);
-      for (TickSchedule* turn : chosen) {
-        SimulatedScene& scene = sceneOf(turn);
-        const Pacer::Start start = turn->pacer.begin(now, turn->catchUp);
-        scene.slipped += start.slippedTicks;
-        scene.worstLateness = std::max(scene.worstLateness, start.lateness);
-        scene.used = {};
-        ++scene.ticks;
-      }
-      for (TickSchedule* turn : chosen) runSlice(sceneOf(turn));
-      const bool guestsRun = scheduler.guestsFrom(turns, now) <= now;
+      for (const TickSchedule* turn : turns)
+        if (turn->running)
+          due = std::min(due, std::max(turn->begun ? now_ : turn->pacer.due(), scheduler_.earliest(*turn)));
+      now_ = std::max(now_, due);
+      if (now_ >= end) return;
+      scheduler_.choose(turns, now_, chosen);
+      for (TickSchedule* turn : chosen) beginTick(sceneOf(turn));
+      // The device works on all of them together.
+      for (TickSchedule* turn : chosen) now_ += sceneOf(turn).nextSlice();
+      for (TickSchedule* turn : chosen) endSlice(sceneOf(turn));
+      scheduler_.observe(turns, now_);
       SimulatedScene* next = nullptr;
       for (const auto& scene : scenes_)
-        if (scene->turn.begun && guestsRun && (next == nullptr || scene->served < next->served))
+        if (scene->begun && scheduler_.earliest(*scene) <= now_ &&
+            (next == nullptr || scene->served < next->served))
           next = scene.get();
-      if (next != nullptr) runSlice(*next);
+      if (next == nullptr) continue;
+      now_ += next->nextSlice();
+      endSlice(*next);
+    }
+  }
+  // Ticks so far do not count.
+  void forgetTicks() {
+    for (const auto& scene : scenes_) {
+      scene->ticks = 0;
+      scene->slipped = 0;
+      scene->worstLateness = {};
     }
   }
 
  private:
-  SimulatedScene& sceneOf(const TickSchedule* turn) {
-    return **std::ranges::find_if(scenes_, [&](const auto& scene) { return &scene->turn == turn; });
+  void beginTick(SimulatedScene& scene) const {
+    const Pacer::Start start = scene.pacer.begin(now_, scene.catchUp);
+    scene.slipped += start.slippedTicks;
+    scene.worstLateness = std::max(scene.worstLateness, start.lateness);
+    scene.used = {};
+    ++scene.ticks;
   }
+  void endSlice(SimulatedScene& scene) {
+    const Clock::duration slice = scene.nextSlice();
+    scene.used += slice;
+    scene.served = now_;
+    scheduler_.used(scene, slice);
+    scene.begun = scene.used < scene.work;
+    if (!scene.begun) scene.tickEnded(scene.used, now_);
+  }
+  static SimulatedScene& sceneOf(TickSchedule* turn) { return static_cast<SimulatedScene&>(*turn); }
 
+  Clock::time_point now_{};
+  TickScheduler scheduler_{kSlice};
   std::vector<std::unique_ptr<SimulatedScene>> scenes_;
 };
-
-TEST(ShareOf, DividesThePeriodAmongRunningScenesAndOnceAmongAllGuests) {
-  TickSchedule one(50), two(100), firstGuest(50, true), secondGuest(50, true);
-  const TickSchedule* const all[] = {&one, &two, &firstGuest, &secondGuest};
-  one.running = true;
-  EXPECT_EQ(shareOf(one, all), 20ms);
-  two.running = true;
-  EXPECT_EQ(shareOf(one, all), 10ms);
-  EXPECT_EQ(shareOf(two, all), 5ms);
-  firstGuest.running = secondGuest.running = true;
-  EXPECT_EQ(shareOf(two, all), 5ms);
-  EXPECT_EQ(shareOf(firstGuest, all), Clock::duration(20ms) / 6);
-  one.running = two.running = false;
-  EXPECT_EQ(shareOf(firstGuest, all), 10ms);
-}
 
 TEST_F(TickSchedulerTest, HeavySceneUsesTheTimeThatOthersLeave) {
   std::vector<SimulatedScene*> light;
@@ -147,7 +150,7 @@ TEST_F(TickSchedulerTest, HeavyScenesAlternate) {
 
 TEST_F(TickSchedulerTest, SleepingScenesDoNotCount) {
   SimulatedScene& resting = add(72, 1ms);
-  resting.turn.running = false;
+  resting.running = false;
   SimulatedScene& heavy = add(72, 50ms);
   run(1s);
   EXPECT_EQ(resting.ticks, 0);
@@ -164,8 +167,8 @@ TEST_F(TickSchedulerTest, EarliestTickStartsFirstWithoutHeavyScenes) {
 
 TEST_F(TickSchedulerTest, GuestsTakeNoFramesFromOtherScenes) {
   SimulatedScene& own = add(72, 4ms);
-  std::vector<SimulatedScene*> guests;
-  for (int i = 0; i < 15; ++i) guests.push_back(&add(72, i < 14 ? 30ms : 3s, true));
+  std::vector<SimulatedScene*> guests = addGuests(14, 72, 30ms);
+  guests.push_back(&add(72, 3s, true));
   run(30s);
   EXPECT_EQ(own.slipped, 0);
   EXPECT_GE(own.ticks, 30 * 72 - 3);
@@ -173,7 +176,7 @@ TEST_F(TickSchedulerTest, GuestsTakeNoFramesFromOtherScenes) {
   Clock::duration used{};
   for (const SimulatedScene* guest : guests) {
     EXPECT_GE(guest->ticks, 1);
-    used += guest->ticks * guest->cost;
+    used += guest->ticks * guest->work;
   }
   // Half of the device is theirs.
   EXPECT_GE(used, 30s / 2 - 3s);
@@ -183,7 +186,7 @@ TEST_F(TickSchedulerTest, GuestsUseTheTimeThatOtherScenesLeave) {
   for (int i = 0; i < 3; ++i) add(72, 1ms);
   SimulatedScene& guest = add(1000, 2ms, true);
   run(10s);
-  EXPECT_GE(guest.ticks * guest.cost, 0.6 * 10s) << "its share is 0.25";
+  EXPECT_GE(guest.ticks * guest.work, 0.6 * 10s) << "its share is 0.25";
 }
 
 TEST_F(TickSchedulerTest, LongSlicesStayWithinTheShareOfGuests) {
@@ -191,7 +194,88 @@ TEST_F(TickSchedulerTest, LongSlicesStayWithinTheShareOfGuests) {
   guest.slice = 12ms;  // own leaves gaps of 10.9 ms
   run(10s);
   EXPECT_GE(own.ticks, 0.99 * 720);
-  EXPECT_NEAR(guest.ticks * seconds(guest.cost), 0.5 * 10, 0.6);
+  EXPECT_NEAR(guest.ticks * seconds(guest.work), 0.5 * 10, 0.6);
+}
+
+TEST_F(TickSchedulerTest, CheapGuestsAllKeepTheirRate) {
+  SimulatedScene& own = add(72, 500us);
+  const std::vector<SimulatedScene*> guests = addGuests(64, 72, 200us);
+  run(1s);  // until all costs are known
+  forgetTicks();
+  run(60s);
+  EXPECT_GE(own.ticks, 60 * 72 - 1);
+  EXPECT_EQ(own.slipped, 0);
+  EXPECT_LE(own.worstLateness, 1ms);
+  for (const SimulatedScene* guest : guests) {
+    EXPECT_GE(guest->ticks, 60 * 72 - 1);
+    EXPECT_EQ(guest->slipped, 0);
+  }
+}
+
+TEST_F(TickSchedulerTest, GuestsOfDifferentRatesKeepThem) {
+  SimulatedScene& own = add(72, 1ms);
+  std::vector<SimulatedScene*> guests;
+  const std::uint32_t rates[] = {30, 60, 72, 90};
+  for (int i = 0; i < 64; ++i) guests.push_back(&add(rates[i % 4], 150us, true, i * 317us));
+  run(1s);
+  forgetTicks();
+  run(60s);
+  EXPECT_EQ(own.slipped, 0);
+  EXPECT_LE(own.worstLateness, 1ms);
+  for (std::size_t i = 0; i < guests.size(); ++i) {
+    EXPECT_NEAR(guests[i]->ticks, 60 * rates[i % 4], 1);
+    EXPECT_LE(guests[i]->worstLateness, 14ms);
+  }
+}
+
+TEST_F(TickSchedulerTest, ExpensiveGuestRunsAmongCheapOnes) {
+  SimulatedScene& own = add(72, 2ms);
+  const std::vector<SimulatedScene*> cheap = addGuests(32, 72, 200us);
+  SimulatedScene& expensive = add(10, 40ms, true);  // its slices fit no gap
+  run(1s);
+  forgetTicks();
+  run(60s);
+  EXPECT_EQ(own.slipped, 0);
+  EXPECT_LE(own.worstLateness, kSlice);
+  for (const SimulatedScene* guest : cheap) EXPECT_GE(guest->ticks, 0.97 * 60 * 72);
+  EXPECT_GE(expensive.ticks * seconds(expensive.work), 0.03 * 60) << "its equal part is 0.015";
+}
+
+TEST_F(TickSchedulerTest, GuestsThatDoNotFitTakeTurns) {
+  SimulatedScene& own = add(72, 2ms);
+  const std::vector<SimulatedScene*> guests = addGuests(64, 72, 500us);  // more than twice what is left
+  run(2s);
+  forgetTicks();
+  run(60s);
+  EXPECT_EQ(own.slipped, 0);
+  const auto [least, most] = std::ranges::minmax(guests, {}, &SimulatedScene::ticks);
+  EXPECT_GE(least->ticks, 0.95 * most->ticks);
+  EXPECT_GE(64 * least->ticks * seconds(least->work), 0.9 * (1 - 0.144) * 60);
+}
+
+TEST_F(TickSchedulerTest, GuestsGetTheirShareWithoutGaps) {
+  SimulatedScene& own = add(72, 14ms);  // needs the whole device
+  const std::vector<SimulatedScene*> guests = addGuests(64, 72, 500us);
+  run(1s);
+  forgetTicks();
+  run(60s);
+  EXPECT_GE(own.ticks * seconds(own.work), 0.5 * 60);
+  const auto [least, most] = std::ranges::minmax(guests, {}, &SimulatedScene::ticks);
+  EXPECT_GE(least->ticks, most->ticks - 2);
+  EXPECT_GE(64 * least->ticks * seconds(least->work), 0.4 * 60);
+}
+
+TEST_F(TickSchedulerTest, GapsAreNotPaidForLater) {
+  SimulatedScene& own = add(72, 500us);
+  const std::vector<SimulatedScene*> guests = addGuests(64, 72, 200us);
+  run(60s);
+  own.work = 20ms;  // leaves no gaps
+  run(1s);
+  forgetTicks();
+  run(10s);
+  Clock::duration used{};
+  for (const SimulatedScene* guest : guests) used += guest->ticks * guest->work;
+  EXPECT_GE(used, 3s);
 }
 
 TEST_F(TickSchedulerTest, GuestsHaveTheWholeDeviceWithoutOtherScenes) {
