@@ -336,6 +336,7 @@ void DeviceThread::submitTicks(bool oneByOne) {
 }
 
 void DeviceThread::waitForTicks(Clock::time_point deviceFree) {
+  noteDisturbances();
   for (const auto& batch : batches_.inFlight()) waitForBatch(*batch, deviceFree);
   batches_.end();
   for (const auto& run : runs_) waitForFirstSlice(*run, deviceFree);
@@ -351,13 +352,12 @@ void DeviceThread::waitForBatch(TickBatches::Members& batch, Clock::time_point& 
   // Each tick knows its part of the device's time before the first one is finished.
   batch.batch.shareTimes();
   const Clock::time_point done = Clock::now();
-  const double all = std::max<double>(1, static_cast<double>(batch.batch.work()));
-  const auto time = static_cast<double>((done - std::exchange(deviceFree, done)).count());
-  for (SceneRun* run : batch.runs) {
-    if (!survives(*run, [&] { faults_.checkScene(run->scene->name()); })) continue;
-    run->become(SceneState::betweenSlices);
-    const double part = static_cast<double>(run->host->recordedWork()) / all;
-    endSlice(*run, Clock::duration(static_cast<Clock::rep>(part * time)));
+  batch.divide(done - std::exchange(deviceFree, done));
+  for (std::size_t i = 0; i < batch.runs.size(); ++i) {
+    SceneRun& run = *batch.runs[i];
+    if (!survives(run, [&] { faults_.checkScene(run.scene->name()); })) continue;
+    run.become(SceneState::betweenSlices);
+    endSlice(run, batch.times[i]);
   }
 }
 
@@ -371,6 +371,7 @@ void DeviceThread::runSlice() {
         (next == nullptr || run->tick.served < next->tick.served))
       next = run.get();
   if (next == nullptr) return;
+  noteDisturbances();
   const bool survived = survives(*next, [&] {
     next->host->submitSlice();
     next->host->waitForSlice();
@@ -426,7 +427,7 @@ void DeviceThread::endSlice(SceneRun& run, Clock::duration time) {
   run.tick.used += time;
   scheduler_.used(run, time);
   // While a scene is loaded, its kernels lengthen slices. The end of the tick shows what the device did.
-  const bool isLate = run.price.addSlice(schedule::seconds(time)) && !isDisturbed();
+  const bool isLate = run.price.addSlice(schedule::seconds(time)) && !isDisturbed_;
   if (run.host->hasSlices()) return checkPrice(run, isLate);
   if (!survives(run, [&] { run.host->finish(); })) return;
   run.become(SceneState::running);
@@ -454,18 +455,17 @@ void DeviceThread::adaptToLoad(SceneRun& run, Clock::time_point now) {
        .own = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(own)),
        .share = scheduler_.shareOf(run),
        .idle = idle_,
-       .disturbed = isDisturbed() || isMaking()},
+       .disturbed = isDisturbed_ || isMaking_},
       leastSubsteps);
   if (changed) run.host->setWork(run.overload.level());
 }
 
-bool DeviceThread::isDisturbed() const {
-  return std::ranges::any_of(runs_, [](const auto& run) { return run->usesLoader(); });
-}
-
-bool DeviceThread::isMaking() const {
-  return std::ranges::any_of(
-      runs_, [](const auto& run) { return run->host && run->host->makingTime() > Clock::duration::zero(); });
+void DeviceThread::noteDisturbances() {
+  isDisturbed_ = isMaking_ = false;
+  for (const auto& run : runs_) {
+    isDisturbed_ = isDisturbed_ || run->usesLoader();
+    isMaking_ = isMaking_ || (run->host && run->host->makingTime() > Clock::duration::zero());
+  }
 }
 
 void DeviceThread::checkPrice(SceneRun& run, bool isLate) {

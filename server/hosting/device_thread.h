@@ -163,10 +163,8 @@ class DeviceThread {
   void chargeMaking(SceneRun& run, Clock::time_point& deviceFree);
   // Lets the scene do less work if it overloads the device, and more if there is room again.
   void adaptToLoad(SceneRun& run, Clock::time_point now);
-  // Returns whether the device works for anything but ticks.
-  bool isDisturbed() const;
-  // Whether a change of any scene has held this thread up in that scene's present tick.
-  bool isMaking() const;
+  // Notes what else than ticks the device and this thread work for.
+  void noteDisturbances();
   // Stops the scene if it takes far more than its price; it may be in the middle of a tick, with no slice in
   // flight. `isLate`: PriceWatch says so, on a device of the speed that it assumes; that speed is then
   // measured. Throws vulkan::DeviceLost.
@@ -204,6 +202,8 @@ class DeviceThread {
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
   TickBatches batches_;
   std::vector<SceneRun*> together_;  // ticks of a batch
+  bool isDisturbed_ = false;         // the loader works
+  bool isMaking_ = false;            // a change has held this thread up in the present tick of its scene
   Clock::duration idle_{};           // time without work for the device
 
   std::thread thread_;

@@ -5,31 +5,35 @@
 
 namespace clothstream::hosting {
 
+void TickBatches::Members::add(SceneRun& run) {
+  run.host->join(batch);
+  runs.push_back(&run);
+  work.push_back(static_cast<double>(run.host->recordedWork()));
+  times.emplace_back();
+}
+
 TickBatches::Members& TickBatches::next(vulkan::Device& device) {
   if (used_ == batches_.size()) batches_.push_back(std::make_unique<Members>(device));
-  Members& members = *batches_[used_++];
+  Members& members = *batches_[used_];
   members.batch.begin();
   members.runs.clear();
-  members.submitted = 0;
+  members.work.clear();
+  members.times.clear();
   return members;
 }
 
 void TickBatches::submit(vulkan::Device& device, std::span<SceneRun* const> runs) {
   const double most = scene::Slices::firstSlice(device);
-  Members* members = nullptr;
-  double work = 0;
-  for (SceneRun* run : runs) {
-    const auto more = static_cast<double>(run->host->recordedWork());
-    if (members == nullptr || (work > 0 && work + more > most)) {
-      if (members != nullptr) members->submitted = device.submit(members->batch);
-      members = &next(device);
-      work = 0;
-    }
-    run->host->join(members->batch);
-    members->runs.push_back(run);
-    work += more;
+  for (auto run = runs.begin(); run != runs.end();) {
+    Members& members = next(device);
+    double work = 0;
+    do {
+      work += static_cast<double>((*run)->host->recordedWork());
+      members.add(**run++);
+    } while (run != runs.end() && work + static_cast<double>((*run)->host->recordedWork()) <= most);
+    members.submitted = device.submit(members.batch);
+    ++used_;
   }
-  if (members != nullptr) members->submitted = device.submit(members->batch);
 }
 
 void TickBatches::clear() {

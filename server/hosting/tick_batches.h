@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "server/hosting/scene_run.h"
+#include "server/schedule/clock.h"
+#include "server/schedule/divided_time.h"
 #include "server/vulkan/batch.h"
 #include "server/vulkan/device.h"
 
@@ -19,20 +21,28 @@ class TickBatches {
  public:
   struct Members {
     explicit Members(const vulkan::Device& device) : batch(device) {}
+    void add(SceneRun& run);
+    // Divides the time that the device worked on the batch by the work of its ticks.
+    void divide(schedule::Clock::duration time) { schedule::divideTime(time, work, times); }
+
     vulkan::Batch batch;
     std::vector<SceneRun*> runs;
-    vulkan::TimelineValue submitted = 0;  // 0: not submitted
+    // Of each run: its work (vulkan::Recorder::work), and its part of the device's time after divide().
+    std::vector<double> work;
+    std::vector<schedule::Clock::duration> times;
+    vulkan::TimelineValue submitted = 0;
   };
 
   // Submits the recorded ticks of these scenes, in batches of about one slice. Throws vulkan::DeviceLost.
   void submit(vulkan::Device& device, std::span<SceneRun* const> runs);
-  // Batches that are submitted and not ended, in their order.
+  // Batches that were submitted since end(), in their order.
   std::span<const std::unique_ptr<Members>> inFlight() const { return std::span(batches_).first(used_); }
-  // Ends the batches, whose ticks were waited for.
+  // All of them have been waited for.
   void end() { used_ = 0; }
   void clear();
 
  private:
+  // The next batch that is not in flight, empty.
   Members& next(vulkan::Device& device);
 
   std::vector<std::unique_ptr<Members>> batches_;  // the first ones are in flight
