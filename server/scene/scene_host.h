@@ -50,6 +50,7 @@ class SceneHost {
   // `loaded` holds the scene's start.
   SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene, delivery::FramePublisher& publisher,
             double reportRate, SceneLoader* loader = nullptr);
+  // Publishes the frames of the scene that wait.
   ~SceneHost();
 
   // Sets the work from the next tick on. Substeps are raised to leastSubsteps(). A change is announced.
@@ -78,7 +79,8 @@ class SceneHost {
   // Releases the encoders of the coarser qualities, when the scene is paused or has no subscribers.
   void releaseCoarseEncoders();
 
-  // Releases everything on the device. After that only rebuild() and isReady() may be called.
+  // Releases everything on the device, once the scene's frames are published. After that only rebuild() and
+  // isReady() may be called.
   void release();
   bool isReady() const { return onDevice_ != nullptr; }
   // Continues from the newest snapshot. `loaded` holds the scene's start. `why` begins the notice to the
@@ -151,7 +153,6 @@ class SceneHost {
   void announceRefusal(const std::string& reason);
 
   LiveScene& live_;
-  delivery::FramePublisher& publisher_;
   std::shared_ptr<SceneOnDevice> onDevice_;  // shared with a rehearsal
 
   SceneParameters parameters_;
