@@ -293,7 +293,7 @@ std::size_t Origin::moveAll(Clock::time_point until) {
   {
     const std::lock_guard lock(mutex_);
     for (const auto& [name, stream] : streams_)
-      if (stream->scene()->created) names.push_back(name);
+      if (stream->scene()->terms.created) names.push_back(name);
   }
   std::size_t stay = 0;
   for (const std::string& name : names) {

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -18,16 +19,27 @@
 #include "server/vulkan/device.h"
 #include "server/vulkan/kernel.h"
 #include "server/vulkan/recorder.h"
+#include "server/vulkan/stage_timer.h"
 
 namespace clothstream::vulkan {
 
 struct Kernel::Handles {
+  // The form for several scenes at once (shared_code.h), made when it is first needed. Thread-safe.
+  struct Shared {
+    std::once_flag made;
+    vk::raii::PipelineLayout layout = nullptr;
+    vk::raii::Pipeline pipeline = nullptr;
+  };
+  const Shared& shared() const;
+
+  const Device::Handles* device = nullptr;
   KernelCode code;
   std::vector<std::uint32_t> constants;  // by constant_id: the workgroup size, then the specialisation
   SpirvInterface interface;
   vk::raii::DescriptorSetLayout setLayout = nullptr;
   vk::raii::PipelineLayout layout = nullptr;
   vk::raii::Pipeline pipeline = nullptr;
+  std::unique_ptr<Shared> sharedForm = std::make_unique<Shared>();
 };
 
 // Address of the embedded SPIR-V, and Kernel::Handles::constants.
@@ -44,6 +56,7 @@ struct Device::Handles {
   vk::raii::PipelineCache pipelineCache = nullptr;
   std::uint32_t queueFamily = 0;
   bool keepsStatistics = false;  // of kernels: kernel_statistics.h
+  bool sharesKernels = false;    // kernels have shared forms: shared_code.h
   mutable std::atomic<std::uint64_t> allocatedBytes{0};
   mutable std::atomic<std::uint32_t> allocations{0};
   // Pipelines that kernels use.
@@ -77,18 +90,16 @@ struct Buffer::Handles {
 };
 
 struct Bindings::Handles {
+  std::vector<const Buffer::Handles*> buffers;  // in order
   vk::raii::DescriptorPool pool = nullptr;
   vk::raii::DescriptorSet set = nullptr;
 };
 
 struct Recorder::Handles {
   vk::raii::CommandPool pool = nullptr;
-  std::vector<vk::raii::CommandBuffer> slices;
-  std::uint32_t used = 0;                    // slices of the present recording
-  std::vector<vk::CommandBuffer> submitted;  // newest submission, to reuse its memory
-  vk::raii::CommandBuffer& current() { return slices[used - 1]; }
-  // Mark i begins stage marks_[i]; one more mark ends the last stage.
-  vk::raii::QueryPool timestamps = nullptr;
+  std::vector<vk::raii::CommandBuffer> slices;  // as many as the longest recording had
+  std::vector<vk::CommandBuffer> submitted;     // newest submission, to reuse its memory
+  std::optional<StageTimer> timer;              // since a recording had stages
 };
 
 }  // namespace clothstream::vulkan

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "server/vulkan/handles.h"
+#include "server/vulkan/shared_code.h"
 
 namespace clothstream::vulkan {
 namespace {
@@ -26,6 +27,36 @@ constexpr vk::DescriptorType typeOf(BindingKind kind) {
 }
 
 constexpr std::uint32_t kWord = sizeof(std::uint32_t);
+
+vk::raii::Pipeline pipelineOf(const Device::Handles& device, const Kernel::Handles& kernel,
+                              std::span<const std::uint32_t> spirv, vk::PipelineLayout layout) {
+  const vk::raii::Device& vulkan = device.device;
+  std::vector<vk::SpecializationMapEntry> entries;
+  for (std::uint32_t id = 0; id < kernel.constants.size(); ++id)
+    entries.push_back({.constantID = id, .offset = id * kWord, .size = kWord});
+  const vk::SpecializationInfo specialisation{.mapEntryCount = static_cast<std::uint32_t>(entries.size()),
+                                              .pMapEntries = entries.data(),
+                                              .dataSize = kernel.constants.size() * kWord,
+                                              .pData = kernel.constants.data()};
+  const vk::raii::ShaderModule module(
+      vulkan, vk::ShaderModuleCreateInfo{.codeSize = spirv.size_bytes(), .pCode = spirv.data()});
+  vk::PipelineCreateFlags flags = vk::PipelineCreateFlagBits::eDispatchBase;
+  if (device.keepsStatistics) flags |= vk::PipelineCreateFlagBits::eCaptureStatisticsKHR;
+  vk::raii::Pipeline pipeline(
+      vulkan, device.pipelineCache,
+      vk::ComputePipelineCreateInfo{.flags = flags,
+                                    .stage = {.stage = vk::ShaderStageFlagBits::eCompute,
+                                              .module = *module,
+                                              .pName = "main",
+                                              .pSpecializationInfo = &specialisation},
+                                    .layout = layout});
+  if (device.validates())
+    vulkan.setDebugUtilsObjectNameEXT(
+        {.objectType = vk::ObjectType::ePipeline,
+         .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*pipeline)),
+         .pObjectName = kernel.code.name});
+  return pipeline;
+}
 
 // Makes the pipeline of handles with code, constants and interface.
 void makePipeline(const Device::Handles& device, Kernel::Handles& made) {
@@ -46,31 +77,7 @@ void makePipeline(const Device::Handles& device, Kernel::Handles& made) {
                                                                     .pSetLayouts = &*made.setLayout,
                                                                     .pushConstantRangeCount = push.size > 0,
                                                                     .pPushConstantRanges = &push});
-  std::vector<vk::SpecializationMapEntry> entries;
-  for (std::uint32_t id = 0; id < made.constants.size(); ++id)
-    entries.push_back({.constantID = id, .offset = id * kWord, .size = kWord});
-  const vk::SpecializationInfo specialisation{.mapEntryCount = static_cast<std::uint32_t>(entries.size()),
-                                              .pMapEntries = entries.data(),
-                                              .dataSize = made.constants.size() * kWord,
-                                              .pData = made.constants.data()};
-  const vk::raii::ShaderModule module(
-      vulkan,
-      vk::ShaderModuleCreateInfo{.codeSize = made.code.spirv.size_bytes(), .pCode = made.code.spirv.data()});
-  vk::PipelineCreateFlags flags = vk::PipelineCreateFlagBits::eDispatchBase;
-  if (device.keepsStatistics) flags |= vk::PipelineCreateFlagBits::eCaptureStatisticsKHR;
-  made.pipeline =
-      vk::raii::Pipeline(vulkan, device.pipelineCache,
-                         vk::ComputePipelineCreateInfo{.flags = flags,
-                                                       .stage = {.stage = vk::ShaderStageFlagBits::eCompute,
-                                                                 .module = *module,
-                                                                 .pName = "main",
-                                                                 .pSpecializationInfo = &specialisation},
-                                                       .layout = *made.layout});
-  if (device.validates())
-    vulkan.setDebugUtilsObjectNameEXT(
-        {.objectType = vk::ObjectType::ePipeline,
-         .objectHandle = reinterpret_cast<std::uint64_t>(static_cast<VkPipeline>(*made.pipeline)),
-         .pObjectName = made.code.name});
+  made.pipeline = pipelineOf(device, made, made.code.spirv, *made.layout);
 }
 
 // Throws std::runtime_error if these handles, which have no pipeline yet, exceed what the device allows.
@@ -98,8 +105,10 @@ Kernel::Kernel(const Device& device, const KernelCode& code, std::uint32_t workg
   std::weak_ptr<const Handles>& shared = device.handles().pipelines[{code.spirv.data(), constants}];
   handles_ = shared.lock();
   if (handles_) return;
-  const auto made = std::make_shared<Handles>(
-      Handles{.code = code, .constants = std::move(constants), .interface = interfaceOf(code.spirv)});
+  const auto made = std::make_shared<Handles>(Handles{.device = &device.handles(),
+                                                      .code = code,
+                                                      .constants = std::move(constants),
+                                                      .interface = interfaceOf(code.spirv)});
   checkLimits(device, *made);
   try {
     makePipeline(device.handles(), *made);
@@ -109,6 +118,18 @@ Kernel::Kernel(const Device& device, const KernelCode& code, std::uint32_t workg
   }
   shared = handles_ = made;
   if (!device.executes()) device.handles().kept.push_back(made);
+}
+
+const Kernel::Handles::Shared& Kernel::Handles::shared() const {
+  std::call_once(sharedForm->made, [this] {
+    const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
+                                     .size = sizeof(vk::DeviceAddress)};
+    sharedForm->layout = vk::raii::PipelineLayout(
+        device->device,
+        vk::PipelineLayoutCreateInfo{.pushConstantRangeCount = 1, .pPushConstantRanges = &push});
+    sharedForm->pipeline = pipelineOf(*device, *this, sharedCode(code.spirv), *sharedForm->layout);
+  });
+  return *sharedForm;
 }
 
 std::string_view Kernel::name() const {
@@ -135,7 +156,10 @@ Bindings::Bindings(const Device& device, Kernel kernel, std::span<const Buffer* 
     throw std::logic_error(fmt::format("kernel {} has {} bindings and is given {} buffers", kernel_.name(),
                                        bindings.size(), buffers.size()));
   const auto count = static_cast<std::uint32_t>(bindings.size());
-  for (const Buffer* buffer : buffers) buffers_.push_back({&buffer->handles(), buffer->bytes()});
+  for (const Buffer* buffer : buffers) {
+    buffers_.push_back({&buffer->handles(), buffer->bytes()});
+    handles_->buffers.push_back(&buffer->handles());
+  }
   if (count == 0 || !device.executes()) return;
 
   std::vector<vk::DescriptorPoolSize> sizes;

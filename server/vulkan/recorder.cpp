@@ -4,42 +4,24 @@
 
 #include <algorithm>
 #include <cassert>
+#include <stdexcept>
 #include <utility>
+#include <variant>
 
 #include <fmt/format.h>
 
+#include "server/vulkan/command_writer.h"
 #include "server/vulkan/handles.h"
 
 namespace clothstream::vulkan {
 namespace {
 
-using Access = vk::AccessFlagBits;
-using Stage = vk::PipelineStageFlagBits;
-
-constexpr vk::PipelineStageFlags kWork = Stage::eComputeShader | Stage::eTransfer;
-constexpr vk::AccessFlags kWrites = Access::eShaderWrite | Access::eTransferWrite;
 // Timestamps of a recording: one before each stage and one at the end, and two between slices.
 constexpr std::uint32_t kMaxTimestamps = Recorder::kMaxMarks + 1 + 2 * Recorder::kMaxTimedSlices;
-// Stage of the time between two slices, in which other work may run.
-constexpr std::string_view kBetweenSlices;
 
 // Least work of a dispatch that shares a larger one. A dispatch costs a software device up to 0.1 ms, and
 // this work about 1 ms.
 constexpr std::uint64_t kLeastDispatch = 1 << 16;
-
-// Stage, reads and writes of a command, by Recorder::Command.
-struct CommandAccess {
-  Stage stage;
-  vk::AccessFlags writes, uses;
-};
-constexpr CommandAccess kAccess[] = {
-    {Stage::eComputeShader, Access::eShaderWrite, Access::eShaderRead | Access::eShaderWrite},
-    {Stage::eTransfer, Access::eTransferWrite, Access::eTransferRead | Access::eTransferWrite},
-    {Stage::eDrawIndirect, {}, Access::eIndirectCommandRead},
-};
-
-constexpr vk::AccessFlags kUses = Access::eShaderRead | Access::eShaderWrite | Access::eTransferRead |
-                                  Access::eTransferWrite | Access::eIndirectCommandRead;
 
 }  // namespace
 
@@ -49,77 +31,43 @@ Recorder& Recorder::operator=(Recorder&&) noexcept = default;
 
 Recorder::Recorder(const Device& device) : device_(&device), handles_(std::make_unique<Handles>()) {
   if (!device.executes()) return;
-  const vk::raii::Device& vulkan = device.handles().device;
   handles_->pool = vk::raii::CommandPool(
-      vulkan, vk::CommandPoolCreateInfo{.queueFamilyIndex = device.handles().queueFamily});
-  const std::uint32_t bits =
-      device.handles().physical.getQueueFamilyProperties()[device.handles().queueFamily].timestampValidBits;
-  if (bits > 0)
-    handles_->timestamps = vk::raii::QueryPool(
-        vulkan,
-        vk::QueryPoolCreateInfo{.queryType = vk::QueryType::eTimestamp, .queryCount = kMaxTimestamps});
-  timestampMask_ = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-  marks_.reserve(kMaxTimestamps);
-  ticks_.resize(kMaxTimestamps);
+      device.handles().device, vk::CommandPoolCreateInfo{.queueFamilyIndex = device.handles().queueFamily});
   times_.reserve(kMaxStages);
-}
-
-std::uint32_t Recorder::sliceCount() const {
-  return handles_->used;
 }
 
 void Recorder::begin() {
   open_ = true;
+  recording_.clear();
   rehearses_ = !device_->executes();
   if (rehearses_) return rehearsed_.clear();
-  handles_->pool.reset();
-  handles_->used = 0;
-  beginSlice();
-  if (*handles_->timestamps) handles_->current().resetQueryPool(*handles_->timestamps, 0, kMaxTimestamps);
-  marks_.clear();
-  timedSlices_ = 0;
-  largestDispatch_ = mostOfDispatch_ = 0;
+  slices_ = 1;
+  invocations_ = most_ = work_ = largestDispatch_ = mostOfDispatch_ = 0;
+  marks_ = timedSlices_ = 0;
+  stage_ = {};
 }
 
-void Recorder::beginSlice() {
-  if (handles_->used == handles_->slices.size()) {
-    vk::raii::CommandBuffers all(device_->handles().device,
-                                 vk::CommandBufferAllocateInfo{.commandPool = *handles_->pool,
-                                                               .level = vk::CommandBufferLevel::ePrimary,
-                                                               .commandBufferCount = 1});
-    handles_->slices.push_back(std::move(all.front()));
-  }
-  ++handles_->used;
+void Recorder::startSlice() {
+  recording_.add(SliceStart{});
+  ++slices_;
   invocations_ = most_ = 0;
-  since_ = 0;
-  before_.fill(0);
-  handles_->current().begin(vk::CommandBufferBeginInfo{});
-}
-
-void Recorder::endSlice() {
-  const vk::MemoryBarrier memory{.srcAccessMask = kWrites, .dstAccessMask = kUses | Access::eHostRead};
-  handles_->current().pipelineBarrier(kWork, kWork | Stage::eDrawIndirect | Stage::eHost, {}, memory, nullptr,
-                                      nullptr);
-  handles_->current().end();
 }
 
 void Recorder::count(std::uint64_t invocations, std::uint64_t most) {
   most = std::max(most, invocations);
   if (most_ > 0 && (invocations_ + invocations > sliceInvocations_ || most_ + most > sliceMost_)) {
-    if (marks_.empty() || timedSlices_ == kMaxTimedSlices) {
-      endSlice();
-      beginSlice();
+    if (marks_ == 0 || timedSlices_ == kMaxTimedSlices) {
+      startSlice();
     } else {
-      const std::string_view stage = marks_.back();
-      beginStage(kBetweenSlices);
-      endSlice();
-      beginSlice();
-      beginStage(stage);
+      recording_.add(StageStart{StageTimer::kPause});
+      startSlice();
+      recording_.add(StageStart{stage_});
       ++timedSlices_;
     }
   }
   invocations_ += invocations;
   most_ += most;
+  work_ += invocations;
   largestDispatch_ = std::max(largestDispatch_, invocations);
   mostOfDispatch_ = std::max(mostOfDispatch_, most);
 }
@@ -142,15 +90,10 @@ void Recorder::note(const Bindings& bindings, std::uint64_t invocations) {
 
 void Recorder::beginStage(std::string_view stage) {
   if (!device_->executes()) return;
-  assert(open_ && marks_.size() + 1 < kMaxTimestamps);
-  mark();
-  marks_.push_back(stage);
-}
-
-void Recorder::mark() {
-  if (*handles_->timestamps)
-    handles_->current().writeTimestamp(Stage::eBottomOfPipe, *handles_->timestamps,
-                                       static_cast<std::uint32_t>(marks_.size()));
+  assert(open_ && marks_ < kMaxMarks);
+  stage_ = stage;
+  ++marks_;
+  recording_.add(StageStart{stage});
 }
 
 std::uint64_t Recorder::groupsPerDispatch(const Kernel& kernel, std::uint64_t work,
@@ -182,19 +125,18 @@ void Recorder::dispatchBytes(const Bindings& bindings, const void* push, std::ui
         "kernel {}: {} invocations are {} workgroups of {}, more than the {} that {} runs at once; make the "
         "workgroups larger or the invocations fewer",
         kernel.name(), threads, groups, kernel.workgroupSize(), allowed, device_->info().name));
+  const PushRange range = notePush(kernel, push, pushBytes);
   const std::uint64_t each = work == 0 ? groups : std::min(groups, groupsPerDispatch(kernel, work, most));
   for (std::uint64_t first = 0; first < groups; first += each) {
     const std::uint64_t now = std::min(each, groups - first);
     const std::uint64_t done = first * kernel.workgroupSize();
     const std::uint64_t invocations = std::min(now * kernel.workgroupSize(), threads - done);
     count(invocations * std::max<std::uint64_t>(work, 1), invocations * most);
-    bind(bindings, push, pushBytes);
-    // Synchronisation checks of the validation layer do not know vkCmdDispatchBase.
-    if (first == 0)
-      handles_->current().dispatch(static_cast<std::uint32_t>(now), 1, 1);
-    else
-      handles_->current().dispatchBase(static_cast<std::uint32_t>(first), 0, 0,
-                                       static_cast<std::uint32_t>(now), 1, 1);
+    recording_.add(Dispatch{.kernel = &kernel.handles(),
+                            .bindings = &bindings.handles(),
+                            .push = range,
+                            .firstGroup = static_cast<std::uint32_t>(first),
+                            .groups = static_cast<std::uint32_t>(now)});
   }
 }
 
@@ -204,101 +146,99 @@ void Recorder::dispatchIndirectBytes(const Bindings& bindings, const void* push,
   assert(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= groups.bytes());
   if (rehearses_) return note(bindings, std::max(expected, most));
   count(expected, most);
-  waitBefore(sizeCommand);
-  bind(bindings, push, pushBytes);
-  handles_->current().dispatchIndirect(*groups.handles().buffer, offset);
+  recording_.add(IndirectDispatch{.kernel = &bindings.kernel().handles(),
+                                  .bindings = &bindings.handles(),
+                                  .push = notePush(bindings.kernel(), push, pushBytes),
+                                  .sizes = &groups.handles(),
+                                  .offset = offset});
 }
 
 void Recorder::touch(const Bindings& bindings) {
   const std::vector<std::byte> push(bindings.kernel().interface().pushConstantBytes);
-  bind(bindings, push.data(), static_cast<std::uint32_t>(push.size()));
-  handles_->current().dispatch(0, 1, 1);
+  recording_.add(
+      Touch{.kernel = &bindings.kernel().handles(),
+            .bindings = &bindings.handles(),
+            .push = notePush(bindings.kernel(), push.data(), static_cast<std::uint32_t>(push.size()))});
 }
 
-void Recorder::bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes) {
-  const Kernel& kernel = bindings.kernel();
+PushRange Recorder::notePush(const Kernel& kernel, const void* push, std::uint32_t pushBytes) {
   assert(open_);
   if (pushBytes != kernel.interface().pushConstantBytes)
     throw std::logic_error(fmt::format("kernel {} has {} bytes of push constants and is given {}",
                                        kernel.name(), kernel.interface().pushConstantBytes, pushBytes));
-  waitBefore(kernelCommand);
-  handles_->current().bindPipeline(vk::PipelineBindPoint::eCompute, *kernel.handles().pipeline);
-  if (*bindings.handles().set)
-    handles_->current().bindDescriptorSets(vk::PipelineBindPoint::eCompute, *kernel.handles().layout, 0,
-                                           *bindings.handles().set, nullptr);
-  if (pushBytes > 0)
-    handles_->current().pushConstants<std::byte>(*kernel.handles().layout, vk::ShaderStageFlagBits::eCompute,
-                                                 0, {pushBytes, static_cast<const std::byte*>(push)});
+  return recording_.addPush({static_cast<const std::byte*>(push), pushBytes});
 }
 
 void Recorder::barrier() {
   assert(open_);
-  for (std::uint8_t& before : before_) before |= since_;
-  since_ = 0;
-}
-
-void Recorder::waitBefore(Command command) {
-  const std::uint8_t before = std::exchange(before_[command], std::uint8_t{0});
-  since_ |= static_cast<std::uint8_t>(1u << command);
-  if (before == 0) return;
-  vk::PipelineStageFlags stages;
-  vk::AccessFlags writes;
-  for (std::uint32_t type = 0; type < kCommands; ++type) {
-    if ((before >> type & 1u) == 0) continue;
-    stages |= kAccess[type].stage;
-    writes |= kAccess[type].writes;
-  }
-  const vk::MemoryBarrier memory{.srcAccessMask = writes, .dstAccessMask = kAccess[command].uses};
-  handles_->current().pipelineBarrier(stages, kAccess[command].stage, {}, memory, nullptr, nullptr);
+  recording_.add(Barrier{});
 }
 
 void Recorder::copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset,
                     std::size_t toOffset) {
   assert(open_ && fromOffset + bytes <= from.bytes() && toOffset + bytes <= to.bytes());
   if (bytes == 0 || !device_->executes()) return;
-  waitBefore(copyCommand);
-  handles_->current().copyBuffer(
-      *from.handles().buffer, *to.handles().buffer,
-      vk::BufferCopy{.srcOffset = fromOffset, .dstOffset = toOffset, .size = bytes});
+  recording_.add(Copy{.from = &from.handles(),
+                      .to = &to.handles(),
+                      .fromOffset = fromOffset,
+                      .toOffset = toOffset,
+                      .bytes = bytes});
 }
 
 void Recorder::fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset) {
   assert(open_ && bytes % 4 == 0 && offset % 4 == 0 && offset + bytes <= buffer.bytes());
   if (bytes == 0 || !device_->executes()) return;
-  waitBefore(copyCommand);
-  handles_->current().fillBuffer(*buffer.handles().buffer, offset, bytes, value);
+  recording_.add(Fill{.buffer = &buffer.handles(), .offset = offset, .bytes = bytes, .value = value});
 }
 
 void Recorder::finish() {
   if (!open_) return;
   assert(device_->executes());
-  if (!marks_.empty()) mark();
-  endSlice();
+  open_ = inBatch_ = false;
+  Handles& on = *handles_;
+  if (marks_ > 0 && !on.timer) on.timer.emplace(*device_, kMaxTimestamps, kMaxStages);
+  on.pool.reset();
+  while (on.slices.size() < slices_) {
+    vk::raii::CommandBuffers all(
+        device_->handles().device,
+        vk::CommandBufferAllocateInfo{
+            .commandPool = *on.pool, .level = vk::CommandBufferLevel::ePrimary, .commandBufferCount = 1});
+    on.slices.push_back(std::move(all.front()));
+  }
+  std::uint32_t slice = 0;
+  CommandWriter writer;
+  writer.begin(on.slices[slice]);
+  if (on.timer) on.timer->begin(writer.commands());
+  for (const Command& command : recording_.commands()) {
+    if (const auto* stage = std::get_if<StageStart>(&command)) {
+      on.timer->mark(writer.commands(), stage->name);
+    } else if (std::holds_alternative<SliceStart>(command)) {
+      writer.end();
+      writer.begin(on.slices[++slice]);
+    } else {
+      writer.write(command, recording_);
+    }
+  }
+  if (on.timer) on.timer->end(writer.commands());
+  writer.end();
+}
+
+const Recording& Recorder::endForBatch() {
+  assert(open_ && !rehearses_ && slices_ == 1);
   open_ = false;
+  inBatch_ = true;
+  times_.clear();
+  return recording_;
+}
+
+void Recorder::setStageTimes(std::span<const StageTime> batch, double part) {
+  times_.clear();
+  for (const StageTime& time : batch) times_.push_back({time.stage, part * time.seconds});
 }
 
 std::span<const StageTime> Recorder::stageTimes() {
-  times_.clear();
-  if (marks_.empty() || !*handles_->timestamps) return times_;
-  const auto count = static_cast<std::uint32_t>(marks_.size() + 1);
-  const VkResult result = device_->handles().device.getDispatcher()->vkGetQueryPoolResults(
-      *device_->handles().device, *handles_->timestamps, 0, count, count * sizeof(std::uint64_t),
-      ticks_.data(), sizeof(std::uint64_t), VK_QUERY_RESULT_64_BIT);
-  if (result != VK_SUCCESS) return times_;
-  for (std::size_t i = 0; i < marks_.size(); ++i) {
-    if (marks_[i] == kBetweenSlices) continue;
-    const double seconds = static_cast<double>((ticks_[i + 1] - ticks_[i]) & timestampMask_) *
-                           static_cast<double>(device_->limits().timestampPeriod) * 1e-9;
-    const auto known = std::find_if(times_.begin(), times_.end(),
-                                    [&](const StageTime& time) { return time.stage == marks_[i]; });
-    if (known != times_.end()) {
-      known->seconds += seconds;
-    } else {
-      assert(times_.size() < kMaxStages);
-      times_.push_back({marks_[i], seconds});
-    }
-  }
-  return times_;
+  if (inBatch_) return times_;
+  return handles_->timer ? handles_->timer->times() : std::span<const StageTime>();
 }
 
 }  // namespace clothstream::vulkan

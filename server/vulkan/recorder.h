@@ -2,7 +2,6 @@
 // Records work for the device: bind, push, dispatch, copy, barrier, timestamp.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -13,6 +12,8 @@
 #include "server/vulkan/buffer.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/kernel.h"
+#include "server/vulkan/recording.h"
+#include "server/vulkan/stage_time.h"
 
 namespace clothstream::vulkan {
 
@@ -23,14 +24,10 @@ struct RehearsedKernel {
   std::uint64_t dispatches = 0;
 };
 
-struct StageTime {
-  std::string_view stage;  // the name passed to beginStage; static storage
-  double seconds = 0;
-};
-
 // Reusable command buffers with their timestamps. Belongs to one thread at a time. Allocates no memory after
-// its longest recording. On a device that only compiles (Device::executes), every recording is a rehearsal:
-// it notes kernels and has no commands.
+// its longest recording. Commands are data until the recording is submitted, alone or in a Batch; what they
+// refer to has to exist until it is complete. On a device that only compiles (Device::executes), every
+// recording is a rehearsal: it notes kernels and has no commands.
 class Recorder {
  public:
   explicit Recorder(const Device& device);
@@ -47,7 +44,9 @@ class Recorder {
     sliceInvocations_ = invocations;
     sliceMost_ = most;
   }
-  std::uint32_t sliceCount() const;
+  std::uint32_t sliceCount() const { return slices_; }
+  // Work of all dispatches since begin(), in invocations as slices count them.
+  std::uint64_t work() const { return work_; }
   // Work of the largest dispatch since begin(), in invocations as slices count them.
   std::uint64_t largestDispatch() const { return largestDispatch_; }
   // The most work of the dispatch that may become the largest.
@@ -61,8 +60,8 @@ class Recorder {
   // One entry for each pipeline that the last rehearsal noted, in the order of their first dispatches. Valid
   // until the next rehearsal.
   std::span<const RehearsedKernel> rehearsed() const { return rehearsed_; }
-  // Runs a kernel on no data, so that the device does its first-time work now. A software device compiles the
-  // kernel then, which takes up to tenths of a second.
+  // Runs a kernel, in the forms that recordings and batches use, on no data, so that the device does its
+  // first-time work now. A software device compiles the kernel then, which takes up to tenths of a second.
   void touch(const Bindings& bindings);
 
   // Work counts towards this stage until the next beginStage() or the end. Names need static storage. A
@@ -108,10 +107,8 @@ class Recorder {
     dispatchIndirectBytes(bindings, &push, sizeof(Push), groups, offset, expected, most);
   }
 
-  // Makes earlier work (kernels, copies, fills, dispatch sizes) visible to later work. The device waits when
-  // a later command needs it, and only for the types of commands that there were: between kernels alone, a
-  // GPU need not wait for copies and dispatch sizes. No barrier is needed at the start or the end of a
-  // recording: recordings on one device always see each other's work.
+  // Makes earlier work (kernels, copies, fills, dispatch sizes) visible to later work. No barrier is needed
+  // at the start or the end of a recording: recordings on one device always see each other's work.
   void barrier();
 
   void copy(const Buffer& from, const Buffer& to, std::size_t bytes, std::size_t fromOffset = 0,
@@ -119,13 +116,17 @@ class Recorder {
   // `bytes` must be a multiple of 4.
   void fill(const Buffer& buffer, std::uint32_t value, std::size_t bytes, std::size_t offset = 0);
 
-  // Device time of each stage of the last submitted recording, in order of first appearance. Call it when the
-  // recording is complete. Empty if the device has no timestamps. Valid until the next call or begin().
+  // Device time of each stage of the last submitted recording, in order of first appearance; after a batch,
+  // the recording's part of the batch's stages. Call it when the recording is complete. Empty if the device
+  // has no timestamps. Valid until the next call or begin().
   std::span<const StageTime> stageTimes();
 
-  // Only for this folder (handles.h). Ends the recording with a barrier towards the host and later
-  // recordings.
+  // Only for this folder. Writes the command buffers of a recording that is submitted alone.
   void finish();
+  // Ends a recording that is submitted in a batch, and returns it.
+  const Recording& endForBatch();
+  // Its part of the stages of the batch.
+  void setStageTimes(std::span<const StageTime> batch, double part);
   struct Handles;
   Handles& handles() const { return *handles_; }
 
@@ -140,31 +141,22 @@ class Recorder {
                              std::uint64_t most);
   // Counts a dispatch, and ends the slice before it if it is full.
   void count(std::uint64_t invocations, std::uint64_t most);
-  void beginSlice();
-  void endSlice();
+  void startSlice();
   void note(const Bindings& bindings, std::uint64_t invocations);
-  void bind(const Bindings& bindings, const void* push, std::uint32_t pushBytes);
-  void mark();
-  // Commands as barriers distinguish them. An indirect dispatch is a kernel and also reads its size.
-  enum Command : std::uint8_t { kernelCommand, copyCommand, sizeCommand, kCommands };
-  // Records the barrier that a command of this type needs, if any.
-  void waitBefore(Command command);
+  PushRange notePush(const Kernel& kernel, const void* push, std::uint32_t pushBytes);
 
   const Device* device_;
   std::unique_ptr<Handles> handles_;
-  std::uint64_t timestampMask_ = 0;
-  std::vector<std::string_view> marks_;
-  std::vector<std::uint64_t> ticks_;
-  std::vector<StageTime> times_;
+  Recording recording_;
+  std::vector<StageTime> times_;  // of a batch
   std::vector<RehearsedKernel> rehearsed_;
   std::uint64_t sliceInvocations_ = ~std::uint64_t{0}, invocations_ = 0;  // limit, and of the current slice
   std::uint64_t sliceMost_ = ~std::uint64_t{0}, most_ = 0;                // the same of the most work
-  std::uint64_t largestDispatch_ = 0, mostOfDispatch_ = 0;
+  std::uint64_t work_ = 0, largestDispatch_ = 0, mostOfDispatch_ = 0;
+  std::string_view stage_;  // present one
+  std::uint32_t slices_ = 0, marks_ = 0;
   std::uint32_t timedSlices_ = 0;  // slices whose start was marked
-  // Types of the commands since the last call of barrier(), and of those before it that a command of a type
-  // has not waited for, as bits.
-  std::uint8_t since_ = 0;
-  std::array<std::uint8_t, kCommands> before_{};
+  bool inBatch_ = false;           // the last submission was a batch
   bool open_ = false, rehearses_ = false;
 };
 

@@ -42,7 +42,7 @@ class RecordedScene {
  public:
   explicit RecordedScene(RecorderOptions options, model::Scene scene = smallScene())
       : recorder(std::make_shared<Recorder>(std::move(options))),
-        live(std::move(scene), false, recorder),
+        live(std::move(scene), {}, recorder),
         host(std::make_unique<scene::SceneHost>(tests::device(), live, publisher)) {}
   ~RecordedScene() { publisher.drain(); }
 

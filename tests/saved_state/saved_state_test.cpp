@@ -109,7 +109,7 @@ TEST_F(SavedStateTest, CreatedScenesComeBackWithStateParametersAndParticipants) 
   EXPECT_THAT(names(), ::testing::Contains("mine"));
   EXPECT_GE(live("mine")->tick.load(), tick);
   EXPECT_EQ(live("mine")->definition().environment.gravity.y(), -3);
-  EXPECT_TRUE(live("mine")->created);
+  EXPECT_TRUE(live("mine")->terms.created);
   EXPECT_EQ(live("mine")->roster.away(), 2u);
   TestPeer owner(server(), "owner"), other(server(), "other"), stranger(server(), "stranger");
   owner.hello(helloTo("mine", ada));
@@ -314,7 +314,7 @@ TEST_F(SavedStateTest, AServerSceneDoesNotReplaceACreatedOneOfTheSameName) {
   create(tests::smallScene("mine"));
   end();
   run({}, kNoLimits, {}, {tests::smallScene("mine")});
-  EXPECT_FALSE(live("mine")->created);
+  EXPECT_FALSE(live("mine")->terms.created);
   EXPECT_EQ(live("mine")->keeper, nullptr);
   {
     TestPeer peer(server());
@@ -325,7 +325,7 @@ TEST_F(SavedStateTest, AServerSceneDoesNotReplaceACreatedOneOfTheSameName) {
   end();
   run();
   ASSERT_NE(live("mine"), nullptr);
-  EXPECT_TRUE(live("mine")->created);
+  EXPECT_TRUE(live("mine")->terms.created);
 }
 
 // The scene has never run, and the disk is too full for states.
