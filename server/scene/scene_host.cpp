@@ -239,7 +239,7 @@ void SceneHost::finish() {
   status_ = on.simulation.status();
   ++tick_;
   giveToJournal();
-  if (const std::vector<float> depths = on.simulation.depths(); !depths.empty()) interaction_.settle(depths);
+  interaction_.settle(on.simulation);
   if (status_.healthy) takeState();
   traceTick(done);
   telemetry::SceneMetrics& metrics = live_.metrics;
@@ -308,12 +308,12 @@ void SceneHost::traceTick(Clock::time_point done) {
 }
 
 void SceneHost::announceEvents() {
-  v1::ServerMessage message;
-  v1::TickEvents& events = *message.mutable_tick_events();
+  v1::TickEvents& events = *events_.mutable_tick_events();
+  events.Clear();
   events.set_tick(tick_);
   interaction_.addEvents(parameters_.scene(), onDevice_->simulation, events);
   if (events.grabs().empty() && events.contacts().empty()) return;
-  live_.subscribers.announce(delivery::serialise(message));
+  live_.subscribers.announce(delivery::serialise(events_));
 }
 
 void SceneHost::keepSnapshot() {

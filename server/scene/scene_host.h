@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clothstream/v1/session.pb.h"
 #include "server/delivery/frame_publisher.h"
 #include "server/scene/checkpoint.h"
 #include "server/scene/defaults.h"
@@ -159,7 +160,8 @@ class SceneHost {
   Interaction interaction_;
   SceneFrames frames_;
   SceneRecovery recovery_;
-  Inputs inputs_;  // of the newest tick
+  Inputs inputs_;             // of the newest tick
+  v1::ServerMessage events_;  // of the newest tick, in memory that is reused
 
   // Newest healthy state on the CPU.
   struct Snapshot {
