@@ -64,8 +64,8 @@ class FramePublisher {
     // Swaps `frame` with an older one, whose memory the caller reuses. Waits while the queue is full, which
     // it never is with frames of one encoder for each quality.
     void push(CompleteFrame& frame);
-    // Returns when every frame of the queue is published. No encoder of a pushed frame is used after that,
-    // and neither are its subscribers and metrics. Frames of other scenes wait meanwhile.
+    // Returns when every frame of the queue is published. They come before those of other scenes. No encoder
+    // of a pushed frame is used after that, and neither are its subscribers and metrics.
     void drain();
 
    private:
