@@ -11,7 +11,8 @@ class Workers {
  public:
   virtual ~Workers() = default;
   // Calls `piece` for each number below `pieces`, several at a time and in any order. Returns when all calls
-  // have returned. Only one caller at a time. `piece` does not throw.
+  // have returned. An encoder calls it on one thread at a time. Encoders that share workers may call it at
+  // the same time. `piece` does not throw.
   virtual void run(std::uint32_t pieces, const std::function<void(std::uint32_t)>& piece) = 0;
 };
 

@@ -2,15 +2,17 @@
 // Encodes complete frames into packets and publishes them to the subscribers of their scene.
 #pragma once
 
+#include <array>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
 
+#include "proto/codec/stream_layout.h"
 #include "server/delivery/subscribers.h"
 #include "server/encode/encoder_threads.h"
 #include "server/encode/frame_encoder.h"
@@ -44,21 +46,56 @@ struct CompleteFrame {
   std::unique_ptr<v1::Frame> fields;
 };
 
-// Owns the thread that encodes and publishes. push() and drain() belong to the device's thread.
+// Owns the threads that encode and publish. Frames of one scene are published one at a time and in order,
+// those of different scenes at the same time. Scenes with frames that wait take turns. An exception while a
+// frame is encoded or published ends the process.
 class FramePublisher {
  public:
-  // At most `capacity` frames wait, at least 1. The number of slots in all encoders is enough for push()
-  // never to wait. `everySecond` is called about once a second on the publisher's thread. `encoderThreads` is
-  // the number of threads, the publisher's included, that predict large frames.
-  FramePublisher(std::size_t capacity, std::function<void()> everySecond, std::uint32_t encoderThreads = 1);
-  // Publishes the frames that wait, then ends.
+  // Frames of one scene that are not published yet. Belongs to the device's thread.
+  class Queue {
+   public:
+    // The publisher must outlive the queue.
+    explicit Queue(FramePublisher& publisher);
+    // Drains.
+    ~Queue() { drain(); }
+    Queue(const Queue&) = delete;
+    Queue& operator=(const Queue&) = delete;
+
+    // Swaps `frame` with an older one, whose memory the caller reuses. Waits while the queue is full, which
+    // it never is with frames of one encoder for each quality.
+    void push(CompleteFrame& frame);
+    // Returns when every frame of the queue is published. They come before those of other scenes. No encoder
+    // of a pushed frame is used after that, and neither are its subscribers and metrics.
+    void drain();
+
+   private:
+    friend class FramePublisher;
+
+    // A frame that waits has a slot of an encoder. One that is being published may have none any more.
+    static constexpr std::size_t kCapacity = codec::kMaxQualities * encode::FrameEncoder::kSlots + 1;
+
+    FramePublisher& publisher_;
+    // The publisher's lock protects all below, except for the first frame while it is being published.
+    std::array<CompleteFrame, kCapacity> frames_;  // a ring
+    std::size_t first_ = 0, size_ = 0;
+    bool isDraining_ = false;
+    std::list<Queue*> turn_;  // its element is here or among the publisher's turns, so that none is allocated
+    const std::list<Queue*>::iterator place_;
+  };
+
+  // `threads`, at least 1, encode and publish. `predicting` is the number of threads, one of these included,
+  // that predict a large frame.
+  explicit FramePublisher(std::uint32_t threads = 1, std::uint32_t predicting = 1);
+  // Every queue must have ended.
   ~FramePublisher();
   FramePublisher(const FramePublisher&) = delete;
   FramePublisher& operator=(const FramePublisher&) = delete;
 
-  // Swaps `frame` with an older one, whose memory the caller reuses. Waits while `capacity` frames wait.
-  void push(CompleteFrame& frame);
-  // Returns when every frame is published. No encoder and no scene of a pushed frame is used after that.
+  // Number of `threads` for a machine with `processors` processors: three quarters of them, 1 to 16. The
+  // device's thread and the endpoints need the others.
+  static std::uint32_t suitedTo(std::uint32_t processors);
+
+  // Returns when every frame of every queue is published. Belongs to the device's thread.
   void drain();
   // Number of frames that wait. Any thread.
   std::size_t waiting() const;
@@ -67,22 +104,16 @@ class FramePublisher {
 
  private:
   void run();
-  void encode();
-  void publish(const CompleteFrame::Recorded& recorded, const encode::EncodedFrame& encoded);
+  void stop();
 
-  std::function<void()> everySecond_;
   encode::EncoderThreads workers_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<CompleteFrame> ring_;
-  std::size_t first_ = 0, waiting_ = 0;
-  bool busy_ = false, stopping_ = false;
+  mutable std::mutex mutex_;  // protects all below, and the queues
+  std::condition_variable hasTurns_, published_;
+  std::list<Queue*> turns_;  // queues with frames of which none is being published; the first is next
+  std::size_t unpublished_ = 0, inWork_ = 0;  // frames
+  bool stopping_ = false;
 
-  // Owned by the thread and reused for every frame.
-  CompleteFrame frame_;
-  std::vector<std::byte> packet_;
-
-  std::thread thread_;
+  std::vector<std::thread> threads_;
 };
 
 }  // namespace clothstream::delivery

@@ -25,7 +25,7 @@ HeldFrames::Added HeldFrames::add(const PublishedFrame& frame) {
 
 PublishedFrame HeldFrames::take() {
   PublishedFrame frame = std::move(frames_.front());
-  frames_.pop_front();
+  frames_.erase(frames_.begin());
   bytes_ -= frame.message->size();
   return frame;
 }

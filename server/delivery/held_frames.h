@@ -4,7 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
+#include <vector>
 
 #include "server/delivery/published_frame.h"
 
@@ -40,7 +40,7 @@ class HeldFrames {
   std::size_t restart();
 
  private:
-  std::deque<PublishedFrame> frames_;
+  std::vector<PublishedFrame> frames_;  // few, so that the first may be erased
   std::size_t bytes_ = 0;
   bool needsKey_ = true;
   // Tick of the newest frame that is held, or else was taken, or was dropped while a key frame is awaited.

@@ -17,7 +17,7 @@
 namespace clothstream::delivery {
 
 // The only list of a scene's mailboxes. Simulated scenes and played recordings publish to it. Thread-safe;
-// publish() belongs to one thread.
+// publish() belongs to one thread at a time.
 class Subscribers {
  public:
   // `tap`, if any, gets a copy of everything that is sent to all subscribers: announcements, and of each tick

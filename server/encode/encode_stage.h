@@ -13,7 +13,7 @@ namespace clothstream::encode {
 
 inline constexpr std::uint32_t kFrameSlots = FrameEncoder::kSlots;
 
-// record() belongs to the device's thread, entropyCode() to one other thread (or the same).
+// record() belongs to the device's thread, entropyCode() to one other thread at a time (or the same).
 class EncodeStage {
  public:
   virtual ~EncodeStage() = default;

@@ -45,7 +45,7 @@ struct EncodedFrame {
   std::uint64_t referenceTick = 0;  // of a predicted frame; else 0
 };
 
-// record() belongs to the device's thread, entropyCode() to one other thread (or the same).
+// record() belongs to the device's thread, entropyCode() to one other thread at a time (or the same).
 class FrameEncoder {
  public:
   // Largest number of frames that are recorded and not yet entropy-coded.

@@ -133,8 +133,6 @@ void DeviceThread::adopt(std::shared_ptr<scene::LiveScene> scene) {
 
 std::future<void> DeviceThread::remove(std::shared_ptr<scene::LiveScene> scene) {
   return inbox_.post(std::packaged_task<void()>([this, scene = std::move(scene)] {
-    // Waiting frames refer to the scene.
-    publisher_.drain();
     std::erase_if(runs_, [&](const auto& run) { return run->scene == scene; });
   }));
 }
@@ -480,7 +478,6 @@ void DeviceThread::checkPrice(SceneRun& run, bool isLate) {
 }
 
 void DeviceThread::stop(SceneRun& run, std::optional<Clock::duration> pause, const std::string& why) {
-  publisher_.drain();
   const std::string text =
       fmt::format("the scene '{}' is stopped because it harms other scenes: {}", run.scene->name(), why);
   if (!pause) {
@@ -512,7 +509,6 @@ void DeviceThread::countLoss(const SceneRun& noticed) {
 }
 
 void DeviceThread::rebuildScene(SceneRun& run, const std::string& reason) {
-  publisher_.drain();
   device_->drain();
   const std::uint64_t ticks = run.host->tick();
   run.release();

@@ -26,8 +26,8 @@
 
 namespace clothstream::hosting {
 
-// Belongs to the device's thread. The frames of a scene must be published (FramePublisher::drain()) before
-// its host is released, in release(), giveUp() and quarantine().
+// Belongs to the device's thread. release(), giveUp() and quarantine() wait until the frames of the scene are
+// published, and so does its end.
 class SceneRun : public schedule::TickSchedule {
  public:
   explicit SceneRun(std::shared_ptr<scene::LiveScene> live);

@@ -3,11 +3,16 @@
 
 #include <algorithm>
 #include <cassert>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "server/scene/scene_observer.h"
 
@@ -35,6 +40,11 @@ std::vector<model::Scene> defaultFirst(std::vector<model::Scene> scenes, const S
   return scenes;
 }
 
+// Number of threads: `asked`, or else as many as suit this machine.
+std::uint32_t threadsOr(std::uint32_t (*suitedTo)(std::uint32_t), std::uint32_t asked) {
+  return asked > 0 ? asked : suitedTo(std::thread::hardware_concurrency());
+}
+
 ServerOptions withDefaultScene(ServerOptions options, const std::string& name) {
   options.defaultScene = name;
   return options;
@@ -52,12 +62,8 @@ SceneServer::SceneServer(std::vector<model::Scene>&& definitions, ServerOptions&
       connections(options, metrics),
       authentication(options, metrics),
       access(options, scenes),
-      publisher((scenes.all().size() + options.maxCreatedScenes) * codec::kMaxQualities *
-                    encode::FrameEncoder::kSlots,
-                [this] { checkPeers(); },
-                options.encoderThreads > 0
-                    ? options.encoderThreads
-                    : encode::EncoderThreads::suitedTo(std::thread::hardware_concurrency())),
+      publisher(threadsOr(delivery::FramePublisher::suitedTo, options.encoderThreads),
+                threadsOr(encode::EncoderThreads::suitedTo, options.encoderThreads)),
       device(options.device, scenes.all(), publisher, metrics, *budget, options.runAlways, options.reportRate,
              options.adaptsToLoad),
       created(options, metrics, budget, scenes, kept, device),
@@ -69,7 +75,7 @@ SceneServer::SceneServer(std::vector<model::Scene>&& definitions, ServerOptions&
   created.restore();
   // Participants of an earlier run cannot come back before this time, however long the start took.
   for (const auto& scene : scenes.all()) scene->roster.restartGrace(options.reconnectGrace, Clock::now());
-  started_ = true;
+  housekeeping_ = std::jthread([this](const std::stop_token& stop) { keepHouse(stop); });
 }
 
 SceneServer::SceneServer(std::vector<model::Scene> definitions, ServerOptions given)
@@ -105,10 +111,27 @@ std::vector<std::shared_ptr<scene::LiveScene>> SceneServer::startScenes(
   return all;
 }
 
-void SceneServer::checkPeers() {
-  for (const auto& peer : connections.peers()) peer->checkSilence(Clock::now());
-  if (!started_) return;
+void SceneServer::keepHouse(const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any never;  // wakes at a request to stop
+  std::unique_lock lock(mutex);
+  while (!stop.stop_requested()) {
+    never.wait_for(lock, stop, std::chrono::seconds(1), [] { return false; });
+    try {
+      checkPeers(stop);
+    } catch (const std::exception& failure) {
+      spdlog::error("the check of every second failed: {}", failure.what());
+    }
+  }
+}
+
+void SceneServer::checkPeers(const std::stop_token& stop) {
+  for (const auto& peer : connections.peers()) {
+    if (stop.stop_requested()) return;
+    peer->checkSilence(Clock::now());
+  }
   for (const auto& scene : scenes.all()) {
+    if (stop.stop_requested()) return;
     scene->roster.expire(Clock::now());
     scene->poses.divideRoom(Clock::now());
   }

@@ -5,7 +5,9 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "server/delivery/envelope.h"
@@ -31,8 +33,8 @@
 namespace clothstream::hosting {
 
 // Owns the parts of a server, starts them and stops them; others use the parts. Thread-safe, like each of its
-// parts. DeviceThread runs the ticks of all scenes, FramePublisher encodes and publishes frames, SceneMaker
-// creates scenes and SceneLoader loads them: one thread each. EncoderThreads may add more.
+// parts. DeviceThread runs the ticks of all scenes, SceneMaker creates scenes and SceneLoader loads them, and
+// this class looks after peers: one thread each. FramePublisher encodes and publishes frames on several.
 class SceneServer {
  public:
   // The definitions must be valid (server/messages) and their names unique. Throws vulkan::DeviceError, or
@@ -81,11 +83,11 @@ class SceneServer {
   SceneServer(std::vector<model::Scene>&& definitions, ServerOptions&& given, std::uint64_t newest);
   // The scenes that the server starts with. They continue from their kept states.
   std::vector<std::shared_ptr<scene::LiveScene>> startScenes(std::vector<model::Scene> definitions) const;
-  // Looks at peers and disconnected participants. The publisher's thread calls it about once a second.
-  void checkPeers();
-
-  // Set when peers can join; before, no reconnect grace ends.
-  std::atomic<bool> started_{false};
+  // Checks peers about once a second until a request to stop.
+  void keepHouse(const std::stop_token& stop);
+  // Disconnects silent peers, removes participants whose reconnect grace has ended, and divides the room for
+  // poses. Holds a lock of one peer or scene at a time.
+  void checkPeers(const std::stop_token& stop);
 
  public:
   delivery::FramePublisher publisher;
@@ -94,6 +96,9 @@ class SceneServer {
   SceneMaker maker;
   SceneRequests requests;
   UnaryCalls unaryCalls;
+
+ private:
+  std::jthread housekeeping_;  // last, because it uses the parts; runs from when peers can join
 };
 
 }  // namespace clothstream::hosting

@@ -68,7 +68,8 @@ struct ServerOptions : Limits {
   std::uint32_t maxCreatedScenes = 16;
   // Limits what participants add by creating scenes and changing parameters.
   scene::BudgetLimits budget{};
-  // Threads that predict large frames on the CPU; 0 means automatic (EncoderThreads).
+  // Threads that encode and publish frames (FramePublisher), and threads that together predict a large frame
+  // on the CPU (EncoderThreads). 0 means automatic for both.
   std::uint32_t encoderThreads = 0;
   // Returns the journal of a scene, or null for none. May be empty.
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};

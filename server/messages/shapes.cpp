@@ -81,6 +81,7 @@ void writeSimple(const model::Shape& shape, Message& message) {
                    v1::Capsule& to = *message.mutable_capsule();
                    to.set_radius(capsule.radius);
                    to.set_length(capsule.length);
+                   to.clear_top_radius();
                    if (capsule.topRadius) to.set_top_radius(*capsule.topRadius);
                  },
                  [&](const model::Plane&) { message.mutable_plane(); },

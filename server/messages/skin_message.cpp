@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "server/messages/skin_message.h"
 
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -142,9 +144,9 @@ void writePoses(std::span<const model::Pose> poses, google::protobuf::RepeatedFi
 
 void writeJoints(const model::Skin& skin, std::span<const model::Pose> local,
                  google::protobuf::RepeatedField<float>& numbers) {
-  std::vector<model::Pose> poses;
-  model::compose(skin, local, poses);
-  writePoses(poses, numbers);
+  std::array<model::Pose, model::kMaxJoints> poses;
+  model::compose(skin, local, std::span(poses).first(local.size()));
+  writePoses(std::span(poses).first(local.size()), numbers);
 }
 
 }  // namespace clothstream::messages

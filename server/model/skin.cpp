@@ -97,10 +97,15 @@ Pose between(const Pose& a, const Pose& b, double part) {
 }
 
 void compose(const Skin& skin, std::span<const Pose> local, std::vector<Pose>& poses) {
+  poses.resize(local.size());
+  compose(skin, local, std::span(poses));
+}
+
+void compose(const Skin& skin, std::span<const Pose> local, std::span<Pose> poses) {
+  assert(poses.size() == local.size());
   Frames frames;
   composeFrames(skin, local, frames);
-  poses.clear();
-  for (std::size_t i = 0; i < local.size(); ++i) poses.push_back(poseOf(frames[i]));
+  for (std::size_t i = 0; i < local.size(); ++i) poses[i] = poseOf(frames[i]);
 }
 
 std::vector<Pose> restJoints(const Skin& skin) {

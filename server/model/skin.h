@@ -45,6 +45,8 @@ struct Skin {
 // Poses of the joints in the frame of the collider, from poses relative to their parents. Only + - * / and
 // sqrt in double are used, so every machine gives the same values. Allocates nothing if `poses` has room.
 void compose(const Skin& skin, std::span<const Pose> local, std::vector<Pose>& poses);
+// `poses` has as many elements as `local`.
+void compose(const Skin& skin, std::span<const Pose> local, std::span<Pose> poses);
 // The pose that is this part of the way from one to another, 0 to 1. It turns the shorter way.
 Pose between(const Pose& a, const Pose& b, double part);
 // Poses at rest and at a simulated time of the animation, relative to the parents.

@@ -209,7 +209,7 @@ Families serverFamilies(const hosting::SceneServer& server) {
         static_cast<double>(server.device.reservedDeviceMemory()));
   gauge("clothstream_device_silence_seconds", "Time since the last answer of the device thread.",
         schedule::seconds(schedule::Clock::now() - server.device.lastAnswer()));
-  gauge("clothstream_publisher_waiting_frames", "Frames that wait for the encoder thread.",
+  gauge("clothstream_publisher_waiting_frames", "Frames that wait for an encoder thread.",
         static_cast<double>(server.publisher.waiting()));
   const scene::StoreStatus store =
       server.options.store ? server.options.store->status() : scene::StoreStatus();

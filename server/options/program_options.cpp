@@ -112,9 +112,11 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
       "Seconds without participants after which a scene that a client created is deleted. 0 keeps it");
   table.showDefault(parsed.sceneLifetimeOption, kOfProfile);
   addBudgetOptions(table, options.server.budget);
-  table.number("--encoder-threads", options.server.encoderThreads, kThreads,
-               "CPU threads that predict large frames where the device does not. 0 means a quarter of the "
-               "processors, at most 8");
+  table.number(
+      "--encoder-threads", options.server.encoderThreads, kThreads,
+      "CPU threads that encode frames of different scenes, and that predict a large frame together "
+      "where the device does not. 0 means three quarters of the processors, at most 16, and to predict "
+      "a quarter, at most 8");
   table.action("--list-materials", parsed.listMaterials, "List the materials of cloths, and exit");
 }
 

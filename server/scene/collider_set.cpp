@@ -165,24 +165,31 @@ ColliderSet::Identity ColliderSet::identity(std::size_t index) const {
   return {placed.participant, placed.now.id};
 }
 
+// Sets every field of each element. Protobuf would free the fields of elements that are cleared.
 void ColliderSet::write(const model::Scene& scene, v1::Frame& frame) const {
+  const std::size_t own = scene.colliders.size();
   auto& states = *frame.mutable_colliders();
-  states.Clear();
-  for (std::size_t i = 0; i < scene.colliders.size(); ++i) {
-    v1::ColliderState& state = *states.Add();
+  const auto count = static_cast<int>(own + state_.colliders.size());
+  while (states.size() > count) states.RemoveLast();
+  while (states.size() < count) states.Add();
+  for (std::size_t i = 0; i < own; ++i) {
+    v1::ColliderState& state = states[static_cast<int>(i)];
     messages::write(scene.colliders[i], state_.scenePoses[i], state);
+    state.clear_joints();
     if (const model::Skin* skin = skinOf(scene.colliders[i]))
       messages::writeJoints(*skin, state_.joints[i].now, *state.mutable_joints());
+    state.set_yields(false);
   }
-  for (const Placed& collider : state_.colliders) {
-    v1::ColliderState& state = *states.Add();
+  for (std::size_t i = 0; i < state_.colliders.size(); ++i) {
+    const Placed& collider = state_.colliders[i];
+    v1::ColliderState& state = states[static_cast<int>(own + i)];
+    const bool yields = collider.yield && collider.yield->stands;
     model::ParticipantCollider shown = collider.now;
     shown.shape = model::thinned(shown.shape, collider.depth);
-    if (collider.yield && collider.yield->stands) {
-      shown.pose = collider.before;
-      state.set_yields(true);
-    }
+    if (yields) shown.pose = collider.before;
     messages::write(shown, collider.participant, state);
+    state.clear_joints();
+    state.set_yields(yields);
   }
 }
 

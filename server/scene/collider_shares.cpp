@@ -40,11 +40,10 @@ ColliderLoad loadOf(std::span<const model::ParticipantCollider> colliders, const
   return load;
 }
 
-double fairShare(std::span<const double> needs, double room) {
-  std::vector<double> ascending(needs.begin(), needs.end());
-  std::ranges::sort(ascending);
-  std::size_t left = ascending.size();
-  for (const double need : ascending) {
+double fairShare(std::span<double> needs, double room) {
+  std::ranges::sort(needs);
+  std::size_t left = needs.size();
+  for (const double need : needs) {
     const double even = room / static_cast<double>(left--);
     if (need > even + kRounding) return std::max(even, 0.0);
     room -= need;

@@ -42,8 +42,8 @@ struct ColliderLoad {
 ColliderLoad loadOf(std::span<const model::ParticipantCollider> colliders, const ClothBounds* cloth);
 
 // The largest amount that each may have if all together have `room`: one that needs less leaves the rest to
-// the others. Infinite if there is room for all.
-double fairShare(std::span<const double> needs, double room);
+// the others. Infinite if there is room for all. Sorts the needs.
+double fairShare(std::span<double> needs, double room);
 
 // Removes each collider that no longer fits into a share, in their order. Returns whether any was removed.
 bool trim(std::vector<model::ParticipantCollider>& colliders, const ColliderLoad& share,

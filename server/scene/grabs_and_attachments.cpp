@@ -98,8 +98,9 @@ void GrabsAndAttachments::letGo() {
   toldToJump_.clear();
 }
 
-float GrabsAndAttachments::forceOfEach(float most) const {
-  std::vector<double> wanted;
+float GrabsAndAttachments::forceOfEach(float most) {
+  std::vector<double>& wanted = wantedForces_;
+  wanted.clear();
   for (const Slot& slot : state_.slots)
     if ((slot.phase == Slot::Phase::takes || slot.phase == Slot::Phase::holds) && slot.vertices != 0u)
       wanted.push_back(std::min(slot.now.maxForce, most));

@@ -76,10 +76,11 @@ class GrabsAndAttachments {
   static void release(Slot& slot);
   // Largest force of each grab, N: those that hold something, or may do so, share it. `most` is
   // maxGrabForce().
-  float forceOfEach(float most) const;
+  float forceOfEach(float most);
 
   State state_;
   std::vector<std::size_t> toldToJump_;                            // attachments, in the next tick
+  std::vector<double> wantedForces_;                               // of grabs, N; reused in every tick
   std::uint64_t newest_ = 0;                                       // number of the newest grab
   std::vector<std::pair<std::uint64_t, std::uint32_t>> released_;  // in the current tick: participant, id
 };

@@ -60,10 +60,17 @@ void Interaction::takeArrivals(std::vector<Clock::time_point>& arrivals) {
   arrivals_.clear();
 }
 
+void Interaction::settle(const simulation::ClothSimulation& simulation) {
+  simulation.readDepths(depths_);
+  if (!depths_.empty()) colliders_.settle(depths_);
+}
+
 void Interaction::addEvents(const model::Scene& scene, const simulation::ClothSimulation& simulation,
                             v1::TickEvents& events) {
-  grabs_.addEvents(simulation.grabs(), events);
-  contacts_.addEvents(events.tick(), scene, colliders_, simulation.contacts(), events);
+  simulation.readGrabs(grabStatuses_);
+  grabs_.addEvents(grabStatuses_, events);
+  simulation.readContacts(contactStatuses_);
+  contacts_.addEvents(events.tick(), scene, colliders_, contactStatuses_, events);
 }
 
 }  // namespace clothstream::scene

@@ -49,7 +49,7 @@ class Interaction {
 
   // The tick is complete. The first accepts or refuses poses of colliders (ColliderSet::settle); the second
   // adds the events of the tick, which is events.tick().
-  void settle(std::span<const float> depths) { colliders_.settle(depths); }
+  void settle(const simulation::ClothSimulation& simulation);
   void addEvents(const model::Scene& scene, const simulation::ClothSimulation& simulation,
                  v1::TickEvents& events);
 
@@ -68,6 +68,10 @@ class Interaction {
   PoseHistory poses_;
   std::vector<Clock::time_point> arrivals_;  // of poses that no frame has shown yet
   simulation::TickInputs inputs_;
+  // Results of the tick, whose memory is reused.
+  std::vector<float> depths_;
+  std::vector<simulation::GrabStatus> grabStatuses_;
+  std::vector<simulation::ContactStatus> contactStatuses_;
 };
 
 }  // namespace clothstream::scene

@@ -13,7 +13,7 @@ using Recorded = delivery::CompleteFrame::Recorded;
 
 SceneFrames::SceneFrames(LiveScene& live, delivery::FramePublisher& publisher, double reportRate)
     : live_(live),
-      publisher_(publisher),
+      queue_(publisher),
       schedule_(live.start().simulationRate, live.start().streamRate, reportRate) {}
 
 void SceneFrames::chooseEncoders(SceneOnDevice& on, Clock::time_point now) {
@@ -83,7 +83,7 @@ void SceneFrames::publish(const SceneOnDevice& on, const simulation::TickStatus&
   frame_.discarded = !status.healthy;
   frame_.fields->set_state_hash(status.stateHash);
   frame_.deviceDone = done;
-  publisher_.push(frame_);
+  queue_.push(frame_);
 }
 
 void SceneFrames::encodePaused(SceneOnDevice& on, std::uint64_t tick, const model::Scene& scene,
@@ -119,7 +119,7 @@ void SceneFrames::encodePaused(SceneOnDevice& on, std::uint64_t tick, const mode
   frame_.discarded = !status.healthy;
   frame_.fields->set_state_hash(status.stateHash);
   frame_.deviceDone = Clock::now();
-  publisher_.push(frame_);
+  queue_.push(frame_);
 }
 
 void SceneFrames::writeReport(const SceneOnDevice& on, double seconds) {

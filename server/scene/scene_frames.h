@@ -17,7 +17,8 @@ namespace clothstream::scene {
 // Belongs to the device's thread.
 class SceneFrames {
  public:
-  // Both must outlive this object. With `reportRate` 0 no frame carries a report.
+  // Both must outlive this object, whose end waits until its frames are published. With `reportRate` 0 no
+  // frame carries a report.
   SceneFrames(LiveScene& live, delivery::FramePublisher& publisher, double reportRate);
 
   // Records the frame of `tick`, whose end is recorded, if it has one: in the qualities that subscribers
@@ -34,6 +35,9 @@ class SceneFrames {
   void encodePaused(SceneOnDevice& on, std::uint64_t tick, const model::Scene& scene,
                     const Interaction& interaction, Clock::time_point now);
 
+  // Returns when every frame is published. The encoders are not used after that.
+  void drain() { queue_.drain(); }
+
   // As in FrameSchedule.
   void owe() { schedule_.owe(); }
   bool owes() const { return schedule_.owes(); }
@@ -47,7 +51,7 @@ class SceneFrames {
   void writeReport(const SceneOnDevice& on, double seconds);
 
   LiveScene& live_;
-  delivery::FramePublisher& publisher_;
+  delivery::FramePublisher::Queue queue_;
   FrameSchedule schedule_;
   delivery::CompleteFrame frame_;
   bool hasFrame_ = false;   // the current tick

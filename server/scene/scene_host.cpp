@@ -23,7 +23,6 @@ SceneHost::SceneHost(vulkan::Device& device, LiveScene& scene, delivery::FramePu
 SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
                      delivery::FramePublisher& publisher, double reportRate, SceneLoader* loader)
     : live_(scene),
-      publisher_(publisher),
       onDevice_(std::move(loaded)),
       parameters_(scene.start(), loader),
       interaction_(scene.start()),
@@ -43,6 +42,7 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
 }
 
 SceneHost::~SceneHost() {
+  frames_.drain();  // the journal gets them
   if (live_.journal) live_.journal->end();
 }
 
@@ -129,7 +129,7 @@ void SceneHost::beginJournalIfDue() {
   on.simulation.recordSaveState(on.recorder);
   on.device.wait(on.device.submit(on.recorder));
   // Frames of earlier ticks must not become part of the recording.
-  publisher_.drain();
+  frames_.drain();
   beginJournal(on.simulation.collectState(tick_));
   current_.beginsJournal = true;
   frames_.beginRecording();
@@ -239,7 +239,7 @@ void SceneHost::finish() {
   status_ = on.simulation.status();
   ++tick_;
   giveToJournal();
-  if (const std::vector<float> depths = on.simulation.depths(); !depths.empty()) interaction_.settle(depths);
+  interaction_.settle(on.simulation);
   if (status_.healthy) takeState();
   traceTick(done);
   telemetry::SceneMetrics& metrics = live_.metrics;
@@ -308,12 +308,12 @@ void SceneHost::traceTick(Clock::time_point done) {
 }
 
 void SceneHost::announceEvents() {
-  v1::ServerMessage message;
-  v1::TickEvents& events = *message.mutable_tick_events();
+  v1::TickEvents& events = *events_.mutable_tick_events();
+  events.Clear();
   events.set_tick(tick_);
   interaction_.addEvents(parameters_.scene(), onDevice_->simulation, events);
   if (events.grabs().empty() && events.contacts().empty()) return;
-  live_.subscribers.announce(delivery::serialise(message));
+  live_.subscribers.announce(delivery::serialise(events_));
 }
 
 void SceneHost::keepSnapshot() {
@@ -357,11 +357,12 @@ void SceneHost::encodePausedFrame(Clock::time_point now) {
 }
 
 void SceneHost::releaseCoarseEncoders() {
-  publisher_.drain();
+  frames_.drain();
   onDevice_->encoders.drop();
 }
 
 void SceneHost::release() {
+  frames_.drain();  // they use the encoders
   parameters_.endRehearsal();
   onDevice_.reset();
 }

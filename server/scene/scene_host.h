@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clothstream/v1/session.pb.h"
 #include "server/delivery/frame_publisher.h"
 #include "server/scene/checkpoint.h"
 #include "server/scene/defaults.h"
@@ -50,6 +51,7 @@ class SceneHost {
   // `loaded` holds the scene's start.
   SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene, delivery::FramePublisher& publisher,
             double reportRate, SceneLoader* loader = nullptr);
+  // Publishes the frames of the scene that wait.
   ~SceneHost();
 
   // Sets the work from the next tick on. Substeps are raised to leastSubsteps(). A change is announced.
@@ -86,7 +88,8 @@ class SceneHost {
   // Releases the encoders of the coarser qualities, when the scene is paused or has no subscribers.
   void releaseCoarseEncoders();
 
-  // Releases everything on the device. After that only rebuild() and isReady() may be called.
+  // Releases everything on the device, once the scene's frames are published. After that only rebuild() and
+  // isReady() may be called.
   void release();
   bool isReady() const { return onDevice_ != nullptr; }
   // Continues from the newest snapshot. `loaded` holds the scene's start. `why` begins the notice to the
@@ -159,14 +162,14 @@ class SceneHost {
   void announceRefusal(const std::string& reason);
 
   LiveScene& live_;
-  delivery::FramePublisher& publisher_;
   std::shared_ptr<SceneOnDevice> onDevice_;  // shared with a rehearsal
 
   SceneParameters parameters_;
   Interaction interaction_;
   SceneFrames frames_;
   SceneRecovery recovery_;
-  Inputs inputs_;  // of the newest tick
+  Inputs inputs_;             // of the newest tick
+  v1::ServerMessage events_;  // of the newest tick, in memory that is reused
 
   // Newest healthy state on the CPU.
   struct Snapshot {

@@ -178,8 +178,7 @@ void Session::closePage() {
 
 void Session::checkSilence(Clock::time_point now) {
   const hosting::ServerOptions& options = server_.options;
-  // This runs on a thread that publishes frames. A session that handles a message is not silent; the next
-  // call checks it.
+  // The caller checks every peer. A session that handles a message is not silent; the next call checks it.
   const std::unique_lock lock(mutex_, std::try_to_lock);
   if (!lock) return;
   // A mailbox that others closed, such as the scene's roster, is noticed here too.

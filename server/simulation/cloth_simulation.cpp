@@ -353,22 +353,21 @@ void ClothSimulation::recordReport(vulkan::Recorder& recorder, const TickInputs&
   on.namesConstraints = inputs.namesConstraints && on.stages.solvers.recordActiveSprings(recorder);
 }
 
-std::vector<ContactStatus> ClothSimulation::contacts() const {
-  return pipeline_->stages.collision.contacts(pipeline_->slot);
+void ClothSimulation::readContacts(std::vector<ContactStatus>& contacts) const {
+  pipeline_->stages.collision.readContacts(pipeline_->slot, contacts);
 }
 
-std::vector<float> ClothSimulation::depths() const {
+void ClothSimulation::readDepths(std::vector<float>& depths) const {
   const Stages& stages = pipeline_->stages;
-  if (!stages.motionBound) return {};
-  return stages.collision.inOrder(stages.motionBound->depths(pipeline_->slot));
+  depths.clear();
+  if (stages.motionBound) stages.collision.order(stages.motionBound->depths(pipeline_->slot), depths);
 }
 
-std::vector<GrabStatus> ClothSimulation::grabs() const {
-  std::vector<GrabStatus> grabs;
-  if (pipeline_->stages.attachments)
-    for (const shared::GrabReport& report : pipeline_->stages.attachments->report(pipeline_->slot))
-      grabs.push_back(statusOf(report));
-  return grabs;
+void ClothSimulation::readGrabs(std::vector<GrabStatus>& grabs) const {
+  grabs.clear();
+  if (!pipeline_->stages.attachments) return;
+  for (const shared::GrabReport& report : pipeline_->stages.attachments->report(pipeline_->slot))
+    grabs.push_back(statusOf(report));
 }
 
 std::vector<ClothReport> ClothSimulation::report() const {

@@ -93,18 +93,18 @@ class ClothSimulation {
   // then implicit Euler (each first grids, then meshes, and small systems first), then assembled systems.
   std::vector<shared::SolveRecord> solves() const;
 
+  // The following three replace the elements of a vector, so that a tick allocates nothing.
+  //
   // Contacts of the last recorded tick, once it is complete, ordered by collider, then by cloth. Colliders
   // without contact are left out.
-  std::vector<ContactStatus> contacts() const;
-
+  void readContacts(std::vector<ContactStatus>& contacts) const;
   // For each collider: depth of the deepest free node that touches it, in this or another collider, at the
   // end of the last recorded tick, once it is complete. Only nodes of cloths that nothing passes through
   // count. Metres, in the order of TickInputs::colliders; 0 for a triangle mesh. Empty if the scene has no
   // such cloth.
-  std::vector<float> depths() const;
-
+  void readDepths(std::vector<float>& depths) const;
   // Status of the grabs of the last recorded tick, once it is complete.
-  std::vector<GrabStatus> grabs() const;
+  void readGrabs(std::vector<GrabStatus>& grabs) const;
 
   // Records a report of each cloth after a tick, in the same recording. report() reads it once that is
   // complete. Ticks without a report cost nothing. Stage "report".

@@ -3,6 +3,7 @@
 #include "server/simulation/force_stage.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/texel.h"
@@ -97,10 +98,12 @@ void ForceStage::recordSubstep(vulkan::Recorder& recorder, const Substep& subste
   }
   const AdvanceVariant variant =
       variantOf(tick.cloths, airDensity_, winds_.count() > 0, false, Follow::nothing);
-  rungeKutta_->record(recorder, substep.from, push.collision, [&](std::uint32_t from, float part) {
+  const auto recordEuler = [&](std::uint32_t from, float part) {
     push.stepSeconds = part * static_cast<float>(tick.substepSeconds);
     recordAdvance(recorder, from, variant, Follow::nothing, push);
-  });
+  };
+  // By reference, because a copy in the std::function would be allocated.
+  rungeKutta_->record(recorder, substep.from, push.collision, std::ref(recordEuler));
 }
 
 void ForceStage::recordAdvance(vulkan::Recorder& recorder, std::uint32_t from, const AdvanceVariant& variant,

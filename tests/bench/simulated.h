@@ -58,7 +58,11 @@ class Simulated {
 
   simulation::NodeState state();
   // Contacts of the last tick, if its inputs asked for them.
-  std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
+  std::vector<simulation::ContactStatus> contacts() const {
+    std::vector<simulation::ContactStatus> contacts;
+    simulation_.readContacts(contacts);
+    return contacts;
+  }
   std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
 
   // Times of ticks in seconds: wall clock of the whole tick, and the advance stage by the device's clock.

@@ -43,7 +43,6 @@ class RecordedScene {
   explicit RecordedScene(RecorderOptions options, model::Scene scene = smallScene())
       : recorder(std::make_shared<Recorder>(std::move(options))),
         live(std::move(scene), {}, recorder),
-        publisher(encode::FrameEncoder::kSlots, [] {}),
         host(std::make_unique<scene::SceneHost>(tests::device(), live, publisher)) {}
   ~RecordedScene() { publisher.drain(); }
 

@@ -47,7 +47,7 @@ class SceneJournalTest : public tests::GpuTest {
     options.serverName = "test";
     journal = std::make_shared<SceneJournal>("small", options, always);
     live = std::make_unique<scene::LiveScene>(tests::smallScene(), scene::SceneTerms{}, journal);
-    publisher = std::make_unique<delivery::FramePublisher>(encode::FrameEncoder::kSlots, [] {});
+    publisher = std::make_unique<delivery::FramePublisher>();
     host = std::make_unique<scene::SceneHost>(tests::device(), *live, *publisher);
   }
   void ticks(int count) {

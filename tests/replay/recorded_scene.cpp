@@ -63,7 +63,7 @@ std::string recordScene(vulkan::Device& device, const std::string& name,
   const model::Vec3 wind = scene->environment.wind;
   const auto recorder = std::make_shared<recording::Recorder>(
       recording::RecorderOptions{.directory = directory, .serverName = "clothstream replay"});
-  delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
+  delivery::FramePublisher publisher;
   scene::LiveScene live(std::move(*scene), {}, recorder);
   auto host = std::make_unique<scene::SceneHost>(device, live, publisher);
   model::Vec3 centre = model::Vec3::Zero();

@@ -259,7 +259,7 @@ TEST_F(CheckpointTest, StaysUntilAHostContinuesFromIt) {
   const auto journal = std::make_shared<FailingJournal>();
   scene::LiveScene live(scene, {}, journal);
   restore(live, savedScene(scene, checkpointAfter(5)));
-  delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
+  delivery::FramePublisher publisher;
   EXPECT_THROW(scene::SceneHost(tests::device(), live, publisher), vulkan::DeviceLost);
   journal->fails = false;
   const scene::SceneHost host(tests::device(), live, publisher);

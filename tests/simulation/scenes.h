@@ -73,9 +73,21 @@ class Running {
   simulation::NodeState state() { return simulation::unpack(save()); }
   std::vector<model::Vec3> normals();
   std::vector<shared::SolveRecord> solves() const { return simulation_.solves(); }
-  std::vector<simulation::ContactStatus> contacts() const { return simulation_.contacts(); }
-  std::vector<simulation::GrabStatus> grabs() const { return simulation_.grabs(); }
-  std::vector<float> depths() const { return simulation_.depths(); }
+  std::vector<simulation::ContactStatus> contacts() const {
+    std::vector<simulation::ContactStatus> contacts;
+    simulation_.readContacts(contacts);
+    return contacts;
+  }
+  std::vector<simulation::GrabStatus> grabs() const {
+    std::vector<simulation::GrabStatus> grabs;
+    simulation_.readGrabs(grabs);
+    return grabs;
+  }
+  std::vector<float> depths() const {
+    std::vector<float> depths;
+    simulation_.readDepths(depths);
+    return depths;
+  }
   // Dispatches of a tick, also those that the device makes empty. The tick does not run.
   std::uint64_t dispatches(const simulation::TickInputs& inputs);
   // Runs one tick with a report. Returns the reports of all cloths.

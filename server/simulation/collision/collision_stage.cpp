@@ -93,23 +93,21 @@ void CollisionStage::recordReport(vulkan::Recorder& recorder, const Tick& tick) 
   recorder.copy(contactImpulses_, readback, contactBytes());
 }
 
-std::vector<ContactStatus> CollisionStage::contacts(std::uint32_t slot) const {
-  std::vector<ContactStatus> statuses;
-  if (!reportsContacts_) return statuses;
+void CollisionStage::readContacts(std::uint32_t slot, std::vector<ContactStatus>& contacts) const {
+  contacts.clear();
+  if (!reportsContacts_) return;
   const auto units = contactReadbacks_[slot].mapped<const std::uint32_t>();
   for (std::uint32_t i = 0; i < indices_.size() * clothCount_; ++i)
     if (units[i] != 0)
-      statuses.push_back(
+      contacts.push_back(
           {indices_[i / clothCount_], i % clothCount_, units[i] / double{shared::kImpulseUnits}});
-  std::ranges::sort(statuses, {},
+  std::ranges::sort(contacts, {},
                     [](const ContactStatus& status) { return std::tuple(status.collider, status.cloth); });
-  return statuses;
 }
 
-std::vector<float> CollisionStage::inOrder(std::span<const float> numbers) const {
-  std::vector<float> values(indices_.size());
+void CollisionStage::order(std::span<const float> numbers, std::vector<float>& values) const {
+  values.resize(indices_.size());
   for (std::size_t i = 0; i < indices_.size(); ++i) values[indices_[i]] = numbers[i];
-  return values;
 }
 
 void CollisionStage::recordStart(vulkan::Recorder& recorder, const Tick& tick, std::uint32_t present) {

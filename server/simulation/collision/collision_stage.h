@@ -40,12 +40,12 @@ class CollisionStage final : public Stage {
   std::uint32_t solidCount() const { return static_cast<std::uint32_t>(indices_.size()) - count_; }
   shared::CollisionPush push(std::uint32_t substep, std::uint32_t substeps, float tickRate) const;
 
-  // Contacts of the last recorded tick, which has this slot, once it is complete.
-  std::vector<ContactStatus> contacts(std::uint32_t slot) const;
+  // Replaces `contacts` by those of the last recorded tick, which has this slot, once it is complete.
+  void readContacts(std::uint32_t slot, std::vector<ContactStatus>& contacts) const;
 
-  // Values of the colliders of the last recorded tick, in the order of its inputs. `numbers` has them as the
-  // device numbers colliders.
-  std::vector<float> inOrder(std::span<const float> numbers) const;
+  // Replaces `values` by those of the colliders of the last recorded tick, in the order of its inputs.
+  // `numbers` has them as the device numbers colliders.
+  void order(std::span<const float> numbers, std::vector<float>& values) const;
 
   const vulkan::Buffer& colliders() const { return colliders_; }
   const vulkan::Buffer& nearLists() const { return nearLists_; }

@@ -9,7 +9,6 @@
 #include "clothstream/v1/session.pb.h"
 #include "server/delivery/frame_publisher.h"
 #include "server/delivery/mailbox.h"
-#include "server/encode/frame_encoder.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/scene_host.h"
 
@@ -40,7 +39,7 @@ bool isFrame(const delivery::SharedBytes& message) {
 
 RecordedStream recordStream(vulkan::Device& device, const model::Scene& scene, std::uint32_t ticks) {
   scene::LiveScene live(scene);
-  delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
+  delivery::FramePublisher publisher;
   scene::SceneHost host(device, live, publisher);
   const auto mailbox = std::make_shared<delivery::Mailbox>([] {});
   live.subscribers.add(mailbox);

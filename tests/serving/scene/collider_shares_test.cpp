@@ -66,11 +66,12 @@ TEST(ColliderShares, AHandWeighsLessThanTwoLargeColliders) {
 }
 
 TEST(ColliderShares, AParticipantThatNeedsLessLeavesTheRest) {
-  EXPECT_EQ(fairShare(std::vector{1.0, 2.0, 3.0}, 6), INFINITY);
-  EXPECT_DOUBLE_EQ(fairShare(std::vector{60.0, 1.0, 60.0}, 11), 5);
-  EXPECT_DOUBLE_EQ(fairShare(std::vector{60.0, 60.0}, 0), 0);
-  EXPECT_DOUBLE_EQ(fairShare(std::vector{60.0}, -1), 0);
-  EXPECT_EQ(fairShare({}, 1), INFINITY);
+  const auto share = [](std::vector<double> needs, double room) { return fairShare(needs, room); };
+  EXPECT_EQ(share({1, 2, 3}, 6), INFINITY);
+  EXPECT_DOUBLE_EQ(share({60, 1, 60}, 11), 5);
+  EXPECT_DOUBLE_EQ(share({60, 60}, 0), 0);
+  EXPECT_DOUBLE_EQ(share({60}, -1), 0);
+  EXPECT_EQ(share({}, 1), INFINITY);
 }
 
 TEST(ColliderShares, TrimmingKeepsHands) {

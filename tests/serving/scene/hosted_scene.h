@@ -33,9 +33,7 @@ class HostedScene {
       model::Scene scene = smallScene(), std::size_t subscribers = 1,
       const std::function<void(scene::LiveScene&)>& prepare = [](scene::LiveScene&) {},
       std::shared_ptr<scene::Journal> journal = nullptr)
-      : live(std::move(scene), {}, std::move(journal)),
-        publisher(encode::FrameEncoder::kSlots, [] {}),
-        host((prepare(live), device()), live, publisher) {
+      : live(std::move(scene), {}, std::move(journal)), host((prepare(live), device()), live, publisher) {
     for (std::size_t i = 0; i < subscribers; ++i) {
       mailboxes.push_back(std::make_shared<delivery::Mailbox>([] {}));
       live.subscribers.add(mailboxes.back());

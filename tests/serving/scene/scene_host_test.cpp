@@ -41,7 +41,7 @@ class SceneHostTest : public tests::GpuTest {};
 TEST_F(SceneHostTest, RefusesASceneThatLeavesTooFewAllocations) {
   vulkan::Device few({.maxAllocations = SceneOnDevice::kSpareAllocations});
   LiveScene live(smallScene());
-  delivery::FramePublisher publisher(1, [] {});
+  delivery::FramePublisher publisher;
   try {
     const SceneHost host(few, live, publisher);
     FAIL() << "accepted";
@@ -103,7 +103,7 @@ TEST_F(SceneHostTest, SlicesOfATickGiveTheSameStates) {
   cloth.mass = 0.001f * static_cast<float>(cloth.nodeCount());
   const auto simulate = [&](double sliceScale, std::uint32_t& slices) {
     LiveScene live(scene);
-    delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
+    delivery::FramePublisher publisher;
     auto loaded = std::make_unique<SceneOnDevice>(tests::device(), scene, publisher.workers());
     for (int i = 0; i < 20; ++i) loaded->slices.scale(sliceScale);
     SceneHost host(std::move(loaded), live, publisher, 0);
@@ -224,7 +224,7 @@ model::ParameterChange constraints(std::uint32_t iterations) {
 TEST_F(SceneHostTest, ChangesOfOneTickMakeStagesOnce) {
   const model::Scene scene = smallScene();
   LiveScene live(scene);
-  delivery::FramePublisher publisher(encode::FrameEncoder::kSlots, [] {});
+  delivery::FramePublisher publisher;
   auto loaded = std::make_unique<SceneOnDevice>(tests::device(), scene, publisher.workers());
   const auto& simulation = loaded->simulation;
   SceneHost host(std::move(loaded), live, publisher, 0);
