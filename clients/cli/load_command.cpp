@@ -205,7 +205,7 @@ void LoadCommand::add(CLI::App& app) {
       ->capture_default_str()
       ->needs(scenes);
   command_->add_option("--rate", options_.rate, "Ticks and frames per second of each created scene")
-      ->check(CLI::Range(1u, 1000u))
+      ->check(CLI::Range(load::kLeastRate, load::kMostRate))
       ->capture_default_str()
       ->needs(scenes);
   command_

@@ -25,7 +25,7 @@ v1::Scene hungScene(std::uint32_t nodes, std::uint32_t rate) {
   scene.set_simulation_rate(rate);
   scene.set_stream_rate(rate);
   scene.set_substeps(kSubsteps);
-  scene.mutable_environment()->mutable_wind()->set_z(2);
+  scene.mutable_environment()->mutable_wind()->set_z(4);
   v1::Cloth& cloth = *scene.add_cloths();
   cloth.set_name("sheet");
   v1::Grid& grid = *cloth.mutable_grid();
@@ -39,7 +39,7 @@ v1::Scene hungScene(std::uint32_t nodes, std::uint32_t rate) {
   cloth.mutable_shear()->set_stiffness(static_cast<float>(kShear * bearable));
   cloth.mutable_bend()->set_stiffness(static_cast<float>(kBend * bearable));
   cloth.set_damping(0.5f);
-  cloth.set_drag(0.5f);
+  cloth.set_drag(0.1f);
   v1::GridRange& corners = *cloth.add_pins();
   corners.set_last_column(columns - 1);
   corners.set_column_step(columns - 1);

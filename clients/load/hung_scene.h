@@ -8,8 +8,8 @@
 
 namespace clothstream::load {
 
-// Number of nodes of a created scene, which its server may limit further.
-inline constexpr std::uint32_t kLeastNodes = 4, kMostNodes = 1 << 20;
+// Number of nodes of a created scene, which its server may limit further, and its ticks per second.
+inline constexpr std::uint32_t kLeastNodes = 4, kMostNodes = 1 << 20, kLeastRate = 10, kMostRate = 1000;
 
 // One sheet of a square metre that hangs by two corners in a light wind, so that it never rests. Its grid has
 // about `nodes` nodes, as many rows as columns or one more. The springs are as stiff as the ten substeps of a
