@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::delivery {
 
@@ -52,6 +53,7 @@ std::size_t FramePublisher::waiting() const {
 }
 
 void FramePublisher::run() {
+  telemetry::nameThread("publisher");
   Clock::time_point nextCall = Clock::now() + std::chrono::seconds(1);
   for (;;) {
     {
