@@ -12,7 +12,7 @@
 namespace clothstream::load {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using std::chrono::steady_clock;
 
 // Longer than a server takes for a scene before it gives it up (--profile).
 constexpr std::chrono::seconds kCreationTime{90};
@@ -21,7 +21,7 @@ constexpr std::chrono::seconds kLastCreationTime{10};
 // Time without an answer after which no more deletions are awaited.
 constexpr std::chrono::seconds kDeletionTime{30};
 constexpr std::size_t kDeletionsAtOnce = 16;
-constexpr std::chrono::milliseconds kPause{2};
+constexpr std::chrono::milliseconds kPollInterval{2};
 
 std::string randomPrefix() {
   char text[16];
@@ -52,7 +52,7 @@ bool CreatedScenes::exists(std::uint32_t scene) {
 void CreatedScenes::takeAnswer() {
   const std::optional<SceneRequest::Answer> answer = request_->answer();
   if (!answer) {
-    if (Clock::now() - request_->sent() < kCreationTime) return;
+    if (steady_clock::now() - request_->sent() < kCreationTime) return;
     failure_ = {Failure::Kind::lost,
                 "the server did not answer within " + std::to_string(kCreationTime.count()) + " s"};
   } else if (answer->failure) {
@@ -79,8 +79,9 @@ std::unique_ptr<SceneRequest> CreatedScenes::deletionOf(std::uint32_t scene) con
 }
 
 CreatedScenes::Remaining CreatedScenes::remove() {
-  for (const auto end = Clock::now() + kLastCreationTime; request_ && Clock::now() < end; takeAnswer())
-    std::this_thread::sleep_for(kPause);
+  for (const auto end = steady_clock::now() + kLastCreationTime; request_ && steady_clock::now() < end;
+       takeAnswer())
+    std::this_thread::sleep_for(kPollInterval);
   request_.reset();
 
   Remaining remaining;
@@ -90,18 +91,18 @@ CreatedScenes::Remaining CreatedScenes::remove() {
   };
   std::vector<std::unique_ptr<SceneRequest>> requests;
   std::uint32_t next = 0;
-  auto heard = Clock::now();
+  auto heard = steady_clock::now();
   while (next < count() || !requests.empty()) {
     while (requests.size() < kDeletionsAtOnce && next < count()) requests.push_back(deletionOf(next++));
-    std::this_thread::sleep_for(kPause);
+    std::this_thread::sleep_for(kPollInterval);
     std::erase_if(requests, [&](const std::unique_ptr<SceneRequest>& request) {
       const std::optional<SceneRequest::Answer> answer = request->answer();
       if (!answer) return false;
-      heard = Clock::now();
+      heard = steady_clock::now();
       if (answer->failure) remains(1, *answer->failure);
       return true;
     });
-    if (Clock::now() - heard < kDeletionTime) continue;
+    if (steady_clock::now() - heard < kDeletionTime) continue;
     remains(requests.size() + count() - next,
             {Failure::Kind::lost,
              "the server did not answer within " + std::to_string(kDeletionTime.count()) + " s"});

@@ -12,7 +12,7 @@ namespace clothstream::load {
 inline constexpr std::uint32_t kLeastNodes = 4, kMostNodes = 1 << 20, kLeastRate = 10, kMostRate = 1000;
 
 // One sheet of a square metre that hangs by two corners in a light wind, so that it never rests. Its grid has
-// about `nodes` nodes, as many rows as columns or one more. The springs are as stiff as the ten substeps of a
+// about `nodes` nodes and about as many rows as columns. The springs are as stiff as the ten substeps of a
 // tick bear. `rate` is that of ticks and of frames, 1/s. The scene has no name.
 v1::Scene hungScene(std::uint32_t nodes, std::uint32_t rate);
 

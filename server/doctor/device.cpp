@@ -141,23 +141,22 @@ Finding crowdOf(const OptionsFor& options, std::uint32_t size) try {
   const Machine machine{.processors = std::max(1u, std::thread::hardware_concurrency()),
                         .software = device.isSoftware()};
   const CarriedScenes carried = carriedScenes(cost, machine, kRate);
-  Finding finding{.level = Level::good,
-                  .topic = "crowd",
-                  .text = fmt::format("about {} scenes of {} vertices at {} Hz, by an estimate from "
-                                      "measurements on this machine: {:.0f} us "
-                                      "of the device for each in a tick and {:.0f} us for all together, "
-                                      "{:.0f} us of a processor for each "
-                                      "frame; the {} is the limit",
-                                      carried.count, scene.nodeCount(), kRate, 1e6 * cost.ownSeconds,
-                                      1e6 * cost.sharedSeconds, 1e6 * cost.frameSeconds,
-                                      carried.byProcessors ? "processor" : "device"),
-                  .figures = {{"vertices", scene.nodeCount()},
-                              {"scenes", carried.count},
-                              {"limit", carried.byProcessors ? "processors" : "device"},
-                              {"deviceUsOfScene", 1e6 * cost.ownSeconds},
-                              {"deviceUsOfAll", 1e6 * cost.sharedSeconds},
-                              {"processorUsOfFrame", 1e6 * cost.frameSeconds},
-                              {"processors", machine.processors}}};
+  Finding finding{
+      .level = Level::good,
+      .topic = "crowd",
+      .text = fmt::format(
+          "about {} scenes of {} vertices at {} Hz, by an estimate from measurements on this machine: {:.0f} "
+          "us of the device for each in a tick, {:.0f} us for all together, and {:.0f} us of a processor for "
+          "each frame; the {} the limit",
+          carried.count, scene.nodeCount(), kRate, 1e6 * cost.ownSeconds, 1e6 * cost.sharedSeconds,
+          1e6 * cost.frameSeconds, carried.byProcessors ? "processors are" : "device is"),
+      .figures = {{"vertices", scene.nodeCount()},
+                  {"scenes", carried.count},
+                  {"limit", carried.byProcessors ? "processors" : "device"},
+                  {"deviceUsOfScene", 1e6 * cost.ownSeconds},
+                  {"deviceUsOfAll", 1e6 * cost.sharedSeconds},
+                  {"processorUsOfFrame", 1e6 * cost.frameSeconds},
+                  {"processors", machine.processors}}};
   if (carried.count == 0) {
     finding.level = Level::advice;
     finding.fix = "Stop other programs that use the device, or use a faster one (--device)";
