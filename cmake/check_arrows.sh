@@ -32,15 +32,15 @@ server/hosting     | proto/text server/identity server/scene server/delivery ser
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording proto/text clothstream
 server/fleet       | server/session server/hosting server/saved_state server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
-server/agones      | server/hosting server/scene server/schedule
-server/events      | server/files proto/text server/scene server/schedule
+server/agones      | server/hosting server/scene server/schedule server/telemetry
+server/events      | server/files proto/text server/scene server/schedule server/telemetry
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls server/files
 server/discovery   | proto/discovery
 server/doctor      | server/endpoint/listen server/encode server/messages server/model server/simulation server/tls server/vulkan
 server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health grpc/reflection
-server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule
+server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/files proto/recording server/events server/hosting server/recording server/step server/scene server/model
 server/program     | server/agones server/events server/fleet proto/recording proto/text server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan

@@ -15,6 +15,7 @@
 #include "clients/cli/print.h"
 #include "clients/cli/recording_limits.h"
 #include "clients/cli/signals.h"
+#include "clients/load/hung_scene.h"
 #include "clients/native/address.h"
 
 namespace clothstream::cli {
@@ -68,6 +69,22 @@ void addPoses(nlohmann::ordered_json& object, load::PoseTimes& poses) {
   }
 }
 
+// Adds figures by participant, and those of created scenes, which are null without them.
+void addScenes(nlohmann::ordered_json& object, load::LoadReport& report) {
+  load::SceneReport& scenes = report.scenes;
+  object["slowestFramesPerSecond"] = load::percentile(report.participantRates, 0);
+  object["medianFramesPerSecond"] = load::percentile(report.participantRates, 50);
+  object["lateFrames"] = report.figures.late;
+  object["scenes"] = scenes.wanted;
+  object["scenesCreated"] = scenes.created;
+  object["scenesNotDeleted"] = scenes.remaining;
+  object["firstFrameMsP50"] = object["firstFrameMsP99"] = nullptr;
+  if (scenes.firstFrameMs.empty()) return;
+  const Ages times = agesOf(scenes.firstFrameMs);
+  object["firstFrameMsP50"] = times.p50;
+  object["firstFrameMsP99"] = times.p99;
+}
+
 std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
   const Ages ages = agesOf(report.figures.ages), tickAges = agesOf(report.figures.tickAges);
   nlohmann::ordered_json object{
@@ -94,6 +111,7 @@ std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
   };
   if (serverCpu) object["serverCpuSeconds"] = *serverCpu;
   addPoses(object, report.figures.poses);
+  addScenes(object, report);
   return jsonText(object, 2);
 }
 
@@ -117,6 +135,14 @@ std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
         "packet {}, to decoded {}, in play-out {}",
         of(kStages[0]), of(kStages[1]), of(kStages[2]), of(kStages[3]), of(kStages[4]));
   }
+  if (report.scenes.created > 0) {
+    const Ages times = agesOf(report.scenes.firstFrameMs);
+    text += fmt::format(
+        "\n{} scenes, from CreateScene to the first frame: {:.1f} ms median, {:.1f} ms p99"
+        "\nslowest participant {:.1f} frames/s, median {:.1f}; {} frames late",
+        report.scenes.created, times.p50, times.p99, load::percentile(report.participantRates, 0),
+        load::percentile(report.participantRates, 50), report.figures.late);
+  }
   if (report.slow > 0)
     text += fmt::format("\n{} slow: {:.1f} frames/s each, {} dropped", report.slow,
                         report.slowFramesPerSecond(), report.slowFigures.dropped);
@@ -129,6 +155,32 @@ std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
   return text;
 }
 
+// Prints the errors of a test, and returns the exit code of the first one.
+ExitCode printErrors(const load::LoadReport& report, const std::string& address) {
+  ExitCode code = kOk;
+  const auto add = [&](ExitCode of, const std::string& text) {
+    printError(of, text);
+    if (code == kOk) code = of;
+  };
+  const load::SceneReport& scenes = report.scenes;
+  if (scenes.failure)
+    add(exitCodeOf(scenes.failure->kind),
+        fmt::format("{} of {} scenes were created at {}; the next one was not: {}", scenes.created,
+                    scenes.wanted, address, scenes.failure->text));
+  if (report.lost > 0)
+    add(exitCodeOf(report.firstLoss.kind),
+        report.joined == 0
+            ? fmt::format("no participant could join at {}: {}", address, report.firstLoss.text)
+            : fmt::format("{} participants were refused or disconnected; the first: {}", report.lost,
+                          report.firstLoss.text));
+  if (scenes.remaining > 0)
+    add(exitCodeOf(scenes.whyRemaining.kind), fmt::format("{} scenes could not be deleted; the first: {}",
+                                                          scenes.remaining, scenes.whyRemaining.text));
+  if (report.figures.hashMismatches + report.slowFigures.hashMismatches > 0)
+    add(kHashMismatch, "decoded frames differ from the server's");
+  return code;
+}
+
 }  // namespace
 
 void LoadCommand::add(CLI::App& app) {
@@ -137,15 +189,32 @@ void LoadCommand::add(CLI::App& app) {
                        "HOST or HOST:PORT of the server's gRPC endpoint, default 127.0.0.1:50051, with "
                        "https:// before it for TLS; with --web, of its web "
                        "endpoint, default 127.0.0.1:8080");
-  command_->add_option("--scene", options_.scene, "Scene to join; default: the server's default scene");
+  CLI::Option* const scene =
+      command_->add_option("--scene", options_.scene, "Scene to join; default: the server's default scene");
+  CLI::Option* const scenes =
+      command_
+          ->add_option("--scenes", options_.scenes,
+                       "Create this many scenes, share the participants out to them in turn, and delete them "
+                       "at the end. Default: join --scene")
+          ->check(CLI::Range(1u, 10'000u))
+          ->excludes(scene);
   command_
-      ->add_option("--participants", options_.participants, "Number of participants that read at full speed")
-      ->check(CLI::Range(1u, 100'000u))
-      ->capture_default_str();
+      ->add_option("--nodes", options_.nodes,
+                   "About this many nodes in each created scene: a sheet that hangs by two corners")
+      ->check(CLI::Range(load::kLeastNodes, load::kMostNodes))
+      ->capture_default_str()
+      ->needs(scenes);
+  command_->add_option("--rate", options_.rate, "Ticks and frames per second of each created scene")
+      ->check(CLI::Range(load::kLeastRate, load::kMostRate))
+      ->capture_default_str()
+      ->needs(scenes);
   command_
-      ->add_option("--viewers", options_.viewers,
-                   "Number of these that send no poses; the others move a sphere")
-      ->capture_default_str();
+      ->add_option("--participants", participants_,
+                   "Number of participants that read at full speed. Default: 10; with --scenes, one for each")
+      ->check(CLI::Range(1u, 100'000u));
+  command_->add_option("--viewers", viewers_,
+                       "Number of these that send no poses; the others move a sphere. Default: 0; with "
+                       "--scenes, all");
   command_->add_option(
       "--decoders", decoders_,
       "Number of these that decode frames and compare them with the server's; the others only acknowledge. "
@@ -164,7 +233,10 @@ void LoadCommand::add(CLI::App& app) {
                    "disconnect and reconnect")
       ->check(CLI::Range(0u, 10'000u))
       ->capture_default_str();
-  command_->add_option("--joins", options_.joinsPerSecond, "Participants that join per second at the start")
+  command_
+      ->add_option("--joins", options_.joinsPerSecond,
+                   "Participants that join per second at the start; with --scenes, the scenes are created at "
+                   "most at this rate, one after the other")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command_
@@ -185,6 +257,11 @@ void LoadCommand::add(CLI::App& app) {
 void LoadCommand::check() {
   if (!parsed()) return;
   if (address_.empty()) address_ = web_ ? std::string("127.0.0.1") : std::string(kDefaultAddress);
+  const bool creates = options_.scenes > 0;
+  options_.participants = participants_.value_or(creates ? options_.scenes : options_.participants);
+  if (options_.participants < options_.scenes)
+    throw CLI::ValidationError("--participants", "must be at least --scenes, so that each scene has one");
+  options_.viewers = viewers_.value_or(creates ? options_.participants : options_.viewers);
   if (options_.viewers > options_.participants)
     throw CLI::ValidationError("--viewers", "must not exceed --participants");
   options_.decoders = decoders_.value_or(options_.participants);
@@ -218,17 +295,9 @@ ExitCode LoadCommand::run(const ServerAddress& address) const {
   if (shows) showStatus(stdout, "");
   std::optional<double> serverCpu;
   if (before && after) serverCpu = *after - *before;
-  const ExitCode loss = exitCodeOf(report.firstLoss.kind);
-  if (report.joined == 0 && report.lost > 0)
-    return printError(Error{
-        loss, fmt::format("no participant could join at {}: {}", address.address, report.firstLoss.text)});
-  put((json_ ? json(report, serverCpu) : text(report, serverCpu)) + '\n');
-  if (report.lost > 0)
-    return printError(Error{loss, fmt::format("{} participants were refused or disconnected; the first: {}",
-                                              report.lost, report.firstLoss.text)});
-  if (report.figures.hashMismatches + report.slowFigures.hashMismatches > 0)
-    return printError(Error{kHashMismatch, "decoded frames differ from the server's"});
-  return kOk;
+  const bool nothing = report.joined == 0 && (report.lost > 0 || report.scenes.failure);
+  if (!nothing) put((json_ ? json(report, serverCpu) : text(report, serverCpu)) + '\n');
+  return printErrors(report, address.address);
 }
 
 }  // namespace clothstream::cli

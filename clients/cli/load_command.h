@@ -30,7 +30,7 @@ class LoadCommand {
  private:
   load::LoadOptions options_;
   std::string address_;
-  std::optional<std::uint32_t> decoders_;
+  std::optional<std::uint32_t> participants_, viewers_, decoders_;
   std::optional<std::uint32_t> serverPid_;
   bool web_ = false, json_ = false;
   CLI::App* command_ = nullptr;

@@ -8,7 +8,9 @@
 #include <numeric>
 #include <thread>
 
+#include "clients/load/created_scenes.h"
 #include "clients/load/hostile_client.h"
+#include "clients/load/hung_scene.h"
 
 namespace clothstream::load {
 namespace {
@@ -16,10 +18,11 @@ namespace {
 // Pose interval. At 71 poses a second and 72 ticks a second, poses fall evenly on all times between two
 // ticks.
 constexpr std::chrono::duration<double> kStep{1.0 / 71};
-// Time for the last participant to join.
+// Time for the last participant to join, and to create a scene.
 constexpr std::chrono::seconds kJoinTime{30};
 // Time for the goodbye of a participant that leaves.
 constexpr std::chrono::seconds kLeaveTime{2};
+constexpr std::chrono::milliseconds kLeavePause{5};
 
 Clock::duration inSeconds(double seconds) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
@@ -32,18 +35,27 @@ class Load {
     report_.participants = options.participants;
     report_.slow = options.slow;
     report_.hostileClients = options.hostileClients;
+    report_.scenes.wanted = options.scenes;
+    if (options.scenes > 0) scenes_.emplace(links, options.token, hungScene(options.nodes, options.rate));
     for (std::uint32_t i = 0; i < options.hostileClients; ++i)
-      hostileClients_.push_back(std::make_unique<HostileClient>(links, options.scene, i, options.token));
+      hostileClients_.push_back(std::make_unique<HostileClient>(links, sceneOf(i), i, options.token));
   }
 
   LoadReport run() {
-    if (!gather()) return report_;
-    for (Seat& seat : seats_) seat.participant->take();
-    progress_.gathered();
-    measure();
-    progress_.measured();
-    for (Seat& seat : seats_) collect(seat);
-    for (const auto& client : hostileClients_) report_.visits += client->visits();
+    if (gather()) {
+      for (Seat& seat : seats_) seat.participant->take();
+      progress_.gathered();
+      measure();
+      progress_.measured();
+      for (Seat& seat : seats_) {
+        collect(seat);
+        if (!isSlow(seat) && report_.seconds > 0)
+          report_.participantRates.push_back(
+              static_cast<float>(static_cast<double>(seat.frames) / report_.seconds));
+      }
+      for (const auto& client : hostileClients_) report_.visits += client->visits();
+    }
+    if (scenes_) deleteScenes();
     return report_;
   }
 
@@ -51,7 +63,9 @@ class Load {
   struct Seat {
     std::uint32_t number;
     std::unique_ptr<Participant> participant;
-    bool counted = false;  // whether it counts as joined
+    bool counted = false;      // whether it counts as joined
+    bool timed = false;        // whether the time to its first frame is in the report
+    std::uint64_t frames = 0;  // received while the test measures
   };
   struct Leaving {
     std::unique_ptr<Participant> participant;
@@ -61,10 +75,14 @@ class Load {
   std::uint32_t seats() const { return options_.participants + options_.slow; }
   bool isSlow(const Seat& seat) const { return seat.number >= options_.participants; }
 
+  std::string sceneOf(std::uint32_t number) const {
+    return scenes_ ? scenes_->name(number % options_.scenes) : options_.scene;
+  }
+
   std::unique_ptr<Participant> make(std::uint32_t number) {
     return std::make_unique<Participant>(
         links_,
-        ParticipantOptions{.scene = options_.scene,
+        ParticipantOptions{.scene = sceneOf(number),
                            .name = "load " + std::to_string(++names_),
                            .token = options_.token,
                            .decodes = number < options_.decoders,
@@ -74,22 +92,38 @@ class Load {
                            .maxVertices = options_.maxVertices});
   }
 
-  // Returns false if the test was ended early or a participant was lost.
+  // Returns whether the scene of this seat exists. Takes a step towards creating it if it does not.
+  bool hasScene(std::uint32_t number) {
+    if (!scenes_) return true;
+    const std::uint32_t before = scenes_->count();
+    const bool exists = scenes_->exists(number % options_.scenes);
+    report_.scenes.created = scenes_->count();
+    report_.scenes.failure = scenes_->failure();
+    if (scenes_->count() > before) lastCreated_ = Clock::now();
+    return exists;
+  }
+
+  bool allStream() const {
+    return seats_.size() == seats() &&
+           std::all_of(seats_.begin(), seats_.end(), [](const Seat& seat) { return seat.counted; }) &&
+           report_.scenes.firstFrameMs.size() == options_.scenes;
+  }
+
+  // Returns false if the test was ended early, a participant was lost or a scene could not be created.
   bool gather() {
     const auto start = Clock::now();
     const auto end = start + inSeconds(seats() / options_.joinsPerSecond) + kJoinTime;
-    while (Clock::now() < end) {
+    while (Clock::now() < std::max(end, lastCreated_ + kJoinTime) || (scenes_ && scenes_->waits())) {
       const double due =
           std::chrono::duration<double>(Clock::now() - start).count() * options_.joinsPerSecond;
       while (seats_.size() < seats() && static_cast<double>(seats_.size()) <= due) {
         const auto number = static_cast<std::uint32_t>(seats_.size());
+        if (!hasScene(number)) break;
         seats_.push_back({number, make(number)});
       }
       if (!step()) return false;
-      if (report_.lost > 0) return false;
-      if (seats_.size() == seats() &&
-          std::all_of(seats_.begin(), seats_.end(), [](const Seat& seat) { return seat.counted; }))
-        return true;
+      if (report_.lost > 0 || report_.scenes.failure) return false;
+      if (allStream()) return true;
     }
     report_.lost += 1;
     report_.firstLoss = {Failure::Kind::lost, "not all participants could join within " +
@@ -112,8 +146,7 @@ class Load {
       LoadReport last = report_;
       last.figures = {};
       for (Seat& seat : seats_) {
-        const Figures figures = seat.participant->take();
-        (isSlow(seat) ? report_.slowFigures : report_.figures).add(figures);
+        const Figures figures = collect(seat);
         if (!isSlow(seat)) last.figures.add(figures);
       }
       last.seconds = 1;
@@ -133,8 +166,38 @@ class Load {
     seat.participant = make(seat.number);
   }
 
-  void collect(Seat& seat) {
-    (isSlow(seat) ? report_.slowFigures : report_.figures).add(seat.participant->take());
+  // Adds what the participant has received since the last time to the report.
+  Figures collect(Seat& seat) {
+    Figures figures = seat.participant->take();
+    (isSlow(seat) ? report_.slowFigures : report_.figures).add(figures);
+    seat.frames += figures.frames;
+    return figures;
+  }
+
+  // The first participant of each created scene shows when the scene streams.
+  void timeFirstFrame(Seat& seat) {
+    if (seat.timed || seat.number >= options_.scenes) return;
+    const std::optional<double> seconds = seat.participant->firstFrameSeconds();
+    if (!seconds) return;
+    seat.timed = true;
+    report_.scenes.firstFrameMs.push_back(
+        static_cast<float>(1000 * (scenes_->creationSeconds(seat.number) + *seconds)));
+  }
+
+  // The participants leave first, because a scene with an owner may be deleted by its owners alone.
+  void deleteScenes() {
+    for (const Seat& seat : seats_) seat.participant->leave();
+    const auto end = Clock::now() + kLeaveTime;
+    while (Clock::now() < end && !std::all_of(seats_.begin(), seats_.end(), [](const Seat& seat) {
+             return seat.participant->ended().has_value();
+           }))
+      std::this_thread::sleep_for(kLeavePause);
+    seats_.clear();
+    leaving_.clear();
+    hostileClients_.clear();
+    const CreatedScenes::Remaining remaining = scenes_->remove();
+    report_.scenes.remaining = remaining.scenes;
+    report_.scenes.whyRemaining = remaining.why;
   }
 
   bool step() {
@@ -147,6 +210,7 @@ class Load {
         seat.counted = true;
         ++report_.joined;
       }
+      timeFirstFrame(seat);
       if (const auto why = seat.participant->ended()) {
         if (report_.lost++ == 0) report_.firstLoss = *why;
         collect(seat);
@@ -163,6 +227,8 @@ class Load {
   const LoadOptions options_;
   const LoadProgress progress_;
   LoadReport report_;
+  std::optional<CreatedScenes> scenes_;  // outlives the participants
+  Clock::time_point lastCreated_{};
   std::vector<Seat> seats_;
   std::vector<Leaving> leaving_;
   std::vector<std::unique_ptr<HostileClient>> hostileClients_;

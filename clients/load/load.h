@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Load test: many participants in one scene, and what they receive.
+// Load test: many participants in one scene or in many, and what they receive.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,10 @@
 namespace clothstream::load {
 
 struct LoadOptions {
-  std::string scene;  // empty: the server's default
-  std::string token;  // of all participants and hostile clients; empty: none
+  std::string scene;         // empty: the server's default
+  std::uint32_t scenes = 0;  // scenes to create, for the participants in turn; 0: all join `scene`
+  std::uint32_t nodes = 1024, rate = 72;  // of each created scene, as in hungScene()
+  std::string token;                      // of all participants and hostile clients; empty: none
   std::uint32_t participants = 10;
   std::uint32_t decoders = 0;  // participants that decode; the others only acknowledge frames
   std::uint32_t viewers = 0;   // participants that send no poses; the last ones to join
@@ -27,6 +30,17 @@ struct LoadOptions {
   std::uint32_t maxVertices = 0;     // as in limitVertices
 };
 
+// What became of the scenes that the test has created.
+struct SceneReport {
+  std::uint32_t wanted = 0, created = 0;
+  std::optional<Failure> failure;  // why the next one could not be created
+  std::uint32_t remaining = 0;     // scenes that could not be deleted
+  Failure whyRemaining;            // of the first of them
+  // Time for each scene from the request to its answer, and then from the connection of the first participant
+  // to its first frame, ms. The time between the two is that of the test and does not count.
+  std::vector<float> firstFrameMs;
+};
+
 struct LoadReport {
   double seconds = 0;
   std::uint32_t participants = 0, slow = 0, hostileClients = 0;
@@ -37,6 +51,8 @@ struct LoadReport {
   // Number of participants that were refused or disconnected, and the reason of the first.
   std::uint64_t lost = 0;
   Failure firstLoss;
+  SceneReport scenes;
+  std::vector<float> participantRates;  // frames/s of each participant that is not slow
 
   // Average rates over the measured time: frames per participant, and Mbit of all clients.
   double framesPerSecond() const;

@@ -39,6 +39,7 @@ void Figures::add(const Figures& other) {
   frames += other.frames;
   bytes += other.bytes;
   dropped += other.dropped;
+  late += other.late;
   decodeErrors += other.decodeErrors;
   hashMismatches += other.hashMismatches;
   ages.insert(ages.end(), other.ages.begin(), other.ages.end());
@@ -90,6 +91,11 @@ Figures Participant::take() {
         statistics.hash_mismatches - std::exchange(hashMismatchesTaken_, statistics.hash_mismatches);
   }
   return std::exchange(figures_, {});
+}
+
+std::optional<double> Participant::firstFrameSeconds() const {
+  const std::lock_guard lock(mutex_);
+  return firstFrameSeconds_;
 }
 
 void Participant::step(Clock::time_point now) {
@@ -198,11 +204,18 @@ void Participant::frameDecoded(const v1::Frame& frame) {
 }
 
 void Participant::count(const codec::PacketHeader& header, std::uint32_t frameDivisor) {
+  const Clock::time_point now = Clock::now();
+  const std::uint32_t rate = std::max(cs_simulation_rate(core_.get()), 1u);
   const std::uint64_t perFrame =
-      std::uint64_t{
-          std::max(cs_simulation_rate(core_.get()) / std::max(cs_stream_rate(core_.get()), 1u), 1u)} *
+      std::uint64_t{std::max(rate / std::max(cs_stream_rate(core_.get()), 1u), 1u)} *
       std::max(frameDivisor_, frameDivisor);
   frameDivisor_ = frameDivisor;
+  const std::chrono::duration<double> period(static_cast<double>(perFrame) / rate);
+  if (!newestTick_)
+    firstFrameSeconds_ = std::chrono::duration<double>(now - opened_).count();
+  else if (now - newestAt_ > 2 * period)
+    ++figures_.late;
+  newestAt_ = now;
   if (newestTick_ && header.tick > *newestTick_)
     figures_.dropped += std::max<std::uint64_t>((header.tick - *newestTick_) / perFrame, 1) - 1;
   if (!options_.decodes && header.referenceCount > 0 && header.references[0] != newestTick_)

@@ -37,6 +37,9 @@ struct ParticipantOptions {
 struct Figures {
   std::uint64_t frames = 0, bytes = 0;  // received packets
   std::uint64_t dropped = 0;            // missing frames, from the gaps between ticks
+  // Frames that arrived more than a period of the stream after they were due, by the arrival of the frame
+  // before.
+  std::uint64_t late = 0;
   // Packets that the decoder refused. Without decoding: packets whose reference is missing.
   std::uint64_t decodeErrors = 0;
   std::uint64_t hashMismatches = 0;
@@ -64,6 +67,8 @@ class Participant final : private LinkListener {
   // Reason why the link ended, or nothing while it is open.
   std::optional<Failure> ended() const;
   Figures take();
+  // Seconds from connecting to the first frame. Nothing before it.
+  std::optional<double> firstFrameSeconds() const;
 
  private:
   void received(std::span<const std::byte> message) override;
@@ -79,6 +84,7 @@ class Participant final : private LinkListener {
   void flush();
 
   const ParticipantOptions options_;
+  const Clock::time_point opened_ = Clock::now();
   mutable std::mutex mutex_;
   std::unique_ptr<cs_client, void (*)(cs_client*)> core_;
   v1::ServerMessage message_;
@@ -89,6 +95,8 @@ class Participant final : private LinkListener {
   std::uint64_t decodedTickUs_ = 0;          // start of the newest decoded tick, server's clock; 0: none
   std::optional<std::uint64_t> newestTick_;  // of the frames, to which the next one refers
   std::uint32_t frameDivisor_ = 1;           // of the newest frame
+  Clock::time_point newestAt_;               // arrival of the newest frame
+  std::optional<double> firstFrameSeconds_;
   Clock::time_point readsAgainAt_{};
   bool readLater_ = false;
   std::optional<Failure> ended_;

@@ -9,6 +9,7 @@
 
 #include "server/hosting/scene_server.h"
 #include "server/scene/live_scene.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::agones {
 
@@ -28,6 +29,7 @@ Agones::~Agones() {
 }
 
 void Agones::run() {
+  telemetry::nameThread("agones");
   std::unique_lock lock(mutex_);
   while (!stopping_) {
     lock.unlock();

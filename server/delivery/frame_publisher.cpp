@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::delivery {
 namespace {
@@ -118,6 +119,7 @@ std::size_t FramePublisher::waiting() const {
 }
 
 void FramePublisher::run() {
+  telemetry::nameThread("publisher");
   std::vector<std::byte> packet;
   std::unique_lock lock(mutex_);
   for (;;) {

@@ -6,12 +6,17 @@
 #include <cstddef>
 #include <exception>
 #include <memory>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
+#include <time.h>
 
+#include "server/doctor/crowd.h"
 #include "server/encode/frame_encoder.h"
+#include "server/model/price.h"
 #include "server/simulation/cloth_simulation.h"
+#include "server/simulation/speed_meter.h"
 #include "server/vulkan/recorder.h"
 
 namespace clothstream::doctor {
@@ -21,7 +26,8 @@ using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
 constexpr std::uint32_t kRate = 72, kFirstSize = 32, kMaxSize = 4096, kTicks = 12;
-constexpr double kShare = 0.8;          // of the period that a tick may take
+// A crowd's sheets swing for this time before they are representative.
+constexpr std::uint32_t kCrowdTicks = 36;
 constexpr std::size_t kNodeBytes = 16;  // of the largest binding of a scene
 
 // A square metre that hangs by its upper edge.
@@ -45,26 +51,44 @@ model::Scene sheet(std::uint32_t size, model::SolverKind kind, std::uint32_t sub
   return scene;
 }
 
-// Median time of a tick with its packet, after the first ones.
-double tickSeconds(const vulkan::DeviceOptions& options, const model::Scene& scene) {
-  vulkan::Device device(options);
+// Processor time of this thread, seconds.
+double processorSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+double medianOf(std::vector<double>& samples) {
+  std::ranges::nth_element(samples, samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2));
+  return samples[samples.size() / 2];
+}
+
+struct TickTimes {
+  double tick = 0;   // with its packet
+  double frame = 0;  // processor time of the packet
+};
+
+// Median times in seconds, after the first ticks.
+TickTimes measureTicks(vulkan::Device& device, const model::Scene& scene, std::uint32_t ticks) {
   simulation::ClothSimulation simulation(device, scene);
   encode::FrameEncoder encoder(device, simulation, encode::streamLayout(scene, 1));
   vulkan::Recorder recorder(device);
   std::vector<std::byte> packet(encoder.packetBound());
-  std::vector<double> times;
-  for (std::uint32_t tick = 0; tick < kTicks; ++tick) {
+  std::vector<double> times, frames;
+  for (std::uint32_t tick = 0; tick < ticks; ++tick) {
     const Clock::time_point before = Clock::now();
     recorder.begin();
     simulation.recordTick(recorder, simulation::inputsAt(scene, tick));
     const encode::RecordedFrame frame = encoder.record(recorder, tick + 1, false);
     device.wait(device.submit(recorder));
+    const double began = processorSeconds();
     encoder.entropyCode(frame, packet);
     // The first ticks compile kernels and make a key frame.
-    if (tick >= 2) times.push_back(Seconds(Clock::now() - before).count());
+    if (tick < 2) continue;
+    frames.push_back(processorSeconds() - began);
+    times.push_back(Seconds(Clock::now() - before).count());
   }
-  std::ranges::nth_element(times, times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2));
-  return times[times.size() / 2];
+  return {.tick = medianOf(times), .frame = medianOf(frames)};
 }
 
 Finding capacityOf(const OptionsFor& options, const char* method, model::SolverKind kind,
@@ -80,9 +104,10 @@ Finding capacityOf(const OptionsFor& options, const char* method, model::SolverK
       break;
     }
     try {
-      const double seconds = tickSeconds(options(size * size), sheet(size, kind, substeps));
+      vulkan::Device device(options(size * size));
+      const double seconds = measureTicks(device, sheet(size, kind, substeps), kTicks).tick;
       rows.push_back({{"size", size}, {"tickMs", 1e3 * seconds}});
-      if (seconds > kShare / kRate) break;
+      if (seconds > kUsedShare / kRate) break;
       fits = size;
       fitting = seconds;
     } catch (const std::exception& error) {
@@ -104,6 +129,43 @@ Finding capacityOf(const OptionsFor& options, const char* method, model::SolverK
     finding.fix = "Stop other programs that use the device, or use a faster one (--device)";
   }
   return finding;
+}
+
+Finding crowdOf(const OptionsFor& options, std::uint32_t size) try {
+  model::Scene scene = sheet(size, model::SolverKind::massSpring, 10);
+  scene.cloths.front().pins.front().columnStep = size - 1;  // hangs by two corners
+  vulkan::Device device(options(size * size));
+  const double frame = measureTicks(device, scene, kCrowdTicks).frame;
+  const model::DeviceSpeed speed = simulation::SpeedMeter(device).measure();
+  const CrowdCost cost = costOf(model::PriceModel(scene).work(scene), speed, frame);
+  const Machine machine{.processors = std::max(1u, std::thread::hardware_concurrency()),
+                        .software = device.isSoftware()};
+  const CarriedScenes carried = carriedScenes(cost, machine, kRate);
+  Finding finding{
+      .level = Level::good,
+      .topic = "crowd",
+      .text = fmt::format(
+          "about {} scenes of {} vertices at {} Hz, by an estimate from measurements on this machine: {:.0f} "
+          "us of the device for each in a tick, {:.0f} us for all together, and {:.0f} us of a processor for "
+          "each frame; the {} the limit",
+          carried.count, scene.nodeCount(), kRate, 1e6 * cost.ownSeconds, 1e6 * cost.sharedSeconds,
+          1e6 * cost.frameSeconds, carried.byProcessors ? "processors are" : "device is"),
+      .figures = {{"vertices", scene.nodeCount()},
+                  {"scenes", carried.count},
+                  {"limit", carried.byProcessors ? "processors" : "device"},
+                  {"deviceUsOfScene", 1e6 * cost.ownSeconds},
+                  {"deviceUsOfAll", 1e6 * cost.sharedSeconds},
+                  {"processorUsOfFrame", 1e6 * cost.frameSeconds},
+                  {"processors", machine.processors}}};
+  if (carried.count == 0) {
+    finding.level = Level::advice;
+    finding.fix = "Stop other programs that use the device, or use a faster one (--device)";
+  }
+  return finding;
+} catch (const std::exception& error) {
+  return {.level = Level::problem,
+          .topic = "crowd",
+          .text = fmt::format("scenes of {}x{} nodes cannot be measured: {}", size, size, error.what())};
 }
 
 }  // namespace
@@ -153,6 +215,10 @@ Findings measureCapacity(const OptionsFor& options, std::chrono::duration<double
   };
   return {capacityOf(options, "mass-spring, 10 substeps", model::SolverKind::massSpring, 10, until(0.5)),
           capacityOf(options, "implicit Euler, 2 substeps", model::SolverKind::implicitEuler, 2, until(1))};
+}
+
+Findings estimateCrowds(const OptionsFor& options) {
+  return {crowdOf(options, 32), crowdOf(options, 100)};
 }
 
 }  // namespace clothstream::doctor

@@ -10,6 +10,7 @@
 #include "server/scene/live_scene.h"
 #include "server/scene/roster.h"
 #include "server/schedule/clock.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::events {
 
@@ -89,6 +90,7 @@ scene::ObserverStatus Events::status() const {
 }
 
 void Events::run() {
+  telemetry::nameThread("events");
   while (!io_.stopped()) {
     try {
       io_.run();

@@ -15,6 +15,7 @@
 #include "server/saved_state/crc.h"
 #include "server/scene/live_scene.h"
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::fleet {
 namespace {
@@ -220,6 +221,7 @@ v1::ServerEntry Directory::selfNow() const {
 }
 
 void Directory::run() {
+  telemetry::nameThread("directory");
   std::unique_ptr<Buckets> buckets;
   std::unique_lock lock(mutex_);
   for (;;) {

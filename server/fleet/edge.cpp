@@ -19,6 +19,7 @@
 #include "server/messages/limits.h"
 #include "server/scene/live_scene.h"
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::fleet {
 namespace {
@@ -110,6 +111,7 @@ void Edge::wake() {
 }
 
 void Edge::run() {
+  telemetry::nameThread("edge");
   Clock::time_point next = Clock::now();
   for (;;) {
     std::deque<Arrival> arrivals;

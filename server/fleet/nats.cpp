@@ -12,6 +12,7 @@
 
 #include "server/fleet/random_id.h"
 #include "server/fleet/subjects.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::fleet {
 namespace {
@@ -184,6 +185,7 @@ void Nats::publish(std::string subject, delivery::SharedBytes data, std::string 
 }
 
 void Nats::run() {
+  telemetry::nameThread("nats sender");
   std::unique_lock lock(mutex_);
   for (;;) {
     changed_.wait(lock, [&] { return stopping_ || !waiting_.empty(); });

@@ -21,6 +21,7 @@
 #include "server/scene/live_scene.h"
 #include "server/schedule/clock.h"
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::fleet {
 namespace {
@@ -171,6 +172,7 @@ Origin::~Origin() {
 }
 
 void Origin::run() {
+  telemetry::nameThread("origin");
   std::unique_lock lock(mutex_);
   while (!stopping_.load()) {
     lock.unlock();

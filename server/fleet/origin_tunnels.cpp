@@ -13,6 +13,7 @@
 #include "server/fleet/message_bytes.h"
 #include "server/hosting/scene_server.h"
 #include "server/session/session.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::fleet {
 namespace {
@@ -189,6 +190,7 @@ bool OriginTunnels::pump(Tunnel& tunnel) {
 }
 
 void OriginTunnels::run() {
+  telemetry::nameThread("tunnels");
   Clock::time_point nextPoll = Clock::now();
   std::unique_lock lock(mutex_);
   while (!stopping_) {

@@ -12,6 +12,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -151,6 +152,7 @@ std::span<schedule::TickSchedule* const> DeviceThread::schedules() {
 
 void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& scenes,
                        std::promise<void>& ready) {
+  telemetry::nameThread("device");
   try {
     if (!scenes.empty()) {
       device_.open();

@@ -19,6 +19,7 @@
 #include "server/messages/scene_message.h"
 #include "server/messages/validation.h"
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -47,7 +48,10 @@ using Waiting = std::unique_ptr<std::atomic<std::uint32_t>, EndWaiting>;
 SceneMaker::SceneMaker(const ServerOptions& options, telemetry::ServerMetrics& metrics,
                        const SceneRegistry& scenes, const KeptScenes& kept, CreatedScenes& created)
     : options_(options), metrics_(metrics), scenes_(scenes), kept_(kept), created_(created) {
-  boost::asio::post(thread_, [this] { expireLater(); });
+  boost::asio::post(thread_, [this] {
+    telemetry::nameThread("scene maker");
+    expireLater();
+  });
 }
 
 SceneMaker::~SceneMaker() {

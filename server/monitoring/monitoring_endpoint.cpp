@@ -28,6 +28,7 @@
 #include "server/monitoring/http_connection.h"
 #include "server/monitoring/metric_families.h"
 #include "server/monitoring/trace_events.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::monitoring {
 namespace {
@@ -101,6 +102,7 @@ struct MonitoringEndpoint::State {
   // An exception, such as for /proc without a free descriptor, ends the handler of one socket and not the
   // endpoint.
   void run() {
+    telemetry::nameThread("monitoring");
     for (;;) try {
         io.run();
         return;

@@ -63,8 +63,10 @@ int runDoctor(const ServeOptions& options, const DoctorOptions& command, const S
     return simulation::suitedTo(nodes, options.server.device);
   };
   tell(doctor::checkDevices(optionsFor(0)));
-  if (!doctor::hasProblem(findings) && command.seconds > 0)
+  if (!doctor::hasProblem(findings) && command.seconds > 0) {
     tell(doctor::measureCapacity(optionsFor, std::chrono::duration<double>(command.seconds)));
+    tell(doctor::estimateCrowds(optionsFor));
+  }
   if (command.accepts)
     for (const doctor::AcceptedState& expected : doctor::acceptedStates()) {
       const auto stop = [&] { return interrupted = interrupted || signals.interrupted(); };

@@ -12,6 +12,7 @@
 
 #include "server/scene/live_scene.h"
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::recording {
 namespace {
@@ -76,6 +77,7 @@ std::string Playback::damage() const {
 }
 
 void Playback::run(scene::LiveScene& scene) {
+  telemetry::nameThread("player");
   for (;;) {
     const std::optional<Clock::time_point> next = step(scene, Clock::now());
     std::unique_lock lock(mutex_);

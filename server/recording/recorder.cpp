@@ -18,6 +18,7 @@
 #include "server/recording/tick_message.h"
 #include "server/scene/snapshot_message.h"
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::recording {
 namespace {
@@ -205,6 +206,7 @@ void Recorder::push(std::variant<Own, delivery::SharedBytes> what, std::size_t b
 }
 
 void Recorder::run(const std::string& sceneName, const Metadata& metadata) {
+  telemetry::nameThread("recorder");
   std::unique_ptr<OutputFile> file;
   {
     const std::lock_guard lock(mutex_);

@@ -12,6 +12,7 @@
 #include "server/saved_state/contents.h"
 #include "server/saved_state/state_message.h"
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::saved_state {
 namespace {
@@ -188,6 +189,7 @@ scene::StoreStatus SavedState::status() const {
 }
 
 void SavedState::run() {
+  telemetry::nameThread("state writer");
   bool failed = false;
   for (bool last = false; !last;) {
     std::uint64_t asked = 0;

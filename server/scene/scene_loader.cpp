@@ -10,6 +10,7 @@
 
 #include "server/schedule/clock.h"
 #include "server/telemetry/log.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::scene {
 namespace {
@@ -23,7 +24,9 @@ void giveMemoryBack() {
 }  // namespace
 
 SceneLoader::SceneLoader(codec::Workers& workers, std::function<void()> done)
-    : workers_(workers), done_(std::move(done)) {}
+    : workers_(workers), done_(std::move(done)) {
+  boost::asio::post(thread_, [] { telemetry::nameThread("scene loader"); });
+}
 
 SceneLoader::Future SceneLoader::load(vulkan::Device& device, const model::Scene& scene,
                                       std::stop_token stop) {

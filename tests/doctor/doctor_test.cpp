@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "server/doctor/acceptance.h"
+#include "server/doctor/crowd.h"
 #include "server/doctor/device.h"
 #include "server/doctor/host.h"
 #include "server/endpoint/listen/listen.h"
@@ -94,6 +95,49 @@ TEST_F(Doctor, PrintsLevelTopicTextAndFix) {
   EXPECT_FALSE(doctor::hasProblem({findings.front()}));
 }
 
+// A millisecond of the device for all scenes and a tenth for each, and a twentieth of a processor for a
+// frame.
+constexpr doctor::CrowdCost kCost{.sharedSeconds = 1e-3, .ownSeconds = 1e-4, .frameSeconds = 5e-5};
+
+TEST(CrowdEstimate, DeviceLimitsManyProcessors) {
+  // 8 ms of a tick of 10 ms: the kernel calls, and 70 scenes.
+  const auto carried = doctor::carriedScenes(kCost, {.processors = 16}, 100);
+  EXPECT_NEAR(carried.count, 70, 1);
+  EXPECT_FALSE(carried.byProcessors);
+}
+
+TEST(CrowdEstimate, OneProcessorLimitsAFastDevice) {
+  doctor::CrowdCost cost = kCost;
+  cost.ownSeconds = 1e-6;
+  // 8 ms of a tick for frames.
+  const auto carried = doctor::carriedScenes(cost, {.processors = 1}, 100);
+  EXPECT_NEAR(carried.count, 160, 1);
+  EXPECT_TRUE(carried.byProcessors);
+}
+
+TEST(CrowdEstimate, SoftwareDeviceSharesTheProcessors) {
+  // 7 ms of a tick, of which each scene takes 0.1 ms on the device and 0.025 ms for its frame.
+  const auto carried = doctor::carriedScenes(kCost, {.processors = 2, .software = true}, 100);
+  EXPECT_NEAR(carried.count, 56, 1);
+  EXPECT_TRUE(carried.byProcessors);
+}
+
+TEST(CrowdEstimate, NoSceneFitsATooSlowDevice) {
+  EXPECT_EQ(doctor::carriedScenes(kCost, {.processors = 16}, 1000).count, 0u);
+}
+
+TEST(CrowdEstimate, KernelCallsAreShared) {
+  const model::Work work{.nodeSteps = 1000, .gpuDispatches = 10, .dispatches = 20};
+  model::DeviceSpeed speed{.nodeStepSeconds = 1e-8, .dispatchSeconds = 1e-5};
+  const doctor::CrowdCost cost = doctor::costOf(work, speed, 0.25);
+  EXPECT_DOUBLE_EQ(cost.sharedSeconds, 20e-5);
+  EXPECT_DOUBLE_EQ(cost.ownSeconds, work.seconds(speed) - 20e-5);
+  EXPECT_NEAR(cost.ownSeconds, 1e-5, 1e-12);
+  EXPECT_EQ(cost.frameSeconds, 0.25);
+  speed.gpu = true;
+  EXPECT_DOUBLE_EQ(doctor::costOf(work, speed, 0).sharedSeconds, 30e-5);
+}
+
 class DoctorOfDevices : public GpuTest {
  protected:
   static vulkan::DeviceOptions options(std::uint32_t) { return {.validation = true}; }
@@ -117,6 +161,19 @@ TEST_F(DoctorOfDevices, MeasuresWhatADeviceCarries) {
     EXPECT_EQ(ticks[0]["size"], 32);
     EXPECT_GT(ticks[0]["tickMs"].get<double>(), 0);
   }
+}
+
+TEST_F(DoctorOfDevices, EstimatesWhatTheMachineCarries) {
+  const doctor::Findings findings = doctor::estimateCrowds(options);
+  ASSERT_EQ(findings.size(), 2u);
+  EXPECT_EQ(findings[0].figures["vertices"], 1024);
+  EXPECT_EQ(findings[1].figures["vertices"], 10'000);
+  for (const Finding& finding : findings) {
+    EXPECT_THAT(finding.text, HasSubstr("estimate"));
+    EXPECT_GT(finding.figures["deviceUsOfScene"].get<double>(), 0);
+    EXPECT_GT(finding.figures["processorUsOfFrame"].get<double>(), 0);
+  }
+  EXPECT_GE(findings[0].figures["scenes"], findings[1].figures["scenes"]);
 }
 
 TEST_F(DoctorOfDevices, AcceptsADeviceWithTheRightStatesAlone) {

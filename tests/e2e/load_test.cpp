@@ -25,6 +25,14 @@ class Load : public RunningServer {
     arguments.insert(arguments.begin(), {CLOTHSTREAM, "load"});
     return std::make_unique<Process>(arguments);
   }
+  // Scenes of the server that clients have created.
+  std::size_t createdScenes() const {
+    Process list({CLOTHSTREAM, "list", address_, "--json"});
+    EXPECT_EQ(list.waitForEnd(kEnd), 0) << list.errors();
+    std::size_t count = 0;
+    for (const auto& scene : nlohmann::json::parse(list.output())) count += scene.at("created") == true;
+    return count;
+  }
   // Two participants move and decode. The stages of their poses add up to the total.
   static void expectPosesAreTimed(const nlohmann::json& report) {
     ASSERT_GT(report.at("poses").get<int>(), 10);
@@ -86,6 +94,44 @@ TEST_F(Load, WebSocketServesParticipantsAmongHostileClients) {
   if (!web_.empty()) expectAllAreServed({"--web", web_});
 }
 
+// Takes about five seconds, most of them for measuring.
+TEST_F(Load, CreatesScenesAndDeletesThem) {
+  startServer({"--scene", "small", "--scene-file", "tests/e2e/small.json", "--max-created-scenes", "3"});
+  if (address_.empty()) return;
+  const Arguments scenes{"--scenes", "3", "--nodes", "64"};
+  for (const Arguments& endpoint : {Arguments{address_}, Arguments{"--web", web_}}) {
+    Arguments arguments{"--seconds", "1", "--json"};
+    arguments.insert(arguments.end(), scenes.begin(), scenes.end());
+    arguments.insert(arguments.end(), endpoint.begin(), endpoint.end());
+    const auto program = load(arguments);
+    ASSERT_EQ(program->waitForEnd(kEnd), 0) << program->errors();
+    const auto report = nlohmann::json::parse(program->output());
+    EXPECT_EQ(report.at("participants"), 3);
+    EXPECT_EQ(report.at("joined"), 3);
+    EXPECT_EQ(report.at("poses"), 0);
+    EXPECT_EQ(report.at("scenesCreated"), 3);
+    EXPECT_EQ(report.at("scenesNotDeleted"), 0);
+    EXPECT_GT(report.at("slowestFramesPerSecond").get<double>(), 0);
+    EXPECT_GE(report.at("medianFramesPerSecond"), report.at("slowestFramesPerSecond"));
+    EXPECT_GT(report.at("firstFrameMsP50").get<double>(), 0);
+    EXPECT_GE(report.at("firstFrameMsP99"), report.at("firstFrameMsP50"));
+    EXPECT_EQ(report.at("decodeErrors").get<int>() + report.at("hashMismatches").get<int>(), 0);
+    EXPECT_EQ(createdScenes(), 0u);
+  }
+
+  const auto crowd = load({address_, "--scenes", "4", "--nodes", "64"});
+  EXPECT_EQ(crowd->waitForEnd(kEnd), 4);
+  EXPECT_THAT(crowd->errors(), HasSubstr("3 of 4 scenes were created"));
+  EXPECT_THAT(crowd->errors(), HasSubstr("created scenes, its maximum"));
+  EXPECT_EQ(createdScenes(), 0u);
+
+  const auto interrupted = load({address_, "--scenes", "2", "--nodes", "64", "--seconds", "3600"});
+  EXPECT_TRUE(eventually([&] { return createdScenes() == 2; }));
+  interrupted->signal(SIGINT);
+  EXPECT_EQ(interrupted->waitForEnd(kEnd), 0) << interrupted->errors();
+  EXPECT_EQ(createdScenes(), 0u);
+}
+
 TEST_F(Load, ReportsNoLatencyWithoutPoses) {
   startServer();
   if (address_.empty()) return;
@@ -126,6 +172,12 @@ TEST_F(Load, RefusesInvalidArguments) {
                                                     {"--participants", "0"},
                                                     {"--seconds", "0"},
                                                     {"--server-pid", "4000000000"},
+                                                    {"--scenes", "0"},
+                                                    {"--scenes", "2", "--scene", "small"},
+                                                    {"--nodes", "64"},
+                                                    {"--nodes", "3", "--scenes", "1"},
+                                                    {"--rate", "9", "--scenes", "1"},
+                                                    {"--participants", "2", "--scenes", "3"},
                                                     {"--pair", "123456", "--web"},
                                                     {"--web", "host:port"}}) {
     const auto program = load(arguments);

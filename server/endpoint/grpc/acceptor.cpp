@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "server/endpoint/listen/listen.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -42,7 +43,10 @@ Acceptor::~Acceptor() {
 void Acceptor::start() {
   accept();
   checkLater();
-  thread_ = std::thread([this] { io_.run(); });
+  thread_ = std::thread([this] {
+    telemetry::nameThread("grpc acceptor");
+    io_.run();
+  });
 }
 
 void Acceptor::accept() {

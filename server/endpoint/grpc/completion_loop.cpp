@@ -5,6 +5,8 @@
 
 #include <grpc/support/time.h>
 
+#include "server/telemetry/thread_name.h"
+
 namespace clothstream::endpoint {
 
 CompletionLoop::CompletionLoop(std::unique_ptr<grpc::ServerCompletionQueue> queue)
@@ -12,6 +14,7 @@ CompletionLoop::CompletionLoop(std::unique_ptr<grpc::ServerCompletionQueue> queu
 
 void CompletionLoop::start() {
   thread_ = std::thread([this] {
+    telemetry::nameThread("grpc");
     void* tag = nullptr;
     bool ok = false;
     while (queue_->Next(&tag, &ok)) static_cast<Operation*>(tag)->done(ok);

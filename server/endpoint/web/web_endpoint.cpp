@@ -22,6 +22,7 @@
 #include "server/endpoint/web/http_connection.h"
 #include "server/endpoint/web/web_socket_stream.h"
 #include "server/hosting/scene_server.h"
+#include "server/telemetry/thread_name.h"
 #include "server/tls/qr_code.h"
 
 namespace clothstream::endpoint {
@@ -103,6 +104,7 @@ struct WebEndpoint::State {
 
   // An exception ends the handler of one socket and not the endpoint.
   void run() {
+    telemetry::nameThread("web");
     for (;;) try {
         io.run();
         return;
