@@ -17,7 +17,7 @@ import unittest
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BUILD = pathlib.Path(sys.argv.pop(1)).resolve()
-# What a machine must have besides a driver.
+# Programs that a machine must have, in addition to a driver.
 TOOLS = ("sh", "cat", "date", "dirname", "env", "mkdir", "timeout")
 MOST_BYTES = 60_000_000
 
@@ -43,7 +43,7 @@ def machine(folder):
 def hidden():
     """Command that hides the sources, the build and the network from the program after it, as far as this is allowed."""
     unshare = ["unshare", "--mount", "--net", *([] if os.getuid() == 0 else ["--map-root-user"])]
-    # The build may lie in the sources, which hide it then.
+    # A build inside the sources is hidden with them.
     folders = [str(ROOT)] + [str(BUILD)] * (not BUILD.is_relative_to(ROOT))
     command = [*unshare, "sh", "-c", HIDE, "sh", *folders, "--"]
     allowed = subprocess.run([*command, "true"], cwd="/", stderr=subprocess.DEVNULL).returncode == 0

@@ -2,15 +2,15 @@
 // gpu-kit-report: turns the output of a run's steps into files like those of tests/bench/results, compares
 // them with the committed ones, and says what is wrong or slower.
 #include <algorithm>
-#include <cstdint>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -101,18 +101,21 @@ void reportTests(const StepOutput& output) {
 // Returns the number of steps that failed.
 std::size_t reportSteps(const std::vector<Step>& steps) {
   std::size_t failed = 0;
+  std::string missing;
   for (const Step& step : steps) {
     if (step.state == "cut_short")
       say("cut", fmt::format("{} was cut short after {} s", step.name, step.seconds));
-    if (step.state == "not_run") say("cut", fmt::format("{} did not run", step.name));
+    if (step.state == "not_run") missing += (missing.empty() ? "" : ", ") + step.name;
     if (step.state != "failed") continue;
     ++failed;
     say("FAILED", fmt::format("{}: steps/{}.log says why", step.name, step.name));
   }
+  if (!missing.empty()) say("not run", missing);
   return failed;
 }
 
 void reportTimes(const std::vector<Kept>& all, const Rows& rows, const std::string& against) {
+  if (rows.empty()) return;
   const std::string device = deviceOf(rows);
   std::string names;
   const Kept* kept = nullptr;

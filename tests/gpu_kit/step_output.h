@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the steps of a run printed: rows of clothstream-bench, and results of tests.
+// Rows of clothstream-bench and results of tests, from the output of the steps of a run.
 #pragma once
 
 #include <cstddef>
