@@ -180,11 +180,9 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
 
 }  // namespace
 
-Rows runAcad(vulkan::Device& device, const Settings& settings) {
-  Rows rows;
+void runAcad(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   for (const std::uint32_t size : settings.size ? std::vector{*settings.size} : std::vector{64u, 128u})
-    for (auto& row : measureSize(device, settings, size)) rows.push_back(std::move(row));
-  return rows;
+    for (const Row& row : measureSize(device, settings, size)) add(row);
 }
 
 }  // namespace clothstream::bench

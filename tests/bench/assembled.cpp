@@ -142,12 +142,10 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
 
 }  // namespace
 
-Rows runAssembled(vulkan::Device& device, const Settings& settings) {
-  Rows rows;
+void runAssembled(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   for (const std::uint32_t size : settings.size ? std::vector{*settings.size} : std::vector{32u, 64u})
     for (const bool bend : {false, true})
-      for (auto& row : measureSize(device, settings, size, bend)) rows.push_back(std::move(row));
-  return rows;
+      for (const Row& row : measureSize(device, settings, size, bend)) add(row);
 }
 
 }  // namespace clothstream::bench

@@ -282,9 +282,8 @@ Outcome run(vulkan::Device& device, const Figure& figure, const Panel& panel) {
 
 }  // namespace
 
-Rows runBehaviour(vulkan::Device& device, const Settings& settings) {
+void runBehaviour(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   if (settings.size) throw std::runtime_error("--size: not allowed, because the sizes are the paper's");
-  Rows rows;
   for (const Figure& figure : figures()) {
     std::vector<Outcome> outcomes;
     std::vector<Picture> pictures;
@@ -300,29 +299,28 @@ Rows runBehaviour(vulkan::Device& device, const Settings& settings) {
     const auto file = settings.pictures / fmt::format("figure_{}.png", figure.number);
     writePng(sideBySide(pictures), file);
     for (const Outcome& outcome : outcomes)
-      rows.push_back({{"suite", "behaviour"},
-                      {"figure", figure.number},
-                      {"method", outcome.panel.method},
-                      {"stepSeconds", 1.0 / figure.stepsASecond},
-                      {"stiffness", outcome.panel.stiffness},
-                      {"healthy", outcome.healthy},
-                      {"comparedSteps", outcome.compared},
-                      {"strainMean", outcome.strains.mean()},
-                      {"strainP99", outcome.strains.p99()},
-                      {"strainMax", outcome.strains.quantile(1)},
-                      {"kineticEnergy", outcome.kineticEnergy},
-                      {"largestStrain", outcome.largestStrain},
-                      {"restEnergy", outcome.restEnergy},
-                      {"lowest", outcome.lowest},
-                      {"picture", file.string()},
-                      {"device", device.info().name}});
+      add({{"suite", "behaviour"},
+           {"figure", figure.number},
+           {"method", outcome.panel.method},
+           {"stepSeconds", 1.0 / figure.stepsASecond},
+           {"stiffness", outcome.panel.stiffness},
+           {"healthy", outcome.healthy},
+           {"comparedSteps", outcome.compared},
+           {"strainMean", outcome.strains.mean()},
+           {"strainP99", outcome.strains.p99()},
+           {"strainMax", outcome.strains.quantile(1)},
+           {"kineticEnergy", outcome.kineticEnergy},
+           {"largestStrain", outcome.largestStrain},
+           {"restEnergy", outcome.restEnergy},
+           {"lowest", outcome.lowest},
+           {"picture", file.string()},
+           {"device", device.info().name}});
     try {
       figure.check(outcomes);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("Figure {}: {}", figure.number, error.what()));
     }
   }
-  return rows;
 }
 
 }  // namespace clothstream::bench

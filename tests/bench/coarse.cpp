@@ -83,7 +83,7 @@ simulation::TickInputs inputsAt(const model::Scene& scene, std::uint32_t frame, 
   return inputs;
 }
 
-Rows::value_type rowOf(vulkan::Device& device, const Setting& setting, float speed) {
+Row rowOf(vulkan::Device& device, const Setting& setting, float speed) {
   const model::Scene scene = sceneOf(setting);
   Simulated simulated(device, scene, {});
   // Every pair of means may lie at its largest distance, where rounding decides whether it acts.
@@ -117,15 +117,15 @@ Rows::value_type rowOf(vulkan::Device& device, const Setting& setting, float spe
 
 }  // namespace
 
-Rows runCoarse(vulkan::Device&, const Settings& settings) {
-  Rows rows;
+void runCoarse(vulkan::Device&, const Settings& settings, const RowSink& add) {
+  bool known = false;
   for (const Setting& setting : kSettings) {
     if (settings.size && *settings.size != setting.size) continue;
+    known = true;
     vulkan::Device device(simulation::suitedTo(setting.size * setting.size, settings.device));
-    for (const float speed : {0.0f, 1.0f, 5.0f}) rows.push_back(rowOf(device, setting, speed));
+    for (const float speed : {0.0f, 1.0f, 5.0f}) add(rowOf(device, setting, speed));
   }
-  if (rows.empty()) throw std::runtime_error("--size: use 32, 64, 128 or 256");
-  return rows;
+  if (!known) throw std::runtime_error("--size: use 32, 64, 128 or 256");
 }
 
 }  // namespace clothstream::bench

@@ -94,7 +94,7 @@ std::vector<simulation::MovingCollider> bed(float lift, int tick) {
 }
 
 // Ticks with and without spheres alternate. Both sheets start in the state in which a sheet lies on them.
-void measureBed(vulkan::Device& device, const Settings& settings, float lift, Rows& rows) {
+void measureBed(vulkan::Device& device, const Settings& settings, float lift, const RowSink& add) {
   const model::Scene scene = sheet();
   const simulation::SimulationOptions options{settings.rowsPerInvocation, settings.workgroupSize, {}};
   Simulated touching(device, scene, options), without(device, scene, options);
@@ -121,27 +121,26 @@ void measureBed(vulkan::Device& device, const Settings& settings, float lift, Ro
   double spent = 0;
   while (spent < 2 * settings.seconds || without.wall().count() < 7)
     spent += secondsOf([&] { next(); }) + secondsOf([&] { without.tick(none); });
-  rows.push_back({{"suite", "colliders"},
-                  {"size", kSheet},
-                  {"colliders", kSpheres * kSpheres},
-                  {"touching", lift > 0 ? "moving" : "at rest"},
-                  {"tickMsMin", touching.wall().min() * 1e3},
-                  {"tickMsMedian", touching.wall().median() * 1e3},
-                  {"tickMsP99", touching.wall().p99() * 1e3},
-                  {"nearMsMedian", touching.near().median() * 1e3},
-                  {"withoutMsMin", without.wall().min() * 1e3},
-                  {"withoutMsMedian", without.wall().median() * 1e3},
-                  {"timesWithout", touching.wall().min() / without.wall().min()},
-                  {"ticks", touching.wall().count()},
-                  {"device", device.info().name}});
+  add({{"suite", "colliders"},
+       {"size", kSheet},
+       {"colliders", kSpheres * kSpheres},
+       {"touching", lift > 0 ? "moving" : "at rest"},
+       {"tickMsMin", touching.wall().min() * 1e3},
+       {"tickMsMedian", touching.wall().median() * 1e3},
+       {"tickMsP99", touching.wall().p99() * 1e3},
+       {"nearMsMedian", touching.near().median() * 1e3},
+       {"withoutMsMin", without.wall().min() * 1e3},
+       {"withoutMsMedian", without.wall().median() * 1e3},
+       {"timesWithout", touching.wall().min() / without.wall().min()},
+       {"ticks", touching.wall().count()},
+       {"device", device.info().name}});
 }
 
 }  // namespace
 
-Rows runColliders(vulkan::Device& device, const Settings& settings) {
+void runColliders(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   const std::uint32_t size = settings.size.value_or(128);
   const model::Scene scene = curtain(size);
-  Rows rows;
   for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{100}, std::size_t{4000}}) {
     const simulation::TickInputs inputs{scene.environment, hands(count)};
     Simulated simulated(device, scene, {settings.rowsPerInvocation, settings.workgroupSize, {}});
@@ -152,22 +151,21 @@ Rows runColliders(vulkan::Device& device, const Settings& settings) {
     while (spent < settings.seconds || simulated.wall().count() < 7)
       spent += secondsOf([&] { simulated.tick(inputs); });
     const double nodeSteps = static_cast<double>(size) * size * scene.substeps;
-    rows.push_back({{"suite", "colliders"},
-                    {"size", size},
-                    {"colliders", count},
-                    {"tickMsMin", simulated.wall().min() * 1e3},
-                    {"tickMsMedian", simulated.wall().median() * 1e3},
-                    {"tickMsP99", simulated.wall().p99() * 1e3},
-                    {"nearMsMedian", count > 0 ? simulated.near().median() * 1e3 : 0},
-                    {"nsMin", simulated.wall().min() / nodeSteps * 1e9},
-                    {"nsMedian", simulated.wall().median() / nodeSteps * 1e9},
-                    {"referenceMs", referenceSeconds * 1e3},
-                    {"ticks", simulated.wall().count()},
-                    {"device", device.info().name}});
+    add({{"suite", "colliders"},
+         {"size", size},
+         {"colliders", count},
+         {"tickMsMin", simulated.wall().min() * 1e3},
+         {"tickMsMedian", simulated.wall().median() * 1e3},
+         {"tickMsP99", simulated.wall().p99() * 1e3},
+         {"nearMsMedian", count > 0 ? simulated.near().median() * 1e3 : 0},
+         {"nsMin", simulated.wall().min() / nodeSteps * 1e9},
+         {"nsMedian", simulated.wall().median() / nodeSteps * 1e9},
+         {"referenceMs", referenceSeconds * 1e3},
+         {"ticks", simulated.wall().count()},
+         {"device", device.info().name}});
   }
-  measureBed(device, settings, 0, rows);
-  measureBed(device, settings, 0.002f, rows);
-  return rows;
+  measureBed(device, settings, 0, add);
+  measureBed(device, settings, 0.002f, add);
 }
 
 }  // namespace clothstream::bench

@@ -53,12 +53,11 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
 
 }  // namespace
 
-Rows runCreation(vulkan::Device& device, const Settings& settings) {
+void runCreation(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   constexpr int kRepeats = 3;
   std::vector<std::uint32_t> sizes = {128, 256, 512};
   if (settings.size) sizes = {*settings.size};
   encode::EncoderThreads workers(1);
-  Rows rows;
   for (const Case& experiment : kCases) {
     // Kernels are compiled once for all scenes that need them.
     const scene::SceneOnDevice first(device, sceneOf(experiment, 16), workers);
@@ -84,17 +83,16 @@ Rows runCreation(vulkan::Device& device, const Settings& settings) {
       }
       const auto nodes = static_cast<double>(size * size);
       const double all = check.min() + prepare.min() + load.min() + remove.min();
-      rows.push_back({{"suite", "creation"},
-                      {"method", experiment.method},
-                      {"size", size},
-                      {"check_ms", check.min() * 1e3},
-                      {"prepare_ms", prepare.min() * 1e3},
-                      {"load_ms", load.min() * 1e3},
-                      {"delete_ms", remove.min() * 1e3},
-                      {"us_per_node", all / nodes * 1e6}});
+      add({{"suite", "creation"},
+           {"method", experiment.method},
+           {"size", size},
+           {"check_ms", check.min() * 1e3},
+           {"prepare_ms", prepare.min() * 1e3},
+           {"load_ms", load.min() * 1e3},
+           {"delete_ms", remove.min() * 1e3},
+           {"us_per_node", all / nodes * 1e6}});
     }
   }
-  return rows;
 }
 
 }  // namespace clothstream::bench

@@ -110,7 +110,7 @@ void checkFrames(const cs_statistics& seen) {
 
 }  // namespace
 
-Rows runCurtain(vulkan::Device& device, const Settings& settings) {
+void runCurtain(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   if (settings.size) throw std::runtime_error("--size: not allowed, because the scene has a fixed size");
   const model::Scene scene = *messages::loadScene("curtain");
   Simulated(device, scene, {}).check({scene.environment, {}});
@@ -129,25 +129,25 @@ Rows runCurtain(vulkan::Device& device, const Settings& settings) {
   const telemetry::Summary tick = metrics.tick.summary(), onDevice = metrics.deviceTotal.summary(),
                            encode = metrics.encode.summary(), pose = metrics.inputToPacket.summary();
   if (pose.count == 0) throw std::runtime_error("no pose reached the scene");
-  return {{{"suite", "curtain"},
-           {"nodes", scene.nodeCount()},
-           {"substeps", scene.substeps},
-           {"rate", scene.simulationRate},
-           {"budgetMs", scene.tickSeconds() * 1e3},
-           {"tickMsMedian", tick.p50 * 1e3},
-           {"tickMsP99", tick.p99 * 1e3},
-           {"deviceMsMedian", onDevice.p50 * 1e3},
-           {"encodeMsMedian", encode.p50 * 1e3},
-           {"poseToPacketMsMedian", pose.p50 * 1e3},
-           {"poseToPacketMsP99", pose.p99 * 1e3},
-           {"poses", pose.count},
-           {"ticks", metrics.ticks.value()},
-           {"lateTicks", metrics.lateTicks.value()},
-           {"slippedTicks", metrics.slippedTicks.value()},
-           {"frames", seen.frames},
-           {"dropped", seen.dropped},
-           {"bitsPerVertex", seen.bits_per_vertex},
-           {"device", device.info().name}}};
+  add({{"suite", "curtain"},
+       {"nodes", scene.nodeCount()},
+       {"substeps", scene.substeps},
+       {"rate", scene.simulationRate},
+       {"budgetMs", scene.tickSeconds() * 1e3},
+       {"tickMsMedian", tick.p50 * 1e3},
+       {"tickMsP99", tick.p99 * 1e3},
+       {"deviceMsMedian", onDevice.p50 * 1e3},
+       {"encodeMsMedian", encode.p50 * 1e3},
+       {"poseToPacketMsMedian", pose.p50 * 1e3},
+       {"poseToPacketMsP99", pose.p99 * 1e3},
+       {"poses", pose.count},
+       {"ticks", metrics.ticks.value()},
+       {"lateTicks", metrics.lateTicks.value()},
+       {"slippedTicks", metrics.slippedTicks.value()},
+       {"frames", seen.frames},
+       {"dropped", seen.dropped},
+       {"bitsPerVertex", seen.bits_per_vertex},
+       {"device", device.info().name}});
 }
 
 }  // namespace clothstream::bench

@@ -86,12 +86,10 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
 
 }  // namespace
 
-Rows runEnforcement(vulkan::Device& device, const Settings& settings) {
-  Rows rows;
+void runEnforcement(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   for (const std::uint32_t size :
        settings.size ? std::vector{*settings.size} : std::vector{16u, 32u, 64u, 128u})
-    for (auto& row : measureSize(device, settings, size)) rows.push_back(std::move(row));
-  return rows;
+    for (const Row& row : measureSize(device, settings, size)) add(row);
 }
 
 }  // namespace clothstream::bench

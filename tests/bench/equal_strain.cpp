@@ -121,9 +121,8 @@ double gravityEnergyLost(const model::Scene& scene, const reference::ReferenceCl
          measured.gravityEnergy(gravity);
 }
 
-Rows::value_type rowOf(const Ladder& ladder, const Setting& setting, const Bound& bound,
-                       const model::Scene& scene, const reference::ReferenceCloth& measured,
-                       const Simulated& simulated) {
+Row rowOf(const Ladder& ladder, const Setting& setting, const Bound& bound, const model::Scene& scene,
+          const reference::ReferenceCloth& measured, const Simulated& simulated) {
   const double nodes = scene.nodeCount();
   return {{"suite", "equal_strain"},
           {"nodes", scene.nodeCount()},
@@ -144,8 +143,8 @@ Rows::value_type rowOf(const Ladder& ladder, const Setting& setting, const Bound
 }
 
 // First setting of the ladder with which the sheet falls and keeps the bound. Otherwise nullopt.
-std::optional<Rows::value_type> cheapest(vulkan::Device& device, const Settings& settings,
-                                         const Ladder& ladder, const Bound& bound) {
+std::optional<Row> cheapest(vulkan::Device& device, const Settings& settings, const Ladder& ladder,
+                            const Bound& bound) {
   for (const Setting& setting : ladder.settings) {
     const model::Scene scene = sceneOf(ladder, setting, bound.size);
     const simulation::TickInputs inputs{scene.environment, {}};
@@ -157,7 +156,7 @@ std::optional<Rows::value_type> cheapest(vulkan::Device& device, const Settings&
     for (std::uint32_t frame = 0; frame < kFrames; ++frame) simulated.tick(inputs);
     const reference::ReferenceCloth measured = measuredCloth(scene.cloths.front(), simulated.state());
     if (measured.strain().mean > bound.strain || gravityEnergyLost(scene, measured) < kFallen) continue;
-    Rows::value_type row = rowOf(ladder, setting, bound, scene, measured, simulated);
+    Row row = rowOf(ladder, setting, bound, scene, measured, simulated);
     row["device"] = device.info().name;
     return row;
   }
@@ -167,21 +166,24 @@ std::optional<Rows::value_type> cheapest(vulkan::Device& device, const Settings&
 }  // namespace
 
 // Runs each size on a device that the server would choose for it.
-Rows runEqualStrain(vulkan::Device&, const Settings& settings) {
-  Rows rows;
+void runEqualStrain(vulkan::Device&, const Settings& settings, const RowSink& add) {
+  bool known = false;
   for (const Bound& bound : kBounds) {
     if (settings.size && *settings.size != bound.size) continue;
     vulkan::Device device(simulation::suitedTo(bound.size * bound.size, settings.device));
-    const std::size_t before = rows.size();
+    known = true;
+    bool found = false;
     for (const Ladder& ladder : ladders())
       if (bound.size <= ladder.largest)
-        if (auto row = cheapest(device, settings, ladder, bound)) rows.push_back(std::move(*row));
-    if (rows.size() == before)
+        if (const auto row = cheapest(device, settings, ladder, bound)) {
+          add(*row);
+          found = true;
+        }
+    if (!found)
       throw std::runtime_error(
           fmt::format("{} nodes a side: every setting stretches by more than {}", bound.size, bound.strain));
   }
-  if (rows.empty()) throw std::runtime_error("--size: use 32, 64, 128 or 256");
-  return rows;
+  if (!known) throw std::runtime_error("--size: use 32, 64, 128 or 256");
 }
 
 }  // namespace clothstream::bench

@@ -27,12 +27,11 @@ nlohmann::ordered_json numberOf(const std::optional<double>& value) {
 
 }  // namespace
 
-Rows runKernels(vulkan::Device& device, const Settings& settings) {
+void runKernels(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   const simulation::SimulationOptions options{.rowsPerInvocation = settings.rowsPerInvocation,
                                               .workgroupSize = settings.workgroupSize,
                                               .xpbdWholeNodes = settings.xpbdWholeNodes,
                                               .solveWholeNodes = settings.solveWholeNodes};
-  Rows rows;
   for (const kernel_survey::SurveyedKernel& kernel :
        kernel_survey::survey(device, kernel_survey::surveyScenes(), options)) {
     nlohmann::ordered_json row{{"suite", "kernels"},          {"kernel", kernel.kernel},
@@ -48,9 +47,8 @@ Rows runKernels(vulkan::Device& device, const Settings& settings) {
       row[fmt::format("at least ps a node, {}", gpu.name)] =
           numberOf(bound ? std::optional(*bound * 1e12) : bound);
     }
-    rows.push_back(std::move(row));
+    add(row);
   }
-  return rows;
 }
 
 }  // namespace clothstream::bench

@@ -55,6 +55,9 @@ constexpr std::array kSuites{
                  &bench::runPrice},
     bench::Suite{"creation", "time to check, prepare, load and delete a scene, for each of its nodes",
                  &bench::runCreation},
+    bench::Suite{"doctor",
+                 "what clothstream-server doctor --accept finds about the device, and the machine's name",
+                 &bench::runDoctor},
     bench::Suite{"kernels",
                  "registers, spills, instructions, bytes and bounds of every kernel; it only compiles them",
                  &bench::runKernels, true},
@@ -78,7 +81,7 @@ int main(int argc, char** argv) {
   CLI::Option* sizeOption =
       app.add_option("--size", size, "Rows and columns of the grid (default: the suite's sizes)")
           ->check(CLI::Range(2, 65536));
-  app.add_flag("--json", json, "Print the rows as one JSON array");
+  app.add_flag("--json", json, "Print the rows as one JSON array, each when it is measured");
   app.add_option("--device", settings.device.select, "Index or part of the name of the Vulkan device");
   CLI::Option* threadsOption = app.add_option("--software-threads", softwareThreads,
                                               "Threads of a software device (0: only the calling thread)");
@@ -91,6 +94,7 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   app.add_option("--rows", settings.rowsPerInvocation, "Rows of a grid for each invocation (0: automatic)");
   app.add_option("--workgroup", settings.workgroupSize, "Invocations of a workgroup (0: automatic)");
+  app.add_option("--scene", settings.scenes, "Scene of suite doctor; may be repeated (default: all)");
   app.add_option("--pictures", settings.pictures, "Directory of the pictures")
       ->check(CLI::ExistingDirectory)
       ->capture_default_str();
@@ -111,9 +115,16 @@ int main(int argc, char** argv) {
     if (!json)
       fmt::print("{}, {}, Vulkan {}, {} CPU threads\n", device.info().name, device.info().driver,
                  device.info().apiVersion, std::thread::hardware_concurrency());
-    const bench::Rows rows = suites.at(name)->run(device, settings);
+    bench::Rows rows;
+    suites.at(name)->run(device, settings, [&](const bench::Row& row) {
+      if (json) {
+        fmt::print("{}\n  {}", rows.empty() ? "[" : ",", row.dump());
+        std::fflush(stdout);
+      }
+      rows.push_back(row);
+    });
     if (json)
-      fmt::print("{}\n", nlohmann::ordered_json(rows).dump(2));
+      fmt::print("{}\n]\n", rows.empty() ? "[" : "");
     else
       bench::printTable(rows);
   } catch (const std::exception& error) {

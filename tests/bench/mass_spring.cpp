@@ -141,9 +141,8 @@ Rows measureSize(vulkan::Device& device, const Settings& settings, std::uint32_t
 
 }  // namespace
 
-Rows runMassSpring(vulkan::Device& device, const Settings& settings) {
+void runMassSpring(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   const std::uint32_t detailed = settings.size.value_or(256);
-  Rows rows;
   for (std::uint32_t size = settings.size.value_or(32);; size *= 2) {
     if (!fits(device, size)) {
       if (!settings.size) break;
@@ -160,10 +159,9 @@ Rows runMassSpring(vulkan::Device& device, const Settings& settings) {
                                        {.spheres = 16},
                                        {.mesh = true},
                                        {.springDamping = true, .air = true, .mesh = true}});
-    for (auto& row : measureSize(device, settings, size, variants)) rows.push_back(std::move(row));
+    for (const Row& row : measureSize(device, settings, size, variants)) add(row);
     if (settings.size) break;
   }
-  return rows;
 }
 
 }  // namespace clothstream::bench

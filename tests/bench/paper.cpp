@@ -190,8 +190,8 @@ struct Contender {
   }
 };
 
-Rows::value_type rowOf(const vulkan::Device& device, const Case& experiment, const model::Cloth& cloth,
-                       const Contender& contender) {
+Row rowOf(const vulkan::Device& device, const Case& experiment, const model::Cloth& cloth,
+          const Contender& contender) {
   const std::vector<model::SpringLink> links = model::springLinks(cloth);
   nlohmann::ordered_json row{
       {"suite", "paper"},
@@ -251,17 +251,15 @@ Rows measure(vulkan::Device& device, const Settings& settings, const Case& exper
 
 }  // namespace
 
-Rows runPaper(vulkan::Device& device, const Settings& settings) {
+void runPaper(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   if (settings.size) throw std::runtime_error("--size: not allowed, because the sizes are the paper's");
-  Rows rows;
   for (const Case& experiment : cases()) {
     try {
-      for (auto& row : measure(device, settings, experiment)) rows.push_back(std::move(row));
+      for (const Row& row : measure(device, settings, experiment)) add(row);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("Figure {}: {}", experiment.figure, error.what()));
     }
   }
-  return rows;
 }
 
 }  // namespace clothstream::bench

@@ -138,11 +138,10 @@ model::Scene sceneOf(const Case& experiment, std::uint32_t size) {
 
 }  // namespace
 
-Rows runPrice(vulkan::Device& device, const Settings& settings) {
+void runPrice(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   std::vector<std::uint32_t> sizes = {16, 32, 64, 128, 256};
   if (settings.size) sizes = {*settings.size};
   simulation::SpeedMeter meter(device);
-  Rows rows;
   for (const std::uint32_t size : sizes)
     for (const Case& experiment : cases()) {
       const model::Scene scene = sceneOf(experiment, size);
@@ -158,19 +157,18 @@ Rows runPrice(vulkan::Device& device, const Settings& settings) {
       const double measured = simulated.wall().median();
       const model::PriceModel model(scene);
       const double price = model.work(scene).seconds(speed);
-      rows.push_back({{"suite", "price"},
-                      {"method", experiment.method},
-                      {"size", size},
-                      {"iterations", experiment.solver.iterations},
-                      {"node_step_ns", speed.nodeStepSeconds * 1e9},
-                      {"dispatch_us", speed.dispatchSeconds * 1e6},
-                      {"price_ms", price * 1e3},
-                      {"tick_ms", measured * 1e3},
-                      {"price_over_tick", price / measured},
-                      {"price_mb", model.bytes(scene) / 1e6},
-                      {"device_mb", static_cast<double>(bytes) / 1e6}});
+      add({{"suite", "price"},
+           {"method", experiment.method},
+           {"size", size},
+           {"iterations", experiment.solver.iterations},
+           {"node_step_ns", speed.nodeStepSeconds * 1e9},
+           {"dispatch_us", speed.dispatchSeconds * 1e6},
+           {"price_ms", price * 1e3},
+           {"tick_ms", measured * 1e3},
+           {"price_over_tick", price / measured},
+           {"price_mb", model.bytes(scene) / 1e6},
+           {"device_mb", static_cast<double>(bytes) / 1e6}});
     }
-  return rows;
 }
 
 }  // namespace clothstream::bench

@@ -140,15 +140,13 @@ nlohmann::ordered_json foldsScene(vulkan::Device& device, const Settings& settin
 
 }  // namespace
 
-Rows runSelfCollision(vulkan::Device& device, const Settings& settings) {
-  Rows rows;
+void runSelfCollision(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   const std::vector<std::uint32_t> sizes =
       settings.size ? std::vector{*settings.size} : std::vector<std::uint32_t>{64, 128};
   for (const std::uint32_t size : sizes)
     for (const bool folds : {false, true})
-      for (const bool balls : {false, true}) rows.push_back(sheet(device, settings, size, folds, balls));
-  rows.push_back(foldsScene(device, settings));
-  return rows;
+      for (const bool balls : {false, true}) add(sheet(device, settings, size, folds, balls));
+  add(foldsScene(device, settings));
 }
 
 }  // namespace clothstream::bench

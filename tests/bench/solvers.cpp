@@ -69,8 +69,7 @@ double mostStrain(const model::Scene& scene) {
   return 2 * rows * 9.81 * (double{cloth.nodeMass()} * compliance + 2 * h * h) / length;
 }
 
-Rows::value_type measure(vulkan::Device& device, const Settings& settings, const Case& experiment,
-                         std::uint32_t size) {
+Row measure(vulkan::Device& device, const Settings& settings, const Case& experiment, std::uint32_t size) {
   const model::Scene scene = sceneOf(experiment, size);
   const simulation::TickInputs inputs{scene.environment, {}};
   const simulation::SimulationOptions options{.rowsPerInvocation = settings.rowsPerInvocation,
@@ -100,11 +99,9 @@ Rows::value_type measure(vulkan::Device& device, const Settings& settings, const
 
 }  // namespace
 
-Rows runSolvers(vulkan::Device& device, const Settings& settings) {
-  Rows rows;
+void runSolvers(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   for (const std::uint32_t size : settings.size ? std::vector{*settings.size} : std::vector{32u, 64u})
-    for (const Case& experiment : kCases) rows.push_back(measure(device, settings, experiment, size));
-  return rows;
+    for (const Case& experiment : kCases) add(measure(device, settings, experiment, size));
 }
 
 }  // namespace clothstream::bench

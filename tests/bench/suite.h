@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,7 @@ struct Settings {
   std::uint32_t workgroupSize = 0;
   std::optional<std::uint32_t> xpbdWholeNodes;  // chosen by the simulation if absent
   std::optional<std::uint32_t> solveWholeNodes;
+  std::vector<std::string> scenes;       // of suite doctor; all built-in scenes if empty
   std::filesystem::path pictures = ".";  // directory of the pictures of suite behaviour
   // Input of the codec suites: named motions, or instead a file (bench_motion.h); number of frames of each;
   // max error in metres.
@@ -32,34 +34,39 @@ struct Settings {
   std::uint32_t encoderThreads = 1;
 };
 
-// One JSON object for each row; every row names its suite. A suite checks its results before it reports a
-// time, and throws std::runtime_error if they are wrong.
-using Rows = std::vector<nlohmann::ordered_json>;
+// A JSON object. Every row names its suite.
+using Row = nlohmann::ordered_json;
+using Rows = std::vector<Row>;
+
+// Takes a row as soon as it is complete, so that a suite that is stopped leaves the rows before. A suite
+// checks its results before it reports a time, and throws std::runtime_error if they are wrong.
+using RowSink = std::function<void(const Row&)>;
 
 struct Suite {
   const char* name;
   const char* description;
-  Rows (*run)(vulkan::Device& device, const Settings& settings);
+  void (*run)(vulkan::Device& device, const Settings& settings, const RowSink& add);
   bool compileOnly = false;  // the device is opened with vulkan::DeviceOptions::compileOnly
 };
 
-Rows runMassSpring(vulkan::Device& device, const Settings& settings);
-Rows runPaper(vulkan::Device& device, const Settings& settings);
-Rows runBehaviour(vulkan::Device& device, const Settings& settings);
-Rows runEqualStrain(vulkan::Device& device, const Settings& settings);
-Rows runCoarse(vulkan::Device& device, const Settings& settings);
-Rows runWorkPrecision(vulkan::Device& device, const Settings& settings);
-Rows runSolvers(vulkan::Device& device, const Settings& settings);
-Rows runEnforcement(vulkan::Device& device, const Settings& settings);
-Rows runAssembled(vulkan::Device& device, const Settings& settings);
-Rows runAcad(vulkan::Device& device, const Settings& settings);
-Rows runCurtain(vulkan::Device& device, const Settings& settings);
-Rows runColliders(vulkan::Device& device, const Settings& settings);
-Rows runSelfCollision(vulkan::Device& device, const Settings& settings);
-Rows runCodec(vulkan::Device& device, const Settings& settings);
-Rows runCodecDevice(vulkan::Device& device, const Settings& settings);
-Rows runPrice(vulkan::Device& device, const Settings& settings);
-Rows runKernels(vulkan::Device& device, const Settings& settings);
-Rows runCreation(vulkan::Device& device, const Settings& settings);
+void runMassSpring(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runPaper(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runBehaviour(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runEqualStrain(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runCoarse(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runWorkPrecision(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runSolvers(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runEnforcement(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runAssembled(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runAcad(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runCurtain(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runColliders(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runSelfCollision(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runCodec(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runCodecDevice(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runPrice(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runDoctor(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runKernels(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runCreation(vulkan::Device& device, const Settings& settings, const RowSink& add);
 
 }  // namespace clothstream::bench

@@ -152,9 +152,8 @@ Measured measure(vulkan::Device& device, model::Scene scene, const Method& metho
 
 }  // namespace
 
-Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
+void runWorkPrecision(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   if (settings.size) throw std::runtime_error("--size: not allowed, because the sheet has 32x32 nodes");
-  Rows rows;
   for (const model::Scene& scene : scenes()) {
     const Trajectory truth = referenceTrajectory(scene, kReferenceSubsteps);
     const double floor = distance(referenceTrajectory(scene, kCoarserSubsteps), truth);
@@ -164,22 +163,21 @@ Rows runWorkPrecision(vulkan::Device& device, const Settings& settings) {
         const Measured measured = measure(device, scene, method, substeps);
         const double error = distance(measured.trajectory, truth);
         if (method.kind == model::SolverKind::massSpring) worst = error;
-        rows.push_back({{"suite", "work_precision"},
-                        {"scene", scene.name},
-                        {"method", method.name},
-                        {"substeps", substeps},
-                        {"secondsPerSecond", measured.seconds},
-                        {"error", error},
-                        {"referenceError", floor},
-                        {"energyLost", truth.energy - measured.trajectory.energy},
-                        {"device", device.info().name}});
+        add({{"suite", "work_precision"},
+             {"scene", scene.name},
+             {"method", method.name},
+             {"substeps", substeps},
+             {"secondsPerSecond", measured.seconds},
+             {"error", error},
+             {"referenceError", floor},
+             {"energyLost", truth.energy - measured.trajectory.energy},
+             {"device", device.info().name}});
       }
     }
     // Explicit forces converge to the truth with smaller steps. If they do not, something is wrong.
     if (!(*worst < 0.005))
       throw std::runtime_error(fmt::format("{}: the finest forces are {} m off", scene.name, *worst));
   }
-  return rows;
 }
 
 }  // namespace clothstream::bench

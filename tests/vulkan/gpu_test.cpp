@@ -4,8 +4,10 @@
 #include "tests/vulkan/gpu_test.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
 #include <stdexcept>
+#include <string_view>
 
 namespace clothstream::tests {
 namespace {
@@ -29,6 +31,11 @@ class SharedDevice : public ::testing::Environment {
   }
 };
 
+bool validates() {
+  const char* value = std::getenv("CLOTHSTREAM_VALIDATION");
+  return value == nullptr || std::string_view(value) != "0";
+}
+
 [[maybe_unused]] const bool registered = [] {
   ::testing::AddGlobalTestEnvironment(new SharedDevice);
   ::testing::UnitTest::GetInstance()->listeners().Append(new ValidationListener);
@@ -39,7 +46,7 @@ class SharedDevice : public ::testing::Environment {
 
 vulkan::Device& device() {
   if (!sharedDevice)
-    sharedDevice = std::make_unique<vulkan::Device>(vulkan::DeviceOptions{.validation = true});
+    sharedDevice = std::make_unique<vulkan::Device>(vulkan::DeviceOptions{.validation = validates()});
   return *sharedDevice;
 }
 

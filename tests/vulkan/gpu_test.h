@@ -16,8 +16,8 @@ namespace clothstream::tests {
 
 // In programs that link `clothstream_gpu_test`, a message of the validation layer fails the running test. A
 // message while the shared device is closed fails the program, because an object on it was not destroyed. The
-// shared device always validates. Devices that tests open do so under ctest, which sets
-// CLOTHSTREAM_VALIDATION=1.
+// shared device always validates, except with CLOTHSTREAM_VALIDATION=0, for machines without the layer.
+// Devices that tests open do so under ctest, which sets CLOTHSTREAM_VALIDATION=1.
 
 // The device of this test program. The first call opens it; it closes after the last test. Throws
 // vulkan::DeviceError if no device is usable.

@@ -45,28 +45,26 @@ nlohmann::ordered_json measure(const std::string& motion, const codec::StreamLay
 
 }  // namespace
 
-Rows runCodec(vulkan::Device& device, const Settings& settings) {
-  Rows rows;
+void runCodec(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   for (const BenchMotion& motion : chosenMotions(device, settings)) {
     const Frames frames(motion);
     const auto ofTheGrid = [&](std::size_t frame) { return frames[frame]; };
     codec::StreamLayout layout{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
     for (const auto normals : {codec::NormalMode::none, codec::NormalMode::octahedral}) {
       layout.normals = normals;
-      rows.push_back(measure(motion.name, layout, frames.count(), ofTheGrid));
+      add(measure(motion.name, layout, frames.count(), ofTheGrid));
     }
     if (settings.encoderThreads > 1) {
       encode::EncoderThreads threads(settings.encoderThreads);
       const codec::StreamLayout plain{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
-      rows.push_back(measure(motion.name, plain, frames.count(), ofTheGrid, &threads));
+      add(measure(motion.name, plain, frames.count(), ofTheGrid, &threads));
     }
     if (motion.cloth.rows < 2 || motion.cloth.rows != motion.cloth.columns) continue;
     codec::CutGrid cut(motion.cloth.rows);
     const codec::StreamLayout ofAMesh{.epoch = 1, .maxError = settings.maxError, .cloths = {cut.cloth()}};
-    rows.push_back(measure(motion.name, ofAMesh, frames.count(),
-                           [&](std::size_t frame) { return cut.renumbered(frames[frame]); }));
+    add(measure(motion.name, ofAMesh, frames.count(),
+                [&](std::size_t frame) { return cut.renumbered(frames[frame]); }));
   }
-  return rows;
 }
 
 }  // namespace clothstream::bench

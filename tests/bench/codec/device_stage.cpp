@@ -87,8 +87,7 @@ nlohmann::ordered_json measure(vulkan::Device& device, const model::Scene& scene
 
 }  // namespace
 
-Rows runCodecDevice(vulkan::Device& device, const Settings& settings) {
-  Rows rows;
+void runCodecDevice(vulkan::Device& device, const Settings& settings, const RowSink& add) {
   const std::pair<model::Normals, encode::Prediction> ways[]{
       {model::Normals::none, encode::Prediction::onHost},
       {model::Normals::none, encode::Prediction::onDevice},
@@ -99,11 +98,11 @@ Rows runCodecDevice(vulkan::Device& device, const Settings& settings) {
       model::Scene scene = hungCloth(settings.size.value_or(100));
       scene.substeps = std::max(scene.substeps, model::stableSubsteps(scene));
       scene.stream.normals = normals;
-      rows.push_back(measure(device, scene, kind, prediction));
-      rows.back()["device"] = device.info().name;
+      Row row = measure(device, scene, kind, prediction);
+      row["device"] = device.info().name;
+      add(row);
     }
   }
-  return rows;
 }
 
 }  // namespace clothstream::bench
