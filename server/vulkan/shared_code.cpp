@@ -91,6 +91,12 @@ class SharedForm {
     std::uint32_t type, offset;
   };
 
+  // A pointer to a component of a vector: the chain to the vector, its type, and the component.
+  struct Component {
+    Words chain;  // base and indices
+    std::uint32_t vector = 0, index = 0;
+  };
+
   // What the module says.
 
   void readAnnotations() {
@@ -171,6 +177,14 @@ class SharedForm {
       if (operation == kMemberDecorate && words[0] == structure && words[1] == member && words[2] == kOffset)
         return words[3];
     refuse(fmt::format("member {} of {} has no offset", member, nameOf(structure)));
+  }
+
+  // Type of what an index leads to, from a structure or array of this type.
+  std::uint32_t typeAt(std::uint32_t type, std::uint32_t index) const {
+    const auto& [operation, words] = definition(type);
+    if (operation == kTypeStruct) return words.at(1 + valueOf(index));
+    if (operation == kTypeArray || operation == kTypeRuntimeArray) return words[1];
+    refuse(fmt::format("an index leads into type {}", nameOf(type)));
   }
 
   // Value of a constant that cannot be specialised; nothing else has one here.
@@ -393,7 +407,7 @@ class SharedForm {
         if (pointees_.contains(words[0])) addParameter(words[1], words[0]);
         return true;
       case kLoad:
-        return changeLoad(words);
+        return changeLoad(instruction);
       case kStore:
         if (const std::uint32_t type = usePointer(words[0])) align(words, 2, pointees_.at(type));
         refuseUse(operation, words[1]);
@@ -469,8 +483,13 @@ class SharedForm {
     words.insert(words.begin() + static_cast<std::ptrdiff_t>(at) + 1, alignmentOf(type));
   }
 
-  bool changeLoad(Words& words) {
+  bool changeLoad(Instruction& instruction) {
+    Words& words = instruction.words;
     if (words[2] == groupCount_ || groupCounts_.contains(words[2])) return true;
+    if (const auto component = components_.find(words[2]); component != components_.end()) {
+      loadComponent(instruction, component->second);
+      return true;
+    }
     const std::uint32_t type = usePointer(words[2]);
     if (images_.contains(words[0])) {
       texels_[words[1]] = words[2];
@@ -479,6 +498,20 @@ class SharedForm {
     }
     if (type != 0) align(words, 3, words[0]);
     return true;
+  }
+
+  // Loads the whole vector. Mesa 22.3 confuses the components if a kernel loads both a vector and a component
+  // of it through an address.
+  void loadComponent(Instruction& load, const Component& of) {
+    const std::uint32_t vector =
+        emit(kAccessChain, pointerTo(of.vector, kPhysicalStorageBufferClass), of.chain);
+    Words operands = load.words;  // with the memory operands
+    operands[0] = of.vector;
+    operands[1] = module_.newId();
+    operands[2] = vector;
+    align(operands, 3, of.vector);
+    load = {kVectorExtractDynamic, {load.words[0], load.words[1], operands[1], of.index}};
+    module_.functions.push_back({kLoad, std::move(operands)});
   }
 
   void changeChain(Words& words) {
@@ -492,9 +525,14 @@ class SharedForm {
       changed_.insert(words[1]);
       return;
     }
-    if (usePointer(words[2]) == 0) return;
+    const std::uint32_t type = usePointer(words[2]);
+    if (type == 0) return;
     types_[words[1]] = words[0];
     changed_.insert(words[1]);
+    std::uint32_t parent = pointees_.at(type);
+    for (std::size_t i = 3; i + 1 < words.size(); ++i) parent = typeAt(parent, words[i]);
+    if (words.size() > 3 && definition(parent).operation == kTypeVector)
+      components_[words[1]] = {{words.begin() + 2, words.end() - 1}, parent, words.back()};
   }
 
   void changeLength(Instruction& instruction) {
@@ -688,6 +726,7 @@ class SharedForm {
   std::map<std::uint32_t, Variable> variables_;                                  // that become addresses
   std::map<std::uint32_t, std::uint32_t> pointees_;  // of the types of pointers that become addresses
   std::map<std::uint32_t, std::uint32_t> types_;     // of values and variables that become addresses
+  std::map<std::uint32_t, Component> components_;    // pointers in functions
   std::map<std::uint32_t, std::uint32_t> texels_;    // loaded images, and the addresses of their texels
   std::set<std::uint32_t> images_;                   // types
   std::set<std::uint32_t> groupCounts_;              // pointers into gl_NumWorkGroups

@@ -17,13 +17,13 @@ constexpr std::uint32_t kUndef = 1, kName = 5, kExtInst = 12, kMemoryModel = 14,
                         kFunctionCall = 57, kVariable = 59, kImageTexelPointer = 60, kLoad = 61, kStore = 62,
                         kAccessChain = 65, kInBoundsAccessChain = 66, kArrayLength = 68, kDecorate = 71,
                         kMemberDecorate = 72, kDecorationGroup = 73, kGroupMemberDecorate = 75,
-                        kVectorShuffle = 79, kCompositeConstruct = 80, kCompositeExtract = 81,
-                        kCompositeInsert = 82, kImageFetch = 95, kImageRead = 98, kImage = 100, kUDiv = 134,
-                        kISub = 130, kULessThan = 176, kControlBarrier = 224, kMemoryBarrier = 225,
-                        kAtomicLoad = 227, kAtomicStore = 228, kAtomicXor = 242, kLoopMerge = 246,
-                        kSelectionMerge = 247, kLabel = 248, kBranch = 249, kBranchConditional = 250,
-                        kSwitch = 251, kReturn = 253, kExecutionModeId = 331, kDecorateId = 332,
-                        kDecorateString = 5632, kMemberDecorateString = 5633;
+                        kVectorExtractDynamic = 77, kVectorShuffle = 79, kCompositeConstruct = 80,
+                        kCompositeExtract = 81, kCompositeInsert = 82, kImageFetch = 95, kImageRead = 98,
+                        kImage = 100, kUDiv = 134, kISub = 130, kULessThan = 176, kControlBarrier = 224,
+                        kMemoryBarrier = 225, kAtomicLoad = 227, kAtomicStore = 228, kAtomicXor = 242,
+                        kLoopMerge = 246, kSelectionMerge = 247, kLabel = 248, kBranch = 249,
+                        kBranchConditional = 250, kSwitch = 251, kReturn = 253, kExecutionModeId = 331,
+                        kDecorateId = 332, kDecorateString = 5632, kMemberDecorateString = 5633;
 
 // Decorations.
 constexpr std::uint32_t kSpecId = 1, kBlock = 2, kArrayStride = 6, kBuiltIn = 11, kRestrict = 19,
