@@ -190,11 +190,13 @@ void DeviceThread::run(const std::vector<std::shared_ptr<scene::LiveScene>>& sce
   saveLast();
   publisher_.drain();
   runs_.clear();
+  batches_.clear();
   device_.close();
 }
 
 bool DeviceThread::waitForWork() {
   deviceMemory_ = device_.allocatedBytes();
+  reservedDeviceMemory_ = device_.reservedBytes();
   lastAnswer_ = Clock::now();
   Clock::time_point due = Clock::time_point::max();
   const Clock::time_point guestsFrom = scheduler_.guestsFrom(schedules(), lastAnswer_);
@@ -285,8 +287,8 @@ void DeviceThread::encodePausedFrames() {
 void DeviceThread::runDueTicks() {
   faults_.check();
   Clock::time_point before = Clock::now();
-  // Slices that an exception kept from being waited for.
-  for (const auto& run : runs_) waitForFirstSlice(*run, before);
+  // Ticks that an exception kept from being waited for.
+  waitForTicks(before);
   scheduler_.choose(schedules(), before, chosen_);
   const bool oneByOne =
       std::ranges::any_of(runs_, [&](const auto& run) { return run->blame.isAlone(before); });
@@ -297,9 +299,62 @@ void DeviceThread::runDueTicks() {
       run.become(SceneState::inFlight);
       chargeMaking(run, before);
     }
-    if (oneByOne) waitForFirstSlice(run, before);
+    if (oneByOne) {
+      submitTicks(oneByOne);
+      waitForTicks(before);
+      before = Clock::now();
+    }
   }
-  for (schedule::TickSchedule* due : chosen_) waitForFirstSlice(static_cast<SceneRun&>(*due), before);
+  submitTicks(oneByOne);
+  waitForTicks(before);
+}
+
+void DeviceThread::submitTicks(bool oneByOne) {
+  together_.clear();
+  for (schedule::TickSchedule* due : chosen_) {
+    SceneRun& run = static_cast<SceneRun&>(*due);
+    if (run.state() == SceneState::inFlight && run.host->fitsIntoBatch()) together_.push_back(&run);
+  }
+  if (oneByOne || together_.size() == 1) together_.clear();
+  if (!together_.empty()) {
+    try {
+      batches_.submit(*device_, together_);
+    } catch (const vulkan::DeviceLost&) {
+      countLoss(*together_.front());
+      throw;
+    }
+  }
+  for (schedule::TickSchedule* due : chosen_) {
+    SceneRun& run = static_cast<SceneRun&>(*due);
+    if (run.state() == SceneState::inFlight && run.host->isUnsubmitted())
+      survives(run, [&] { run.host->submitSlice(); });
+  }
+}
+
+void DeviceThread::waitForTicks(Clock::time_point deviceFree) {
+  for (const auto& batch : batches_.inFlight()) waitForBatch(*batch, deviceFree);
+  batches_.end();
+  for (const auto& run : runs_) waitForFirstSlice(*run, deviceFree);
+}
+
+void DeviceThread::waitForBatch(TickBatches::Members& batch, Clock::time_point& deviceFree) {
+  try {
+    device_->wait(batch.submitted);
+  } catch (const vulkan::DeviceLost&) {
+    countLoss(*batch.runs.front());
+    throw;
+  }
+  // Each tick knows its part of the device's time before the first one is finished.
+  batch.batch.shareTimes();
+  const Clock::time_point done = Clock::now();
+  const double all = std::max<double>(1, static_cast<double>(batch.batch.work()));
+  const auto time = static_cast<double>((done - std::exchange(deviceFree, done)).count());
+  for (SceneRun* run : batch.runs) {
+    if (!survives(*run, [&] { faults_.checkScene(run->scene->name()); })) continue;
+    run->become(SceneState::betweenSlices);
+    const double part = static_cast<double>(run->host->recordedWork()) / all;
+    endSlice(*run, Clock::duration(static_cast<Clock::rep>(part * time)));
+  }
 }
 
 void DeviceThread::runSlice() {
@@ -315,7 +370,7 @@ void DeviceThread::runSlice() {
     next->host->submitSlice();
     next->host->waitForSlice();
   });
-  if (survived) endSlice(*next, before);
+  if (survived) endSlice(*next, Clock::now() - before);
 }
 
 void DeviceThread::readStates() {
@@ -357,12 +412,12 @@ void DeviceThread::waitForFirstSlice(SceneRun& run, Clock::time_point& deviceFre
   });
   if (!survived) return;
   run.become(SceneState::betweenSlices);
-  endSlice(run, std::exchange(deviceFree, Clock::now()));
+  const Clock::time_point done = Clock::now();
+  endSlice(run, done - std::exchange(deviceFree, done));
 }
 
-void DeviceThread::endSlice(SceneRun& run, Clock::time_point before) {
+void DeviceThread::endSlice(SceneRun& run, Clock::duration time) {
   run.tick.served = Clock::now();
-  const Clock::duration time = run.tick.served - before;
   run.tick.used += time;
   scheduler_.used(run, time);
   // While a scene is loaded, its kernels lengthen slices. The end of the tick shows what the device did.
@@ -478,6 +533,7 @@ void DeviceThread::rebuildDevice(const std::string& reason) {
 
 bool DeviceThread::tryRebuildDevice() {
   for (const auto& run : runs_) run->release();
+  batches_.clear();
   if (!device_.reopen()) return false;
   budget_.setSpeed(device_.speed());
   metrics_.deviceRebuilds.add();

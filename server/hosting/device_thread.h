@@ -19,6 +19,7 @@
 #include "server/hosting/scene_run.h"
 #include "server/hosting/simulated_faults.h"
 #include "server/hosting/task_inbox.h"
+#include "server/hosting/tick_batches.h"
 #include "server/scene/budget.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/scene_host.h"
@@ -32,10 +33,10 @@ using schedule::Clock;
 
 // Thread-safe.
 //
-// Ticks that are due together are all submitted before the first is waited for. Between the slices of a long
-// tick, those that became due run, scenes are added and removed, and the thread can end. A scene is loaded
-// onto the device when it is first joined, on another thread while other scenes run. A scene without
-// subscribers sleeps.
+// Ticks that are due together are all submitted before the first is waited for, and the short ones together
+// (TickBatches). Between the slices of a long tick, those that became due run, scenes are added and removed,
+// and the thread can end. A scene is loaded onto the device when it is first joined, on another thread while
+// other scenes run. A scene without subscribers sleeps.
 //
 // Device loss: a new device is created. This is tried once a second until it succeeds. The scenes are then
 // loaded again one by one, the default scene first, then those with the most subscribers. Each continues from
@@ -95,8 +96,9 @@ class DeviceThread {
 
   // Time at which the thread last looked for work. It does so after each wake().
   Clock::time_point lastAnswer() const { return lastAnswer_; }
-  // Memory of all buffers on the device at that time, in bytes.
+  // Memory of all buffers on the device at that time, and of the allocations that they share, in bytes.
   std::uint64_t deviceMemory() const { return deviceMemory_; }
+  std::uint64_t reservedDeviceMemory() const { return reservedDeviceMemory_; }
 
   // Treats the device as lost before the next tick. For tests.
   void simulateDeviceLoss() {
@@ -137,6 +139,10 @@ class DeviceThread {
   // Encodes frames of paused scenes for subscribers that need a key frame.
   void encodePausedFrames();
   void runDueTicks();
+  // Submits the ticks of `chosen_` that have begun.
+  void submitTicks(bool oneByOne);
+  // Waits for all ticks that are in flight. The device was busy until `deviceFree`.
+  void waitForTicks(Clock::time_point deviceFree);
   // Runs one slice of a tick that has begun and takes longer than a slice.
   void runSlice();
   // Answers hold() and read().
@@ -145,10 +151,12 @@ class DeviceThread {
   // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost,
   // and counts that as the scene's.
   bool survives(SceneRun& run, const std::function<void()>& partOfTick);
+  // Waits for a batch that was submitted when the device was busy until `deviceFree`.
+  void waitForBatch(TickBatches::Members& batch, Clock::time_point& deviceFree);
   // Waits for the first slice of a tick that began when the device was busy until `deviceFree`.
   void waitForFirstSlice(SceneRun& run, Clock::time_point& deviceFree);
-  // Accounts for the time since `before`, and finishes the tick if it has no more slices.
-  void endSlice(SceneRun& run, Clock::time_point before);
+  // The device worked for this time on the tick. Finishes the tick if it has no more slices.
+  void endSlice(SceneRun& run, Clock::duration time);
   // Gives the time of this thread at the start of a tick to the scene, other than its commands.
   void chargeMaking(SceneRun& run, Clock::time_point& deviceFree);
   // Lets the scene do less work if it overloads the device, and more if there is room again.
@@ -185,14 +193,16 @@ class DeviceThread {
   SimulatedFaults faults_;
   // Written by the thread alone.
   std::atomic<Clock::time_point> lastAnswer_{Clock::now()};
-  std::atomic<std::uint64_t> deviceMemory_{0};
+  std::atomic<std::uint64_t> deviceMemory_{0}, reservedDeviceMemory_{0};
 
   // Owned by the thread.
   OwnedDevice device_;
   std::vector<std::unique_ptr<SceneRun>> runs_;
   schedule::TickScheduler scheduler_{scene::SceneHost::kSliceTime};
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
-  Clock::duration idle_{};                                   // time without work for the device
+  TickBatches batches_;
+  std::vector<SceneRun*> together_;  // ticks of a batch
+  Clock::duration idle_{};           // time without work for the device
 
   std::thread thread_;
 };

@@ -40,6 +40,8 @@ class OwnedDevice {
 
   // Memory of all buffers on the device, in bytes.
   std::uint64_t allocatedBytes() const { return device_ ? device_->allocatedBytes() : 0; }
+  // Memory of the allocations that buffers share, in bytes.
+  std::uint64_t reservedBytes() const { return device_ ? device_->reservedBytes() : 0; }
   // Speed of the device when it was opened.
   const model::DeviceSpeed& speed() const { return speed_; }
   // Measures by which factor it is slower now. Throws vulkan::DeviceLost.

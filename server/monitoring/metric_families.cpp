@@ -204,6 +204,9 @@ Families serverFamilies(const hosting::SceneServer& server) {
         kMegabyte * usage.freeMegabytes);
   gauge("clothstream_device_memory_bytes", "Memory of all buffers on the device.",
         static_cast<double>(server.device.deviceMemory()));
+  gauge("clothstream_device_reserved_memory_bytes",
+        "Memory of the device that the server has allocated, in blocks that buffers share.",
+        static_cast<double>(server.device.reservedDeviceMemory()));
   gauge("clothstream_device_silence_seconds", "Time since the last answer of the device thread.",
         schedule::seconds(schedule::Clock::now() - server.device.lastAnswer()));
   gauge("clothstream_publisher_waiting_frames", "Frames that wait for an encoder thread.",

@@ -31,8 +31,8 @@ namespace clothstream::scene {
 // ends at the simulated time n / simulation rate. Tick numbers only grow, also after the state went back.
 //
 // A tick that takes longer than kSliceTime is submitted in slices of about this time (Slices), so that ticks
-// of other scenes can run in between, and so that it can be dropped: begin() submits the first slice,
-// waitForSlice() waits for it, and submitSlice() submits the next one as long as hasSlices().
+// of other scenes can run in between, and so that it can be dropped: after begin(), submitSlice() submits the
+// next slice as long as hasSlices(), and waitForSlice() waits for it. A short tick can join a batch instead.
 //
 // The first host of a restored scene continues from its checkpoint, and every host gives checkpoints to the
 // scene's keeper, if it has one.
@@ -61,8 +61,16 @@ class SceneHost {
   // Minimum number of substeps with which the scene is stable with its present parameters.
   std::uint32_t leastSubsteps() const { return leastSubsteps_; }
 
-  // Drains the inbox, records the next tick and submits its first slice. Throws vulkan::DeviceLost.
+  // Drains the inbox and records the next tick. Throws vulkan::DeviceLost.
   void begin(Clock::time_point now);
+  // Returns whether the tick may be submitted in a batch.
+  bool fitsIntoBatch() const { return onDevice_->slices.fitsIntoBatch(); }
+  // Returns whether no slice of the tick was submitted.
+  bool isUnsubmitted() const { return onDevice_->slices.isUnsubmitted(); }
+  // Adds the tick to a batch. finish() may be called when the batch is complete.
+  void join(vulkan::Batch& batch) { onDevice_->slices.join(batch); }
+  // Work of the tick, in kernel invocations (vulkan::Recorder::work).
+  std::uint64_t recordedWork() const { return onDevice_->recorder.work(); }
   // Returns whether slices of the tick are not submitted yet.
   bool hasSlices() const { return onDevice_->slices.hasMore(); }
   // Waits for the submitted slice. The device was busy with other scenes until `deviceFree`. Throws

@@ -63,11 +63,14 @@ void SceneOnDevice::warmUp(const model::Scene& scene, const std::stop_token& sto
     inputs.grabs.emplace_back();
   }
   submitAndWait(stop);
-  // One submission for each kernel, so that other scenes can use the device between two of them.
+  // One submission for each kernel that no scene has used yet, so that other scenes can use the device
+  // between two of them.
   for (const vulkan::RehearsedKernel& kernel : recorder.rehearsed()) {
+    if (kernel.bindings->kernel().isReady()) continue;
     recorder.begin();
     recorder.touch(*kernel.bindings);
     submitAndWait(stop);
+    kernel.bindings->kernel().setReady();
   }
 
   encode::FrameEncoder& encoder = encoders.finest();

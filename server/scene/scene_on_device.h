@@ -24,8 +24,8 @@ struct SceneOnDevice {
                 const std::stop_token& stop = {});
 
   // Allocations of memory that a new scene leaves free: buffers for grabs, reports and coarser qualities of
-  // running scenes are made when they are first needed.
-  static constexpr std::uint32_t kSpareAllocations = 256;
+  // running scenes are made when they are first needed. Buffers share allocations, so that few are enough.
+  static constexpr std::uint32_t kSpareAllocations = 16;
 
   vulkan::Device& device;
   simulation::ClothSimulation simulation;

@@ -21,9 +21,13 @@ constexpr double kMostWork = 16;
 Slices::Slices(vulkan::Device& device, vulkan::Recorder& recorder)
     : device_(device),
       recorder_(recorder),
-      first_(device.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice),
+      first_(firstSlice(device)),
       invocations_(first_) {
   sliceRecordings();
+}
+
+double Slices::firstSlice(const vulkan::Device& device) {
+  return device.isSoftware() ? kFirstSlice : kGpuFactor * kFirstSlice;
 }
 
 void Slices::scale(double factor) {
@@ -41,7 +45,11 @@ void Slices::sliceRecordings() {
 void Slices::begin() {
   next_ = 0;
   longest_ = {};
-  submit();
+}
+
+void Slices::join(vulkan::Batch& batch) {
+  batch.add(recorder_);
+  ++next_;
 }
 
 void Slices::submit() {

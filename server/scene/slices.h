@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Runs the ticks of a scene on the device in slices.
+// Runs the ticks of a scene on the device, in slices or as a part of a batch.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 
 #include "server/schedule/clock.h"
+#include "server/vulkan/batch.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
 
@@ -14,7 +15,8 @@ namespace clothstream::scene {
 using schedule::Clock;
 
 // A tick that takes longer than kTime is submitted in slices of about this time, whose size follows from the
-// time of earlier slices. Belongs to the thread of the recorder.
+// time of earlier slices. A tick of one slice may be submitted in a batch with those of other scenes instead.
+// Belongs to the thread of the recorder.
 class Slices {
  public:
   static constexpr std::chrono::milliseconds kTime{10};
@@ -25,8 +27,17 @@ class Slices {
   // Makes the slices of the following recordings larger or smaller by about this factor.
   void scale(double factor);
 
-  // A tick is recorded: submits its first slice. Throws vulkan::DeviceLost.
+  // Work of the first slice on a device, in kernel invocations.
+  static double firstSlice(const vulkan::Device& device);
+
+  // A tick is recorded.
   void begin();
+  // Returns whether no slice of the tick was submitted.
+  bool isUnsubmitted() const { return next_ == 0; }
+  // Returns whether the tick may be submitted in a batch.
+  bool fitsIntoBatch() const { return isUnsubmitted() && recorder_.sliceCount() == 1; }
+  // Adds the tick to a batch, which is submitted and waited for by the caller.
+  void join(vulkan::Batch& batch);
   // Returns whether slices are not submitted yet.
   bool hasMore() const { return next_ < recorder_.sliceCount(); }
   // Submits the next slice. Throws vulkan::DeviceLost.

@@ -58,7 +58,7 @@ std::uint32_t memoryType(const Device& device, std::uint32_t typeBits, const Tra
 }  // namespace
 
 std::uint64_t Buffer::bytesOfThread() {
-  return bufferBytesOfThread;
+  return MemoryRange::bytesOfThread();
 }
 
 Buffer::Buffer() = default;
@@ -67,7 +67,7 @@ Buffer::Buffer(Buffer&&) noexcept = default;
 Buffer& Buffer::operator=(Buffer&&) noexcept = default;
 
 Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
-    : bytes_(bytes), handles_(std::make_unique<Handles>(device)) {
+    : bytes_(bytes), handles_(std::make_unique<Handles>()) {
   assert(bytes > 0);
   const bool texels = purpose == BufferPurpose::texels;
   const bool mapped = purpose == BufferPurpose::upload || purpose == BufferPurpose::readback;
@@ -87,25 +87,18 @@ Buffer::Buffer(const Device& device, BufferPurpose purpose, std::size_t bytes)
     mapped_ = handles_->hostBytes.data();
     return;
   }
-  handles_->counted = true;
-  if (++handles_->device.allocations > limits.maxAllocations)
-    throw std::runtime_error(fmt::format(
-        "a buffer of {} bytes would be more than the {} allocations of memory that {} allows: use "
-        "fewer scenes",
-        bytes, limits.maxAllocations, device.info().name));
-  const Traits traits = traitsOf(purpose);
+  Traits traits = traitsOf(purpose);
+  if (device.hasAddresses()) traits.usage |= Usage::eShaderDeviceAddress;
   const vk::raii::Device& vulkan = device.handles().device;
   try {
     handles_->buffer = vk::raii::Buffer(vulkan, vk::BufferCreateInfo{.size = bytes, .usage = traits.usage});
     const vk::MemoryRequirements needs = handles_->buffer.getMemoryRequirements();
-    handles_->memory = vk::raii::DeviceMemory(
-        vulkan, vk::MemoryAllocateInfo{.allocationSize = needs.size,
-                                       .memoryTypeIndex = memoryType(device, needs.memoryTypeBits, traits)});
-    handles_->bytes = needs.size;
-    handles_->device.allocatedBytes += needs.size;
-    bufferBytesOfThread += needs.size;
-    handles_->buffer.bindMemory(*handles_->memory, 0);
-    if (mapped) mapped_ = handles_->memory.mapMemory(0, VK_WHOLE_SIZE);
+    const MemoryRange& range = handles_->range.emplace(*device.handles().memory, needs,
+                                                       memoryType(device, needs.memoryTypeBits, traits));
+    handles_->buffer.bindMemory(range.memory(), range.offset());
+    if (mapped) mapped_ = range.mapped();
+    if (device.hasAddresses())
+      handles_->address = vulkan.getBufferAddress(vk::BufferDeviceAddressInfo{.buffer = *handles_->buffer});
     if (texels)
       handles_->texelView = vk::raii::BufferView(
           vulkan, vk::BufferViewCreateInfo{

@@ -19,8 +19,9 @@ enum class BufferPurpose : std::uint8_t {
   indirect,  // state that also has dispatch sizes
 };
 
-// Move-only. The contents start undefined. Throws std::runtime_error, which names the size, if memory or
-// the device's allocations (Limits::maxAllocations) run out.
+// Move-only. Shares an allocation of memory with other buffers of the device. The contents start undefined:
+// they may be those of a buffer that was destroyed. Throws std::runtime_error, which names the size, if
+// memory or the device's allocations (Limits::maxAllocations) run out.
 class Buffer {
  public:
   Buffer();

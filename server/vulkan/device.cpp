@@ -15,6 +15,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "server/vulkan/batch_handles.h"
 #include "server/vulkan/handles.h"
 #include "server/vulkan/instance.h"
 #include "server/vulkan/recorder.h"
@@ -58,13 +59,20 @@ bool offersStatistics(const vk::raii::PhysicalDevice& physical) {
   });
 }
 
-vk::raii::Device openDevice(const Candidate& candidate, bool statistics) {
+bool offersAddresses(const vk::raii::PhysicalDevice& physical) {
+  return physical.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features>()
+      .get<vk::PhysicalDeviceVulkan12Features>()
+      .bufferDeviceAddress;
+}
+
+vk::raii::Device openDevice(const Candidate& candidate, bool statistics, bool addresses) {
   const float priority = 1;
   const vk::DeviceQueueCreateInfo queue{
       .queueFamilyIndex = candidate.queueFamily, .queueCount = 1, .pQueuePriorities = &priority};
   vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR executables{.pipelineExecutableInfo = VK_TRUE};
   const vk::PhysicalDeviceVulkan12Features features{.pNext = statistics ? &executables : nullptr,
-                                                    .timelineSemaphore = VK_TRUE};
+                                                    .timelineSemaphore = VK_TRUE,
+                                                    .bufferDeviceAddress = addresses};
   const char* extension = VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME;
   return {candidate.physical, vk::DeviceCreateInfo{.pNext = &features,
                                                    .queueCreateInfoCount = 1,
@@ -149,7 +157,8 @@ Device::Device(const DeviceOptions& options)
   pipelineCacheLoaded_ = cached.size();
   try {
     handles_->keepsStatistics = options.compileOnly && offersStatistics(chosen.physical);
-    handles_->device = openDevice(chosen, handles_->keepsStatistics);
+    addresses_ = offersAddresses(chosen.physical);
+    handles_->device = openDevice(chosen, handles_->keepsStatistics, addresses_);
     const vk::SemaphoreTypeCreateInfo timeline{.semaphoreType = vk::SemaphoreType::eTimeline};
     handles_->queue = handles_->device.getQueue(chosen.queueFamily, 0);
     // Drivers without a GPU have no semaphores.
@@ -168,8 +177,19 @@ Device::Device(const DeviceOptions& options)
   if (chosen.info.kind == DeviceKind::software) limits_.parallelWorkgroups = threads.count();
   if (options.maxAllocations > 0) limits_.maxAllocations = options.maxAllocations;
   handles_->queueFamily = chosen.queueFamily;
+  const bool shares = options.sharing == KernelSharing::automatic ? chosen.info.kind != DeviceKind::software
+                                                                  : options.sharing == KernelSharing::always;
+  handles_->sharesKernels = shares && executes_ && addresses_;
   info_ = std::move(chosen.info);
   handles_->physical = std::move(chosen.physical);
+  handles_->memory =
+      std::make_unique<MemoryBlocks>(handles_->device, handles_->physical.getMemoryProperties(),
+                                     MemorySettings{.device = info_.name,
+                                                    .maxBlocks = limits_.maxAllocations,
+                                                    .largestBlock = options.largestBlock,
+                                                    .addresses = addresses_,
+                                                    .marksFreshMemory = validate});
+  handles_->descriptorPools = std::make_unique<DescriptorPools>(handles_->device);
 }
 
 Device::~Device() {
@@ -193,22 +213,31 @@ TimelineValue Device::submitSlice(Recorder& recorder, std::uint32_t slice) {
 }
 
 TimelineValue Device::submit(const Recorder& recorder, std::uint32_t first, std::uint32_t end) {
-  assert(executes_);
-  Recorder::Handles& recording = recorder.handles();
-  recording.submitted.clear();
+  std::vector<vk::CommandBuffer>& submitted = recorder.handles().submitted;
+  submitted.clear();
   for (std::uint32_t slice = first; slice < end; ++slice)
-    recording.submitted.push_back(*recording.slices[slice]);
+    submitted.push_back(*recorder.handles().slices[slice]);
+  return submitCommands(submitted.data(), submitted.size());
+}
+
+TimelineValue Device::submit(Batch& batch) {
+  batch.finish();
+  const std::vector<vk::CommandBuffer>& submitted = batch.handles().submitted;
+  return submitCommands(submitted.data(), submitted.size());
+}
+
+TimelineValue Device::submitCommands(const void* commands, std::size_t count) {
+  assert(executes_);
   const std::lock_guard lock(submitting_);
   const TimelineValue value = submitted_ + 1;
   const vk::TimelineSemaphoreSubmitInfo timeline{.signalSemaphoreValueCount = 1,
                                                  .pSignalSemaphoreValues = &value};
   try {
-    handles_->queue.submit(
-        vk::SubmitInfo{.pNext = &timeline,
-                       .commandBufferCount = static_cast<std::uint32_t>(recording.submitted.size()),
-                       .pCommandBuffers = recording.submitted.data(),
-                       .signalSemaphoreCount = 1,
-                       .pSignalSemaphores = &*handles_->timeline});
+    handles_->queue.submit(vk::SubmitInfo{.pNext = &timeline,
+                                          .commandBufferCount = static_cast<std::uint32_t>(count),
+                                          .pCommandBuffers = static_cast<const vk::CommandBuffer*>(commands),
+                                          .signalSemaphoreCount = 1,
+                                          .pSignalSemaphores = &*handles_->timeline});
   } catch (const vk::DeviceLostError&) {
     throw DeviceLost(kLost);
   }
@@ -235,12 +264,20 @@ void Device::drain() {
   wait(last);
 }
 
-std::uint32_t Device::allocations() const {
-  return handles_->allocations;
+bool Device::sharesKernels() const {
+  return handles_->sharesKernels;
 }
 
 std::uint64_t Device::allocatedBytes() const {
-  return handles_->allocatedBytes;
+  return handles_->memory->usedBytes();
+}
+
+std::uint32_t Device::allocations() const {
+  return handles_->memory->count();
+}
+
+std::uint64_t Device::reservedBytes() const {
+  return handles_->memory->bytes();
 }
 
 TimelineValue Device::completed() const {

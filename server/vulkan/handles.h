@@ -3,7 +3,6 @@
 // bindings compile slowly.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -16,20 +15,22 @@
 #include <vulkan/vulkan_raii.hpp>
 
 #include "server/vulkan/buffer.h"
+#include "server/vulkan/descriptor_pools.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/kernel.h"
+#include "server/vulkan/memory_blocks.h"
 #include "server/vulkan/recorder.h"
 #include "server/vulkan/stage_timer.h"
 
 namespace clothstream::vulkan {
 
 struct Kernel::Handles {
-  // The form for several scenes at once (shared_code.h), made when it is first needed. Thread-safe.
   struct Shared {
     std::once_flag made;
     vk::raii::PipelineLayout layout = nullptr;
     vk::raii::Pipeline pipeline = nullptr;
   };
+  // The form for several scenes at once (shared_code.h), which the first call makes. Thread-safe.
   const Shared& shared() const;
 
   const Device::Handles* device = nullptr;
@@ -39,7 +40,8 @@ struct Kernel::Handles {
   vk::raii::DescriptorSetLayout setLayout = nullptr;
   vk::raii::PipelineLayout layout = nullptr;
   vk::raii::Pipeline pipeline = nullptr;
-  std::unique_ptr<Shared> sharedForm = std::make_unique<Shared>();
+  mutable Shared sharedForm;
+  mutable std::atomic<bool> ready{false};  // Kernel::isReady()
 };
 
 // Address of the embedded SPIR-V, and Kernel::Handles::constants.
@@ -57,8 +59,9 @@ struct Device::Handles {
   std::uint32_t queueFamily = 0;
   bool keepsStatistics = false;  // of kernels: kernel_statistics.h
   bool sharesKernels = false;    // kernels have shared forms: shared_code.h
-  mutable std::atomic<std::uint64_t> allocatedBytes{0};
-  mutable std::atomic<std::uint32_t> allocations{0};
+  mutable std::atomic<std::uint64_t> batches{0};  // that have begun
+  std::unique_ptr<MemoryBlocks> memory = {};
+  std::unique_ptr<DescriptorPools> descriptorPools = {};
   // Pipelines that kernels use.
   mutable std::mutex pipelinesMutex{};
   mutable std::map<PipelineKey, std::weak_ptr<const Kernel::Handles>> pipelines{};
@@ -68,31 +71,26 @@ struct Device::Handles {
   bool validates() const { return *messenger != vk::DebugUtilsMessengerEXT{}; }
 };
 
-inline thread_local std::uint64_t bufferBytesOfThread = 0;  // Buffer::bytesOfThread()
-
 struct Buffer::Handles {
-  explicit Handles(const Device& of) : device(of.handles()) {}
-  ~Handles() {
-    device.allocatedBytes -= bytes;
-    bufferBytesOfThread -= bytes;
-    if (counted) --device.allocations;
-  }
-  Handles(const Handles&) = delete;
-  Handles& operator=(const Handles&) = delete;
-
-  const Device::Handles& device;
-  std::uint64_t bytes = 0;  // of `memory`
-  bool counted = false;     // among the device's allocations
-  vk::raii::DeviceMemory memory = nullptr;
-  std::vector<std::byte> hostBytes;  // on a device that only compiles, which has no `memory`
+  std::optional<MemoryRange> range;
+  std::vector<std::byte> hostBytes;  // on a device that only compiles, which has no `range`
   vk::raii::Buffer buffer = nullptr;
   vk::raii::BufferView texelView = nullptr;
+  vk::DeviceAddress address = 0;  // of its first byte; 0 without Device::hasAddresses()
+};
+
+// The first bytes of a buffer, as a shared kernel sees it.
+struct BoundBufferAddress {
+  const Buffer::Handles* buffer = nullptr;
+  std::uint64_t bytes = 0;
 };
 
 struct Bindings::Handles {
-  std::vector<const Buffer::Handles*> buffers;  // in order
-  vk::raii::DescriptorPool pool = nullptr;
-  vk::raii::DescriptorSet set = nullptr;
+  std::vector<BoundBufferAddress> buffers;  // in order
+  // Address of their record in the table of the newest batch that used them, and the number of that batch.
+  mutable vk::DeviceAddress record = 0;
+  mutable std::uint64_t batch = 0;
+  PooledSet set;
 };
 
 struct Recorder::Handles {

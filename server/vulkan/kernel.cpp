@@ -14,18 +14,6 @@
 namespace clothstream::vulkan {
 namespace {
 
-constexpr vk::DescriptorType typeOf(BindingKind kind) {
-  switch (kind) {
-    case BindingKind::texels:
-      return vk::DescriptorType::eUniformTexelBuffer;
-    case BindingKind::images:
-      return vk::DescriptorType::eStorageTexelBuffer;
-    case BindingKind::storage:
-      break;
-  }
-  return vk::DescriptorType::eStorageBuffer;
-}
-
 constexpr std::uint32_t kWord = sizeof(std::uint32_t);
 
 vk::raii::Pipeline pipelineOf(const Device::Handles& device, const Kernel::Handles& kernel,
@@ -105,10 +93,11 @@ Kernel::Kernel(const Device& device, const KernelCode& code, std::uint32_t workg
   std::weak_ptr<const Handles>& shared = device.handles().pipelines[{code.spirv.data(), constants}];
   handles_ = shared.lock();
   if (handles_) return;
-  const auto made = std::make_shared<Handles>(Handles{.device = &device.handles(),
-                                                      .code = code,
-                                                      .constants = std::move(constants),
-                                                      .interface = interfaceOf(code.spirv)});
+  const auto made = std::make_shared<Handles>();
+  made->device = &device.handles();
+  made->code = code;
+  made->constants = std::move(constants);
+  made->interface = interfaceOf(code.spirv);
   checkLimits(device, *made);
   try {
     makePipeline(device.handles(), *made);
@@ -121,15 +110,15 @@ Kernel::Kernel(const Device& device, const KernelCode& code, std::uint32_t workg
 }
 
 const Kernel::Handles::Shared& Kernel::Handles::shared() const {
-  std::call_once(sharedForm->made, [this] {
+  std::call_once(sharedForm.made, [this] {
     const vk::PushConstantRange push{.stageFlags = vk::ShaderStageFlagBits::eCompute,
                                      .size = sizeof(vk::DeviceAddress)};
-    sharedForm->layout = vk::raii::PipelineLayout(
+    sharedForm.layout = vk::raii::PipelineLayout(
         device->device,
         vk::PipelineLayoutCreateInfo{.pushConstantRangeCount = 1, .pPushConstantRanges = &push});
-    sharedForm->pipeline = pipelineOf(*device, *this, sharedCode(code.spirv), *sharedForm->layout);
+    sharedForm.pipeline = pipelineOf(*device, *this, sharedCode(code.spirv), *sharedForm.layout);
   });
-  return *sharedForm;
+  return sharedForm;
 }
 
 std::string_view Kernel::name() const {
@@ -145,6 +134,13 @@ const SpirvInterface& Kernel::interface() const {
   return handles_->interface;
 }
 
+bool Kernel::isReady() const {
+  return handles_->ready;
+}
+void Kernel::setReady() const {
+  handles_->ready = true;
+}
+
 Bindings::~Bindings() = default;
 Bindings::Bindings(Bindings&&) noexcept = default;
 Bindings& Bindings::operator=(Bindings&&) noexcept = default;
@@ -158,11 +154,10 @@ Bindings::Bindings(const Device& device, Kernel kernel, std::span<const Buffer* 
   const auto count = static_cast<std::uint32_t>(bindings.size());
   for (const Buffer* buffer : buffers) {
     buffers_.push_back({&buffer->handles(), buffer->bytes()});
-    handles_->buffers.push_back(&buffer->handles());
+    handles_->buffers.push_back({&buffer->handles(), buffer->bytes()});
   }
   if (count == 0 || !device.executes()) return;
 
-  std::vector<vk::DescriptorPoolSize> sizes;
   std::vector<vk::DescriptorBufferInfo> infos(count);
   std::vector<vk::WriteDescriptorSet> writes;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -174,30 +169,19 @@ Bindings::Bindings(const Device& device, Kernel kernel, std::span<const Buffer* 
           kernel_.name(), i, buffer.bytes(), device.limits().maxStorageRange, device.info().name));
     assert(bindings[i].kind == BindingKind::storage || *buffer.handles().texelView);
     infos[i] = vk::DescriptorBufferInfo{.buffer = *buffer.handles().buffer, .range = VK_WHOLE_SIZE};
-    sizes.push_back({.type = typeOf(bindings[i].kind), .descriptorCount = 1});
     writes.push_back({.dstBinding = i,
                       .descriptorCount = 1,
                       .descriptorType = typeOf(bindings[i].kind),
                       .pBufferInfo = &infos[i],
                       .pTexelBufferView = &*buffer.handles().texelView});
   }
-  const vk::raii::Device& vulkan = device.handles().device;
   try {
-    handles_->pool = vk::raii::DescriptorPool(
-        vulkan, vk::DescriptorPoolCreateInfo{.flags = vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet,
-                                             .maxSets = 1,
-                                             .poolSizeCount = count,
-                                             .pPoolSizes = sizes.data()});
-    vk::raii::DescriptorSets sets(
-        vulkan, vk::DescriptorSetAllocateInfo{.descriptorPool = *handles_->pool,
-                                              .descriptorSetCount = 1,
-                                              .pSetLayouts = &*kernel_.handles().setLayout});
-    handles_->set = std::move(sets.front());
+    handles_->set = PooledSet(*device.handles().descriptorPools, *kernel_.handles().setLayout, bindings);
   } catch (const vk::SystemError& error) {
     throw std::runtime_error(fmt::format("kernel {} cannot be bound: {}", kernel_.name(), error.what()));
   }
   for (vk::WriteDescriptorSet& write : writes) write.dstSet = *handles_->set;
-  vulkan.updateDescriptorSets(writes, nullptr);
+  device.handles().device.updateDescriptorSets(writes, nullptr);
 }
 
 }  // namespace clothstream::vulkan

@@ -41,6 +41,10 @@ class Kernel {
   std::span<const std::uint32_t> specialisation() const;
   // The interface that its SPIR-V declares.
   const SpirvInterface& interface() const;
+  // Whether setReady() was called for this pipeline: it has run, so that the device need not compile it. Any
+  // thread.
+  bool isReady() const;
+  void setReady() const;
 
   // Only for this folder (handles.h).
   struct Handles;

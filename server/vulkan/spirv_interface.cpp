@@ -6,31 +6,15 @@
 #include <set>
 #include <utility>
 
+#include "server/vulkan/spirv_module.h"
+#include "server/vulkan/spirv_names.h"
+
 namespace clothstream::vulkan {
 namespace {
 
-// Operations, decorations and classes of the SPIR-V specification.
-constexpr std::uint32_t kName = 5, kTypeInt = 21, kTypeFloat = 22, kTypeVector = 23, kTypeImage = 25,
-                        kTypeSampledImage = 27, kTypeArray = 28, kTypeStruct = 30, kTypePointer = 32,
-                        kConstant = 43, kSpecConstantTrue = 48, kSpecConstantFalse = 49, kSpecConstant = 50,
-                        kFunctionCall = 57, kVariable = 59, kImageTexelPointer = 60, kLoad = 61,
-                        kAccessChain = 65, kArrayLength = 68, kDecorate = 71, kMemberDecorate = 72;
-constexpr std::uint32_t kSpecId = 1, kArrayStride = 6, kNonWritable = 24, kNonReadable = 25, kBinding = 33,
-                        kOffset = 35;
-constexpr std::uint32_t kPushConstantClass = 9;
-constexpr std::uint32_t kUsedWithSampler = 1;
-constexpr std::size_t kHeaderWords = 5;
+using namespace spirv;
 
-std::string textAt(std::span<const std::uint32_t> words) {
-  std::string text;
-  for (const std::uint32_t word : words)
-    for (std::uint32_t shift = 0; shift < 32; shift += 8) {
-      const char letter = static_cast<char>(word >> shift);
-      if (letter == 0) return text;
-      text += letter;
-    }
-  return text;
-}
+constexpr std::size_t kHeaderWords = 5;
 
 // What a module says about identifiers. All maps are by identifier.
 struct Module {
@@ -54,7 +38,7 @@ struct Module {
   void add(std::uint32_t operation, std::span<const std::uint32_t> words) {
     switch (operation) {
       case kName:
-        names[words[0]] = textAt(words.subspan(1));
+        names[words[0]] = textOf(words.subspan(1));
         break;
       case kDecorate:
         if (words[1] == kSpecId) specIds[words[0]] = words[2];

@@ -181,6 +181,8 @@ TEST_F(MonitoringTest, MetricsAgreeWithWhatTheClientReceived) {
       << "a histogram without records has no samples";
   EXPECT_GE(of("device_stage_seconds_count", {{"scene", "small"}, {"stage", "advance"}}), of("ticks_total"));
   EXPECT_GT(atRest.value("clothstream_device_memory_bytes"), 8 * 8 * 32);
+  EXPECT_GE(atRest.value("clothstream_device_reserved_memory_bytes"),
+            atRest.value("clothstream_device_memory_bytes"));
   EXPECT_LT(atRest.value("clothstream_device_silence_seconds"), 5);
   EXPECT_GE(atRest.value("clothstream_sent_bytes_total", {{"endpoint", "web"}}),
             of("packet_bytes_total") / 2);

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: MIT
 // The same inputs give the same bits for every partition of the work, next to other cloths, and on every
 // device.
+#include <array>
 #include <cmath>
+#include <memory>
 #include <set>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "server/vulkan/batch.h"
+#include "server/vulkan/buffer.h"
 #include "tests/simulation/scenes.h"
 
 namespace clothstream::tests {
@@ -114,6 +119,115 @@ TEST_F(Determinism, ClothsInOneSceneMoveAsEachAlone) {
     EXPECT_EQ(own.positions, part(end.positions)) << "cloth " << i;
     EXPECT_EQ(own.velocities, part(end.velocities)) << "cloth " << i;
   }
+}
+
+// Small cloths with every solver and every feature that has buffers.
+model::Scene sceneOfAllStages() {
+  std::vector<model::Cloth> cloths(8, calmCloth(9, 7));
+  cloths[1].solver.kind = model::SolverKind::constraint;
+  cloths[2] = assembled(calmCloth(9, 7), true);
+  cloths[3].solver.kind = model::SolverKind::acad;
+  cloths[4].solver.kind = model::SolverKind::implicitEuler;
+  cloths[5].solver.kind = model::SolverKind::xpbd;
+  cloths[5].solver.iterations = 3;
+  cloths[5].coarse = model::CoarseCorrection{};
+  cloths[6] = discCloth(4);
+  cloths[6].solver.kind = model::SolverKind::acad;
+  cloths[6].selfCollision = model::SelfCollision{.radius = 0.008f};
+  cloths[7].selfCollision = model::SelfCollision{.radius = 0.008f, .nothingPasses = true};
+  for (std::size_t i = 0; i < cloths.size(); ++i) {
+    cloths[i].grid.pose.position.z() = 0.04f * static_cast<float>(i);
+    cloths[i].drag = 0.5f;
+    if (i != 6) cloths[i].pins = {topRow(cloths[i])};
+  }
+  cloths[0].dihedralBending = 1e-5f;
+  return sceneOf(cloths);
+}
+
+// Scenes of two shapes, two of each with different data, and one of a third shape.
+std::vector<model::Scene> companions() {
+  std::vector<model::Scene> scenes{sceneOfAllStages(), busyScene(), sceneOfAllStages(), busyScene(),
+                                   sceneOf({calmCloth(5, 70)})};
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    scenes[i].environment.gravity.x() = static_cast<float>(i);
+    scenes[i].cloths.front().drag = 0.1f * static_cast<float>(i + 1);
+  }
+  return scenes;
+}
+
+// The same ticks on the shared device, one scene after the other, and on `device`, all together.
+void expectTheSameInABatch(vulkan::Device& device) {
+  struct Member {
+    Member(vulkan::Device& on, const model::Scene& scene) : simulation(on, scene), recorder(on) {}
+    simulation::ClothSimulation simulation;
+    vulkan::Recorder recorder;
+  };
+  const std::vector<model::Scene> scenes = companions();
+  std::vector<std::unique_ptr<Running>> alone;
+  std::vector<std::unique_ptr<Member>> together;
+  for (const model::Scene& scene : scenes) {
+    alone.push_back(std::make_unique<Running>(scene));
+    together.push_back(std::make_unique<Member>(device, scene));
+  }
+  vulkan::Batch batch(device);
+  for (int tick = 0; tick < 4; ++tick) {
+    batch.begin();
+    for (std::size_t i = 0; i < scenes.size(); ++i) {
+      Member& member = *together[i];
+      member.recorder.begin();
+      member.simulation.recordTick(member.recorder, busyInputs(scenes[i], tick + static_cast<int>(i)));
+      member.simulation.recordNormals(member.recorder);
+      batch.add(member.recorder);
+    }
+    ASSERT_TRUE(device.wait(device.submit(batch)));
+    batch.shareTimes();
+    for (std::size_t i = 0; i < scenes.size(); ++i)
+      EXPECT_EQ(together[i]->simulation.status().stateHash,
+                alone[i]->tick(busyInputs(scenes[i], tick + static_cast<int>(i))).stateHash)
+          << "scene " << i << ", tick " << tick;
+  }
+}
+
+TEST_F(Determinism, ScenesSideBySideMoveAsAlone) {
+  vulkan::Device device({.sharing = vulkan::KernelSharing::never});
+  expectTheSameInABatch(device);
+}
+
+TEST_F(Determinism, ScenesThatShareDispatchesMoveAsAlone) {
+  vulkan::Device device({.sharing = vulkan::KernelSharing::always});
+  if (!device.sharesKernels()) GTEST_SKIP() << "the device has no addresses of buffers";
+  expectTheSameInABatch(device);
+}
+
+constexpr std::array kPurposes{vulkan::BufferPurpose::state, vulkan::BufferPurpose::texels,
+                               vulkan::BufferPurpose::indirect, vulkan::BufferPurpose::upload,
+                               vulkan::BufferPurpose::readback};
+
+// Fills the memory that the next buffers get.
+void fillFreeMemory(vulkan::Device& device, std::uint32_t value) {
+  for (const vulkan::BufferPurpose purpose : kPurposes) {
+    const vulkan::Buffer buffer(device, purpose, 8 << 20);
+    vulkan::Recorder recorder(device);
+    recorder.begin();
+    recorder.fill(buffer, value, buffer.bytes());
+    submitAndWait(device, recorder);
+  }
+}
+
+TEST_F(Determinism, OldContentsOfMemoryChangeNothing) {
+  const model::Scene scene = sceneOfAllStages();
+  vulkan::Device device;
+  // The first allocation of each type of memory has room for everything below.
+  for (const vulkan::BufferPurpose purpose : kPurposes) vulkan::Buffer(device, purpose, 24 << 20);
+  const std::uint64_t reserved = device.reservedBytes();
+  const Running first(scene, {}, device);  // keeps the kernels
+  std::set<std::uint64_t> hashes;
+  for (const std::uint32_t value : {0u, 0x40404040u, ~0u}) {
+    fillFreeMemory(device, value);
+    hashes.insert(hashAfter(scene, passingBall, 3, {}, device));
+  }
+  EXPECT_EQ(hashes.size(), 1u);
+  EXPECT_EQ(device.reservedBytes(), reserved) << "the simulations had other memory";
 }
 
 TEST_F(Determinism, TheHashOfTheDeviceEqualsThatOfTheCpu) {
