@@ -93,11 +93,10 @@ class Scene {
     move();
     const std::uint64_t before = blocks;
     findsPlaces = measures;
-    host_.begin(now_);
-    int slices = 1;
-    for (; host_.hasSlices(); ++slices) {
-      host_.waitForSlice();
+    int slices = 0;
+    for (host_.begin(now_); host_.hasSlices(); ++slices) {
       host_.submitSlice();
+      host_.waitForSlice();
     }
     host_.finish();
     findsPlaces = false;
