@@ -88,6 +88,10 @@ void Batch::shareTimes() {
     member.recorder->setStageTimes(times, all > 0 ? static_cast<double>(member.recorder->work()) / all : 0);
 }
 
+const CommandCounts& Batch::counts() const {
+  return handles_->writer.counts();
+}
+
 void Batch::findGroups() {
   const auto shapeOf = [](const Member& member) {
     return std::pair(member.recording->shape(), member.recording->commands().size());

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "server/vulkan/command_counts.h"
 #include "server/vulkan/device.h"
 #include "server/vulkan/recorder.h"
 
@@ -38,7 +39,10 @@ class Batch {
   // The submission is complete: gives each recording its part of the stages' times, by its work.
   void shareTimes();
 
-  // Only for this folder (handles.h). Writes the command buffers.
+  // Commands of the newest submission, without the upload of its table.
+  const CommandCounts& counts() const;
+
+  // Only for this folder (batch_handles.h). Writes the command buffers.
   void finish();
   struct Handles;
   Handles& handles() const { return *handles_; }

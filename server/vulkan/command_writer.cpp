@@ -32,6 +32,7 @@ constexpr CommandAccess kAccess[] = {
 
 void CommandWriter::begin(const vk::raii::CommandBuffer& commands) {
   commands_ = &commands;
+  counts_ = {};
   since_ = 0;
   before_.fill(0);
   commands_->begin(vk::CommandBufferBeginInfo{});
@@ -112,6 +113,8 @@ void CommandWriter::barrier() {
 void CommandWriter::waitBefore(Type type) {
   const std::uint8_t before = std::exchange(before_[type], std::uint8_t{0});
   since_ |= static_cast<std::uint8_t>(1u << type);
+  if (type == kernelCommand) ++counts_.dispatches;
+  if (type == copyCommand) ++counts_.copies;
   if (before == 0) return;
   vk::PipelineStageFlags stages;
   vk::AccessFlags writes;
@@ -120,6 +123,7 @@ void CommandWriter::waitBefore(Type type) {
     stages |= kAccess[other].stage;
     writes |= kAccess[other].writes;
   }
+  ++counts_.barriers;
   const vk::MemoryBarrier memory{.srcAccessMask = writes, .dstAccessMask = kAccess[type].uses};
   commands_->pipelineBarrier(stages, kAccess[type].stage, {}, memory, nullptr, nullptr);
 }

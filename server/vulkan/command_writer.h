@@ -7,6 +7,7 @@
 
 #include <vulkan/vulkan_raii.hpp>
 
+#include "server/vulkan/command_counts.h"
 #include "server/vulkan/kernel.h"
 #include "server/vulkan/recording.h"
 
@@ -33,6 +34,8 @@ class CommandWriter {
   void barrier();
 
   const vk::raii::CommandBuffer& commands() const { return *commands_; }
+  // Commands since begin().
+  const CommandCounts& counts() const { return counts_; }
 
  private:
   void writeOne(const Dispatch& dispatch, const Recording& recording);
@@ -52,6 +55,7 @@ class CommandWriter {
   void waitBefore(Type type);
 
   const vk::raii::CommandBuffer* commands_ = nullptr;
+  CommandCounts counts_;
   // Types of the commands since the last call of barrier(), and of those before it that a command of a type
   // has not waited for, as bits.
   std::uint8_t since_ = 0;

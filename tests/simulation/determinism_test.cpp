@@ -155,13 +155,14 @@ std::vector<model::Scene> companions() {
   return scenes;
 }
 
+struct Member {
+  Member(vulkan::Device& on, const model::Scene& scene) : simulation(on, scene), recorder(on) {}
+  simulation::ClothSimulation simulation;
+  vulkan::Recorder recorder;
+};
+
 // The same ticks on the shared device, one scene after the other, and on `device`, all together.
 void expectTheSameInABatch(vulkan::Device& device) {
-  struct Member {
-    Member(vulkan::Device& on, const model::Scene& scene) : simulation(on, scene), recorder(on) {}
-    simulation::ClothSimulation simulation;
-    vulkan::Recorder recorder;
-  };
   const std::vector<model::Scene> scenes = companions();
   std::vector<std::unique_ptr<Running>> alone;
   std::vector<std::unique_ptr<Member>> together;
@@ -197,6 +198,35 @@ TEST_F(Determinism, ScenesThatShareDispatchesMoveAsAlone) {
   vulkan::Device device({.sharing = vulkan::KernelSharing::always});
   if (!device.sharesKernels()) GTEST_SKIP() << "the device has no addresses of buffers";
   expectTheSameInABatch(device);
+}
+
+// Commands of the second tick of this many scenes in a batch.
+vulkan::CommandCounts commandsOf(vulkan::Device& device, std::size_t scenes) {
+  const model::Scene scene = busyScene();
+  std::vector<std::unique_ptr<Member>> members;
+  for (std::size_t i = 0; i < scenes; ++i) members.push_back(std::make_unique<Member>(device, scene));
+  vulkan::Batch batch(device);
+  for (int tick = 0; tick < 2; ++tick) {
+    batch.begin();
+    for (const auto& member : members) {
+      member->recorder.begin();
+      member->simulation.recordTick(member->recorder, busyInputs(scene, tick));
+      batch.add(member->recorder);
+    }
+    device.wait(device.submit(batch));
+  }
+  return batch.counts();
+}
+
+TEST_F(Determinism, ABatchOfEqualScenesHasTheCommandsOfOne) {
+  vulkan::Device device({.sharing = vulkan::KernelSharing::always});
+  if (!device.sharesKernels()) GTEST_SKIP() << "the device has no addresses of buffers";
+  const vulkan::CommandCounts one = commandsOf(device, 1), two = commandsOf(device, 2);
+  EXPECT_EQ(commandsOf(device, 20), two);
+  EXPECT_LE(two.barriers, one.barriers);
+  // Copies and fills become dispatches.
+  EXPECT_EQ(two.copies, 0u);
+  EXPECT_EQ(two.dispatches, one.dispatches + one.copies);
 }
 
 constexpr std::array kPurposes{vulkan::BufferPurpose::state, vulkan::BufferPurpose::texels,
