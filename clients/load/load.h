@@ -30,7 +30,7 @@ struct LoadOptions {
   std::uint32_t maxVertices = 0;     // as in limitVertices
 };
 
-// What became of the scenes that the test has created.
+// The fate of the scenes that the test has created.
 struct SceneReport {
   std::uint32_t wanted = 0, created = 0;
   std::optional<Failure> failure;  // why the next one could not be created

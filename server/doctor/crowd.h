@@ -12,7 +12,7 @@ namespace clothstream::doctor {
 // unexpected.
 inline constexpr double kUsedShare = 0.8;
 
-// What a tick of equal scenes takes, in seconds. All scenes of a tick share its kernel calls.
+// Seconds that a tick of equal scenes takes. All scenes of a tick share its kernel calls.
 struct CrowdCost {
   double sharedSeconds = 0;  // of the device, once for all scenes: kernel calls
   double ownSeconds = 0;     // of the device, for each scene: its nodes

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is settled about a scene before it runs: where it comes from, and how many may join it.
+// Facts about a scene that are settled before it runs: where it comes from, and how many may join it.
 #pragma once
 
 #include <cstdint>

@@ -19,10 +19,7 @@ constexpr double kMostWork = 16;
 }  // namespace
 
 Slices::Slices(vulkan::Device& device, vulkan::Recorder& recorder)
-    : device_(device),
-      recorder_(recorder),
-      first_(firstSlice(device)),
-      invocations_(first_) {
+    : device_(device), recorder_(recorder), first_(firstSlice(device)), invocations_(first_) {
   sliceRecordings();
 }
 

@@ -132,7 +132,7 @@ void TickScheduler::chooseGuests(Clock::time_point now, std::vector<TickSchedule
     return excess_ <= Clock::duration::zero() || entitledFrom(*guest) <= now_;
   });
   if (turn != waiting_.end() && expectedUse(**turn) > room) {
-    // Nothing else fits beside it.
+    // Nothing else fits next to it.
     if (!(*turn)->begun) chosen.push_back(*turn);
     return;
   }

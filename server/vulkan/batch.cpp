@@ -9,7 +9,6 @@
 
 #include "kernels/move_words.h"
 #include "server/vulkan/batch_handles.h"
-#include "shaders/shared/move_words.h"
 
 namespace clothstream::vulkan {
 namespace {
@@ -17,17 +16,25 @@ namespace {
 constexpr std::uint32_t kWordBytes = sizeof(std::uint32_t);
 constexpr std::uint32_t kMoveWorkgroup = 64;
 
-// A copy or a fill as the kernel move_words does it.
+// Push constants of the kernel move_words.
+struct MovePush {
+  std::uint32_t firstFrom = 0, firstTo = 0;  // words
+  std::uint32_t words = 0;
+  std::uint32_t fills = 0;  // not 0: each word becomes `value`
+  std::uint32_t value = 0;
+};
+
+// A copy or a fill as that kernel does it.
 struct Move {
   std::array<BoundBufferAddress, 2> buffers;  // from, to
-  shared::MovePush push;
+  MovePush push;
 };
 
 Move moveOf(const Copy& copy) {
   return {{BoundBufferAddress{copy.from, copy.fromOffset + copy.bytes},
            BoundBufferAddress{copy.to, copy.toOffset + copy.bytes}},
-          {.from = static_cast<std::uint32_t>(copy.fromOffset / kWordBytes),
-           .to = static_cast<std::uint32_t>(copy.toOffset / kWordBytes),
+          {.firstFrom = static_cast<std::uint32_t>(copy.fromOffset / kWordBytes),
+           .firstTo = static_cast<std::uint32_t>(copy.toOffset / kWordBytes),
            .words = static_cast<std::uint32_t>(copy.bytes / kWordBytes),
            .fills = 0,
            .value = 0}};
@@ -36,8 +43,8 @@ Move moveOf(const Copy& copy) {
 Move moveOf(const Fill& fill) {
   const BoundBufferAddress to{fill.buffer, fill.offset + fill.bytes};
   return {{to, to},
-          {.from = 0,
-           .to = static_cast<std::uint32_t>(fill.offset / kWordBytes),
+          {.firstFrom = 0,
+           .firstTo = static_cast<std::uint32_t>(fill.offset / kWordBytes),
            .words = static_cast<std::uint32_t>(fill.bytes / kWordBytes),
            .fills = 1,
            .value = fill.value}};

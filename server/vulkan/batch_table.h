@@ -14,8 +14,8 @@
 
 namespace clothstream::vulkan {
 
-// The CPU writes the table into memory of its own, and the device copies it at the start of the batch,
-// because kernels read the memory of a GPU faster. Only for this folder, like handles.h.
+// The CPU writes the table into mapped memory, and the device copies it at the start of the batch, because
+// kernels read the memory of a GPU faster. Only for this folder, like handles.h.
 class BatchTable {
  public:
   explicit BatchTable(const Device& device) : device_(&device) {}

@@ -20,8 +20,8 @@ enum class DeviceKind : std::uint8_t { discrete, integrated, virtualGpu, softwar
 // of the results do not depend on them. `automatic` means `cpu` for software devices and `gpu` for others.
 enum class KernelSettings : std::uint8_t { automatic, cpu, gpu };
 
-// Whether scenes that run together share dispatches (Batch). `automatic`: on GPUs, where a dispatch costs more
-// than the work of a small scene. The bits of the results do not depend on it.
+// Whether scenes that run together share dispatches (Batch). `automatic`: on GPUs, where a dispatch costs
+// more than the work of a small scene. The bits of the results do not depend on it.
 enum class KernelSharing : std::uint8_t { automatic, never, always };
 
 struct DeviceInfo {

@@ -57,8 +57,8 @@ struct Device::Handles {
   vk::raii::Semaphore timeline = nullptr;
   vk::raii::PipelineCache pipelineCache = nullptr;
   std::uint32_t queueFamily = 0;
-  bool keepsStatistics = false;  // of kernels: kernel_statistics.h
-  bool sharesKernels = false;    // kernels have shared forms: shared_code.h
+  bool keepsStatistics = false;                   // of kernels: kernel_statistics.h
+  bool sharesKernels = false;                     // kernels have shared forms: shared_code.h
   mutable std::atomic<std::uint64_t> batches{0};  // that have begun
   std::unique_ptr<MemoryBlocks> memory = {};
   std::unique_ptr<DescriptorPools> descriptorPools = {};

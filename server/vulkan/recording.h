@@ -19,7 +19,7 @@ struct PushRange {
   std::uint32_t offset = 0, bytes = 0;
 };
 
-// What the commands refer to has to exist until the recording is complete on the device.
+// The objects that commands refer to have to exist until the recording is complete on the device.
 struct Dispatch {
   const Kernel::Handles* kernel = nullptr;
   const Bindings::Handles* bindings = nullptr;

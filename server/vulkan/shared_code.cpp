@@ -97,7 +97,7 @@ class SharedForm {
     std::uint32_t vector = 0, index = 0;
   };
 
-  // What the module says.
+  // Facts about the module.
 
   void readAnnotations() {
     for (const auto& [operation, words] : module_.annotations) {

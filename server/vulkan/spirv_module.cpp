@@ -20,7 +20,7 @@ bool isAnnotation(std::uint32_t operation) {
          operation == spirv::kMemberDecorateString;
 }
 
-// True for the first type, constant or variable of the module, and for all that follow it.
+// True for the first type, constant or variable of the module, and for those that follow it.
 bool isGlobal(std::uint32_t operation) {
   return (operation >= spirv::kTypeVoid && operation <= spirv::kTypeForwardPointer) ||
          (operation >= spirv::kConstantTrue && operation <= spirv::kSpecConstantOp) ||

@@ -25,7 +25,7 @@ class StageTimer {
 
   // Begins a submission. The earlier one must be complete.
   void begin(const vk::raii::CommandBuffer& commands);
-  // What follows counts towards this stage. Marks beyond the limit are left out.
+  // Later commands count towards this stage. Marks beyond the limit are left out.
   void mark(const vk::raii::CommandBuffer& commands, std::string_view stage);
   void end(const vk::raii::CommandBuffer& commands);
 

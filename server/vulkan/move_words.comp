@@ -2,9 +2,6 @@
 // Copies words from one buffer to another, or fills them with a value: a copy of a recording, as a kernel
 // that several recordings share. An invocation moves one word.
 #version 450
-#extension GL_GOOGLE_include_directive : require
-
-#include "shaders/shared/move_words.h"
 
 layout(local_size_x_id = 0) in;
 
@@ -16,12 +13,15 @@ layout(std430, binding = 1) writeonly buffer To {
 };
 
 layout(push_constant) uniform Push {
-  MovePush push;
+  uint firstFrom, firstTo;  // words
+  uint words;
+  uint fills;  // not 0: each word becomes `value`
+  uint value;
 };
 
 void main() {
   uint word = gl_GlobalInvocationID.x;
-  if (word < push.words) {
-    to[push.to + word] = push.fills != 0 ? push.value : from[push.from + word];
+  if (word < words) {
+    to[firstTo + word] = fills != 0 ? value : from[firstFrom + word];
   }
 }
