@@ -249,6 +249,10 @@ void DeviceThread::begin(SceneRun& run, std::unique_ptr<scene::SceneOnDevice> lo
     if (adaptsToLoad_ && run.host->tick() > 0) run.overload.beginAt(run.host->work());
   }
   run.host->setWork(run.overload.level());
+  if (run.cost == Clock::duration::zero()) {
+    const double seconds = run.scene->tickWork(run.host->colliders()).seconds(budget_.speed());
+    run.cost = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+  }
   run.become(SceneState::idle);
 }
 
@@ -326,6 +330,10 @@ void DeviceThread::submitTicks(bool oneByOne) {
     } catch (const vulkan::DeviceLost&) {
       countLoss(*together_.front());
       throw;
+    } catch (const std::exception& failure) {
+      // None of them shows which tick is to blame, and none can be submitted again.
+      for (SceneRun* run : together_) rebuildScene(*run, failure.what());
+      batches_.end();
     }
   }
   for (schedule::TickSchedule* due : chosen_) {
@@ -511,7 +519,13 @@ void DeviceThread::countLoss(const SceneRun& noticed) {
 }
 
 void DeviceThread::rebuildScene(SceneRun& run, const std::string& reason) {
-  device_->drain();
+  try {
+    device_->drain();
+  } catch (const vulkan::DeviceLost&) {
+    throw;
+  } catch (const std::exception& failure) {
+    throw vulkan::DeviceLost(failure.what());  // the device may still use what would be released
+  }
   const std::uint64_t ticks = run.host->tick();
   run.release();
   wake();
