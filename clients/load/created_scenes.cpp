@@ -66,8 +66,9 @@ void CreatedScenes::takeAnswer() {
 std::unique_ptr<SceneRequest> CreatedScenes::creationOf(std::uint32_t scene) const {
   v1::ClientMessage message;
   message.set_request_id(1);
-  *message.mutable_create_scene()->mutable_scene() = definition_;
-  message.mutable_create_scene()->set_name(name(scene));
+  v1::Scene& created = *message.mutable_create_scene()->mutable_scene();
+  created = definition_;
+  created.set_name(name(scene));
   return std::make_unique<SceneRequest>(links_, token_, message);
 }
 
