@@ -15,6 +15,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/scene/scene_observer.h"
+#include "server/telemetry/thread_name.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -112,6 +113,7 @@ std::vector<std::shared_ptr<scene::LiveScene>> SceneServer::startScenes(
 }
 
 void SceneServer::keepHouse(const std::stop_token& stop) {
+  telemetry::nameThread("housekeeping");
   std::mutex mutex;
   std::condition_variable_any never;  // wakes at a request to stop
   std::unique_lock lock(mutex);
