@@ -22,8 +22,10 @@ struct AcceptedState {
 std::span<const AcceptedState> acceptedStates();
 
 // Simulates a built-in scene. Halfway everything on the device is dropped, as after its loss: a new device
-// goes on from the saved state. Compares the hash of the last state, and the price of a tick with its time.
-// Throws std::runtime_error if the device fails. Stops between ticks if `interrupted` returns true.
+// goes on from the saved state. A device that shares kernels runs the second half twice in one batch, so that
+// the kernels' shared forms are compared, too. Compares the hash of the last state, and the price of a tick
+// with its time. Throws std::runtime_error if the device fails. Stops between ticks if `interrupted` returns
+// true.
 Finding accept(const OptionsFor& options, const AcceptedState& expected,
                const std::function<bool()>& interrupted);
 

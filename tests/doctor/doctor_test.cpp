@@ -188,6 +188,18 @@ TEST_F(DoctorOfDevices, AcceptsADeviceWithTheRightStatesAlone) {
   EXPECT_THROW(doctor::accept(options, *small, [] { return true; }), std::runtime_error);
 }
 
+TEST_F(DoctorOfDevices, AcceptsStatesOfSharedKernels) {
+  const auto states = doctor::acceptedStates();
+  const auto small = std::ranges::find(states, "figure_11", &doctor::AcceptedState::scene);
+  ASSERT_NE(small, states.end());
+  const doctor::OptionsFor sharing = [](std::uint32_t nodes) {
+    vulkan::DeviceOptions device = options(nodes);
+    device.sharing = vulkan::KernelSharing::always;
+    return device;
+  };
+  EXPECT_EQ(doctor::accept(sharing, *small, [] { return false; }).level, Level::good);
+}
+
 TEST(AcceptedStates, AreThoseOfAllBuiltInScenes) {
   std::vector<std::string> names;
   for (const doctor::AcceptedState& state : doctor::acceptedStates()) names.emplace_back(state.scene);

@@ -69,7 +69,7 @@ class FakeServer final : public Links {
       answer.mutable_error()->set_text("there is no room");
     } else if (request.has_create_scene()) {
       EXPECT_EQ(request.create_scene().scene().cloths_size(), 1);
-      EXPECT_TRUE(scenes.insert(request.create_scene().name()).second);
+      EXPECT_TRUE(scenes.insert(request.create_scene().scene().name()).second);
       answer.mutable_create_scene();
     } else {
       EXPECT_EQ(scenes.erase(request.delete_scene().name()), 1u);

@@ -246,7 +246,7 @@ class IndependenceTest : public tests::ServerTest {
 };
 
 TEST_F(IndependenceTest, ScenesInCompanyMoveAsAlone) {
-  start(12);
+  start(8);
   if (IsSkipped()) return;
   live(60);
   expectTheSameAlone();
