@@ -9,6 +9,7 @@
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -114,7 +115,10 @@ void runCurtain(vulkan::Device& device, const Settings& settings, const RowSink&
   if (settings.size) throw std::runtime_error("--size: not allowed, because the scene has a fixed size");
   const model::Scene scene = *messages::loadScene("curtain");
   Simulated(device, scene, {}).check({scene.environment, {}});
-  hosting::SceneServer server({scene}, {.device = settings.device, .defaultScene = scene.name});
+  hosting::ServerOptions options;
+  options.device = settings.device;
+  options.defaultScene = scene.name;
+  hosting::SceneServer server({scene}, std::move(options));
   const telemetry::SceneMetrics& metrics = server.scenes.all().front()->metrics;
   const double seconds = std::max(settings.seconds, kLeastSeconds);
   cs_statistics seen;
