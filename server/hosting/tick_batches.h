@@ -27,9 +27,8 @@ class TickBatches {
 
     vulkan::Batch batch;
     std::vector<SceneRun*> runs;
-    // Of each run: its work (vulkan::Recorder::work), and its part of the device's time after divide().
-    std::vector<double> work;
-    std::vector<schedule::Clock::duration> times;
+    std::vector<double> work;                      // of each run (vulkan::Recorder::work)
+    std::vector<schedule::Clock::duration> times;  // part of the device's time of each run, after divide()
     vulkan::TimelineValue submitted = 0;
   };
 

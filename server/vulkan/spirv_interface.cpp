@@ -16,7 +16,7 @@ using namespace spirv;
 
 constexpr std::size_t kHeaderWords = 5;
 
-// What a module says about identifiers. All maps are by identifier.
+// Facts about identifiers of a module. All maps are by identifier.
 struct Module {
   std::map<std::uint32_t, std::string> names;
   std::map<std::uint32_t, std::uint32_t> specIds, bindings;  // decorations of constants and of variables

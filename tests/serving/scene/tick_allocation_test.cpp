@@ -113,9 +113,8 @@ class Scene {
   std::uint64_t blocksOfPublisher() const { return blocksOfPublisher_; }
 
   bool measures = false;
-  // Of the newest tick.
-  int messages = 0;       // to the viewer
-  bool isLonger = false;  // it had more slices than all before: it needs more command buffers
+  int messages = 0;       // of the newest tick, to the viewer
+  bool isLonger = false;  // the newest tick had more slices than all before: it needs more command buffers
 
  private:
   // Posts what an endpoint would post.

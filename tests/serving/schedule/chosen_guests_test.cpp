@@ -57,7 +57,7 @@ class ChosenGuestsTest : public ::testing::Test {
   std::vector<std::unique_ptr<TickSchedule>> guests_;
 };
 
-TEST_F(ChosenGuestsTest, AllThatFitTheGapBegin) {
+TEST_F(ChosenGuestsTest, GuestsThatFitTheGapBegin) {
   own.pacer.start(kNow + 5ms);
   TickSchedule &third = addGuest(1us, kNow), &second = addGuest(2ms, kNow - 1ms),
                &first = addGuest(3ms, kNow - 2ms);
