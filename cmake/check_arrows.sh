@@ -22,7 +22,7 @@ server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
 server/meshes      | server/files server/model proto/text
 server/messages    | server/files server/model server/meshes server/telemetry proto/hands proto/parameters proto/text clothstream
-server/encode      | server/model server/simulation server/vulkan proto/codec shaders
+server/encode      | server/model server/simulation server/telemetry server/vulkan proto/codec shaders
 server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream

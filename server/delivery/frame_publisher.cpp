@@ -80,7 +80,7 @@ void FramePublisher::Queue::drain() {
   isDraining_ = false;
 }
 
-FramePublisher::FramePublisher(std::uint32_t threads, std::uint32_t predicting) : workers_(predicting) {
+FramePublisher::FramePublisher(std::uint32_t threads, std::uint32_t workers) : workers_(workers) {
   assert(threads > 0);
   try {
     for (std::uint32_t i = 0; i < threads; ++i) threads_.emplace_back([this] { run(); });

@@ -14,7 +14,7 @@
 
 #include "proto/codec/stream_layout.h"
 #include "server/delivery/subscribers.h"
-#include "server/encode/encoder_threads.h"
+#include "server/encode/worker_threads.h"
 #include "server/encode/frame_encoder.h"
 
 namespace clothstream::delivery {
@@ -83,9 +83,9 @@ class FramePublisher {
     const std::list<Queue*>::iterator place_;
   };
 
-  // `threads`, at least 1, encode and publish. `predicting` is the number of threads, one of these included,
-  // that predict a large frame.
-  explicit FramePublisher(std::uint32_t threads = 1, std::uint32_t predicting = 1);
+  // `threads`, at least 1, encode and publish. `workers` is the number of threads, one of these included, that
+  // predict a large frame.
+  explicit FramePublisher(std::uint32_t threads = 1, std::uint32_t workers = 1);
   // Every queue must have ended.
   ~FramePublisher();
   FramePublisher(const FramePublisher&) = delete;
@@ -99,14 +99,14 @@ class FramePublisher {
   void drain();
   // Number of frames that wait. Any thread.
   std::size_t waiting() const;
-  // Workers for the encoders of the frames that will be pushed.
+  // Workers for the encoders of the frames that will be pushed. Others may use them, too.
   codec::Workers& workers() { return workers_; }
 
  private:
   void run();
   void stop();
 
-  encode::EncoderThreads workers_;
+  encode::WorkerThreads workers_;
   mutable std::mutex mutex_;  // protects all below, and the queues
   std::condition_variable hasTurns_, published_;
   std::list<Queue*> turns_;  // queues with frames of which none is being published; the first is next

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -21,6 +22,10 @@ namespace {
 constexpr std::chrono::milliseconds kPausedFramePeriod{50};
 // Pause after an error that belongs to no scene.
 constexpr std::chrono::milliseconds kErrorPause{20};
+
+// Scenes whose ticks one thread begins or finishes, one after the other. That takes about 15 us for each
+// tick, and another thread needs about as long to wake up.
+constexpr std::size_t kTogether = 4;
 
 // Fails a promise of a task.
 template <class Value>
@@ -300,21 +305,30 @@ void DeviceThread::runDueTicks() {
   scheduler_.choose(schedules(), before, chosen_);
   const bool oneByOne =
       std::ranges::any_of(runs_, [&](const auto& run) { return run->blame.isAlone(before); });
-  for (schedule::TickSchedule* due : chosen_) {
-    SceneRun& run = static_cast<SceneRun&>(*due);
-    run.tick.used = {};
-    if (survives(run, [&] { run.beginTick(Clock::now(), budget_.speed()); })) {
-      run.become(SceneState::inFlight);
-      chargeMaking(run, before);
-    }
-    if (oneByOne) {
-      submitTicks(oneByOne);
-      waitForTicks(before);
-      before = Clock::now();
-    }
+  const std::span<schedule::TickSchedule* const> due = chosen_;
+  const std::size_t atOnce = oneByOne ? 1 : due.size();
+  for (std::size_t begun = 0; begun < due.size(); begun += atOnce) {
+    if (begun > 0) before = Clock::now();
+    beginTicks(due.subspan(begun, atOnce), before);
+    submitTicks(oneByOne);
+    waitForTicks(before);
   }
-  submitTicks(oneByOne);
-  waitForTicks(before);
+}
+
+void DeviceThread::beginTicks(std::span<schedule::TickSchedule* const> due, Clock::time_point& deviceFree) {
+  const model::DeviceSpeed speed = budget_.speed();
+  const auto begin = [&](std::size_t i) {
+    SceneRun& run = static_cast<SceneRun&>(*due[i]);
+    run.tick.used = {};
+    run.beginTick(Clock::now(), speed);
+  };
+  runParts(due.size(), std::ref(begin));
+  for (std::size_t i = 0; i < due.size(); ++i) {
+    SceneRun& run = static_cast<SceneRun&>(*due[i]);
+    if (!survives(run, [&] { checkPart(i); })) continue;
+    run.become(SceneState::inFlight);
+    chargeMaking(run, deviceFree);
+  }
 }
 
 void DeviceThread::submitTicks(bool oneByOne) {
@@ -361,11 +375,18 @@ void DeviceThread::waitForBatch(TickBatches::Members& batch, Clock::time_point& 
   batch.batch.shareTimes();
   const Clock::time_point done = Clock::now();
   batch.divide(done - std::exchange(deviceFree, done));
+  const auto finish = [&](std::size_t i) {
+    SceneRun& run = *batch.runs[i];
+    faults_.checkScene(run.scene->name());
+    run.host->finish();
+  };
+  runParts(batch.runs.size(), std::ref(finish));
   for (std::size_t i = 0; i < batch.runs.size(); ++i) {
     SceneRun& run = *batch.runs[i];
-    if (!survives(run, [&] { faults_.checkScene(run.scene->name()); })) continue;
+    if (!survives(run, [&] { checkPart(i); })) continue;
     run.become(SceneState::betweenSlices);
-    endSlice(run, batch.times[i]);
+    noteSlice(run, batch.times[i]);
+    endTick(run);
   }
 }
 
@@ -430,14 +451,40 @@ void DeviceThread::waitForFirstSlice(SceneRun& run, Clock::time_point& deviceFre
   endSlice(run, done - std::exchange(deviceFree, done));
 }
 
-void DeviceThread::endSlice(SceneRun& run, Clock::duration time) {
+void DeviceThread::runParts(std::size_t count, const std::function<void(std::size_t)>& part) {
+  failures_.assign(count, nullptr);
+  const auto runGroup = [&](std::uint32_t group) {
+    const std::size_t first = group * kTogether;
+    for (std::size_t i = first; i < std::min(first + kTogether, count); ++i) {
+      try {
+        part(i);
+      } catch (...) {
+        failures_[i] = std::current_exception();
+      }
+    }
+  };
+  publisher_.workers().run(static_cast<std::uint32_t>((count + kTogether - 1) / kTogether), std::ref(runGroup));
+}
+
+void DeviceThread::checkPart(std::size_t part) const {
+  if (failures_[part]) std::rethrow_exception(failures_[part]);
+}
+
+bool DeviceThread::noteSlice(SceneRun& run, Clock::duration time) {
   run.tick.served = Clock::now();
   run.tick.used += time;
   scheduler_.used(run, time);
   // While a scene is loaded, its kernels lengthen slices. The end of the tick shows what the device did.
-  const bool isLate = run.price.addSlice(schedule::seconds(time)) && !isDisturbed_;
+  return run.price.addSlice(schedule::seconds(time)) && !isDisturbed_;
+}
+
+void DeviceThread::endSlice(SceneRun& run, Clock::duration time) {
+  const bool isLate = noteSlice(run, time);
   if (run.host->hasSlices()) return checkPrice(run, isLate);
-  if (!survives(run, [&] { run.host->finish(); })) return;
+  if (survives(run, [&] { run.host->finish(); })) endTick(run);
+}
+
+void DeviceThread::endTick(SceneRun& run) {
   run.become(SceneState::running);
   const Clock::time_point ended = Clock::now();
   run.tickEnded(run.tick.used, ended);

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <future>
 #include <memory>
@@ -141,6 +143,8 @@ class DeviceThread {
   // Encodes frames of paused scenes for subscribers that need a key frame.
   void encodePausedFrames();
   void runDueTicks();
+  // Begins the ticks of these runs, on several threads if they are many.
+  void beginTicks(std::span<schedule::TickSchedule* const> due, Clock::time_point& deviceFree);
   // Submits the ticks of `chosen_` that have begun.
   void submitTicks(bool oneByOne);
   // Waits for all ticks that are in flight. The device was busy until `deviceFree`.
@@ -153,12 +157,21 @@ class DeviceThread {
   // Runs a part of a tick. Returns false if it failed; the scene is then rebuilt. Throws vulkan::DeviceLost,
   // and counts that as the scene's.
   bool survives(SceneRun& run, const std::function<void()>& partOfTick);
+  // Calls `part`, which is best a std::ref, so that it allocates nothing, with each number below `count`, on
+  // several threads if they are many. Keeps what it throws in `failures_`.
+  void runParts(std::size_t count, const std::function<void(std::size_t)>& part);
+  // Throws what the part with this number threw.
+  void checkPart(std::size_t part) const;
   // Waits for a batch that was submitted when the device was busy until `deviceFree`.
   void waitForBatch(TickBatches::Members& batch, Clock::time_point& deviceFree);
   // Waits for the first slice of a tick that began when the device was busy until `deviceFree`.
   void waitForFirstSlice(SceneRun& run, Clock::time_point& deviceFree);
-  // The device worked for this time on the tick. Finishes the tick if it has no more slices.
+  // The device worked for this time on the tick. Returns whether the tick takes too long already.
+  bool noteSlice(SceneRun& run, Clock::duration time);
+  // The same. Finishes the tick if it has no more slices.
   void endSlice(SceneRun& run, Clock::duration time);
+  // The tick is finished.
+  void endTick(SceneRun& run);
   // Gives the time of this thread at the start of a tick to the scene, other than its commands.
   void chargeMaking(SceneRun& run, Clock::time_point& deviceFree);
   // Lets the scene do less work if it overloads the device, and more if there is room again.
@@ -202,6 +215,7 @@ class DeviceThread {
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
   TickBatches batches_;
   std::vector<SceneRun*> together_;  // ticks of a batch
+  std::vector<std::exception_ptr> failures_;  // of the newest runParts()
   bool isDisturbed_ = false;         // the loader works
   bool isMaking_ = false;            // a change has held this thread up in the present tick of its scene
   Clock::duration idle_{};           // time without work for the device

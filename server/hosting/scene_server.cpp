@@ -64,7 +64,7 @@ SceneServer::SceneServer(std::vector<model::Scene>&& definitions, ServerOptions&
       authentication(options, metrics),
       access(options, scenes),
       publisher(threadsOr(delivery::FramePublisher::suitedTo, options.encoderThreads),
-                threadsOr(encode::EncoderThreads::suitedTo, options.encoderThreads)),
+                threadsOr(encode::WorkerThreads::suitedTo, options.encoderThreads)),
       device(options.device, scenes.all(), publisher, metrics, *budget, options.runAlways, options.reportRate,
              options.adaptsToLoad),
       created(options, metrics, budget, scenes, kept, device),

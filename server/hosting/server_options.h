@@ -69,7 +69,7 @@ struct ServerOptions : Limits {
   // Limits what participants add by creating scenes and changing parameters.
   scene::BudgetLimits budget{};
   // Threads that encode and publish frames (FramePublisher), and threads that together predict a large frame
-  // on the CPU (EncoderThreads). 0 means automatic for both.
+  // on the CPU, or begin and finish ticks (WorkerThreads). 0 means automatic for both.
   std::uint32_t encoderThreads = 0;
   // Returns the journal of a scene, or null for none. May be empty.
   std::function<std::shared_ptr<scene::Journal>(const model::Scene&)> journals{};

@@ -114,9 +114,9 @@ void addSceneOptions(OptionTable& table, Parsed& parsed) {
   addBudgetOptions(table, options.server.budget);
   table.number(
       "--encoder-threads", options.server.encoderThreads, kThreads,
-      "CPU threads that encode frames of different scenes, and that predict a large frame together "
-      "where the device does not. 0 means three quarters of the processors, at most 16, and to predict "
-      "a quarter, at most 8");
+      "CPU threads that encode frames of different scenes, and that together predict a large frame "
+      "where the device does not, or begin and finish the ticks of many scenes. 0 means three quarters of "
+      "the processors, at most 16, to encode, and a quarter, at most 8, for the rest");
   table.action("--list-materials", parsed.listMaterials, "List the materials of cloths, and exit");
 }
 

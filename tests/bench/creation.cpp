@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/encode/encoder_threads.h"
+#include "server/encode/worker_threads.h"
 #include "server/messages/scene_message.h"
 #include "server/scene/live_scene.h"
 #include "server/scene/scene_on_device.h"
@@ -57,7 +57,7 @@ void runCreation(vulkan::Device& device, const Settings& settings, const RowSink
   constexpr int kRepeats = 3;
   std::vector<std::uint32_t> sizes = {128, 256, 512};
   if (settings.size) sizes = {*settings.size};
-  encode::EncoderThreads workers(1);
+  encode::WorkerThreads workers(1);
   for (const Case& experiment : kCases) {
     // Kernels are compiled once for all scenes that need them.
     const scene::SceneOnDevice first(device, sceneOf(experiment, 16), workers);

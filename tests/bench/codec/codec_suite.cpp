@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "server/encode/encoder_threads.h"
+#include "server/encode/worker_threads.h"
 #include "tests/bench/codec/bench_motion.h"
 #include "tests/bench/codec/codec_measurement.h"
 #include "tests/bench/codec/our_codec.h"
@@ -55,7 +55,7 @@ void runCodec(vulkan::Device& device, const Settings& settings, const RowSink& a
       add(measure(motion.name, layout, frames.count(), ofTheGrid));
     }
     if (settings.encoderThreads > 1) {
-      encode::EncoderThreads threads(settings.encoderThreads);
+      encode::WorkerThreads threads(settings.encoderThreads);
       const codec::StreamLayout plain{.epoch = 1, .maxError = settings.maxError, .cloths = {motion.cloth}};
       add(measure(motion.name, plain, frames.count(), ofTheGrid, &threads));
     }

@@ -39,8 +39,8 @@ MARGIN = 1
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 # Stages by the beginning of the names of threads. gRPC and software Vulkan name their threads themselves.
 STAGES = {
-    "device": ("device", "llvmpipe"),
-    "publisher": ("publisher", "encoder"),
+    "device": ("device", "worker", "llvmpipe"),
+    "publisher": ("publisher",),
     "network": ("grpc", "web", "event_engine", "default-exec", "resolver-exec"),
 }
 COLUMNS = {

@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/encode/encoder_threads.h"
+#include "server/encode/worker_threads.h"
 #include "server/messages/scene_file.h"
 #include "server/messages/scene_message.h"
 #include "server/scene/scene_on_device.h"
@@ -272,7 +272,7 @@ TEST_F(BudgetOfServerTest, SceneThatTakesFarMoreThanItsPriceIsStopped) {
 TEST_F(BudgetOfServerTest, PriceCoversTheDeviceMemoryOfEveryNamedScene) {
   START();
   vulkan::Device& device = tests::device();
-  encode::EncoderThreads workers(0);
+  encode::WorkerThreads workers(0);
   for (const std::string& name : messages::namedScenes()) {
     const messages::Result<model::Scene> scene = messages::loadScene(name);
     ASSERT_TRUE(scene) << scene.error().text;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Threads change how long a frame takes, and nothing else.
-#include "server/encode/encoder_threads.h"
+#include "server/encode/worker_threads.h"
 
 #include <algorithm>
 #include <atomic>
@@ -45,7 +45,7 @@ Packets packetsOf(const StreamLayout& layout, std::uint32_t weightLag, codec::Wo
 void expectTheSamePackets(const StreamLayout& layout, std::uint32_t weightLag = 0) {
   const Packets alone = packetsOf(layout, weightLag, nullptr);
   for (const std::uint32_t count : {1u, 2u, 3u, 8u}) {
-    EncoderThreads threads(count);
+    WorkerThreads threads(count);
     EXPECT_EQ(packetsOf(layout, weightLag, &threads), alone) << count << " threads";
   }
 }
@@ -57,23 +57,23 @@ StreamLayout largeLayout() {
           .cloths = {{200 * 190, 200, 190}, {7 * 9, 7, 9}, {60 * 50, 60, 50}, {1, 1, 1}}};
 }
 
-TEST(EncoderThreads, MakeTheSamePacketsAsOneThread) {
+TEST(WorkerThreads, MakeTheSamePacketsAsOneThread) {
   expectTheSamePackets(largeLayout());
 }
 
-TEST(EncoderThreads, MakeTheSamePacketsWithNormalsAndLag) {
+TEST(WorkerThreads, MakeTheSamePacketsWithNormalsAndLag) {
   StreamLayout layout = largeLayout();
   layout.normals = NormalMode::octahedral;
   expectTheSamePackets(layout, 3);
 }
 
-TEST(EncoderThreads, MakeTheSamePacketsOfAMesh) {
+TEST(WorkerThreads, MakeTheSamePacketsOfAMesh) {
   const codec::CutGrid cut(90);
   expectTheSamePackets({.epoch = 1, .maxError = 0.0005f, .cloths = {cut.cloth()}});
 }
 
-TEST(EncoderThreads, RunEachPieceOnceForSeveralCallers) {
-  EncoderThreads threads(3);
+TEST(WorkerThreads, RunEachPieceOnceForSeveralCallers) {
+  WorkerThreads threads(3);
   std::atomic<std::uint32_t> wrong = 0;
   const auto call = [&] {
     for (std::uint32_t pieces = 0; pieces < 200; ++pieces) {
@@ -88,11 +88,11 @@ TEST(EncoderThreads, RunEachPieceOnceForSeveralCallers) {
   EXPECT_EQ(wrong, 0u);
 }
 
-TEST(EncoderThreads, NumberAQuarterOfTheProcessors) {
-  EXPECT_EQ(EncoderThreads::suitedTo(0), 1u);
-  EXPECT_EQ(EncoderThreads::suitedTo(2), 1u);
-  EXPECT_EQ(EncoderThreads::suitedTo(16), 4u);
-  EXPECT_EQ(EncoderThreads::suitedTo(128), 8u);
+TEST(WorkerThreads, NumberAQuarterOfTheProcessors) {
+  EXPECT_EQ(WorkerThreads::suitedTo(0), 1u);
+  EXPECT_EQ(WorkerThreads::suitedTo(2), 1u);
+  EXPECT_EQ(WorkerThreads::suitedTo(16), 4u);
+  EXPECT_EQ(WorkerThreads::suitedTo(128), 8u);
 }
 
 }  // namespace
