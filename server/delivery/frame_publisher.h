@@ -14,8 +14,8 @@
 
 #include "proto/codec/stream_layout.h"
 #include "server/delivery/subscribers.h"
-#include "server/encode/worker_threads.h"
 #include "server/encode/frame_encoder.h"
+#include "server/encode/worker_threads.h"
 
 namespace clothstream::delivery {
 
@@ -83,8 +83,8 @@ class FramePublisher {
     const std::list<Queue*>::iterator place_;
   };
 
-  // `threads`, at least 1, encode and publish. `workers` is the number of threads, one of these included, that
-  // predict a large frame.
+  // `threads`, at least 1, encode and publish. `workers` is the number of threads, one of these included,
+  // that predict a large frame.
   explicit FramePublisher(std::uint32_t threads = 1, std::uint32_t workers = 1);
   // Every queue must have ended.
   ~FramePublisher();

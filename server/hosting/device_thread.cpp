@@ -463,7 +463,8 @@ void DeviceThread::runParts(std::size_t count, const std::function<void(std::siz
       }
     }
   };
-  publisher_.workers().run(static_cast<std::uint32_t>((count + kTogether - 1) / kTogether), std::ref(runGroup));
+  publisher_.workers().run(static_cast<std::uint32_t>((count + kTogether - 1) / kTogether),
+                           std::ref(runGroup));
 }
 
 void DeviceThread::checkPart(std::size_t part) const {

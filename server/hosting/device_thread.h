@@ -214,11 +214,11 @@ class DeviceThread {
   schedule::TickScheduler scheduler_{scene::SceneHost::kSliceTime};
   std::vector<schedule::TickSchedule*> schedules_, chosen_;  // of runs_
   TickBatches batches_;
-  std::vector<SceneRun*> together_;  // ticks of a batch
+  std::vector<SceneRun*> together_;           // ticks of a batch
   std::vector<std::exception_ptr> failures_;  // of the newest runParts()
-  bool isDisturbed_ = false;         // the loader works
-  bool isMaking_ = false;            // a change has held this thread up in the present tick of its scene
-  Clock::duration idle_{};           // time without work for the device
+  bool isDisturbed_ = false;                  // the loader works
+  bool isMaking_ = false;   // a change has held this thread up in the present tick of its scene
+  Clock::duration idle_{};  // time without work for the device
 
   std::thread thread_;
 };

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 #include "server/messages/grab_place.h"
+#include "server/messages/local_wind.h"
 #include "server/messages/scene_message.h"
 #include "server/messages/shapes.h"
 #include "server/messages/solid_message.h"
@@ -162,6 +164,17 @@ bool readColliders(const v1::SavedCheckpoint& message, const model::Scene& scene
          });
 }
 
+bool readWinds(const v1::SavedCheckpoint& message, std::vector<scene::HeldWinds::Placed>& winds) {
+  for (const v1::SavedWind& from : message.winds()) {
+    messages::Checks checks;
+    model::LocalWind wind = messages::toLocalWind(checks, messages::Path("wind"), from.wind());
+    if (checks.failed()) return false;
+    wind.pose = toPose(from.wind().pose());
+    winds.push_back({from.participant_id(), wind});
+  }
+  return std::ranges::is_sorted(winds, {}, &scene::HeldWinds::Placed::participant);
+}
+
 bool readGrabs(const v1::SavedCheckpoint& message, const model::Scene& scene,
                const simulation::HeldNodes& held, scene::GrabsAndAttachments::State& state) {
   std::size_t attachments = 0;
@@ -311,6 +324,11 @@ v1::SavedCheckpoint toMessage(const scene::Checkpoint& checkpoint) {
   }
   for (const Slot& slot : checkpoint.grabs.slots) write(slot, *message.add_grabs());
   for (const model::Pose& pose : checkpoint.grabs.frames) messages::write(pose, *message.add_frames());
+  for (const scene::HeldWinds::Placed& placed : checkpoint.winds) {
+    v1::SavedWind& to = *message.add_winds();
+    to.set_participant_id(placed.participant);
+    messages::write(placed.wind, *to.mutable_wind());
+  }
   if (checkpoint.lastRecovery) message.set_last_recovery(*checkpoint.lastRecovery);
   message.set_frame_divisor(checkpoint.work.frameDivisor);
   message.set_substeps(checkpoint.work.substeps);
@@ -366,6 +384,7 @@ Read<scene::Checkpoint> toCheckpoint(const v1::SavedCheckpoint& message, const m
     return wrong("colliders do not fit the scene");
   if (!readGrabs(message, checkpoint.scene, checkpoint.state.held, checkpoint.grabs))
     return wrong("grabs do not fit the scene");
+  if (!readWinds(message, checkpoint.winds)) return wrong("winds are invalid");
   if (message.has_last_recovery()) checkpoint.lastRecovery = message.last_recovery();
   // Without the work, the scene has all of it.
   checkpoint.work = {std::max(1u, message.frame_divisor()),

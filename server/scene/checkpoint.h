@@ -10,6 +10,7 @@
 #include "server/model/scene.h"
 #include "server/scene/collider_set.h"
 #include "server/scene/grabs_and_attachments.h"
+#include "server/scene/held_winds.h"
 #include "server/scene/roster.h"
 #include "server/schedule/overload_policy.h"
 #include "server/simulation/state_snapshot.h"
@@ -25,6 +26,7 @@ struct Checkpoint {
   std::vector<std::uint64_t> easeUntil;
   ColliderSet::State colliders;
   GrabsAndAttachments::State grabs;
+  std::vector<HeldWinds::Placed> winds;
   std::optional<std::uint64_t> lastRecovery;  // newest tick with an invalid state
   schedule::WorkLevel work;  // of the tick; less than all work while the device is overloaded
 };

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "server/model/input.h"
@@ -15,6 +16,11 @@ namespace clothstream::scene {
 // their number, each one's as it sent them.
 class HeldWinds {
  public:
+  struct Placed {
+    std::uint64_t participant;
+    model::LocalWind wind;
+  };
+
   // Sets all winds of this participant.
   void place(std::uint64_t participant, std::span<const model::HeldWind> winds);
   // Removes all winds.
@@ -25,12 +31,12 @@ class HeldWinds {
   // speeds of the latter are more than `room` together, m/s, all are slowed by the same factor.
   void advance(const model::Scene& scene, float room, std::vector<model::LocalWind>& winds) const;
 
+  const std::vector<Placed>& state() const { return placed_; }
+  // Continues from a state.
+  void restore(std::vector<Placed> placed) { placed_ = std::move(placed); }
+
  private:
-  struct Placed {
-    std::uint64_t participant;
-    model::LocalWind wind;
-  };
-  std::vector<Placed> placed_;
+  std::vector<Placed> placed_;  // in the order above
 };
 
 }  // namespace clothstream::scene

@@ -14,9 +14,11 @@ constexpr std::size_t kMaxPoseArrivals = 256;
 
 }  // namespace
 
-void Interaction::restore(ColliderSet::State colliders, GrabsAndAttachments::State grabs) {
+void Interaction::restore(ColliderSet::State colliders, GrabsAndAttachments::State grabs,
+                          std::vector<HeldWinds::Placed> winds) {
   colliders_.restore(std::move(colliders));
   grabs_.restore(std::move(grabs));
+  winds_.restore(std::move(winds));
 }
 
 void Interaction::add(Poses&& poses) {

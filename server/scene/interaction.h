@@ -27,7 +27,8 @@ class Interaction {
   // Starts at simulated time 0.
   explicit Interaction(const model::Scene& scene) : colliders_(scene), grabs_(scene) {}
   // Continues from a state of this scene.
-  void restore(ColliderSet::State colliders, GrabsAndAttachments::State grabs);
+  void restore(ColliderSet::State colliders, GrabsAndAttachments::State grabs,
+               std::vector<HeldWinds::Placed> winds);
 
   // Adds poses that arrived since the last tick.
   void add(Poses&& poses);
@@ -54,6 +55,7 @@ class Interaction {
                  v1::TickEvents& events);
 
   const GrabsAndAttachments::State& grabs() const { return grabs_.state(); }
+  const std::vector<HeldWinds::Placed>& winds() const { return winds_.state(); }
   // The device goes back to a snapshot (GrabsAndAttachments::goBack).
   void goBack(std::span<const GrabsAndAttachments::Slot> then, simulation::HeldNodes& held) {
     grabs_.goBack(then, held);

@@ -41,7 +41,8 @@ std::function<void(const delivery::SharedBytes&)> tapOf(const std::shared_ptr<Jo
   return [journal](const delivery::SharedBytes& message) { journal->sent(message); };
 }
 
-// Drops colliders and grabs of participants that are not in the roster: they left after the checkpoint.
+// Drops colliders, grabs and winds of participants that are not in the roster: they left after the
+// checkpoint.
 void dropAbsent(const SavedRoster& roster, Checkpoint& checkpoint) {
   const auto isAbsent = [&](std::uint64_t id) {
     return std::ranges::find(roster.participants, id, [](const SavedParticipant& known) {
@@ -50,6 +51,8 @@ void dropAbsent(const SavedRoster& roster, Checkpoint& checkpoint) {
   };
   std::erase_if(checkpoint.colliders.colliders,
                 [&](const ColliderSet::Placed& placed) { return isAbsent(placed.participant); });
+  std::erase_if(checkpoint.winds,
+                [&](const HeldWinds::Placed& placed) { return isAbsent(placed.participant); });
   std::vector<GrabsAndAttachments::Slot>& slots = checkpoint.grabs.slots;
   for (GrabsAndAttachments::Slot& slot : slots)
     if (slot.phase != GrabsAndAttachments::Slot::Phase::empty && isAbsent(slot.participant)) slot = {};

@@ -51,7 +51,7 @@ void SceneHost::continueFrom(const LiveScene::Restored& restored) {
     const Checkpoint& from = *restored.checkpoint;
     tick_ = from.state.tick;
     parameters_.restore(from.scene, from.easeUntil);
-    interaction_.restore(from.colliders, from.grabs);
+    interaction_.restore(from.colliders, from.grabs, from.winds);
     recovery_.restore(from.lastRecovery);
     snapshot_ = {.state = from.state, .grabs = interaction_.grabs().slots};
     wantedWork_ = work_ = from.work;
@@ -79,6 +79,7 @@ Checkpoint SceneHost::checkpoint() const {
           .easeUntil = parameters_.easeUntil(),
           .colliders = interaction_.colliders().state(),
           .grabs = interaction_.grabs(),
+          .winds = interaction_.winds(),
           .lastRecovery = recovery_.newestFailure(),
           .work = work_};
 }

@@ -28,8 +28,8 @@
 namespace clothstream::scene {
 
 // Belongs to the device's thread, and to others while that one waits for them: begin() and finish() of
-// different scenes may run at the same time. A tick is begin(), then finish(); the device works between. Tick n
-// ends at the simulated time n / simulation rate. Tick numbers only grow, also after the state went back.
+// different scenes may run at the same time. A tick is begin(), then finish(); the device works between. Tick
+// n ends at the simulated time n / simulation rate. Tick numbers only grow, also after the state went back.
 //
 // A tick that takes longer than kSliceTime is submitted in slices of about this time (Slices), so that ticks
 // of other scenes can run in between, and so that it can be dropped: after begin(), submitSlice() submits the

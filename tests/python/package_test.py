@@ -248,6 +248,21 @@ class Streams(unittest.TestCase):
             stream.pause(False)
             stream.next_frame()
 
+    def test_a_fan_blows_against_the_wind(self):
+        with running_server() as address, clothstream.join(address, role="owner") as stream:
+            depth = lambda: float(stream.next_frame().positions[221:, 2].mean())  # of the right cloth
+            while depth() < 0.02:  # the scene's wind goes to +Z
+                pass
+            half = 0.5 ** 0.5
+            stream.set_winds([clothstream.OwnWind((0.5, 1.8, 0.5), (-half, 0, 0, half), speed=20, radius=0.5)])
+            while depth() > -0.05:
+                pass
+            stream.set_winds([])
+            while depth() < 0.02:
+                pass
+            with self.assertRaises(AttributeError):
+                stream.set_winds([(0, 0, 0)])
+
     def test_joints_move_a_mesh_and_the_cloth(self):
         with running_server(scene="arm") as address, clothstream.join(address) as stream:
             vertices, triangles = stream.next_frame().mesh(0)

@@ -96,6 +96,7 @@ TEST_P(EverySolver, ContinuesFromACheckpointToTheBit) {
   ASSERT_TRUE(keeper->kept.has_value());
   EXPECT_FALSE(keeper->kept->state.held.nodes.empty());
   EXPECT_EQ(keeper->kept->grabs.slots.size(), 2u);
+  EXPECT_EQ(keeper->kept->winds.size(), 1u);
 
   HostedScene restored(scene, 1,
                        [&](scene::LiveScene& live) { restore(live, savedScene(scene, *keeper->kept)); });
@@ -187,6 +188,7 @@ TEST_F(CheckpointTest, DropsWhatParticipantsHeldWhoAreNotInTheRoster) {
   const model::Scene scene = tests::busyScene(SolverKind::massSpring);
   const scene::Checkpoint with = checkpointAfter(5);
   ASSERT_EQ(with.colliders.colliders.size(), 1u);
+  ASSERT_EQ(with.winds.size(), 1u);
   const auto keeper = std::make_shared<TickKeeper>(5);
   HostedScene restored(scene, 1, [&](scene::LiveScene& live) {
     scene::SavedScene saved = savedScene(scene, with);
@@ -197,6 +199,7 @@ TEST_F(CheckpointTest, DropsWhatParticipantsHeldWhoAreNotInTheRoster) {
   restored.host.saveLast();
   ASSERT_TRUE(keeper->kept.has_value());
   EXPECT_TRUE(keeper->kept->colliders.colliders.empty());
+  EXPECT_TRUE(keeper->kept->winds.empty());
   EXPECT_TRUE(keeper->kept->state.held.nodes.empty());
   const scene::Checkpoint without = throughBytes(*keeper->kept, scene);
   for (const auto& slot : without.grabs.slots)
@@ -299,6 +302,7 @@ TEST_F(CheckpointTest, RefusesWhatDoesNotFitTheScene) {
   refuses("colliders", [](v1::SavedCheckpoint& m) { m.mutable_scene_colliders()->RemoveLast(); });
   refuses("shape", [](v1::SavedCheckpoint& m) { m.mutable_colliders(0)->clear_shape(); });
   refuses("yield", [](v1::SavedCheckpoint& m) { m.mutable_colliders(0)->mutable_yield()->set_step(0); });
+  refuses("wind", [](v1::SavedCheckpoint& m) { m.mutable_winds(0)->mutable_wind()->set_speed(101); });
   refuses("cloths", [](v1::SavedCheckpoint& m) { m.clear_cloths(); });
   refuses("substeps", [](v1::SavedCheckpoint& m) { m.set_substeps(13); });
   refuses("parameters", [](v1::SavedCheckpoint& m) { m.mutable_parameters()->clear_cloths(); });

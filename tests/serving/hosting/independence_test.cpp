@@ -53,7 +53,7 @@ class IndependenceTest : public tests::ServerTest {
     ServerOptions options;
     options.maxCreatedScenes = 64;
     options.runAlways = true;
-    options.encoderThreads = 3;  // ticks of different scenes begin and end at the same time
+    options.encoderThreads = 3;                  // ticks of different scenes begin and end at the same time
     options.silence = std::chrono::minutes(30);  // viewers read rarely
     options.journals = [this](const model::Scene& scene) {
       return (isAlwaysRecorded(scene) ? always_ : onRequest_)->add(scene.name);

@@ -4,6 +4,7 @@
 
 #include <set>
 #include <string>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -26,6 +27,14 @@ TEST(LimitsTest, ProfilesHaveTheirColumns) {
   EXPECT_TRUE(home.outsideControl);
   EXPECT_FALSE(open.outsideControl);
   EXPECT_GT(fleet.connectionsPerAddress, 100'000u);
+}
+
+TEST(LimitsTest, EachFieldHasARow) {
+  const Limits limits;
+  // A new field does not compile before it has a name here.
+  const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u] = limits;
+  const auto fields = std::tie(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u);
+  EXPECT_EQ(limitTable().size(), std::tuple_size_v<decltype(fields)>);
 }
 
 TEST(LimitsTest, NoFieldHasTwoRows) {

@@ -18,13 +18,14 @@ from .recording import (Faults, Info, Message, Pose, Recorded, RecordedCollider,
 from .simulation import Simulation, SimulationFailed, simulate
 from .stream import ConnectionFailed, RequestRefused, Stream, join
 from .types import (Cloth, ClothReport, ClothSettings, Collider, ContactEvent, Environment, Event, Grab, GrabEvent, OwnCollider,
-                    Participant, Presence, Role, SceneSummary, Shape, Solver, Statistics)
+                    OwnWind, Participant, Presence, Role, SceneSummary, Shape, Solver, Statistics, WindKind)
 
 __version__: str = _text(_lib.clothstream_version())
 
 __all__ = [
     "ClientState", "Cloth", "ClothReport", "ClothSettings", "Collider", "ConnectionFailed", "ContactEvent", "Environment", "Error",
-    "Event", "Faults", "Frame", "Grab", "GrabEvent", "Info", "Message", "OwnCollider", "Participant", "Pose", "Presence", "Recorded",
+    "Event", "Faults", "Frame", "Grab", "GrabEvent", "Info", "Message", "OwnCollider", "OwnWind", "Participant", "Pose", "Presence", "Recorded",
     "RecordedCollider", "RecordedFrame", "RecordedGrab", "RecordedTick", "Recording", "RecordingError", "RequestRefused", "Role",
-    "SceneSummary", "Shape", "Simulation", "SimulationFailed", "Solver", "Statistics", "Stream", "join", "open_recording", "simulate",
+    "SceneSummary", "Shape", "Simulation", "SimulationFailed", "Solver", "Statistics", "Stream", "WindKind", "join", "open_recording",
+    "simulate",
 ]

@@ -10,7 +10,7 @@ from typing import Any, Iterator, Sequence
 from . import _bindings as b
 from ._library import Error, lib, new, text, vector
 from .client_state import ClientState, Frame
-from .types import Event, Grab, OwnCollider, Quaternion, Role, SceneSummary, Vec3
+from .types import Event, Grab, OwnCollider, OwnWind, Quaternion, Role, SceneSummary, Vec3
 
 
 class ConnectionFailed(Error):
@@ -215,6 +215,16 @@ class Stream(ClientState):
             struct.slip_distance = grab.slip_distance
         with self._client() as client:
             lib.cs_set_grabs(client, structs, len(grabs), lib.clothstream_now_us())
+
+    def set_winds(self, winds: Sequence[OwnWind]) -> None:
+        """Replaces the winds that this participant holds. At most 2 are used."""
+        structs = (b.cs_own_wind * max(1, len(winds)))()
+        for struct, wind in zip(structs, winds):
+            struct.version, struct.kind = b.CS_OWN_WIND_VERSION, wind.kind
+            struct.position, struct.orientation = tuple(wind.position), tuple(wind.orientation)
+            struct.speed, struct.radius, struct.spread, struct.reach = wind.speed, wind.radius, wind.spread, wind.reach
+        with self._client() as client:
+            lib.cs_set_winds(client, structs, len(winds), lib.clothstream_now_us())
 
     def move_attachment(self, attachment: str, position: Vec3, orientation: Quaternion | None = None,
                         jumps: bool = False) -> None:

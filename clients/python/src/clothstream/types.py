@@ -53,6 +53,11 @@ class Shape(enum.IntEnum):
     HULL = b.CS_SHAPE_HULL
 
 
+class WindKind(enum.IntEnum):
+    FAN = b.CS_WIND_FAN
+    VORTEX = b.CS_WIND_VORTEX
+
+
 class Solver(enum.IntEnum):
     AS_IS = b.CS_SOLVER_AS_IS
     MASS_SPRING = b.CS_SOLVER_MASS_SPRING
@@ -231,3 +236,16 @@ class Grab:
     reach: float = float("nan")  # m
     max_force: float = float("nan")  # N
     slip_distance: float = float("nan")  # m
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnWind:
+    """Wind that this participant holds: a fan or a vortex. NaN: the server's default."""
+
+    position: Vec3  # m
+    orientation: Quaternion = (0, 0, 0, 1)  # turns +Y to the axis
+    kind: WindKind = WindKind.FAN
+    speed: float = float("nan")  # m/s
+    radius: float = float("nan")  # m; of a fan's opening, or of a vortex's core
+    spread: float = float("nan")  # of a fan: growth of its radius for each metre of distance
+    reach: float = float("nan")  # m
