@@ -25,7 +25,7 @@ namespace clothstream::link {
 namespace {
 
 constexpr const char* kDevice = "link0";
-// Packets that wait to be read. More than a large TCP window, so that the losses of the link are all losses.
+// Packets that may wait to be read. Enough for large windows of TCP, so that only the link loses packets.
 constexpr int kDeviceQueue = 10'000;
 constexpr std::size_t kMaxMessage = 1000;
 // First byte of the child's message; the rest is text.

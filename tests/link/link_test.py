@@ -175,6 +175,7 @@ class Link(unittest.TestCase):
             (["--delay", "5:x"], "--delay: 'x' is not a number"),
             (["--burst-ms", "4", "--burst-packets", "4", "--loss", "1"], "in packets or in time, not both"),
             (["--burst-packets", "2", "--loss", "90"], "too short for this loss"),
+            (["--rate", "0.1", "--queue-ms", "1"], "the queue is shorter than one packet"),
             (["--congestion", "none"], "--congestion: this kernel has no 'none'"),
             (["--seed", "-1"], "--seed"),
             (["--mtu", "100"], "--mtu"),

@@ -25,7 +25,7 @@ namespace clothstream::link {
 namespace {
 
 constexpr int kFailure = 1, kWrongArguments = 2, kNotPermitted = 3;
-constexpr double kMaxMs = 10'000;  // a few seconds of packets fit into memory
+constexpr double kMaxMs = 10'000;  // longer delays would need much memory
 
 // A value for each direction.
 struct Both {
@@ -90,9 +90,13 @@ std::string algorithms() {
 
 // Throws CLI::ValidationError for options that do not fit together, or not this machine.
 void check(const Options& options) {
-  for (double Both::*const way : {&Both::down, &Both::up})
-    if (const auto error = errorOf(conditionsOf(options, way)))
-      throw CLI::ValidationError("--loss, --rate", *error);
+  for (double Both::*const way : {&Both::down, &Both::up}) {
+    const Conditions conditions = conditionsOf(options, way);
+    if (const auto error = errorOf(conditions)) throw CLI::ValidationError("--loss, --rate", *error);
+    if (conditions.bytesPerSecond > 0 && conditions.queueBytes < options.mtu)
+      throw CLI::ValidationError("--queue-bytes, --queue-ms",
+                                 "the queue is shorter than one packet of --mtu bytes");
+  }
   const std::string names = algorithms();
   if (!options.congestion.empty() &&
       (' ' + names + ' ').find(' ' + options.congestion + ' ') == std::string::npos)
@@ -130,7 +134,7 @@ int run(const Options& options) {
   sigaddset(&endings, SIGTERM);
   sigprocmask(SIG_BLOCK, &endings, nullptr);
   const Descriptor signals(signalfd(-1, &endings, SFD_CLOEXEC));
-  prctl(PR_SET_TIMERSLACK, 1);  // sleeps as short as the delays are exact
+  prctl(PR_SET_TIMERSLACK, 1);  // ns; delays are as exact as sleeps
 
   const End server({.number = 1, .mtu = options.mtu, .congestion = options.congestion});
   const End client({.number = 2, .mtu = options.mtu, .congestion = options.congestion});

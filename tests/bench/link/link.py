@@ -113,12 +113,14 @@ class Bench:
         with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as load:
             try:
                 time.sleep(self.arguments.seconds / 2)
-                listed = subprocess.run([*link.within(SERVER), "ss", "-tinH"], capture_output=True, text=True, check=True)
+                listed = subprocess.run([*link.within(SERVER), "ss", "-tinH"], capture_output=True, text=True)
                 out, errors = load.communicate()
             finally:
                 load.terminate()
         if load.returncode != 0:
             raise ProgramFailed(f"the load test failed with {load.returncode}: {errors}{out}")
+        if listed.returncode != 0:
+            raise ProgramFailed(f"ss failed with {listed.returncode} (package iproute2): {listed.stderr}")
         return json.loads(out), algorithms_of(listed.stdout), frames_of(path) if keeps_frames else None
 
 
@@ -168,8 +170,8 @@ def read_arguments(arguments=None):
     parser.add_argument("--conditions", type=choice(CONDITIONS), default=list(CONDITIONS),
                         help=f"some of {','.join(CONDITIONS)}. Default: all")
     parser.add_argument("--congestion",
-                        help="congestion control of TCP at both ends, such as bbr or cubic. Default: that of the kernel. A "
-                             "program that chooses its own keeps it; the line below the table says what was used")
+                        help="congestion control of TCP at both ends, such as bbr or cubic, unless the server chooses its own; "
+                             "the line below the table says what the server used. Default: that of the kernel")
     parser.add_argument("--scene", default="flag", help="built-in scene (default: %(default)s)")
     parser.add_argument("--rounds", type=number(1, 100, int), default=3, help="rounds (default: %(default)s)")
     parser.add_argument("--seconds", type=number(2, 3600, float), default=15,
