@@ -2,9 +2,12 @@
 // Options, progress line and report of a load test.
 #include "clients/cli/load_command.h"
 
+#include <chrono>
 #include <cstdio>
 #include <fstream>
+#include <iterator>
 #include <sstream>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -15,6 +18,7 @@
 #include "clients/cli/print.h"
 #include "clients/cli/recording_limits.h"
 #include "clients/cli/signals.h"
+#include "clients/files/new_file.h"
 #include "clients/load/hung_scene.h"
 #include "clients/native/address.h"
 
@@ -113,6 +117,19 @@ std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
   addPoses(object, report.figures.poses);
   addScenes(object, report);
   return jsonText(object, 2);
+}
+
+// One line of JSON for each frame.
+std::string frameLines(const load::LoadReport& report) {
+  std::string lines;
+  for (const load::FrameTime& frame : report.figures.frameTimes)
+    fmt::format_to(std::back_inserter(lines),
+                   R"({{"seconds":{:.4f},"participant":{},"tick":{},"ageMs":{:.2f},"displayableMs":{}}})"
+                   "\n",
+                   std::chrono::duration<double>(frame.arrived - report.start).count(), frame.participant,
+                   frame.tick, frame.age,
+                   frame.displayableAge ? fmt::format("{:.2f}", *frame.displayableAge) : "null");
+  return lines;
 }
 
 std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
@@ -251,6 +268,10 @@ void LoadCommand::add(CLI::App& app) {
   command_->add_flag("--web", web_, "Use WebSocket, as the page does, instead of gRPC");
   command_->add_option("--server-pid", serverPid_,
                        "Process id of the server on this machine; adds its CPU time to the report");
+  command_
+      ->add_option("--frames", framesPath_,
+                   "Write a line of JSON for each frame of the participants that are not slow to this file")
+      ->type_name("FILE");
   command_->add_flag("--json", json_, "Print only one JSON object");
 }
 
@@ -273,6 +294,12 @@ void LoadCommand::check() {
 }
 
 ExitCode LoadCommand::run(const ServerAddress& address) const {
+  std::optional<files::NewFile> frames;
+  if (!framesPath_.empty()) {
+    auto created = files::NewFile::create(framesPath_);
+    if (!created) return printError(kNotWritten, created.error());
+    frames.emplace(std::move(*created));
+  }
   const auto links = web_ ? load::makeWebLinks(address) : load::makeGrpcLinks(address);
   const bool shows = !json_ && isatty(STDOUT_FILENO) != 0;
   std::optional<double> before, after;
@@ -291,13 +318,17 @@ ExitCode LoadCommand::run(const ServerAddress& address) const {
   }
   load::LoadOptions options = options_;
   options.token = address.token;
+  options.keepsFrames = frames.has_value();
   load::LoadReport report = load::runLoad(*links, options, progress);
   if (shows) showStatus(stdout, "");
   std::optional<double> serverCpu;
   if (before && after) serverCpu = *after - *before;
   const bool nothing = report.joined == 0 && (report.lost > 0 || report.scenes.failure);
   if (!nothing) put((json_ ? json(report, serverCpu) : text(report, serverCpu)) + '\n');
-  return printErrors(report, address.address);
+  const ExitCode code = printErrors(report, address.address);
+  if (!frames || nothing) return code;
+  const auto written = frames->write(frameLines(report)).and_then([&] { return frames->finish(); });
+  return written ? code : printError(kNotWritten, written.error());
 }
 
 }  // namespace clothstream::cli

@@ -30,6 +30,7 @@ class LoadCommand {
  private:
   load::LoadOptions options_;
   std::string address_;
+  std::string framesPath_;  // empty: none
   std::optional<std::uint32_t> participants_, viewers_, decoders_;
   std::optional<std::uint32_t> serverPid_;
   bool web_ = false, json_ = false;

@@ -89,7 +89,8 @@ class Load {
                            .moves = number + options_.viewers < options_.participants,
                            .phase = number * std::numbers::phi,
                            .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond,
-                           .maxVertices = options_.maxVertices});
+                           .maxVertices = options_.maxVertices,
+                           .keepsFrames = options_.keepsFrames && number < options_.participants});
   }
 
   // Returns whether the scene of this seat exists. Takes a step towards creating it if it does not.
@@ -132,7 +133,7 @@ class Load {
   }
 
   void measure() {
-    const auto start = Clock::now();
+    const auto start = report_.start = Clock::now();
     const auto end = start + inSeconds(options_.seconds);
     auto shown = start;
     std::uint64_t changes = 0;
@@ -169,6 +170,7 @@ class Load {
   // Adds what the participant has received since the last time to the report.
   Figures collect(Seat& seat) {
     Figures figures = seat.participant->take();
+    for (FrameTime& frame : figures.frameTimes) frame.participant = seat.number;
     (isSlow(seat) ? report_.slowFigures : report_.figures).add(figures);
     seat.frames += figures.frames;
     return figures;

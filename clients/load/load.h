@@ -28,6 +28,7 @@ struct LoadOptions {
   double leavesPerSecond = 0;        // after all have joined; each is replaced
   double seconds = 10;               // after all have joined
   std::uint32_t maxVertices = 0;     // as in limitVertices
+  bool keepsFrames = false;          // as in ParticipantOptions, for participants that are not slow
 };
 
 // The fate of the scenes that the test has created.
@@ -43,6 +44,7 @@ struct SceneReport {
 
 struct LoadReport {
   double seconds = 0;
+  Clock::time_point start;  // of the measurement
   std::uint32_t participants = 0, slow = 0, hostileClients = 0;
   // Figures of the participants that are not slow.
   Figures figures;

@@ -45,6 +45,7 @@ void Figures::add(const Figures& other) {
   ages.insert(ages.end(), other.ages.begin(), other.ages.end());
   tickAges.insert(tickAges.end(), other.tickAges.begin(), other.tickAges.end());
   poses.add(other.poses);
+  frameTimes.insert(frameTimes.end(), other.frameTimes.begin(), other.frameTimes.end());
 }
 
 Participant::Participant(Links& links, const ParticipantOptions& options)
@@ -172,6 +173,12 @@ void Participant::frameReceived(const v1::Frame& frame, std::uint64_t nowUs) {
     };
     figures_.ages.push_back(age(frame.packet_time_us()));
     figures_.tickAges.push_back(age(frame.tick_time_us()));
+    if (options_.keepsFrames)
+      figures_.frameTimes.push_back({.participant = 0,
+                                     .tick = packet->header.tick,
+                                     .arrived = Clock::now(),
+                                     .age = figures_.tickAges.back(),
+                                     .displayableAge = {}});
   }
   if (options_.decodes || !acknowledgement_.due(nowUs)) return;
   v1::ClientMessage acknowledgement;
@@ -196,6 +203,10 @@ void Participant::frameDecoded(const v1::Frame& frame) {
                          .packet = own(frame.packet_time_us()),
                          .decoded = decoded,
                          .displayable = std::max(decoded, own(beforeUs) + 1000 * stages.delay_ms)};
+  // The time of this frame is missing while the offset of the clocks is unknown.
+  const bool isKept = !figures_.frameTimes.empty() && figures_.frameTimes.back().tick == statistics.tick;
+  if (isKept && beforeUs != 0)
+    figures_.frameTimes.back().displayableAge = static_cast<float>((times.displayable - times.tick) / 1000);
   PoseTimes notMeasured;
   PoseTimes& out = statistics.clock_offset_us != 0 && beforeUs != 0 ? figures_.poses : notMeasured;
   const std::uint64_t me = cs_participant_id(core_.get());

@@ -31,6 +31,17 @@ struct ParticipantOptions {
   // Reading rate; 0: unlimited.
   double bytesPerSecond = 0;
   std::uint32_t maxVertices = 0;  // as in limitVertices
+  bool keepsFrames = false;       // whether Figures::frameTimes has an entry for each frame
+};
+
+// A received frame. Ages are ms since its tick began, on the server's clock.
+struct FrameTime {
+  std::uint32_t participant = 0;  // as in the order of joining; set by the load test
+  std::uint64_t tick = 0;
+  Clock::time_point arrived;
+  float age = 0;  // on arrival
+  // When play-out can first show it. Only if the participant moves and decodes.
+  std::optional<float> displayableAge;
 };
 
 // Figures of one participant since the last take(), or sums over several participants.
@@ -48,6 +59,7 @@ struct Figures {
   std::vector<float> ages, tickAges;
   // Only if the participant moves and decodes.
   PoseTimes poses;
+  std::vector<FrameTime> frameTimes;  // only with ParticipantOptions::keepsFrames
 
   void add(const Figures& other);
 };

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Runs `clothstream load` against both endpoints of the real clothstream-server.
+#include <array>
 #include <csignal>
+#include <cstdint>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/e2e/running_server.h"
+#include "tests/e2e/temporary_directory.h"
 
 namespace clothstream::e2e {
 namespace {
@@ -141,6 +145,37 @@ TEST_F(Load, ReportsNoLatencyWithoutPoses) {
   EXPECT_EQ(report.at("poses"), 0);
   EXPECT_TRUE(report.at("poseToDisplayableMsP50").is_null());
   EXPECT_TRUE(report.at("decodedToDisplayableMsP99").is_null());
+}
+
+// The first participant moves, the second only looks.
+TEST_F(Load, WritesLineForEachFrame) {
+  startServer();
+  if (address_.empty()) return;
+  const TemporaryDirectory directory;
+  const std::string path = directory.path() / "frames";
+  const auto program =
+      load({address_, "--participants", "2", "--viewers", "1", "--seconds", "1", "--frames", path});
+  ASSERT_EQ(program->waitForEnd(kEnd), 0) << program->errors();
+  std::array<std::uint64_t, 2> frames{}, newest{};
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    const auto frame = nlohmann::json::parse(line);
+    const auto participant = frame.at("participant").get<std::size_t>();
+    ++frames.at(participant);
+    EXPECT_GE(frame.at("seconds").get<double>(), 0);
+    EXPECT_GT(frame.at("tick").get<std::uint64_t>(), newest.at(participant));
+    newest.at(participant) = frame.at("tick").get<std::uint64_t>();
+    if (participant == 1) {
+      EXPECT_TRUE(frame.at("displayableMs").is_null());
+    } else if (frames[0] > 1) {
+      EXPECT_GE(frame.at("displayableMs"), frame.at("ageMs"));
+    }
+  }
+  for (const std::uint64_t count : frames) EXPECT_GT(count, 10u);
+
+  const auto elsewhere = load({address_, "--frames", directory.path() / "missing" / "frames"});
+  EXPECT_EQ(elsewhere->waitForEnd(kEnd), 6);
+  EXPECT_THAT(elsewhere->errors(), HasSubstr("missing"));
 }
 
 TEST_F(Load, ReportsWhyParticipantsWereRefused) {

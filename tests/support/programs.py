@@ -131,10 +131,11 @@ class Program:
 
 
 class Server(Program):
-    """A server or an edge on free ports, which has started. `address` is that of gRPC, and `url` that of the page."""
+    """A server or an edge on free ports, which has started. `address` is that of gRPC, and `url` that of the page. `within`:
+    command that runs the server, for example in a namespace."""
 
-    def __init__(self, server, arguments, log, environment=None):
-        command = [server, *arguments, "--port", 0, "--grpc-port", 0]
+    def __init__(self, server, arguments, log, environment=None, within=()):
+        command = [*within, server, *arguments, "--port", 0, "--grpc-port", 0]
         super().__init__(pathlib.Path(server).name, command, log, environment)
 
     def start(self):
