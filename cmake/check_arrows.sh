@@ -16,6 +16,7 @@ server/model       | proto/codec proto/parameters
 server/vulkan      |
 proto/wire         |
 proto/codec        |
+proto/datagram     |
 proto/recording    | proto/codec proto/wire clothstream
 server/reference   | server/model
 server/telemetry   | proto/text

@@ -56,12 +56,12 @@ class Writer {
   }
   void bytes(std::span<const std::byte> bytes) {
     assert(bytes.size() <= room());
-    std::ranges::copy(bytes, out_.begin() + static_cast<std::ptrdiff_t>(written_));
+    std::copy(bytes.begin(), bytes.end(), out_.begin() + static_cast<std::ptrdiff_t>(written_));
     written_ += bytes.size();
   }
   void zeros(std::size_t count) {
     assert(count <= room());
-    std::ranges::fill(out_.subspan(written_, count), std::byte{});
+    std::fill_n(out_.begin() + static_cast<std::ptrdiff_t>(written_), count, std::byte{});
     written_ += count;
   }
 

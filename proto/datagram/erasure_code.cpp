@@ -88,7 +88,7 @@ struct Square {
 
 void makeParity(std::span<const std::byte> data, unsigned row, std::span<std::byte> parity) {
   assert(row < kMaxParityPieces && !data.empty() && data.size() <= kMaxDataPieces * parity.size());
-  std::ranges::fill(parity, std::byte{});
+  std::fill(parity.begin(), parity.end(), std::byte{});
   for (unsigned i = 0; !data.empty(); ++i) {
     const std::size_t bytes = std::min(parity.size(), data.size());
     addProduct(cauchy(row, i), data.first(bytes), parity);
@@ -109,7 +109,7 @@ void recoverData(std::span<const CodedPiece> pieces, std::span<std::byte> data) 
     if (piece.index < count) {
       assert(!present[piece.index]);
       present[piece.index] = true;
-      std::ranges::copy(piece.bytes, dataPiece(piece.index).begin());
+      std::copy(piece.bytes.begin(), piece.bytes.end(), dataPiece(piece.index).begin());
       continue;
     }
     assert(piece.index < count + kMaxParityPieces);
@@ -117,7 +117,7 @@ void recoverData(std::span<const CodedPiece> pieces, std::span<std::byte> data) 
     square.rows[square.size++] = rowPoint(piece.index - static_cast<unsigned>(count));
   }
 
-  // What the parity pieces hold of the missing data pieces.
+  // Take the data pieces that are present out of the parity pieces.
   unsigned missing = 0;
   for (unsigned column = 0; column < count; ++column) {
     if (!present[column]) {
@@ -131,7 +131,7 @@ void recoverData(std::span<const CodedPiece> pieces, std::span<std::byte> data) 
 
   for (unsigned column = 0; column < square.size; ++column) {
     const std::span<std::byte> recovered = dataPiece(square.columns[column]);
-    std::ranges::fill(recovered, std::byte{});
+    std::fill(recovered.begin(), recovered.end(), std::byte{});
     for (unsigned row = 0; row < square.size; ++row)
       addProduct(square.inverse(column, row), sums[row], recovered);
   }

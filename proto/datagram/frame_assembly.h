@@ -42,8 +42,8 @@ struct AssembledFrame {
 // silence of two frame intervals the next frame is requested once, because the last frame of a scene that
 // pauses may be lost as a whole.
 //
-// Holds at most 32 frames, each of which takes at most as much memory as pieces of it have arrived, so 4.7 MB
-// at most. A jump by more than 8 missing frames, or beyond the 32, is a gap at once: a key frame costs less.
+// Holds at most 32 frames, in memory that grows with the pieces that arrive: less than 10 MB. A jump by more
+// than 8 missing frames, or beyond the 32, is a gap at once: a key frame costs less than the repeats.
 //
 // After each add() call next() until it returns nullopt, then nextRequest() likewise; do the same at dueUs().
 class FrameAssembly {
@@ -59,7 +59,8 @@ class FrameAssembly {
 
   void add(const Piece& piece, std::uint64_t nowUs);
 
-  // Returns the next frame that need not wait. The message is valid until the next call.
+  // Returns the next frame that need not wait. The message is valid until next() is called
+  // again.
   std::optional<AssembledFrame> next(std::uint64_t nowUs);
 
   // Returns a request that is to be sent now.

@@ -61,8 +61,7 @@ std::optional<InputMessages> InputReceiver::receive(std::span<const std::byte> d
   found.count =
       static_cast<std::size_t>(std::clamp<std::int64_t>(unseen, 0, static_cast<std::int64_t>(found.count)));
   if (found.count > 0) next_ = newest + 1;
-  std::ranges::reverse(found.messages.begin(),
-                       found.messages.begin() + static_cast<std::ptrdiff_t>(found.count));
+  std::reverse(found.messages.begin(), found.messages.begin() + static_cast<std::ptrdiff_t>(found.count));
   return found;
 }
 

@@ -6,14 +6,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "proto/datagram/piece.h"
 
 namespace clothstream::datagram {
 
-// Memory grows with the pieces that arrive, not with the announced size: at most kMaxFrameBytes and one
-// piece, and twice that while the message is put together.
+// Memory grows with the pieces that arrive, not with the announced size: at most twice their bytes, and the
+// message in addition while it is put together.
 class PartialFrame {
  public:
   enum class Added {

@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint64_t kMs = 1'000;
 constexpr unsigned kParity = 3;
 
-// Sends pieces of frames, which have three data pieces, and keeps what comes out.
+// Sends pieces of frames, which have three data pieces, and keeps the frames that are emitted.
 class AssemblyTest : public ::testing::Test {
  protected:
   void send(std::uint32_t frame, std::initializer_list<unsigned> pieces, std::uint64_t nowUs) {
@@ -41,7 +41,7 @@ class AssemblyTest : public ::testing::Test {
       const auto sent = std::ranges::find_if(frames_, [&](const auto& entry) {
         return equal(frame->message, testMessage(bytes_, entry.first));
       });
-      EXPECT_NE(sent, frames_.end()) << "the message differs from all that were sent";
+      EXPECT_NE(sent, frames_.end()) << "no such message was sent";
       if (sent == frames_.end()) continue;
       numbers.push_back(sent->first);
       if (frame->afterGap) gaps_.push_back(sent->first);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // All targets, for the program that replays their inputs.
 #include "tests/fuzz/targets/core_target.h"
+#include "tests/fuzz/targets/datagram_target.h"
 #include "tests/fuzz/targets/decoder_target.h"
 #include "tests/fuzz/targets/draco_target.h"
 #include "tests/fuzz/targets/files_target.h"
@@ -8,6 +9,7 @@
 #include "tests/fuzz/targets/http_target.h"
 #include "tests/fuzz/targets/hull_target.h"
 #include "tests/fuzz/targets/obj_target.h"
+#include "tests/fuzz/targets/pieces_target.h"
 #include "tests/fuzz/targets/recording_target.h"
 #include "tests/fuzz/targets/saved_state_target.h"
 #include "tests/fuzz/targets/scene_json_target.h"
@@ -19,9 +21,10 @@ namespace clothstream::fuzz {
 
 std::span<const Target* const> targets() {
   static constexpr const Target* kAll[]{
-      &kCoreTarget,  &kDecoderTarget,   &kDracoTarget,   &kFilesTarget,     &kGltfTarget,
-      &kHttpTarget,  &kHullTarget,      &kObjTarget,     &kRecordingTarget, &kSavedStateTarget,
-      &kSceneTarget, &kSceneJsonTarget, &kSessionTarget, &kTokenTarget};
+      &kCoreTarget,  &kDatagramTarget,  &kDecoderTarget,   &kDracoTarget,
+      &kFilesTarget, &kGltfTarget,      &kHttpTarget,      &kHullTarget,
+      &kObjTarget,   &kPiecesTarget,    &kRecordingTarget, &kSavedStateTarget,
+      &kSceneTarget, &kSceneJsonTarget, &kSessionTarget,   &kTokenTarget};
   return kAll;
 }
 

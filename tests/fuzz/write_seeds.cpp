@@ -16,6 +16,9 @@
 #include "clothstream/v1/recording.pb.h"
 #include "clothstream/v1/saved_state.pb.h"
 #include "inputs.pb.h"
+#include "proto/datagram/input_bundle.h"
+#include "proto/datagram/piece_request.h"
+#include "proto/datagram/receipt.h"
 #include "server/messages/embedded_scenes.h"
 #include "tests/codec/golden.h"
 #include "tests/core/scripted_server.h"
@@ -45,6 +48,49 @@ class Folder {
   std::filesystem::path path_;
   int count_ = 0;
 };
+
+void writePieces(const std::filesystem::path& directory) {
+  Folder folder(directory, "pieces");
+  for (const std::uint32_t lost : {0u, 1u, 4u}) {
+    PiecesInput input;
+    std::uint32_t packet = 0;
+    for (std::uint32_t frame = 0; frame < 6; ++frame)
+      for (std::uint32_t index = 0; index < 4; ++index) {
+        if (packet++ % 5 < lost) continue;
+        PiecesInput::Step& step = *input.add_steps();
+        step.set_microseconds(index == 0 ? 14'000 : 0);
+        PiecesInput::Piece& piece = *step.mutable_piece();
+        piece.set_packet(packet);
+        piece.set_frame(frame);
+        piece.set_index(index);
+        piece.set_bytes(2'400);
+      }
+    // The last piece states another number of data pieces.
+    Patch& patch = *input.mutable_steps(input.steps_size() - 1)->mutable_piece()->add_patches();
+    patch.set_offset(14);
+    patch.set_bytes("\2");
+    folder.add(input);
+  }
+}
+
+void writeDatagrams(const std::filesystem::path& directory) {
+  Folder folder(directory, "datagram");
+  std::array<std::byte, datagram::kMaxDatagramBytes> out;
+  DatagramInput input;
+  const auto add = [&](std::size_t bytes) {
+    DatagramInput::Step& step = *input.add_steps();
+    step.set_datagram(std::string(reinterpret_cast<const char*>(out.data()), bytes));
+    step.set_microseconds(14'000);
+    step.set_frame_bytes(2'400);
+  };
+  datagram::InputSender sender;
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    add(sender.write(std::vector<std::byte>(3, std::byte{7}), 0, out));
+    add(datagram::writeReceipt({.newest = i, .arrivalUs = 14'000 * i, .before = i}, out));
+    add(datagram::writeRequest({.frame = i, .present = i}, out));
+  }
+  folder.add(input);
+}
 
 v1::ServerMessage parsed(const std::string& bytes) {
   v1::ServerMessage message;
@@ -489,6 +535,7 @@ void writeTokens(const std::filesystem::path& directory) {
 
 void writeAll(const std::filesystem::path& directory) {
   writeCore(directory);
+  writeDatagrams(directory);
   writeDecoder(directory);
   writeScenes(directory);
   writeSession(directory);
@@ -496,6 +543,7 @@ void writeAll(const std::filesystem::path& directory) {
   writeSavedState(directory);
   writeHulls(directory);
   writeHttp(directory);
+  writePieces(directory);
   writeMeshes(directory);
   writeFiles(directory);
   writeTokens(directory);
