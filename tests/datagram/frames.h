@@ -2,10 +2,10 @@
 // Frames with known bytes, and their datagrams.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <vector>
@@ -40,7 +40,7 @@ inline Bytes datagramOf(const FramePieces& frame, const PiecePrefix& prefix, uns
 }
 
 inline bool equal(std::span<const std::byte> a, std::span<const std::byte> b) {
-  return std::ranges::equal(a, b);
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
 }  // namespace clothstream::datagram
