@@ -16,7 +16,6 @@
 namespace clothstream::datagram {
 namespace {
 
-constexpr std::uint64_t kMs = 1'000;
 constexpr unsigned kParity = 3;
 
 // Sends pieces of frames, which have three data pieces, and keeps the frames that are emitted.

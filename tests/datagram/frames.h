@@ -16,6 +16,8 @@ namespace clothstream::datagram {
 
 using Bytes = std::vector<std::byte>;
 
+inline constexpr std::uint64_t kMs = 1'000;  // us
+
 // Bytes that differ between frames and between places.
 inline Bytes testMessage(std::size_t bytes, std::uint32_t frame = 0) {
   Bytes message(bytes);

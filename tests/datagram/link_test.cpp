@@ -20,8 +20,8 @@
 namespace clothstream::datagram {
 namespace {
 
-constexpr std::uint64_t kMs = 1'000, kFrameUs = 13'889;
-constexpr std::uint32_t kFrames = 1'000;
+constexpr std::uint64_t kFrameUs = 13'889;
+constexpr std::uint32_t kSimulatedFrames = 1'000;
 // Frames repeat after this number, so that parity is made only for these.
 constexpr std::uint32_t kDifferent = 32;
 
@@ -84,14 +84,14 @@ class Simulation {
   }
 
   Outcome run() {
-    for (std::uint32_t i = 0; i < kFrames; ++i) at(i * kFrameUs, [this] { sendFrame(); });
+    for (std::uint32_t i = 0; i < kSimulatedFrames; ++i) at(i * kFrameUs, [this] { sendFrame(); });
     while (!events_.empty()) {
       const auto event = events_.extract(events_.begin());
       nowUs_ = event.key();
       event.mapped()();
     }
     Outcome outcome;
-    outcome.lost = kFrames - static_cast<std::uint32_t>(delays_.size());
+    outcome.lost = kSimulatedFrames - static_cast<std::uint32_t>(delays_.size());
     outcome.statistics = assembly_.statistics();
     std::ranges::sort(delays_);
     const auto quantile = [&](double q) {
@@ -127,7 +127,7 @@ class Simulation {
     while (const auto frame = assembly_.next(nowUs_)) {
       while (!equal(frame->message, *messages_[emitted_ % kDifferent])) {
         ASSERT_TRUE(frame->afterGap) << "a frame is lost without a sign";
-        ASSERT_LT(++emitted_, kFrames) << "a frame has other bytes than the server sent";
+        ASSERT_LT(++emitted_, kSimulatedFrames) << "a frame has other bytes than the server sent";
       }
       delays_.push_back(static_cast<double>(nowUs_ - emitted_++ * kFrameUs - Link::kDelayUs) /
                         static_cast<double>(kMs));
@@ -164,8 +164,8 @@ Outcome simulate(const Conditions& conditions) {
       "%5zu B, parity %u, %s, loss %4.1f %% in bursts of %.0f: %u of %u frames lost, delay p50 %.1f p99 %.1f "
       "max %.1f ms, %llu requests\n",
       conditions.frameBytes, conditions.parity, conditions.answers ? "requests" : "no answers",
-      100 * conditions.loss, conditions.burst, outcome.lost, kFrames, outcome.p50, outcome.p99, outcome.max,
-      static_cast<unsigned long long>(outcome.statistics.requests));
+      100 * conditions.loss, conditions.burst, outcome.lost, kSimulatedFrames, outcome.p50, outcome.p99,
+      outcome.max, static_cast<unsigned long long>(outcome.statistics.requests));
   return outcome;
 }
 
@@ -181,7 +181,7 @@ double tooManyLost(unsigned count, unsigned allowed, double loss) {
 
 // Five standard deviations of a binomial count, and one.
 double tolerance(double probability) {
-  return 5 * std::sqrt(kFrames * probability * (1 - probability)) + 1;
+  return 5 * std::sqrt(kSimulatedFrames * probability * (1 - probability)) + 1;
 }
 
 TEST(DatagramLink, ParityLosesAsTheBinomialSays) {
@@ -192,7 +192,7 @@ TEST(DatagramLink, ParityLosesAsTheBinomialSays) {
             simulate({.frameBytes = bytes, .parity = parity, .loss = loss, .answers = false});
         const unsigned count = testFrame(bytes, 0)->dataPieces();
         const double lost = tooManyLost(count + parity, parity, loss);
-        EXPECT_NEAR(outcome.lost, kFrames * lost, tolerance(lost))
+        EXPECT_NEAR(outcome.lost, kSimulatedFrames * lost, tolerance(lost))
             << bytes << " bytes, " << parity << ", " << loss;
       }
 }
@@ -207,7 +207,7 @@ TEST(DatagramLink, RequestsRepairAlmostEverything) {
         const unsigned count = testFrame(bytes, 0)->dataPieces();
         const double incomplete = tooManyLost(count + parity, parity, loss);
         const double lost = incomplete * (loss + 3 * loss * loss);
-        EXPECT_LE(outcome.lost, kFrames * lost + tolerance(lost))
+        EXPECT_LE(outcome.lost, kSimulatedFrames * lost + tolerance(lost))
             << bytes << " bytes, " << parity << ", " << loss;
         // A repair takes the time to the next frame, a round trip, and jitter. A frame that needs a second
         // one delays about seven others.
@@ -223,7 +223,7 @@ TEST(DatagramLink, RequestsRepairAlmostEverything) {
 TEST(DatagramLink, BurstsAreRepaired) {
   for (const double loss : {0.02, 0.05}) {
     const Outcome outcome = simulate({.frameBytes = 7300, .parity = 2, .loss = loss, .burst = 4});
-    EXPECT_LE(outcome.lost, kFrames / 100) << loss;
+    EXPECT_LE(outcome.lost, kSimulatedFrames / 100) << loss;
     EXPECT_LE(outcome.max, 150 + 14 + 5) << "the deadline, the time to the next frame, and jitter";
   }
 }
@@ -231,7 +231,7 @@ TEST(DatagramLink, BurstsAreRepaired) {
 TEST(DatagramLink, ReorderingCausesFewRequests) {
   const Outcome outcome = simulate({.parity = 1, .loss = 0, .jitterUs = 20'000, .ordered = false});
   EXPECT_EQ(outcome.lost, 0u);
-  EXPECT_LE(outcome.statistics.requests, kFrames / 20);
+  EXPECT_LE(outcome.statistics.requests, kSimulatedFrames / 20);
   const Outcome lossy = simulate({.parity = 1, .loss = 0.05, .jitterUs = 20'000, .ordered = false});
   EXPECT_LE(lossy.lost, 2u);
 }
