@@ -3,6 +3,7 @@
 #include "tests/fuzz/targets/core_target.h"
 #include "tests/fuzz/targets/decoder_target.h"
 #include "tests/fuzz/targets/draco_target.h"
+#include "tests/fuzz/targets/dtls_target.h"
 #include "tests/fuzz/targets/files_target.h"
 #include "tests/fuzz/targets/gltf_target.h"
 #include "tests/fuzz/targets/http_target.h"
@@ -13,15 +14,16 @@
 #include "tests/fuzz/targets/scene_json_target.h"
 #include "tests/fuzz/targets/scene_target.h"
 #include "tests/fuzz/targets/session_target.h"
+#include "tests/fuzz/targets/stun_target.h"
 #include "tests/fuzz/targets/token_target.h"
 
 namespace clothstream::fuzz {
 
 std::span<const Target* const> targets() {
   static constexpr const Target* kAll[]{
-      &kCoreTarget,  &kDecoderTarget,   &kDracoTarget,   &kFilesTarget,     &kGltfTarget,
-      &kHttpTarget,  &kHullTarget,      &kObjTarget,     &kRecordingTarget, &kSavedStateTarget,
-      &kSceneTarget, &kSceneJsonTarget, &kSessionTarget, &kTokenTarget};
+      &kCoreTarget,      &kDecoderTarget, &kDracoTarget, &kDtlsTarget,      &kFilesTarget,      &kGltfTarget,
+      &kHttpTarget,      &kHullTarget,    &kObjTarget,   &kRecordingTarget, &kSavedStateTarget, &kSceneTarget,
+      &kSceneJsonTarget, &kSessionTarget, &kStunTarget,  &kTokenTarget};
   return kAll;
 }
 
