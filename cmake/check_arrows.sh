@@ -11,13 +11,16 @@ proto/text         |
 proto/tls          |
 proto/discovery    |
 proto/hands        |
+proto/checksum     |
+proto/ice          | proto/checksum
+proto/dtls         | proto/tls
 server/files       |
 server/model       | proto/codec proto/parameters
 server/vulkan      |
 proto/wire         |
 proto/codec        |
 proto/datagram     |
-proto/recording    | proto/codec proto/wire clothstream
+proto/recording    | proto/checksum proto/codec proto/wire clothstream
 server/reference   | server/model
 server/telemetry   | proto/text
 server/simulation  | server/model server/vulkan shaders
@@ -60,7 +63,7 @@ clients/testing    |
 clients/files      | proto/codec proto/text clothstream
 clients/measure    | clients/core
 clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
-clients/cli        | proto/text proto/discovery clients/core clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream clients/measure
+clients/cli        | proto/checksum proto/text proto/discovery clients/core clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream clients/measure
 '
 # rooms that may include these headers
 readonly OUTSIDE='
@@ -68,7 +71,7 @@ readonly OUTSIDE='
 <grpcpp/           | server/endpoint/grpc clients/grpc clients/load
 <boost/beast       | server/agones server/events server/endpoint/web server/monitoring clients/websocket
 <prometheus/       | server/monitoring
-<openssl/          | proto/tls server/tls server/identity server/events server/scene
+<openssl/          | proto/dtls proto/ice proto/tls server/tls server/identity server/events server/scene
 <jwt.h>            | server/identity
 <sqlite3           | server/saved_state
 <boost/asio/ssl    | server/tls server/events server/endpoint/web clients/websocket

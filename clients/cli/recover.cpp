@@ -13,7 +13,7 @@
 #include "clients/cli/print.h"
 #include "clients/cli/progress.h"
 #include "clients/cli/signals.h"
-#include "proto/recording/crc32.h"
+#include "proto/checksum/crc32.h"
 #include "proto/recording/file.h"
 #include "proto/recording/frame_check.h"
 #include "proto/recording/message_types.h"
@@ -41,7 +41,7 @@ struct Sum {
   void add(const recording::Message& message) {
     if (messages++ == 0) firstTime = message.time;
     lastTime = message.time;
-    crc = recording::crcOf(message.bytes, crc);
+    crc = checksum::crc32(message.bytes, crc);
   }
 };
 

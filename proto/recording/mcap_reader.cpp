@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "proto/checksum/crc32.h"
 #include "proto/recording/bytes.h"
-#include "proto/recording/crc32.h"
 #include "proto/recording/decompress.h"
 
 namespace clothstream::recording {
@@ -269,7 +269,7 @@ bool McapReader::State::readSummary() {
     return false;
   const std::uint64_t footerPart = kRecordHead + kFooterBytes - sizeof crc;
   if (!source->read(start, footerAt - start + footerPart, bytes)) return false;
-  if (crc != 0 && crcOf(bytes) != crc) return false;
+  if (crc != 0 && checksum::crc32(bytes) != crc) return false;
   ByteReader summary(std::string_view(bytes).substr(0, static_cast<std::size_t>(footerAt - start)));
   while (summary.left() > 0) {
     const auto opcode = static_cast<Opcode>(summary.number<std::uint8_t>());
@@ -474,7 +474,7 @@ tl::expected<std::span<const Message>, std::string> McapReader::read(std::size_t
     return wrong("it is compressed by '" + std::string(head->compression.substr(0, 16)) +
                  "', and zstd is what can be read");
   }
-  if (head->crc != 0 && crcOf(s.records) != head->crc) return wrong("its checksum does not match");
+  if (head->crc != 0 && checksum::crc32(s.records) != head->crc) return wrong("its checksum does not match");
   if (Done parsed = s.parseMessages(*head); !parsed) return wrong(parsed.error());
   return std::span<const Message>(s.messages);
 }
@@ -505,7 +505,7 @@ Done McapReader::check() {
   for (std::uint64_t offset = 0; offset < s.dataEnd; offset += kPiece) {
     if (!s.source->read(offset, std::min(kPiece, s.dataEnd - offset), bytes))
       return broken("the bytes from " + std::to_string(offset) + " on cannot be read");
-    crc = crcOf(bytes, crc);
+    crc = checksum::crc32(bytes, crc);
   }
   if (stated != 0 && stated != crc) return broken("the checksum of its data does not match");
   return {};

@@ -7,8 +7,8 @@
 
 #include <zstd.h>
 
+#include "proto/checksum/crc32.h"
 #include "proto/recording/bytes.h"
-#include "proto/recording/crc32.h"
 
 namespace clothstream::recording {
 namespace {
@@ -52,7 +52,7 @@ struct McapWriter::State {
     if (!outcome) return outcome;
     outcome = sink(bytes);
     if (!outcome) return outcome;
-    crc = crcOf(bytes, crc);
+    crc = checksum::crc32(bytes, crc);
     offset += bytes.size();
     return {};
   }
@@ -184,7 +184,7 @@ Written McapWriter::closeChunk() {
   appendNumber(content, s.chunkStart);
   appendNumber(content, s.lastTime);
   appendNumber(content, std::uint64_t{s.chunk.size()});
-  appendNumber(content, crcOf(s.chunk));
+  appendNumber(content, checksum::crc32(s.chunk));
   appendText(content, kCompression);
   appendNumber(content, std::uint64_t{size});
   content.append(s.compressed, 0, size);
@@ -244,7 +244,7 @@ Written McapWriter::State::writeSummary() {
         appendNumber(footer, std::uint64_t{kFooterBytes});
         appendNumber(footer, start);
         appendNumber(footer, offsetsStart);
-        appendNumber(footer, crcOf(footer, crcOf(offsets, crc)));
+        appendNumber(footer, checksum::crc32(footer, checksum::crc32(offsets, crc)));
         return put(offsets + footer + std::string(kMagic));
       });
 }

@@ -21,12 +21,13 @@
 #include <openssl/err.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
-#include <openssl/rand.h>
 #include <openssl/x509.h>
 #include <openssl/x509v3.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "proto/tls/openssl.h"
+#include "proto/tls/self_signed.h"
 #include "server/files/regular_file.h"
 #include "server/files/state_directory.h"
 
@@ -40,31 +41,7 @@ constexpr std::chrono::hours kValidity{397 * 24};
 constexpr std::chrono::hours kRenewBefore{30 * 24};
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
 
-template <auto Free>
-struct Freed {
-  template <typename T>
-  void operator()(T* pointer) const {
-    Free(pointer);
-  }
-};
-using Bio = std::unique_ptr<BIO, Freed<BIO_free>>;
-using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
-using X509Certificate = std::unique_ptr<X509, Freed<X509_free>>;
 using Names = std::unique_ptr<GENERAL_NAMES, Freed<GENERAL_NAMES_free>>;
-
-std::string opensslError() {
-  std::array<char, 256> text{};
-  ERR_error_string_n(ERR_get_error(), text.data(), text.size());
-  ERR_clear_error();
-  return text.data();
-}
-
-// Returns the result of an OpenSSL call, or throws if it has failed.
-template <typename T>
-T check(T result, const char* what) {
-  if (!result) throw std::runtime_error(fmt::format("{}: {}", what, opensslError()));
-  return result;
-}
 
 Bio bioOf(const std::string& text) {
   return Bio(check(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())), "memory"));
@@ -131,45 +108,11 @@ bool isAddress(const std::string& name) {
          ::inet_pton(AF_INET6, name.c_str(), ignored.data()) == 1;
 }
 
-void addExtension(X509& certificate, int kind, const std::string& value) {
-  X509V3_CTX context;
-  X509V3_set_ctx(&context, &certificate, &certificate, nullptr, nullptr, 0);
-  const std::unique_ptr<X509_EXTENSION, Freed<X509_EXTENSION_free>> extension(
-      check(X509V3_EXT_nconf_nid(nullptr, &context, kind, value.c_str()), "extension of a certificate"));
-  check(X509_add_ext(&certificate, extension.get(), -1), "extension of a certificate");
-}
-
-X509Certificate makeCertificate(EVP_PKEY& key, const std::vector<std::string>& names) {
-  X509Certificate certificate(check(X509_new(), "memory"));
-  X509& x509 = *certificate;
-  check(X509_set_version(&x509, X509_VERSION_3), "certificate");
-  // 20 bytes at most, and positive (RFC 5280, 4.1.2.2).
-  std::array<unsigned char, 16> serial{};
-  check(RAND_bytes(serial.data(), serial.size()) == 1, "random numbers");
-  serial[0] &= 0x7F;
-  const std::unique_ptr<BIGNUM, Freed<BN_free>> number(
-      check(BN_bin2bn(serial.data(), serial.size(), nullptr), "memory"));
-  check(BN_to_ASN1_INTEGER(number.get(), X509_get_serialNumber(&x509)), "certificate");
-  constexpr long kDay = 24 * 3600;  // clocks of clients may be behind
-  check(X509_gmtime_adj(X509_getm_notBefore(&x509), -kDay), "certificate");
-  check(X509_gmtime_adj(X509_getm_notAfter(&x509), std::chrono::seconds(kValidity).count() - kDay),
-        "certificate");
-  check(X509_set_pubkey(&x509, &key), "certificate");
-  X509_NAME* const subject = X509_get_subject_name(&x509);
-  constexpr std::string_view kSubject = "ClothStream";
-  check(X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_ASC,
-                                   reinterpret_cast<const unsigned char*>(kSubject.data()),
-                                   static_cast<int>(kSubject.size()), -1, 0),
-        "certificate");
-  check(X509_set_issuer_name(&x509, subject), "certificate");
+// Certificate of a server with these host names and IP addresses.
+X509Certificate makeServerCertificate(EVP_PKEY& key, const std::vector<std::string>& names) {
   std::vector<std::string> alternatives;
   for (const std::string& name : names) alternatives.push_back((isAddress(name) ? "IP:" : "DNS:") + name);
-  addExtension(x509, NID_subject_alt_name, fmt::format("{}", fmt::join(alternatives, ",")));
-  addExtension(x509, NID_basic_constraints, "critical,CA:FALSE");
-  addExtension(x509, NID_key_usage, "critical,digitalSignature");
-  addExtension(x509, NID_ext_key_usage, "serverAuth");
-  check(X509_sign(&x509, &key, EVP_sha256()), "signature of a certificate");
-  return certificate;
+  return makeCertificate(key, kValidity, fmt::format("{}", fmt::join(alternatives, ",")));
 }
 
 bool hasName(X509& certificate, const std::string& name) {
@@ -288,10 +231,7 @@ Certificate selfSigned(const fs::path& directory, const std::vector<std::string>
   if (const auto made = files::makeStateDirectory(directory); !made)
     throw std::runtime_error(fmt::format("{}: {}", directory.string(), made.error()));
   const fs::path keyFile = directory / "self.key", chainFile = directory / "self.pem";
-  if (!fs::exists(keyFile)) {
-    const Key key(check(EVP_EC_gen("P-256"), "key"));
-    writeFile(keyFile, toPem(*key), 0600);
-  }
+  if (!fs::exists(keyFile)) writeFile(keyFile, toPem(*makeKey()), 0600);
   const std::string keyText = readFile(keyFile);
   const Key key = keyOf(keyText);
   if (!key)
@@ -305,7 +245,7 @@ Certificate selfSigned(const fs::path& directory, const std::vector<std::string>
                       std::ranges::all_of(names, [&](const auto& name) { return hasName(*old, name); });
   ERR_clear_error();
   if (!usable) {
-    chain = toPem(*makeCertificate(*key, names));
+    chain = toPem(*makeServerCertificate(*key, names));
     writeFile(chainFile, chain, 0644);
   }
   return {std::move(chain), keyText};

@@ -17,6 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "proto/tls/ciphers.h"
 #include "proto/tls/fingerprint.h"
 
 namespace clothstream::tls {
@@ -24,8 +25,6 @@ namespace {
 
 namespace ssl = boost::asio::ssl;
 
-// Ciphers of TLS 1.2 with forward secrecy and authenticated encryption. TLS 1.3 has no others.
-constexpr const char* kCiphers = "ECDHE+AESGCM:ECDHE+CHACHA20";
 // Sessions of TLS belong to this name. At most 32 bytes.
 constexpr std::string_view kSessions = "clothstream";
 

@@ -4,6 +4,7 @@
 #include "tests/fuzz/targets/datagram_target.h"
 #include "tests/fuzz/targets/decoder_target.h"
 #include "tests/fuzz/targets/draco_target.h"
+#include "tests/fuzz/targets/dtls_target.h"
 #include "tests/fuzz/targets/files_target.h"
 #include "tests/fuzz/targets/gltf_target.h"
 #include "tests/fuzz/targets/http_target.h"
@@ -15,16 +16,17 @@
 #include "tests/fuzz/targets/scene_json_target.h"
 #include "tests/fuzz/targets/scene_target.h"
 #include "tests/fuzz/targets/session_target.h"
+#include "tests/fuzz/targets/stun_target.h"
 #include "tests/fuzz/targets/token_target.h"
 
 namespace clothstream::fuzz {
 
 std::span<const Target* const> targets() {
   static constexpr const Target* kAll[]{
-      &kCoreTarget,  &kDatagramTarget,  &kDecoderTarget,   &kDracoTarget,
-      &kFilesTarget, &kGltfTarget,      &kHttpTarget,      &kHullTarget,
-      &kObjTarget,   &kPiecesTarget,    &kRecordingTarget, &kSavedStateTarget,
-      &kSceneTarget, &kSceneJsonTarget, &kSessionTarget,   &kTokenTarget};
+      &kCoreTarget,    &kDatagramTarget,  &kDecoderTarget,    &kDracoTarget, &kDtlsTarget,
+      &kFilesTarget,   &kGltfTarget,      &kHttpTarget,       &kHullTarget,  &kObjTarget,
+      &kPiecesTarget,  &kRecordingTarget, &kSavedStateTarget, &kSceneTarget, &kSceneJsonTarget,
+      &kSessionTarget, &kStunTarget,      &kTokenTarget};
   return kAll;
 }
 

@@ -6,6 +6,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "proto/datagram/input_bundle.h"
 #include "proto/datagram/piece_request.h"
 #include "proto/datagram/receipt.h"
+#include "proto/ice/connectivity_check.h"
 #include "server/messages/embedded_scenes.h"
 #include "tests/codec/golden.h"
 #include "tests/core/scripted_server.h"
@@ -533,6 +535,44 @@ void writeTokens(const std::filesystem::path& directory) {
   folder.add(file);
 }
 
+// The first byte of an input selects its form (targets/stun_target.h).
+void writeStun(const std::filesystem::path& directory) {
+  Folder folder(directory, "stun");
+  const ice::Credentials server{.ufrag = "serv", .password = "passwordofserverpasswo"};
+  const ice::Credentials client{.ufrag = "clie", .password = "passwordofclientpasswo"};
+  const auto add = [&](char form, std::span<const std::byte> bytes) {
+    folder.add(form + std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  };
+  const ice::Pairing ofClient(client, server, ice::Role::controlling);
+  const ice::Pairing ofServer(server, client, ice::Role::controlled);
+  for (const std::vector<std::byte>& check :
+       {ofClient.check({}, true), ofClient.check({}, false), ofServer.check({}, false)}) {
+    add('\0', check);
+    // The attributes before MESSAGE-INTEGRITY: as requests with either password, and as other messages.
+    const auto attributes = std::span(check).subspan(20, check.size() - 20 - 32);
+    for (const char form : {'\1', '\3', '\5', '\11', '\13', '\17'}) add(form, attributes);
+  }
+  for (const ice::Address& address : {ice::Address::ofIpv4({192, 0, 2, 1}, 1000), ice::Address{.port = 1}})
+    add('\0', ice::writeStun({.kind = ice::StunKind::success, .mapped = address}, server.password));
+  add('\0', ice::writeStun({.kind = ice::StunKind::error, .error = 420, .unknown = {1, 2}}, server.password));
+}
+
+// Datagrams of a right handshake and others, as numbers of two bytes (targets/dtls_target.h).
+void writeDtls(const std::filesystem::path& directory) {
+  Folder folder(directory, "dtls");
+  const std::string recorded("\x80\0\0\0\0\x80\1\0\0\0\x80\2\0\0\0", 15);
+  for (const char role : {'\0', '\1', '\2'}) {
+    folder.add(role + recorded);
+    folder.add(role + recorded + recorded);
+    for (const char place : {'\0', '\3', '\15', '\16', '\22', '\40', '\100'})
+      folder.add(role + std::string({'\x80', '\0', '\0', place, '\x10'}) + recorded);
+    const std::string changeCipherSpec("\x14\xfe\xfd\0\0\0\0\0\0\0\1\0\1\1", 14);
+    const std::string alert("\x15\xfe\xfd\0\0\0\0\0\0\0\2\0\2\2\50", 15);
+    for (const std::string& record : {changeCipherSpec, alert})
+      folder.add(role + std::string({'\0', static_cast<char>(record.size())}) + record + recorded);
+  }
+}
+
 void writeAll(const std::filesystem::path& directory) {
   writeCore(directory);
   writeDatagrams(directory);
@@ -547,6 +587,8 @@ void writeAll(const std::filesystem::path& directory) {
   writeMeshes(directory);
   writeFiles(directory);
   writeTokens(directory);
+  writeStun(directory);
+  writeDtls(directory);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// CRC-32 as in zip files. WebAssembly has no zlib, and all builds use the same code.
+// CRC-32 as in zip files and STUN. WebAssembly has no zlib, and all builds use the same code.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
-namespace clothstream::recording {
+namespace clothstream::checksum {
 
 // Table k gives the CRC of a byte that k zero bytes follow.
 inline constexpr auto kCrcTables = [] {
@@ -27,7 +27,7 @@ inline constexpr auto kCrcTables = [] {
 }();
 
 // CRC-32 of the bytes, continued from `before`. Eight bytes a step.
-inline std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
+inline std::uint32_t crc32(std::string_view bytes, std::uint32_t before = 0) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(bytes[i]); };
   std::uint32_t crc = ~before;
   while (bytes.size() >= 8) {
@@ -43,4 +43,4 @@ inline std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
   return ~crc;
 }
 
-}  // namespace clothstream::recording
+}  // namespace clothstream::checksum
