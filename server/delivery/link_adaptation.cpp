@@ -11,8 +11,6 @@ namespace {
 constexpr double kAverageSeconds = 0.5;
 // Longest time that one update() counts. A paused or slow scene says no more about a link than this.
 constexpr std::chrono::milliseconds kLongestUpdate{250};
-// Share of the measured throughput that frames may use; the rest is for control messages.
-constexpr double kUsedThroughput = 0.9;
 
 }  // namespace
 
@@ -28,21 +26,26 @@ double LinkAdaptation::bytesPerSecond(std::uint8_t quality) const {
   return rate_ * std::pow(kCoarserRate, quality - rateQuality_);
 }
 
-bool LinkAdaptation::update(bool behind, Clock::time_point now) {
+bool LinkAdaptation::update(bool behind, Clock::time_point now, std::optional<double> linkRate) {
   // The calls come from several threads, so that `now` may be older than in the call before.
   const Clock::time_point newest = newestUpdate_.value_or(now);
   const Clock::duration passed =
       std::clamp<Clock::duration>(now - newest, Clock::duration::zero(), kLongestUpdate);
   newestUpdate_ = std::max(newest, now);
-  if (behind)
+  const bool exceedsLink = linkRate && bytesPerSecond(quality_) > *linkRate;
+  if (behind || exceedsLink)
     strain(passed, now - passed);
   else
     strain_ = std::max(strain_ - passed / 2, Clock::duration::zero());
   calm_ =
       strain_ == Clock::duration::zero() ? calm_ + passed : std::max(calm_ - passed, Clock::duration::zero());
   const std::uint8_t before = quality_;
-  if (strain_ >= kPatience) stepDown(now);
-  if (quality_ > finest_ && calm_ >= wait_) stepUp(now);
+  if (strain_ >= kPatience) stepDown(now, linkRate);
+  const auto finerFits = [&] {
+    return !linkRate ||
+           bytesPerSecond(static_cast<std::uint8_t>(quality_ - 1)) <= kUsedThroughput * *linkRate;
+  };
+  if (wantsFiner() && calm_ >= wait_ && finerFits()) stepUp(now);
   return quality_ != before;
 }
 
@@ -54,7 +57,7 @@ void LinkAdaptation::strain(Clock::duration more, Clock::time_point since) {
   strain_ += more;
 }
 
-void LinkAdaptation::stepDown(Clock::time_point now) {
+void LinkAdaptation::stepDown(Clock::time_point now, std::optional<double> linkRate) {
   calm_ = Clock::duration::zero();
   // There is no coarser quality. The strain is bounded, so that the way up does not take long.
   if (quality_ == coarsest_) {
@@ -65,8 +68,9 @@ void LinkAdaptation::stepDown(Clock::time_point now) {
   backOff_ = failed ? std::min<Clock::duration>(2 * backOff_, kLongestWait) : kShortestWait;
   wait_ = backOff_;
   ++quality_;
-  const double carried = kUsedThroughput * static_cast<double>(delivered_) /
-                         std::max(schedule::seconds(now - strainedSince_), 1e-3);
+  const double throughput = linkRate.value_or(static_cast<double>(delivered_) /
+                                              std::max(schedule::seconds(now - strainedSince_), 1e-3));
+  const double carried = kUsedThroughput * throughput;
   while (quality_ < coarsest_ && bytesPerSecond(quality_) > carried) ++quality_;
   strain_ = Clock::duration::zero();
 }

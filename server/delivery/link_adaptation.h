@@ -21,6 +21,10 @@ using schedule::Clock;
 // fails within kTrial, the wait before the next one doubles. The wait is bounded so that the way from the
 // coarsest quality to the finest takes 3 s at most. With a single quality nothing changes.
 //
+// Where a rate controller measures the link (RateController), its rate replaces the measured throughput. Time
+// in which frames exceed that rate counts as strain, and quality steps up only if the link carries the finer
+// one. To find that out, the sender fills frames up to kProbe times their size, as far as the link has room.
+//
 // Not thread-safe. Reads no clock: all times are arguments.
 class LinkAdaptation {
  public:
@@ -33,11 +37,17 @@ class LinkAdaptation {
   // Bit rate of a quality relative to the next finer one. Measured: less for calm cloth, more for a flag.
   static constexpr double kCoarserRate = 0.7;
 
+  // Share of the link's throughput that frames may use; the rest is for control messages.
+  static constexpr double kUsedThroughput = 0.9;
+  static constexpr double kProbe = 1 / (kCoarserRate * kUsedThroughput);
+
   // The subscriber asked for the quality `finest`; the last one of the stream is `coarsest`.
   LinkAdaptation(std::uint8_t finest, std::uint8_t coarsest)
       : finest_(finest), coarsest_(coarsest), quality_(finest) {}
 
   std::uint8_t quality() const { return quality_; }
+  // The link has lowered the quality.
+  bool wantsFiner() const { return quality_ > finest_; }
 
   // Records a frame of the subscriber's quality.
   void made(std::uint8_t quality, std::size_t bytes, Clock::time_point now);
@@ -45,14 +55,14 @@ class LinkAdaptation {
   void delivered(std::size_t bytes) { delivered_ += bytes; }
   // Records that frames were dropped because they waited too long.
   void dropped(Clock::time_point now) { strain(kDropStrain, now); }
-  // Call at least with each frame. `behind`: something waits for the subscriber. Returns whether the
-  // quality has changed.
-  bool update(bool behind, Clock::time_point now);
+  // Call at least with each frame. `behind`: something waits for the subscriber. `linkRate`: bytes/s that
+  // frames may take, if a rate controller measures the link. Returns whether the quality has changed.
+  bool update(bool behind, Clock::time_point now, std::optional<double> linkRate = std::nullopt);
 
  private:
   // Adds strain. `since` is its beginning if there was none before.
   void strain(Clock::duration more, Clock::time_point since);
-  void stepDown(Clock::time_point now);
+  void stepDown(Clock::time_point now, std::optional<double> linkRate);
   void stepUp(Clock::time_point now);
   double bytesPerSecond(std::uint8_t quality) const;
 

@@ -97,7 +97,7 @@ void Mailbox::adapt(Clock::time_point now) {
   if (shape_.lockstep) return;
   const bool behind = !held_.empty() || (held_.needsKey() && !(endpointWaits_ && hasRoom()));
   const std::uint8_t before = adaptation_.quality();
-  if (!adaptation_.update(behind, now)) return;
+  if (!adaptation_.update(behind, now, link_ ? std::optional(link_->frameRate) : std::nullopt)) return;
   (adaptation_.quality() < before ? metrics_->stepsUp : metrics_->stepsDown).add();
 }
 
@@ -111,6 +111,21 @@ bool Mailbox::hold(const PublishedFrame& frame) {
     requestsKey_ = false;
   }
   return added.held;
+}
+
+void Mailbox::setLink(std::optional<Link> link) {
+  {
+    const std::lock_guard lock(mutex_);
+    link_ = link;
+    if (closed_ || held_.empty() || !hasRoom()) return;
+    endpointWaits_ = false;
+  }
+  wake();
+}
+
+bool Mailbox::wantsFinerQuality() const {
+  const std::lock_guard lock(mutex_);
+  return streaming_ && !closed_ && adaptation_.wantsFiner();
 }
 
 RequestedFrames Mailbox::requested(Clock::time_point now) {

@@ -36,6 +36,9 @@ namespace clothstream::delivery {
 // it has room and its endpoint waits for something to write. A peer that does not read therefore asks for
 // nothing.
 //
+// Where frames travel as datagrams, the rate controller of the peer says instead whether there is room
+// (setLink()); SendWindow::kMax still bounds the frames that are not acknowledged.
+//
 // LinkAdaptation chooses the quality; the peer gets an OperatingPoint message when it changes. A new quality
 // begins with a key frame; until then the former quality continues. A subscriber that was sent a tick in one
 // quality never gets a key frame of the same tick in another one, because decoders reject it as stale.
@@ -68,6 +71,17 @@ class Mailbox {
   // If the subscriber needs a key frame and has room for it: gives it `frames`, which were published before:
   // a key frame in its quality and those that follow, at most HeldFrames::kMax in all.
   void deliver(std::span<const PublishedFrame> frames);
+  // State of a link that a rate controller measures.
+  struct Link {
+    bool hasRoom = false;  // a frame may start
+    double frameRate = 0;  // bytes/s that frames may take, without parity and headers
+  };
+  // Frames travel over this link from now on; nothing: over the stream, where SendWindow gives the room. Call
+  // it after each frame that next() returns, and when the controller's state changes.
+  void setLink(std::optional<Link> link);
+  // Returns whether the link has lowered the quality. The sender then fills frames with parity rows up to
+  // LinkAdaptation::kProbe times their size, as far as the link has room, to find out what it carries.
+  bool wantsFinerQuality() const;
   // Returns what the subscriber asks of the next frame. Call it whenever a frame is made, because it also
   // measures the time in which the subscriber gets no frames.
   RequestedFrames requested(Clock::time_point now);
@@ -106,7 +120,9 @@ class Mailbox {
 
  private:
   std::optional<SharedBytes> take(Clock::time_point now);
-  bool hasRoom() const { return window_.hasRoom(shape_.rate); }
+  bool hasRoom() const {
+    return link_ ? link_->hasRoom && window_.inFlight() < SendWindow::kMax : window_.hasRoom(shape_.rate);
+  }
   // Quality that the adaptation chose; the present one if the stream has a single quality.
   std::uint8_t chosenQuality() const;
   void adapt(Clock::time_point now);
@@ -121,6 +137,7 @@ class Mailbox {
   ControlMessages control_;
   HeldFrames held_;
   SendWindow window_;
+  std::optional<Link> link_;
 
   std::shared_ptr<const DescriptionChunks> description_;
   std::size_t nextChunk_ = 0;

@@ -25,7 +25,9 @@ class SendWindow {
 
   // Frames that may be sent and not acknowledged, of a stream of this rate in frames/s.
   std::size_t size(std::uint32_t rate) const;
-  bool hasRoom(std::uint32_t rate) const { return sent_.size() < size(rate); }
+  bool hasRoom(std::uint32_t rate) const { return inFlight() < size(rate); }
+  // Frames that were sent and are not acknowledged.
+  std::size_t inFlight() const { return sent_.size(); }
 
   struct Sent {
     std::uint64_t tick;

@@ -215,6 +215,31 @@ TEST(LinkAdaptation, SendsAtMostTheRequestedQuality) {
   EXPECT_EQ(coarse.given, 1);
 }
 
+// A stream of 100,000 bytes/s in quality 0 on a link whose rate a controller measures.
+TEST(LinkAdaptation, MeasuredRateChoosesTheQuality) {
+  LinkAdaptation adaptation(0, kCoarsest);
+  Clock::time_point now{1h};
+  const auto pass = [&](Clock::duration time, double linkRate) {
+    for (const Clock::time_point end = now + time; now < end; now += 10ms) {
+      adaptation.made(
+          adaptation.quality(),
+          static_cast<std::size_t>(1000 * std::pow(LinkAdaptation::kCoarserRate, adaptation.quality())), now);
+      adaptation.update(false, now, linkRate);
+    }
+  };
+  pass(2s, 110'000);
+  EXPECT_EQ(adaptation.quality(), 0);
+  EXPECT_FALSE(adaptation.wantsFiner());
+  // The link carries 70,000 bytes/s with the reserve for control messages.
+  pass(400ms, 80'000);
+  EXPECT_EQ(adaptation.quality(), 1) << "although nothing waits";
+  pass(30s, 105'000);
+  EXPECT_EQ(adaptation.quality(), 1) << "there are no attempts that would fail";
+  EXPECT_TRUE(adaptation.wantsFiner());
+  pass(2s, 120'000);
+  EXPECT_EQ(adaptation.quality(), 0);
+}
+
 TEST(LinkAdaptation, DropsFramesWithOneQuality) {
   SimulatedScene scene({.rate = 72, .qualities = 1});
   SimulatedLink& link = scene.join();

@@ -3,6 +3,7 @@
 #include "server/delivery/mailbox.h"
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -121,6 +122,42 @@ TEST_F(MailboxTest, StartsWithAKeyFrame) {
   mailbox.deliver(frame(6, true));
   EXPECT_FALSE(wantsKeyFrame());
   EXPECT_TRUE(mailbox.next(now));
+}
+
+// The room of a rate controller counts, and not the number of frames on their way.
+TEST_F(MailboxTest, LinkGivesTheRoom) {
+  join();
+  const std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3), frame(4), frame(5)};
+  mailbox.setLink(Mailbox::Link{.hasRoom = true, .frameRate = 1e6});
+  for (std::size_t i = 0; i < 3; ++i) {
+    mailbox.deliver(frames[i]);
+    EXPECT_EQ(taken(frames), Ticks{frames[i].tick});
+  }
+  mailbox.setLink(Mailbox::Link{.hasRoom = false, .frameRate = 1e6});
+  mailbox.deliver(frames[3]);
+  EXPECT_EQ(taken(frames), Ticks{});
+  EXPECT_TRUE(mailbox.acknowledge(3, now));
+  EXPECT_EQ(taken(frames), Ticks{});
+  const int before = wakes;
+  mailbox.setLink(Mailbox::Link{.hasRoom = true, .frameRate = 1e6});
+  EXPECT_EQ(wakes, before + 1);
+  EXPECT_EQ(taken(frames), Ticks{4});
+  mailbox.setLink(std::nullopt);
+  mailbox.deliver(frames[4]);
+  EXPECT_EQ(taken(frames), Ticks{5}) << "the stream's window has room";
+  EXPECT_FALSE(mailbox.wantsFinerQuality());
+}
+
+// A peer that sends receipts, but acknowledges no frames.
+TEST_F(MailboxTest, LinkBoundsUnacknowledgedFrames) {
+  join();
+  mailbox.setLink(Mailbox::Link{.hasRoom = true, .frameRate = 1e6});
+  std::size_t sent = 0;
+  for (std::uint64_t tick = 1; tick <= 2 * SendWindow::kMax; ++tick) {
+    mailbox.deliver(frame(tick, tick == 1));
+    while (mailbox.next(now)) ++sent;
+  }
+  EXPECT_EQ(sent, SendWindow::kMax);
 }
 
 TEST_F(MailboxTest, SendsTwoFramesWithoutAcknowledgement) {
