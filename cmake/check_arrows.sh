@@ -11,6 +11,7 @@ proto/text         |
 proto/tls          |
 proto/discovery    |
 proto/hands        |
+proto/sctp         |
 server/files       |
 server/model       | proto/codec proto/parameters
 server/vulkan      |
