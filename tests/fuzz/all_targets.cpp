@@ -12,6 +12,7 @@
 #include "tests/fuzz/targets/saved_state_target.h"
 #include "tests/fuzz/targets/scene_json_target.h"
 #include "tests/fuzz/targets/scene_target.h"
+#include "tests/fuzz/targets/sctp_target.h"
 #include "tests/fuzz/targets/session_target.h"
 #include "tests/fuzz/targets/token_target.h"
 
@@ -19,9 +20,9 @@ namespace clothstream::fuzz {
 
 std::span<const Target* const> targets() {
   static constexpr const Target* kAll[]{
-      &kCoreTarget,  &kDecoderTarget,   &kDracoTarget,   &kFilesTarget,     &kGltfTarget,
-      &kHttpTarget,  &kHullTarget,      &kObjTarget,     &kRecordingTarget, &kSavedStateTarget,
-      &kSceneTarget, &kSceneJsonTarget, &kSessionTarget, &kTokenTarget};
+      &kCoreTarget,  &kDecoderTarget,   &kDracoTarget, &kFilesTarget,     &kGltfTarget,
+      &kHttpTarget,  &kHullTarget,      &kObjTarget,   &kRecordingTarget, &kSavedStateTarget,
+      &kSceneTarget, &kSceneJsonTarget, &kSctpTarget,  &kSessionTarget,   &kTokenTarget};
   return kAll;
 }
 
