@@ -340,6 +340,40 @@ TEST_F(AssociationTest, FragmentsAreDropped) {
   EXPECT_TRUE(delivered.empty());
 }
 
+TEST_F(AssociationTest, UnofferedStreamIsDropped) {
+  establish();
+  for (const std::uint16_t stream : {Association::kStreams, std::uint16_t{Association::kStreams - 1}})
+    receive(packetOf(kOwnTag, {.tsn = kPeerTsn + Association::kStreams - stream,
+                               .stream = stream,
+                               .protocol = 53,
+                               .payload = bytesOf("ping")}));
+  EXPECT_EQ(sentSack().cumulative, kPeerTsn + 1);
+  EXPECT_EQ(delivered.size(), 1u);
+}
+
+TEST_F(AssociationTest, OtherInitIsIgnoredAfterInitAck) {
+  association.connect(now);
+  EXPECT_EQ(sentChunk().type, ChunkType::init);
+  const Bytes cookie = bytesOf({5, 6, 7, 8});
+  Init init = peerInit();
+  init.cookie = cookie;
+  receive(packetOf(kOwnTag, ChunkType::initAck, init));
+  const Chunk echo = sentChunk();
+  EXPECT_EQ(echo.type, ChunkType::cookieEcho);
+  EXPECT_TRUE(std::ranges::equal(echo.value, cookie));
+  Init other = peerInit();
+  other.tag = 9;
+  receive(packetOf(0, ChunkType::init, other));
+  EXPECT_TRUE(sent.empty());
+  receive(packetOf(0, ChunkType::init, peerInit()));  // both ends connect
+  EXPECT_EQ(sentChunk().type, ChunkType::initAck);
+  receive(packetOf(kOwnTag, ChunkType::cookieAck, 0, {}));
+  EXPECT_TRUE(association.isConnected());
+  EXPECT_EQ(send(), SendResult::sent);
+  EXPECT_EQ(sentChunk().type, ChunkType::data);
+  EXPECT_EQ(sentTag(), kPeerTag);
+}
+
 TEST_F(AssociationTest, EmptyMessageEndsIt) {
   establish();
   Bytes value(12);
