@@ -14,6 +14,7 @@ proto/hands        |
 proto/checksum     |
 proto/ice          | proto/checksum
 proto/dtls         | proto/tls
+proto/sctp         |
 server/files       |
 server/model       | proto/codec proto/parameters
 server/vulkan      |

@@ -15,6 +15,7 @@
 #include "tests/fuzz/targets/saved_state_target.h"
 #include "tests/fuzz/targets/scene_json_target.h"
 #include "tests/fuzz/targets/scene_target.h"
+#include "tests/fuzz/targets/sctp_target.h"
 #include "tests/fuzz/targets/session_target.h"
 #include "tests/fuzz/targets/stun_target.h"
 #include "tests/fuzz/targets/token_target.h"
@@ -23,10 +24,10 @@ namespace clothstream::fuzz {
 
 std::span<const Target* const> targets() {
   static constexpr const Target* kAll[]{
-      &kCoreTarget,    &kDatagramTarget,  &kDecoderTarget,    &kDracoTarget, &kDtlsTarget,
-      &kFilesTarget,   &kGltfTarget,      &kHttpTarget,       &kHullTarget,  &kObjTarget,
-      &kPiecesTarget,  &kRecordingTarget, &kSavedStateTarget, &kSceneTarget, &kSceneJsonTarget,
-      &kSessionTarget, &kStunTarget,      &kTokenTarget};
+      &kCoreTarget,   &kDatagramTarget,  &kDecoderTarget,    &kDracoTarget, &kDtlsTarget,
+      &kFilesTarget,  &kGltfTarget,      &kHttpTarget,       &kHullTarget,  &kObjTarget,
+      &kPiecesTarget, &kRecordingTarget, &kSavedStateTarget, &kSceneTarget, &kSceneJsonTarget,
+      &kSctpTarget,   &kSessionTarget,   &kStunTarget,       &kTokenTarget};
   return kAll;
 }
 
