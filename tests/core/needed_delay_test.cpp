@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <random>
 #include <utility>
@@ -28,21 +29,24 @@ struct Arrivals {
   std::function<bool(double)> sends = [](double) { return true; };
   double drift = 0;  // growth of the estimated server's time, relative to the true one
 
-  struct Shown {
+  struct Frame {
     double ms = 0;  // time of arrival
     double delayMs = 0;
     bool late = false;  // the delay before this frame was shorter than it needed
   };
 
-  std::vector<Shown> run(double seconds) const {
+  std::vector<Frame> run(double seconds) const {
     PlayOutDelay delay;
-    std::vector<Shown> shown;
-    double arrival = 0, before = -kFrameMs;  // when the previous frame was sent
+    std::vector<Frame> shown;
+    double arrival = 0;
+    std::optional<double> before;  // when the previous frame was sent
     for (double sent = 0; sent < 1000 * seconds; sent += kFrameMs) {
       if (!sends(sent)) continue;
       arrival = std::max(arrival, sent + kWayMs + extraMs(sent));
       const double at = kStartMs + arrival * (1 + drift);
-      const double needed = at - kStartMs - std::exchange(before, sent);
+      const std::optional<double> previous = std::exchange(before, sent);
+      if (!previous) continue;
+      const double needed = at - kStartMs - *previous;
       const bool late = delay.known() && 1000 * needed > delay.us() + 1000 * kRoundingMs;
       delay.sample(std::round(1000 * needed), static_cast<std::uint64_t>(std::llround(1000 * at)));
       const auto elapsedUs = shown.empty() ? std::nullopt : std::optional(1000 * (arrival - shown.back().ms));
@@ -55,28 +59,28 @@ struct Arrivals {
   static constexpr double kStartMs = 5e6;
 };
 
-using Shown = std::vector<Arrivals::Shown>;
+using Frames = std::vector<Arrivals::Frame>;
 
-Shown between(const Shown& all, double fromMs, double toMs) {
-  Shown some;
+Frames between(const Frames& all, double fromMs, double toMs) {
+  Frames some;
   std::copy_if(all.begin(), all.end(), std::back_inserter(some),
                [&](const auto& one) { return one.ms >= fromMs && one.ms < toMs; });
   return some;
 }
 
-double longest(const Shown& shown) {
+double longest(const Frames& shown) {
   return std::max_element(shown.begin(), shown.end(),
                           [](const auto& a, const auto& b) { return a.delayMs < b.delayMs; })
       ->delayMs;
 }
 
-double shortest(const Shown& shown) {
+double shortest(const Frames& shown) {
   return std::min_element(shown.begin(), shown.end(),
                           [](const auto& a, const auto& b) { return a.delayMs < b.delayMs; })
       ->delayMs;
 }
 
-double lateShare(const Shown& shown) {
+double lateShare(const Frames& shown) {
   const auto late = std::count_if(shown.begin(), shown.end(), [](const auto& one) { return one.late; });
   return static_cast<double>(late) / static_cast<double>(shown.size());
 }
@@ -96,14 +100,14 @@ std::function<double(double)> jitter(double ms, unsigned seed = 1) {
 }
 
 TEST(NeededDelay, IsExactOnASteadyLink) {
-  const Shown shown = Arrivals{}.run(20);
+  const Frames shown = Arrivals{}.run(20);
   EXPECT_NEAR(shortest(shown), kCalmMs, kRoundingMs);
   EXPECT_NEAR(longest(shown), kCalmMs, kRoundingMs);
 }
 
 TEST(NeededDelay, CoversJitterAt98Percent) {
   for (const unsigned seed : {1u, 2u, 3u}) {
-    const Shown shown = between(Arrivals{.extraMs = jitter(5, seed)}.run(60), 15'000, 60'000);
+    const Frames shown = between(Arrivals{.extraMs = jitter(5, seed)}.run(60), 15'000, 60'000);
     // The slowest of the 72 frames of a second needs less than 0.9 of the range once in 2,000 seconds.
     EXPECT_GE(shortest(shown), kCalmMs + 0.9 * 5);
     EXPECT_LE(longest(shown), kCalmMs + 5);
@@ -116,7 +120,7 @@ TEST(NeededDelay, CoversJitterAt98Percent) {
 TEST(NeededDelay, ReturnsInTwoSecondsAfterAStall) {
   for (const double at : {500.0, 3000.0, 20'000.0}) {
     for (const double ms : {100.0, 300.0, 1000.0}) {
-      const Shown shown = Arrivals{.extraMs = stall(at, ms)}.run(30);
+      const Frames shown = Arrivals{.extraMs = stall(at, ms)}.run(30);
       // The delay grows at most for the second in which late frames are remembered, and falls as fast.
       EXPECT_LE(longest(shown), kCalmMs + PlayOutDelay::kSlew * (1000 + 2 * kFrameMs)) << at << ' ' << ms;
       EXPECT_NEAR(longest(between(shown, at + ms + 2000 + 4 * kFrameMs, 30'000)), kCalmMs, kRoundingMs)
@@ -137,7 +141,7 @@ TEST(NeededDelay, CoversRecurringStalls) {
   Arrivals link;
   // A lost packet every 0.7 s holds frames back for 80 ms: 11 % of them.
   link.extraMs = [](double sent) { return stall(700 * std::ceil(sent / 700) - 80, 80)(sent); };
-  const Shown shown = between(link.run(40), 5000, 40'000);
+  const Frames shown = between(link.run(40), 5000, 40'000);
   EXPECT_LE(lateShare(shown), 0.02);
   EXPECT_GE(shortest(shown), kCalmMs + 80 - 2 * kFrameMs) << "the second late frame of each stall";
   EXPECT_LE(longest(shown), kCalmMs + 80);
@@ -148,7 +152,7 @@ TEST(NeededDelay, FollowsADisturbanceUpAndDown) {
   link.extraMs = [noise = jitter(90)](double sent) mutable {
     return sent >= 10'000 && sent < 20'000 ? noise(sent) : 0.0;
   };
-  const Shown shown = link.run(30);
+  const Frames shown = link.run(30);
   // 2 % of 1,024 frames are 21, of which some in each 1,024 / 21 frames; then 90 ms at the slew.
   EXPECT_GE(shortest(between(shown, 13'000, 20'000)), kCalmMs + 0.8 * 90);
   EXPECT_LE(longest(shown), kCalmMs + 90);
@@ -167,8 +171,8 @@ TEST(NeededDelay, ForgetsASlowStart) {
 
 TEST(NeededDelay, FollowsADriftingClock) {
   for (const double drift : {-1e-4, 1e-4}) {
-    const Shown shown = Arrivals{.drift = drift}.run(120);
-    for (const Arrivals::Shown& one : shown) {
+    const Frames shown = Arrivals{.drift = drift}.run(120);
+    for (const Arrivals::Frame& one : shown) {
       // Rising needs are followed after 2 % of the remembered frames, falling ones after a second.
       ASSERT_NEAR(one.delayMs, kCalmMs + drift * one.ms, 1e-4 * 1000 + 2 * kRoundingMs) << one.ms;
     }
