@@ -107,6 +107,21 @@ Finding checkDirectory(const std::filesystem::path& directory, const char* optio
   return finding;
 }
 
+Finding checkCongestionControl(const std::string& used) {
+  Finding finding{.level = Level::good, .topic = "tcp", .text = fmt::format("connections use {}", used)};
+  finding.figures = {{"congestionControl", used}};
+  if (used == endpoint::kCongestionControl) return finding;
+  finding.level = Level::advice;
+  finding.text =
+      fmt::format("connections use {}: this kernel has no {}, which loses fewer frames on bad links",
+                  used.empty() ? "an unknown congestion control" : used, endpoint::kCongestionControl);
+  finding.fix = fmt::format(
+      "`modprobe tcp_{0}` as root, and a line tcp_{0} in /etc/modules-load.d/{0}.conf for the next start of "
+      "the machine",
+      endpoint::kCongestionControl);
+  return finding;
+}
+
 Finding checkClock() {
   Finding finding{.level = Level::good, .topic = "clock", .text = {}};
   timex request{};

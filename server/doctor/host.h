@@ -22,6 +22,10 @@ Finding checkCertificate(const std::filesystem::path& chain, const std::filesyst
 // `keepFreeMegabytes` is what the server leaves free.
 Finding checkDirectory(const std::filesystem::path& directory, const char* option, double keepFreeMegabytes);
 
+// Whether TCP connections of the server have the congestion control that it asks for. `used` is the one that
+// they have.
+Finding checkCongestionControl(const std::string& used);
+
 // Whether the kernel says that the clock is synchronised. Tokens and certificates need the right time.
 Finding checkClock();
 

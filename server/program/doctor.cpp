@@ -12,6 +12,7 @@
 #include "server/doctor/acceptance.h"
 #include "server/doctor/device.h"
 #include "server/doctor/host.h"
+#include "server/endpoint/listen/listen.h"
 #include "server/program/commands.h"
 #include "server/simulation/software_threads.h"
 
@@ -37,6 +38,7 @@ doctor::Findings checkHost(const ServeOptions& options) {
     findings.push_back(doctor::checkDirectory(options.record.directory,
                                               options.record.onRequest ? "--recordings" : "--record",
                                               options.keepFreeMb));
+  findings.push_back(doctor::checkCongestionControl(endpoint::congestionControlOfPorts()));
   findings.push_back(doctor::checkClock());
   return findings;
 }

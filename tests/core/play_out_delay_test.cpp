@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Adaptive delay of play-out, and the motion that is shown with it.
+#include "clients/core/stream/play_out_delay.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -113,7 +115,7 @@ TEST(PlayOut, ShowsTrueMotionDespiteJitter) {
         const auto passed =
             static_cast<double>(shown[i].played.server_time_us - shown[i - 1].played.server_time_us);
         const double displayed = 1000 * (shown[i].ms - shown[i - 1].ms);
-        ASSERT_NEAR(passed / displayed, 1, 0.05 + 2 / displayed)
+        ASSERT_NEAR(passed / displayed, 1, PlayOutDelay::kSlew + 2 / displayed)
             << "rounding loses a microsecond at either end";
       }
       // The wanted delay is enough for 98 % of the past frames. The current delay follows it.

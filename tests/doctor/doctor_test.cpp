@@ -82,6 +82,16 @@ TEST_F(Doctor, SeesWhetherADirectoryCanBeWrittenAndHasRoom) {
   EXPECT_EQ(doctor::checkDirectory(folder_ / "file", "--state-dir", 0).level, Level::problem);
 }
 
+TEST_F(Doctor, SeesCongestionControl) {
+  EXPECT_EQ(doctor::checkCongestionControl("bbr").level, Level::good);
+  const Finding other = doctor::checkCongestionControl("cubic");
+  EXPECT_EQ(other.level, Level::advice);
+  EXPECT_EQ(other.figures["congestionControl"], "cubic");
+  EXPECT_THAT(other.text, HasSubstr("use cubic"));
+  EXPECT_THAT(other.fix, HasSubstr("modprobe tcp_bbr"));
+  EXPECT_EQ(doctor::checkCongestionControl("").level, Level::advice);
+}
+
 TEST_F(Doctor, PrintsLevelTopicTextAndFix) {
   const doctor::Findings findings = {
       {.level = Level::good, .topic = "clock", .text = "right"},

@@ -103,7 +103,7 @@ const PlayOut::Frame& PlayOut::newest(std::size_t back) const {
 
 void PlayOut::add(const DisplayableFrame& frame, std::uint64_t displayableUs) {
   if (count_ > 0 && since(newest(0).timeUs, frame.timeUs) <= 0) forget();
-  if (count_ > 0 && displayableUs != 0) delay_.sample(since(newest(0).timeUs, displayableUs));
+  if (count_ > 0 && displayableUs != 0) delay_.sample(since(newest(0).timeUs, displayableUs), displayableUs);
   if (plays_ && since(timeUs_, frame.timeUs) < 0) ++lateFrames_;
   Frame& slot = frames_[count_++ % frames_.size()];
   slot.tick = frame.tick;

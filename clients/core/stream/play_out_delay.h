@@ -5,28 +5,42 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <vector>
+
+#include "clients/core/stream/server_clock.h"
 
 namespace clothstream::client {
 
-// The delay that all but the slowest 2 % of the newest frames needed. It moves by at most kSlew of the time
-// that passes, so that motion never jumps. All times are microseconds.
+// The delay that all but the slowest 2 % of the newest frames needed, and at most the delay that the slowest
+// frame of the last second needed. A rare stall is therefore ignored, stalls that recur are waited for, and
+// one second after a disturbance the delay falls.
+//
+// It moves by at most kSlew of the time that passes, so that motion never jumps. With the first frames, which
+// are slow while a connection starts, it moves by at most the whole of that time. All times are microseconds.
 class PlayOutDelay {
  public:
-  void forget() { count_ = 0; }
+  static constexpr double kSlew = 0.1;
+
+  PlayOutDelay() { sorted_.reserve(kSamples); }
+
+  void forget() {
+    count_ = 0;
+    sorted_.clear();
+  }
   // Whether a frame was sampled since forget().
   bool known() const { return count_ > 0; }
 
-  // Adds the time from the start of the previous tick until a frame could be displayed. With this delay the
-  // frame arrives just when interpolation towards it starts.
-  void sample(double neededUs) {
-    samples_[count_++ % kSamples] = neededUs;
-    const std::size_t count = std::min(count_, kSamples);
-    const auto first = sorted_.begin(), last = first + static_cast<std::ptrdiff_t>(count);
-    std::copy_n(samples_.begin(), count, first);
-    const auto at = first + static_cast<std::ptrdiff_t>(kPercentile * static_cast<double>(count - 1));
-    std::nth_element(first, at, last);
-    neededUs_ = *at;
+  // Adds a frame that could be displayed at this time, `neededUs` after the start of the previous tick. With
+  // this delay it arrives just when interpolation towards it starts.
+  void sample(double neededUs, std::uint64_t atUs) {
+    Sample& slot = samples_[count_ % kSamples];
+    if (count_++ >= kSamples) sorted_.erase(std::lower_bound(sorted_.begin(), sorted_.end(), slot.neededUs));
+    slot = {neededUs, atUs};
+    sorted_.insert(std::upper_bound(sorted_.begin(), sorted_.end(), neededUs), neededUs);
+    const auto at = static_cast<std::size_t>(kPercentile * static_cast<double>(sorted_.size() - 1));
+    neededUs_ = std::min(sorted_[at], slowestSince(atUs));
   }
 
   void set(double us) { us_ = wantedUs_ = us; }
@@ -34,18 +48,37 @@ class PlayOutDelay {
   // needs a longer delay. `elapsedUs` is the time since the last call; nullopt: the delay is set at once.
   void move(double aheadUs, std::optional<double> elapsedUs, double leastUs, double mostUs) {
     wantedUs_ = std::clamp(neededUs_ + aheadUs, leastUs, mostUs);
-    const double most = kSlew * elapsedUs.value_or(0);
+    const double most = (count_ < kFirst ? 1 : kSlew) * elapsedUs.value_or(0);
     us_ = elapsedUs ? us_ + std::clamp(wantedUs_ - us_, -most, most) : wantedUs_;
   }
   double us() const { return us_; }
   double wantedUs() const { return wantedUs_; }
 
  private:
-  static constexpr std::size_t kSamples = 256;
-  static constexpr double kPercentile = 0.98, kSlew = 0.05;
+  static constexpr std::size_t kSamples = 2048;
+  static constexpr std::size_t kFirst = 16;  // frames
+  static constexpr double kPercentile = 0.98, kRecentUs = 1e6;
 
-  std::array<double, kSamples> samples_{}, sorted_{};
-  std::size_t count_ = 0;  // samples so far; the newest are kept
+  struct Sample {
+    double neededUs = 0;
+    std::uint64_t atUs = 0;
+  };
+
+  // Largest need of the last kRecentUs. Stops where times go back, because the clock has jumped.
+  double slowestSince(std::uint64_t nowUs) const {
+    double slowest = samples_[(count_ - 1) % kSamples].neededUs;
+    for (std::size_t back = 1; back < sorted_.size(); ++back) {
+      const Sample& sample = samples_[(count_ - 1 - back) % kSamples];
+      const double ageUs = since(sample.atUs, nowUs);
+      if (ageUs < 0 || ageUs > kRecentUs) break;
+      slowest = std::max(slowest, sample.neededUs);
+    }
+    return slowest;
+  }
+
+  std::array<Sample, kSamples> samples_{};  // ring buffer
+  std::vector<double> sorted_;              // needs of the samples in the ring
+  std::size_t count_ = 0;                   // samples so far; the newest are kept
   double neededUs_ = 0;
   double us_ = 0, wantedUs_ = 0;
 };
