@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view kCharacters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 // Priority of a peer-reflexive candidate with the only component (RFC 8445, sections 5.1.2 and 7.1.1).
-constexpr std::uint32_t kPriority = 110U << 24 | 65535U << 8 | 255U;
+constexpr std::uint32_t kHostPriority = 110U << 24 | 65535U << 8 | 255U;
 
 void fillRandom(std::span<std::byte> bytes) {
   if (RAND_bytes(reinterpret_cast<unsigned char*>(bytes.data()), static_cast<int>(bytes.size())) != 1)
@@ -74,7 +74,7 @@ std::vector<std::byte> Pairing::check(const TransactionId& transaction, bool nom
   return writeStun({.kind = StunKind::request,
                     .transaction = transaction,
                     .username = sentUsername_,
-                    .priority = kPriority,
+                    .priority = kHostPriority,
                     .role = role_,
                     .tieBreaker = tieBreaker_,
                     .useCandidate = nominate},

@@ -41,7 +41,7 @@ constexpr std::string_view kIpv6Response =
     "0113a9fa a5d3f179 bc25f4b5 bed2b9d9 00080014 a382954e 4be67bf1 1784c97c 8292c275 bfe3ed41 80280004"
     "c8fb0b4c";
 
-constexpr Address kIpv6{
+constexpr Address kMappedIpv6{
     .bytes = {0x20, 0x01, 0x0d, 0xb8, 0x12, 0x34, 0x56, 0x78, 0, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77},
     .port = 32853};
 
@@ -52,7 +52,7 @@ StunMessage everything() {
                       .role = Role::controlling,
                       .tieBreaker = 0x0123456789abcdef,
                       .useCandidate = true,
-                      .mapped = kIpv6,
+                      .mapped = kMappedIpv6,
                       .error = 487,
                       .unknown = {0x7fff, 0x0003, 0x0019}};
   message.transaction.fill(std::byte{0x5a});
@@ -77,7 +77,7 @@ TEST(StunMessageTest, ReadsRequestOfRfc5769) {
 
 TEST(StunMessageTest, ReadsResponsesOfRfc5769) {
   for (const auto& [text, address] :
-       {std::pair{kIpv4Response, Address::ofIpv4({192, 0, 2, 1}, 32853)}, {kIpv6Response, kIpv6}}) {
+       {std::pair{kIpv4Response, Address::ofIpv4({192, 0, 2, 1}, 32853)}, {kIpv6Response, kMappedIpv6}}) {
     const Bytes bytes = fromHex(text);
     const auto message = readStun(bytes);
     ASSERT_TRUE(message);
