@@ -363,6 +363,7 @@ TEST_F(SceneJournalTest, ResimulatesHeldWinds) {
     live->inbox.postPoses(3, {.winds = {fan}}, now);
     ticks(1);
   };
+  ticks(1);
   const auto file = journal->start("winds");
   ASSERT_TRUE(file) << file.error().text;
   for (int i = 0; i < 20; ++i) hold(0.01f * static_cast<float>(i), 5);
