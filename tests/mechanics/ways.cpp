@@ -3,6 +3,7 @@
 
 #include <cctype>
 #include <cmath>
+#include <stdexcept>
 
 namespace clothstream::mechanics {
 namespace {
@@ -28,6 +29,12 @@ std::vector<Way> ways() {
           {"`implicitEuler`", plain(model::SolverKind::implicitEuler), false, false},
           {"`xpbd`", plain(model::SolverKind::xpbd)},
           {"`xpbd`, 4 sweeps", sweeps}};
+}
+
+Way wayNamed(std::string_view name) {
+  for (const Way& way : ways())
+    if (way.name == name) return way;
+  throw std::out_of_range("no way is named " + std::string(name));
 }
 
 std::string lettersOf(const std::string& name) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -25,6 +26,8 @@ struct Way {
 };
 
 std::vector<Way> ways();
+// The way of this name. Throws std::out_of_range if there is none.
+Way wayNamed(std::string_view name);
 
 // Letters and digits of a name in the page, for a test's name.
 std::string lettersOf(const std::string& name);

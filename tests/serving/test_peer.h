@@ -34,7 +34,7 @@ struct SeenFrame {
 // kPatience.
 class TestPeer {
  public:
-  static constexpr std::chrono::seconds kPatience{60};
+  static constexpr std::chrono::seconds kPatience{180};
 
   // A peer of this machine without a token.
   explicit TestPeer(hosting::SceneServer& server, std::string name = "test")
