@@ -14,7 +14,7 @@ proto/hands        |
 proto/checksum     |
 proto/ice          | proto/checksum
 proto/dtls         | proto/tls
-proto/sctp         |
+proto/sctp         | proto/checksum
 server/files       |
 server/model       | proto/codec proto/parameters
 server/vulkan      |
@@ -31,7 +31,7 @@ server/encode      | server/model server/simulation server/telemetry server/vulk
 server/schedule    |
 server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
-server/identity    | server/files server/scene server/schedule server/messages clothstream
+server/identity    | proto/tls server/files server/scene server/schedule server/messages clothstream
 server/saved_state | server/files server/scene server/model server/messages server/telemetry clothstream
 server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// CRC-32 as in zip files and STUN. WebAssembly has no zlib, and all builds use the same code.
+// CRC-32 as in zip files and STUN, and others of 32 bits. WebAssembly has no zlib, and all builds use the
+// same code.
 #pragma once
 
 #include <array>
@@ -9,9 +10,9 @@
 
 namespace clothstream::checksum {
 
-// Table k gives the CRC of a byte that k zero bytes follow.
+// Table k gives the CRC of a byte that k zero bytes follow. The polynomial is reversed.
+template <std::uint32_t kPolynomial>
 inline constexpr auto kCrcTables = [] {
-  constexpr std::uint32_t kPolynomial = 0xedb88320;  // reversed
   std::array<std::array<std::uint32_t, 256>, 8> tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
     std::uint32_t crc = byte;
@@ -26,21 +27,27 @@ inline constexpr auto kCrcTables = [] {
   return tables;
 }();
 
-// CRC-32 of the bytes, continued from `before`. Eight bytes a step.
-inline std::uint32_t crc32(std::string_view bytes, std::uint32_t before = 0) {
+// CRC with this reversed polynomial, continued from `before`. Eight bytes a step.
+template <std::uint32_t kPolynomial>
+std::uint32_t crc(std::string_view bytes, std::uint32_t before) {
+  constexpr auto& kTables = kCrcTables<kPolynomial>;
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(bytes[i]); };
-  std::uint32_t crc = ~before;
+  std::uint32_t sum = ~before;
   while (bytes.size() >= 8) {
-    const std::uint32_t low = crc ^ (byte(0) | std::uint32_t{byte(1)} << 8 | std::uint32_t{byte(2)} << 16 |
+    const std::uint32_t low = sum ^ (byte(0) | std::uint32_t{byte(1)} << 8 | std::uint32_t{byte(2)} << 16 |
                                      std::uint32_t{byte(3)} << 24);
-    crc = kCrcTables[7][low & 0xff] ^ kCrcTables[6][low >> 8 & 0xff] ^ kCrcTables[5][low >> 16 & 0xff] ^
-          kCrcTables[4][low >> 24] ^ kCrcTables[3][byte(4)] ^ kCrcTables[2][byte(5)] ^
-          kCrcTables[1][byte(6)] ^ kCrcTables[0][byte(7)];
+    sum = kTables[7][low & 0xff] ^ kTables[6][low >> 8 & 0xff] ^ kTables[5][low >> 16 & 0xff] ^
+          kTables[4][low >> 24] ^ kTables[3][byte(4)] ^ kTables[2][byte(5)] ^ kTables[1][byte(6)] ^
+          kTables[0][byte(7)];
     bytes.remove_prefix(8);
   }
-  for (const char last : bytes)
-    crc = crc >> 8 ^ kCrcTables[0][(crc ^ static_cast<std::uint8_t>(last)) & 0xff];
-  return ~crc;
+  for (const char last : bytes) sum = sum >> 8 ^ kTables[0][(sum ^ static_cast<std::uint8_t>(last)) & 0xff];
+  return ~sum;
+}
+
+// CRC-32 of the bytes, continued from `before`.
+inline std::uint32_t crc32(std::string_view bytes, std::uint32_t before = 0) {
+  return crc<0xedb88320>(bytes, before);
 }
 
 }  // namespace clothstream::checksum

@@ -25,6 +25,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "proto/tls/openssl.h"
 #include "server/files/regular_file.h"
 #include "server/scene/resume_token.h"
 
@@ -38,15 +39,8 @@ constexpr std::size_t kMaxIdBytes = 64;
 constexpr std::size_t kNewSecretBytes = 32;
 constexpr std::size_t kDraftBytes = 8;
 
-template <auto Free>
-struct Freed {
-  template <typename T>
-  void operator()(T* pointer) const {
-    Free(pointer);
-  }
-};
-using Bio = std::unique_ptr<BIO, Freed<BIO_free>>;
-using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
+using tls::Bio;
+using tls::Key;
 
 [[noreturn]] void fail(const fs::path& file, const std::string& what) {
   throw std::runtime_error(fmt::format("{}: {}", file.string(), what));
