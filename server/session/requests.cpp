@@ -227,7 +227,6 @@ struct Session::Messages {
   }
 
   static void upload(Session& session, const Message& message) {
-    session.uploads_ = true;
     session.refuseUnless(session.upload_.add(message.upload(), session.now_));
   }
 
@@ -338,7 +337,7 @@ void Session::dispatch(const v1::ClientMessage& message) {
   if (row == nullptr)
     return refuse(
         {v1::ERROR_CODE_MALFORMED_MESSAGE, "the message has no body, or one that this server does not know"});
-  if (row->state != State::any && !identity_) {
+  if (row->state != State::any && !identity_.isKnown()) {
     server_.metrics.refuse(telemetry::Refusal::token);
     return fail(v1::ERROR_CODE_UNAUTHENTICATED, whyUnknown_);
   }

@@ -38,6 +38,7 @@ Session::Session(hosting::SceneServer& server, Arrival arrival, std::function<vo
       mailbox_(std::make_shared<Mailbox>(std::move(wake), arrival.atEdge)),
       opened_(Clock::now()),
       lastHeard_(opened_),
+      identity_(server.connections),
       upload_(server.uploads, address_),
       readRate_(server.options.maxReadRate * kMegabyte, server.options.maxReadRate * kMegabyte) {}
 
@@ -86,7 +87,7 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point sent) 
   try {
     if (const std::shared_ptr<scene::RemoteSession> remote = this->remote()) {
       // The scenes that this peer can join are those of this server.
-      if (v1::ClientMessage list; bytes.size() <= kMaxListBytes && identity_ &&
+      if (v1::ClientMessage list; bytes.size() <= kMaxListBytes && identity_.isKnown() &&
                                   list.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
                                   list.has_list_scenes()) {
         requestId_ = list.request_id();
@@ -190,8 +191,9 @@ void Session::checkSilence(Clock::time_point now) {
   if (remote()) return;
   // A stream in a scene has some time to send a new token.
   const auto grace = scene_ ? identity::Authenticator::kExpiryGrace : std::chrono::seconds(0);
-  if (const char* const why =
-          identity_ && options.authenticator ? options.authenticator->whyEnded(*identity_, grace) : nullptr) {
+  if (const char* const why = identity_.isKnown() && options.authenticator
+                                  ? options.authenticator->whyEnded(*identity_, grace)
+                                  : nullptr) {
     now_ = now;
     spdlog::info("{}: disconnected: {}", peer_, why);
     return closeLocked(delivery::error(v1::ERROR_CODE_UNAUTHENTICATED, why, true), DisconnectReason::lost);
@@ -211,7 +213,7 @@ void Session::checkSilence(Clock::time_point now) {
                               schedule::seconds(options.silence)));
   if (scene_ || asked_ > 0) return;
   const std::chrono::milliseconds time =
-      options.helloTimeout + (uploads_ ? options.maxUploadTime : std::chrono::milliseconds(0));
+      options.helloTimeout + (upload_.hasBegun() ? options.maxUploadTime : std::chrono::milliseconds(0));
   if (now - opened_ > time)
     cutOff(telemetry::Refusal::helloTimeout,
            fmt::format("the client joined no scene within {} s: send hello soon after connecting (--profile)",
@@ -230,7 +232,7 @@ void Session::end() {
   const std::lock_guard lock(mutex_);
   now_ = Clock::now();
   closeLocked(nullptr, DisconnectReason::lost);
-  counted_.reset();
+  identity_.release();
 }
 
 void Session::disconnect(DisconnectReason reason) {

@@ -25,6 +25,7 @@
 #include "server/scene/roster.h"
 #include "server/schedule/clock.h"
 #include "server/schedule/token_bucket.h"
+#include "server/session/peer_identity.h"
 #include "server/session/rates.h"
 #include "server/session/upload.h"
 
@@ -119,7 +120,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   void dispatch(const v1::ClientMessage& message);
   void authenticate(const v1::AuthenticateRequest& request);
   // Sets the identity and counts the connection. Returns false, and ends the session, if there are too many.
-  bool become(identity::Identity identity);
+  bool become(identity::Identity identity, const std::string& token);
   // Rights that the identity has in this scene.
   scene::Rights rightsIn(const scene::LiveScene& scene) const;
   void hello(const v1::Hello& message);
@@ -172,13 +173,10 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
 
   std::mutex mutex_;  // protects all below
   std::shared_ptr<scene::LiveScene> scene_;
-  std::string token_;  // newest one that the peer has sent
   std::uint64_t participant_ = 0;
-  std::optional<identity::Identity> identity_;  // none until the peer has proved what the server requires
-  std::string whyUnknown_;                      // error for a peer without identity
-  std::shared_ptr<const void> counted_;         // while the connection counts for its token
+  PeerIdentity identity_;
+  std::string whyUnknown_;  // error for a peer without identity
   Upload upload_;
-  bool uploads_ = false;     // has begun an upload
   std::uint32_t asked_ = 0;  // requests whose answers another thread makes
   // Request id and arrival of the current message.
   std::uint64_t requestId_ = 0;
