@@ -34,6 +34,7 @@ struct SceneCounters {
   Counter packetBytes;        // bytes of all packets, each counted once for all subscribers
   Counter skippedFrames;      // frames not encoded because the encoder was behind, per quality
   Counter framesTaken;        // frames taken by endpoints, per subscriber
+  Counter datagramFrames;     // those of framesTaken that left in datagrams
   Counter framesDropped;      // frames not sent because the subscriber was behind, per subscriber
   Counter sentBytes;          // bytes of all messages that endpoints have taken, per subscriber
   Counter stepsDown;          // subscribers moved to a coarser quality
