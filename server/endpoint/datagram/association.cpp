@@ -15,10 +15,11 @@ constexpr std::chrono::seconds kCheckInterval{1};
 }  // namespace
 
 Association::Association(const AssociationContext& context, ice::Credentials local,
-                         hosting::DatagramPeer peer, Transmit transmit, Admit admit, Time now)
+                         hosting::DatagramPeer peer, std::function<void()> wake, Transmit transmit,
+                         Admit admit, Time now)
     : ufrag_(local.ufrag),
       now_(now),
-      link_(peer, SecurePath::headerBytes(peer.offer.sctp), context.pieces, context.metrics),
+      link_(peer, std::move(wake), SecurePath::headerBytes(peer.offer.sctp), context.pieces, context.metrics),
       path_(context.dtls, std::move(local), peer.offer,
             {.transmit = std::move(transmit),
              .deliver = [this](std::span<const std::byte> payload) { link_.receive(payload, now_); },

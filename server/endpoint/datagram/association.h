@@ -27,11 +27,12 @@ class Association {
   // Datagrams of the peer in a second, and in a burst. Further ones are dropped.
   static constexpr double kDatagramsPerSecond = 2000, kBurst = 500;
 
-  // `local`: the server's credentials. For the functions see SecurePath::Callbacks.
+  // `local`: the server's credentials. `wake` is called, from any thread, when the mailbox has something. For
+  // the other functions see SecurePath::Callbacks.
   using Transmit = std::function<void(const Address& to, std::span<const std::byte> datagram)>;
   using Admit = std::function<std::shared_ptr<const void>(const Address& from)>;
   Association(const AssociationContext& context, ice::Credentials local, hosting::DatagramPeer peer,
-              Transmit transmit, Admit admit, Time now);
+              std::function<void()> wake, Transmit transmit, Admit admit, Time now);
 
   // Handles a datagram of any bytes. Returns whether it is an authentic check of the peer.
   bool handle(const Address& from, std::span<const std::byte> datagram, Time now);

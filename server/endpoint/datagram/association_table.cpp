@@ -20,11 +20,12 @@ std::size_t AssociationTable::Hash::operator()(const Address& address) const {
 AssociationTable::AssociationTable(const AssociationContext& context, Transmit transmit)
     : context_(context), transmit_(std::move(transmit)) {}
 
-void AssociationTable::add(ice::Credentials local, hosting::DatagramPeer peer, Time now) {
+void AssociationTable::add(ice::Credentials local, hosting::DatagramPeer peer, std::function<void()> wake,
+                           Time now) {
   const std::string ufrag = local.ufrag;
   Entry& entry = entries_[ufrag];
   entry.association = std::make_unique<Association>(
-      context_, std::move(local), std::move(peer),
+      context_, std::move(local), std::move(peer), std::move(wake),
       [this, ufrag](const Address& to, std::span<const std::byte> datagram) {
         transmit(ufrag, to, datagram);
       },
@@ -43,15 +44,34 @@ void AssociationTable::remove(const std::string& ufrag) {
   entries_.erase(found);
 }
 
+void AssociationTable::clear() {
+  while (!entries_.empty()) remove(std::string(entries_.begin()->first));
+}
+
 void AssociationTable::handle(const Route& route, std::span<const std::byte> datagram, Time now) {
   if (datagram.empty()) return;
-  if (Entry* const named = findByName(datagram)) return handle(*named, route, datagram, now);
-  if (const auto found = proven_.find(route.peer); found != proven_.end())
-    return handle(*found->second, route, datagram, now);
-  std::vector<Entry*> checked;
-  for (auto [each, end] = checked_.equal_range(route.peer); each != end; ++each)
-    checked.push_back(each->second);
-  for (Entry* const entry : checked) handle(*entry, route, datagram, now);
+  std::vector<Entry*> receivers;
+  const auto proven = proven_.find(route.peer);
+  if (Entry* const named = findByName(datagram)) {
+    receivers.push_back(named);
+  } else if (proven != proven_.end() && !ice::isStun(datagram)) {
+    receivers.push_back(proven->second);
+  } else {
+    // An answer to a check has no name, and several associations may await one from there.
+    if (proven != proven_.end()) receivers.push_back(proven->second);
+    for (auto [each, end] = checked_.equal_range(route.peer); each != end; ++each)
+      receivers.push_back(each->second);
+  }
+  for (Entry* const entry : receivers) {
+    current_ = route;
+    try {
+      handle(*entry, route, datagram, now);
+    } catch (const std::exception& failure) {
+      spdlog::error("an association of datagrams ends: {}", failure.what());
+      remove(std::string(entry->association->ufrag()));
+    }
+    current_.reset();
+  }
 }
 
 // Association of a check, by its user name "SERVER:CLIENT" (RFC 8445, section 7.2.2).
@@ -65,7 +85,6 @@ AssociationTable::Entry* AssociationTable::findByName(std::span<const std::byte>
 
 void AssociationTable::handle(Entry& entry, const Route& route, std::span<const std::byte> datagram,
                               Time now) {
-  current_ = route;
   Association& association = *entry.association;
   const bool isCheck = association.handle(route.peer, datagram, now);
   if (association.selected(now) == route.peer) {
@@ -84,7 +103,6 @@ void AssociationTable::handle(Entry& entry, const Route& route, std::span<const 
     entry.checked = route;
   }
   advance(entry, now);
-  current_.reset();
 }
 
 void AssociationTable::forget(Entry& entry, std::optional<Route> Entry::*route) {

@@ -43,10 +43,12 @@ class AssociationTable {
   AssociationTable(const AssociationTable&) = delete;
   AssociationTable& operator=(const AssociationTable&) = delete;
 
-  // `local`: new credentials of the server, whose fragment names the association.
-  void add(ice::Credentials local, hosting::DatagramPeer peer, Time now);
+  // `local`: new credentials of the server, whose fragment names the association. `wake` is called, from any
+  // thread, when the mailbox has something: wake() must follow.
+  void add(ice::Credentials local, hosting::DatagramPeer peer, std::function<void()> wake, Time now);
   // Does nothing if there is no such association.
   void remove(const std::string& ufrag);
+  void clear();
   // Handles a datagram of any bytes.
   void handle(const Route& route, std::span<const std::byte> datagram, Time now);
   // The mailbox of this association's peer has something.

@@ -19,12 +19,15 @@ constexpr Clock::duration kSettled = 2 * delivery::RateController::kSilence;
 
 }  // namespace
 
-FrameLink::FrameLink(hosting::DatagramPeer peer, std::uint32_t headerBytes, SharedPieces& pieces,
-                     telemetry::DatagramMetrics& metrics)
-    : peer_(std::move(peer)), pieces_(pieces), metrics_(metrics), sender_(headerBytes) {}
+FrameLink::FrameLink(hosting::DatagramPeer peer, std::function<void()> wake, std::uint32_t headerBytes,
+                     SharedPieces& pieces, telemetry::DatagramMetrics& metrics)
+    : peer_(std::move(peer)), pieces_(pieces), metrics_(metrics), sender_(headerBytes) {
+  peer_.mailbox->setFrameWake(std::move(wake));
+}
 
 FrameLink::~FrameLink() {
   enter(State::closed, {});
+  peer_.mailbox->setFrameWake(nullptr);
 }
 
 void FrameLink::enter(State state, Clock::time_point now) {

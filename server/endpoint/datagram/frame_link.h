@@ -27,9 +27,10 @@ class FrameLink {
   // Interval of Mailbox::setLink() while frames are sent.
   static constexpr std::chrono::milliseconds kUpdateInterval{20};
 
-  // `headerBytes` as for FrameSender. `pieces` and `metrics` must outlive the link.
-  FrameLink(hosting::DatagramPeer peer, std::uint32_t headerBytes, SharedPieces& pieces,
-            telemetry::DatagramMetrics& metrics);
+  // `wake` as for Mailbox::setFrameWake(), `headerBytes` as for FrameSender. `pieces` and `metrics` must
+  // outlive the link.
+  FrameLink(hosting::DatagramPeer peer, std::function<void()> wake, std::uint32_t headerBytes,
+            SharedPieces& pieces, telemetry::DatagramMetrics& metrics);
   // Frames leave by the stream again.
   ~FrameLink();
   FrameLink(const FrameLink&) = delete;
