@@ -30,7 +30,7 @@
  * Units are SI unless a comment or a name says otherwise. Coordinates are right-handed with +Y up, in metres.
  *
  * Sections: lifetime, scenes, frames, play-out, mirror, input, parameters, participants, recording,
- * statistics.
+ * statistics, datagrams.
  */
 #ifndef CLOTHSTREAM_CLIENTS_CORE_CORE_H
 #define CLOTHSTREAM_CLIENTS_CORE_CORE_H
@@ -85,7 +85,8 @@ enum {
   CS_EVENT_TOKEN = 8192,         /* pairing has given a token: keep cs_token */
   CS_EVENT_PAIRING_CODE = 16384, /* cs_get_pairing_code */
   CS_EVENT_ANSWER = 32768,       /* cs_get_answer: a request about scenes succeeded or failed */
-  CS_EVENT_MOVING = 65536        /* cs_next_server: the scene moves there soon */
+  CS_EVENT_MOVING = 65536,       /* cs_next_server: the scene moves there soon */
+  CS_EVENT_DATAGRAMS = 131072    /* cs_get_datagram_answer: the server has answered an offer */
 };
 
 /* Values of cs_error_code after which the program asks its user for a token or a pairing code. */
@@ -972,6 +973,105 @@ void cs_want_constraints(cs_client* client, int wants, uint64_t now_us) CS_NOEXC
  * null if it is 0. A report names at most 16,384 constraints, while active_constraints counts all of them.
  * Valid until the next call that receives. */
 const uint32_t* cs_constraint_ends(const cs_client* client, uint32_t index, uint32_t* count) CS_NOEXCEPT;
+
+/* ---------------------------------------------------------------------------------------------------------------
+ * Datagrams: frames and input by UDP, in addition to the stream of messages (docs/transport.md).
+ *
+ * The program has the datagrams: a data channel of WebRTC, or ICE, DTLS and a UDP socket. It offers them with
+ * cs_offer_datagrams, and opens them as the answer says. From then on it passes to cs_datagrams
+ *  - each datagram that arrives (cs_receive_datagram);
+ *  - each message of the stream, before cs_receive (cs_hold_message);
+ *  - each message of cs_next_outgoing, before it is sent (cs_send_in_datagram).
+ * After each of these calls, and at cs_datagrams_due_at, it calls the three functions cs_next_... until they
+ * return NULL. One cs_datagrams belongs to one connection of the stream and one pair of offer and answer. It
+ * is not thread-safe, and independent of the cs_client, so it may be in another thread or module.
+ */
+
+#define CS_DATAGRAM_OFFER_VERSION 1u
+/* What the server needs to recognise this client (DatagramOffer in session.proto). */
+typedef struct cs_datagram_offer {
+  uint32_t version CS_INIT(CS_DATAGRAM_OFFER_VERSION);
+  const char* ufrag;       /* of ICE: 4 to 64 letters, digits, + and / (RFC 8839 section 5.4) */
+  const char* password;    /* of ICE: 22 to 256 of these */
+  uint8_t fingerprint[32]; /* SHA-256 of the client's certificate for DTLS */
+  int32_t sctp; /* 1: the datagrams are those of a data channel (WebRTC); 0: those of DTLS itself */
+} cs_datagram_offer;
+
+#define CS_DATAGRAM_ANSWER_VERSION 1u
+/* How to reach the server (DatagramAnswer in session.proto). */
+typedef struct cs_datagram_answer {
+  uint32_t version CS_INIT(CS_DATAGRAM_ANSWER_VERSION);
+  uint32_t addresses;      /* number of them, 0 to 16; 0: the server opens no datagrams */
+  uint32_t port;           /* UDP, 1 to 65535; this and the following are 0 and "" without addresses */
+  const char* ufrag;       /* as in cs_datagram_offer */
+  const char* password;    /* as in cs_datagram_offer */
+  uint8_t fingerprint[32]; /* SHA-256 of the server's certificate for DTLS */
+} cs_datagram_answer;
+
+/* Offers datagrams on the present connection: the one of the last cs_connecting or, without that call, the
+ * first one. The offer is sent right after Hello. A later offer replaces it, and ends the server's
+ * association with it. Strings are copied. Fails, and changes nothing, for an unknown version, a member that
+ * is not allowed, on a mirror, and while there is no connection. */
+int cs_offer_datagrams(cs_client* client, const cs_datagram_offer* offer) CS_NOEXCEPT;
+/* The answer to the newest offer. Fails before it, and if `out->version` is unknown. Strings are valid until
+ * the next offer, CS_EVENT_DATAGRAMS or end of the connection. */
+int cs_get_datagram_answer(const cs_client* client, cs_datagram_answer* out) CS_NOEXCEPT;
+/* An address of the answer, the preferred one first: such as "192.0.2.1" or "2001:db8::1", at most 45
+ * characters out of [0-9A-Fa-f:.]. It can be malformed otherwise. "" if the index is out of range. Valid as
+ * long as the answer. */
+const char* cs_datagram_address(const cs_client* client, uint32_t index) CS_NOEXCEPT;
+
+#define CS_MAX_DATAGRAM_BYTES 1150u
+
+typedef struct cs_datagrams cs_datagrams;
+
+cs_datagrams* cs_create_datagrams(void) CS_NOEXCEPT;
+/* NULL is allowed. */
+void cs_destroy_datagrams(cs_datagrams* datagrams) CS_NOEXCEPT;
+/* Takes the payload of a datagram of the server, of any bytes. */
+void cs_receive_datagram(cs_datagrams* datagrams, const uint8_t* datagram, size_t bytes,
+                         uint64_t now_us) CS_NOEXCEPT;
+/* Takes a message of the stream. Returns 0 if the program must pass it to cs_receive now. Returns 1 if it
+ * must not: a frame whose reference is under way in datagrams is kept, and an old frame is dropped. Frames
+ * are kept for at most 150 ms, and at most 32 of them with 4 MiB. */
+int cs_hold_message(cs_datagrams* datagrams, const uint8_t* message, size_t bytes,
+                    uint64_t now_us) CS_NOEXCEPT;
+/* Takes a message of cs_next_outgoing. Returns 1 if it travels in datagrams, 0 if the program must send it on
+ * the stream: while no datagram has arrived for 500 ms, and all messages except poses, acknowledgements and
+ * requests for key frames. Poses that move attachments or joints also go there, because each is sent once. */
+int cs_send_in_datagram(cs_datagrams* datagrams, const uint8_t* message, size_t bytes,
+                        uint64_t now_us) CS_NOEXCEPT;
+
+/* Next message for cs_receive, and its size in *bytes; NULL if there is none. The pointers of this function
+ * and the next two are valid until the next call with the same cs_datagrams. */
+const uint8_t* cs_next_datagram_message(cs_datagrams* datagrams, uint64_t now_us, size_t* bytes) CS_NOEXCEPT;
+/* Next datagram to send to the server, at most CS_MAX_DATAGRAM_BYTES; NULL if there is none. */
+const uint8_t* cs_next_datagram(cs_datagrams* datagrams, uint64_t now_us, size_t* bytes) CS_NOEXCEPT;
+/* Next message to send on the stream; NULL if there is none. The newest poses travel there too when none have
+ * followed them for 100 ms, because datagrams can be lost. */
+const uint8_t* cs_next_stream_message(cs_datagrams* datagrams, uint64_t now_us, size_t* bytes) CS_NOEXCEPT;
+/* Time at which these functions may return something without a further call; UINT64_MAX if never. */
+uint64_t cs_datagrams_due_at(const cs_datagrams* datagrams) CS_NOEXCEPT;
+/* Sets the round-trip time of the link, for example round_trip_ms of cs_statistics. 100 ms until then. */
+void cs_set_datagram_round_trip(cs_datagrams* datagrams, uint64_t microseconds) CS_NOEXCEPT;
+
+#define CS_DATAGRAM_STATISTICS_VERSION 1u
+/* Counts since cs_create_datagrams. */
+typedef struct cs_datagram_statistics {
+  uint32_t version CS_INIT(CS_DATAGRAM_STATISTICS_VERSION);
+  int32_t in_use;           /* 1 if a datagram has arrived in the last 500 ms, else 0 */
+  uint64_t packets;         /* datagrams with pieces of frames that arrived */
+  uint64_t lost_packets;    /* datagrams that were sent before the newest of these and did not arrive */
+  uint64_t parity_packets;  /* packets with parity */
+  uint64_t frames;          /* frames that are complete */
+  uint64_t repaired_frames; /* complete frames that needed parity or a request */
+  uint64_t lost_frames;     /* frames that were given up */
+  uint64_t requests;        /* requests for missing pieces */
+  uint64_t held_frames;     /* frames of both ways that waited for their reference */
+} cs_datagram_statistics;
+/* Fails if `out->version` is unknown. */
+int cs_get_datagram_statistics(const cs_datagrams* datagrams, uint64_t now_us,
+                               cs_datagram_statistics* out) CS_NOEXCEPT;
 
 /* NOLINTEND(modernize-use-using) */
 

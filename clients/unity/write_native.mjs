@@ -23,9 +23,10 @@ const camel = (text) => {
 const typeName = (name) => kRenamed.get(name) ?? pascal(name.replace(/^cs_/, ""));
 
 // The type of a parameter, result or field, for example `const uint32_t**`. described: names of enums and structs.
+// Structs whose members are private are handles.
 function csharpType(text, described) {
   const name = text.replaceAll(/\bconst\b|\*/g, "").trim();
-  if (name === "cs_client") return "IntPtr";
+  if (name.startsWith("cs_") && !described.has(name)) return "IntPtr";
   return (described.has(name) ? typeName(name) : (kTypes.get(name) ?? name)) + "*".repeat(text.match(/\*/g)?.length ?? 0);
 }
 

@@ -38,6 +38,10 @@ CS_PLAYBACK_VERSION = 1
 CS_STATISTICS_VERSION = 1
 CS_STAGE_STATISTICS_VERSION = 1
 CS_CLOTH_REPORT_VERSION = 1
+CS_DATAGRAM_OFFER_VERSION = 1
+CS_DATAGRAM_ANSWER_VERSION = 1
+CS_MAX_DATAGRAM_BYTES = 1150
+CS_DATAGRAM_STATISTICS_VERSION = 1
 CS_STATE_JOINING = 0
 CS_STATE_JOINED = 1
 CS_STATE_FAILED = 2
@@ -59,6 +63,7 @@ CS_EVENT_TOKEN = 8192
 CS_EVENT_PAIRING_CODE = 16384
 CS_EVENT_ANSWER = 32768
 CS_EVENT_MOVING = 65536
+CS_EVENT_DATAGRAMS = 131072
 CS_ERROR_UNAUTHENTICATED = 60
 CS_ERROR_WRONG_PAIRING_CODE = 61
 CS_ROLE_UNSPECIFIED = 0
@@ -135,7 +140,7 @@ CS_GRAB_STATE_FREE = 0
 CS_GRAB_STATE_HOLDS = 1
 CS_GRAB_STATE_TAKES = 2
 CLOTHSTREAM_TOKEN_BYTES = 4097
-CLOTHSTREAM_OPTIONS_VERSION = 2
+CLOTHSTREAM_OPTIONS_VERSION = 3
 CLOTHSTREAM_ALLOCATOR_VERSION = 1
 CLOTHSTREAM_OK = 0
 CLOTHSTREAM_INVALID = 1
@@ -146,6 +151,9 @@ CLOTHSTREAM_FAILED = 5
 CLOTHSTREAM_LOG_INFO = 1
 CLOTHSTREAM_LOG_WARNING = 2
 CLOTHSTREAM_LOG_ERROR = 3
+CLOTHSTREAM_TRANSPORT_AUTO = 0
+CLOTHSTREAM_TRANSPORT_DATAGRAMS = 1
+CLOTHSTREAM_TRANSPORT_TCP = 2
 
 
 class cs_client_options(c.Structure):
@@ -524,6 +532,45 @@ class cs_cloth_report(c.Structure):
     ]
 
 
+class cs_datagram_offer(c.Structure):
+    VERSION = CS_DATAGRAM_OFFER_VERSION
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("ufrag", c.c_char_p),
+        ("password", c.c_char_p),
+        ("fingerprint", c.c_uint8 * 32),
+        ("sctp", c.c_int32),
+    ]
+
+
+class cs_datagram_answer(c.Structure):
+    VERSION = CS_DATAGRAM_ANSWER_VERSION
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("addresses", c.c_uint32),
+        ("port", c.c_uint32),
+        ("ufrag", c.c_char_p),
+        ("password", c.c_char_p),
+        ("fingerprint", c.c_uint8 * 32),
+    ]
+
+
+class cs_datagram_statistics(c.Structure):
+    VERSION = CS_DATAGRAM_STATISTICS_VERSION
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("in_use", c.c_int32),
+        ("packets", c.c_uint64),
+        ("lost_packets", c.c_uint64),
+        ("parity_packets", c.c_uint64),
+        ("frames", c.c_uint64),
+        ("repaired_frames", c.c_uint64),
+        ("lost_frames", c.c_uint64),
+        ("requests", c.c_uint64),
+        ("held_frames", c.c_uint64),
+    ]
+
+
 class cs_recording_source(c.Structure):
     VERSION = CS_RECORDING_SOURCE_VERSION
     _fields_ = [
@@ -647,6 +694,7 @@ class clothstream_options(c.Structure):
         ("fingerprint", c.c_char_p),
         ("log", c.c_void_p),
         ("log_context", c.c_void_p),
+        ("transport", c.c_uint32),
     ]
 
 
@@ -794,6 +842,20 @@ FUNCTIONS = {
     "cs_get_cloth_report": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_cloth_report)]),
     "cs_want_constraints": (None, [c.c_void_p, c.c_int, c.c_uint64]),
     "cs_constraint_ends": (c.POINTER(c.c_uint32), [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
+    "cs_offer_datagrams": (c.c_int, [c.c_void_p, c.POINTER(cs_datagram_offer)]),
+    "cs_get_datagram_answer": (c.c_int, [c.c_void_p, c.POINTER(cs_datagram_answer)]),
+    "cs_datagram_address": (c.c_char_p, [c.c_void_p, c.c_uint32]),
+    "cs_create_datagrams": (c.c_void_p, []),
+    "cs_destroy_datagrams": (None, [c.c_void_p]),
+    "cs_receive_datagram": (None, [c.c_void_p, c.POINTER(c.c_uint8), c.c_size_t, c.c_uint64]),
+    "cs_hold_message": (c.c_int, [c.c_void_p, c.POINTER(c.c_uint8), c.c_size_t, c.c_uint64]),
+    "cs_send_in_datagram": (c.c_int, [c.c_void_p, c.POINTER(c.c_uint8), c.c_size_t, c.c_uint64]),
+    "cs_next_datagram_message": (c.POINTER(c.c_uint8), [c.c_void_p, c.c_uint64, c.POINTER(c.c_size_t)]),
+    "cs_next_datagram": (c.POINTER(c.c_uint8), [c.c_void_p, c.c_uint64, c.POINTER(c.c_size_t)]),
+    "cs_next_stream_message": (c.POINTER(c.c_uint8), [c.c_void_p, c.c_uint64, c.POINTER(c.c_size_t)]),
+    "cs_datagrams_due_at": (c.c_uint64, [c.c_void_p]),
+    "cs_set_datagram_round_trip": (None, [c.c_void_p, c.c_uint64]),
+    "cs_get_datagram_statistics": (c.c_int, [c.c_void_p, c.c_uint64, c.POINTER(cs_datagram_statistics)]),
     "cs_recording_open": (c.c_void_p, [c.c_char_p, c.c_uint32]),
     "cs_recording_open_bytes": (c.c_void_p, [c.POINTER(c.c_uint8), c.c_size_t, c.c_uint32]),
     "cs_recording_open_source": (c.c_void_p, [c.POINTER(cs_recording_source)]),
@@ -820,6 +882,7 @@ FUNCTIONS = {
     "clothstream_wait": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
     "clothstream_acquire": (c.c_void_p, [c.c_void_p]),
     "clothstream_release": (None, [c.c_void_p]),
+    "clothstream_get_datagram_statistics": (c.c_int, [c.c_void_p, c.POINTER(cs_datagram_statistics)]),
     "clothstream_set_allocator": (c.c_int, [c.POINTER(clothstream_allocator)]),
     "clothstream_now_us": (c.c_uint64, []),
     "clothstream_error_text": (c.c_char_p, []),

@@ -29,6 +29,7 @@ namespace ClothStream.Core
         PairingCode = 16384,
         Answer = 32768,
         Moving = 65536,
+        Datagrams = 131072,
     }
 
     /// <summary>
@@ -1098,6 +1099,105 @@ namespace ClothStream.Core
         [FieldOffset(48)] public ulong tick;
     }
 
+    /// <summary>
+    /// What the server needs to recognise this client (DatagramOffer in session.proto).
+    /// </summary>
+    [StructLayout(LayoutKind.Explicit, Size = 64)]
+    public unsafe struct DatagramOffer
+    {
+        [FieldOffset(0)] public uint version;
+        /// <summary>
+        /// of ICE: 4 to 64 letters, digits, + and / (RFC 8839 section 5.4)
+        /// </summary>
+        [FieldOffset(8)] public byte* ufrag;
+        /// <summary>
+        /// of ICE: 22 to 256 of these
+        /// </summary>
+        [FieldOffset(16)] public byte* password;
+        /// <summary>
+        /// SHA-256 of the client's certificate for DTLS
+        /// </summary>
+        [FieldOffset(24)] public fixed byte fingerprint[32];
+        /// <summary>
+        /// 1: the datagrams are those of a data channel (WebRTC); 0: those of DTLS itself
+        /// </summary>
+        [FieldOffset(56)] public int sctp;
+    }
+
+    /// <summary>
+    /// How to reach the server (DatagramAnswer in session.proto).
+    /// </summary>
+    [StructLayout(LayoutKind.Explicit, Size = 64)]
+    public unsafe struct DatagramAnswer
+    {
+        [FieldOffset(0)] public uint version;
+        /// <summary>
+        /// number of them, 0 to 16; 0: the server opens no datagrams
+        /// </summary>
+        [FieldOffset(4)] public uint addresses;
+        /// <summary>
+        /// UDP, 1 to 65535; this and the following are 0 and "" without addresses
+        /// </summary>
+        [FieldOffset(8)] public uint port;
+        /// <summary>
+        /// as in cs_datagram_offer
+        /// </summary>
+        [FieldOffset(16)] public byte* ufrag;
+        /// <summary>
+        /// as in cs_datagram_offer
+        /// </summary>
+        [FieldOffset(24)] public byte* password;
+        /// <summary>
+        /// SHA-256 of the server's certificate for DTLS
+        /// </summary>
+        [FieldOffset(32)] public fixed byte fingerprint[32];
+    }
+
+    /// <summary>
+    /// Counts since cs_create_datagrams.
+    /// </summary>
+    [StructLayout(LayoutKind.Explicit, Size = 72)]
+    public unsafe struct DatagramStatistics
+    {
+        [FieldOffset(0)] public uint version;
+        /// <summary>
+        /// 1 if a datagram has arrived in the last 500 ms, else 0
+        /// </summary>
+        [FieldOffset(4)] public int inUse;
+        /// <summary>
+        /// datagrams with pieces of frames that arrived
+        /// </summary>
+        [FieldOffset(8)] public ulong packets;
+        /// <summary>
+        /// datagrams that were sent before the newest of these and did not arrive
+        /// </summary>
+        [FieldOffset(16)] public ulong lostPackets;
+        /// <summary>
+        /// packets with parity
+        /// </summary>
+        [FieldOffset(24)] public ulong parityPackets;
+        /// <summary>
+        /// frames that are complete
+        /// </summary>
+        [FieldOffset(32)] public ulong frames;
+        /// <summary>
+        /// complete frames that needed parity or a request
+        /// </summary>
+        [FieldOffset(40)] public ulong repairedFrames;
+        /// <summary>
+        /// frames that were given up
+        /// </summary>
+        [FieldOffset(48)] public ulong lostFrames;
+        /// <summary>
+        /// requests for missing pieces
+        /// </summary>
+        [FieldOffset(56)] public ulong requests;
+        /// <summary>
+        /// frames of both ways that waited for their reference
+        /// </summary>
+        [FieldOffset(64)] public ulong heldFrames;
+    }
+
     // The functions of core.h. Each takes the client first; see Client.Handle.
     public static unsafe class Native
     {
@@ -1138,6 +1238,10 @@ namespace ClothStream.Core
         public const uint CS_STATISTICS_VERSION = 1;
         public const uint CS_STAGE_STATISTICS_VERSION = 1;
         public const uint CS_CLOTH_REPORT_VERSION = 1;
+        public const uint CS_DATAGRAM_OFFER_VERSION = 1;
+        public const uint CS_DATAGRAM_ANSWER_VERSION = 1;
+        public const uint CS_MAX_DATAGRAM_BYTES = 1150;
+        public const uint CS_DATAGRAM_STATISTICS_VERSION = 1;
 
         /// <summary>
         /// Creates a client that joins a scene. Its first outgoing message is Hello. Free the client with cs_destroy.
@@ -1722,5 +1826,70 @@ namespace ClothStream.Core
         /// Valid until the next call that receives.
         /// </summary>
         [DllImport(Library)] public static extern uint* cs_constraint_ends(IntPtr client, uint index, uint* count);
+        /// <summary>
+        /// Offers datagrams on the present connection: the one of the last cs_connecting or, without that call, the
+        /// first one. The offer is sent right after Hello. A later offer replaces it, and ends the server's
+        /// association with it. Strings are copied. Fails, and changes nothing, for an unknown version, a member that
+        /// is not allowed, on a mirror, and while there is no connection.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_offer_datagrams(IntPtr client, DatagramOffer* offer);
+        /// <summary>
+        /// The answer to the newest offer. Fails before it, and if `out->version` is unknown. Strings are valid until
+        /// the next offer, CS_EVENT_DATAGRAMS or end of the connection.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_get_datagram_answer(IntPtr client, DatagramAnswer* @out);
+        /// <summary>
+        /// An address of the answer, the preferred one first: such as "192.0.2.1" or "2001:db8::1", at most 45
+        /// characters out of [0-9A-Fa-f:.]. It can be malformed otherwise. "" if the index is out of range. Valid as
+        /// long as the answer.
+        /// </summary>
+        [DllImport(Library)] public static extern byte* cs_datagram_address(IntPtr client, uint index);
+        [DllImport(Library)] public static extern IntPtr cs_create_datagrams();
+        /// <summary>
+        /// NULL is allowed.
+        /// </summary>
+        [DllImport(Library)] public static extern void cs_destroy_datagrams(IntPtr datagrams);
+        /// <summary>
+        /// Takes the payload of a datagram of the server, of any bytes.
+        /// </summary>
+        [DllImport(Library)] public static extern void cs_receive_datagram(IntPtr datagrams, byte* datagram, UIntPtr bytes, ulong nowUs);
+        /// <summary>
+        /// Takes a message of the stream. Returns 0 if the program must pass it to cs_receive now. Returns 1 if it
+        /// must not: a frame whose reference is under way in datagrams is kept, and an old frame is dropped. Frames
+        /// are kept for at most 150 ms, and at most 32 of them with 4 MiB.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_hold_message(IntPtr datagrams, byte* message, UIntPtr bytes, ulong nowUs);
+        /// <summary>
+        /// Takes a message of cs_next_outgoing. Returns 1 if it travels in datagrams, 0 if the program must send it on
+        /// the stream: while no datagram has arrived for 500 ms, and all messages except poses, acknowledgements and
+        /// requests for key frames. Poses that move attachments or joints also go there, because each is sent once.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_send_in_datagram(IntPtr datagrams, byte* message, UIntPtr bytes, ulong nowUs);
+        /// <summary>
+        /// Next message for cs_receive, and its size in *bytes; NULL if there is none. The pointers of this function
+        /// and the next two are valid until the next call with the same cs_datagrams.
+        /// </summary>
+        [DllImport(Library)] public static extern byte* cs_next_datagram_message(IntPtr datagrams, ulong nowUs, UIntPtr* bytes);
+        /// <summary>
+        /// Next datagram to send to the server, at most CS_MAX_DATAGRAM_BYTES; NULL if there is none.
+        /// </summary>
+        [DllImport(Library)] public static extern byte* cs_next_datagram(IntPtr datagrams, ulong nowUs, UIntPtr* bytes);
+        /// <summary>
+        /// Next message to send on the stream; NULL if there is none. The newest poses travel there too when none have
+        /// followed them for 100 ms, because datagrams can be lost.
+        /// </summary>
+        [DllImport(Library)] public static extern byte* cs_next_stream_message(IntPtr datagrams, ulong nowUs, UIntPtr* bytes);
+        /// <summary>
+        /// Time at which these functions may return something without a further call; UINT64_MAX if never.
+        /// </summary>
+        [DllImport(Library)] public static extern ulong cs_datagrams_due_at(IntPtr datagrams);
+        /// <summary>
+        /// Sets the round-trip time of the link, for example round_trip_ms of cs_statistics. 100 ms until then.
+        /// </summary>
+        [DllImport(Library)] public static extern void cs_set_datagram_round_trip(IntPtr datagrams, ulong microseconds);
+        /// <summary>
+        /// Fails if `out->version` is unknown.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_get_datagram_statistics(IntPtr datagrams, ulong nowUs, DatagramStatistics* @out);
     }
 }

@@ -137,6 +137,20 @@ export interface CoreFunctions {
   cs_get_cloth_report(client: Pointer, index: number, out: Pointer): number;
   cs_want_constraints(client: Pointer, wants: number, nowUs: bigint): void;
   cs_constraint_ends(client: Pointer, index: number, count: Pointer): Pointer;
+  cs_offer_datagrams(client: Pointer, offer: Pointer): number;
+  cs_get_datagram_answer(client: Pointer, out: Pointer): number;
+  cs_datagram_address(client: Pointer, index: number): Pointer;
+  cs_create_datagrams(): Pointer;
+  cs_destroy_datagrams(datagrams: Pointer): void;
+  cs_receive_datagram(datagrams: Pointer, datagram: Pointer, bytes: number, nowUs: bigint): void;
+  cs_hold_message(datagrams: Pointer, message: Pointer, bytes: number, nowUs: bigint): number;
+  cs_send_in_datagram(datagrams: Pointer, message: Pointer, bytes: number, nowUs: bigint): number;
+  cs_next_datagram_message(datagrams: Pointer, nowUs: bigint, bytes: Pointer): Pointer;
+  cs_next_datagram(datagrams: Pointer, nowUs: bigint, bytes: Pointer): Pointer;
+  cs_next_stream_message(datagrams: Pointer, nowUs: bigint, bytes: Pointer): Pointer;
+  cs_datagrams_due_at(datagrams: Pointer): bigint;
+  cs_set_datagram_round_trip(datagrams: Pointer, microseconds: bigint): void;
+  cs_get_datagram_statistics(datagrams: Pointer, nowUs: bigint, out: Pointer): number;
 }
 
 // clients/recording/recording.h, which only clothstream_recording.wasm has

@@ -30,6 +30,9 @@ export const CS_PLAYBACK_VERSION = 1;
 export const CS_STATISTICS_VERSION = 1;
 export const CS_STAGE_STATISTICS_VERSION = 1;
 export const CS_CLOTH_REPORT_VERSION = 1;
+export const CS_DATAGRAM_OFFER_VERSION = 1;
+export const CS_DATAGRAM_ANSWER_VERSION = 1;
+export const CS_DATAGRAM_STATISTICS_VERSION = 1;
 export const CS_RECORDING_INFO_VERSION = 1;
 export const CS_RECORDED_VERSION = 1;
 export const CS_RECORDING_FAULTS_VERSION = 1;
@@ -330,6 +333,36 @@ export const cs_cloth_report = {
   penetration: 40,
   device_ms: 44,
   tick: 48,
+} as const;
+export const cs_datagram_offer = {
+  sizeof: 48,
+  version: 0,
+  ufrag: 4,
+  password: 8,
+  fingerprint: 12,
+  sctp: 44,
+} as const;
+export const cs_datagram_answer = {
+  sizeof: 52,
+  version: 0,
+  addresses: 4,
+  port: 8,
+  ufrag: 12,
+  password: 16,
+  fingerprint: 20,
+} as const;
+export const cs_datagram_statistics = {
+  sizeof: 72,
+  version: 0,
+  in_use: 4,
+  packets: 8,
+  lost_packets: 16,
+  parity_packets: 24,
+  frames: 32,
+  repaired_frames: 40,
+  lost_frames: 48,
+  requests: 56,
+  held_frames: 64,
 } as const;
 export const cs_recording_info = {
   sizeof: 48,
