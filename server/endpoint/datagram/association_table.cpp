@@ -23,14 +23,26 @@ AssociationTable::AssociationTable(const AssociationContext& context, Transmit t
 void AssociationTable::add(ice::Credentials local, hosting::DatagramPeer peer, std::function<void()> wake,
                            Time now) {
   const std::string ufrag = local.ufrag;
-  Entry& entry = entries_[ufrag];
-  entry.association = std::make_unique<Association>(
+  auto association = std::make_unique<Association>(
       context_, std::move(local), std::move(peer), std::move(wake),
       [this, ufrag](const Address& to, std::span<const std::byte> datagram) {
         transmit(ufrag, to, datagram);
       },
       [this](const Address& from) { return admit(from); }, now);
-  advance(entry, now);
+  Entry& entry = entries_[ufrag];
+  entry.association = std::move(association);
+  run(entry, [&] { advance(entry, now); });
+}
+
+template <typename Step>
+void AssociationTable::run(Entry& entry, Step step) {
+  try {
+    step();
+  } catch (const std::exception& failure) {
+    spdlog::error("an association of datagrams ends: {}", failure.what());
+    current_.reset();
+    remove(std::string(entry.association->ufrag()));
+  }
 }
 
 void AssociationTable::remove(const std::string& ufrag) {
@@ -62,16 +74,7 @@ void AssociationTable::handle(const Route& route, std::span<const std::byte> dat
     for (auto [each, end] = checked_.equal_range(route.peer); each != end; ++each)
       receivers.push_back(each->second);
   }
-  for (Entry* const entry : receivers) {
-    current_ = route;
-    try {
-      handle(*entry, route, datagram, now);
-    } catch (const std::exception& failure) {
-      spdlog::error("an association of datagrams ends: {}", failure.what());
-      remove(std::string(entry->association->ufrag()));
-    }
-    current_.reset();
-  }
+  for (Entry* const entry : receivers) run(*entry, [&] { handle(*entry, route, datagram, now); });
 }
 
 // Association of a check, by its user name "SERVER:CLIENT" (RFC 8445, section 7.2.2).
@@ -86,7 +89,12 @@ AssociationTable::Entry* AssociationTable::findByName(std::span<const std::byte>
 void AssociationTable::handle(Entry& entry, const Route& route, std::span<const std::byte> datagram,
                               Time now) {
   Association& association = *entry.association;
-  const bool isCheck = association.handle(route.peer, datagram, now);
+  current_ = route;
+  const Association::Handled handled = association.handle(route.peer, datagram, now);
+  current_.reset();
+  if (handled == Association::Handled::dropped) return;
+  // Other datagrams can have a forged source, so they say nothing about the way to the peer.
+  const bool isCheck = handled == Association::Handled::check;
   if (association.selected(now) == route.peer) {
     if (!entry.proven || entry.proven->peer != route.peer) {
       forget(entry, &Entry::proven);
@@ -95,8 +103,10 @@ void AssociationTable::handle(Entry& entry, const Route& route, std::span<const 
       if (const auto former = proven_.find(route.peer); former != proven_.end())
         forget(*former->second, &Entry::proven);
       proven_[route.peer] = &entry;
+      entry.proven = route;
+    } else if (isCheck) {
+      entry.proven = route;
     }
-    entry.proven = route;
   } else if (isCheck && !(entry.checked && entry.checked->peer == route.peer)) {
     forget(entry, &Entry::checked);
     checked_.emplace(route.peer, &entry);
@@ -118,7 +128,8 @@ void AssociationTable::forget(Entry& entry, std::optional<Route> Entry::*route) 
 }
 
 void AssociationTable::wake(const std::string& ufrag, Time now) {
-  if (const auto found = entries_.find(ufrag); found != entries_.end()) advance(found->second, now);
+  if (const auto found = entries_.find(ufrag); found != entries_.end())
+    run(found->second, [&] { advance(found->second, now); });
 }
 
 void AssociationTable::advance(Time now) {
@@ -127,7 +138,7 @@ void AssociationTable::advance(Time now) {
     if (entry.association->isOver(now))
       remove(std::string(entry.association->ufrag()));
     else
-      advance(entry, now);
+      run(entry, [&] { advance(entry, now); });
   }
 }
 

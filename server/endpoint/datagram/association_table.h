@@ -76,6 +76,9 @@ class AssociationTable {
   };
 
   Entry* findByName(std::span<const std::byte> datagram);
+  // Runs a step of an association. If it throws std::exception, the association ends.
+  template <typename Step>
+  void run(Entry& entry, Step step);
   void handle(Entry& entry, const Route& route, std::span<const std::byte> datagram, Time now);
   // Lets the association do what is due, and notes when that is next.
   void advance(Entry& entry, Time now);
@@ -87,7 +90,8 @@ class AssociationTable {
   const AssociationContext context_;
   const Transmit transmit_;
   const std::shared_ptr<Handshakes> handshakes_ = std::make_shared<Handshakes>();
-  std::optional<Route> current_;                    // of the datagram that is handled
+  // Of the datagram that an association handles. Its answers take the same way back.
+  std::optional<Route> current_;
   std::unordered_map<std::string, Entry> entries_;  // by the server's fragment
   std::unordered_map<Address, Entry*, Hash> proven_;
   std::unordered_multimap<Address, Entry*, Hash> checked_;
