@@ -74,6 +74,9 @@ void DatagramClient::offer(bool sctp, const std::string& fingerprint) {
   channel_.reset();
   dtls_.reset();
   agent_.reset();
+  assembly_ = datagram::FrameAssembly();
+  received_ = datagram::ReceivedPackets();
+  input_ = datagram::InputSender();
   sctp_ = sctp;
   local_ = ice::randomCredentials();
   v1::ClientMessage message;
