@@ -23,14 +23,15 @@ AssociationTable::AssociationTable(const AssociationContext& context, Transmit t
 void AssociationTable::add(ice::Credentials local, hosting::DatagramPeer peer, std::function<void()> wake,
                            Time now) {
   const std::string ufrag = local.ufrag;
-  Entry& entry = entries_[ufrag];
-  entry.association = std::make_unique<Association>(
+  auto association = std::make_unique<Association>(
       context_, std::move(local), std::move(peer), std::move(wake),
       [this, ufrag](const Address& to, std::span<const std::byte> datagram) {
         transmit(ufrag, to, datagram);
       },
       [this](const Address& from) { return admit(from); }, now);
-  advance(entry, now);
+  Entry& entry = entries_[ufrag];
+  entry.association = std::move(association);
+  attempt(entry, [&] { advance(entry, now); });
 }
 
 void AssociationTable::remove(const std::string& ufrag) {
