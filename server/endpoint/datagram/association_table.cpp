@@ -23,14 +23,15 @@ AssociationTable::AssociationTable(const AssociationContext& context, Transmit t
 void AssociationTable::add(ice::Credentials local, hosting::DatagramPeer peer, std::function<void()> wake,
                            Time now) {
   const std::string ufrag = local.ufrag;
-  Entry& entry = entries_[ufrag];
-  entry.association = std::make_unique<Association>(
+  auto association = std::make_unique<Association>(
       context_, std::move(local), std::move(peer), std::move(wake),
       [this, ufrag](const Address& to, std::span<const std::byte> datagram) {
         transmit(ufrag, to, datagram);
       },
       [this](const Address& from) { return admit(from); }, now);
-  advance(entry, now);
+  Entry& entry = entries_[ufrag];
+  entry.association = std::move(association);
+  attempt(entry, [&] { advance(entry, now); });
 }
 
 void AssociationTable::remove(const std::string& ufrag) {
@@ -50,27 +51,32 @@ void AssociationTable::clear() {
 
 void AssociationTable::handle(const Route& route, std::span<const std::byte> datagram, Time now) {
   if (datagram.empty()) return;
-  std::vector<Entry*> receivers;
+  current_ = route;
+  const auto give = [&](Entry& entry) { attempt(entry, [&] { handle(entry, route, datagram, now); }); };
   const auto proven = proven_.find(route.peer);
   if (Entry* const named = findByName(datagram)) {
-    receivers.push_back(named);
+    give(*named);
   } else if (proven != proven_.end() && !ice::isStun(datagram)) {
-    receivers.push_back(proven->second);
+    give(*proven->second);
   } else {
-    // An answer to a check has no name, and several associations may await one from there.
+    // An answer to a check has no name, and several associations may await one from there. So do records that
+    // come before the answer.
+    std::vector<Entry*> receivers;
     if (proven != proven_.end()) receivers.push_back(proven->second);
     for (auto [each, end] = checked_.equal_range(route.peer); each != end; ++each)
       receivers.push_back(each->second);
+    for (Entry* const entry : receivers) give(*entry);
   }
-  for (Entry* const entry : receivers) {
-    current_ = route;
-    try {
-      handle(*entry, route, datagram, now);
-    } catch (const std::exception& failure) {
-      spdlog::error("an association of datagrams ends: {}", failure.what());
-      remove(std::string(entry->association->ufrag()));
-    }
-    current_.reset();
+  current_.reset();
+}
+
+template <typename Step>
+void AssociationTable::attempt(Entry& entry, Step step) {
+  try {
+    step();
+  } catch (const std::exception& failure) {
+    spdlog::error("an association of datagrams ends: {}", failure.what());
+    remove(std::string(entry.association->ufrag()));
   }
 }
 
@@ -118,7 +124,8 @@ void AssociationTable::forget(Entry& entry, std::optional<Route> Entry::*route) 
 }
 
 void AssociationTable::wake(const std::string& ufrag, Time now) {
-  if (const auto found = entries_.find(ufrag); found != entries_.end()) advance(found->second, now);
+  if (const auto found = entries_.find(ufrag); found != entries_.end())
+    attempt(found->second, [&] { advance(found->second, now); });
 }
 
 void AssociationTable::advance(Time now) {
@@ -127,7 +134,7 @@ void AssociationTable::advance(Time now) {
     if (entry.association->isOver(now))
       remove(std::string(entry.association->ufrag()));
     else
-      advance(entry, now);
+      attempt(entry, [&] { advance(entry, now); });
   }
 }
 

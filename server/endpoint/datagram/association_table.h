@@ -75,6 +75,9 @@ class AssociationTable {
     std::size_t operator()(const Address& address) const;
   };
 
+  // Does the step. Ends the association if it throws, because OpenSSL or the kernel fails.
+  template <typename Step>
+  void attempt(Entry& entry, Step step);
   Entry* findByName(std::span<const std::byte> datagram);
   void handle(Entry& entry, const Route& route, std::span<const std::byte> datagram, Time now);
   // Lets the association do what is due, and notes when that is next.
