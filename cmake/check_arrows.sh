@@ -29,7 +29,7 @@ server/meshes      | server/files server/model proto/text
 server/messages    | server/files server/model server/meshes server/telemetry proto/hands proto/parameters proto/text clothstream
 server/encode      | server/model server/simulation server/telemetry server/vulkan proto/codec shaders
 server/schedule    |
-server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec clothstream
+server/delivery    | server/schedule server/encode server/messages server/telemetry proto/codec proto/datagram clothstream
 server/scene       | server/delivery server/schedule server/model server/vulkan server/simulation server/encode server/messages server/telemetry clothstream
 server/identity    | proto/tls server/files server/scene server/schedule server/messages clothstream
 server/saved_state | server/files server/scene server/model server/messages server/telemetry clothstream
@@ -46,6 +46,7 @@ server/doctor      | server/endpoint/listen server/encode server/messages server
 server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health grpc/reflection
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry
+server/endpoint/datagram | server/endpoint/listen server/session server/hosting server/delivery server/schedule server/messages server/telemetry proto/datagram proto/dtls proto/ice proto/sctp proto/tls
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/files proto/recording server/events server/hosting server/recording server/step server/scene server/model
 server/program     | server/agones server/events server/fleet proto/recording proto/text server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan

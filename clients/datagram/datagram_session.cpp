@@ -177,7 +177,7 @@ void DatagramSession::end(std::string why) {
 }
 
 cs_datagram_statistics DatagramSession::statistics() const {
-  cs_datagram_statistics sum;
+  cs_datagram_statistics sum{};
   if (link_) cs_get_datagram_statistics(link_.get(), nowUs(), &sum);
   add(sum, earlier_);
   return sum;

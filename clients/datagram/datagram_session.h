@@ -86,7 +86,7 @@ class DatagramSession {
   std::optional<Association> association_;
   bool hasOpened_ = false;
   std::string why_ = "the server has not answered the offer";
-  cs_datagram_statistics earlier_;  // of the links before this one
+  cs_datagram_statistics earlier_{};  // of the links before this one
 };
 
 }  // namespace clothstream

@@ -59,7 +59,7 @@ struct LoadReport {
   std::vector<float> participantRates;  // frames/s of each participant that is not slow
   // Number of participants with datagrams at the end, and the sum of their figures.
   std::uint32_t withDatagrams = 0;
-  cs_datagram_statistics datagrams;
+  cs_datagram_statistics datagrams{};
 
   // Average rates over the measured time: frames per participant, and Mbit of all clients.
   double framesPerSecond() const;

@@ -31,7 +31,7 @@ version=$(tar -xOf "$work/root.tar" ./var/lib/dpkg/status |
   awk '/^Package: / { found = $2 == "clothstream-server" } found && /^Version: / { sub(/\+deb.*/, "", $2); print $2 }')
 container=$(buildah from scratch)
 buildah add --quiet "$container" "$work/root.tar" / >/dev/null
-buildah config --user $kUser:$kUser --workingdir /var/lib/clothstream --port 8080/tcp --port 50051/tcp \
+buildah config --user $kUser:$kUser --workingdir /var/lib/clothstream --port 8080/tcp --port 8080/udp --port 50051/tcp \
   --volume /var/lib/clothstream --volume /var/cache/clothstream \
   --env CLOTHSTREAM_STATE_DIR=/var/lib/clothstream --env CLOTHSTREAM_CACHE_DIR=/var/cache/clothstream \
   --env NVIDIA_VISIBLE_DEVICES=all --env NVIDIA_DRIVER_CAPABILITIES=graphics,compute,utility \

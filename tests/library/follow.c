@@ -230,7 +230,12 @@ static int has_what_it_wants(const char* address) {
   options.quality = 4;
   CHECK(clothstream_open(address, &options, &stream) == CLOTHSTREAM_INVALID);
   options.quality = 1;
+  options.transport = CLOTHSTREAM_TRANSPORT_TCP + 1;
+  CHECK(clothstream_open(address, &options, &stream) == CLOTHSTREAM_INVALID);
+  options.transport = CLOTHSTREAM_TRANSPORT_TCP;
   CHECK(clothstream_open(address, &options, &stream) == CLOTHSTREAM_OK);
+  cs_datagram_statistics datagrams = {.version = CS_DATAGRAM_STATISTICS_VERSION};
+  CHECK(clothstream_get_datagram_statistics(stream, &datagrams) == 0);
   uint64_t tick = 0;
   const uint64_t end_us = clothstream_now_us() + 60 * kSecond;
   for (unsigned frames = 0; frames < 20;) {

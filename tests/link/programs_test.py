@@ -38,14 +38,21 @@ class Programs(unittest.TestCase):
         return json.loads(ended.stdout)
 
     def test_frames_arrive_and_are_right(self):
-        for options in ([self.server.address], ["--web", self.server.url.split("/")[2]]):
-            report = self.load(*options)
+        web = ["--web", self.server.url.split("/")[2]]
+        for way, options in (("tcp", [self.server.address]), ("tcp", web), ("datagrams", [self.server.address]),
+                             ("datagrams", web)):
+            report = self.load(*options, "--transport", way)
             self.assertEqual((report["joined"], report["lost"]), (1, 0))
             self.assertEqual((report["decodeErrors"], report["hashMismatches"]), (0, 0))
             self.assertGreater(report["framesPerSecond"], 5)
             # The clock of the server is estimated through the link.
             self.assertGreater(report["tickAgeMsP50"], DELAY_MS - 5)
             self.assertGreater(report["poseToDisplayableMsP50"], 2 * DELAY_MS)
+            self.assertEqual(report["withDatagrams"], int(way == "datagrams"))
+            if way == "datagrams":
+                # All frames but the first few, which the stream carries.
+                self.assertGreater(report["datagrams"]["frames"], 0.9 * report["framesPerSecond"] * report["seconds"])
+                self.assertLess(report["datagrams"]["lostFrames"], 3)
         self.server.end()
         for statistics in self.link.end().values():
             self.assertGreater(statistics["lost"], 0)

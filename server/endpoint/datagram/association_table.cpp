@@ -31,18 +31,7 @@ void AssociationTable::add(ice::Credentials local, hosting::DatagramPeer peer, s
       [this](const Address& from) { return admit(from); }, now);
   Entry& entry = entries_[ufrag];
   entry.association = std::move(association);
-  run(entry, [&] { advance(entry, now); });
-}
-
-template <typename Step>
-void AssociationTable::run(Entry& entry, Step step) {
-  try {
-    step();
-  } catch (const std::exception& failure) {
-    spdlog::error("an association of datagrams ends: {}", failure.what());
-    current_.reset();
-    remove(std::string(entry.association->ufrag()));
-  }
+  attempt(entry, [&] { advance(entry, now); });
 }
 
 void AssociationTable::remove(const std::string& ufrag) {
@@ -62,19 +51,32 @@ void AssociationTable::clear() {
 
 void AssociationTable::handle(const Route& route, std::span<const std::byte> datagram, Time now) {
   if (datagram.empty()) return;
-  std::vector<Entry*> receivers;
+  const auto give = [&](Entry& entry) { attempt(entry, [&] { handle(entry, route, datagram, now); }); };
   const auto proven = proven_.find(route.peer);
   if (Entry* const named = findByName(datagram)) {
-    receivers.push_back(named);
+    give(*named);
   } else if (proven != proven_.end() && !ice::isStun(datagram)) {
-    receivers.push_back(proven->second);
+    give(*proven->second);
   } else {
-    // An answer to a check has no name, and several associations may await one from there.
+    // An answer to a check has no name, and several associations may await one from there. So do records that
+    // come before the answer.
+    std::vector<Entry*> receivers;
     if (proven != proven_.end()) receivers.push_back(proven->second);
     for (auto [each, end] = checked_.equal_range(route.peer); each != end; ++each)
       receivers.push_back(each->second);
+    for (Entry* const entry : receivers) give(*entry);
   }
-  for (Entry* const entry : receivers) run(*entry, [&] { handle(*entry, route, datagram, now); });
+}
+
+template <typename Step>
+void AssociationTable::attempt(Entry& entry, Step step) {
+  try {
+    step();
+  } catch (const std::exception& failure) {
+    spdlog::error("an association of datagrams ends: {}", failure.what());
+    current_.reset();
+    remove(std::string(entry.association->ufrag()));
+  }
 }
 
 // Association of a check, by its user name "SERVER:CLIENT" (RFC 8445, section 7.2.2).
@@ -129,7 +131,7 @@ void AssociationTable::forget(Entry& entry, std::optional<Route> Entry::*route) 
 
 void AssociationTable::wake(const std::string& ufrag, Time now) {
   if (const auto found = entries_.find(ufrag); found != entries_.end())
-    run(found->second, [&] { advance(found->second, now); });
+    attempt(found->second, [&] { advance(found->second, now); });
 }
 
 void AssociationTable::advance(Time now) {
@@ -138,7 +140,7 @@ void AssociationTable::advance(Time now) {
     if (entry.association->isOver(now))
       remove(std::string(entry.association->ufrag()));
     else
-      run(entry, [&] { advance(entry, now); });
+      attempt(entry, [&] { advance(entry, now); });
   }
 }
 

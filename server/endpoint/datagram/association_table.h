@@ -75,10 +75,10 @@ class AssociationTable {
     std::size_t operator()(const Address& address) const;
   };
 
-  Entry* findByName(std::span<const std::byte> datagram);
-  // Runs a step of an association. If it throws std::exception, the association ends.
+  // Does the step. Ends the association if it throws, because OpenSSL or the kernel fails.
   template <typename Step>
-  void run(Entry& entry, Step step);
+  void attempt(Entry& entry, Step step);
+  Entry* findByName(std::span<const std::byte> datagram);
   void handle(Entry& entry, const Route& route, std::span<const std::byte> datagram, Time now);
   // Lets the association do what is due, and notes when that is next.
   void advance(Entry& entry, Time now);

@@ -123,13 +123,13 @@ std::uint16_t DatagramEndpoint::port() const {
 
 std::optional<hosting::DatagramGate::Opened> DatagramEndpoint::open(hosting::DatagramPeer peer) {
   State& state = *state_;
+  ice::Credentials local = ice::randomCredentials();
   if (++state.peers > state.options.maxPeers) {
     --state.peers;
     spdlog::warn("{}: stays on its stream: {} peers have datagrams, the maximum", peer.name,
                  state.options.maxPeers);
     return std::nullopt;
   }
-  ice::Credentials local = ice::randomCredentials();
   Opened opened;
   opened.answer.set_ufrag(local.ufrag);
   opened.answer.set_password(local.password);

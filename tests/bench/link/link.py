@@ -43,12 +43,13 @@ PLOTTED = "2"  # condition of which rows keep the age of each frame
 
 Transport = collections.namedtuple("Transport", ["server_options", "load_arguments"])
 TRANSPORTS = {
-    "websocket": Transport([], lambda server: ["--web", server.url.split("/")[2]]),
-    "grpc": Transport([], lambda server: [server.address]),
+    "websocket": Transport([], lambda server: ["--web", server.url.split("/")[2], "--transport", "tcp"]),
+    "grpc": Transport([], lambda server: [server.address, "--transport", "tcp"]),
+    "datagrams": Transport([], lambda server: ["--web", server.url.split("/")[2], "--transport", "datagrams"]),
 }
 # Figures of the load test that rows keep.
 KEPT = ("poseToDisplayableMsP50", "poseToDisplayableMsP99", "framesPerSecond", "tickAgeMsP50", "tickAgeMsP99",
-        "decodedToDisplayableMsP50", "poses", "dropped", "mbitPerSecond")
+        "decodedToDisplayableMsP50", "poses", "dropped", "mbitPerSecond", "datagrams")
 
 
 def link_options(condition, congestion, seed):

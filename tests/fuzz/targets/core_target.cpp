@@ -68,6 +68,9 @@ class Program {
   explicit Program(const CoreInput& input) : input_(input) {}
 
   void run() {
+    const cs_datagram_offer offer{
+        .ufrag = "abcd", .password = "0123456789abcdefghijkl", .fingerprint = {}, .sctp = 1};
+    cs_offer_datagrams(client(), &offer);
     int steps = 0;
     for (const CoreInput::Step& step : input_.steps()) {
       if (++steps > kMaxSteps) break;
@@ -451,6 +454,11 @@ void Program::requestScene(std::uint32_t index, const char* text) {
 }
 
 void Program::readAnswers() {
+  cs_datagram_answer datagrams;
+  if (cs_get_datagram_answer(client(), &datagrams) != 0) {
+    require((datagrams.addresses == 0) == (datagrams.port == 0), "addresses have a port");
+    for (std::uint32_t i = 0; i <= datagrams.addresses; ++i) expectText(cs_datagram_address(client(), i));
+  }
   cs_answer answer;
   if (cs_get_answer(client(), &answer) != 0) {
     require(answer.request_id != 0 && answer.request >= CS_REQUEST_CREATE_SCENE, "answers name a request");

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "clients/core/core.h"
 #include "inputs.pb.h"
 #include "proto/datagram/frame_assembly.h"
 #include "proto/datagram/frame_pieces.h"
@@ -57,7 +58,36 @@ void use(datagram::FrameAssembly& assembly, std::uint64_t nowUs) {
   require(!due || *due > nowUs, "nothing is due that was just done");
 }
 
+// The same datagrams for the client core, which also gets each input as a message of the stream.
+class Core {
+ public:
+  void receive(const Bytes& bytes, std::uint64_t nowUs) {
+    const auto* const data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+    cs_receive_datagram(datagrams_.get(), data, bytes.size(), nowUs);
+    use(nowUs);
+    cs_hold_message(datagrams_.get(), data, bytes.size(), nowUs);
+    cs_send_in_datagram(datagrams_.get(), data, bytes.size(), nowUs);
+    use(nowUs);
+  }
+
+  void use(std::uint64_t nowUs) {
+    std::size_t bytes = 0;
+    while (cs_next_datagram_message(datagrams_.get(), nowUs, &bytes))
+      require(bytes > 0, "messages are not empty");
+    while (cs_next_datagram(datagrams_.get(), nowUs, &bytes))
+      require(bytes > 0 && bytes <= CS_MAX_DATAGRAM_BYTES, "a datagram has a possible length");
+    while (cs_next_stream_message(datagrams_.get(), nowUs, &bytes))
+      require(bytes > 0, "messages are not empty");
+    require(cs_datagrams_due_at(datagrams_.get()) > nowUs, "nothing is due that was just done");
+  }
+
+ private:
+  std::unique_ptr<cs_datagrams, decltype(&cs_destroy_datagrams)> datagrams_{cs_create_datagrams(),
+                                                                            &cs_destroy_datagrams};
+};
+
 void run(const PiecesInput& input) {
+  Core core;
   datagram::FrameAssembly assembly;
   std::uint64_t nowUs = 0;
   int steps = 0;
@@ -74,6 +104,8 @@ void run(const PiecesInput& input) {
       bytes.assign(raw.begin(), raw.end());
     }
     bytes.shrink_to_fit();
+    core.use(nowUs);
+    core.receive(bytes, nowUs);
     const auto piece = datagram::parsePiece(bytes);
     if (!piece) continue;
     checkReadAsWritten(*piece, bytes);
