@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -195,6 +194,16 @@ TEST_F(FrameLinkTest, IgnoresForeignPayloads) {
   link.receive(std::span(out).first(writeReceipt({.newest = 1'000'000}, out)), now);
   pass(100ms);
   EXPECT_EQ(metrics.peers, 1u);
+}
+
+TEST(FrameSenderTest, ProbeFillsFrameWhereThereIsRoom) {
+  const Clock::time_point now{1h};
+  FrameSender sender(kHeaders);
+  EXPECT_EQ(sender.rowsFor(4500, false, now), 1u);
+  EXPECT_EQ(sender.rowsFor(4500, true, now), 2u) << "4 data pieces are filled up to 1.59 times their size";
+  SharedPieces pieces;
+  sender.add(pieces.of(std::make_shared<const Bytes>(12'000), 0), 0, now);
+  EXPECT_EQ(sender.rowsFor(4500, true, now), 1u);
 }
 
 // Peers of a scene share the pieces of a frame.
