@@ -178,7 +178,8 @@ export class Connection {
   }
 
   private send(message: Uint8Array<ArrayBuffer>): void {
-    if (!this.datagrams?.send(message)) this.socket.send(message);
+    if (this.datagrams) this.datagrams.send(message);
+    else this.socket.send(message);
   }
 
   private receive(bytes: ArrayBuffer): void {

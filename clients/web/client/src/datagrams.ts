@@ -52,11 +52,11 @@ export class Datagrams {
     this.pump(held === 0 ? message : undefined);
   }
 
-  // Takes a message to the server. False: it must travel on the stream.
-  send(message: Uint8Array): boolean {
+  // Takes a message to the server, which travels in datagrams or on the stream.
+  send(message: Uint8Array<ArrayBuffer>): void {
     const taken = this.core.exports.cs_send_in_datagram(this.pointer, this.buffer.write(message), message.byteLength, this.nowUs());
-    if (taken !== 0) this.pump();
-    return taken !== 0;
+    if (taken === 0) this.listener.streamMessage(message);
+    this.pump();
   }
 
   // Whether datagrams can be sent now.
