@@ -44,6 +44,17 @@ bool Client::renew(std::string_view token) {
   return true;
 }
 
+bool Client::offerDatagrams(const cs_datagram_offer& offer) {
+  if (!isAllowed(offer) || stream_.newest().isMirror() || state_ == CS_STATE_FAILED || !datagrams_.mayOffer())
+    return false;
+  const std::uint64_t id = requests_.nextId();
+  std::string message;
+  writeDatagramOffer(message, id, offer);
+  outbox_.setOffer(std::move(message));
+  datagrams_.offered(id);
+  return true;
+}
+
 void Client::want(std::uint32_t finest) {
   hello_.quality = finest;
   if (outbox_.helloWaits()) sendHello();
@@ -67,6 +78,7 @@ void Client::connecting(std::uint64_t nowUs) {
   credentials_.forgetRenewal();
   if (timer_.isWelcomed()) disconnected(nowUs);
   redirection_.attempting();
+  datagrams_.connecting();
   outbox_.clear();
   requests_.forget();
   stream_.connecting();
@@ -79,6 +91,7 @@ void Client::disconnected(std::uint64_t nowUs) {
   if (state_ == CS_STATE_FAILED) return;
   if (!welcome_.token.empty()) state_ = CS_STATE_RECONNECTING;
   redirection_.ended();
+  datagrams_.disconnected();
   stream_.acknowledgements().connectionEnded();
   outbox_.clear();
   requests_.forget();
@@ -100,7 +113,7 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
     case Body::welcome:
       return welcomed(message->body, nowUs);
     case Body::chunk:
-      return chunkReceived(message->body);
+      return chunkReceived(message->body, nowUs);
     case Body::frame:
       return frameReceived(message->body, nowUs, decoded);
     case Body::pong:
@@ -127,6 +140,8 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
       return tokenReceived(message->body);
     case Body::createPairingCode:
       return pairingCodeReceived(message->body);
+    case Body::datagramAnswer:
+      return datagramAnswerReceived(message->body);
     case Body::getScene:
     case Body::createScene:
     case Body::deleteScene:
@@ -205,32 +220,36 @@ std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
   return CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE;
 }
 
-std::uint32_t Client::chunkReceived(Bytes body) {
+std::uint32_t Client::chunkReceived(Bytes body, std::uint64_t nowUs) {
   const std::optional<Chunk> chunk = readChunk(body);
   if (!chunk) return failMalformed("Chunk");
   if (!timer_.isWelcomed()) return fail("The server sent a description before its Welcome.");
   auto begun = stream_.add(*chunk, limits_, resumed_);
   if (!begun) return fail(std::move(begun.error()));
-  return *begun ? described() : 0;
+  return *begun ? described(nowUs) : 0;
 }
 
-std::uint32_t Client::described() {
+std::uint32_t Client::described(std::uint64_t nowUs) {
   display_.begin(stream_.description());
   hello_.contentId = welcome_.contentId;
   const bool returned = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
   redirection_.joined();
+  if (datagrams_.takeMissedFrame()) requestKeyFrame(nowUs);
   return returned ? CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED : CS_EVENT_DESCRIPTION;
 }
 
 std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs, const cs_decoded* decoded) {
-  if (state_ != CS_STATE_JOINED) return fail("The server sent a frame before the description.");
+  const bool isMirror = stream_.newest().isMirror();
+  if (state_ != CS_STATE_JOINED) {
+    if (isMirror || datagrams_.missFrame()) return 0;
+    return fail("The server sent a frame before the description.");
+  }
   const auto received = stream_.receive(body, decoded, nowUs);
   if (!received) return failMalformed(received.error());
   if (received->needsKeyFrame) requestKeyFrame(nowUs);
   if (!received->isNew) return 0;
   const std::uint64_t tick = stream_.newest().tick();
-  const bool isMirror = stream_.newest().isMirror();
   if (!isMirror && stream_.acknowledgements().decoded(tick, inLockstep(), nowUs)) outbox_.setAck(tick);
   stream_.measure(clock_, nowUs);
   if (display_.playsOut()) {
@@ -299,6 +318,7 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::ui
   std::optional<ServerError> error = readError(body);
   if (!error) return failMalformed("Error");
   if (!error->fatal) {
+    if (datagrams_.refused(requestId)) return CS_EVENT_DATAGRAMS;
     // Pieces that were under way when the server refused an upload are refused as well.
     if (requests_.isOfEndedUpload(requestId)) return 0;
     if (requests_.refused(requestId, *error) == Requests::Outcome::answered) return CS_EVENT_ANSWER;
@@ -357,6 +377,12 @@ std::uint32_t Client::operatingPointReceived(Bytes body) {
   if (!quality) return failMalformed("OperatingPoint");
   stream_.operatingPoint(*quality);
   return 0;
+}
+
+std::uint32_t Client::datagramAnswerReceived(Bytes body) {
+  std::optional<DatagramAnswer> answer = readDatagramAnswer(body);
+  if (!answer) return failMalformed("DatagramAnswer");
+  return datagrams_.answered(std::move(*answer)) ? CS_EVENT_DATAGRAMS : 0;
 }
 
 std::uint32_t Client::playbackReceived(Bytes body, std::uint64_t nowUs) {

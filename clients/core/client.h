@@ -13,6 +13,7 @@
 #include "clients/core/display.h"
 #include "clients/core/stream/connection_timer.h"
 #include "clients/core/stream/credentials.h"
+#include "clients/core/stream/datagram_negotiation.h"
 #include "clients/core/stream/outbox.h"
 #include "clients/core/stream/participants.h"
 #include "clients/core/stream/playback_position.h"
@@ -51,6 +52,8 @@ class Client {
   bool resume(std::string_view text);
   // Whether the program opens connections at connectServer().
   void followRedirects(bool on) { redirection_.enable(on); }
+  // Returns false if the offer is not allowed, or cannot be made now.
+  bool offerDatagrams(const cs_datagram_offer& offer);
   // Has no effect on the current connection if its Hello is sent already.
   void want(std::uint32_t finest);
 
@@ -110,6 +113,8 @@ class Client {
   bool resumed() const { return resumed_; }
   // Empty before the first Welcome.
   std::string resumeToken() const;
+  // The answer to the newest offer on the present connection.
+  const std::optional<DatagramAnswer>& datagramAnswer() const { return datagrams_.answer(); }
   const Participants& participants() const { return participants_; }
   const Welcome& welcome() const { return welcome_; }
   const ReceivedStream& stream() const { return stream_; }
@@ -139,8 +144,8 @@ class Client {
   bool mayCollide() const;
   std::uint32_t welcomed(Bytes body, std::uint64_t nowUs);
   std::uint32_t presenceReceived(Bytes body, std::uint64_t nowUs);
-  std::uint32_t chunkReceived(Bytes body);
-  std::uint32_t described();
+  std::uint32_t chunkReceived(Bytes body, std::uint64_t nowUs);
+  std::uint32_t described(std::uint64_t nowUs);
   std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs, const cs_decoded* decoded);
   void requestKeyFrame(std::uint64_t nowUs, bool early = false);
   std::uint32_t pongReceived(Bytes body, std::uint64_t requestId, std::uint64_t nowUs);
@@ -155,6 +160,7 @@ class Client {
   std::uint32_t tokenReceived(Bytes body);
   std::uint32_t pairingCodeReceived(Bytes body);
   std::uint32_t operatingPointReceived(Bytes body);
+  std::uint32_t datagramAnswerReceived(Bytes body);
   // Sends a request that `write(message, id)` serialises. Returns its id, or 0.
   template <typename Write>
   std::uint64_t request(cs_request kind, Write write);
@@ -178,6 +184,7 @@ class Client {
   Participants participants_;
   ConnectionTimer timer_;
   Redirection redirection_;
+  DatagramNegotiation datagrams_;
   Limits limits_;
   ReceivedStream stream_;
   ServerClock clock_;

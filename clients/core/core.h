@@ -991,7 +991,7 @@ const uint32_t* cs_constraint_ends(const cs_client* client, uint32_t index, uint
 /* What the server needs to recognise this client (DatagramOffer in session.proto). */
 typedef struct cs_datagram_offer {
   uint32_t version CS_INIT(CS_DATAGRAM_OFFER_VERSION);
-  const char* ufrag;       /* of ICE: 4 to 256 letters, digits, + and / (RFC 8839 section 5.4) */
+  const char* ufrag;       /* of ICE: 4 to 64 letters, digits, + and / (RFC 8839 section 5.4) */
   const char* password;    /* of ICE: 22 to 256 of these */
   uint8_t fingerprint[32]; /* SHA-256 of the client's certificate for DTLS */
   int32_t sctp; /* 1: the datagrams are those of a data channel (WebRTC); 0: those of DTLS itself */
@@ -1013,12 +1013,12 @@ typedef struct cs_datagram_answer {
  * association with it. Strings are copied. Fails, and changes nothing, for an unknown version, a member that
  * is not allowed, on a mirror, and while there is no connection. */
 int cs_offer_datagrams(cs_client* client, const cs_datagram_offer* offer) CS_NOEXCEPT;
-/* The newest answer on the present connection. Fails before it, and if `out->version` is unknown. Strings are
- * valid until the next CS_EVENT_DATAGRAMS. */
+/* The answer to the newest offer. Fails before it, and if `out->version` is unknown. Strings are valid until
+ * the next offer, CS_EVENT_DATAGRAMS or end of the connection. */
 int cs_get_datagram_answer(const cs_client* client, cs_datagram_answer* out) CS_NOEXCEPT;
 /* An address of the answer, the preferred one first: such as "192.0.2.1" or "2001:db8::1", at most 45
- * characters out of [0-9A-Fa-f:.]. It can be malformed otherwise. "" if the index is out of range. Valid
- * until the next CS_EVENT_DATAGRAMS. */
+ * characters out of [0-9A-Fa-f:.]. It can be malformed otherwise. "" if the index is out of range. Valid as
+ * long as the answer. */
 const char* cs_datagram_address(const cs_client* client, uint32_t index) CS_NOEXCEPT;
 
 #define CS_MAX_DATAGRAM_BYTES 1150u

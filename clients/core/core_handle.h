@@ -25,8 +25,8 @@ const Element* at(const std::vector<Element>& elements, std::uint32_t index) {
   return index < elements.size() ? &elements[index] : nullptr;
 }
 
-template <typename Values>
-void copy(const Values& values, float* out) {
+template <typename Values, typename Number>
+void copy(const Values& values, Number* out) {
   std::copy(values.begin(), values.end(), out);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Order of messages: proof of identity, Hello, control, acknowledgement, poses.
+// Order of messages: proof of identity, Hello, offer of datagrams, control, acknowledgement, poses.
 #include "clients/core/stream/outbox.h"
 
 namespace clothstream::client {
@@ -13,6 +13,7 @@ bool Outbox::addControl(std::string message) {
 void Outbox::clear() {
   proof_.clear();
   hello_.clear();
+  offer_.clear();
   control_.clear();
   poses_.clear();
   ackTick_.reset();
@@ -25,6 +26,9 @@ const std::string* Outbox::next() {
   } else if (!hello_.empty()) {
     taken_.swap(hello_);
     hello_.clear();
+  } else if (!offer_.empty()) {
+    taken_.swap(offer_);
+    offer_.clear();
   } else if (!control_.empty()) {
     taken_ = std::move(control_.front());
     control_.pop_front();

@@ -13,7 +13,7 @@
 namespace clothstream::client {
 
 // Keeps only the newest acknowledgement and the newest poses. The proof of identity is sent first, then
-// Hello, then the control messages in order.
+// Hello, the offer of datagrams, then the control messages in order.
 class Outbox {
  public:
   // Limit of waiting control messages. At the limit the transport has stopped sending.
@@ -24,6 +24,8 @@ class Outbox {
   // Replaces a Hello that waits.
   void setHello(std::string hello) { hello_ = std::move(hello); }
   bool helloWaits() const { return !hello_.empty(); }
+  // Replaces an offer of datagrams that waits.
+  void setOffer(std::string offer) { offer_ = std::move(offer); }
   // Returns false if the queue is full.
   [[nodiscard]] bool addControl(std::string message);
   void setAck(std::uint64_t tick) { ackTick_ = tick; }
@@ -37,6 +39,7 @@ class Outbox {
  private:
   std::string proof_;  // empty if none waits
   std::string hello_;  // empty if none waits
+  std::string offer_;  // empty if none waits
   std::deque<std::string> control_;
   std::string poses_;  // empty if none wait
   std::optional<std::uint64_t> ackTick_;

@@ -392,6 +392,7 @@ struct ClientMessage {
   static constexpr Field kCreatePairingCode{61, WireType::kBytes};
   static constexpr Field kListBans{62, WireType::kBytes};
   static constexpr Field kLiftBan{63, WireType::kBytes};
+  static constexpr Field kDatagramOffer{70, WireType::kBytes};
 };
 struct ServerMessage {
   static constexpr Field kRequestId{1, WireType::kVarint};
@@ -418,6 +419,7 @@ struct ServerMessage {
   static constexpr Field kCreatePairingCode{61, WireType::kBytes};
   static constexpr Field kListBans{62, WireType::kBytes};
   static constexpr Field kLiftBan{63, WireType::kBytes};
+  static constexpr Field kDatagramAnswer{70, WireType::kBytes};
 };
 struct Hello {
   static constexpr Field kProtocolVersion{1, WireType::kVarint};
@@ -708,6 +710,19 @@ struct GrabEvent {
   static constexpr Field kVertices{4, WireType::kVarint};
   static constexpr Field kDistance{5, WireType::kFixed32};
   static constexpr Field kTicksSinceSeen{6, WireType::kVarint};
+};
+struct DatagramOffer {
+  static constexpr Field kUfrag{1, WireType::kBytes};
+  static constexpr Field kPassword{2, WireType::kBytes};
+  static constexpr Field kFingerprint{3, WireType::kBytes};
+  static constexpr Field kSctp{4, WireType::kVarint};
+};
+struct DatagramAnswer {
+  static constexpr Field kUfrag{1, WireType::kBytes};
+  static constexpr Field kPassword{2, WireType::kBytes};
+  static constexpr Field kFingerprint{3, WireType::kBytes};
+  static constexpr Field kAddresses{4, WireType::kBytes};
+  static constexpr Field kPort{5, WireType::kVarint};
 };
 struct Ping {
   static constexpr Field kClientTimeUs{1, WireType::kVarint};

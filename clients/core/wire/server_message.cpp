@@ -94,7 +94,7 @@ Body bodyOf(std::uint32_t tag) {
                               Body::deleteScene,    Body::controlScene,
                               Body::startRecording, Body::stopRecording,
                               Body::listBans,       Body::liftBan,
-                              Body::moving};
+                              Body::moving,         Body::datagramAnswer};
   for (const Body body : kKnown) {
     if (tag == bytes(static_cast<std::uint32_t>(body))) return body;
   }

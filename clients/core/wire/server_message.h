@@ -41,6 +41,7 @@ enum class Body : std::uint32_t {
   stopRecording = field::ServerMessage::kStopRecording.number,
   listBans = field::ServerMessage::kListBans.number,
   liftBan = field::ServerMessage::kLiftBan.number,
+  datagramAnswer = field::ServerMessage::kDatagramAnswer.number,
 };
 
 // An unknown kind of body is `none`.

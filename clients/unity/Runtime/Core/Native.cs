@@ -1107,7 +1107,7 @@ namespace ClothStream.Core
     {
         [FieldOffset(0)] public uint version;
         /// <summary>
-        /// of ICE: 4 to 256 letters, digits, + and / (RFC 8839 section 5.4)
+        /// of ICE: 4 to 64 letters, digits, + and / (RFC 8839 section 5.4)
         /// </summary>
         [FieldOffset(8)] public byte* ufrag;
         /// <summary>
@@ -1834,14 +1834,14 @@ namespace ClothStream.Core
         /// </summary>
         [DllImport(Library)] public static extern int cs_offer_datagrams(IntPtr client, DatagramOffer* offer);
         /// <summary>
-        /// The newest answer on the present connection. Fails before it, and if `out->version` is unknown. Strings are
-        /// valid until the next CS_EVENT_DATAGRAMS.
+        /// The answer to the newest offer. Fails before it, and if `out->version` is unknown. Strings are valid until
+        /// the next offer, CS_EVENT_DATAGRAMS or end of the connection.
         /// </summary>
         [DllImport(Library)] public static extern int cs_get_datagram_answer(IntPtr client, DatagramAnswer* @out);
         /// <summary>
         /// An address of the answer, the preferred one first: such as "192.0.2.1" or "2001:db8::1", at most 45
-        /// characters out of [0-9A-Fa-f:.]. It can be malformed otherwise. "" if the index is out of range. Valid
-        /// until the next CS_EVENT_DATAGRAMS.
+        /// characters out of [0-9A-Fa-f:.]. It can be malformed otherwise. "" if the index is out of range. Valid as
+        /// long as the answer.
         /// </summary>
         [DllImport(Library)] public static extern byte* cs_datagram_address(IntPtr client, uint index);
         [DllImport(Library)] public static extern IntPtr cs_create_datagrams();

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "clients/core/datagrams/datagram_link.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "proto/datagram/piece.h"
+#include "proto/datagram/piece_request.h"
+
+namespace clothstream::client {
+
+static_assert(CS_MAX_DATAGRAM_BYTES == datagram::kMaxDatagramBytes);
+
+namespace {
+
+// Poses that move attachments or joints are sent once, so they must not be lost.
+bool repeatsEverything(Bytes poses) {
+  using F = field::ColliderPoses;
+  return readFields(poses, [](std::uint32_t tag, Reader& reader) {
+    return tag != F::kAttachments.tag && tag != F::kJoints.tag && skip(reader);
+  });
+}
+
+// What matters about an outgoing ClientMessage.
+struct Outgoing {
+  bool isPoses = false;
+  bool mayBeLost = false;  // later messages replace it
+};
+
+Outgoing classify(Bytes message) {
+  using F = field::ClientMessage;
+  Outgoing found;
+  const bool isWhole = readFields(message, [&](std::uint32_t tag, Reader& reader) {
+    if (tag == F::kColliderPoses.tag) {
+      found = {.isPoses = true, .mayBeLost = repeatsEverything(reader.get_view())};
+      return true;
+    }
+    found.mayBeLost |= tag == F::kFrameAck.tag || tag == F::kKeyFrameRequest.tag;
+    return skip(reader);
+  });
+  return isWhole ? found : Outgoing();
+}
+
+std::span<const std::byte> asBytes(Bytes message) {
+  return std::as_bytes(std::span(message.data(), message.size()));
+}
+
+Bytes asMessage(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+}  // namespace
+
+void DatagramLink::count(const datagram::Piece& piece) {
+  const std::uint32_t packet = piece.prefix.packet;
+  if (packets_++ == 0) newestPacket_ = packet;
+  const std::int32_t ahead = datagram::steps(static_cast<std::uint32_t>(newestPacket_), packet);
+  if (ahead > 0) newestPacket_ += static_cast<std::uint32_t>(ahead);
+  if (piece.index >= piece.dataPieces) ++parityPackets_;
+}
+
+void DatagramLink::receive(std::span<const std::byte> datagram, std::uint64_t nowUs) {
+  const std::optional<datagram::Piece> piece = datagram::parsePiece(datagram);
+  if (!piece) return;
+  heardUs_ = nowUs;
+  count(*piece);
+  received_.add(piece->prefix.packet, nowUs);
+  const std::uint64_t before = assembly_.statistics().frames;
+  assembly_.add(*piece, nowUs);
+  completed_ |= assembly_.statistics().frames > before;
+}
+
+bool DatagramLink::holds(Bytes message, std::uint64_t nowUs) {
+  // Before the first frame of the stream, the client may have had others.
+  return !order_.passes(message, order_.hasPassed(), nowUs);
+}
+
+bool DatagramLink::sends(Bytes message, std::uint64_t nowUs) {
+  const Outgoing outgoing = classify(message);
+  if (outgoing.isPoses) unsettled_.reset();
+  if (!outgoing.mayBeLost || !inUse(nowUs) || message.size() > datagram::kMaxInputBytes) return false;
+  if (outgoing.isPoses) unsettled_ = {std::string(message.data(), message.size()), nowUs};
+  if (waiting_.size() == kMaxWaiting) waiting_.pop_front();
+  Datagram& out = waiting_.emplace_back();
+  out.size = input_.write(asBytes(message), nowUs, out.bytes);
+  return true;
+}
+
+Bytes DatagramLink::nextMessage(std::uint64_t nowUs) {
+  message_ = order_.next(nowUs);
+  if (!message_.empty()) return {message_.data(), message_.size()};
+  while (const auto frame = assembly_.next(nowUs)) {
+    const Bytes message = asMessage(frame->message);
+    if (order_.passes(message, !frame->afterGap, nowUs)) return message;
+    message_ = order_.next(nowUs);
+    if (!message_.empty()) return {message_.data(), message_.size()};
+  }
+  return {};
+}
+
+std::span<const std::byte> DatagramLink::nextDatagram(std::uint64_t nowUs) {
+  const auto written = [&](std::size_t size) { return std::span(datagram_.bytes).first(size); };
+  if (!waiting_.empty()) {
+    datagram_ = waiting_.front();
+    waiting_.pop_front();
+    return written(datagram_.size);
+  }
+  if (const auto repeatUs = input_.repeatUs(); repeatUs && nowUs >= *repeatUs)
+    return written(input_.repeat(nowUs, datagram_.bytes));
+  if (const auto request = assembly_.nextRequest(nowUs))
+    return written(datagram::writeRequest(*request, datagram_.bytes));
+  if (const auto due = received_.dueUs(); due && (completed_ || nowUs >= *due)) {
+    completed_ = false;
+    return written(datagram::writeReceipt(*received_.take(), datagram_.bytes));
+  }
+  return {};
+}
+
+Bytes DatagramLink::nextStreamMessage(std::uint64_t nowUs) {
+  if (!unsettled_ || nowUs < unsettled_->sentUs + kSettleUs) return {};
+  message_ = std::exchange(unsettled_, std::nullopt)->message;
+  return {message_.data(), message_.size()};
+}
+
+std::optional<std::uint64_t> DatagramLink::dueUs() const {
+  std::optional<std::uint64_t> due;
+  const auto include = [&](std::optional<std::uint64_t> us) {
+    if (us) due = due ? std::min(*due, *us) : us;
+  };
+  include(assembly_.dueUs());
+  include(order_.dueUs());
+  include(received_.dueUs());
+  include(input_.repeatUs());
+  if (unsettled_) include(unsettled_->sentUs + kSettleUs);
+  return due;
+}
+
+cs_datagram_statistics DatagramLink::statistics(std::uint64_t nowUs) const {
+  const datagram::AssemblyStatistics& frames = assembly_.statistics();
+  const std::uint64_t sent = packets_ > 0 ? newestPacket_ + 1 : 0;
+  return {.version = CS_DATAGRAM_STATISTICS_VERSION,
+          .in_use = inUse(nowUs) ? 1 : 0,
+          .packets = packets_,
+          .lost_packets = sent - std::min(packets_, sent),
+          .parity_packets = parityPackets_,
+          .frames = frames.frames,
+          .repaired_frames = frames.repairedFrames,
+          .lost_frames = frames.lostFrames,
+          .requests = frames.requests,
+          .held_frames = order_.heldFrames()};
+}
+
+}  // namespace clothstream::client
