@@ -51,6 +51,7 @@ server/options     | server/files proto/recording server/events server/hosting s
 server/program     | server/agones server/events server/fleet proto/recording proto/text server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
 server/main.cpp    | proto/text server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
+clients/core/datagrams | clients/core/core.h clients/core/wire proto/codec proto/datagram
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/touch | clients/core/core.h clients/core/wire proto/codec proto/hands
 clients/core/wire  | clients/core/core.h proto/codec proto/parameters proto/text proto/wire
@@ -59,12 +60,13 @@ clients/native     | clients/core proto/text
 clients/grpc       | clients/core clients/native proto/tls clothstream
 clients/websocket  | clients/native proto/text proto/tls
 clients/websocket/winhttp | clients/websocket clients/native proto/text proto/tls
-clients/library    | clients/native clients/grpc clients/websocket proto/tls
+clients/datagram   | clients/core clients/native proto/dtls proto/ice
+clients/library    | clients/datagram clients/native clients/grpc clients/websocket proto/tls
 clients/testing    |
 clients/files      | proto/codec proto/text clothstream
 clients/measure    | clients/core
-clients/load       | clients/core clients/native clients/grpc clients/websocket proto/codec clothstream
-clients/cli        | proto/checksum proto/text proto/discovery clients/core clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream clients/measure
+clients/load       | clients/core clients/datagram clients/native clients/grpc clients/websocket proto/codec clothstream
+clients/cli        | proto/checksum proto/text proto/discovery clients/core clients/datagram clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream clients/measure
 '
 # rooms that may include these headers
 readonly OUTSIDE='

@@ -17,6 +17,7 @@
 #include "clients/cli/report.h"
 #include "clients/cli/signals.h"
 #include "clients/cli/stream_time.h"
+#include "clients/datagram/datagram_transport.h"
 #include "clients/grpc/grpc_client.h"
 
 namespace clothstream::cli {
@@ -108,6 +109,7 @@ tl::expected<void, Error> sendLines(NativeClient& client, InputLines& input) {
 Report reportOf(NativeClient& client) {
   Report report;
   client.visit([&](cs_client* core) { report = Report::of(core, NativeClient::nowUs()); });
+  report.datagrams = client.datagrams();
   return report;
 }
 
@@ -156,7 +158,9 @@ ExitCode join(const JoinOptions& options) {
   clientOptions.maxVertices = options.maxVertices;
   if (!options.reconnects) clientOptions.reconnectFor = std::chrono::milliseconds(0);
   clientOptions.cancelled = [] { return interrupted(); };
-  auto joined = joinByGrpc(options.address, clientOptions, Listener(line, options));
+  auto joined = NativeClient::join(options.address,
+                                   withDatagrams(makeGrpcTransport(options.address), options.datagrams),
+                                   clientOptions, Listener(line, options));
   if (!joined) return printError(joined.error());
   NativeClient& client = **joined;
   sendInput(client, options);

@@ -9,6 +9,7 @@
 
 #include "clients/cli/exit_code.h"
 #include "clients/core/core.h"
+#include "clients/datagram/datagram_transport.h"
 #include "clients/native/address.h"
 
 namespace clothstream::cli {
@@ -20,6 +21,7 @@ struct JoinOptions {
   cs_role role = CS_ROLE_UNSPECIFIED;
   std::uint32_t quality = 0;      // finest wanted, as in cs_want
   std::uint32_t maxVertices = 0;  // 0: the default of cs_limits
+  Datagrams datagrams = Datagrams::automatic;
   bool reconnects = true;
   std::optional<double> seconds;  // not set: until a signal
   std::string objPath;            // empty: no file

@@ -17,7 +17,9 @@
 #include "clients/cli/json_text.h"
 #include "clients/cli/print.h"
 #include "clients/cli/recording_limits.h"
+#include "clients/cli/report.h"
 #include "clients/cli/signals.h"
+#include "clients/cli/transport_option.h"
 #include "clients/files/new_file.h"
 #include "clients/load/hung_scene.h"
 #include "clients/native/address.h"
@@ -112,6 +114,8 @@ std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
       {"slowDropped", report.slowFigures.dropped},
       {"intruders", report.hostileClients},
       {"intrusions", report.visits},
+      {"withDatagrams", report.withDatagrams},
+      {"datagrams", jsonOf(report.datagrams)},
   };
   if (serverCpu) object["serverCpuSeconds"] = *serverCpu;
   addPoses(object, report.figures.poses);
@@ -163,6 +167,8 @@ std::string text(load::LoadReport& report, std::optional<double> serverCpu) {
   if (report.slow > 0)
     text += fmt::format("\n{} slow: {:.1f} frames/s each, {} dropped", report.slow,
                         report.slowFramesPerSecond(), report.slowFigures.dropped);
+  if (report.withDatagrams > 0)
+    text += fmt::format("\n{} with datagrams: {}", report.withDatagrams, cli::text(report.datagrams));
   if (report.left > 0) text += fmt::format("\n{} left and were replaced", report.left);
   if (report.hostileClients > 0)
     text += fmt::format("\n{} hostile clients connected {} times", report.hostileClients, report.visits);
@@ -265,6 +271,7 @@ void LoadCommand::add(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   addStreamLimit(*command_, options_.maxVertices);
+  addTransport(*command_, options_.datagrams);
   command_->add_flag("--web", web_, "Use WebSocket, as the page does, instead of gRPC");
   command_->add_option("--server-pid", serverPid_,
                        "Process id of the server on this machine; adds its CPU time to the report");

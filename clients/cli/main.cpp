@@ -35,6 +35,7 @@
 #include "clients/cli/set.h"
 #include "clients/cli/set_options.h"
 #include "clients/cli/signals.h"
+#include "clients/cli/transport_option.h"
 #include "clients/core/core.h"
 #include "clients/grpc/channel.h"
 #include "clients/grpc/identity.h"
@@ -205,6 +206,7 @@ int run(int argc, char** argv) {
                   "Finest quality to receive: 0 is the finest, each further level doubles the error")
       ->check(CLI::Range(0, 3));
   addStreamLimit(joinCommand, joinOptions.maxVertices);
+  addTransport(joinCommand, joinOptions.datagrams);
   joinCommand.add_flag("!--no-reconnect", joinOptions.reconnects,
                        "End when the connection is lost. Default: try to reconnect for a minute");
   joinCommand

@@ -44,6 +44,29 @@ std::string text(const ClothFigures& figures) {
                             now.device_ms);
 }
 
+double lossOf(const cs_datagram_statistics& datagrams) {
+  const std::uint64_t sent = datagrams.packets + datagrams.lost_packets;
+  return sent > 0 ? static_cast<double>(datagrams.lost_packets) / static_cast<double>(sent) : 0;
+}
+
+std::string text(const cs_datagram_statistics& datagrams) {
+  return fmt::format(
+      "{} packets, {:.2f} % lost, {} with parity; {} frames, {} repaired, {} lost, {} requests",
+      datagrams.packets, 100 * lossOf(datagrams), datagrams.parity_packets, datagrams.frames,
+      datagrams.repaired_frames, datagrams.lost_frames, datagrams.requests);
+}
+
+nlohmann::ordered_json jsonOf(const cs_datagram_statistics& datagrams) {
+  return {{"packets", datagrams.packets},
+          {"lostPackets", datagrams.lost_packets},
+          {"parityPackets", datagrams.parity_packets},
+          {"frames", datagrams.frames},
+          {"repairedFrames", datagrams.repaired_frames},
+          {"lostFrames", datagrams.lost_frames},
+          {"requests", datagrams.requests},
+          {"heldFrames", datagrams.held_frames}};
+}
+
 Report Report::of(const cs_client* client, std::uint64_t nowUs) {
   Report report;
   report.scene = cs_scene_name(client);
@@ -91,7 +114,10 @@ std::string Report::json(bool hash) const {
       {"dropped", statistics.dropped},
       {"quality", quality},
       {"decodeErrors", statistics.decode_errors},
+      {"transport", usesDatagrams() ? "datagrams" : "tcp"},
+      {"datagrams", nullptr},
   };
+  if (datagrams) object["datagrams"] = jsonOf(*datagrams);
   object["cloths"] = nlohmann::ordered_json::array();
   for (const ClothFigures& figures : cloths) {
     const cs_cloth_report& now = figures.report;
@@ -122,6 +148,8 @@ std::string Report::text(bool hash) const {
       printable(scene), printable(server), printable(device), vertices, statistics.frames, seconds,
       framesPerSecond(), streamRate, kbitPerSecond(), statistics.bits_per_vertex, statistics.round_trip_ms,
       statistics.dropped, statistics.decode_errors);
+  text += usesDatagrams() ? "\ntransport: datagrams" : "\ntransport: tcp";
+  if (datagrams) text += "; " + cli::text(*datagrams);
   if (hash)
     text += fmt::format("\n{} of {} frames equal the server's",
                         statistics.frames - statistics.hash_mismatches, statistics.frames);

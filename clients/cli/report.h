@@ -3,8 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "clients/core/core.h"
 
@@ -22,16 +25,25 @@ std::string text(const ClothFigures& figures);
 // Name of a cs_solver as in scene files; the number of an unknown solver.
 std::string solverName(std::uint32_t solver);
 
+// Share of the packets of frames that were lost, 0 to 1.
+double lossOf(const cs_datagram_statistics& datagrams);
+// One line of text for users, and a JSON object.
+std::string text(const cs_datagram_statistics& datagrams);
+nlohmann::ordered_json jsonOf(const cs_datagram_statistics& datagrams);
+
 struct Report {
   std::string scene, server, device;
   std::uint32_t vertices = 0, streamRate = 0, frameDivisor = 1;
   double seconds = 0;  // from the first frame to the newest
   cs_statistics statistics{};
-  std::uint32_t quality = 0;         // as currently sent
-  std::vector<ClothFigures> cloths;  // empty before the first report
+  std::uint32_t quality = 0;                        // as currently sent
+  std::optional<cs_datagram_statistics> datagrams;  // if any were open
+  std::vector<ClothFigures> cloths;                 // empty before the first report
 
   static Report of(const cs_client* client, std::uint64_t nowUs);
 
+  // Whether frames arrive in datagrams now.
+  bool usesDatagrams() const { return datagrams && datagrams->in_use != 0; }
   // Averages over all frames. The statistics hold averages over the last second.
   double framesPerSecond() const;
   double kbitPerSecond() const;

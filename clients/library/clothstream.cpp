@@ -95,7 +95,8 @@ void clothstream_default_options(clothstream_options* out) noexcept {
           .ca_file = "",
           .fingerprint = "",
           .log = nullptr,
-          .log_context = nullptr};
+          .log_context = nullptr,
+          .transport = CLOTHSTREAM_TRANSPORT_AUTO};
 }
 
 clothstream_result clothstream_open(const char* address, const clothstream_options* options,
@@ -106,8 +107,9 @@ clothstream_result clothstream_open(const char* address, const clothstream_optio
     if (!wanted) return fail(CLOTHSTREAM_INVALID, wanted.error());
     const auto server = readAddress(address, *wanted, false);
     if (!server) return fail(CLOTHSTREAM_INVALID, server.error());
-    auto joined = NativeClient::join(*server, makeLibraryTransport(*server), clientOptions(*wanted),
-                                     [](cs_client*, std::uint32_t) {});
+    auto joined =
+        NativeClient::join(*server, withLibraryDatagrams(makeLibraryTransport(*server), wanted->transport),
+                           clientOptions(*wanted), [](cs_client*, std::uint32_t) {});
     if (!joined) return fail(joined.error());
     *out = std::make_unique<clothstream_stream>(clothstream_stream{std::move(*joined)}).release();
     return CLOTHSTREAM_OK;
@@ -157,6 +159,13 @@ cs_client* clothstream_acquire(clothstream_stream* stream) noexcept {
 
 void clothstream_release(clothstream_stream* stream) noexcept {
   stream->client->unlock();
+}
+
+int clothstream_get_datagram_statistics(clothstream_stream* stream, cs_datagram_statistics* out) noexcept {
+  const auto datagrams = stream->client->datagrams();
+  if (!datagrams || out->version != CS_DATAGRAM_STATISTICS_VERSION) return 0;
+  *out = *datagrams;
+  return 1;
 }
 
 clothstream_result clothstream_set_allocator(const clothstream_allocator* allocator) noexcept {

@@ -5,8 +5,8 @@
  * frames, keeps the clock, and reconnects after a loss. Between clothstream_acquire and clothstream_release
  * that thread waits, and the caller may use the cs_client: its data does not change, so positions, normals
  * and triangles can be read without a copy. All functions of core.h are allowed, except those for programs
- * with their own connection: cs_create, cs_want, cs_destroy, cs_set_clock, cs_receive,
- * cs_update, cs_next_outgoing, cs_connecting, cs_disconnected, cs_follow_redirects.
+ * with their own connection: cs_create, cs_want, cs_destroy, cs_set_clock, cs_receive, cs_update,
+ * cs_next_outgoing, cs_connecting, cs_disconnected, cs_follow_redirects, cs_offer_datagrams.
  *
  * Threads: all functions may be called from any thread. On one stream, clothstream_close must be the last
  * call, and the thread that acquired must release. Acquire only as long as copying or drawing takes: no
@@ -52,7 +52,14 @@ typedef enum clothstream_log_level {
   CLOTHSTREAM_LOG_ERROR = 3 /* why the stream ended */
 } clothstream_log_level;
 
-#define CLOTHSTREAM_OPTIONS_VERSION 2u
+/* How frames and input travel (docs/transport.md). */
+typedef enum clothstream_transport {
+  CLOTHSTREAM_TRANSPORT_AUTO = 0,      /* in datagrams (UDP) if the server and the network allow them */
+  CLOTHSTREAM_TRANSPORT_DATAGRAMS = 1, /* likewise; clothstream_open fails if they cannot be opened */
+  CLOTHSTREAM_TRANSPORT_TCP = 2        /* never in datagrams */
+} clothstream_transport;
+
+#define CLOTHSTREAM_OPTIONS_VERSION 3u
 typedef struct clothstream_options {
   uint32_t version CS_INIT(CLOTHSTREAM_OPTIONS_VERSION);
   uint32_t role; /* requested cs_role */
@@ -78,10 +85,13 @@ typedef struct clothstream_options {
    * NULL means no log. */
   void (*log)(void* context, uint32_t level, const char* text);
   void* log_context; /* argument of log */
+  /* clothstream_transport. A library for Windows has no datagrams: it refuses
+   * CLOTHSTREAM_TRANSPORT_DATAGRAMS. */
+  uint32_t transport;
 } clothstream_options;
 
 /* Fills in the version and the defaults: client_name "libclothstream", other strings "", role unspecified,
- * the whole stream, 10 s to join, 60 s to reconnect, no log. */
+ * the whole stream, 10 s to join, 60 s to reconnect, no log, CLOTHSTREAM_TRANSPORT_AUTO. */
 void clothstream_default_options(clothstream_options* out) CS_NOEXCEPT;
 
 /* Joins a scene. Returns when the description of the scene has arrived.
@@ -111,6 +121,10 @@ clothstream_result clothstream_wait(clothstream_stream* stream, uint32_t timeout
  * stream is acquired are sent after clothstream_release. */
 cs_client* clothstream_acquire(clothstream_stream* stream) CS_NOEXCEPT;
 void clothstream_release(clothstream_stream* stream) CS_NOEXCEPT;
+
+/* Figures of the datagrams, summed over all connections of the stream. Returns 1, or 0 if no datagrams were
+ * open or `out->version` is unknown. Also allowed while the stream is acquired. */
+int clothstream_get_datagram_statistics(clothstream_stream* stream, cs_datagram_statistics* out) CS_NOEXCEPT;
 
 #define CLOTHSTREAM_ALLOCATOR_VERSION 1u
 /* Memory functions of the program. They must be thread-safe, and must not call functions of the library. */

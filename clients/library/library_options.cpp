@@ -24,6 +24,12 @@ std::string error(const clothstream_options& options) {
     if (!text)
       return "options->scene, client_name, display_name, token, ca_file or fingerprint is NULL; \"\" is "
              "allowed.";
+  if (options.transport > CLOTHSTREAM_TRANSPORT_TCP)
+    return "options->transport is " + std::to_string(options.transport) +
+           "; allowed is a clothstream_transport, 0 to " + std::to_string(CLOTHSTREAM_TRANSPORT_TCP) + ".";
+  if (options.transport == CLOTHSTREAM_TRANSPORT_DATAGRAMS && !kLibraryHasDatagrams)
+    return "options->transport is CLOTHSTREAM_TRANSPORT_DATAGRAMS; this library is built without datagrams. "
+           "Use CLOTHSTREAM_TRANSPORT_AUTO.";
   if (options.join_timeout_ms == 0) return "options->join_timeout_ms is 0; at least 1 is allowed.";
   return {};
 }

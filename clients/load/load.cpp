@@ -36,6 +36,7 @@ class Load {
     report_.slow = options.slow;
     report_.hostileClients = options.hostileClients;
     report_.scenes.wanted = options.scenes;
+    if (options.datagrams != Datagrams::off) host_.emplace();
     if (options.scenes > 0) scenes_.emplace(links, options.token, hungScene(options.nodes, options.rate));
     for (std::uint32_t i = 0; i < options.hostileClients; ++i)
       hostileClients_.push_back(std::make_unique<HostileClient>(links, sceneOf(i), i, options.token));
@@ -49,6 +50,10 @@ class Load {
       progress_.measured();
       for (Seat& seat : seats_) {
         collect(seat);
+        if (const auto datagrams = seat.participant->datagrams()) {
+          ++report_.withDatagrams;
+          add(report_.datagrams, *datagrams);
+        }
         if (!isSlow(seat) && report_.seconds > 0)
           report_.participantRates.push_back(
               static_cast<float>(static_cast<double>(seat.frames) / report_.seconds));
@@ -90,7 +95,10 @@ class Load {
                            .phase = number * std::numbers::phi,
                            .bytesPerSecond = number < options_.participants ? 0 : options_.slowBytesPerSecond,
                            .maxVertices = options_.maxVertices,
-                           .keepsFrames = options_.keepsFrames && number < options_.participants});
+                           .keepsFrames = options_.keepsFrames && number < options_.participants,
+                           .datagrams = host_ && number < options_.participants ? &*host_ : nullptr,
+                           .requiresDatagrams =
+                               options_.datagrams == Datagrams::required && number < options_.participants});
   }
 
   // Returns whether the scene of this seat exists. Takes a step towards creating it if it does not.
@@ -230,6 +238,7 @@ class Load {
   const LoadProgress progress_;
   LoadReport report_;
   std::optional<CreatedScenes> scenes_;  // outlives the participants
+  std::optional<DatagramHost> host_;     // likewise
   Clock::time_point lastCreated_{};
   std::vector<Seat> seats_;
   std::vector<Leaving> leaving_;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/datagram/datagram_transport.h"
 #include "clients/load/link.h"
 #include "clients/load/participant.h"
 
@@ -23,12 +24,13 @@ struct LoadOptions {
   std::uint32_t viewers = 0;   // participants that send no poses; the last ones to join
   std::uint32_t slow = 0;      // slow readers in addition to the participants
   double slowBytesPerSecond = 20'000;
-  std::uint32_t hostileClients = 0;  // in addition to the others
-  double joinsPerSecond = 100;       // until all have joined
-  double leavesPerSecond = 0;        // after all have joined; each is replaced
-  double seconds = 10;               // after all have joined
-  std::uint32_t maxVertices = 0;     // as in limitVertices
-  bool keepsFrames = false;          // as in ParticipantOptions, for participants that are not slow
+  std::uint32_t hostileClients = 0;            // in addition to the others
+  double joinsPerSecond = 100;                 // until all have joined
+  double leavesPerSecond = 0;                  // after all have joined; each is replaced
+  double seconds = 10;                         // after all have joined
+  std::uint32_t maxVertices = 0;               // as in limitVertices
+  bool keepsFrames = false;                    // as in ParticipantOptions, for participants that are not slow
+  Datagrams datagrams = Datagrams::automatic;  // of participants that are not slow
 };
 
 // The fate of the scenes that the test has created.
@@ -55,6 +57,9 @@ struct LoadReport {
   Failure firstLoss;
   SceneReport scenes;
   std::vector<float> participantRates;  // frames/s of each participant that is not slow
+  // Number of participants with datagrams at the end, and the sum of their figures.
+  std::uint32_t withDatagrams = 0;
+  cs_datagram_statistics datagrams;
 
   // Average rates over the measured time: frames per participant, and Mbit of all clients.
   double framesPerSecond() const;

@@ -58,18 +58,37 @@ Participant::Participant(Links& links, const ParticipantOptions& options)
     cs_default_play_out(&playOut);
     cs_set_play_out(core_.get(), &playOut);
   }
+  if (options.datagrams != nullptr) {
+    datagrams_ = std::make_unique<DatagramSession>(*options.datagrams, [this] { datagramsArrived(); });
+    datagrams_->connecting();
+  }
   link_ = links.open(*this);
-  flush();
+  {
+    const std::lock_guard lock(mutex_);
+    flush();
+  }
   link_->read();
 }
 
 Participant::~Participant() {
+  std::unique_ptr<DatagramSession> ending;
+  {
+    const std::lock_guard lock(mutex_);
+    ending = std::move(datagrams_);
+  }
+  ending.reset();  // its thread may wait for the lock
   link_->drop();
 }
 
 bool Participant::joined() const {
   const std::lock_guard lock(mutex_);
-  return cs_get_state(core_.get()) == CS_STATE_JOINED;
+  return cs_get_state(core_.get()) == CS_STATE_JOINED &&
+         (!options_.requiresDatagrams || (datagrams_ && datagrams_->hasOpened()));
+}
+
+std::optional<cs_datagram_statistics> Participant::datagrams() const {
+  const std::lock_guard lock(mutex_);
+  return datagrams_ && datagrams_->hasOpened() ? std::optional(datagrams_->statistics()) : std::nullopt;
 }
 
 std::optional<Failure> Participant::ended() const {
@@ -78,6 +97,10 @@ std::optional<Failure> Participant::ended() const {
 }
 
 void Participant::leave() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (datagrams_) datagrams_->close();
+  }
   link_->leave();
 }
 
@@ -100,7 +123,7 @@ std::optional<double> Participant::firstFrameSeconds() const {
 }
 
 void Participant::step(Clock::time_point now) {
-  bool reads = false;
+  bool reads = false, fails = false;
   {
     const std::lock_guard lock(mutex_);
     if (ended_) return;
@@ -110,27 +133,55 @@ void Participant::step(Clock::time_point now) {
       readLater_ = false;
       reads = true;
     }
-    flush();
+    fails = proceed();
   }
+  if (fails) link_->leave();
   if (reads) link_->read();
+}
+
+void Participant::datagramsArrived() {
+  bool fails = false;
+  {
+    const std::lock_guard lock(mutex_);
+    if (ended_ || !datagrams_) return;
+    fails = proceed();
+  }
+  if (fails) link_->leave();
+}
+
+bool Participant::proceed() {
+  if (datagrams_) {
+    datagrams_->exchange();
+    while (const auto message = datagrams_->nextMessage()) take(*message);
+    if (options_.requiresDatagrams && datagrams_->isRefused() && !ended_) {
+      ended_ = {Failure::Kind::refused, "datagrams are required, but " + datagrams_->why()};
+      return true;
+    }
+  }
+  const bool fails = !ended_ && cs_get_state(core_.get()) == CS_STATE_FAILED;
+  if (fails) ended_ = refusal();
+  flush();
+  return fails;
+}
+
+void Participant::take(std::span<const std::byte> message) {
+  const std::uint64_t now = nowUs();
+  const bool isFrame =
+      message_.ParseFromArray(message.data(), static_cast<int>(message.size())) && message_.has_frame();
+  if (isFrame) frameReceived(message_.frame(), now);
+  std::uint32_t events = 0;
+  if (!isFrame || options_.decodes)
+    events =
+        cs_receive(core_.get(), reinterpret_cast<const std::uint8_t*>(message.data()), message.size(), now);
+  if (isFrame && timesPoses() && (events & CS_EVENT_FRAME) != 0) frameDecoded(message_.frame());
 }
 
 void Participant::received(std::span<const std::byte> message) {
   bool fails = false;
   {
     const std::lock_guard lock(mutex_);
-    const std::uint64_t now = nowUs();
-    const bool isFrame =
-        message_.ParseFromArray(message.data(), static_cast<int>(message.size())) && message_.has_frame();
-    if (isFrame) frameReceived(message_.frame(), now);
-    std::uint32_t events = 0;
-    if (!isFrame || options_.decodes)
-      events =
-          cs_receive(core_.get(), reinterpret_cast<const std::uint8_t*>(message.data()), message.size(), now);
-    if (isFrame && timesPoses() && (events & CS_EVENT_FRAME) != 0) frameDecoded(message_.frame());
-    fails = !ended_ && cs_get_state(core_.get()) == CS_STATE_FAILED;
-    if (fails) ended_ = refusal();
-    flush();
+    if (!datagrams_ || !datagrams_->holds(message)) take(message);
+    fails = proceed();
     if (options_.bytesPerSecond > 0) {
       const std::chrono::duration<double> time(static_cast<double>(message.size()) / options_.bytesPerSecond);
       readsAgainAt_ =
@@ -183,7 +234,7 @@ void Participant::frameReceived(const v1::Frame& frame, std::uint64_t nowUs) {
   if (options_.decodes || !acknowledgement_.due(nowUs)) return;
   v1::ClientMessage acknowledgement;
   acknowledgement.mutable_frame_ack()->set_tick(packet->header.tick);
-  link_->send(acknowledgement.SerializeAsString());
+  send(acknowledgement.SerializeAsString());
 }
 
 void Participant::frameDecoded(const v1::Frame& frame) {
@@ -250,10 +301,19 @@ void Participant::move(std::uint64_t nowUs) {
   cs_set_colliders(core_.get(), &sphere, 1, nowUs);
 }
 
+void Participant::send(std::string message) {
+  if (!datagrams_ || !datagrams_->sends(bytesOf(message))) link_->send(std::move(message));
+}
+
 void Participant::flush() {
+  if (datagrams_) datagrams_->negotiate(*core_);
   std::size_t bytes = 0;
   while (const std::uint8_t* message = cs_next_outgoing(core_.get(), &bytes))
-    link_->send(std::string(reinterpret_cast<const char*>(message), bytes));
+    send(std::string(reinterpret_cast<const char*>(message), bytes));
+  if (!datagrams_) return;
+  datagrams_->exchange();
+  while (const auto message = datagrams_->nextStreamMessage())
+    link_->send(std::string(reinterpret_cast<const char*>(message->data()), message->size()));
 }
 
 }  // namespace clothstream::load

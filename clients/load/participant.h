@@ -12,6 +12,7 @@
 
 #include "clients/core/core.h"
 #include "clients/core/stream/frame_feedback.h"
+#include "clients/datagram/datagram_session.h"
 #include "clients/load/link.h"
 #include "clients/load/pose_timing.h"
 #include "clients/native/failure.h"
@@ -32,6 +33,9 @@ struct ParticipantOptions {
   double bytesPerSecond = 0;
   std::uint32_t maxVertices = 0;  // as in limitVertices
   bool keepsFrames = false;       // whether Figures::frameTimes has an entry for each frame
+  // What it opens datagrams with; it must outlive the participant. Null: no datagrams.
+  DatagramHost* datagrams = nullptr;
+  bool requiresDatagrams = false;  // it has joined when they are open
 };
 
 // A received frame. Ages are ms since its tick began, on the server's clock.
@@ -79,11 +83,20 @@ class Participant final : private LinkListener {
   // Reason why the link ended, or nothing while it is open.
   std::optional<Failure> ended() const;
   Figures take();
+  // Nothing if datagrams were not open.
+  std::optional<cs_datagram_statistics> datagrams() const;
   // Seconds from connecting to the first frame. Nothing before it.
   std::optional<double> firstFrameSeconds() const;
 
  private:
   void received(std::span<const std::byte> message) override;
+  void datagramsArrived();
+  // The caller of the following holds the lock.
+  void take(std::span<const std::byte> message);
+  // Takes the messages that datagrams have brought, and sends what waits. Returns whether the stream must
+  // end.
+  bool proceed();
+  void send(std::string message);
   void closed(const std::string& why) override;
   // Why the core has ended the stream.
   Failure refusal() const;
@@ -113,6 +126,7 @@ class Participant final : private LinkListener {
   bool readLater_ = false;
   std::optional<Failure> ended_;
   std::unique_ptr<Link> link_;
+  std::unique_ptr<DatagramSession> datagrams_;  // null: none
 };
 
 }  // namespace clothstream::load

@@ -62,6 +62,7 @@ class NativeClient::Stream {
     cs_set_clock(core_.get(), &NativeClient::nowUs);
     cs_hold_acknowledgements(core_.get(), options.acknowledgesSeen ? 1 : 0);
     limitVertices(core_.get(), options.maxVertices);
+    missing_ = transport_->missing();
     thread_ = std::thread([this] { run(); });
   }
 
@@ -80,10 +81,11 @@ class NativeClient::Stream {
     std::unique_lock lock(mutex_);
     while (SteadyClock::now() < deadline) {
       const auto until = std::min(deadline, SteadyClock::now() + kCancelInterval);
-      if (changed_.wait_until(lock, until, [&] { return wasJoined_ || ended_; })) return ended_;
+      if (changed_.wait_until(lock, until, [&] { return ended_ || isJoined(); })) return joinFailure();
       if (options_.cancelled && options_.cancelled())
         return Failure{Failure::Kind::unreachable, "Gave up before " + address_.address + " answered."};
     }
+    if (wasJoined_ && missing_) return Failure{Failure::Kind::unreachable, missing_->text};
     return Failure{Failure::Kind::unreachable, "No clothstream-server answers at " + address_.address +
                                                    " within " + seconds(options_.joinTimeout) +
                                                    " s: is it running there, and is the address right?"};
@@ -122,7 +124,19 @@ class NativeClient::Stream {
     return ended_;
   }
 
+  std::optional<cs_datagram_statistics> datagrams() const {
+    const std::lock_guard lock(datagramsMutex_);
+    return datagrams_;
+  }
+
  private:
+  // Whether join() need not wait any more.
+  bool isJoined() const { return wasJoined_ && (!missing_ || missing_->isFinal); }
+  std::optional<Failure> joinFailure() const {
+    if (ended_ || !missing_) return ended_;
+    return Failure{Failure::Kind::refused, missing_->text};
+  }
+
   // Makes the thread check for outgoing messages.
   void wake() {
     if (!ended_) transport_->wake();
@@ -230,7 +244,19 @@ class NativeClient::Stream {
       silent_ = true;
       transport_->cancel();
     }
+    negotiate();
     write();
+  }
+
+  void negotiate() {
+    transport_->negotiate(*core_);
+    {
+      const std::lock_guard lock(datagramsMutex_);
+      datagrams_ = transport_->datagrams();
+    }
+    if (!missing_) return;
+    missing_ = transport_->missing();
+    changed_.notify_all();
   }
 
   // Longest time to open a connection while reconnecting, since a link that was just restored may have lost
@@ -241,10 +267,12 @@ class NativeClient::Stream {
   }
 
   void write() {
-    if (!transport_->canWrite()) return;
     std::size_t bytes = 0;
-    const std::uint8_t* message = cs_next_outgoing(core_.get(), &bytes);
-    if (message) transport_->write(std::as_bytes(std::span(message, bytes)));
+    while (transport_->canWrite()) {
+      const std::uint8_t* message = cs_next_outgoing(core_.get(), &bytes);
+      if (!message) return;
+      transport_->write(std::as_bytes(std::span(message, bytes)));
+    }
   }
 
   // Says goodbye. The server then has kClosingTime to end the connection.
@@ -289,6 +317,8 @@ class NativeClient::Stream {
   // Set while the thread waits for the mutex. Then lock() lets the thread go first.
   std::atomic<bool> threadWaits_{false};
   std::condition_variable turn_;
+  mutable std::mutex datagramsMutex_;
+  std::optional<cs_datagram_statistics> datagrams_;  // guarded by datagramsMutex_
   // Guards everything below. The thread releases it only while it waits for the transport.
   mutable std::mutex mutex_;
   std::condition_variable changed_;
@@ -300,6 +330,7 @@ class NativeClient::Stream {
   std::unique_ptr<cs_client, decltype(&cs_destroy)> core_;
   // Reset when the stream has ended. Other threads only call its wake().
   std::unique_ptr<Transport> transport_;
+  std::optional<Transport::Missing> missing_;  // nothing from the time on at which the transport had all
   bool leaving_ = false, wasJoined_ = false, reconnects_ = false;
   // About the newest connection.
   bool opened_ = false, silent_ = false, swallowed_ = false;
@@ -340,6 +371,10 @@ void NativeClient::visit(const std::function<void(cs_client*)>& task) {
 
 std::uint32_t NativeClient::wait(std::chrono::milliseconds timeout) {
   return stream_->wait(timeout);
+}
+
+std::optional<cs_datagram_statistics> NativeClient::datagrams() const {
+  return stream_->datagrams();
 }
 
 std::optional<Failure> NativeClient::ended() const {

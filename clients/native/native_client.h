@@ -80,6 +80,10 @@ class NativeClient {
   // Returns the event bits of all messages since the last call.
   std::uint32_t wait(std::chrono::milliseconds timeout);
 
+  // Figures of the datagrams, as of the last message or the last 50 ms; nothing if there were none. Also
+  // allowed between lock() and unlock().
+  std::optional<cs_datagram_statistics> datagrams() const;
+
   // Reason why the stream ended, or nothing while it runs.
   std::optional<Failure> ended() const;
 

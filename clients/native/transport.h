@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "clients/core/core.h"
 #include "clients/native/failure.h"
 
 namespace clothstream {
@@ -42,6 +43,17 @@ class Transport {
   virtual void leave() = 0;
   // Ends the connection without a goodbye. It may stay active until the next wait().
   virtual void cancel() = 0;
+
+  // Called before each write(), on the thread of the client: a transport may talk to the server through it.
+  virtual void negotiate(cs_client& /*client*/) {}
+  // What a client needs of the transport in addition to an open connection, before it counts as joined.
+  struct Missing {
+    std::string text;      // for users
+    bool isFinal = false;  // it will not come
+  };
+  virtual std::optional<Missing> missing() const { return std::nullopt; }
+  // Sum over all connections; nothing if no datagrams were open so far.
+  virtual std::optional<cs_datagram_statistics> datagrams() const { return std::nullopt; }
 
   // Waits until something has happened, wake() is called, or the time is over.
   virtual void wait(std::chrono::steady_clock::duration atMost) = 0;

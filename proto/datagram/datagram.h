@@ -18,7 +18,6 @@ enum class Kind : std::uint8_t {
   input = 2,    // up: numbered ClientMessages
   request = 3,  // up: pieces that are missing
   receipt = 4,  // up: packets that arrived
-  message = 5,  // down: one ServerMessage, such as a Pong, which is neither repeated nor ordered
 };
 
 // Bytes of the largest datagram: payload of a DTLS record or SCTP message. It then fits into the 1,280 bytes
@@ -32,7 +31,7 @@ using PieceSet = std::bitset<kMaxDataPieces + kMaxParityPieces>;
 [[nodiscard]] inline std::optional<Kind> kindOf(std::span<const std::byte> datagram) {
   if (datagram.empty() || datagram.size() > kMaxDatagramBytes) return std::nullopt;
   const auto kind = static_cast<Kind>(datagram.front());
-  if (kind < Kind::piece || kind > Kind::message) return std::nullopt;
+  if (kind < Kind::piece || kind > Kind::receipt) return std::nullopt;
   return kind;
 }
 

@@ -28,6 +28,7 @@ class FramePieces {
   unsigned pieces() const { return dataPieces_ + static_cast<unsigned>(parity_.size() / payloadBytes()); }
   // Bytes of the datagram of each piece.
   std::size_t datagramBytes() const { return kPieceHeaderBytes + payloadBytes(); }
+  std::size_t messageBytes() const { return message_->size(); }
   // Bytes of the message and its parity.
   std::size_t storedBytes() const { return message_->size() + parity_.size(); }
 

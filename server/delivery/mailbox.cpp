@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "clothstream/v1/session.pb.h"
+#include "proto/datagram/frame_pieces.h"
 
 namespace clothstream::delivery {
 namespace {
@@ -21,7 +22,7 @@ bool Mailbox::reply(SharedBytes message) {
   {
     const std::lock_guard lock(mutex_);
     if (!closed_ && !control_.reply(std::move(message))) return false;
-    endpointWaits_ = false;
+    arrived(Outlet::stream);
   }
   wake();
   return true;
@@ -38,7 +39,7 @@ void Mailbox::announce(SharedBytes message, SharedMerges& merges) {
     if (closed_) return;
     control_.announce(std::move(message), merges);
     if (!streaming_) return;
-    endpointWaits_ = false;
+    arrived(Outlet::stream);
   }
   wake();
 }
@@ -49,18 +50,20 @@ void Mailbox::subscribe(std::shared_ptr<const DescriptionChunks> description, co
     const std::lock_guard lock(mutex_);
     description_ = std::move(description);
     streaming_ = !description_;
+    acknowledged_ = false;
     shape_ = shape;
     const auto coarsest = static_cast<std::uint8_t>(shape.qualities - 1);
     quality_ = std::min(finest, coarsest);
     adaptation_ = LinkAdaptation(quality_, coarsest);
     reported_ = 0;
     metrics_ = &metrics;
-    endpointWaits_ = false;
+    arrived(Outlet::stream);
   }
   wake();
 }
 
 void Mailbox::deliver(const PublishedFrame& frame) {
+  std::optional<Outlet> outlet;
   {
     const std::lock_guard lock(mutex_);
     if (!streaming_ || closed_ || (frame.repeated && !held_.needsKey())) return;
@@ -70,23 +73,23 @@ void Mailbox::deliver(const PublishedFrame& frame) {
     else if (!frame.key || (shape_.qualities > 1 && frame.quality != chosenQuality()))
       return;
     sinceKey_ = frame.key ? 0 : sinceKey_ + 1;
-    if (!hold(frame) || !hasRoom()) return;
-    endpointWaits_ = false;
+    if (hold(frame)) outlet = noteFrame();
   }
-  wake();
+  wake(outlet);
 }
 
 void Mailbox::deliver(std::span<const PublishedFrame> frames) {
+  std::optional<Outlet> outlet;
   {
     const std::lock_guard lock(mutex_);
-    if (!streaming_ || closed_ || !held_.needsKey() || !endpointWaits_ || !hasRoom()) return;
+    if (!streaming_ || closed_ || !held_.needsKey() || !outletsWait() || !hasRoom()) return;
     if (shape_.qualities > 1 && frames.front().quality != chosenQuality()) return;
     if (!hold(frames.front())) return;
     sinceKey_ = 0;
     for (const PublishedFrame& frame : frames.subspan(1)) hold(frame);
-    endpointWaits_ = false;
+    outlet = noteFrame();
   }
-  wake();
+  wake(outlet);
 }
 
 std::uint8_t Mailbox::chosenQuality() const {
@@ -95,9 +98,9 @@ std::uint8_t Mailbox::chosenQuality() const {
 
 void Mailbox::adapt(Clock::time_point now) {
   if (shape_.lockstep) return;
-  const bool behind = !held_.empty() || (held_.needsKey() && !(endpointWaits_ && hasRoom()));
+  const bool behind = !held_.empty() || (held_.needsKey() && !(outletsWait() && hasRoom()));
   const std::uint8_t before = adaptation_.quality();
-  if (!adaptation_.update(behind, now, link_ ? std::optional(link_->frameRate) : std::nullopt)) return;
+  if (!adaptation_.update(behind, now, usesLink() ? std::optional(link_->frameRate) : std::nullopt)) return;
   (adaptation_.quality() < before ? metrics_->stepsUp : metrics_->stepsDown).add();
 }
 
@@ -114,13 +117,30 @@ bool Mailbox::hold(const PublishedFrame& frame) {
 }
 
 void Mailbox::setLink(std::optional<Link> link) {
+  std::optional<Outlet> outlet;
   {
     const std::lock_guard lock(mutex_);
     link_ = link;
-    if (closed_ || held_.empty() || !hasRoom()) return;
-    endpointWaits_ = false;
+    if (!closed_) outlet = noteFrame();
   }
-  wake();
+  wake(outlet);
+}
+
+void Mailbox::setFrameWake(std::function<void()> wake) {
+  const std::lock_guard lock(wakeMutex_);
+  frameWake_ = std::move(wake);
+}
+
+std::optional<Mailbox::Outlet> Mailbox::outletOfFrame() const {
+  if (held_.empty() || !hasRoom()) return std::nullopt;
+  return usesLink() && datagram::FramePieces::fits(held_.front().message->size()) ? Outlet::link
+                                                                                  : Outlet::stream;
+}
+
+std::optional<Mailbox::Outlet> Mailbox::noteFrame() {
+  const std::optional<Outlet> outlet = outletOfFrame();
+  if (outlet) arrived(*outlet);
+  return outlet;
 }
 
 bool Mailbox::wantsFinerQuality() const {
@@ -138,27 +158,27 @@ RequestedFrames Mailbox::requested(Clock::time_point now) {
     requested |= {.qualities = bit, .keyFrames = key ? bit : std::uint8_t{0}};
   };
   if (!held_.needsKey()) add(quality_, requestsKey_ && sinceKey_ >= kMinKeyFrameDistance);
-  if (held_.needsKey() ? endpointWaits_ && hasRoom() : chosenQuality() != quality_)
-    add(chosenQuality(), true);
+  if (held_.needsKey() ? outletsWait() && hasRoom() : chosenQuality() != quality_) add(chosenQuality(), true);
   return requested;
 }
 
 std::uint8_t Mailbox::needsKeyFrame() const {
   const std::lock_guard lock(mutex_);
-  if (!streaming_ || closed_ || !held_.needsKey() || !endpointWaits_ || !hasRoom()) return 0;
+  if (!streaming_ || closed_ || !held_.needsKey() || !outletsWait() || !hasRoom()) return 0;
   return static_cast<std::uint8_t>(1u << chosenQuality());
 }
 
 bool Mailbox::acknowledge(std::uint64_t tick, Clock::time_point now) {
+  std::optional<Outlet> outlet;
   {
     const std::lock_guard lock(mutex_);
     const std::optional<std::size_t> bytes = window_.acknowledge(tick, now);
     if (!bytes) return false;
+    acknowledged_ = true;
     adaptation_.delivered(*bytes);
-    if (held_.empty() || !hasRoom()) return true;
-    endpointWaits_ = false;
+    outlet = noteFrame();
   }
-  wake();
+  wake(outlet);
   return true;
 }
 
@@ -209,12 +229,42 @@ bool Mailbox::closed() const {
 }
 
 std::optional<SharedBytes> Mailbox::next(Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
-  std::optional<SharedBytes> message = take(now);
-  // After the end of the session the metrics may no longer exist.
-  if (message && metrics_ != nullptr && !closed_) metrics_->sentBytes.add((*message)->size());
-  endpointWaits_ = !message;
+  std::optional<SharedBytes> message;
+  std::optional<Outlet> outlet;
+  {
+    const std::lock_guard lock(mutex_);
+    message = take(now);
+    // After the end of the session the metrics may no longer exist.
+    if (message && metrics_ != nullptr && !closed_) metrics_->sentBytes.add((*message)->size());
+    streamWaits_ = !message;
+    // A frame that was too long for the link has left, or the peer has its first one.
+    if (usesLink() && linkWaits_ && !closed_) outlet = noteFrame();
+  }
+  if (outlet == Outlet::link) wake(outlet);
   return message;
+}
+
+std::optional<SharedBytes> Mailbox::nextFrame(Clock::time_point now) {
+  SharedBytes frame;
+  bool toStream = false;  // something for next()
+  {
+    const std::lock_guard lock(mutex_);
+    if (!closed_ && outletOfFrame() == Outlet::link) {
+      const std::uint8_t quality = held_.front().quality;
+      if (quality != reported_ && control_.reply(operatingPoint(quality))) {
+        reported_ = quality;
+        toStream = true;
+      }
+      frame = takeFrame(now);
+      metrics_->datagramFrames.add();
+      metrics_->sentBytes.add(frame->size());
+      toStream |= outletOfFrame() == Outlet::stream;
+      if (toStream) arrived(Outlet::stream);
+    }
+    linkWaits_ = !frame;
+  }
+  if (toStream) wake();
+  return frame ? std::optional(std::move(frame)) : std::nullopt;
 }
 
 std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
@@ -229,7 +279,7 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
     return chunk;
   }
   if (!streaming_) return std::nullopt;
-  const bool hasFrame = !held_.empty() && hasRoom();
+  const bool hasFrame = outletOfFrame() == Outlet::stream;
   // In lockstep, the order must not depend on whether a frame waits already when the endpoint looks.
   const bool frameFirst = hasFrame && !shape_.lockstep && control_.framesComeFirst();
   if (SharedBytes announcement = frameFirst ? nullptr : control_.nextAnnouncement()) return announcement;
@@ -238,7 +288,10 @@ std::optional<SharedBytes> Mailbox::take(Clock::time_point now) {
     reported_ = quality;
     return operatingPoint(quality);
   }
+  return takeFrame(now);
+}
 
+SharedBytes Mailbox::takeFrame(Clock::time_point now) {
   const PublishedFrame frame = held_.take();
   window_.send({frame.tick, frame.message->size(), now});
   control_.frameSent();
@@ -251,9 +304,13 @@ void Mailbox::countDropped(std::size_t frames) {
   if (metrics_ != nullptr) metrics_->framesDropped.add(frames);
 }
 
-void Mailbox::wake() {
+void Mailbox::wake(std::optional<Outlet> outlet) {
+  if (outlet) call(*outlet == Outlet::stream ? wake_ : frameWake_);
+}
+
+void Mailbox::call(const std::function<void()>& wake) {
   const std::lock_guard lock(wakeMutex_);
-  if (wake_) wake_();
+  if (wake) wake();
 }
 
 void Mailbox::silence() {

@@ -33,11 +33,14 @@ namespace clothstream::delivery {
 //
 // SendWindow says whether the subscriber has room for a frame. Without room, a few frames are held, and a
 // subscriber that misses one continues with the next key frame (HeldFrames). It asks for that key frame once
-// it has room and its endpoint waits for something to write. A peer that does not read therefore asks for
+// it has room and its outlets wait for something to write. A peer that does not read therefore asks for
 // nothing.
 //
-// Where frames travel as datagrams, the rate controller of the peer says instead whether there is room
-// (setLink()); SendWindow::kMax still bounds the frames that are not acknowledged.
+// A mailbox has two outlets: next() for the stream, and nextFrame() for datagrams. Frames leave by the second
+// one while setLink() describes a link, as soon as the peer has acknowledged a frame and so has the
+// description. The rate controller of the peer then says whether there is room; SendWindow::kMax still bounds
+// the frames that are not acknowledged. A frame that is too long for datagrams leaves by next(), and those
+// after it wait. Each frame leaves once, in order.
 //
 // LinkAdaptation chooses the quality; the peer gets an OperatingPoint message when it changes. A new quality
 // begins with a key frame; until then the former quality continues. A subscriber that was sent a tick in one
@@ -77,8 +80,13 @@ class Mailbox {
     double frameRate = 0;  // bytes/s that frames may take, without parity and headers
   };
   // Frames travel over this link from now on; nothing: over the stream, where SendWindow gives the room. Call
-  // it after each frame that next() returns, and when the controller's state changes.
+  // it after each frame that nextFrame() returns, and when the controller's state changes.
   void setLink(std::optional<Link> link);
+  // `wake` is called, from any thread, when nextFrame() may have something. It must not block. Null: it is
+  // not called any more after the return; the caller must then hold no lock that `wake` takes.
+  void setFrameWake(std::function<void()> wake);
+  // Returns the next frame for the link, or nothing.
+  std::optional<SharedBytes> nextFrame(Clock::time_point now);
   // Returns whether the link has lowered the quality. The sender then fills frames with parity rows up to
   // LinkAdaptation::kProbe times their size, as far as the link has room, to find out what it carries.
   bool wantsFinerQuality() const;
@@ -110,19 +118,34 @@ class Mailbox {
   void close(SharedBytes last);
   bool closed() const;
 
-  // Returns the next message to write, or nothing.
+  // Returns the next message to write to the stream, or nothing.
   std::optional<SharedBytes> next(Clock::time_point now);
 
-  // Calls `wake`, unless silence() has returned.
-  void wake();
-  // `wake` is not called any more after the return. The caller must hold no lock that `wake` takes.
+  // Calls `wake` of the constructor, unless silence() has returned.
+  void wake() { call(wake_); }
+  // That `wake` is not called any more after the return. The caller must hold no lock that it takes.
   void silence();
 
  private:
+  enum class Outlet : std::uint8_t { stream, link };
+
   std::optional<SharedBytes> take(Clock::time_point now);
+  SharedBytes takeFrame(Clock::time_point now);
+  bool usesLink() const { return link_ && acknowledged_; }
   bool hasRoom() const {
-    return link_ ? link_->hasRoom && window_.inFlight() < SendWindow::kMax : window_.hasRoom(shape_.rate);
+    return usesLink() ? link_->hasRoom && window_.inFlight() < SendWindow::kMax
+                      : window_.hasRoom(shape_.rate);
   }
+  // By which the oldest held frame leaves now; nothing without a frame or room.
+  std::optional<Outlet> outletOfFrame() const;
+  // Whether the outlets have asked for something, found nothing, and nothing has come for them since.
+  bool outletsWait() const { return streamWaits_ && (linkWaits_ || !usesLink()); }
+  // Notes that the oldest held frame, if it can leave, has come for its outlet, and returns that. Call
+  // wake(outlet) afterwards, without the lock.
+  std::optional<Outlet> noteFrame();
+  void arrived(Outlet outlet) { (outlet == Outlet::stream ? streamWaits_ : linkWaits_) = false; }
+  void wake(std::optional<Outlet> outlet);
+  void call(const std::function<void()>& wake);
   // Quality that the adaptation chose; the present one if the stream has a single quality.
   std::uint8_t chosenQuality() const;
   void adapt(Clock::time_point now);
@@ -133,7 +156,8 @@ class Mailbox {
   const bool atEdge_;
   mutable std::mutex mutex_;
   bool closed_ = false;
-  bool endpointWaits_ = false;  // next() returned nothing, and nothing has arrived since
+  bool streamWaits_ = false;  // next() returned nothing, and nothing has come for it since
+  bool linkWaits_ = true;     // the same of nextFrame(); true before its first call
   ControlMessages control_;
   HeldFrames held_;
   SendWindow window_;
@@ -147,12 +171,13 @@ class Mailbox {
   LinkAdaptation adaptation_{0, 0};
   std::uint8_t reported_ = 0;   // newest quality in an OperatingPoint that the peer was sent
   bool streaming_ = false;      // the description is sent
+  bool acknowledged_ = false;   // a frame was acknowledged, so the peer has the description
   bool requestsKey_ = false;    // the peer asked for a key frame and continues without it
   std::uint32_t sinceKey_ = 0;  // frames of quality_ since the newest key frame
   std::uint8_t quality_ = 0;
 
   std::mutex wakeMutex_;
-  std::function<void()> wake_;
+  std::function<void()> wake_, frameWake_;
 };
 
 }  // namespace clothstream::delivery

@@ -80,6 +80,7 @@ class RateController {
   double minimumRoundTrip() const { return roundTrip_ ? 1e-6 * static_cast<double>(shortest_.value()) : 0; }
   double smoothedRoundTrip() const { return roundTrip_.value_or(0); }
   const LossMeter& loss() const { return packets_.loss(); }
+  std::uint64_t lostPackets() const { return packets_.lost(); }
   // Another flow fills the buffer of the bottleneck.
   bool competes() const { return competition_.has_value(); }
 

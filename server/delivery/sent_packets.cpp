@@ -51,6 +51,7 @@ std::optional<SentPackets::Report> SentPackets::receive(std::uint32_t newest, st
     ++report.packets;
     if (!packet.arrived) {
       ++report.lost;
+      ++lost_;
       report.newestLost = first_;
     }
     loss_.add(!packet.arrived);

@@ -56,6 +56,7 @@ class SentPackets {
   std::uint64_t inFlight() const { return inFlight_; }  // bytes
   std::uint64_t arrived() const { return arrived_; }    // bytes, in all
   std::uint32_t next() const { return first_ + static_cast<std::uint32_t>(packets_.size()); }
+  std::uint64_t lost() const { return lost_; }  // packets, in all
   const LossMeter& loss() const { return loss_; }
 
  private:
@@ -66,6 +67,7 @@ class SentPackets {
   std::uint64_t inFlight_ = 0, arrived_ = 0;
   std::optional<std::uint32_t> newest_;  // in a receipt
   std::optional<std::uint32_t> arrivalUs_;
+  std::uint64_t lost_ = 0;
   LossMeter loss_;
 };
 

@@ -16,6 +16,7 @@
 #include "server/hosting/authentication.h"
 #include "server/hosting/connections.h"
 #include "server/hosting/created_scenes.h"
+#include "server/hosting/datagram_gate.h"
 #include "server/hosting/device_thread.h"
 #include "server/hosting/kept_scenes.h"
 #include "server/hosting/scene_maker.h"
@@ -72,6 +73,8 @@ class SceneServer {
   UploadBudget uploads;
   const std::shared_ptr<scene::Budget> budget;
   std::atomic<std::uint64_t> newestParticipant{0};  // its number
+  // Opens datagrams for peers; null: they are off. The gate must outlive the sessions of its peers.
+  std::atomic<DatagramGate*> datagrams{nullptr};
   const KeptScenes kept;
   SceneRegistry scenes;
   Connections connections;

@@ -78,6 +78,7 @@ constexpr CounterRow kSceneCounters[] = {
      &Metrics::packetBytes},
     {"skipped_frames_total", "Frames not encoded because the encoder was behind.", &Metrics::skippedFrames},
     {"taken_frames_total", "Frames taken by endpoints, per subscriber.", &Metrics::framesTaken},
+    {"datagram_frames_total", "Those of the taken frames that left in datagrams.", &Metrics::datagramFrames},
     {"dropped_frames_total", "Frames not sent because the subscriber was behind, per subscriber.",
      &Metrics::framesDropped},
     {"sent_bytes_total", "Bytes of all messages that endpoints have taken, per subscriber.",
@@ -224,6 +225,20 @@ Families serverFamilies(const hosting::SceneServer& server) {
   const auto total = [&](const char* name, const char* help, std::uint64_t value) {
     addSample(add(families, MetricType::Counter, name, help), static_cast<double>(value));
   };
+  const telemetry::DatagramMetrics& datagrams = metrics.datagrams;
+  gauge("clothstream_datagram_peers", "Peers whose frames leave in datagrams.",
+        static_cast<double>(datagrams.peers));
+  counter("clothstream_datagram_packets_total", "Packets with pieces of frames, repeated ones included.",
+          datagrams.packets);
+  counter("clothstream_datagram_bytes_total", "Bytes of these packets, without headers and encryption.",
+          datagrams.bytes);
+  counter("clothstream_datagram_lost_packets_total",
+          "Packets that have not arrived, by the receipts of peers.", datagrams.lost);
+  counter("clothstream_datagram_repeats_total", "Pieces that peers requested and were sent again.",
+          datagrams.repeats);
+  counter("clothstream_datagram_fallbacks_total",
+          "Times that the frames of a peer went back to its stream, because its receipts stopped.",
+          datagrams.fallbacks);
   gauge("clothstream_nats_connected", "1 while there is a connection to NATS, else 0.",
         metrics.nats.connected ? 1 : 0);
   MetricFamily& natsMessages = add(

@@ -46,8 +46,8 @@ std::filesystem::path userDirectory(const char* variable, const char* inHome) {
 struct Parsed {
   ProgramOptions options;
   std::vector<std::string> changeable, allowed;
-  std::string record, recordings, playSpeed = "1", config, tls = "off", announce = "auto", overload = "adapt",
-                                  tokenValid = "8h", kernels = "auto";
+  std::string record, recordings, playSpeed = "1", config, tls = "off", announce = "auto", transport = "auto",
+                                  overload = "adapt", tokenValid = "8h", kernels = "auto";
   std::optional<scene::Role> anonymousRole, tokenRole;
   std::optional<hosting::Profile> chosenProfile;
   // Limits of the profile that are set alone.
@@ -204,6 +204,16 @@ void checkIdentity(const IdentityOptions& identity, const NetworkOptions& networ
         isLoopback(network.host) ? network.publicNames.front() : network.host));
 }
 
+Check checkAddress() {
+  return [](const std::string& text) -> std::string {
+    in6_addr address{};  // has room for both families
+    if (::inet_pton(AF_INET, text.c_str(), &address) == 1 ||
+        ::inet_pton(AF_INET6, text.c_str(), &address) == 1)
+      return {};
+    return fmt::format("'{}' is not an address; use one such as 192.0.2.1 or 2001:db8::1", text);
+  };
+}
+
 void addNetworkOptions(OptionTable& table, Parsed& parsed) {
   ServeOptions& options = parsed.options.serve;
   table.group("Network");
@@ -211,6 +221,21 @@ void addNetworkOptions(OptionTable& table, Parsed& parsed) {
   table.number("--port", options.network.port, kPort,
                "Port of the page and the WebSocket. 0 picks a free port");
   table.number("--grpc-port", options.network.grpcPort, kPort, "Port of gRPC. 0 picks a free port");
+  table.text(
+      "--transport", parsed.transport, "WAY",
+      "Way of frames and input: datagrams (an error if the UDP port cannot be opened), tcp (the stream of "
+      "each client alone), or auto: datagrams if the port can be opened. Clients that no datagram reaches "
+      "stay on their streams",
+      checkChoice({"auto", "datagrams", "tcp"}));
+  CLI::Option* datagramPort =
+      table.number("--datagram-port", options.network.datagramPort, kPort,
+                   "UDP port of datagrams. Others must be able to reach it. 0 picks a free port");
+  table.showDefault(datagramPort, "the number of --port");
+  table.list(
+      "--public-address", options.network.publicAddresses, "ADDRESS",
+      "IPv4 or IPv6 address under which clients reach the UDP port, such as that of a router that forwards "
+      "it; may be repeated. The address that a client's connection has reached is always tried",
+      checkAddress());
   table.text("--page", options.network.page, "DIR",
              "Directory of the page, instead of the one next to the program");
   table.list(
@@ -691,6 +716,10 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
     checkTls(serve.tls);
     checkWebhook(serve.webhook);
     checkNats(serve.nats);
+    const std::string way = CLI::detail::to_lower(parsed.transport);
+    serve.network.datagrams = way == "datagrams" ? DatagramUse::required
+                              : way == "tcp"     ? DatagramUse::off
+                                                 : DatagramUse::automatic;
     serve.network.announces = parsed.announce == "on" || (parsed.announce == "auto" && serve.tls.self &&
                                                           !isLoopback(serve.network.host));
     setLimits(parsed);

@@ -38,6 +38,13 @@ enum class Command {
   listMaterials
 };
 
+// Whether frames and input also travel in datagrams.
+enum class DatagramUse : std::uint8_t {
+  automatic,  // if the port can be opened
+  required,   // an error at the start if the port cannot be opened
+  off,
+};
+
 // The endpoints of a server.
 struct NetworkOptions {
   std::string host = "127.0.0.1";
@@ -45,8 +52,11 @@ struct NetworkOptions {
   bool reflects = false;       // gRPC reflection
   std::filesystem::path page;  // empty: the directory next to the program, if it exists
   std::vector<std::string> publicNames, allowedOrigins;
-  std::uint32_t maxConnections = 256;  // of each endpoint
-  bool announces = false;              // by mDNS
+  DatagramUse datagrams = DatagramUse::automatic;
+  std::optional<std::uint16_t> datagramPort;  // unset: the number of the page's port
+  std::vector<std::string> publicAddresses;   // IPv4 and IPv6, as text
+  std::uint32_t maxConnections = 256;         // of each endpoint
+  bool announces = false;                     // by mDNS
 };
 
 // TLS for both endpoints: with a self-signed certificate, or with that in the files.

@@ -21,6 +21,15 @@ bool isAddress(const std::string& text) {
   return ::inet_pton(AF_INET, text.c_str(), &v4) == 1 || ::inet_pton(AF_INET6, text.c_str(), &v6) == 1;
 }
 
+std::vector<std::string> addressesOf(const std::string& host) {
+  if (host == "localhost") return {"127.0.0.1"};
+  if (isAddress(host) && host != "0.0.0.0" && host != "::") return {host};
+  std::vector<std::string> addresses;
+  for (const std::string& name : tls::namesOfThisMachine())
+    if (isAddress(name) && !isLoopback(name)) addresses.push_back(name);
+  return addresses;
+}
+
 std::string addressInNetwork(const NetworkOptions& network) {
   if (isLoopback(network.host)) return {};
   if (network.host != "0.0.0.0" && network.host != "::") return network.host;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "server/options/program_options.h"
 
@@ -14,6 +15,10 @@ std::string localAddress(const std::string& host, std::uint16_t port);
 
 // Whether the text is an IPv4 or IPv6 address.
 bool isAddress(const std::string& text);
+
+// Addresses of this machine that its peers can reach: `host`, or those of all interfaces if it stands for all
+// addresses. Loopback addresses are only among them if `host` is one.
+std::vector<std::string> addressesOf(const std::string& host);
 
 // The first address of this machine that others in its network can reach, or empty.
 std::string addressInNetwork(const NetworkOptions& network);

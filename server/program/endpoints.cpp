@@ -5,14 +5,17 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <optional>
+#include <stdexcept>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "server/agones/agones.h"
 #include "server/discovery/announcement.h"
+#include "server/endpoint/datagram/datagram_endpoint.h"
 #include "server/endpoint/grpc/grpc_endpoint.h"
 #include "server/endpoint/web/web_endpoint.h"
 #include "server/program/addresses.h"
@@ -44,6 +47,26 @@ void printHomeAddresses(const NetworkOptions& network, std::uint16_t port, const
   if (host.empty()) return;
   const std::string address = fmt::format("https://{}/", localAddress(host, port));
   fmt::print("type    {}\n{}", address, tls::qrCode(address));
+}
+
+// Null if datagrams are off, or if the port cannot be opened and they are not required.
+std::unique_ptr<endpoint::DatagramEndpoint> openDatagrams(hosting::SceneServer& server,
+                                                          const NetworkOptions& network) {
+  if (network.datagrams == DatagramUse::off) return nullptr;
+  try {
+    return std::make_unique<endpoint::DatagramEndpoint>(
+        server, endpoint::DatagramEndpointOptions{.host = network.host,
+                                                  .port = network.datagramPort.value_or(network.port),
+                                                  .ownAddresses = addressesOf(network.host),
+                                                  .publicAddresses = network.publicAddresses,
+                                                  .maxPeers = 2 * network.maxConnections});
+  } catch (const std::exception& failure) {
+    if (network.datagrams == DatagramUse::required)
+      throw std::runtime_error(fmt::format("--transport datagrams: {}", failure.what()));
+    spdlog::warn("{}; clients stay on their streams. --transport tcp says that this is meant",
+                 failure.what());
+    return nullptr;
+  }
 }
 
 void print(const std::string& text) {
@@ -98,6 +121,8 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Serv
         .connectionsPerAddress = options.server.connectionsPerAddress,
         .connectionsPerSecond = options.server.connectionsPerSecond,
         .connectionsPerSecondOfAddress = options.server.connectionsPerSecondPerAddress};
+    // Outlives the sessions of both other endpoints, whose associations it has.
+    const std::unique_ptr<endpoint::DatagramEndpoint> datagrams = openDatagrams(server, options.network);
     const endpoint::WebEndpoint web(server, {.host = options.network.host,
                                              .port = options.network.port,
                                              .pageDirectory = page,
@@ -118,6 +143,7 @@ std::unique_ptr<EndGuard> openEndpoints(hosting::SceneServer& server, const Serv
     fmt::print("{}page    http{}://{}/\ngRPC    {}{}\n", intro, tls ? "s" : "",
                localAddress(options.network.host, web.port()), tls ? "https://" : "",
                localAddress(options.network.host, rpc.port()));
+    if (datagrams) fmt::print("UDP     {}\n", localAddress(options.network.host, datagrams->port()));
     if (options.tls.self) printHomeAddresses(options.network, web.port(), tls->fingerprint());
     std::fflush(stdout);
     if (options.identity.pairing) print(pairingCodeLine(*authenticator));

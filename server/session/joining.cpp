@@ -23,31 +23,21 @@ void Session::identify(const std::string& token) {
   const std::lock_guard lock(mutex_);
   if (mailbox_->closed()) return;
   now_ = Clock::now();
-  token_ = token;
   messages::Result<identity::Identity> identity = server_.authentication.identify(token, address_.empty());
   if (identity)
-    become(std::move(*identity));
+    become(std::move(*identity), token);
   else if (token.empty())
     whyUnknown_ = identity.error().text;
   else
     fail(identity.error().code, identity.error().text);
 }
 
-bool Session::become(identity::Identity identity) {
-  // A new token of the same subject replaces the former one.
-  const bool same = identity_ && identity_->verified && identity_->subject == identity.subject;
-  if (!same) {
-    counted_.reset();
-    counted_ = server_.connections.count(identity);
-  }
-  if (!counted_) {
-    fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-         fmt::format("your token has {} open connections, its maximum (--profile)",
-                     server_.options.maxConnectionsPerToken));
-    return false;
-  }
-  identity_ = std::move(identity);
-  return true;
+bool Session::become(identity::Identity identity, const std::string& token) {
+  if (identity_.set(std::move(identity), token)) return true;
+  fail(v1::ERROR_CODE_RESOURCE_EXHAUSTED,
+       fmt::format("your token has {} open connections, its maximum (--profile)",
+                   server_.options.maxConnectionsPerToken));
+  return false;
 }
 
 void Session::authenticate(const v1::AuthenticateRequest& request) {
@@ -61,8 +51,8 @@ void Session::authenticate(const v1::AuthenticateRequest& request) {
     return refuse({v1::ERROR_CODE_OUT_OF_ORDER,
                    "authenticate: a stream in a scene accepts only tokens of the same subject and tenant "
                    "that are valid for this scene"});
-  if (!become(std::move(*identity))) return;
-  token_ = reply.authenticate().token().empty() ? request.token() : reply.authenticate().token();
+  const std::string& newToken = reply.authenticate().token();
+  if (!become(std::move(*identity), newToken.empty() ? request.token() : newToken)) return;
   if (scene_ != nullptr) scene_->roster.renew(*mailbox_, rightsIn(*scene_), now_);
   answer(reply);
 }
@@ -173,7 +163,7 @@ bool Session::joinRemotely(const v1::Hello& message, const messages::Joining& jo
   if (!scene->source || onlyViews || scene->roster.knows(message.resume_token())) return false;
   // Messages of the other server come before the last one of this mailbox.
   std::shared_ptr<scene::RemoteSession> remote = scene->source->connect(
-      {.name = peer_, .address = address_, .token = token_, .resumeToken = message.resume_token()},
+      {.name = peer_, .address = address_, .token = identity_.token(), .resumeToken = message.resume_token()},
       [mailbox = mailbox_] { mailbox->wake(); });
   if (!remote) return false;
   v1::ClientMessage first;

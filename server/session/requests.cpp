@@ -154,6 +154,10 @@ struct Session::Messages {
          .limit = kParticipants,
          .handle = removeParticipant},
         {.body = Message::kFrameAck, .state = State::inScene, .handle = frameAck},
+        {.body = Message::kDatagramOffer,
+         .state = State::inScene,
+         .limit = RateLimit{Rate::control, "offers of datagrams"},
+         .handle = datagramOffer},
         // Only some of these take a token: see the handler.
         {.body = Message::kKeyFrameRequest, .state = State::inScene, .handle = keyFrameRequest},
     });
@@ -227,7 +231,6 @@ struct Session::Messages {
   }
 
   static void upload(Session& session, const Message& message) {
-    session.uploads_ = true;
     session.refuseUnless(session.upload_.add(message.upload(), session.now_));
   }
 
@@ -317,6 +320,10 @@ struct Session::Messages {
     session.server_.device.wake(*session.scene_);
   }
 
+  static void datagramOffer(Session& session, const Message& message) {
+    session.openDatagrams(message.datagram_offer());
+  }
+
   static void keyFrameRequest(Session& session, const Message& message) {
     // A key frame costs all subscribers of its quality. The mailbox limits early requests.
     if (message.key_frame_request().early()) return session.mailbox_->requestKeyFrame();
@@ -338,14 +345,14 @@ void Session::dispatch(const v1::ClientMessage& message) {
   if (row == nullptr)
     return refuse(
         {v1::ERROR_CODE_MALFORMED_MESSAGE, "the message has no body, or one that this server does not know"});
-  if (row->state != State::any && !identity_) {
+  if (row->state != State::any && !identity_.isKnown()) {
     server_.metrics.refuse(telemetry::Refusal::token);
     return fail(v1::ERROR_CODE_UNAUTHENTICATED, whyUnknown_);
   }
   if (row->state == State::outside && scene_ != nullptr)
     return fail(v1::ERROR_CODE_OUT_OF_ORDER,
                 fmt::format("this stream has joined '{}' already: open another one", scene_->name()));
-  if (row->state == State::inScene && scene_ == nullptr)
+  if (row->state == State::inScene && scene_ == nullptr && !remote())
     return fail(v1::ERROR_CODE_OUT_OF_ORDER, "this stream has not joined a scene: send hello first");
   if (row->limit && !allowed(row->limit->rate, row->limit->what)) return;
   if (row->action) {

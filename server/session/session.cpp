@@ -14,6 +14,7 @@
 #include "server/hosting/scene_server.h"
 #include "server/identity/authenticator.h"
 #include "server/messages/client_message.h"
+#include "server/messages/datagram_offer.h"
 #include "server/scene/remote_session.h"
 #include "server/telemetry/log.h"
 
@@ -25,8 +26,8 @@ using delivery::SharedBytes;
 
 constexpr double kMalformedCost = 60;
 constexpr double kMegabyte = 1e6, kKilobyte = 1e3;
-// A request for the list of scenes is not longer.
-constexpr std::size_t kMaxListBytes = 64;
+// Messages that this server answers for a peer of another one are not longer.
+constexpr std::size_t kMaxOwnBytes = 512;
 
 }  // namespace
 
@@ -35,9 +36,11 @@ Session::Session(hosting::SceneServer& server, Arrival arrival, std::function<vo
       peer_(std::move(arrival.peer)),
       address_(std::move(arrival.address)),
       continues_(arrival.continues),
+      reached_(std::move(arrival.reached)),
       mailbox_(std::make_shared<Mailbox>(std::move(wake), arrival.atEdge)),
       opened_(Clock::now()),
       lastHeard_(opened_),
+      identity_(server.connections),
       upload_(server.uploads, address_),
       readRate_(server.options.maxReadRate * kMegabyte, server.options.maxReadRate * kMegabyte) {}
 
@@ -85,12 +88,12 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point sent) 
   readPause_ = readRate_.pay(now, static_cast<double>(bytes.size()));
   try {
     if (const std::shared_ptr<scene::RemoteSession> remote = this->remote()) {
-      // The scenes that this peer can join are those of this server.
-      if (v1::ClientMessage list; bytes.size() <= kMaxListBytes && identity_ &&
-                                  list.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
-                                  list.has_list_scenes()) {
-        requestId_ = list.request_id();
-        return dispatch(list);
+      // The scenes that this peer can join are those of this server, and so are its datagrams.
+      if (v1::ClientMessage own; bytes.size() <= kMaxOwnBytes && identity_.isKnown() &&
+                                 own.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
+                                 (own.has_list_scenes() || own.has_datagram_offer())) {
+        requestId_ = own.request_id();
+        return dispatch(own);
       }
       if (!remote->send(bytes))
         cutOff(telemetry::Refusal::unreadAnswers,
@@ -109,6 +112,31 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point sent) 
                                 "the server could not handle the message; try again later", true, requestId_),
                 DisconnectReason::lost);
   }
+}
+
+void Session::openDatagrams(const v1::DatagramOffer& message) {
+  messages::Result<messages::DatagramOffer> offer = messages::toDatagramOffer(message);
+  if (!offer) return refuse(offer.error());
+  datagrams_.reset();
+  v1::ServerMessage reply;
+  v1::DatagramAnswer& answered = *reply.mutable_datagram_answer();
+  // Frames of another server come by its session with this peer, in their order.
+  const bool hasFrames = scene_ != nullptr && !inLockstep() && !mailbox_->atEdge();
+  if (hosting::DatagramGate* const gate = server_.datagrams.load(); gate != nullptr && hasFrames) {
+    auto opened = gate->open({.name = peer_,
+                              .reached = reached_,
+                              .offer = std::move(*offer),
+                              .mailbox = mailbox_,
+                              .receive = [weak = weak_from_this()](std::span<const std::byte> bytes) {
+                                if (const std::shared_ptr<Session> session = weak.lock())
+                                  session->receive(bytes);
+                              }});
+    if (opened) {
+      answered = std::move(opened->answer);
+      datagrams_ = std::move(opened->association);
+    }
+  }
+  answer(reply);
 }
 
 void Session::answer(v1::ServerMessage& message) {
@@ -190,8 +218,9 @@ void Session::checkSilence(Clock::time_point now) {
   if (remote()) return;
   // A stream in a scene has some time to send a new token.
   const auto grace = scene_ ? identity::Authenticator::kExpiryGrace : std::chrono::seconds(0);
-  if (const char* const why =
-          identity_ && options.authenticator ? options.authenticator->whyEnded(*identity_, grace) : nullptr) {
+  if (const char* const why = identity_.isKnown() && options.authenticator
+                                  ? options.authenticator->whyEnded(*identity_, grace)
+                                  : nullptr) {
     now_ = now;
     spdlog::info("{}: disconnected: {}", peer_, why);
     return closeLocked(delivery::error(v1::ERROR_CODE_UNAUTHENTICATED, why, true), DisconnectReason::lost);
@@ -211,7 +240,7 @@ void Session::checkSilence(Clock::time_point now) {
                               schedule::seconds(options.silence)));
   if (scene_ || asked_ > 0) return;
   const std::chrono::milliseconds time =
-      options.helloTimeout + (uploads_ ? options.maxUploadTime : std::chrono::milliseconds(0));
+      options.helloTimeout + (upload_.hasBegun() ? options.maxUploadTime : std::chrono::milliseconds(0));
   if (now - opened_ > time)
     cutOff(telemetry::Refusal::helloTimeout,
            fmt::format("the client joined no scene within {} s: send hello soon after connecting (--profile)",
@@ -230,11 +259,12 @@ void Session::end() {
   const std::lock_guard lock(mutex_);
   now_ = Clock::now();
   closeLocked(nullptr, DisconnectReason::lost);
-  counted_.reset();
+  identity_.release();
 }
 
 void Session::disconnect(DisconnectReason reason) {
   using End = scene::RemoteSession::End;
+  datagrams_.reset();
   if (const std::shared_ptr<scene::RemoteSession> remote = this->remote())
     remote->end(reason == DisconnectReason::left         ? End::left
                 : reason == DisconnectReason::pageClosed ? End::pageClosed

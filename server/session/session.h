@@ -25,6 +25,7 @@
 #include "server/scene/roster.h"
 #include "server/schedule/clock.h"
 #include "server/schedule/token_bucket.h"
+#include "server/session/peer_identity.h"
 #include "server/session/rates.h"
 #include "server/session/upload.h"
 
@@ -52,6 +53,8 @@ struct Arrival {
   std::string peer;     // name for logs
   std::string address;  // groups the peers of one machine; empty for programs of this machine
   std::string token;    // sent with the connection; empty: none
+  // Address of this machine that the connection has reached, such as 192.0.2.1; empty: not known.
+  std::string reached = {};
   // The peer had a session with another server, which had the scene before. Its Hello must name a participant
   // of the scene. It gets no Welcome and no description, because it has both.
   bool continues = false;
@@ -61,6 +64,9 @@ struct Arrival {
 
 // Thread-safe. An endpoint opens one for each peer, feeds it what arrives, and writes what next() returns,
 // one write in flight. When the write is done it calls next() again. If there is nothing it waits for `wake`.
+//
+// Datagrams of the peer, if it offers some and the server has a gate for them, also bring messages and take
+// frames (hosting::DatagramGate).
 //
 // An invalid message is answered by an Error to this peer alone. Every refused message counts against a
 // budget that refills with time; bytes that are not a message count as 60. A peer that exceeds the budget
@@ -118,8 +124,9 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Checks and handles a message as its row in the table says.
   void dispatch(const v1::ClientMessage& message);
   void authenticate(const v1::AuthenticateRequest& request);
+  void openDatagrams(const v1::DatagramOffer& message);
   // Sets the identity and counts the connection. Returns false, and ends the session, if there are too many.
-  bool become(identity::Identity identity);
+  bool become(identity::Identity identity, const std::string& token);
   // Rights that the identity has in this scene.
   scene::Rights rightsIn(const scene::LiveScene& scene) const;
   void hello(const v1::Hello& message);
@@ -161,6 +168,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   hosting::SceneServer& server_;
   const std::string peer_, address_;
   const bool continues_;
+  const std::string reached_;
   const std::shared_ptr<delivery::Mailbox> mailbox_;
   const Clock::time_point opened_;
   std::atomic<Clock::time_point> lastHeard_;
@@ -172,13 +180,11 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
 
   std::mutex mutex_;  // protects all below
   std::shared_ptr<scene::LiveScene> scene_;
-  std::string token_;  // newest one that the peer has sent
   std::uint64_t participant_ = 0;
-  std::optional<identity::Identity> identity_;  // none until the peer has proved what the server requires
-  std::string whyUnknown_;                      // error for a peer without identity
-  std::shared_ptr<const void> counted_;         // while the connection counts for its token
+  PeerIdentity identity_;
+  std::string whyUnknown_;                 // error for a peer without identity
+  std::shared_ptr<const void> datagrams_;  // while the peer may exchange datagrams
   Upload upload_;
-  bool uploads_ = false;     // has begun an upload
   std::uint32_t asked_ = 0;  // requests whose answers another thread makes
   // Request id and arrival of the current message.
   std::uint64_t requestId_ = 0;

@@ -25,6 +25,9 @@ class Upload {
   // `address` is the key of the peer's address, for its share of the budget; empty for none.
   Upload(hosting::UploadBudget& budget, std::string address) : reservation_(budget, std::move(address)) {}
 
+  // Returns whether the peer has ever begun one.
+  bool hasBegun() const { return begun_ != schedule::Clock::time_point{}; }
+
   // Adds the next chunk, or the first chunk of another content. An error drops everything uploaded so far.
   [[nodiscard]] messages::Result<void> add(const v1::Chunk& chunk, schedule::Clock::time_point now);
   // Returns an error, and drops everything, if the upload is too slow, or is there for too long. Call it

@@ -49,6 +49,7 @@ std::string table(const std::string& scene, const SceneMetrics& m) {
                      {"bytes", m.packetBytes.value()},
                      {"skipped", m.skippedFrames.value()},
                      {"taken", m.framesTaken.value()},
+                     {"in datagrams", m.datagramFrames.value()},
                      {"dropped", m.framesDropped.value()}});
   addCounters(text, {{"steps down", m.stepsDown.value()}, {"steps up", m.stepsUp.value()}});
   if (m.overloadStepsDown.value() > 0)
@@ -65,6 +66,12 @@ std::string table(const ServerMetrics& m) {
                      {"rejected messages", m.rejectedMessages.value()},
                      {"device rebuilds", m.deviceRebuilds.value()},
                      {"scenes in quarantine", m.quarantines.value()}});
+  if (m.datagrams.packets.value() > 0)
+    addCounters(text, {{"datagrams sent", m.datagrams.packets.value()},
+                       {"bytes", m.datagrams.bytes.value()},
+                       {"lost", m.datagrams.lost.value()},
+                       {"repeated", m.datagrams.repeats.value()},
+                       {"fallbacks", m.datagrams.fallbacks.value()}});
   if (m.nats.published.value() + m.nats.received.value() > 0)
     addCounters(text, {{"NATS messages sent", m.nats.published.value()},
                        {"received", m.nats.received.value()},

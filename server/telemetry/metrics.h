@@ -34,6 +34,7 @@ struct SceneCounters {
   Counter packetBytes;        // bytes of all packets, each counted once for all subscribers
   Counter skippedFrames;      // frames not encoded because the encoder was behind, per quality
   Counter framesTaken;        // frames taken by endpoints, per subscriber
+  Counter datagramFrames;     // those of framesTaken that left in datagrams
   Counter framesDropped;      // frames not sent because the subscriber was behind, per subscriber
   Counter sentBytes;          // bytes of all messages that endpoints have taken, per subscriber
   Counter stepsDown;          // subscribers moved to a coarser quality
@@ -69,6 +70,15 @@ struct NatsMetrics {
   Counter refused;  // messages that do not belong to their stream
 };
 
+// Datagrams of all peers.
+struct DatagramMetrics {
+  std::atomic<std::uint64_t> peers{0};  // whose frames leave in datagrams now
+  Counter packets, bytes;               // payloads with pieces, repeated ones too
+  Counter repeats;                      // pieces that peers have requested
+  Counter lost;                         // packets that have not arrived, as receipts show
+  Counter fallbacks;                    // frames of a peer went back to its stream, because receipts stopped
+};
+
 struct ServerMetrics {
   void refuse(Refusal reason) { refusals[static_cast<std::size_t>(reason)].add(); }
 
@@ -81,6 +91,7 @@ struct ServerMetrics {
   Counter deviceRebuilds;
   Counter quarantines;  // scenes stopped because they harmed others
   NatsMetrics nats;
+  DatagramMetrics datagrams;
 };
 
 // One line per histogram (count, p50, p90, p99 and maximum in milliseconds), then lines of counters.

@@ -23,6 +23,11 @@ std::string addressKeyOf(const std::string& peer) {
   return addressKey(addressOf(peer));
 }
 
+std::string reachedBy(const std::string& peer) {
+  const boost::asio::ip::address address = addressOf(peer);
+  return addressKey(address).empty() ? plainText(address) : std::string();
+}
+
 std::string tokenIn(const grpc::ServerContext& context) {
   constexpr std::string_view kScheme = "Bearer ";
   const auto found = context.client_metadata().find("authorization");

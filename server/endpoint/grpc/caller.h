@@ -17,6 +17,10 @@ boost::asio::ip::address addressOf(const std::string& peer);
 // machine.
 std::string addressKeyOf(const std::string& peer);
 
+// Address of this machine that a peer has reached, if that is known: gRPC does not say, but a program of this
+// machine that has a loopback address has reached the same one. Empty for others.
+std::string reachedBy(const std::string& peer);
+
 // Token in the metadata of the call, `authorization: Bearer TOKEN`; empty without one.
 std::string tokenIn(const grpc::ServerContext& context);
 

@@ -54,7 +54,8 @@ void JoinStream::onBegun(bool ok) {
   session_ = session::Session::open(endpoint_.server,
                                     {.peer = "grpc " + context_.peer(),
                                      .address = addressKeyOf(context_.peer()),
-                                     .token = tokenIn(context_)},
+                                     .token = tokenIn(context_),
+                                     .reached = reachedBy(context_.peer())},
                                     std::move(wake));
   read();
   pump();

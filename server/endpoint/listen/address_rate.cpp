@@ -10,11 +10,19 @@ namespace ip = boost::asio::ip;
 
 constexpr std::size_t kPrefixBytes = 8;
 
+ip::address withoutMapping(const ip::address& address) {
+  if (!address.is_v6() || !address.to_v6().is_v4_mapped()) return address;
+  return ip::make_address_v4(ip::v4_mapped, address.to_v6());
+}
+
 }  // namespace
 
+std::string plainText(const ip::address& address) {
+  return withoutMapping(address).to_string();
+}
+
 std::string addressKey(ip::address address) {
-  if (address.is_v6() && address.to_v6().is_v4_mapped())
-    address = ip::make_address_v4(ip::v4_mapped, address.to_v6());
+  address = withoutMapping(address);
   if (address.is_loopback()) return {};
   if (address.is_v4()) {
     const auto bytes = address.to_v4().to_bytes();

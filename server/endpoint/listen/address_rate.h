@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Limits what one address does per second.
+// Limits what one address does per second, and texts of addresses.
 #pragma once
 
 #include <cstddef>
@@ -17,6 +17,9 @@ namespace clothstream::endpoint {
 // bits; their key includes the network (scope). Empty for the loopback addresses, which all programs of this
 // machine share.
 std::string addressKey(boost::asio::ip::address address);
+
+// Text of an address. An IPv4 address that is mapped into IPv6 (::ffff:a.b.c.d) is written as IPv4.
+std::string plainText(const boost::asio::ip::address& address);
 
 // Not thread-safe.
 class AddressRate {

@@ -43,9 +43,11 @@ session::Arrival arrivalOf(const beast::tcp_stream& socket) {
   const auto endpoint = socket.socket().remote_endpoint(error);
   // The address of a connection that has ended already is unknown; it must not count as this machine.
   if (error) return {.peer = "web", .address = "unknown", .token = {}};
+  const auto own = socket.socket().local_endpoint(error);
   return {.peer = fmt::format("web {}:{}", endpoint.address().to_string(), endpoint.port()),
           .address = addressKey(endpoint.address()),
-          .token = {}};
+          .token = {},
+          .reached = error ? std::string() : plainText(own.address())};
 }
 
 // Longest prefix of `text` that fits into a close frame and does not cut a UTF-8 sequence.

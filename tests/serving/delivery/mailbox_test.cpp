@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "proto/datagram/piece.h"
 
 namespace clothstream::delivery {
 namespace {
@@ -32,6 +33,16 @@ class MailboxTest : public ::testing::Test {
     ASSERT_TRUE(mailbox.next(now));
     ASSERT_FALSE(mailbox.next(now));
   }
+  // The same, and acknowledges this key frame. The next frames leave by a link with room.
+  void joinByLink(const PublishedFrame& first) {
+    join();
+    mailbox.setFrameWake([this] { ++frameWakes; });
+    mailbox.deliver(first);
+    ASSERT_EQ(mailbox.next(now), first.message);
+    ASSERT_FALSE(mailbox.next(now));
+    ASSERT_TRUE(mailbox.acknowledge(first.tick, now));
+    mailbox.setLink(Mailbox::Link{.hasRoom = true, .frameRate = 1e6});
+  }
   static std::shared_ptr<const DescriptionChunks> description(std::size_t bytes) {
     return std::make_shared<const DescriptionChunks>(1, std::make_shared<const std::string>(bytes, 'g'),
                                                      "rest");
@@ -52,7 +63,7 @@ class MailboxTest : public ::testing::Test {
   StreamShape shape{.rate = 72};
   Clock::time_point now = Clock::time_point(std::chrono::hours(1));
   telemetry::SceneMetrics metrics;
-  int wakes = 0;
+  int wakes = 0, frameWakes = 0;
   Mailbox mailbox;
 };
 
@@ -124,40 +135,126 @@ TEST_F(MailboxTest, StartsWithAKeyFrame) {
   EXPECT_TRUE(mailbox.next(now));
 }
 
+constexpr Mailbox::Link kRoom{.hasRoom = true, .frameRate = 1e6}, kNoRoom{.frameRate = 1e6};
+
 // The room of a rate controller counts, and not the number of frames on their way.
 TEST_F(MailboxTest, LinkGivesTheRoom) {
-  join();
-  const std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3), frame(4), frame(5)};
-  mailbox.setLink(Mailbox::Link{.hasRoom = true, .frameRate = 1e6});
-  for (std::size_t i = 0; i < 3; ++i) {
+  const std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3), frame(4), frame(5), frame(6)};
+  joinByLink(frames[0]);
+  for (std::size_t i = 1; i < 4; ++i) {
     mailbox.deliver(frames[i]);
-    EXPECT_EQ(taken(frames), Ticks{frames[i].tick});
+    EXPECT_EQ(mailbox.nextFrame(now), frames[i].message);
   }
-  mailbox.setLink(Mailbox::Link{.hasRoom = false, .frameRate = 1e6});
-  mailbox.deliver(frames[3]);
-  EXPECT_EQ(taken(frames), Ticks{});
-  EXPECT_TRUE(mailbox.acknowledge(3, now));
-  EXPECT_EQ(taken(frames), Ticks{});
-  const int before = wakes;
-  mailbox.setLink(Mailbox::Link{.hasRoom = true, .frameRate = 1e6});
-  EXPECT_EQ(wakes, before + 1);
-  EXPECT_EQ(taken(frames), Ticks{4});
-  mailbox.setLink(std::nullopt);
+  mailbox.setLink(kNoRoom);
   mailbox.deliver(frames[4]);
-  EXPECT_EQ(taken(frames), Ticks{5}) << "the stream's window has room";
+  EXPECT_FALSE(mailbox.nextFrame(now));
+  EXPECT_TRUE(mailbox.acknowledge(4, now));
+  EXPECT_FALSE(mailbox.nextFrame(now));
+  const int before = frameWakes;
+  mailbox.setLink(kRoom);
+  EXPECT_EQ(frameWakes, before + 1);
+  EXPECT_EQ(mailbox.nextFrame(now), frames[4].message);
+  mailbox.setLink(std::nullopt);
+  mailbox.deliver(frames[5]);
+  EXPECT_FALSE(mailbox.nextFrame(now));
+  EXPECT_EQ(taken(frames), Ticks{6}) << "the stream's window has room";
   EXPECT_FALSE(mailbox.wantsFinerQuality());
 }
 
 // A peer that sends receipts, but acknowledges no frames.
 TEST_F(MailboxTest, LinkBoundsUnacknowledgedFrames) {
-  join();
-  mailbox.setLink(Mailbox::Link{.hasRoom = true, .frameRate = 1e6});
+  joinByLink(frame(1, true));
   std::size_t sent = 0;
-  for (std::uint64_t tick = 1; tick <= 2 * SendWindow::kMax; ++tick) {
-    mailbox.deliver(frame(tick, tick == 1));
-    while (mailbox.next(now)) ++sent;
+  for (std::uint64_t tick = 2; tick <= 2 * SendWindow::kMax; ++tick) {
+    mailbox.deliver(frame(tick));
+    while (mailbox.nextFrame(now)) ++sent;
   }
   EXPECT_EQ(sent, SendWindow::kMax);
+}
+
+// A peer that has acknowledged no frame may not have the description yet.
+TEST_F(MailboxTest, FirstFrameTravelsOnStream) {
+  join();
+  mailbox.setFrameWake([this] { ++frameWakes; });
+  mailbox.setLink(kRoom);
+  const std::vector<PublishedFrame> frames{frame(1, true), frame(2)};
+  mailbox.deliver(frames[0]);
+  EXPECT_FALSE(mailbox.nextFrame(now));
+  EXPECT_EQ(taken(frames), Ticks{1});
+  EXPECT_TRUE(mailbox.acknowledge(1, now));
+  mailbox.deliver(frames[1]);
+  EXPECT_EQ(taken(frames), Ticks{});
+  EXPECT_EQ(frameWakes, 1);
+  EXPECT_EQ(mailbox.nextFrame(now), frames[1].message);
+}
+
+TEST_F(MailboxTest, LongFrameTravelsOnStreamInOrder) {
+  std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3), frame(4)};
+  frames[2].message = bytes(datagram::kMaxFrameBytes + 1);
+  joinByLink(frames[0]);
+  mailbox.deliver(frames[1]);
+  const int before = wakes;
+  mailbox.deliver(frames[2]);
+  mailbox.deliver(frames[3]);
+  EXPECT_EQ(taken(frames), Ticks{}) << "the frame before it has not left";
+  EXPECT_EQ(mailbox.nextFrame(now), frames[1].message);
+  EXPECT_FALSE(mailbox.nextFrame(now));
+  EXPECT_EQ(wakes, before + 1);
+  const int frameBefore = frameWakes;
+  EXPECT_EQ(taken(frames), Ticks{3});
+  EXPECT_EQ(frameWakes, frameBefore + 1);
+  EXPECT_EQ(mailbox.nextFrame(now), frames[3].message);
+}
+
+// Frames that have not left by the link leave by the stream.
+TEST_F(MailboxTest, HeldFramesReturnToStream) {
+  const std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3)};
+  joinByLink(frames[0]);
+  mailbox.deliver(frames[1]);
+  EXPECT_EQ(mailbox.nextFrame(now), frames[1].message);
+  mailbox.deliver(frames[2]);
+  const int before = wakes;
+  mailbox.setLink(std::nullopt);
+  EXPECT_EQ(wakes, before + 1);
+  EXPECT_FALSE(mailbox.nextFrame(now));
+  EXPECT_EQ(taken(frames), Ticks{3});
+}
+
+TEST_F(MailboxTest, StreamTellsQualityOfLink) {
+  shape.qualities = 2;
+  joinByLink(frame(1, true));
+  mailbox.setLink(Mailbox::Link{.hasRoom = true, .frameRate = 1});
+  const auto deliver = [&](std::uint64_t tick) {
+    now += milliseconds(14);
+    const RequestedFrames requested = mailbox.requested(now);
+    PublishedFrame next = frame(tick, requested.keyFrames != 0);
+    next.quality = (requested.keyFrames & 2) != 0 || requested.qualities == 2 ? 1 : 0;
+    mailbox.deliver(next);
+    const std::optional<SharedBytes> sent = mailbox.nextFrame(now);
+    EXPECT_TRUE(!sent || mailbox.acknowledge(tick, now));
+    return sent ? next.quality : std::uint8_t{0};
+  };
+  std::uint64_t tick = 2;
+  while (tick < 200 && deliver(tick) == 0) ++tick;
+  const std::optional<SharedBytes> told = mailbox.next(now);
+  ASSERT_TRUE(told) << "after " << tick << " frames";
+  v1::ServerMessage message;
+  ASSERT_TRUE(message.ParseFromArray((*told)->data(), static_cast<int>((*told)->size())));
+  EXPECT_EQ(message.operating_point().quality(), 1u);
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_TRUE(mailbox.wantsFinerQuality());
+}
+
+// A key frame costs all subscribers, so both outlets must have sent what they have.
+TEST_F(MailboxTest, KeyFrameWaitsForBothOutlets) {
+  joinByLink(frame(1, true));
+  mailbox.restart();
+  EXPECT_NE(mailbox.needsKeyFrame(), 0);
+  EXPECT_TRUE(mailbox.reply(bytes(10)));
+  EXPECT_EQ(mailbox.needsKeyFrame(), 0);
+  EXPECT_TRUE(mailbox.next(now));
+  EXPECT_FALSE(mailbox.next(now));
+  EXPECT_NE(mailbox.needsKeyFrame(), 0);
 }
 
 TEST_F(MailboxTest, SendsTwoFramesWithoutAcknowledgement) {

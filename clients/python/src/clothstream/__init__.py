@@ -17,13 +17,14 @@ from .recording import (Faults, Info, Message, Pose, Recorded, RecordedCollider,
                         RecordingError, open_recording)
 from .simulation import Simulation, SimulationFailed, simulate
 from .stream import ConnectionFailed, RequestRefused, Stream, join
-from .types import (Cloth, ClothReport, ClothSettings, Collider, ContactEvent, Environment, Event, Grab, GrabEvent, OwnCollider,
-                    OwnWind, Participant, Presence, Role, SceneSummary, Shape, Solver, Statistics, WindKind)
+from .types import (Cloth, ClothReport, ClothSettings, Collider, ContactEvent, DatagramStatistics, Environment, Event, Grab, GrabEvent,
+                    OwnCollider, OwnWind, Participant, Presence, Role, SceneSummary, Shape, Solver, Statistics, WindKind)
 
 __version__: str = _text(_lib.clothstream_version())
 
 __all__ = [
-    "ClientState", "Cloth", "ClothReport", "ClothSettings", "Collider", "ConnectionFailed", "ContactEvent", "Environment", "Error",
+    "ClientState", "Cloth", "ClothReport", "ClothSettings", "Collider", "ConnectionFailed", "ContactEvent", "DatagramStatistics",
+    "Environment", "Error",
     "Event", "Faults", "Frame", "Grab", "GrabEvent", "Info", "Message", "OwnCollider", "OwnWind", "Participant", "Pose", "Presence", "Recorded",
     "RecordedCollider", "RecordedFrame", "RecordedGrab", "RecordedTick", "Recording", "RecordingError", "RequestRefused", "Role",
     "SceneSummary", "Shape", "Simulation", "SimulationFailed", "Solver", "Statistics", "Stream", "WindKind", "join", "open_recording",

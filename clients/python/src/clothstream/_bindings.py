@@ -140,7 +140,7 @@ CS_GRAB_STATE_FREE = 0
 CS_GRAB_STATE_HOLDS = 1
 CS_GRAB_STATE_TAKES = 2
 CLOTHSTREAM_TOKEN_BYTES = 4097
-CLOTHSTREAM_OPTIONS_VERSION = 2
+CLOTHSTREAM_OPTIONS_VERSION = 3
 CLOTHSTREAM_ALLOCATOR_VERSION = 1
 CLOTHSTREAM_OK = 0
 CLOTHSTREAM_INVALID = 1
@@ -151,6 +151,9 @@ CLOTHSTREAM_FAILED = 5
 CLOTHSTREAM_LOG_INFO = 1
 CLOTHSTREAM_LOG_WARNING = 2
 CLOTHSTREAM_LOG_ERROR = 3
+CLOTHSTREAM_TRANSPORT_AUTO = 0
+CLOTHSTREAM_TRANSPORT_DATAGRAMS = 1
+CLOTHSTREAM_TRANSPORT_TCP = 2
 
 
 class cs_client_options(c.Structure):
@@ -691,6 +694,7 @@ class clothstream_options(c.Structure):
         ("fingerprint", c.c_char_p),
         ("log", c.c_void_p),
         ("log_context", c.c_void_p),
+        ("transport", c.c_uint32),
     ]
 
 
@@ -878,6 +882,7 @@ FUNCTIONS = {
     "clothstream_wait": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
     "clothstream_acquire": (c.c_void_p, [c.c_void_p]),
     "clothstream_release": (None, [c.c_void_p]),
+    "clothstream_get_datagram_statistics": (c.c_int, [c.c_void_p, c.POINTER(cs_datagram_statistics)]),
     "clothstream_set_allocator": (c.c_int, [c.POINTER(clothstream_allocator)]),
     "clothstream_now_us": (c.c_uint64, []),
     "clothstream_error_text": (c.c_char_p, []),

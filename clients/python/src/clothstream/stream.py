@@ -8,9 +8,9 @@ import time
 from typing import Any, Iterator, Sequence
 
 from . import _bindings as b
-from ._library import Error, lib, new, text, vector
+from ._library import Error, lib, new, text, to, vector
 from .client_state import ClientState, Frame
-from .types import Event, Grab, OwnCollider, OwnWind, Quaternion, Role, SceneSummary, Vec3
+from .types import DatagramStatistics, Event, Grab, OwnCollider, OwnWind, Quaternion, Role, SceneSummary, Vec3
 
 
 class ConnectionFailed(Error):
@@ -27,10 +27,13 @@ class RequestRefused(Error):
 
 _ROLES = {"viewer": Role.VIEWER, "participant": Role.PARTICIPANT, "owner": Role.OWNER, "": Role.UNSPECIFIED}
 
+_TRANSPORTS = {"auto": b.CLOTHSTREAM_TRANSPORT_AUTO, "datagrams": b.CLOTHSTREAM_TRANSPORT_DATAGRAMS,
+               "tcp": b.CLOTHSTREAM_TRANSPORT_TCP}
+
 
 def join(address: str, scene: str = "", *, role: str | Role = "", name: str = "", token: str = "", ca_file: str = "",
          fingerprint: str = "", quality: int = 0, timeout: float = 10.0,
-         reconnect_for: float = 60.0) -> Stream:
+         reconnect_for: float = 60.0, transport: str = "auto") -> Stream:
     """Joins a scene, and returns when its description has arrived. Use the result in a `with` statement.
 
     address: HOST or HOST:PORT of the server's page (default port 8080); wss:// or https:// before it means TLS.
@@ -39,10 +42,14 @@ def join(address: str, scene: str = "", *, role: str | Role = "", name: str = ""
     ca_file, fingerprint: with TLS, a PEM file of authorities, or the fingerprint of the server's key.
     quality: best quality level, 0 (finest) to 3.
     timeout, reconnect_for: seconds to join, and to try to reconnect after a loss.
+    transport: "auto": frames and input travel in datagrams if the server and the network allow them; "datagrams": joining
+    fails if they do not; "tcp": never.
 
     Raises ValueError if an argument is not allowed, and ConnectionFailed."""
     if isinstance(role, str) and role.lower() not in _ROLES:
         raise ValueError(f"role: '{role}'; use viewer, participant, owner or \"\"")
+    if transport not in _TRANSPORTS:
+        raise ValueError(f"transport: '{transport}'; use auto, datagrams or tcp")
     options = b.clothstream_options()
     lib.clothstream_default_options(c.byref(options))
     kept = [value.encode() for value in (scene, name, token, ca_file, fingerprint)]
@@ -50,6 +57,7 @@ def join(address: str, scene: str = "", *, role: str | Role = "", name: str = ""
     options.client_name = b"clothstream Python"
     options.role = _ROLES[role.lower()] if isinstance(role, str) else role
     options.quality = quality
+    options.transport = _TRANSPORTS[transport]
     options.join_timeout_ms, options.reconnect_for_ms = max(1, round(1000 * timeout)), round(1000 * reconnect_for)
     handle = c.c_void_p()
     result = lib.clothstream_open(address.encode(), c.byref(options), c.byref(handle))
@@ -125,6 +133,16 @@ class Stream(ClientState):
         changed = Event(events.value)
         self._pending |= changed
         return changed
+
+    @property
+    def datagrams(self) -> DatagramStatistics | None:
+        """Figures of the datagrams; None if none were open."""
+        if self._handle is None:
+            raise Error("The stream is closed.")
+        found = new(b.cs_datagram_statistics)
+        if not lib.clothstream_get_datagram_statistics(self._handle, c.byref(found)):
+            return None
+        return to(DatagramStatistics, found)
 
     def next_frame(self, timeout: float = 10.0) -> Frame:
         """Waits for the next frame. It is current, and its arrays are valid, until the next call that waits. Until then no

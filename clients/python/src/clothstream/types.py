@@ -198,6 +198,21 @@ class Statistics:
 
 
 @dataclasses.dataclass(frozen=True)
+class DatagramStatistics:
+    """Counts over all connections of the stream."""
+
+    in_use: int
+    packets: int
+    lost_packets: int
+    parity_packets: int
+    frames: int
+    repaired_frames: int
+    lost_frames: int
+    requests: int
+    held_frames: int
+
+
+@dataclasses.dataclass(frozen=True)
 class SceneSummary:
     name: str
     description: str

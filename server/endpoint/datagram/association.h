@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// Datagrams with one peer: its path, and what travels on it.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <string>
+
+#include "server/endpoint/datagram/frame_link.h"
+#include "server/endpoint/datagram/secure_path.h"
+#include "server/schedule/token_bucket.h"
+
+namespace clothstream::endpoint {
+
+// What all associations of an endpoint use. Must outlive them.
+struct AssociationContext {
+  const dtls::DtlsContext& dtls;
+  SharedPieces& pieces;
+  telemetry::DatagramMetrics& metrics;
+};
+
+// Not thread-safe. Reads no clock.
+class Association {
+ public:
+  // Datagrams of the peer in a second, and in a burst. Further ones are dropped.
+  static constexpr double kDatagramsPerSecond = 2000, kBurst = 500;
+
+  // `local`: the server's credentials. `wake` is called, from any thread, when the mailbox has something. For
+  // the other functions see SecurePath::Callbacks.
+  using Transmit = std::function<void(const Address& to, std::span<const std::byte> datagram)>;
+  using Admit = std::function<std::shared_ptr<const void>(const Address& from)>;
+  Association(const AssociationContext& context, ice::Credentials local, hosting::DatagramPeer peer,
+              std::function<void()> wake, Transmit transmit, Admit admit, Time now);
+
+  // Handles a datagram of any bytes. Returns whether it is an authentic check of the peer.
+  bool handle(const Address& from, std::span<const std::byte> datagram, Time now);
+  // Does what is due. Call it at nextTime(), after handle(), and when the mailbox has something.
+  void advance(Time now);
+  Time nextTime() const;
+
+  const std::string& ufrag() const { return ufrag_; }
+  std::optional<Address> selected(Time now) const { return path_.selected(now); }
+  bool isOver(Time now) const { return path_.isOver(now); }
+
+ private:
+  const std::string ufrag_;  // of the server
+  schedule::TokenBucket rate_{kDatagramsPerSecond, kBurst};
+  Time now_;  // of the function that runs
+  Time checkAt_{};
+  bool wasOpen_ = false;
+  FrameLink link_;
+  SecurePath path_;  // ends before the link, because it may deliver
+};
+
+}  // namespace clothstream::endpoint

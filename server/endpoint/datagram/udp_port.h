@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// UDP port that answers from the address at which it was reached.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/udp.hpp>
+
+#include "server/endpoint/datagram/association_table.h"
+
+namespace clothstream::endpoint {
+
+// Peers check that answers come from the address that they have sent to (RFC 8445, section 7.2.5.2.1), but a
+// machine may have several. So each datagram is received with its destination, and sent with a source
+// (IPV6_PKTINFO, RFC 3542, section 6). The socket has both families. Belongs to the io thread.
+class UdpPort {
+ public:
+  // `host` is an address or a name of this machine; port 0 picks a free one. Throws std::runtime_error that
+  // says what to do if the port is in use, or the host is not an address of this machine.
+  UdpPort(boost::asio::io_context& io, const std::string& host, std::uint16_t port);
+
+  std::uint16_t port() const { return socket_.local_endpoint().port(); }
+
+  // Calls `handle` with each datagram from now on, several in a row, and `done` after these. Longer datagrams
+  // than dtls::kMaxDatagramBytes are dropped. Call it once.
+  void receive(std::function<void(const Route& route, std::span<const std::byte> datagram)> handle,
+               std::function<void()> done);
+  // Sends a datagram, or loses it if the kernel has no room.
+  void send(const Route& route, std::span<const std::byte> datagram);
+  void close() { socket_.close(); }
+
+ private:
+  void await();
+  void receiveSome();
+
+  boost::asio::ip::udp::socket socket_;
+  std::function<void(const Route& route, std::span<const std::byte> datagram)> handle_;
+  std::function<void()> done_;
+};
+
+}  // namespace clothstream::endpoint
