@@ -42,6 +42,8 @@ struct Attack {
   Access access = Access::open;
   // The server gets SIGTERM while the attack still runs.
   bool endsDuring = false;
+  // The honest client watches over datagrams, which it requires to join.
+  bool datagrams = false;
 };
 
 std::span<const Attack> attacks();

@@ -110,7 +110,8 @@ Result run(const std::string& self, const std::string& server, const Attack& att
     ServerAddress page(target.web());
     page.token = token;
     Victim victim(web && !trusted.isEncrypted() ? page : trusted,
-                  web && !trusted.isEncrypted() ? Victim::Endpoint::web : Victim::Endpoint::grpc);
+                  web && !trusted.isEncrypted() ? Victim::Endpoint::web : Victim::Endpoint::grpc,
+                  attack.datagrams);
     std::this_thread::sleep_for(2s);
     victim.begin();
     std::this_thread::sleep_for(4s);
@@ -148,6 +149,9 @@ void print(const Attack& attack, const Result& result) {
       attack.name, result.reached() ? "ok    " : "FAILED", result.before.framesPerSecond,
       result.during.framesPerSecond, result.during.longestGap, result.startMegabytes,
       std::max(0.0, result.peakMegabytes - result.startMegabytes), result.endSeconds, result.answer);
+  if (attack.datagrams)
+    fmt::print("    frames in datagrams {:.0f} % -> {:.0f} %\n", 100 * result.before.inDatagrams,
+               100 * result.during.inDatagrams);
   if (!result.expected) fmt::print("    expected: {}\n", attack.expected);
   if (!result.printable) fmt::print("    the log has control characters\n");
   std::fflush(stdout);

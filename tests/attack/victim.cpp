@@ -10,6 +10,8 @@
 #include <thread>
 #include <utility>
 
+#include "clients/datagram/datagram_session.h"
+#include "clients/datagram/datagram_transport.h"
 #include "clients/grpc/grpc_client.h"
 #include "clients/load/link.h"
 #include "clients/load/participant.h"
@@ -42,6 +44,10 @@ class Victim::Counts {
     longestGap_ = std::max(longestGap_, now - newest_);
     newest_ = now;
   }
+  std::uint64_t frames() const {
+    const std::lock_guard lock(mutex_);
+    return frames_;
+  }
   Seen seen() const {
     const std::lock_guard lock(mutex_);
     const auto now = SteadyClock::now();
@@ -58,30 +64,41 @@ class Victim::Counts {
 
 class Victim::Client {
  public:
-  Client(const ServerAddress& address, Endpoint endpoint, Counts& counts) {
+  Client(const ServerAddress& address, Endpoint endpoint, bool datagrams, Counts& counts) {
     if (endpoint == Endpoint::web)
-      joinWeb(address, counts);
+      joinWeb(address, datagrams, counts);
     else
-      joinGrpc(address, counts);
+      joinGrpc(address, datagrams, counts);
+  }
+
+  // Frames in datagrams so far.
+  std::uint64_t inDatagrams() const {
+    const auto statistics = grpc_ ? grpc_->datagrams() : participant_->datagrams();
+    return statistics ? statistics->frames : 0;
   }
 
  private:
-  void joinGrpc(const ServerAddress& address, Counts& counts) {
-    auto joined = joinByGrpc(address, {}, [&counts](cs_client*, std::uint32_t events) {
-      if ((events & CS_EVENT_FRAME) != 0) counts.add(1);
-    });
+  void joinGrpc(const ServerAddress& address, bool datagrams, Counts& counts) {
+    auto joined = NativeClient::join(
+        address, withDatagrams(makeGrpcTransport(address), datagrams ? Datagrams::required : Datagrams::off),
+        {}, [&counts](cs_client*, std::uint32_t events) {
+          if ((events & CS_EVENT_FRAME) != 0) counts.add(1);
+        });
     if (!joined) throw std::runtime_error("the victim cannot join: " + joined.error().text);
     grpc_ = std::move(*joined);
   }
 
-  void joinWeb(const ServerAddress& address, Counts& counts) {
+  void joinWeb(const ServerAddress& address, bool datagrams, Counts& counts) {
     constexpr auto kPatience = 60s;
     // Much shorter than the gaps that count.
     static constexpr auto kInterval = 5ms;
     links_ = load::makeWebLinks(address);
-    participant_ = std::make_unique<load::Participant>(
-        *links_, load::ParticipantOptions{
-                     .scene = "", .name = "victim", .token = address.token, .decodes = false, .moves = true});
+    load::ParticipantOptions options{
+        .scene = "", .name = "victim", .token = address.token, .decodes = false, .moves = true};
+    if (datagrams) host_ = std::make_unique<DatagramHost>();
+    options.datagrams = host_.get();
+    options.requiresDatagrams = datagrams;
+    participant_ = std::make_unique<load::Participant>(*links_, options);
     for (const auto end = SteadyClock::now() + kPatience; !participant_->joined();) {
       if (const auto why = participant_->ended())
         throw std::runtime_error("the victim cannot join: " + why->text);
@@ -100,21 +117,28 @@ class Victim::Client {
 
   std::unique_ptr<NativeClient> grpc_;
   std::unique_ptr<load::Links> links_;
+  std::unique_ptr<DatagramHost> host_;
   std::unique_ptr<load::Participant> participant_;
   std::jthread counter_;
 };
 
-Victim::Victim(const ServerAddress& address, Endpoint endpoint)
-    : counts_(std::make_unique<Counts>()), client_(std::make_unique<Client>(address, endpoint, *counts_)) {}
+Victim::Victim(const ServerAddress& address, Endpoint endpoint, bool datagrams)
+    : counts_(std::make_unique<Counts>()),
+      client_(std::make_unique<Client>(address, endpoint, datagrams, *counts_)) {}
 
 Victim::~Victim() = default;
 
 void Victim::begin() {
   counts_->begin();
+  datagramsBefore_ = client_->inDatagrams();
 }
 
 Victim::Seen Victim::seen() const {
-  return counts_->seen();
+  const auto frames = static_cast<double>(client_->inDatagrams() - datagramsBefore_);
+  Seen seen = counts_->seen();
+  const double all = static_cast<double>(counts_->frames());
+  seen.inDatagrams = all > 0 ? std::min(frames / all, 1.0) : 0;
+  return seen;
 }
 
 }  // namespace clothstream::attack

@@ -14,8 +14,9 @@ class Victim {
  public:
   enum class Endpoint : std::uint8_t { grpc, web };
 
-  // Throws std::runtime_error if it cannot join.
-  Victim(const ServerAddress& address, Endpoint endpoint);
+  // `datagrams`: it has joined when datagrams are open; else it uses none. Throws std::runtime_error if it
+  // cannot join.
+  Victim(const ServerAddress& address, Endpoint endpoint, bool datagrams);
   ~Victim();
   Victim(const Victim&) = delete;
   Victim& operator=(const Victim&) = delete;
@@ -25,7 +26,8 @@ class Victim {
 
   struct Seen {
     double framesPerSecond = 0;
-    double longestGap = 0;  // s, without a frame
+    double longestGap = 0;   // s, without a frame
+    double inDatagrams = 0;  // share of the frames, 0 to 1
   };
   // Figures since begin().
   Seen seen() const;
@@ -35,6 +37,7 @@ class Victim {
   class Client;
   std::unique_ptr<Counts> counts_;
   std::unique_ptr<Client> client_;  // counts until it ends
+  std::uint64_t datagramsBefore_ = 0;
 };
 
 }  // namespace clothstream::attack

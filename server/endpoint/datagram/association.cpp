@@ -26,12 +26,12 @@ Association::Association(const AssociationContext& context, ice::Credentials loc
              .admit = std::move(admit)},
             now) {}
 
-bool Association::handle(const Address& from, std::span<const std::byte> datagram, Time now) {
+Association::Handled Association::handle(const Address& from, std::span<const std::byte> datagram, Time now) {
   now_ = now;
-  if (!rate_.take(now)) return false;
-  if (ice::isStun(datagram)) return path_.handleCheck(from, datagram, now);
+  if (!(path_.selected(now) == from ? rate_ : unprovenRate_).take(now)) return Handled::dropped;
+  if (ice::isStun(datagram)) return path_.handleCheck(from, datagram, now) ? Handled::check : Handled::other;
   path_.handleRecord(from, datagram, now);
-  return false;
+  return Handled::other;
 }
 
 void Association::advance(Time now) {

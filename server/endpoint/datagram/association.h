@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -24,8 +25,10 @@ struct AssociationContext {
 // Not thread-safe. Reads no clock.
 class Association {
  public:
-  // Datagrams of the peer in a second, and in a burst. Further ones are dropped.
+  // Datagrams from the peer's proven address in a second, and in a burst. Further ones are dropped.
   static constexpr double kDatagramsPerSecond = 2000, kBurst = 500;
+  // The same of all other addresses together: anybody who has seen a check can send others with its name.
+  static constexpr double kUnprovenPerSecond = 100, kUnprovenBurst = 100;
 
   // `local`: the server's credentials. `wake` is called, from any thread, when the mailbox has something. For
   // the other functions see SecurePath::Callbacks.
@@ -34,8 +37,13 @@ class Association {
   Association(const AssociationContext& context, ice::Credentials local, hosting::DatagramPeer peer,
               std::function<void()> wake, Transmit transmit, Admit admit, Time now);
 
-  // Handles a datagram of any bytes. Returns whether it is an authentic check of the peer.
-  bool handle(const Address& from, std::span<const std::byte> datagram, Time now);
+  enum class Handled : std::uint8_t {
+    dropped,  // there were too many; nothing has changed
+    check,    // an authentic one of the peer
+    other,
+  };
+  // Handles a datagram of any bytes.
+  Handled handle(const Address& from, std::span<const std::byte> datagram, Time now);
   // Does what is due. Call it at nextTime(), after handle(), and when the mailbox has something.
   void advance(Time now);
   Time nextTime() const;
@@ -47,6 +55,7 @@ class Association {
  private:
   const std::string ufrag_;  // of the server
   schedule::TokenBucket rate_{kDatagramsPerSecond, kBurst};
+  schedule::TokenBucket unprovenRate_{kUnprovenPerSecond, kUnprovenBurst};
   Time now_;  // of the function that runs
   Time checkAt_{};
   bool wasOpen_ = false;

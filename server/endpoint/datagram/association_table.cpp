@@ -51,7 +51,6 @@ void AssociationTable::clear() {
 
 void AssociationTable::handle(const Route& route, std::span<const std::byte> datagram, Time now) {
   if (datagram.empty()) return;
-  current_ = route;
   const auto give = [&](Entry& entry) { attempt(entry, [&] { handle(entry, route, datagram, now); }); };
   const auto proven = proven_.find(route.peer);
   if (Entry* const named = findByName(datagram)) {
@@ -67,7 +66,6 @@ void AssociationTable::handle(const Route& route, std::span<const std::byte> dat
       receivers.push_back(each->second);
     for (Entry* const entry : receivers) give(*entry);
   }
-  current_.reset();
 }
 
 template <typename Step>
@@ -76,6 +74,7 @@ void AssociationTable::attempt(Entry& entry, Step step) {
     step();
   } catch (const std::exception& failure) {
     spdlog::error("an association of datagrams ends: {}", failure.what());
+    current_.reset();
     remove(std::string(entry.association->ufrag()));
   }
 }
@@ -92,7 +91,12 @@ AssociationTable::Entry* AssociationTable::findByName(std::span<const std::byte>
 void AssociationTable::handle(Entry& entry, const Route& route, std::span<const std::byte> datagram,
                               Time now) {
   Association& association = *entry.association;
-  const bool isCheck = association.handle(route.peer, datagram, now);
+  current_ = route;
+  const Association::Handled handled = association.handle(route.peer, datagram, now);
+  current_.reset();
+  if (handled == Association::Handled::dropped) return;
+  // Other datagrams can have a forged source, so they say nothing about the way to the peer.
+  const bool isCheck = handled == Association::Handled::check;
   if (association.selected(now) == route.peer) {
     if (!entry.proven || entry.proven->peer != route.peer) {
       forget(entry, &Entry::proven);
@@ -101,8 +105,10 @@ void AssociationTable::handle(Entry& entry, const Route& route, std::span<const 
       if (const auto former = proven_.find(route.peer); former != proven_.end())
         forget(*former->second, &Entry::proven);
       proven_[route.peer] = &entry;
+      entry.proven = route;
+    } else if (isCheck) {
+      entry.proven = route;
     }
-    entry.proven = route;
   } else if (isCheck && !(entry.checked && entry.checked->peer == route.peer)) {
     forget(entry, &Entry::checked);
     checked_.emplace(route.peer, &entry);

@@ -90,7 +90,8 @@ class AssociationTable {
   const AssociationContext context_;
   const Transmit transmit_;
   const std::shared_ptr<Handshakes> handshakes_ = std::make_shared<Handshakes>();
-  std::optional<Route> current_;                    // of the datagram that is handled
+  // Of the datagram that an association handles. Its answers take the same way back.
+  std::optional<Route> current_;
   std::unordered_map<std::string, Entry> entries_;  // by the server's fragment
   std::unordered_map<Address, Entry*, Hash> proven_;
   std::unordered_multimap<Address, Entry*, Hash> checked_;

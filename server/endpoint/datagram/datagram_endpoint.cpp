@@ -15,6 +15,7 @@
 #include <spdlog/spdlog.h>
 
 #include "proto/dtls/certificate.h"
+#include "proto/dtls/digest.h"
 #include "proto/dtls/dtls_context.h"
 #include "server/endpoint/datagram/association_table.h"
 #include "server/endpoint/datagram/shared_pieces.h"
@@ -30,15 +31,6 @@ namespace net = boost::asio;
 
 // Addresses in an answer; clients check no more.
 constexpr std::size_t kMaxAddresses = 8;
-
-// SHA-256 of a certificate from its text, "sha-256 " and pairs of hexadecimal digits with colons.
-std::string digestOf(const dtls::Certificate& certificate) {
-  const std::string digits = certificate.fingerprint().substr(certificate.fingerprint().find(' ') + 1);
-  std::string digest;
-  for (std::size_t at = 0; at + 2 <= digits.size(); at += 3)
-    digest += static_cast<char>(std::stoi(digits.substr(at, 2), nullptr, 16));
-  return digest;
-}
 
 }  // namespace
 
@@ -95,7 +87,7 @@ struct DatagramEndpoint::State : std::enable_shared_from_this<State> {
   const DatagramEndpointOptions options;
   const dtls::Certificate certificate;
   const dtls::DtlsContext context{certificate};
-  const std::string fingerprint = digestOf(certificate);
+  const dtls::Digest fingerprint = dtls::digestOf(certificate.fingerprint());
   net::io_context io{1};
   net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};  // until io.stop()
   UdpPort udp;
@@ -141,7 +133,7 @@ std::optional<hosting::DatagramGate::Opened> DatagramEndpoint::open(hosting::Dat
   Opened opened;
   opened.answer.set_ufrag(local.ufrag);
   opened.answer.set_password(local.password);
-  opened.answer.set_fingerprint(state.fingerprint);
+  opened.answer.set_fingerprint(state.fingerprint.data(), state.fingerprint.size());
   opened.answer.set_port(state.port);
   std::vector<std::string> addresses =
       peer.reached.empty() ? state.options.ownAddresses : std::vector{peer.reached};

@@ -99,6 +99,7 @@ void FrameLink::updateLink(Clock::time_point now) {
 }
 
 Clock::time_point FrameLink::nextTime() const {
+  if (state_ == State::closed) return Clock::time_point::max();
   Clock::time_point next = sender_.due().value_or(Clock::time_point::max());
   if (state_ == State::used && updated_ - sent_ < kSettled) next = std::min(next, updated_ + kUpdateInterval);
   if (state_ == State::silent) next = std::min(next, probeAt_);

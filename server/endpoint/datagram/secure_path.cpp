@@ -7,8 +7,8 @@
 
 #include <unistd.h>
 
+#include "proto/dtls/digest.h"
 #include "proto/dtls/limits.h"
-#include "proto/tls/fingerprint.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -23,9 +23,9 @@ constexpr std::uint32_t kSctpHeaders = 12 + 16;
 
 // In the form of SDP (dtls::readFingerprint).
 std::string sdpFingerprint(const std::string& sha256) {
-  KeyDigest digest{};
+  dtls::Digest digest{};
   std::memcpy(digest.data(), sha256.data(), std::min(sha256.size(), digest.size()));
-  return "sha-256 " + fingerprintText(digest);
+  return dtls::fingerprintOf(digest);
 }
 
 sctp::Association::Options randomAssociation() {
@@ -89,8 +89,9 @@ bool SecurePath::begin(const Address& from, Time now) {
   if (dtls_) return true;
   handshake_ = callbacks_.admit(from);
   if (!handshake_) return false;
+  std::unique_ptr<sctp::DataChannel> channel;
   if (sctp_)
-    channel_ = std::make_unique<sctp::DataChannel>(
+    channel = std::make_unique<sctp::DataChannel>(
         sctp::DataChannel::Options{.label = kLabel, .association = randomAssociation()},
         [this](std::span<const std::byte> packet) { dtls_->send(packet); }, callbacks_.deliver);
   dtls_ = std::make_unique<DtlsChannel>(
@@ -102,6 +103,7 @@ bool SecurePath::begin(const Address& from, Time now) {
                                  },
                              .receive = [this](std::span<const std::byte> payload) { receive(payload); }},
       now);
+  channel_ = std::move(channel);  // needs dtls_
   return true;
 }
 

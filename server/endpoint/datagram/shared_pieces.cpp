@@ -15,8 +15,11 @@ std::shared_ptr<const FramePieces> SharedPieces::of(const delivery::SharedBytes&
   }
   std::weak_ptr<const FramePieces>& known = pieces_[message.get()];
   std::shared_ptr<const FramePieces> pieces = known.lock();
-  if (!pieces || pieces->pieces() - pieces->dataPieces() < rows)
-    known = pieces = std::make_shared<const FramePieces>(message, rows);
+  const unsigned made = pieces ? pieces->pieces() - pieces->dataPieces() : 0;
+  if (!pieces || made < rows) {
+    const unsigned doubled = std::min(2 * made, datagram::kMaxParityPieces);
+    known = pieces = std::make_shared<const FramePieces>(message, std::max(rows, doubled));
+  }
   return pieces;
 }
 

@@ -12,8 +12,9 @@
 namespace clothstream::endpoint {
 
 // A frame is one message for all subscribers of its quality, so the message identifies it. Pieces are made
-// when the first peer needs them, and again if a later one needs more parity. They are forgotten when no peer
-// uses them any more. Not thread-safe.
+// when the first peer needs them, and again, with at least twice the parity, if a later one needs more. Peers
+// of different needs thus cost at most three times the parity of the neediest. Pieces are forgotten when no
+// peer uses them any more. Not thread-safe.
 class SharedPieces {
  public:
   // Returns the pieces of a message that fits (datagram::FramePieces::fits), with at least `rows` parity

@@ -171,7 +171,7 @@ std::span<const Attack> attacks() {
     std::vector<Attack> attacks;
     for (const auto part :
          {workAttacks(), contentAttacks(), messageAttacks(), connectionAttacks(), identityAttacks(),
-          handAttacks(), clientAttacks(), endpointAttacks(), hiddenCostAttacks()})
+          handAttacks(), clientAttacks(), endpointAttacks(), hiddenCostAttacks(), datagramAttacks()})
       attacks.insert(attacks.end(), part.begin(), part.end());
     return attacks;
   }();

@@ -133,5 +133,6 @@ std::span<const Attack> identityAttacks();
 std::span<const Attack> clientAttacks();
 std::span<const Attack> endpointAttacks();
 std::span<const Attack> handAttacks();
+std::span<const Attack> datagramAttacks();
 
 }  // namespace clothstream::attack

@@ -189,6 +189,19 @@ TEST_F(FrameLinkTest, ClosedPathReturnsFramesToStream) {
   EXPECT_EQ(metrics.peers, 0u);
 }
 
+TEST_F(FrameLinkTest, ClosedPathHasNothingDue) {
+  pass(300ms);
+  carries = std::bernoulli_distribution(0);
+  for (int i = 0; i < 1000 && metrics.fallbacks.value() == 0; ++i) pass(1ms);
+  std::array<std::byte, datagram::kMaxDatagramBytes> out;
+  const auto frames = static_cast<std::uint32_t>(scene.datagramFrames.value());
+  link.receive(std::span(out).first(writeRequest({.frame = frames - 1, .present = {}}, out)), now);
+  ASSERT_GT(metrics.repeats.value(), 0u);
+  open = false;
+  pass(1ms);
+  EXPECT_EQ(link.nextTime(), Clock::time_point::max());
+}
+
 TEST_F(FrameLinkTest, InputIsTakenOnce) {
   datagram::InputSender sender;
   const Bytes message(3, std::byte{7});
@@ -225,7 +238,7 @@ TEST(SharedPiecesTest, MakesPiecesOnce) {
   const auto two = pieces.of(message, 2);
   EXPECT_EQ(pieces.of(message, 1), two);
   const auto three = pieces.of(message, 3);
-  EXPECT_EQ(three->pieces(), three->dataPieces() + 3);
+  EXPECT_EQ(three->pieces(), three->dataPieces() + 4) << "twice as many as before";
   EXPECT_EQ(pieces.of(message, 2), three);
   EXPECT_NE(pieces.of(std::make_shared<const Bytes>(3000), 2), three);
 }
