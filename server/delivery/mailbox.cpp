@@ -120,6 +120,10 @@ void Mailbox::setLink(std::optional<Link> link) {
   std::optional<Outlet> outlet;
   {
     const std::lock_guard lock(mutex_);
+    if (usesLink() && !link && window_.inFlight() > 0) {
+      window_.abandon();
+      countDropped(held_.restart());
+    }
     link_ = link;
     if (!closed_) outlet = noteFrame();
   }

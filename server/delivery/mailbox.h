@@ -80,7 +80,8 @@ class Mailbox {
     double frameRate = 0;  // bytes/s that frames may take, without parity and headers
   };
   // Frames travel over this link from now on; nothing: over the stream, where SendWindow gives the room. Call
-  // it after each frame that nextFrame() returns, and when the controller's state changes.
+  // it after each frame that nextFrame() returns, and when the controller's state changes. Frames that left
+  // by the link and are not acknowledged when it ends may be lost: the stream then begins with a key frame.
   void setLink(std::optional<Link> link);
   // `wake` is called, from any thread, when nextFrame() may have something. It must not block. Null: it is
   // not called any more after the return; the caller must then hold no lock that `wake` takes.

@@ -34,8 +34,12 @@ std::optional<std::size_t> SendWindow::acknowledge(std::uint64_t tick, Clock::ti
 }
 
 void SendWindow::restart() {
-  sent_.clear();
+  abandon();
   newest_.reset();
+}
+
+void SendWindow::abandon() {
+  sent_.clear();
   leavesOut_ = false;
 }
 

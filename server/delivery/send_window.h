@@ -42,6 +42,9 @@ class SendWindow {
   // The peer continues with a key frame, and acknowledges none of the frames before it.
   void restart();
 
+  // Frames that were sent may be lost: they are not awaited any more.
+  void abandon();
+
   // Frame that waits longest for its acknowledgement; null if none does.
   const Sent* oldest() const { return sent_.empty() ? nullptr : &sent_.front(); }
   // Newest tick that was sent since the last restart().

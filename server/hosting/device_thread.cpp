@@ -340,12 +340,13 @@ void DeviceThread::submitTicks(bool oneByOne) {
   if (oneByOne || together_.size() == 1) together_.clear();
   if (!together_.empty()) {
     try {
+      faults_.checkBatch();
       batches_.submit(*device_, together_);
     } catch (const vulkan::DeviceLost&) {
       countLoss(*together_.front());
       throw;
     } catch (const std::exception& failure) {
-      // None of them shows which tick is to blame, and none can be submitted again.
+      // Nothing shows which tick is to blame, and none can be submitted again.
       for (SceneRun* run : together_) rebuildScene(*run, failure.what());
       batches_.end();
     }

@@ -117,6 +117,12 @@ class DeviceThread {
     faults_.fail();
     wake();
   }
+  // Throws an error when the next batch of ticks is to be submitted, once. Before that it acts as
+  // simulateFailure(), whose pause lets ticks become due together. For tests.
+  void simulateFailedBatch() {
+    faults_.failBatch();
+    simulateFailure();
+  }
 
  private:
   void run(const std::vector<std::shared_ptr<scene::LiveScene>>& scenes, std::promise<void>& ready);

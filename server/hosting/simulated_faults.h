@@ -35,6 +35,11 @@ class SimulatedFaults {
     failsIn_ = std::move(scene);
     failures_ = times;
   }
+  // The next checkBatch() throws another error.
+  void failBatch() {
+    const std::lock_guard lock(mutex_);
+    failsBatch_ = true;
+  }
 
   void check() {
     const std::lock_guard lock(mutex_);
@@ -49,10 +54,14 @@ class SimulatedFaults {
     --failures_;
     throw std::runtime_error("a failure in a scene is simulated");
   }
+  void checkBatch() {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(failsBatch_, false)) throw std::runtime_error("a failed submission is simulated");
+  }
 
  private:
   std::mutex mutex_;
-  bool losesDevice_ = false, fails_ = false;
+  bool losesDevice_ = false, fails_ = false, failsBatch_ = false;
   std::string losesDeviceIn_, failsIn_;
   int failures_ = 0;  // in failsIn_
 };

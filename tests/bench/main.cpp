@@ -53,6 +53,8 @@ constexpr std::array kSuites{
                  &bench::runCodecDevice},
     bench::Suite{"price", "the computed price of a tick, and the measured tick, for every solver",
                  &bench::runPrice},
+    bench::Suite{"batch", "a tick of 1 to 1,000 equal scenes in one submission: time, commands, allocations",
+                 &bench::runBatch},
     bench::Suite{"creation", "time to check, prepare, load and delete a scene, for each of its nodes",
                  &bench::runCreation},
     bench::Suite{"doctor",
@@ -95,6 +97,9 @@ int main(int argc, char** argv) {
   app.add_option("--rows", settings.rowsPerInvocation, "Rows of a grid for each invocation (0: automatic)");
   app.add_option("--workgroup", settings.workgroupSize, "Invocations of a workgroup (0: automatic)");
   app.add_option("--scene", settings.scenes, "Scene of suite doctor; may be repeated (default: all)");
+  app.add_option("--crowd", settings.crowds, "Number of scenes of suite batch; may be repeated")
+      ->check(CLI::Range(1, 10'000))
+      ->capture_default_str();
   app.add_option("--pictures", settings.pictures, "Directory of the pictures")
       ->check(CLI::ExistingDirectory)
       ->capture_default_str();

@@ -23,8 +23,9 @@ struct Settings {
   std::uint32_t workgroupSize = 0;
   std::optional<std::uint32_t> xpbdWholeNodes;  // chosen by the simulation if absent
   std::optional<std::uint32_t> solveWholeNodes;
-  std::vector<std::string> scenes;       // of suite doctor; all built-in scenes if empty
-  std::filesystem::path pictures = ".";  // directory of the pictures of suite behaviour
+  std::vector<std::string> scenes;  // of suite doctor; all built-in scenes if empty
+  std::vector<std::uint32_t> crowds{1, 4, 16, 64, 256, 1000};  // numbers of scenes of suite batch
+  std::filesystem::path pictures = ".";                        // directory of the pictures of suite behaviour
   // Input of the codec suites: named motions, or instead a file (bench_motion.h); number of frames of each;
   // max error in metres.
   std::vector<std::string> motions;
@@ -65,6 +66,7 @@ void runSelfCollision(vulkan::Device& device, const Settings& settings, const Ro
 void runCodec(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runCodecDevice(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runPrice(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runBatch(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runDoctor(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runKernels(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runCreation(vulkan::Device& device, const Settings& settings, const RowSink& add);

@@ -13,7 +13,7 @@
 namespace clothstream::client {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
 // Two waving cloths, of which one frame is shown.
 struct Shown {
@@ -89,9 +89,9 @@ TEST(Pick, RefusesNumbersThatAreNotFiniteAndLeavesTheResult) {
   const Shown shown;
   cs_cloth_point point{};
   point.triangle = 77;
-  const float nan[] = {0, kNan, 0}, good[] = {0, 1, 0}, none[] = {0, 0, 0};
+  const float nan[] = {0, kNotANumber, 0}, good[] = {0, 1, 0}, none[] = {0, 0, 0};
   EXPECT_EQ(cs_nearest_point(shown.client.get(), nan, 10, &point), 0);
-  EXPECT_EQ(cs_nearest_point(shown.client.get(), good, kNan, &point), 0);
+  EXPECT_EQ(cs_nearest_point(shown.client.get(), good, kNotANumber, &point), 0);
   EXPECT_EQ(cs_nearest_point(shown.client.get(), good, -1, &point), 0);
   EXPECT_EQ(cs_cast_ray(shown.client.get(), nan, good, 10, &point), 0);
   EXPECT_EQ(cs_cast_ray(shown.client.get(), good, nan, 10, &point), 0);

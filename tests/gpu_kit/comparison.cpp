@@ -21,6 +21,7 @@ struct Suite {
 const Suite& suiteOf(const Row& row) {
   static const std::vector<Suite> suites{
       {"acad", {"method", "coarse", "nodes"}, {"nsPerNodeSubstep"}, {}},
+      {"batch", {"nodes", "scenes"}, {"deviceMsMedian", "tickMsMedian"}, {}},
       {"coarse",
        {"nodes", "substeps", "cells", "sweeps", "every", "levels", "ballSpeed"},
        {"nsPerNodeFrame"},

@@ -94,6 +94,11 @@ class Kit(unittest.TestCase):
         self.assertEqual(run["tests"]["failed"], [])
         for suite in ("doctor", "enforcement", "mass_spring"):
             self.assertTrue(json.loads((self.out / f"{suite}.json").read_text()), suite)
+        # Scenes that share a tick share its barriers, and a few allocations of memory.
+        one, four = json.loads((self.out / "batch.json").read_text())
+        self.assertEqual((one["scenes"], four["scenes"]), (1, 4))
+        self.assertEqual(one["barriers"], four["barriers"])
+        self.assertLess(four["deviceAllocations"], 64)
 
     def test_keeps_what_it_has_when_interrupted(self):
         process = subprocess.Popen([self.kit / "run", "--out", self.out], cwd="/", env=self.environment,

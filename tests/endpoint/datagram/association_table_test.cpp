@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which datagrams an association takes, and what others cost it. Time is simulated.
+// Datagrams that an association takes, and the cost of others. Time is simulated.
 #include "server/endpoint/datagram/association_table.h"
 
 #include <chrono>

@@ -177,7 +177,7 @@ test("a lost connection is reported with the time of the next attempt, and can b
   assert.lengthOf(FakeSocket.made, sockets + 1);
   const again = posted.at(-1)!;
   assert.isTrue(again.kind === "connecting");
-  // What the page has sent to an earlier connection is dropped.
+  // Messages for an earlier connection are dropped.
   started.handle({ kind: "send", connection: 1, message: Uint8Array.of(1) });
   socket().opens();
   assert.lengthOf(socket().sent, 1);

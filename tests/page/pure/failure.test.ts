@@ -36,6 +36,7 @@ test("every failure has its own words, and either a way on for the person or a n
     failureOf(refusal(7, said), calm),
     failureOf({ kind: "failed", cause: "client", code: 0, reason: said }, calm),
     failureOf({ kind: "failed", cause: "worker", code: 0, reason: said }, calm),
+    failureOf({ kind: "failed", cause: "datagrams", code: 0, reason: said }, calm),
     failureOf(asking(ErrorCode.unauthenticated, said, false), calm),
     failureOf(asking(ErrorCode.unauthenticated, said), calm),
     failureOf(asking(ErrorCode.wrongPairingCode, said), calm),

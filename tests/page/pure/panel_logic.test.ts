@@ -5,6 +5,7 @@ import { assert, test } from "vitest";
 import { kClothParameters, kSettings } from "@clothstream/client";
 import { drawHud, hudText, kHudHeight, kHudWidth } from "../../../clients/web/page/src/panel/hud_drawing";
 import { HudHistory, kChannels, kStages, type Sample } from "../../../clients/web/page/src/panel/hud_history";
+import { LinkCounter } from "../../../clients/web/page/src/panel/link_counts";
 import { numberText, placeOf, powerOf, valueAt } from "../../../clients/web/page/src/panel/number_row";
 import { checkGltf } from "../../../clients/web/page/src/panel/gltf_header";
 import { PinSet } from "../../../clients/web/page/src/panel/pin_set";
@@ -222,4 +223,40 @@ test("the drawing needs only a context, and stays inside its size", () => {
       assert.ok(texts.includes(wanted), wanted);
   }
   assert.equal(hudText(new HudHistory()), "No figures yet.");
+});
+
+test("figures say how frames travel, and why not in datagrams", () => {
+  const history = new HudHistory();
+  const quiet = Object.fromEntries(kChannels.map((name) => [name, 0])) as Sample;
+  history.link = { transport: "websocket", reason: "The server opens no datagrams." };
+  history.add(quiet);
+  assert.match(hudText(history), / Frames by WebSocket: The server opens no datagrams\.$/);
+  history.link = { transport: "datagrams", reason: "" };
+  history.add({ ...quiet, packets: 150, lostPackets: 4, parityPackets: 30, repairedFrames: 2, requests: 1 });
+  history.add({ ...quiet, packets: 150, lostPackets: 8, parityPackets: 60, repairedFrames: 3, requests: 2 });
+  assert.match(hudText(history), / Frames by datagrams: loss 3\.8 %, repaired 5 \/min, requests 3 \/min, parity 30\.0 %\.$/);
+  for (const [transport, reason, wanted] of [["websocket", "It is blocked.", ["WebSocket", "It is blocked."]], ["datagrams", "", ["datagrams", "loss", "3.8", "30.0"]]] as const) {
+    history.link = { transport, reason };
+    const { context, calls } = recorder();
+    drawHud(context, history, { text: "", quiet: "", line: "", accent: "", bad: "", stages: ["", "", "", "", ""], font: "" });
+    const texts = calls.filter(([name]) => name === "fillText");
+    for (const text of wanted) assert.ok(texts.some(([, one]) => one === text), text);
+    for (const [, text, x, y] of texts) assert.ok((x as number) < kHudWidth && (y as number) < kHudHeight, String(text));
+  }
+});
+
+test("counts of the link start again with each association", () => {
+  const counter = new LinkCounter();
+  const counts = { inUse: true, packets: 10, lostPackets: 1, parityPackets: 2, frames: 5, repairedFrames: 1, lostFrames: 0, requests: 3, heldFrames: 0 };
+  const grown = (packets: number, requests: number) => [packets, requests].join();
+  const take = (now?: Partial<typeof counts>) => {
+    const { packets, requests } = counter.take(now && { ...counts, ...now });
+    return grown(packets, requests);
+  };
+  assert.equal(take(), grown(0, 0));
+  assert.equal(take({}), grown(10, 3));
+  assert.equal(take({ packets: 15, requests: 4 }), grown(5, 1));
+  assert.equal(take({ packets: 2, requests: 0 }), grown(2, 0), "a new association");
+  assert.equal(take(), grown(0, 0));
+  assert.equal(take({ packets: 7, requests: 1 }), grown(7, 1), "after none");
 });

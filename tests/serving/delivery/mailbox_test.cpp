@@ -154,6 +154,7 @@ TEST_F(MailboxTest, LinkGivesTheRoom) {
   mailbox.setLink(kRoom);
   EXPECT_EQ(frameWakes, before + 1);
   EXPECT_EQ(mailbox.nextFrame(now), frames[4].message);
+  EXPECT_TRUE(mailbox.acknowledge(5, now));
   mailbox.setLink(std::nullopt);
   mailbox.deliver(frames[5]);
   EXPECT_FALSE(mailbox.nextFrame(now));
@@ -212,12 +213,29 @@ TEST_F(MailboxTest, HeldFramesReturnToStream) {
   joinByLink(frames[0]);
   mailbox.deliver(frames[1]);
   EXPECT_EQ(mailbox.nextFrame(now), frames[1].message);
+  EXPECT_TRUE(mailbox.acknowledge(2, now));
+  mailbox.setLink(kNoRoom);
   mailbox.deliver(frames[2]);
   const int before = wakes;
   mailbox.setLink(std::nullopt);
   EXPECT_EQ(wakes, before + 1);
   EXPECT_FALSE(mailbox.nextFrame(now));
   EXPECT_EQ(taken(frames), Ticks{3});
+}
+
+// The peer may never get what the link has lost, so no acknowledgement may come either.
+TEST_F(MailboxTest, StreamBeginsWithKeyFrameAfterLoss) {
+  const std::vector<PublishedFrame> frames{frame(1, true), frame(2), frame(3), frame(4, true)};
+  joinByLink(frames[0]);
+  mailbox.deliver(frames[1]);
+  EXPECT_EQ(mailbox.nextFrame(now), frames[1].message);
+  mailbox.setLink(std::nullopt);
+  EXPECT_TRUE(wantsKeyFrame());
+  mailbox.deliver(frames[2]);
+  EXPECT_EQ(taken(frames), Ticks{});
+  mailbox.deliver(frames[3]);
+  EXPECT_EQ(taken(frames), Ticks{4});
+  EXPECT_TRUE(mailbox.acknowledge(2, now)) << "it had arrived";
 }
 
 TEST_F(MailboxTest, StreamTellsQualityOfLink) {

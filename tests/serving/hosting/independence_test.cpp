@@ -16,6 +16,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/delivery/envelope.h"
@@ -27,6 +28,7 @@
 #include "tests/e2e/temporary_directory.h"
 #include "tests/serving/hosting/varied_scenes.h"
 #include "tests/serving/server_test.h"
+#include "tests/serving/small_scene.h"
 
 namespace clothstream::hosting {
 namespace {
@@ -38,6 +40,19 @@ constexpr std::uint64_t kParticipant = 7;  // of all inputs
 // The others are recorded on request.
 bool isAlwaysRecorded(const model::Scene& scene) {
   return scene.simulationRate > 30;
+}
+
+// A tick takes far longer than 0.1 s on a software device. Not recorded.
+model::Scene heavyScene() {
+  model::Scene scene = tests::smallScene("heavy");
+  scene.simulationRate = scene.streamRate = 30;
+  model::Cloth& cloth = scene.cloths.front();
+  cloth.grid.rows = cloth.grid.columns = 64;
+  cloth.pins.front().lastColumn = 63;
+  cloth.solver.kind = model::SolverKind::constraint;
+  cloth.solver.iterations = 400;
+  cloth.solver.tolerance = 0;
+  return scene;
 }
 
 // A scene and its viewer.
@@ -68,6 +83,12 @@ class IndependenceTest : public tests::ServerTest {
     clock_ = std::make_unique<TestPeer>(server());
     clock_->join("small");
   }
+  // Skips the test on devices that are too fast for exceedPrice().
+  void startOnSlowDevice(std::size_t count) {
+    start(count);
+    if (!IsSkipped() && server().device.info().kind != vulkan::DeviceKind::software)
+      GTEST_SKIP() << "a GPU is too fast for a scene to exceed its price";
+  }
   // Something happens to the scenes, in random order, while "small" runs this number of ticks.
   void live(std::uint64_t ticks) {
     std::vector<int> deck(20);
@@ -82,6 +103,26 @@ class IndependenceTest : public tests::ServerTest {
       act(deck[next++], residents_[below(residents_.size())]);
       clock_->readFrames(1);
     }
+  }
+  // A created scene takes far more than its price, and is stopped for good.
+  void exceedPrice() {
+    server().budget->setSpeed({.nodeStepSeconds = 1e-15, .dispatchSeconds = 1e-12, .workgroupFactor = 1});
+    const auto heavy = server().created.create(heavyScene(), 8, "", {});
+    ASSERT_TRUE(heavy) << heavy.error().text();
+    TestPeer viewer(server());
+    viewer.hello("heavy");
+    EXPECT_THAT(viewer.readToTheEnd().error().text(), testing::HasSubstr("because it harms other scenes"));
+    EXPECT_EQ(server().metrics.quarantines.value(), 1u);
+  }
+  // The device is lost, and all scenes are restored.
+  void loseDevice() {
+    const std::uint64_t before = server().metrics.deviceRebuilds.value();
+    server().device.simulateDeviceLoss();
+    for (const Resident& resident : residents_)
+      resident.viewer->readUntil([](const v1::ServerMessage& message) {
+        return message.notice().kind() == v1::NOTICE_KIND_DEVICE_REBUILT;
+      });
+    EXPECT_EQ(server().metrics.deviceRebuilds.value(), before + 1);
   }
   // Ends the server, and simulates every recording again.
   void expectTheSameAlone() {
@@ -257,6 +298,17 @@ TEST_F(IndependenceTest, FortyScenesInCompanyMoveAsAlone) {
   start(40);
   if (IsSkipped()) return;
   live(1000);
+  expectTheSameAlone();
+}
+
+TEST_F(IndependenceTest, ScenesMoveAsAloneAfterFaults) {
+  startOnSlowDevice(4);
+  if (IsSkipped()) return;
+  live(10);
+  exceedPrice();
+  live(10);
+  loseDevice();
+  live(30);
   expectTheSameAlone();
 }
 

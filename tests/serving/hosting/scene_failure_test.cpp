@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Failures that end at their scene, while the device goes on.
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -71,6 +72,33 @@ TEST_F(SceneFailureTest, FailedPausedFrameEndsAtItsScene) {
   fail("other", 3);
   EXPECT_THAT(peer.readToTheEnd().error().text(), HasSubstr("a failure in a scene is simulated"));
   expectUndisturbed(honest);
+}
+
+TEST_F(SceneFailureTest, FailedBatchEndsAtItsScenes) {
+  // The pause after an error is longer than a period of these scenes, so that both are due after it.
+  std::vector<model::Scene> pair{tests::smallScene("left"), tests::smallScene("right")};
+  for (model::Scene& scene : pair) scene.simulationRate = scene.streamRate = 100;
+  START({}, pair);
+  TestPeer left(server()), right(server());
+  left.join("left");
+  right.join("right");
+  server().device.simulateFailedBatch();
+  for (TestPeer* peer : {&left, &right}) {
+    const v1::ServerMessage rebuilt = peer->readUntil([](const v1::ServerMessage& message) {
+      return message.notice().kind() == v1::NOTICE_KIND_DEVICE_REBUILT;
+    });
+    EXPECT_THAT(rebuilt.notice().text(), testing::StartsWith("a tick failed; the scene goes on from"));
+    peer->readFrames(1);
+  }
+  // The second time within a simulated second.
+  server().device.simulateFailedBatch();
+  for (TestPeer* peer : {&left, &right})
+    EXPECT_THAT(peer->readToTheEnd().error().text(), HasSubstr("a failed submission is simulated"));
+  TestPeer honest(server());
+  honest.join("small");
+  expectUndisturbed(honest);
+  TestPeer again(server());
+  again.join("left");
 }
 
 TEST_F(SceneFailureTest, CreatedSceneThatFailsIsRefused) {

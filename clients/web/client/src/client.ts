@@ -1,7 +1,16 @@
 // SPDX-License-Identifier: MIT
 // One client of the core, or a mirror of it (core.h): messages in and out, and what it knows of the scene.
 
-import { CS_CLIENT_OPTIONS_VERSION, CS_DECODED_VERSION, cs_client_options, cs_decoded } from "./layout";
+import {
+  CS_CLIENT_OPTIONS_VERSION,
+  CS_DATAGRAM_ANSWER_VERSION,
+  CS_DATAGRAM_OFFER_VERSION,
+  CS_DECODED_VERSION,
+  cs_client_options,
+  cs_datagram_answer,
+  cs_datagram_offer,
+  cs_decoded,
+} from "./layout";
 import { CoreHandle, nowUs } from "./handle";
 import { Frames } from "./frames";
 import { Input } from "./input";
@@ -9,9 +18,10 @@ import { Parameters } from "./parameters";
 import { People } from "./people";
 import { PlaybackControl } from "./playback";
 import { SceneRequests } from "./scene_requests";
+import type { DatagramAnswer, DatagramOffer } from "./session_description";
 import { Settings } from "./cloth_settings";
 import { ClientState, type Identity } from "./types";
-import { KeptView, type CoreModule } from "./wasm";
+import { CoreBuffer, type CoreModule } from "./wasm";
 
 // Result of decoding in the client that a mirror follows (cs_decoding).
 export enum Decoding {
@@ -36,8 +46,8 @@ export class Client {
   readonly requests: SceneRequests;
   readonly settings: Settings;
   private readonly handle: CoreHandle;
-  private readonly inbox: Buffer<Uint8Array>;
-  private readonly decoded: Buffer<Float32Array>;
+  private readonly inbox: CoreBuffer<Uint8Array>;
+  private readonly decoded: CoreBuffer<Float32Array>;
 
   // An empty `scene` means the server's default scene. `program` names the program.
   constructor(
@@ -61,8 +71,8 @@ export class Client {
     core.exports.free(options);
     if (pointer === 0) throw new Error("The client core has no memory left for another client");
     this.handle = new CoreHandle(core, pointer);
-    this.inbox = new Buffer(core, (pointer, count) => core.bytes(pointer, count));
-    this.decoded = new Buffer(core, (pointer, count) => core.floats(pointer, count));
+    this.inbox = new CoreBuffer(core, (pointer, count) => core.bytes(pointer, count));
+    this.decoded = new CoreBuffer(core, (pointer, count) => core.floats(pointer, count));
     this.frames = new Frames(this.handle);
     this.input = new Input(this.handle);
     this.parameters = new Parameters(this.handle);
@@ -163,6 +173,38 @@ export class Client {
     return this.core.text(this.core.exports.cs_next_server(this.handle.pointer));
   }
 
+  // Offers datagrams of a data channel on the present connection, right after Hello. ClientEvent.datagrams follows. Returns
+  // false if the offer is not valid.
+  offerDatagrams({ ufrag, password, fingerprint }: DatagramOffer): boolean {
+    const { core, handle } = this;
+    return core.with([ufrag, password], (name, secret) => {
+      const offer = handle.prepared(CS_DATAGRAM_OFFER_VERSION);
+      const view = core.view();
+      view.setUint32(offer + cs_datagram_offer.ufrag, name!, true);
+      view.setUint32(offer + cs_datagram_offer.password, secret!, true);
+      core.bytes(offer + cs_datagram_offer.fingerprint, fingerprint.length).set(fingerprint);
+      view.setInt32(offer + cs_datagram_offer.sctp, 1, true);
+      return core.exports.cs_offer_datagrams(handle.pointer, offer) !== 0;
+    });
+  }
+
+  // The server's answer. Undefined before ClientEvent.datagrams on the present connection.
+  datagramAnswer(): DatagramAnswer | undefined {
+    const { core, handle } = this;
+    const at = handle.prepared(CS_DATAGRAM_ANSWER_VERSION);
+    if (core.exports.cs_get_datagram_answer(handle.pointer, at) === 0) return undefined;
+    const view = core.view();
+    const text = (offset: number) => core.text(view.getUint32(at + offset, true));
+    const count = view.getUint32(at + cs_datagram_answer.addresses, true);
+    return {
+      ufrag: text(cs_datagram_answer.ufrag),
+      password: text(cs_datagram_answer.password),
+      fingerprint: core.bytes(at + cs_datagram_answer.fingerprint, 32).slice(),
+      addresses: Array.from({ length: count }, (_, index) => core.text(core.exports.cs_datagram_address(handle.pointer, index))),
+      port: view.getUint32(at + cs_datagram_answer.port, true),
+    };
+  }
+
   // Sends pings and runs timers. Call at least ten times per second.
   update(atUs: bigint = nowUs()): void {
     this.core.exports.cs_update(this.handle.pointer, atUs);
@@ -202,35 +244,5 @@ export class Client {
   // Requests the list of the server's scenes. ClientEvent.scenes follows; see requests.scenes().
   listScenes(): void {
     this.core.exports.cs_list_scenes(this.handle.pointer);
-  }
-}
-
-// Memory of the core that grows with what is written to it.
-class Buffer<View extends Uint8Array | Float32Array> {
-  private pointer = 0;
-  private room = 0; // elements
-  private readonly view: KeptView<View>;
-
-  constructor(
-    private readonly core: CoreModule,
-    make: (pointer: number, count: number) => View,
-  ) {
-    this.view = new KeptView(core, make);
-  }
-
-  // Returns the address of the copy.
-  write(values: View): number {
-    if (values.length > this.room) {
-      this.free();
-      this.pointer = this.core.allocate(2 * values.byteLength);
-      this.room = 2 * values.length;
-    }
-    this.view.at(this.pointer, this.room).set(values);
-    return this.pointer;
-  }
-
-  free(): void {
-    this.core.exports.free(this.pointer);
-    this.pointer = this.room = 0;
   }
 }

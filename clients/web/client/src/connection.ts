@@ -2,6 +2,7 @@
 // The client with the connection: receives, decodes, acknowledges and reconnects, in a worker.
 
 import { Client, Decoding } from "./client";
+import { Datagrams } from "./datagrams";
 import { microseconds } from "./handle";
 import { copyParts, FrameRing } from "./frame_ring";
 import { StreamSocket } from "./socket";
@@ -28,6 +29,8 @@ export class Connection {
   private ring: FrameRing | undefined;
   private buffers: ArrayBuffer[] = [];
   private waiting: Uint8Array<ArrayBuffer>[] = []; // messages of the page for the connection that is opening
+  private datagrams: Datagrams | undefined; // of the connection
+  private association = 0; // number of these datagrams; 0 without
 
   static async start(port: Port, options: Start): Promise<Connection> {
     return new Connection(port, options, await CoreModule.start(options.module));
@@ -36,7 +39,7 @@ export class Connection {
   private constructor(
     private readonly port: Port,
     private readonly options: Start,
-    core: CoreModule,
+    private readonly core: CoreModule,
   ) {
     this.clockOffsetMs = performance.timeOrigin - options.pageOrigin;
     this.client = new Client(core, "whole", options.scene, options.program, options.identity);
@@ -47,7 +50,10 @@ export class Connection {
     this.client.followRedirects(options.follows);
     this.socket = new StreamSocket(options.url, {
       opened: () => this.flush(),
-      message: (bytes) => this.receive(bytes),
+      message: (bytes) => {
+        if (this.datagrams) this.datagrams.receiveFromStream(new Uint8Array(bytes));
+        else this.receive(bytes);
+      },
       lost: (reason) => this.lose(reason),
     });
     this.timer = setInterval(() => this.tick(), kPeriodMs);
@@ -59,6 +65,14 @@ export class Connection {
       case "send":
         if (message.connection !== this.number) return;
         this.waiting.push(message.message);
+        this.flush();
+        return;
+      case "channel":
+        if (message.connection === this.number) this.openDatagrams(message.channel, message.association);
+        return;
+      case "offer":
+        if (message.association !== this.association) return;
+        this.client.offerDatagrams(message.offer);
         this.flush();
         return;
       case "reconnect":
@@ -74,6 +88,7 @@ export class Connection {
   // the browser has given up.
   async leave(returns = false): Promise<void> {
     clearInterval(this.timer);
+    this.closeDatagrams();
     this.client.destroy();
     await this.socket.close(returns ? kMayReturn : undefined);
   }
@@ -90,6 +105,7 @@ export class Connection {
     const atMs = this.now();
     const server = this.client.connectServer;
     this.waiting = [];
+    this.closeDatagrams();
     this.client.connecting(microseconds(atMs));
     this.post({ kind: "connecting", connection: ++this.number, atMs });
     this.socket.open(server);
@@ -97,6 +113,7 @@ export class Connection {
 
   private lose(reason: string): void {
     const atMs = this.now();
+    this.closeDatagrams();
     this.client.disconnected(microseconds(atMs));
     this.post({ kind: "lost", atMs, reason, attemptAtMs: this.client.connectAtMs });
     // Times of the core are whole microseconds, and atMs may be earlier than the one made of it.
@@ -108,18 +125,61 @@ export class Connection {
     if (this.client.state === ClientState.failed) return;
     this.client.update(microseconds(atMs));
     this.flush();
+    this.tendDatagrams();
     if (atMs < this.client.connectAtMs) return;
     if (!this.socket.inUse) return this.connect();
     void this.socket.close(kMayReturn);
     this.lose("The server does not answer.");
   }
 
+  // Uses a data channel, which is opening, for the present connection.
+  private openDatagrams(channel: RTCDataChannel | MessagePort, association: number): void {
+    this.closeDatagrams();
+    this.association = association;
+    const said = (isOpen: boolean) => this.post({ kind: "channel", association, isOpen });
+    this.datagrams = new Datagrams(
+      this.core,
+      channel,
+      {
+        opened: () => said(true),
+        message: ({ buffer }) => this.receive(buffer),
+        streamMessage: (message) => this.socket.send(message),
+        closed: () => said(false),
+      },
+      () => this.now(),
+    );
+  }
+
+  // Tells the core the round trip, and the page what datagrams have done.
+  private tendDatagrams(): void {
+    const { datagrams, association } = this;
+    if (!datagrams?.isOpen) return;
+    const { roundTripMs } = this.client.frames.statistics();
+    if (roundTripMs > 0) datagrams.setRoundTrip(roundTripMs);
+    this.post({ kind: "datagrams", association, statistics: datagrams.statistics() });
+  }
+
+  private passAnswer(): void {
+    const answer = this.client.datagramAnswer();
+    if (answer) this.post({ kind: "answered", association: this.association, answer });
+  }
+
+  private closeDatagrams(): void {
+    this.datagrams?.close();
+    this.datagrams = undefined;
+    this.association = 0;
+  }
+
   // Sends what waits, while the socket is open: Hello first, then the messages of the page.
   private flush(): void {
     if (!this.socket.isOpen) return;
-    for (let message = this.client.nextOutgoing(); message; message = this.client.nextOutgoing()) this.socket.send(message);
-    for (const message of this.waiting) this.socket.send(message);
-    this.waiting = [];
+    for (let message = this.client.nextOutgoing(); message; message = this.client.nextOutgoing()) this.send(message);
+    for (let message = this.waiting.shift(); message; message = this.waiting.shift()) this.send(message);
+  }
+
+  private send(message: Uint8Array<ArrayBuffer>): void {
+    if (this.datagrams) this.datagrams.send(message);
+    else this.socket.send(message);
   }
 
   private receive(bytes: ArrayBuffer): void {
@@ -131,6 +191,7 @@ export class Connection {
     this.flush();
     if (events & ClientEvent.description) this.prepare();
     if (events & ClientEvent.moving) this.socket.prepare(this.client.nextServer);
+    if (events & ClientEvent.datagrams) this.passAnswer();
     const isFrame = (events & ClientEvent.frame) !== 0;
     const frame = isFrame ? this.pass(message, arrivedMs, decodeMs) : undefined;
     if (frame === "in the ring") return this.port.postMessage(this.options.session, []);
@@ -138,7 +199,9 @@ export class Connection {
     const decoding = frame ? Decoding.done : refused ? Decoding.refused : Decoding.skipped;
     const transfer = frame?.buffer ? [bytes, frame.buffer] : [bytes];
     this.post({ kind: "message", message: bytes, arrivedMs, isFrame, decoding, frame }, transfer);
-    if (this.client.state === ClientState.failed) void this.socket.close();
+    if (this.client.state !== ClientState.failed) return;
+    this.closeDatagrams();
+    void this.socket.close();
   }
 
   // Makes room for the frames of a new description.

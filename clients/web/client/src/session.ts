@@ -6,8 +6,9 @@ import { Client, Decoding, type DecodedFrame } from "./client";
 import { FrameGaps } from "./frame_gaps";
 import { FrameRing } from "./frame_ring";
 import { microseconds } from "./handle";
+import { Negotiation } from "./negotiation";
 import type { FromWorker, Proof, Told, ToWorker } from "./thread_messages";
-import { ClientEvent, ClientState, ErrorCode, type Identity } from "./types";
+import { ClientEvent, ClientState, ErrorCode, type Identity, type Link, type Transport } from "./types";
 import { CoreModule } from "./wasm";
 
 export type SessionState =
@@ -17,8 +18,9 @@ export type SessionState =
   // The server requires a token or a pairing code. `code` is an ErrorCode. wasGiven: it has refused one.
   | { kind: "asking"; reason: string; code: number; wasGiven: boolean }
   // Nothing happens until the program joins again. "server": it refuses, with an ErrorCode. "client": the client core does
-  // not understand the server. "worker": the worker did not start, or has stopped.
-  | { kind: "failed"; reason: string; cause: "server" | "client" | "worker"; code: number };
+  // not understand the server. "worker": the worker did not start, or has stopped. "datagrams": they cannot be opened, and
+  // the option `transport` requires them.
+  | { kind: "failed"; reason: string; cause: "server" | "client" | "worker" | "datagrams"; code: number };
 
 // Where a token is kept between visits; "" means none.
 export interface TokenStore {
@@ -51,6 +53,7 @@ export interface SessionOptions {
   // For the place in the scene while the page reloads. Default: after a reload, one joins as a new participant.
   places?: TokenStore;
   quality?: number; // best quality wanted, 0 (finest, the default) to 3
+  transport?: Transport; // default: "auto"
   // Addresses of the package's own files, where a bundler does not find them.
   wasmUrl?: string | URL;
   makeWorker?: () => Worker;
@@ -70,6 +73,7 @@ export class Session {
   private number = 0; // of the session in the worker
   private connection = 0;
   private ring: FrameRing | undefined;
+  private readonly negotiation: Negotiation; // of datagrams
   private readonly frame: DecodedFrame = { hasNormals: false, hash: 0n, decodeMs: 0 }; // of the ring, for one call
   private readonly listener: SessionListener;
   private readonly tokens: TokenStore;
@@ -95,6 +99,10 @@ export class Session {
     this.worker = options.makeWorker?.() ?? new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.handle(data);
     this.worker.onerror = ({ message }) => this.breakDown(message || "its script could not be loaded");
+    this.negotiation = new Negotiation(options.transport ?? "auto", {
+      post: (message, transfer) => this.post(message, transfer),
+      required: (reason) => this.missDatagrams(reason),
+    });
     this.scene = options.scene ?? "";
     this.client = this.begin(this.scene, { token: this.tokens.kept() }, this.takePlace());
     window.addEventListener("online", this.reconnect);
@@ -108,6 +116,7 @@ export class Session {
     window.removeEventListener("pagehide", this.hide);
     window.removeEventListener("pageshow", this.comeBack);
     this.worker.onmessage = this.worker.onerror = null;
+    this.negotiation.stop("The session has ended.");
     this.post({ kind: "leave" });
     this.client.destroy();
   }
@@ -133,12 +142,18 @@ export class Session {
       this.post({ kind: "send", connection: this.connection, message }, [message.buffer]);
   }
 
+  // How frames travel at present.
+  get link(): Link {
+    return this.negotiation.link;
+  }
+
   private scene = "";
 
   // The page is closed or reloaded. The server keeps the participant's place for a while if the page can come back.
   private readonly hide = (): void => {
     const { kind } = this.state;
     if (kind === "live" || kind === "reconnecting") this.places.keep(`${this.client.resumeToken} ${this.wanted()}`);
+    this.negotiation.stop("The page is hidden.");
     this.post({ kind: "hide", returns: this.options.places !== undefined });
   };
   // The browser shows a page again that it had put aside.
@@ -170,6 +185,7 @@ export class Session {
     const { url, program = "", identity = { name: "", role: 0 }, quality = 0 } = this.options;
     this.scene = scene;
     this.ring = undefined;
+    this.negotiation.stop("The connection is being opened.");
     const client = new Client(this.core, "mirror", scene, program, identity);
     if ("token" in proof) client.setToken(proof.token);
     client.setResumeToken(resumeToken);
@@ -212,7 +228,8 @@ export class Session {
         this.connection = message.connection;
         this.client.connecting(microseconds(message.atMs));
         this.client.listScenes();
-        return this.flush();
+        this.flush();
+        return this.negotiation.start(message.connection);
       case "lost":
         this.gaps.restart();
         this.client.disconnected(microseconds(message.atMs));
@@ -222,6 +239,10 @@ export class Session {
         return;
       case "message":
         return this.receive(message);
+      case "answered":
+      case "channel":
+      case "datagrams":
+        return this.negotiation.handle(message);
       case "broken":
         return this.breakDown(message.reason);
     }
@@ -291,12 +312,20 @@ export class Session {
     this.enter({ kind: "failed", reason, cause: code === 0 ? "client" : "server", code });
   }
 
+  // The program requires datagrams, and they cannot be opened.
+  private missDatagrams(reason: string): void {
+    ++this.number; // messages that are under way do not count
+    this.post({ kind: "hide", returns: false });
+    this.enter({ kind: "failed", reason, cause: "datagrams", code: 0 });
+  }
+
   private breakDown(reason: string): void {
     this.enter({ kind: "failed", reason, cause: "worker", code: 0 });
   }
 
   private enter(state: SessionState): void {
     this.state = state;
+    if ("reason" in state) this.negotiation.stop(state.reason);
     this.listener.stateChanged?.();
   }
 }

@@ -3,7 +3,8 @@
 // of performance.now() of the page.
 
 import type { DecodedFrame, Decoding } from "./client";
-import type { Identity } from "./types";
+import type { DatagramAnswer, DatagramOffer } from "./session_description";
+import type { DatagramStatistics, Identity } from "./types";
 
 // Proof of identity: what a person gives, or a kept token ("" for none).
 export type Proof = { token: string } | { code: string };
@@ -35,6 +36,10 @@ export type ToWorker =
   | Start
   // Message for the connection of this number; dropped when that has ended.
   | { kind: "send"; connection: number; message: Uint8Array<ArrayBuffer> }
+  // Data channel of a new association for the connection of this number, or a port to it. It replaces the one before.
+  | { kind: "channel"; connection: number; association: number; channel: RTCDataChannel | MessagePort }
+  // Offer of this association to the server.
+  | { kind: "offer"; association: number; offer: DatagramOffer }
   // Connects at once instead of at the scheduled time.
   | { kind: "reconnect" }
   | End
@@ -51,6 +56,12 @@ export type Told =
   | { kind: "ring"; memory: SharedArrayBuffer }
   // A message of the server that is not in the ring. `isFrame`: it has brought a frame, which is left out if the page has no time for it.
   | { kind: "message"; message: ArrayBuffer; arrivedMs: number; isFrame: boolean; decoding: Decoding; frame: SentFrame | undefined }
+  // The server has answered the offer of this association.
+  | { kind: "answered"; association: number; answer: DatagramAnswer }
+  // Its channel has opened or closed.
+  | { kind: "channel"; association: number; isOpen: boolean }
+  // Its counts, while its channel is open.
+  | { kind: "datagrams"; association: number; statistics: DatagramStatistics }
   // The worker cannot go on.
   | { kind: "broken"; reason: string };
 

@@ -27,6 +27,7 @@ export const ClientEvent = {
   pairingCode: 16384,
   answer: 32768,
   moving: 65536,
+  datagrams: 131072,
 } as const;
 
 // Values of Client.errorCode and of SessionState: ErrorCode of session.proto. A newer server may have more.
@@ -61,6 +62,31 @@ export interface Statistics {
   kbitPerSecond: number;
   bitsPerVertex: number;
   roundTripMs: number;
+}
+
+// Counts of one association of datagrams (cs_datagram_statistics).
+export interface DatagramStatistics {
+  inUse: boolean; // a datagram has arrived in the last 500 ms
+  packets: number; // datagrams with pieces of frames that arrived
+  lostPackets: number;
+  parityPackets: number; // of packets, those with parity
+  frames: number; // complete ones
+  repairedFrames: number; // of these, those that needed parity or a request
+  lostFrames: number;
+  requests: number; // for missing pieces
+  heldFrames: number; // frames of both ways that waited for their reference
+}
+
+// How frames and input travel. "auto": in datagrams where they can be opened, else on the WebSocket. "datagrams": joining
+// fails where they cannot be opened. "tcp": on the WebSocket.
+export const kTransports = ["auto", "datagrams", "tcp"] as const;
+export type Transport = (typeof kTransports)[number];
+
+// How frames travel at present.
+export interface Link {
+  transport: "datagrams" | "websocket";
+  reason: string; // why not in datagrams; "" if they do
+  statistics: DatagramStatistics | undefined; // while a data channel is open
 }
 
 // Time that a frame spends in each stage, and state of play-out (cs_stage_statistics).

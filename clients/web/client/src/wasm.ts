@@ -127,3 +127,33 @@ export class KeptView<View extends Uint8Array | Float32Array> {
     return (this.view = this.make(pointer, count));
   }
 }
+
+// Memory of the core that grows with what is written to it.
+export class CoreBuffer<View extends Uint8Array | Float32Array> {
+  private pointer: Pointer = kNull;
+  private room = 0; // elements
+  private readonly view: KeptView<View>;
+
+  constructor(
+    private readonly core: CoreModule,
+    make: (pointer: number, count: number) => View,
+  ) {
+    this.view = new KeptView(core, make);
+  }
+
+  // Returns the address of the copy.
+  write(values: View): number {
+    if (values.length > this.room) {
+      this.free();
+      this.pointer = this.core.allocate(2 * values.byteLength);
+      this.room = 2 * values.length;
+    }
+    this.view.at(this.pointer, this.room).set(values);
+    return this.pointer;
+  }
+
+  free(): void {
+    this.core.exports.free(this.pointer);
+    this.pointer = this.room = 0;
+  }
+}

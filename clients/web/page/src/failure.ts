@@ -53,6 +53,7 @@ export function failureOf(state: SessionState, context: FailureContext): Failure
     case "failed":
       if (state.cause === "worker") return workerFailed(state.reason);
       if (state.cause === "client") return misunderstood(state.reason);
+      if (state.cause === "datagrams") return noDatagrams(state.reason);
       return refused(state.code, state.reason, context);
   }
 }
@@ -217,6 +218,16 @@ function workerFailed(said: string): Failure {
     text: "The worker that receives the stream did not start, or has stopped. Reload the page. If that does not help, try another browser.",
     said,
     actions: [kReload],
+  };
+}
+
+function noDatagrams(said: string): Failure {
+  return {
+    kind: "no-datagrams",
+    title: "Datagrams cannot be opened",
+    text: "The address of this page requires them. Remove transport=datagrams from it, or let UDP through to the server, and join again.",
+    said,
+    actions: [kJoin],
   };
 }
 

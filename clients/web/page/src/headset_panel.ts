@@ -8,7 +8,7 @@ import type { Panel } from "./panel/panel";
 
 const kTabs = ["Scenes", "People", "Quality", "Figures"] as const;
 const kOnePage = 7; // rows of a list
-const kFiguresRows = 5.3;
+const kFiguresRows = 6.7;
 const kMessageMs = 6000;
 
 // Colours of the figures on the panel, which is dark.

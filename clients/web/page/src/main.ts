@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Starts the page: core, view, session, panel, and the drawing loop.
 
-import { Roles, Session, type Client, type SessionListener, type SessionOptions, type Vec3 } from "@clothstream/client";
+import { kTransports, Roles, Session, type Client, type SessionListener, type SessionOptions, type Transport, type Vec3 } from "@clothstream/client";
 import { kGraphicsLost, kNoWebAssembly, kNoWebGl, notLoaded } from "./advice";
 import { Drag } from "./drag";
 import { FrameWork } from "./frame_work";
@@ -101,6 +101,7 @@ async function start(): Promise<void> {
     tokens: browserTokens,
     places: tabPlaces,
     quality: qualityOfAddress(),
+    transport: transportOfAddress((text) => hud.showNotice(text)),
     listener,
   };
   const panel: Panel = new Panel(() => session, options, { sceneChosen: chooseScene, viewReset: () => view.reset(), said: (text) => headset.say(text) });
@@ -229,6 +230,13 @@ function sceneOfAddress(): string {
 function qualityOfAddress(): number {
   const value = Number(new URLSearchParams(window.location.search).get("quality"));
   return Number.isInteger(value) && value >= 0 && value <= 3 ? value : 0;
+}
+
+function transportOfAddress(complain: (text: string) => void): Transport {
+  const value = new URLSearchParams(window.location.search).get("transport") ?? "auto";
+  const known = kTransports.find((one) => one === value);
+  if (!known) complain(`"${value}" is not a transport; use ${kTransports.join(", ")}.`);
+  return known ?? "auto";
 }
 
 // Usual time between frames, ms.

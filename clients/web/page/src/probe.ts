@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
-import type { Client, ClothLayout, ClothReport, Collider, Participant, Playback, Session, SessionState, Stages, Statistics, Vec3 } from "@clothstream/client";
+import type { Client, ClothLayout, ClothReport, Collider, Link, Participant, Playback, Session, SessionState, Stages, Statistics, Vec3 } from "@clothstream/client";
 import * as THREE from "three";
 import type { CanvasPanel, Doing, Headset } from "@clothstream/three";
 import type { FrameWork } from "./frame_work";
@@ -13,6 +13,8 @@ export interface Probe {
   readonly state: SessionState["kind"];
   // Arrays are copies with 3 floats per vertex.
   readonly statistics: Statistics;
+  // How frames travel.
+  readonly link: Link;
   // Stages of the newest frame and state of play-out. Undefined before the first frame.
   readonly stages: Stages | undefined;
   readonly positions: Float32Array;
@@ -99,6 +101,9 @@ export function expose(session: Session, view: View, { headset, panel, work, his
     },
     get statistics() {
       return session.client.frames.statistics();
+    },
+    get link() {
+      return session.link;
     },
     get stages() {
       return session.client.frames.stages();

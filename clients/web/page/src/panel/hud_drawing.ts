@@ -15,7 +15,7 @@ export interface HudTheme {
 
 // Size of the drawing in its own units. Scale the context to fill another size.
 export const kHudWidth = 352;
-export const kHudHeight = 214;
+export const kHudHeight = 272;
 
 interface Cell {
   label: string;
@@ -35,12 +35,26 @@ const kCells: readonly Cell[] = [
   { label: "longest pause", unit: "ms", channel: "pause", digits: 0, shows: "largest" },
   { label: "dropped", unit: "/min", channel: "drops", digits: 0, shows: "sum" },
 ];
+interface LinkCell {
+  label: string;
+  unit: string;
+  digits: number;
+  of(history: HudHistory): number;
+}
+
+const kLinkCells: readonly LinkCell[] = [
+  { label: "loss", unit: "%", digits: 1, of: (history) => percent(history.sum("lostPackets"), history.sum("packets") + history.sum("lostPackets")) },
+  { label: "repaired", unit: "/min", digits: 0, of: (history) => history.sum("repairedFrames") },
+  { label: "requests", unit: "/min", digits: 0, of: (history) => history.sum("requests") },
+  { label: "parity", unit: "%", digits: 1, of: (history) => percent(history.sum("parityPackets"), history.sum("packets")) },
+];
 const kStageLabels = ["up", "server", "down", "decode", "play-out"];
 
 const kColumns = 4;
 const kCellWidth = kHudWidth / kColumns;
 const kCellHeight = 58;
 const kGap = 8;
+const kStagesHeight = 82;
 
 // Draws over what is there: clear the canvas before.
 export function drawHud(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme): void {
@@ -50,7 +64,9 @@ export function drawHud(context: CanvasRenderingContext2D, history: HudHistory, 
     const x = (index % kColumns) * kCellWidth;
     drawCell(context, history, theme, cell, x, Math.floor(index / kColumns) * (kCellHeight + kGap), kCellWidth - kGap);
   });
-  drawStages(context, history, theme, 2 * (kCellHeight + kGap));
+  const stagesAt = 2 * (kCellHeight + kGap);
+  drawStages(context, history, theme, stagesAt);
+  drawLink(context, history, theme, stagesAt + kStagesHeight + kGap);
 }
 
 // The figures as a sentence, for people who do not see the picture.
@@ -58,7 +74,17 @@ export function hudText(history: HudHistory): string {
   if (history.length === 0) return "No figures yet.";
   const figures = kCells.map((cell) => `${cell.label} ${textOf(history, cell)} ${cell.unit}`.trim());
   const stages = kStages.map((stage, index) => `${kStageLabels[index]} ${history.at(stage).toFixed(1)}`);
-  return `${figures.join(", ")}; pose to picture ${history.latency().toFixed(1)} ms: ${stages.join(", ")}.`;
+  return `${figures.join(", ")}; pose to picture ${history.latency().toFixed(1)} ms: ${stages.join(", ")}. ${linkText(history)}`;
+}
+
+function linkText(history: HudHistory): string {
+  if (history.link.transport === "websocket") return `Frames by WebSocket: ${history.link.reason}`;
+  const figures = kLinkCells.map(({ label, unit, digits, of }) => `${label} ${of(history).toFixed(digits)} ${unit}`);
+  return `Frames by datagrams: ${figures.join(", ")}.`;
+}
+
+function percent(part: number, whole: number): number {
+  return whole > 0 ? (100 * part) / whole : 0;
 }
 
 function textOf(history: HudHistory, { channel, digits, shows }: Cell): string {
@@ -67,17 +93,8 @@ function textOf(history: HudHistory, { channel, digits, shows }: Cell): string {
 }
 
 function drawCell(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme, cell: Cell, x: number, y: number, width: number): void {
-  context.font = `10px ${theme.font}`;
-  context.fillStyle = theme.quiet;
-  context.fillText(cell.label, x, y + 10);
-  const text = textOf(history, cell);
-  context.font = `600 15px ${theme.font}`;
-  context.fillStyle = cell.shows === "sum" && history.sum(cell.channel) > 0 ? theme.bad : theme.text;
-  context.fillText(text, x, y + 27);
-  const end = x + context.measureText(text).width + 4;
-  context.font = `10px ${theme.font}`;
-  context.fillStyle = theme.quiet;
-  context.fillText(cell.unit, end, y + 27);
+  const colour = cell.shows === "sum" && history.sum(cell.channel) > 0 ? theme.bad : theme.text;
+  drawFigure(context, theme, cell.label, textOf(history, cell), cell.unit, x, y, colour);
   const most = Math.max(history.largest(cell.channel), 1e-6);
   const floor = y + kCellHeight;
   context.strokeStyle = theme.line;
@@ -98,15 +115,48 @@ function drawCell(context: CanvasRenderingContext2D, history: HudHistory, theme:
   context.stroke();
 }
 
-// Stages from a pose to its picture as areas on top of each other.
-function drawStages(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme, y: number): void {
+function drawFigure(context: CanvasRenderingContext2D, theme: HudTheme, label: string, text: string, unit: string, x: number, y: number, colour: string): void {
   context.font = `10px ${theme.font}`;
   context.fillStyle = theme.quiet;
-  context.fillText("pose to picture", 0, y + 11);
-  const end = context.measureText("pose to picture").width + 6;
+  context.fillText(label, x, y + 10);
+  context.font = `600 15px ${theme.font}`;
+  context.fillStyle = colour;
+  context.fillText(text, x, y + 27);
+  const end = x + context.measureText(text).width + 4;
+  context.font = `10px ${theme.font}`;
+  context.fillStyle = theme.quiet;
+  context.fillText(unit, end, y + 27);
+}
+
+// Draws a line of a label and its value.
+function drawHeading(context: CanvasRenderingContext2D, theme: HudTheme, label: string, text: string, y: number): void {
+  context.font = `10px ${theme.font}`;
+  context.fillStyle = theme.quiet;
+  context.fillText(label, 0, y + 11);
+  const end = context.measureText(label).width + 6;
   context.font = `600 12px ${theme.font}`;
   context.fillStyle = theme.text;
-  context.fillText(`${history.latency().toFixed(1)} ms`, end, y + 11);
+  context.fillText(text, end, y + 11);
+}
+
+// How frames travel: figures of the datagrams, or why there are none.
+function drawLink(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme, y: number): void {
+  const { transport, reason } = history.link;
+  drawHeading(context, theme, "frames by", transport === "datagrams" ? "datagrams" : "WebSocket", y);
+  if (transport === "datagrams") {
+    kLinkCells.forEach(({ label, unit, digits, of }, index) =>
+      drawFigure(context, theme, label, of(history).toFixed(digits), unit, index * kCellWidth, y + 18, theme.text),
+    );
+    return;
+  }
+  context.font = `10px ${theme.font}`;
+  context.fillStyle = theme.quiet;
+  context.fillText(reason, 0, y + 28, kHudWidth);
+}
+
+// Stages from a pose to its picture as areas on top of each other.
+function drawStages(context: CanvasRenderingContext2D, history: HudHistory, theme: HudTheme, y: number): void {
+  drawHeading(context, theme, "pose to picture", `${history.latency().toFixed(1)} ms`, y);
   context.font = `10px ${theme.font}`;
   let x = 0;
   kStages.forEach((stage, index) => {
@@ -119,8 +169,8 @@ function drawStages(context: CanvasRenderingContext2D, history: HudHistory, them
   });
   let most = 1;
   for (let ago = 0; ago < history.length; ++ago) most = Math.max(most, history.latency(ago));
-  const floor = kHudHeight;
-  const height = kHudHeight - y - 34;
+  const floor = y + kStagesHeight;
+  const height = kStagesHeight - 34;
   // From the top layer down, so that each area covers the lower part of the one before it.
   for (let stage = kStages.length - 1; stage >= 0; --stage) {
     context.fillStyle = theme.stages[stage]!;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Figures of the stream over the last minute.
 
+import type { Link } from "@clothstream/client";
+import { kLinkCounts } from "./link_counts";
+
 export const kChannels = [
   "displayRate", // drawn frames per second
   "streamRate", // received frames per second
@@ -16,6 +19,8 @@ export const kChannels = [
   "downlink",
   "decode",
   "playOut",
+  // Datagrams since the sample before.
+  ...kLinkCounts,
 ] as const;
 export type Channel = (typeof kChannels)[number];
 export type Sample = Record<Channel, number>;
@@ -26,6 +31,8 @@ export const kStages = ["uplink", "server", "downlink", "decode", "playOut"] as 
 export class HudHistory {
   private readonly values: Record<Channel, Float32Array>;
   private count = 0;
+  // How frames travel at the newest sample.
+  link: Pick<Link, "transport" | "reason"> = { transport: "websocket", reason: "" };
 
   constructor(readonly capacity = 240) {
     this.values = Object.fromEntries(kChannels.map((name) => [name, new Float32Array(capacity)])) as Record<Channel, Float32Array>;

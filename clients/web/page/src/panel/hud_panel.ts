@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The figures over the picture: samples them four times a second, and draws them while they are shown.
 
-import type { Client } from "@clothstream/client";
+import type { Client, Link } from "@clothstream/client";
 import { element } from "./dom";
 import { drawHud, hudText, kHudHeight, kHudWidth, type HudTheme } from "./hud_drawing";
 import { HudHistory } from "./hud_history";
+import { LinkCounter } from "./link_counts";
 import { poseStages } from "./pose_stages";
 
 const kLabelPeriodMs = 1000;
@@ -21,6 +22,7 @@ export class HudPanel {
   private dropped = 0;
   private frameAt = -Infinity; // arrival of the newest frame
   private displayableMs = 0; // of the newest frame
+  private readonly linkCounter = new LinkCounter();
 
   constructor() {
     this.button.addEventListener("click", () => this.toggle());
@@ -43,7 +45,7 @@ export class HudPanel {
 
   // Takes a sample, also without a connection. Call about four times a second. `pauseMs` is the longest pause between frames
   // since the last call.
-  sample(client: Client | undefined, now: number, pauseMs: number): void {
+  sample(client: Client | undefined, link: Link, now: number, pauseMs: number): void {
     const seconds = (now - this.sampledAt) / 1000;
     const statistics = client?.frames.statistics();
     const stages = client?.frames.stages();
@@ -64,7 +66,9 @@ export class HudPanel {
       drops: Math.max(0, dropped - this.dropped),
       pause: pauseMs,
       ...poseStages(statistics, stages),
+      ...this.linkCounter.take(link.statistics),
     });
+    this.history.link = link;
     this.dropped = dropped;
     this.drawn = 0;
     this.sampledAt = now;

@@ -129,7 +129,9 @@ export class Panel {
   // Updates figures and the list of scenes. Call about four times a second. `pauseMs` is the longest pause between frames
   // since the last call.
   refresh(client: Client | undefined, now: number, pauseMs: number): void {
-    this.hud.sample(client, now, pauseMs);
+    const { link } = this.session();
+    this.hud.sample(client, link, now, pauseMs);
+    write(element("transport"), link.transport === "datagrams" ? "datagrams" : `WebSocket. ${link.reason}`);
     if (!client || !this.tabs.isOpen) return;
     if (this.tabs.current === "cloth") this.cloth.showReport(client);
     if (this.tabs.current === "air") this.controls.showRadius(client);
