@@ -121,7 +121,7 @@ test("a page that wants TCP offers nothing", () => {
 test("the link says why there are no datagrams", async () => {
   const cases: [() => Promise<void> | void, RegExp][] = [
     [() => answered({ ...kAnswer, addresses: [] }), /^The server opens no datagrams\.$/],
-    [() => (answered(), vi.advanceTimersByTimeAsync(10_000)).then(() => undefined), /^UDP port 8080 of the server cannot be reached\.$/],
+    [() => (answered(), vi.advanceTimersByTimeAsync(30_000)).then(() => undefined), /^UDP port 8080 of the server cannot be reached\.$/],
     [() => (answered(), peer().enters("failed")), /^UDP port 8080 of the server cannot be reached\.$/],
     [() => channel(false), /^The server has closed the datagrams\.$/],
     [() => ((peer().refusal = new Error("bad line")), answered(), settle()).then(() => undefined), /^The browser opens no datagrams: bad line\.$/],
