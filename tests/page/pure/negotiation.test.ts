@@ -161,7 +161,7 @@ test("lost datagrams are offered again, later each time", async () => {
   }
 });
 
-test("a new connection offers anew, and forgets the old one", async () => {
+test("a new connection offers datagrams again, and forgets the old one", async () => {
   await open();
   const first = peer();
   negotiation.stop("The connection was lost.");
@@ -169,7 +169,7 @@ test("a new connection offers anew, and forgets the old one", async () => {
   assert.equal(negotiation.link.reason, "The connection was lost.");
   negotiation.start(2);
   await settle();
-  // What the worker said of the first one.
+  // Late messages of the worker about the first one.
   negotiation.handle({ kind: "answered", association: 1, answer: kAnswer });
   negotiation.handle({ kind: "channel", association: 1, isOpen: true });
   negotiation.handle({ kind: "datagrams", association: 1, statistics: kStatistics });
