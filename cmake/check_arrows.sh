@@ -46,7 +46,7 @@ server/doctor      | server/endpoint/listen server/encode server/messages server
 server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health grpc/reflection
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry
-server/endpoint/datagram | server/endpoint/listen server/session server/hosting server/delivery server/schedule server/messages server/telemetry proto/datagram proto/dtls proto/ice proto/sctp proto/tls
+server/endpoint/datagram | server/endpoint/listen server/session server/hosting server/delivery server/schedule server/messages server/telemetry proto/datagram proto/dtls proto/ice proto/sctp
 server/monitoring  | server/hosting server/scene server/telemetry server/endpoint/listen server/endpoint/web
 server/options     | server/files proto/recording server/events server/hosting server/recording server/step server/scene server/model
 server/program     | server/agones server/events server/fleet proto/recording proto/text server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
