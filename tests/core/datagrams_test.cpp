@@ -336,6 +336,23 @@ TEST(TwoWays, LostFrameIsNotWaitedForTwice) {
   EXPECT_EQ(ways.statistics().lost_frames, 1u);
 }
 
+TEST(TwoWays, LossBeforeTheStreamIsForgotten) {
+  ScriptedServer server({.cloths = {{"curtain", 64, 64}}});
+  Ways ways;
+  EXPECT_FALSE(ways.hold(server.frame(1, codec::PacketKind::key)));
+  const auto lost = ways.cut(server.frame(2, codec::PacketKind::key));
+  ASSERT_GT(lost.size(), 1u);
+  ways.receive(lost[0], 10 * kMs);
+  EXPECT_THAT(ways.messages(160 * kMs), IsEmpty());
+  EXPECT_EQ(ways.statistics().lost_frames, 1u);
+  EXPECT_FALSE(ways.hold(server.frame(3, codec::PacketKind::key), 200 * kMs));
+  const std::string late = server.frame(4), fifth = server.frame(5);
+  ways.receiveFrame(fifth, 210 * kMs);
+  EXPECT_THAT(ways.messages(210 * kMs), IsEmpty()) << "its reference may still come by the stream";
+  EXPECT_FALSE(ways.hold(late, 220 * kMs));
+  EXPECT_THAT(ways.messages(220 * kMs), ElementsAre(fifth));
+}
+
 TEST(TwoWays, HeldFramesAreBounded) {
   ScriptedServer server;
   Ways ways;

@@ -306,7 +306,7 @@ TEST(UdpSockets, ExchangeDatagrams) {
   EXPECT_EQ(arrived[0].bytes, datagram);
   EXPECT_EQ(arrived[0].from, *readAddress("127.0.0.1", second.port()));
   EXPECT_FALSE(readAddress("localhost", 1));
-  EXPECT_FALSE(readAddress("::1%", 1));
+  EXPECT_FALSE(readAddress("1.2.3.4.5", 1));
 }
 
 }  // namespace

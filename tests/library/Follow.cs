@@ -16,6 +16,7 @@ static unsafe class Follow
         public IntPtr scene, clientName, displayName;
         public uint joinTimeoutMs, reconnectForMs;
         public IntPtr token, caFile, fingerprint, log, logContext;
+        public uint transport;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -120,7 +121,7 @@ static unsafe class Follow
         Options options;
         IntPtr stream;
         clothstream_default_options(out options);
-        Check(options.version == 2 && options.joinTimeoutMs == 10000, "options are as the header says");
+        Check(options.version == 3 && options.transport == 0 && options.joinTimeoutMs == 10000, "options are as the header says");
         options.joinTimeoutMs = 3000;
         Check(clothstream_open(Utf8("127.0.0.1:1"), ref options, out stream) == Result.Unreachable, "an unreachable server is reported");
         Check(stream == IntPtr.Zero, "there is no stream");

@@ -71,8 +71,11 @@ void DatagramLink::receive(std::span<const std::byte> datagram, std::uint64_t no
 }
 
 bool DatagramLink::holds(Bytes message, std::uint64_t nowUs) {
+  const std::optional<std::uint64_t> before = order_.newestTick();
   // Before the first frame of the stream, the client may have had others.
-  return !order_.passes(message, order_.hasPassed(), nowUs);
+  const bool passes = order_.passes(message, before.has_value(), nowUs);
+  if (order_.newestTick() != before) lostBeforeStream_ = assembly_.statistics().lostFrames;
+  return !passes;
 }
 
 bool DatagramLink::sends(Bytes message, std::uint64_t nowUs) {
@@ -91,7 +94,9 @@ Bytes DatagramLink::nextMessage(std::uint64_t nowUs) {
   if (!message_.empty()) return {message_.data(), message_.size()};
   while (const auto frame = assembly_.next(nowUs)) {
     const Bytes message = asMessage(frame->message);
-    if (order_.passes(message, !frame->afterGap, nowUs)) return message;
+    // Frames that were lost before the stream carried others have no effect any more.
+    const bool isSure = !frame->afterGap || assembly_.statistics().lostFrames == lostBeforeStream_;
+    if (order_.passes(message, isSure, nowUs)) return message;
     message_ = order_.next(nowUs);
     if (!message_.empty()) return {message_.data(), message_.size()};
   }

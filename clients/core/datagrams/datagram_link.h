@@ -58,6 +58,7 @@ class DatagramLink {
   std::optional<std::uint64_t> heardUs_;  // arrival of the newest piece
   datagram::FrameAssembly assembly_;
   FrameOrder order_;
+  std::uint64_t lostBeforeStream_ = 0;  // frames that were lost when the newest frame of the stream passed
   datagram::ReceivedPackets received_;
   bool completed_ = false;  // a frame, since the last receipt
   datagram::InputSender input_;

@@ -40,8 +40,10 @@ class FrameOrder {
   // Time at which next() may return a frame without a further one; nullopt if none waits.
   std::optional<std::uint64_t> dueUs() const;
 
-  // Whether a frame has passed.
-  bool hasPassed() const { return newest_.has_value(); }
+  // Tick of the newest frame that has passed.
+  std::optional<std::uint64_t> newestTick() const {
+    return newest_ ? std::optional(newest_->tick) : std::nullopt;
+  }
   // Frames that have waited.
   std::uint64_t heldFrames() const { return heldFrames_; }
 

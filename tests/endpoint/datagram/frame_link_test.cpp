@@ -81,9 +81,9 @@ class FrameLinkTest : public ::testing::Test {
     while (const auto frame = assembly.next(us()))
       take(std::make_shared<const Bytes>(frame->message.begin(), frame->message.end()), byLink);
     std::array<std::byte, datagram::kMaxDatagramBytes> out;
-    while (const auto request = assembly.nextRequest(us())) answer(out, writeRequest(*request, out));
+    while (const auto request = assembly.nextRequest(us())) answer(out, datagram::writeRequest(*request, out));
     if (received.dueUs().value_or(us()) > us()) return;
-    if (const auto receipt = received.take()) answer(out, writeReceipt(*receipt, out));
+    if (const auto receipt = received.take()) answer(out, datagram::writeReceipt(*receipt, out));
   }
   void answer(std::span<const std::byte> out, std::size_t size) {
     if (carries(random))
@@ -195,7 +195,7 @@ TEST_F(FrameLinkTest, ClosedPathHasNothingDue) {
   for (int i = 0; i < 1000 && metrics.fallbacks.value() == 0; ++i) pass(1ms);
   std::array<std::byte, datagram::kMaxDatagramBytes> out;
   const auto frames = static_cast<std::uint32_t>(scene.datagramFrames.value());
-  link.receive(std::span(out).first(writeRequest({.frame = frames - 1, .present = {}}, out)), now);
+  link.receive(std::span(out).first(datagram::writeRequest({.frame = frames - 1, .present = {}}, out)), now);
   ASSERT_GT(metrics.repeats.value(), 0u);
   open = false;
   pass(1ms);

@@ -121,7 +121,7 @@ test("a page that wants TCP offers nothing", () => {
 test("the link says why there are no datagrams", async () => {
   const cases: [() => Promise<void> | void, RegExp][] = [
     [() => answered({ ...kAnswer, addresses: [] }), /^The server opens no datagrams\.$/],
-    [() => (answered(), vi.advanceTimersByTimeAsync(10_000)).then(() => undefined), /^UDP port 8080 of the server cannot be reached\.$/],
+    [() => (answered(), vi.advanceTimersByTimeAsync(30_000)).then(() => undefined), /^UDP port 8080 of the server cannot be reached\.$/],
     [() => (answered(), peer().enters("failed")), /^UDP port 8080 of the server cannot be reached\.$/],
     [() => channel(false), /^The server has closed the datagrams\.$/],
     [() => ((peer().refusal = new Error("bad line")), answered(), settle()).then(() => undefined), /^The browser opens no datagrams: bad line\.$/],
@@ -161,7 +161,7 @@ test("lost datagrams are offered again, later each time", async () => {
   }
 });
 
-test("a new connection offers again, and forgets the old one", async () => {
+test("a new connection offers datagrams again, and forgets the old one", async () => {
   await open();
   const first = peer();
   negotiation.stop("The connection was lost.");
@@ -169,7 +169,7 @@ test("a new connection offers again, and forgets the old one", async () => {
   assert.equal(negotiation.link.reason, "The connection was lost.");
   negotiation.start(2);
   await settle();
-  // The first one gets no words of the worker any more.
+  // Late messages of the worker about the first one.
   negotiation.handle({ kind: "answered", association: 1, answer: kAnswer });
   negotiation.handle({ kind: "channel", association: 1, isOpen: true });
   negotiation.handle({ kind: "datagrams", association: 1, statistics: kStatistics });

@@ -97,7 +97,7 @@ class IdentityTest : public tests::ServerTest {
   }
   // Every message that needs an identity.
   static std::vector<v1::ClientMessage> demands() {
-    std::vector<v1::ClientMessage> all(18);
+    std::vector<v1::ClientMessage> all(19);
     all[0].mutable_hello()->set_protocol_version(1);
     all[1].mutable_list_scenes();
     all[2].mutable_get_scene();
@@ -116,6 +116,7 @@ class IdentityTest : public tests::ServerTest {
     all[15].mutable_remove_participant();
     all[16].mutable_frame_ack();
     all[17].mutable_key_frame_request();
+    all[18].mutable_datagram_offer();
     return all;
   }
 

@@ -7,8 +7,8 @@ import { describeServer, offerIn, type DatagramAnswer } from "./session_descript
 import type { Told, ToWorker } from "./thread_messages";
 import type { DatagramStatistics, Link, Transport } from "./types";
 
-// Time within which the channel must open after the server's answer, ms.
-const kOpenMs = 10_000;
+// Time within which the channel must open after the server's answer, ms. Chromium itself gives up after 15 s.
+const kOpenMs = 30_000;
 // Time until lost datagrams are opened again: this, ms, then twice as long each time, at most kMostWaitMs.
 const kFirstWaitMs = 2000;
 const kMostWaitMs = 60_000;

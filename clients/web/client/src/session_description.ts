@@ -51,7 +51,7 @@ export function describeServer({ ufrag, password, fingerprint, addresses, port }
   return `${lines.join("\r\n")}\r\n`;
 }
 
-// Of a host candidate (RFC 8445, section 5.1.2.1). Earlier addresses have higher ones.
+// Priority of a host candidate (RFC 8445, section 5.1.2.1). Earlier addresses have higher ones.
 function priority(index: number): number {
   return 126 * 2 ** 24 + (65535 - index) * 2 ** 8 + 255;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What datagrams have carried between two samples. Their counters start again when they are opened again.
+// Counts of datagrams between two samples. Their counters start again when they are opened again.
 
 import type { DatagramStatistics } from "@clothstream/client";
 
