@@ -81,7 +81,8 @@ class FrameLinkTest : public ::testing::Test {
     while (const auto frame = assembly.next(us()))
       take(std::make_shared<const Bytes>(frame->message.begin(), frame->message.end()), byLink);
     std::array<std::byte, datagram::kMaxDatagramBytes> out;
-    while (const auto request = assembly.nextRequest(us())) answer(out, datagram::writeRequest(*request, out));
+    while (const auto request = assembly.nextRequest(us()))
+      answer(out, datagram::writeRequest(*request, out));
     if (received.dueUs().value_or(us()) > us()) return;
     if (const auto receipt = received.take()) answer(out, datagram::writeReceipt(*receipt, out));
   }
