@@ -66,6 +66,7 @@ std::string floodWrongChecks(const Target& target) {
   if (named.offer() != Answer::accepted) return "the server opens no datagrams";
   named.begin(own);
   if (!named.open(kPatience)) return "no association";
+  named.readOn();
   OfferingPeer unknown(target);
   if (unknown.offer() != Answer::accepted) return "the server opens no datagrams";
   const std::array checks{named.wrongCheck(), unknown.wrongCheck()};
@@ -88,6 +89,7 @@ std::string floodWrongChecks(const Target& target) {
     own.send(named.server(), named.check(true));
     ++asked;
     named.step(50ms);
+    std::this_thread::sleep_for(5ms);  // far below the rate of a peer
   });
   strangers.join();
   named.step(100ms);
@@ -198,17 +200,23 @@ std::string floodPayloads(const Target& target) {
     if (flooders[i]->peer.offer() != Answer::accepted) return "the server opens no datagrams";
     flooders[i]->peer.begin(flooders[i]->source);
     if (!flooders[i]->peer.open(kPatience)) return "no association";
+    flooders[i]->peer.readOn();
   }
-  const std::uint64_t sent = flood(target, [&](int i) {
+  // Twice the rate of a peer: beyond that, its own checks would be lost, and with them the association.
+  constexpr int kInARow = 20;
+  const std::uint64_t rounds = flood(target, [&](int i) {
     const auto number = static_cast<std::size_t>(i);
-    floods[number]->send();
+    for (int payload = 0; payload < kInARow; ++payload) floods[number]->send();
     flooders[number]->peer.step();
+    std::this_thread::sleep_for(5ms);
   });
   std::uint64_t most = 0;
   for (const auto& flooder : flooders) most = std::max(most, flooder->source.receivedBytes());
-  const auto open = std::ranges::count_if(flooders, [](const auto& each) { return each->peer.isOpen(); });
-  return fmt::format("{} payloads sent; {} kB a second to one peer at most; {} of {} streams stay open", sent,
-                     most / 1000 / static_cast<std::uint64_t>(target.time.count()), open, kFlooders);
+  std::string ends;
+  for (std::size_t i = 0; i < flooders.size(); ++i)
+    if (const auto end = flooders[i]->peer.end()) ends += fmt::format("; stream {}: {}", i, *end);
+  return fmt::format("{} payloads sent; {} kB a second to one peer at most{}", rounds * kInARow,
+                     most / 1000 / static_cast<std::uint64_t>(target.time.count()), ends);
 }
 
 // Everything that a participant can send from an address at which it never answers a check.
@@ -252,6 +260,7 @@ std::string aimAtOthers(const Target& target) {
   if (peer.offer() != Answer::accepted) return "the server opens no datagrams";
   peer.begin(own);
   if (!peer.open(kPatience)) return "no association";
+  peer.readOn();
   repeat(target, [&] {
     other.send(peer.server(), peer.check(true));
     while (other.receive()) {

@@ -183,12 +183,20 @@ void OfferingPeer::payloadArrived(std::span<const std::byte> payload) {
   if (const auto piece = datagram::parsePiece(payload)) newestPacket_ = piece->prefix.packet;
 }
 
-bool OfferingPeer::isOpen() {
-  v1::ClientMessage message;
-  message.set_request_id(1);
-  message.mutable_list_scenes();
-  return stream_->Write(message) &&
-         readUntil([](const v1::ServerMessage& answer) { return answer.request_id() == 1; });
+void OfferingPeer::readOn() {
+  reader_ = std::jthread([this] {
+    readUntil([this](const v1::ServerMessage& message) {
+      if (message.has_error()) error_ = message.error().text();
+      return false;
+    });
+    ended_ = true;
+  });
+}
+
+std::optional<std::string> OfferingPeer::end() {
+  if (!ended_) return std::nullopt;
+  if (reader_.joinable()) reader_.join();
+  return brief(error_);
 }
 
 }  // namespace clothstream::attack

@@ -2,6 +2,7 @@
 // A participant with datagrams, for attacks on them.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <grpcpp/client_context.h>
@@ -81,8 +83,11 @@ class OfferingPeer {
   // Answers to checks of this peer that have arrived.
   std::uint64_t answers() const { return answers_; }
 
-  // Whether the server still answers on the stream.
-  bool isOpen();
+  // Reads the stream from now on, without which gRPC answers no pings and the server ends the connection. No
+  // offer may follow.
+  void readOn();
+  // Why the stream has ended; nothing while it is open. For a peer that reads on.
+  std::optional<std::string> end();
 
  private:
   // Reads the stream until `stop` accepts a message. Returns false at its end.
@@ -102,6 +107,9 @@ class OfferingPeer {
   datagram::InputSender input_;
   std::optional<std::uint32_t> newestPacket_;
   std::uint64_t answers_ = 0;
+  std::string error_;  // the newest one; belongs to reader_ until it has ended
+  std::atomic<bool> ended_{false};
+  std::jthread reader_;
 };
 
 }  // namespace clothstream::attack
