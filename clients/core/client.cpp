@@ -113,7 +113,7 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
     case Body::welcome:
       return welcomed(message->body, nowUs);
     case Body::chunk:
-      return chunkReceived(message->body, nowUs);
+      return chunkReceived(message->body);
     case Body::frame:
       return frameReceived(message->body, nowUs, decoded);
     case Body::pong:
@@ -220,36 +220,32 @@ std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
   return CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE;
 }
 
-std::uint32_t Client::chunkReceived(Bytes body, std::uint64_t nowUs) {
+std::uint32_t Client::chunkReceived(Bytes body) {
   const std::optional<Chunk> chunk = readChunk(body);
   if (!chunk) return failMalformed("Chunk");
   if (!timer_.isWelcomed()) return fail("The server sent a description before its Welcome.");
   auto begun = stream_.add(*chunk, limits_, resumed_);
   if (!begun) return fail(std::move(begun.error()));
-  return *begun ? described(nowUs) : 0;
+  return *begun ? described() : 0;
 }
 
-std::uint32_t Client::described(std::uint64_t nowUs) {
+std::uint32_t Client::described() {
   display_.begin(stream_.description());
   hello_.contentId = welcome_.contentId;
   const bool returned = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
   redirection_.joined();
-  if (datagrams_.takeMissedFrame()) requestKeyFrame(nowUs);
   return returned ? CS_EVENT_DESCRIPTION | CS_EVENT_RETURNED : CS_EVENT_DESCRIPTION;
 }
 
 std::uint32_t Client::frameReceived(Bytes body, std::uint64_t nowUs, const cs_decoded* decoded) {
-  const bool isMirror = stream_.newest().isMirror();
-  if (state_ != CS_STATE_JOINED) {
-    if (isMirror || datagrams_.missFrame()) return 0;
-    return fail("The server sent a frame before the description.");
-  }
+  if (state_ != CS_STATE_JOINED) return fail("The server sent a frame before the description.");
   const auto received = stream_.receive(body, decoded, nowUs);
   if (!received) return failMalformed(received.error());
   if (received->needsKeyFrame) requestKeyFrame(nowUs);
   if (!received->isNew) return 0;
   const std::uint64_t tick = stream_.newest().tick();
+  const bool isMirror = stream_.newest().isMirror();
   if (!isMirror && stream_.acknowledgements().decoded(tick, inLockstep(), nowUs)) outbox_.setAck(tick);
   stream_.measure(clock_, nowUs);
   if (display_.playsOut()) {

@@ -144,8 +144,8 @@ class Client {
   bool mayCollide() const;
   std::uint32_t welcomed(Bytes body, std::uint64_t nowUs);
   std::uint32_t presenceReceived(Bytes body, std::uint64_t nowUs);
-  std::uint32_t chunkReceived(Bytes body, std::uint64_t nowUs);
-  std::uint32_t described(std::uint64_t nowUs);
+  std::uint32_t chunkReceived(Bytes body);
+  std::uint32_t described();
   std::uint32_t frameReceived(Bytes body, std::uint64_t nowUs, const cs_decoded* decoded);
   void requestKeyFrame(std::uint64_t nowUs, bool early = false);
   std::uint32_t pongReceived(Bytes body, std::uint64_t requestId, std::uint64_t nowUs);

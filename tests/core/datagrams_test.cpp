@@ -176,22 +176,6 @@ TEST(DatagramOffers, MalformedAnswersFail) {
   }
 }
 
-TEST(DatagramOffers, FrameMayOvertakeTheDescription) {
-  ScriptedServer server;
-  ClientUnderTest client;
-  const cs_datagram_offer made = offer();
-  ASSERT_EQ(cs_offer_datagrams(client.get(), &made), 1);
-  client.receive(server.welcome());
-  client.receive(serialised(answer()));
-  client.outgoing();
-  EXPECT_EQ(client.receive(server.frame(1, codec::PacketKind::key)), 0u);
-  client.receiveAll(server.chunks());
-  EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
-  const auto sent = client.outgoing();
-  ASSERT_THAT(sent, SizeIs(1));
-  EXPECT_TRUE(sent[0].has_key_frame_request());
-}
-
 // A pair of ways with the datagrams of a server.
 class Ways {
  public:

@@ -241,7 +241,7 @@ TEST(WebSocketLibraryOptions, AreRefusedWithTheReason) {
     return stream.error();
   };
   const std::string fingerprint(64, 'a');
-  EXPECT_THAT(refused("host", [](auto& options) { options.version = 3; }), HasSubstr("accepts 2"));
+  EXPECT_THAT(refused("host", [](auto& options) { options.version = 4; }), HasSubstr("accepts 3"));
   EXPECT_THAT(refused("host", [](auto& options) { options.token = nullptr; }), HasSubstr("NULL"));
   EXPECT_THAT(refused("host", [&](auto& options) { options.fingerprint = fingerprint.c_str(); }),
               HasSubstr("need TLS: use https://host:8080"));

@@ -35,27 +35,16 @@ class DatagramNegotiation {
   }
   const std::optional<DatagramAnswer>& answer() const { return answer_; }
 
-  // A frame has arrived before the description. Returns whether datagrams explain it: they may overtake the
-  // stream.
-  bool missFrame() {
-    missedFrame_ = answer_ && !answer_->addresses.empty();
-    return missedFrame_;
-  }
-  // Whether the client needs a key frame because it has missed one; false from then on.
-  bool takeMissedFrame() { return std::exchange(missedFrame_, false); }
-
  private:
   void begin(bool connected) {
     connected_ = connected;
     offerId_ = 0;
     answer_.reset();
-    missedFrame_ = false;
   }
 
   bool connected_ = true;
   std::uint64_t offerId_ = 0;  // of the newest offer; 0: there is none
   std::optional<DatagramAnswer> answer_;
-  bool missedFrame_ = false;
 };
 
 }  // namespace clothstream::client
