@@ -198,6 +198,13 @@ TEST_F(DoctorOfDevices, AcceptsADeviceWithTheRightStatesAlone) {
   EXPECT_THROW(doctor::accept(options, *small, [] { return true; }), std::runtime_error);
 }
 
+// About two minutes on two processors.
+TEST_F(DoctorOfDevices, ReachesEveryAcceptedState) {
+  const auto unchecked = [](std::uint32_t) { return vulkan::DeviceOptions(); };
+  for (const doctor::AcceptedState& state : doctor::acceptedStates())
+    EXPECT_EQ(doctor::accept(unchecked, state, [] { return false; }).level, Level::good) << state.scene;
+}
+
 TEST_F(DoctorOfDevices, AcceptsStatesOfSharedKernels) {
   const auto states = doctor::acceptedStates();
   const auto small = std::ranges::find(states, "figure_11", &doctor::AcceptedState::scene);
