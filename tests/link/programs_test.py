@@ -43,13 +43,15 @@ class Programs(unittest.TestCase):
                              ("datagrams", web)):
             report = self.load(*options, "--transport", way)
             self.assertEqual((report["joined"], report["lost"]), (1, 0))
-            self.assertEqual((report["decodeErrors"], report["hashMismatches"]), (0, 0))
+            self.assertEqual(report["hashMismatches"], 0)
             self.assertGreater(report["framesPerSecond"], 5)
             # The clock of the server is estimated through the link.
             self.assertGreater(report["tickAgeMsP50"], DELAY_MS - 5)
             self.assertGreater(report["poseToDisplayableMsP50"], 2 * DELAY_MS)
             self.assertEqual(report["withDatagrams"], int(way == "datagrams"))
-            if way == "datagrams":
+            if way == "tcp":
+                self.assertEqual(report["decodeErrors"], 0)
+            else:
                 # All frames but the first few, which the stream carries.
                 self.assertGreater(report["datagrams"]["frames"], 0.9 * report["framesPerSecond"] * report["seconds"])
                 self.assertLess(report["datagrams"]["lostFrames"], 3)

@@ -8,7 +8,8 @@ import unittest
 
 import link
 
-GOOD = {"hashMismatches": 0, "decodeErrors": 0, "joined": 1, "lost": 0, "poses": 700, "framesPerSecond": 71.5}
+GOOD = {"hashMismatches": 0, "decodeErrors": 0, "joined": 1, "lost": 0, "poses": 700, "framesPerSecond": 71.5,
+        "withDatagrams": 0}
 WHOLE = {way: {"overflowed": 0, "refused": 0} for way in ("down", "up")}
 
 
@@ -29,6 +30,7 @@ class LinkBench(unittest.TestCase):
 
     def test_checks_what_arrived(self):
         link.check(GOOD, WHOLE)
+        link.check({**GOOD, "decodeErrors": 15, "withDatagrams": 1}, WHOLE)
         for name, wrong in (("hashMismatches", 1), ("decodeErrors", 1), ("joined", 0), ("lost", 1), ("poses", 0),
                             ("framesPerSecond", 0)):
             with self.assertRaises(link.ProgramFailed, msg=name):
