@@ -988,7 +988,7 @@ const uint32_t* cs_constraint_ends(const cs_client* client, uint32_t index, uint
  */
 
 #define CS_DATAGRAM_OFFER_VERSION 1u
-/* What the server needs to recognise this client (DatagramOffer in session.proto). */
+/* Credentials by which the server recognises this client (DatagramOffer in session.proto). */
 typedef struct cs_datagram_offer {
   uint32_t version CS_INIT(CS_DATAGRAM_OFFER_VERSION);
   const char* ufrag;       /* of ICE: 4 to 64 letters, digits, + and / (RFC 8839 section 5.4) */

@@ -16,7 +16,7 @@
 
 namespace clothstream {
 
-// What the server has answered to an offer.
+// Answer of the server to an offer.
 struct DatagramPeer {
   ice::Credentials credentials;         // valid (ice::isValid)
   std::string fingerprint;              // in the form of dtls::readFingerprint()

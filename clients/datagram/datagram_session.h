@@ -19,7 +19,7 @@
 
 namespace clothstream {
 
-// What many sessions share: a certificate, and the thread of their sockets. Throws std::runtime_error if
+// Parts that many sessions share: a certificate, and the thread of their sockets. Throws std::runtime_error if
 // OpenSSL fails.
 struct DatagramHost {
   dtls::Certificate certificate;

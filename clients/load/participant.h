@@ -33,7 +33,7 @@ struct ParticipantOptions {
   double bytesPerSecond = 0;
   std::uint32_t maxVertices = 0;  // as in limitVertices
   bool keepsFrames = false;       // whether Figures::frameTimes has an entry for each frame
-  // What it opens datagrams with; it must outlive the participant. Null: no datagrams.
+  // Opens its datagrams, and must outlive the participant. Null: no datagrams.
   DatagramHost* datagrams = nullptr;
   bool requiresDatagrams = false;  // it has joined when they are open
 };

@@ -46,7 +46,7 @@ class Transport {
 
   // Called before each write(), on the thread of the client: a transport may talk to the server through it.
   virtual void negotiate(cs_client& /*client*/) {}
-  // What a client needs of the transport in addition to an open connection, before it counts as joined.
+  // Requirement of the transport that a client with an open connection waits for before it counts as joined.
   struct Missing {
     std::string text;      // for users
     bool isFinal = false;  // it will not come

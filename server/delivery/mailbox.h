@@ -124,7 +124,8 @@ class Mailbox {
 
   // Calls `wake` of the constructor, unless silence() has returned.
   void wake() { call(wake_); }
-  // That `wake` is not called any more after the return. The caller must hold no lock that it takes.
+  // The `wake` of the constructor is not called any more after the return. The caller must hold no lock that
+  // it takes.
   void silence();
 
  private:

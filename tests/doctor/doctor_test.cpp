@@ -198,7 +198,7 @@ TEST_F(DoctorOfDevices, AcceptsADeviceWithTheRightStatesAlone) {
   EXPECT_THROW(doctor::accept(options, *small, [] { return true; }), std::runtime_error);
 }
 
-// About two minutes on two processors.
+// Five minutes on two processors.
 TEST_F(DoctorOfDevices, ReachesEveryAcceptedState) {
   const auto unchecked = [](std::uint32_t) { return vulkan::DeviceOptions(); };
   for (const doctor::AcceptedState& state : doctor::acceptedStates())

@@ -21,7 +21,7 @@ bool repeatsEverything(Bytes poses) {
   });
 }
 
-// What matters about an outgoing ClientMessage.
+// Properties of an outgoing ClientMessage.
 struct Outgoing {
   bool isPoses = false;
   bool mayBeLost = false;  // later messages replace it

@@ -15,7 +15,7 @@
 
 namespace clothstream::endpoint {
 
-// What all associations of an endpoint use. Must outlive them.
+// Parts that all associations of an endpoint use. They must outlive the associations.
 struct AssociationContext {
   const dtls::DtlsContext& dtls;
   SharedPieces& pieces;

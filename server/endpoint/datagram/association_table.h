@@ -90,7 +90,7 @@ class AssociationTable {
   const AssociationContext context_;
   const Transmit transmit_;
   const std::shared_ptr<Handshakes> handshakes_ = std::make_shared<Handshakes>();
-  // Of the datagram that an association handles. Its answers take the same way back.
+  // Route of the datagram that an association handles. Its answers take the same way back.
   std::optional<Route> current_;
   std::unordered_map<std::string, Entry> entries_;  // by the server's fragment
   std::unordered_map<Address, Entry*, Hash> proven_;

@@ -1100,7 +1100,7 @@ namespace ClothStream.Core
     }
 
     /// <summary>
-    /// What the server needs to recognise this client (DatagramOffer in session.proto).
+    /// Credentials by which the server recognises this client (DatagramOffer in session.proto).
     /// </summary>
     [StructLayout(LayoutKind.Explicit, Size = 64)]
     public unsafe struct DatagramOffer
