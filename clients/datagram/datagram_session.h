@@ -19,8 +19,8 @@
 
 namespace clothstream {
 
-// Parts that many sessions share: a certificate, and the thread of their sockets. Throws std::runtime_error if
-// OpenSSL fails.
+// Parts that many sessions share: a certificate, and the thread of their sockets. Throws std::runtime_error
+// if OpenSSL fails.
 struct DatagramHost {
   dtls::Certificate certificate;
   dtls::DtlsContext context{certificate};
