@@ -31,6 +31,11 @@ constexpr double kMostRamp = 0.5, kRampQueue = 0.02, kRampEmpty = 0.005, kQuiet 
 // The ramp leaves out windows that differ from the product at the newest cut by less than this part.
 constexpr double kNearby = 0.15;
 
+// Age from which a queue is no stall of the path or of a processor.
+constexpr auto kStanding = 20ms;
+// Standard deviations by which a loss exceeds kRadioLoss. Every receipt is a test.
+constexpr double kDeviations = 4;
+
 constexpr auto kFrameTime = 20ms;  // at most, of a frame's packets and of a pause between frames
 
 constexpr auto kShortestTest = 4s, kLongestTest = 16s;  // multiples of each other
@@ -120,7 +125,12 @@ void RateController::measure(const SentPackets::Report& report, std::uint32_t ar
   const double sample = schedule::seconds(roundTrip);
   roundTrip_ = roundTrip_ ? *roundTrip_ + (sample - *roundTrip_) / 8 : sample;
   delay_.add(packet.sent, arrivalUs, now);
-  if (isQueued()) queued_ = now;
+  if (isQueued()) {
+    queued_ = now;
+    if (!queuedSince_) queuedSince_ = now;
+  } else {
+    queuedSince_.reset();
+  }
   round_.settled += report.packets;
   round_.lost += report.lost;
 
@@ -133,7 +143,8 @@ void RateController::measure(const SentPackets::Report& report, std::uint32_t ar
 
 void RateController::yield(const SentPackets::Report& report, Clock::time_point now) {
   const double queue = delay_.filtered();
-  if (queue > kTarget + delay_.jitter() || (report.lost > 0 && isQueued())) {
+  const bool stands = queuedSince_ && now - *queuedSince_ >= kStanding;
+  if (queue > kTarget + delay_.jitter() || (report.lost > 0 && stands)) {
     // Radio loss takes nothing from the rate that the bottleneck carries.
     const double carried = delivery_ / (1 - std::min(loss().share(), kRadioLoss));
     const double time = controlTime();
@@ -150,7 +161,7 @@ bool RateController::exceedsRadioLoss() const {
   const double settled = before_.settled + round_.settled, lost = before_.lost + round_.lost;
   // Bursts of mean length b multiply the variance of the binomial distribution by 2 b - 1.
   const double variance = settled * kRadioLoss * (1 - kRadioLoss) * (2 * loss().burst() - 1);
-  return lost > settled * kRadioLoss + 3 * std::sqrt(variance);
+  return lost > settled * kRadioLoss + kDeviations * std::sqrt(variance);
 }
 
 double RateController::used() const {

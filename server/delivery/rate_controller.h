@@ -34,8 +34,9 @@ using schedule::Clock;
 // flow gets. The controller then tests with a cut whether the other flow has gone. The tests are at multiples
 // of their interval on the server's clock, so that peers of one server that share a bottleneck test together.
 //
-// Loss counts as congestion together with a queue. Without a queue, a loss of up to kRadioLoss is taken for
-// radio loss, which parity repairs; more than that, by three standard deviations, is taken for a policer.
+// Loss counts as congestion together with a queue that stands. Without one, a loss of up to kRadioLoss is
+// taken for radio loss, which parity repairs; more than that, by four standard deviations, is taken for a
+// policer.
 //
 // The window never grows beyond 1.5 times what was in flight, so growth is validated (RFC 7661). A stream
 // whose quality the link has lowered therefore needs more bytes before a finer quality is tried: the sender
@@ -137,11 +138,12 @@ class RateController {
   Round round_, before_;
   std::optional<Cut> cut_;
   std::optional<Competition> competition_;
-  std::optional<Clock::time_point> awaited_;   // since then a receipt is due
-  std::optional<Clock::time_point> receipt_;   // time of the newest one
-  std::optional<Clock::time_point> answered_;  // time at which the newest packet in a receipt was sent
-  Clock::time_point sent_{};                   // time of the newest packet
-  Clock::time_point queued_{};                 // newest time at which there was a queue
+  std::optional<Clock::time_point> awaited_;      // since then a receipt is due
+  std::optional<Clock::time_point> receipt_;      // time of the newest one
+  std::optional<Clock::time_point> answered_;     // time at which the newest packet in a receipt was sent
+  Clock::time_point sent_{};                      // time of the newest packet
+  Clock::time_point queued_{};                    // newest time at which there was a queue
+  std::optional<Clock::time_point> queuedSince_;  // beginning of the present queue
 };
 
 }  // namespace clothstream::delivery

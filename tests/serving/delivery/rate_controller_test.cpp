@@ -275,6 +275,19 @@ TEST(RateController, RadioLossTakesNoFrames) {
   }
 }
 
+// A processor or a radio that stops for two frames now and then makes no queue that stands. Losses that come
+// at the same time are no congestion.
+TEST(RateController, StallsWithRadioLossTakeNoFrames) {
+  const PathShape shape{.megabits = 100, .loss = 0.05, .stall = 0.03};
+  Bottleneck path(shape);
+  auto& flow = path.add<DatagramFlow>(constant(2));
+  path.run(5);
+  flow.frames = flow.skipped = 0;
+  path.run(205);
+  print("5 % loss, stalls of 30 ms", shape, flow, flow.megabits(5, 205), 0);
+  EXPECT_LE(flow.skipped, flow.frames / 500);
+}
+
 // Buffers that are larger and smaller than the delay target, and a policer, which has hardly any. The rate
 // falls by a third or more at once, within two round trips and the time until a receipt.
 TEST(RateController, AnswersTailDropWithinTwoRoundTrips) {

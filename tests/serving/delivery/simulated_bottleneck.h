@@ -73,6 +73,7 @@ struct PathShape {
   double jitter = 0;      // largest additional delay after the bottleneck, uniform; the order may change
   double loss = 0;        // share of packets lost after the bottleneck
   double burst = 1;       // mean number of packets lost in a row; 1: independent
+  double stall = 0;       // time for which the receiver stops, every 0.5 to 2.5 s
   bool codel = false;     // RFC 8289 with its default parameters, in addition to the limit of the buffer
 };
 
@@ -177,7 +178,7 @@ class Bottleneck {
     Flow& flow = *event.flow;
     flow.queueDelays.push_back(now_ - event.packet.queued);
     if (!lostOnTheWay())
-      push({.time = now_ + shape.oneWay + shape.jitter * random(),
+      push({.time = afterStall(now_ + shape.oneWay + shape.jitter * random()),
             .kind = Kind::arrival,
             .flow = event.flow,
             .packet = event.packet});
@@ -189,6 +190,12 @@ class Bottleneck {
     if (delivered.size() <= interval) delivered.resize(interval + 1);
     delivered[interval] += event.packet.bytes;
     event.flow->arrive(event.packet, now_);
+  }
+  // Time at which the receiver handles a packet that reaches it at `time`.
+  double afterStall(double time) {
+    if (shape.stall <= 0) return time;
+    while (stallEnd_ < time) stallEnd_ += 0.5 + 2 * random() + shape.stall;
+    return time >= stallEnd_ - shape.stall ? stallEnd_ : time;
   }
   // Two-state chain of Gilbert.
   bool lostOnTheWay() {
@@ -227,6 +234,7 @@ class Bottleneck {
   std::uint64_t order_ = 0;
   std::deque<Queued> queue_;
   double bytes_ = 0;
+  double stallEnd_ = 0;
   bool serving_ = false, losing_ = false, dropping_ = false;
   double firstAbove_ = 0, dropNext_ = 0;
   unsigned drops_ = 0;
