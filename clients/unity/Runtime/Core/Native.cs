@@ -425,8 +425,8 @@ namespace ClothStream.Core
         /// Delay from the start of a tick on the server to its display, 0 to 10000. NaN means adaptive: the shortest
         /// delay with which 98 % of the last 2,048 frames, or all frames of the last second, would have arrived in
         /// time, within the two limits below. The first 8 frames are slow while a connection starts: until then half
-        /// of them are in time, and they do not count later. The adaptive delay changes by at most 10 % of the elapsed
-        /// time; during the first 16 frames, by at most the elapsed time.
+        /// of them are in time, and later they do not count. The adaptive delay changes by at most 10 % of the
+        /// elapsed time; during the first 16 frames, by at most the elapsed time.
         /// </summary>
         [FieldOffset(8)] public double delayMs;
         /// <summary>
