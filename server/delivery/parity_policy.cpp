@@ -15,7 +15,7 @@ constexpr double kLower = 2.0 / 3;
 }  // namespace
 
 std::optional<std::uint32_t> rowsFor(const PacketLoss& loss, std::uint32_t k, double residual,
-                                     std::uint32_t most) {
+                                     std::uint32_t most, std::uint32_t apart) {
   assert(most <= kMostRows && loss.share >= 0 && loss.share < 1);
   // Probabilities that a packet is lost, after a lost one and after one that arrived.
   const double stays = std::max(1 - 1 / loss.burst, loss.share);
@@ -25,6 +25,13 @@ std::optional<std::uint32_t> rowsFor(const PacketLoss& loss, std::uint32_t k, do
   std::array<double, kMostRows + 1> arrived{}, lost{};
   arrived[0] = 1 - loss.share;
   lost[0] = loss.share;
+  const auto pass = [&] {
+    for (std::uint32_t i = 0; i <= most; ++i) {
+      const double stillLost = lost[i] * stays + arrived[i] * enters;
+      arrived[i] += lost[i] - stillLost;
+      lost[i] = stillLost;
+    }
+  };
   // The state before the first packet is the stationary one.
   for (std::uint32_t n = 1; n <= k + most; ++n) {
     for (std::uint32_t i = most + 1; i-- > 0;) {
@@ -37,6 +44,7 @@ std::optional<std::uint32_t> rowsFor(const PacketLoss& loss, std::uint32_t k, do
     double decodable = 0;
     for (std::uint32_t i = 0; i <= m; ++i) decodable += arrived[i] + lost[i];
     if (1 - decodable <= residual) return m;
+    for (std::uint32_t other = 0; m == 0 && other < apart; ++other) pass();
   }
   return std::nullopt;
 }
@@ -55,13 +63,9 @@ void ParityPolicy::update(PacketLoss measured, Clock::time_point now) {
   loss_ = measured;
 }
 
-std::uint32_t ParityPolicy::rows(std::uint32_t k, bool referred, std::uint32_t least,
-                                 std::uint32_t most) const {
-  assert(k >= 1 && k <= 128 && least <= most && most <= kMost);
-  const double residual = referred ? kReferred : kUnreferred;
-  auto rows = rowsFor(loss_, k, residual, most);
-  if (!rows) rows = rowsFor({.share = loss_.share}, k, residual, most);
-  return std::clamp(rows.value_or(most), least, most);
+std::uint32_t ParityPolicy::rows(std::uint32_t k) const {
+  assert(k >= 1 && k <= 128);
+  return rowsFor(loss_, k, kResidual, kMost, defers() ? k : 0).value_or(kMost);
 }
 
 }  // namespace clothstream::delivery

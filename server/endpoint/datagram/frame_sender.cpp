@@ -11,10 +11,17 @@ namespace clothstream::endpoint {
 using delivery::LinkAdaptation;
 using delivery::RateController;
 
+namespace {
+
+// Parity that waits for the next frame leaves after this time at the latest.
+constexpr std::chrono::milliseconds kLongestDelay{20};
+
+}  // namespace
+
 unsigned FrameSender::rowsFor(std::size_t frameBytes, bool probes, Clock::time_point now) {
   const auto pieces =
       static_cast<unsigned>((frameBytes + datagram::kMaxPayloadBytes - 1) / datagram::kMaxPayloadBytes);
-  unsigned rows = parity_.rows(pieces, true);
+  unsigned rows = parity_.rows(pieces);
   if (!probes) return rows;
   const std::size_t packet =
       datagram::kPieceHeaderBytes + datagram::payloadBytes(frameBytes, pieces) + headerBytes_;
@@ -30,9 +37,24 @@ void FrameSender::add(std::shared_ptr<const datagram::FramePieces> frame, unsign
   const std::uint32_t number = sent_.add(frame, pieces, schedule::microseconds(now));
   newest_ = {.frame = frame, .number = number, .index = 0};
   frameShare_ = static_cast<double>(frame->messageBytes()) / (pieces * packetBytes(*frame));
+  const unsigned first = parity_.defers() ? frame->dataPieces() : pieces;
+  queue({.frame = frame, .number = number, .index = 0}, first, now);
+  queueDeferred(now);
+  if (first < pieces)
+    deferred_ = {.first = {.frame = std::move(frame), .number = number, .index = first},
+                 .end = pieces,
+                 .due = now + kLongestDelay};
+}
+
+void FrameSender::queue(Packet first, unsigned end, Clock::time_point now) {
   // A piece that the pacer has no room for counts as lost: the peer requests it.
-  for (unsigned index = 0; index < pieces; ++index)
-    if (!pacer_.add({frame, number, index}, packetBytes(*frame), false, now)) break;
+  for (; first.index < end; ++first.index)
+    if (!pacer_.add(first, packetBytes(*first.frame), false, now)) break;
+}
+
+void FrameSender::queueDeferred(Clock::time_point now) {
+  if (const std::optional<Deferred> deferred = std::exchange(deferred_, std::nullopt))
+    queue(deferred->first, deferred->end, now);
 }
 
 void FrameSender::probe(Clock::time_point now) {
@@ -40,6 +62,7 @@ void FrameSender::probe(Clock::time_point now) {
 }
 
 std::size_t FrameSender::next(Clock::time_point now, std::span<std::byte> out) {
+  if (deferred_ && now >= deferred_->due) queueDeferred(now);
   const std::optional<Packet> packet = pacer_.next(controller_.pace(), now);
   if (!packet) return 0;
   const datagram::PiecePrefix prefix{.packet = nextPacket_++,
@@ -72,7 +95,13 @@ delivery::Mailbox::Link FrameSender::link(Clock::time_point now) {
   return {.hasRoom = controller_.hasRoom(pacer_.bytes(), now), .frameRate = controller_.rate() * frameShare_};
 }
 
+std::optional<Clock::time_point> FrameSender::due() const {
+  const std::optional<Clock::time_point> due = pacer_.due();
+  return due || !deferred_ ? due : deferred_->due;
+}
+
 void FrameSender::forgetPath() {
+  deferred_.reset();
   controller_ = RateController();
   pacer_.clear();
 }

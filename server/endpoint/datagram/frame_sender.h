@@ -32,7 +32,8 @@ class FrameSender {
   // Number of parity rows with which a frame of this length is sent now. `probes`: rows fill the frame up to
   // LinkAdaptation::kProbe times its size, as far as the link has room.
   unsigned rowsFor(std::size_t frameBytes, bool probes, Clock::time_point now);
-  // Queues the data pieces and the first `rows` parity pieces of a frame.
+  // Queues the data pieces and the first `rows` parity pieces of a frame. Where losses come in bursts, the
+  // parity leaves after the data of the next frame, or after 20 ms (ParityPolicy::defers()).
   void add(std::shared_ptr<const datagram::FramePieces> frame, unsigned rows, Clock::time_point now);
   // Queues the first piece of the newest frame once more, to find out whether packets arrive. Nothing without
   // a frame.
@@ -42,7 +43,7 @@ class FrameSender {
   // returns its length. The datagram must then be sent. 0: nothing is due.
   std::size_t next(Clock::time_point now, std::span<std::byte> out);
   // Time at which next() has something; nothing if no packet waits.
-  std::optional<Clock::time_point> due() const { return pacer_.due(); }
+  std::optional<Clock::time_point> due() const;
 
   // Queues the pieces that a request asks for. Returns their number.
   std::size_t answer(const datagram::PieceRequest& request, Clock::time_point now);
@@ -66,6 +67,15 @@ class FrameSender {
     unsigned index = 0;
   };
 
+  // Parity that waits: the pieces from `first` to before `end`.
+  struct Deferred {
+    Packet first;
+    unsigned end = 0;
+    Clock::time_point due{};
+  };
+
+  void queue(Packet first, unsigned end, Clock::time_point now);
+  void queueDeferred(Clock::time_point now);
   std::uint32_t packetBytes(const datagram::FramePieces& frame) const {
     return static_cast<std::uint32_t>(frame.datagramBytes()) + headerBytes_;
   }
@@ -75,6 +85,7 @@ class FrameSender {
   delivery::PacketPacer<Packet> pacer_;
   delivery::ParityPolicy parity_;
   datagram::SentFrames sent_;
+  std::optional<Deferred> deferred_;
   std::optional<Packet> newest_;  // first piece of the newest frame
   std::uint32_t nextPacket_ = 0;
   double frameShare_ = 1;  // part of the newest frame's bytes on the wire that is the frame itself

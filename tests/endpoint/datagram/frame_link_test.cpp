@@ -232,6 +232,40 @@ TEST(FrameSenderTest, ProbeFillsFrameWhereThereIsRoom) {
   EXPECT_EQ(sender.rowsFor(4500, true, now), 1u);
 }
 
+// Indices of the pieces that leave until `until`, with the number of their frame.
+std::vector<std::pair<std::uint32_t, unsigned>> piecesUntil(FrameSender& sender, Clock::time_point& now,
+                                                            Clock::time_point until) {
+  std::vector<std::pair<std::uint32_t, unsigned>> left;
+  std::array<std::byte, datagram::kMaxDatagramBytes> out;
+  for (; now < until; now += 1ms)
+    while (const std::size_t size = sender.next(now, out)) {
+      const std::optional<datagram::Piece> piece = datagram::parsePiece(std::span(out).first(size));
+      if (piece) left.emplace_back(piece->prefix.frame, piece->index);
+    }
+  return left;
+}
+
+// A receipt says that four packets in a row were lost.
+TEST(FrameSenderTest, DefersParityInBursts) {
+  Clock::time_point now{1h};
+  FrameSender sender(kHeaders);
+  SharedPieces pieces;
+  const auto frame = pieces.of(std::make_shared<const Bytes>(1500), 4);
+  for (int i = 0; i < 10; ++i) {
+    sender.add(frame, 2, now);
+    EXPECT_EQ(piecesUntil(sender, now, now + 13ms).size(), 4u);
+  }
+  // Packets 16 to 19 of 0 to 39 are lost.
+  ASSERT_TRUE(sender.acknowledge({.newest = 39, .before = ~(std::uint64_t{0xf} << 19)}, now));
+  using Left = std::vector<std::pair<std::uint32_t, unsigned>>;
+  sender.add(frame, 1, now);
+  EXPECT_EQ(piecesUntil(sender, now, now + 13ms), (Left{{10, 0}, {10, 1}}));
+  sender.add(frame, 1, now);
+  EXPECT_EQ(piecesUntil(sender, now, now + 13ms), (Left{{11, 0}, {11, 1}, {10, 2}}));
+  EXPECT_EQ(piecesUntil(sender, now, now + 30ms), (Left{{11, 2}})) << "no other frame has followed";
+  EXPECT_FALSE(sender.due());
+}
+
 // Peers of a scene share the pieces of a frame.
 TEST(SharedPiecesTest, MakesPiecesOnce) {
   SharedPieces pieces;

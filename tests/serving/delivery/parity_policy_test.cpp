@@ -27,10 +27,10 @@ double binomialTail(double p, int k, int m) {
   return 1 - kept;
 }
 
-std::uint32_t rowsAt(double share, std::uint32_t k, bool referred, double burst = 1) {
+std::uint32_t rowsAt(double share, std::uint32_t k, double burst = 1) {
   ParityPolicy policy;
   policy.update({.share = share, .burst = burst}, kStart);
-  return policy.rows(k, referred);
+  return policy.rows(k);
 }
 
 TEST(ParityPolicy, AgreesWithTheBinomialFormula) {
@@ -48,75 +48,85 @@ TEST(ParityPolicy, AgreesWithTheBinomialFormula) {
 // Counts frames that a simulated chain makes undecodable. The tolerance is four standard deviations.
 TEST(ParityPolicy, AgreesWithSimulatedBursts) {
   constexpr int kFrames = 100'000;
-  constexpr double kResidual = 0.01;
+  constexpr double kAllowed = 0.01;
   const PacketLoss loss{.share = 0.02, .burst = 3};
   const std::uint32_t k = 7;
-  const auto rows = rowsFor(loss, k, kResidual, 8);
-  ASSERT_TRUE(rows);
-  std::minstd_rand random(1);
-  std::uniform_real_distribution<double> uniform;
-  const auto undecodable = [&](std::uint32_t m) {
-    int frames = 0;
-    for (int frame = 0; frame < kFrames; ++frame) {
-      std::uint32_t lost = 0;
-      bool losing = uniform(random) < loss.share;
-      for (std::uint32_t packet = 0; packet < k + m; ++packet) {
-        lost += losing ? 1 : 0;
-        losing = uniform(random) < (losing ? 1 - 1 / loss.burst : loss.share / (1 - loss.share) / loss.burst);
+  for (const std::uint32_t apart : {0u, 7u}) {
+    const auto rows = rowsFor(loss, k, kAllowed, 8, apart);
+    ASSERT_TRUE(rows);
+    std::minstd_rand random(1);
+    std::uniform_real_distribution<double> uniform;
+    const auto undecodable = [&](std::uint32_t m) {
+      int frames = 0;
+      for (int frame = 0; frame < kFrames; ++frame) {
+        std::uint32_t lost = 0;
+        bool losing = uniform(random) < loss.share;
+        for (std::uint32_t packet = 0; packet < k + apart + m; ++packet) {
+          const bool isOther = packet >= k && packet < k + apart;
+          lost += losing && !isOther ? 1 : 0;
+          losing =
+              uniform(random) < (losing ? 1 - 1 / loss.burst : loss.share / (1 - loss.share) / loss.burst);
+        }
+        frames += lost > m ? 1 : 0;
       }
-      frames += lost > m ? 1 : 0;
-    }
-    return static_cast<double>(frames) / kFrames;
-  };
-  const double tolerance = 4 * std::sqrt(kResidual / kFrames);
-  EXPECT_LE(undecodable(*rows), kResidual + tolerance);
-  EXPECT_GE(undecodable(*rows - 1), kResidual - tolerance);
+      return static_cast<double>(frames) / kFrames;
+    };
+    const double tolerance = 4 * std::sqrt(kAllowed / kFrames);
+    EXPECT_LE(undecodable(*rows), kAllowed + tolerance) << apart;
+    EXPECT_GE(undecodable(*rows - 1), kAllowed - tolerance) << apart;
+  }
 }
 
 struct Row {
   double loss;
-  std::uint32_t small, large, unreferred;
+  std::uint32_t small, large;
 };
 
 TEST(ParityPolicy, GivesPlausibleNumbersOfRows) {
-  for (const Row& row : {Row{0.003, 1, 1, 0}, Row{0.015, 2, 2, 1}, Row{0.04, 3, 4, 1}, Row{0.1, 4, 4, 2}}) {
-    EXPECT_EQ(rowsAt(row.loss, 3, true), row.small) << row.loss;
-    EXPECT_EQ(rowsAt(row.loss, 7, true), row.large) << row.loss;
-    EXPECT_EQ(rowsAt(row.loss, 3, false), row.unreferred) << row.loss;
+  for (const Row& row : {Row{0.003, 1, 1}, Row{0.015, 2, 2}, Row{0.04, 3, 4}, Row{0.1, 4, 4}}) {
+    EXPECT_EQ(rowsAt(row.loss, 3), row.small) << row.loss;
+    EXPECT_EQ(rowsAt(row.loss, 7), row.large) << row.loss;
     std::printf("loss %4.1f %%: k = 3: %u rows, %.1f of 10,000 frames lost; k = 7: %u rows, %.1f\n",
                 100 * row.loss, row.small, 1e4 * binomialTail(row.loss, 3, static_cast<int>(row.small)),
                 row.large, 1e4 * binomialTail(row.loss, 7, static_cast<int>(row.large)));
   }
 }
 
-TEST(ParityPolicy, LeavesLongBurstsToRepeats) {
-  EXPECT_EQ(rowsAt(0.02, 7, true, 4), rowsAt(0.02, 7, true));
-  EXPECT_GT(rowsAt(0.002, 3, true, 1.5), rowsAt(0.002, 3, true));
+// With kMost rows, such bursts make 8 of 1,000 frames of two pieces undecodable, and 5 with deferred parity.
+// Two deferred rows do as much as kMost at once.
+TEST(ParityPolicy, DefersParityInBursts) {
+  ParityPolicy policy;
+  EXPECT_FALSE(policy.defers());
+  policy.update({.share = 0.02, .burst = 4}, kStart);
+  EXPECT_TRUE(policy.defers());
+  const PacketLoss loss{.share = 0.02, .burst = 4};
+  EXPECT_EQ(rowsFor(loss, 2, 0.0081, ParityPolicy::kMost), 4u);
+  EXPECT_EQ(rowsFor(loss, 2, 0.0081, ParityPolicy::kMost, 2), 2u);
+  EXPECT_FALSE(rowsFor(loss, 2, 0.005, ParityPolicy::kMost));
+  EXPECT_EQ(rowsFor(loss, 2, 0.005, ParityPolicy::kMost, 2), 4u);
+  EXPECT_EQ(policy.rows(7), ParityPolicy::kMost) << "what it cannot repair is requested";
 }
 
 TEST(ParityPolicy, KeepsBounds) {
   ParityPolicy policy;
-  EXPECT_EQ(policy.rows(3, true), 1u) << "no loss was measured yet";
-  EXPECT_EQ(policy.rows(3, false), 0u);
-  EXPECT_EQ(policy.rows(3, false, 1), 1u);
+  EXPECT_EQ(policy.rows(3), 1u) << "no loss was measured yet";
   policy.update({.share = 1, .burst = 1e9}, kStart);
-  EXPECT_EQ(policy.rows(128, true), ParityPolicy::kMost);
-  EXPECT_EQ(policy.rows(128, true, 0, 2), 2u);
+  EXPECT_EQ(policy.rows(128), ParityPolicy::kMost);
 }
 
 TEST(ParityPolicy, FollowsFallingLossLate) {
   ParityPolicy policy;
   policy.update({.share = 0.04}, kStart);
-  EXPECT_EQ(policy.rows(3, true), 3u);
+  EXPECT_EQ(policy.rows(3), 3u);
   policy.update({.share = 0.01}, kStart + 1s);
   policy.update({.share = 0.03}, kStart + 2s);
   policy.update({.share = 0.01}, kStart + 3s);
   policy.update({.share = 0.01}, kStart + 4900ms);
-  EXPECT_EQ(policy.rows(3, true), 3u) << "it was not low for long";
+  EXPECT_EQ(policy.rows(3), 3u) << "it was not low for long";
   policy.update({.share = 0.01}, kStart + 5s);
-  EXPECT_EQ(policy.rows(3, true), 2u);
+  EXPECT_EQ(policy.rows(3), 2u);
   policy.update({.share = 0.04}, kStart + 5s);
-  EXPECT_EQ(policy.rows(3, true), 3u);
+  EXPECT_EQ(policy.rows(3), 3u);
 }
 
 }  // namespace
