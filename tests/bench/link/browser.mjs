@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The page in Chromium as a participant who moves a sphere, in place of `clothstream load`. Prints the figures that link.py
-// keeps, with the same names and meanings, as one line of JSON. The canvas is small, and calls that draw do nothing, because
-// software rendering would take the processors from the stream.
+// The page in Chromium as a participant who moves a sphere. Prints one line of JSON: the figures of `clothstream load` that
+// link.py keeps, with the same meanings. The canvas is small, and calls that draw do nothing, because software rendering
+// would take the processors from the stream. Usage: node browser.mjs --url URL --seconds N [--frames FILE]
 
 import { createRequire } from "node:module";
 import { writeFile } from "node:fs/promises";
@@ -47,16 +47,18 @@ async function join(browser, url) {
   return page;
 }
 
-// Runs in the page.
+// Runs in the page. Returns the times of the hand, and by how much counts have grown. `datagrams` is undefined if they are
+// not open at the end.
 async function measure(seconds) {
-  const { clothstream } = window;
-  const before = { ...clothstream.statistics, ms: performance.now() };
-  for (const list of Object.values(window.hand)) list.length = 0;
+  const { clothstream, hand } = window;
+  const look = () => ({ stream: { ...clothstream.statistics, ms: performance.now() }, datagrams: clothstream.link.statistics });
+  const growth = (after, before) => after && Object.fromEntries(Object.entries(after).map(([name, value]) => [name, value - before[name]]));
+  for (const list of Object.values(hand)) list.length = 0;
+  const before = look();
   await new Promise((done) => setTimeout(done, 1000 * seconds));
-  const after = { ...clothstream.statistics, ms: performance.now() };
-  const grown = Object.fromEntries(Object.entries(after).map(([name, value]) => [name, value - before[name]]));
+  const after = look();
   const isLive = clothstream.state === "live";
-  return { ...window.hand, before, grown, isLive, link: clothstream.link };
+  return { ...hand, startMs: before.stream.ms, isLive, stream: growth(after.stream, before.stream), datagrams: growth(after.datagrams, before.datagrams) };
 }
 
 // Nearest rank.
@@ -66,22 +68,22 @@ function percentile(values, percent) {
 }
 
 // Figures of `clothstream load --json` that link.py keeps.
-function figuresOf({ poses, decodedToDisplayable, frames, grown, isLive, link }) {
+function figuresOf({ poses, decodedToDisplayable, frames, isLive, stream, datagrams }) {
   const ages = frames.map(([, age]) => age);
-  const seconds = grown.ms / 1000;
-  const { inUse, ...datagrams } = link.statistics ?? {};
+  const seconds = stream.ms / 1000;
+  const { inUse, ...counts } = datagrams ?? {};
   return {
-    framesPerSecond: grown.frames / seconds,
+    framesPerSecond: stream.frames / seconds,
     tickAgeMsP50: percentile(ages, 50),
     tickAgeMsP99: percentile(ages, 99),
-    dropped: grown.dropped,
-    decodeErrors: grown.decodeErrors,
-    hashMismatches: grown.hashMismatches,
-    mbitPerSecond: (8e-6 * grown.bytes) / seconds,
+    dropped: stream.dropped,
+    decodeErrors: stream.decodeErrors,
+    hashMismatches: stream.hashMismatches,
+    mbitPerSecond: (8e-6 * stream.bytes) / seconds,
     joined: 1,
     lost: isLive ? 0 : 1,
-    withDatagrams: link.statistics ? 1 : 0,
-    datagrams,
+    withDatagrams: datagrams ? 1 : 0,
+    datagrams: counts,
     poses: poses.length,
     poseToDisplayableMsP50: percentile(poses, 50),
     poseToDisplayableMsP99: percentile(poses, 99),
@@ -90,12 +92,18 @@ function figuresOf({ poses, decodedToDisplayable, frames, grown, isLive, link })
 }
 
 // Lines of `clothstream load --frames` that link.py reads.
-function linesOf({ frames, before }) {
-  return frames.map(([arrivedMs, ageMs, displayableMs]) => `${JSON.stringify({ seconds: (arrivedMs - before.ms) / 1000, ageMs, displayableMs })}\n`);
+function linesOf({ frames, startMs }) {
+  const line = ([arrivedMs, ageMs, displayableMs]) =>
+    `{"seconds":${((arrivedMs - startMs) / 1000).toFixed(4)},"ageMs":${ageMs.toFixed(2)},"displayableMs":${displayableMs.toFixed(2)}}\n`;
+  return frames.map(line).join("");
 }
 
 const text = { type: "string" };
 const { values: options } = parseArgs({ options: { url: text, seconds: text, frames: text } });
+if (!options.url || !(Number(options.seconds) > 0)) {
+  console.error("browser.mjs: --url URL and --seconds N are required, with N greater than 0");
+  process.exit(2);
+}
 const browser = await launchBrowser();
 try {
   const page = await join(browser, options.url);
