@@ -8,8 +8,8 @@ which transports alternate. With the same --seed, packets with the same number a
 
 The participant decodes every frame and compares its hash. Exits with 1 if a frame was wrong, the participant was lost or
 got no frames, or packets were lost that the link did not lose, and with 77 where namespaces are not permitted. Times are
-printed and never judged. The link, the server and the participant share this machine, and Chromium takes much of it: `late`
-says by how much the link delayed packets for too long.
+printed and never judged. The link, the server and the participant share this machine: `late` says by how much the link
+delayed packets for too long.
 """
 
 import argparse
