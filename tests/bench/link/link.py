@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: MIT
 """Measures the delay from a hand to the picture over bad networks: `./dev bench link`.
 
-For each condition and transport, a link between two network namespaces (tests/link) connects a server to `clothstream load`
-with one participant, who moves a sphere. Every figure is the median over rounds, in which transports alternate. With the
-same --seed, packets with the same number are lost in every round and transport.
+For each condition and transport, a link between two network namespaces (tests/link) connects a server to one participant
+who moves a sphere: of `clothstream load`, or the page in Chromium (browser.mjs). Every figure is the median over rounds, in
+which transports alternate. With the same --seed, packets with the same number are lost in every round and transport.
 
 The participant decodes every frame and compares its hash. Exits with 1 if a frame was wrong, the participant was lost or
-got no frames, or packets were lost that the link did not lose. Times are printed and never judged. The link, the server and
-the participant share this machine: `late` says by how much the link delayed packets for too long.
+got no frames, or packets were lost that the link did not lose, and with 77 where namespaces are not permitted. Times are
+printed and never judged. The link, the server and the participant share this machine: `late` says by how much the link
+delayed packets for too long.
 """
 
 import argparse
-import collections
 import json
 import os
 import pathlib
@@ -28,6 +28,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
 from network_link import CLIENT, SERVER, NetworkLink  # noqa: E402
 from programs import ProgramFailed, Server  # noqa: E402
 
+SKIPPED = 77  # CMake's SKIP_RETURN_CODE
 DELAY_MS, JITTER_MS = 25, 5
 # Options of the link by the name of a condition. Later ones replace earlier ones.
 CONDITIONS = {
@@ -41,13 +42,26 @@ CONDITIONS = {
 }
 PLOTTED = "2"  # condition of which rows keep the age of each frame
 
-Transport = collections.namedtuple("Transport", ["server_options", "load_arguments"])
+BROWSER = pathlib.Path(__file__).with_name("browser.mjs")
+
+
+def load(connect):
+    """Participant of `clothstream load`. `connect` makes the arguments that name a server."""
+    return lambda programs, server: [programs / "clothstream", "load", *connect(server), "--participants", 1, "--json"]
+
+
+def web(server):
+    return ["--web", server.url.split("/")[2]]
+
+
+# Command of the participant, without --seconds and --frames, from the folder of programs and the server.
 TRANSPORTS = {
-    "websocket": Transport([], lambda server: ["--web", server.url.split("/")[2], "--transport", "tcp"]),
-    "grpc": Transport([], lambda server: [server.address, "--transport", "tcp"]),
-    "datagrams": Transport([], lambda server: ["--web", server.url.split("/")[2], "--transport", "datagrams"]),
+    "websocket": load(lambda server: [*web(server), "--transport", "tcp"]),
+    "grpc": load(lambda server: [server.address, "--transport", "tcp"]),
+    "datagrams": load(lambda server: [*web(server), "--transport", "datagrams"]),
+    "browser": lambda programs, server: ["node", BROWSER, "--url", server.url],
 }
-# Figures of the load test that rows keep.
+# Figures of the participant that rows keep.
 KEPT = ("poseToDisplayableMsP50", "poseToDisplayableMsP99", "framesPerSecond", "tickAgeMsP50", "tickAgeMsP99",
         "decodedToDisplayableMsP50", "poses", "dropped", "decodeErrors", "mbitPerSecond", "datagrams")
 
@@ -92,13 +106,14 @@ class Bench:
 
     def measure(self, condition, transport):
         """A row without its round."""
-        arguments, ways = self.arguments, TRANSPORTS[transport]
+        arguments = self.arguments
         options = link_options(condition, arguments.congestion, arguments.seed)
         with NetworkLink(arguments.programs / "clothstream-link", options, self.folder / "link.log") as link:
-            options = ["--scene", arguments.scene, "--host", link.address(SERVER), "--insecure", *ways.server_options]
+            options = ["--scene", arguments.scene, "--host", link.address(SERVER), "--insecure"]
             program = arguments.programs / "clothstream-server"
             with Server(program, options, self.folder / "server.log", within=link.within(SERVER)) as server:
-                result, algorithms, frames = self.load(link, ways.load_arguments(server), condition == PLOTTED)
+                participant = TRANSPORTS[transport](arguments.programs, server)
+                result, algorithms, frames = self.run(link, participant, condition == PLOTTED)
             link_statistics = link.end()
         check(result, link_statistics)
         late = max(direction["lateMsP99"] for direction in link_statistics.values())
@@ -107,23 +122,31 @@ class Bench:
                 "congestion": algorithms, **{name: result[name] for name in KEPT}, "lateMsP99": late,
                 "link": link_statistics, **({"frames": frames} if frames else {})}
 
-    def load(self, link, connect, keeps_frames):
-        """Runs the load test. Returns its result, the congestion controls of TCP, and the frames, if they are kept."""
+    def run(self, link, participant, keeps_frames):
+        """Runs a participant. Returns its result, the congestion controls of TCP, and the frames, if they are kept."""
         path = self.folder / "frames"
-        command = [*link.within(CLIENT), self.arguments.programs / "clothstream", "load", *connect, "--participants", 1,
-                   "--seconds", self.arguments.seconds, "--json", *(["--frames", path] if keeps_frames else [])]
-        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as load:
+        command = [*link.within(CLIENT), *participant, "--seconds", self.arguments.seconds,
+                   *(["--frames", path] if keeps_frames else [])]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             try:
                 time.sleep(self.arguments.seconds / 2)
-                listed = subprocess.run([*link.within(SERVER), "ss", "-tinH"], capture_output=True, text=True)
-                out, errors = load.communicate()
+                algorithms = self.algorithms(link)
+                while not algorithms and process.poll() is None:  # a browser takes seconds to start
+                    time.sleep(0.1)
+                    algorithms = self.algorithms(link)
+                out, errors = process.communicate()
             finally:
-                load.terminate()
-        if load.returncode != 0:
-            raise ProgramFailed(f"the load test failed with {load.returncode}: {errors}{out}")
+                process.terminate()
+        if process.returncode != 0:
+            raise ProgramFailed(f"the participant failed with {process.returncode}: {errors}{out}")
+        return json.loads(out), algorithms, frames_of(path) if keeps_frames else None
+
+    def algorithms(self, link):
+        """Congestion controls of the server's connections."""
+        listed = subprocess.run([*link.within(SERVER), "ss", "-tinH"], capture_output=True, text=True)
         if listed.returncode != 0:
             raise ProgramFailed(f"ss failed with {listed.returncode} (package iproute2): {listed.stderr}")
-        return json.loads(out), algorithms_of(listed.stdout), frames_of(path) if keeps_frames else None
+        return algorithms_of(listed.stdout)
 
 
 def table(rows, conditions, transports):
@@ -166,7 +189,7 @@ def number(least, most, kind):
 def read_arguments(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--programs", type=pathlib.Path, required=True,
-                        help="folder of clothstream, clothstream-server and clothstream-link")
+                        help="folder of clothstream, clothstream-server and clothstream-link; the server finds the page")
     parser.add_argument("--transports", type=choice(TRANSPORTS), default=list(TRANSPORTS),
                         help=f"some of {','.join(TRANSPORTS)}. Default: all")
     parser.add_argument("--conditions", type=choice(CONDITIONS), default=list(CONDITIONS),
@@ -194,7 +217,10 @@ def main():
                     print(f"round {turn + 1} of {arguments.rounds}: {CONDITIONS[condition][0]}, {transport}", file=sys.stderr)
                     try:
                         rows.append({**bench.measure(condition, transport), "round": turn})
-                    except (AssertionError, ProgramFailed, unittest.SkipTest) as failure:
+                    except unittest.SkipTest as skipped:
+                        print(f"skipped: {skipped}")
+                        sys.exit(SKIPPED)
+                    except (AssertionError, ProgramFailed) as failure:
                         sys.exit(str(failure))
                     if arguments.json:
                         arguments.json.write_text(json.dumps(rows) + "\n")
