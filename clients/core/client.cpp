@@ -108,7 +108,8 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
   if (state_ == CS_STATE_FAILED) return 0;
   const std::optional<ServerMessage> message = readServerMessage(bytes);
   if (!message) return failMalformed("ServerMessage");
-  timer_.heard(nowUs);
+  // A frame may have come by datagrams, and then says nothing about the connection. Pongs never do.
+  if (message->kind != Body::frame || !datagrams_.areOpened()) timer_.heard(nowUs);
   switch (message->kind) {
     case Body::welcome:
       return welcomed(message->body, nowUs);

@@ -16,10 +16,12 @@ Association::Association(const dtls::DtlsContext& context, ice::Credentials loca
       agent_(std::move(local), peer.credentials, peer.addresses, now) {}
 
 void Association::handle(const ice::Address& from, std::span<const std::byte> datagram, Time now) {
-  if (ice::isStun(datagram))
+  if (ice::isStun(datagram)) {
     send(agent_.handle(from, datagram, now));
-  else if (channel_ && path_ == from)
+  } else if (channel_ && path_ == from) {
+    agent_.arrived(now);
     channel_->handle(datagram, now);
+  }
   begin(now);
 }
 

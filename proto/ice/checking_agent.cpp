@@ -41,7 +41,8 @@ CheckingAgent::CheckingAgent(Credentials local, Credentials remote, std::span<co
       nextCheck_(candidates_.empty() ? Time::max() : now) {}
 
 std::vector<Datagram> CheckingAgent::advance(Time now) {
-  if (now < nextCheck_) return {};
+  if (now < nextTime()) return {};
+  if (now >= std::exchange(silentAt_, Time::max())) repeatAfter_ = kSilence;
   if (isOver(now)) {
     nextCheck_ = Time::max();
     return {};
@@ -50,7 +51,7 @@ std::vector<Datagram> CheckingAgent::advance(Time now) {
   const Address to = selected_ ? *selected_ : candidates_[nextCandidate_++ % candidates_.size()];
   if (sent_.size() == kMaxSent) sent_.erase(sent_.begin());
   sent_.push_back({.transaction = newTransaction(), .to = to, .at = now});
-  nextCheck_ = now + (selected_ ? kRepeatAfter : kPace);
+  nextCheck_ = now + (selected_ ? repeatAfter_ : kPace);
   std::vector<Datagram> out;
   out.push_back({.to = to, .bytes = pairing_.check(sent_.back().transaction, selected_.has_value())});
   return out;
@@ -72,6 +73,7 @@ std::vector<Datagram> CheckingAgent::handle(const Address& from, std::span<const
   if (sent == sent_.end() || !pairing_.isAuthenticResponse(*message, datagram)) return out;
   roundTrip_ = now - sent->at;
   lastAnswer_ = now;
+  repeatAfter_ = kRepeatAfter;
   // Answers to other checks say nothing new, and an earlier one does not confirm the nomination.
   sent_.clear();
   if (selected_) {

@@ -2,6 +2,7 @@
 // Native client's side of ICE: a full agent that controls a lite one (RFC 8445), with one socket.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <optional>
@@ -14,8 +15,11 @@ namespace clothstream::ice {
 
 // Finds an address of the server that answers, and keeps the server's consent to send. Checks go to one
 // candidate after the other every kPace until one answers. That one is selected and nominated; then a check
-// follows about every kConsentInterval, and every kRepeatAfter while it is not answered. Without an answer
-// for kConsent the search begins again. Not thread-safe. Reads no clock.
+// follows about every kConsentInterval, and every kRepeatAfter while it is not answered. When the server has
+// sent something and then nothing for kSilence, a check follows, and another one every kSilence until one is
+// answered: if the client's own address has changed, such as that of a phone that leaves its Wi-Fi, the
+// server learns the new one by it. Without an answer for kConsent the search begins again. Not thread-safe.
+// Reads no clock.
 class CheckingAgent {
  public:
   // Both credentials are valid (isValid). `candidates`: the addresses of the server from signalling, the
@@ -27,10 +31,15 @@ class CheckingAgent {
   static constexpr std::chrono::milliseconds kPace{50};                // RFC 8445, section 14.2
   static constexpr std::chrono::milliseconds kConsentInterval{2'500};  // times 0.8 to 1.2; RFC 7675: 5 s
   static constexpr std::chrono::milliseconds kRepeatAfter{500};
+  static constexpr std::chrono::milliseconds kSilence{100};  // a few frames
 
   // Sends the check that is due, if any. Call it at nextTime(), and at once after the constructor.
   [[nodiscard]] std::vector<Datagram> advance(Time now);
-  Time nextTime() const { return nextCheck_; }
+  Time nextTime() const { return std::min(nextCheck_, silentAt_); }
+  // The selected address has sent something that is no STUN message.
+  void arrived(Time now) {
+    if (selected_) silentAt_ = now + kSilence;
+  }
 
   // Handles a STUN message (isStun) of any bytes from this address, and returns what must be sent. The
   // server's own checks are answered, from wherever they come: they prove that they know our password.
@@ -64,6 +73,8 @@ class CheckingAgent {
   std::optional<Address> selected_;
   std::optional<Time::duration> roundTrip_;
   Time lastAnswer_, nextCheck_;
+  Time silentAt_ = Time::max();  // when silence of the server asks for a check
+  Time::duration repeatAfter_ = kRepeatAfter;
 };
 
 }  // namespace clothstream::ice

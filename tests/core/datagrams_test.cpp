@@ -129,6 +129,25 @@ TEST(DatagramOffers, AnswersSayHowToReachServer) {
   EXPECT_STREQ(cs_datagram_address(client.get(), 0), "");
 }
 
+// Frames by datagrams must not hide that the stream is dead.
+TEST(DatagramOffers, FramesProlongNoConnectionWithDatagrams) {
+  ScriptedServer server;
+  ClientUnderTest client;
+  client.receive(server.welcome());
+  client.receiveAll(server.chunks());
+  client.receive(server.frame(1, codec::PacketKind::key), 1'000 * kMs);
+  const std::uint64_t silent = cs_connect_at(client.get());
+  client.receive(server.frame(2, codec::PacketKind::predicted), 1'500 * kMs);
+  EXPECT_EQ(cs_connect_at(client.get()), silent + 500 * kMs);
+  const cs_datagram_offer made = offer();
+  ASSERT_EQ(cs_offer_datagrams(client.get(), &made), 1);
+  client.receive(serialised(answer()), 2'000 * kMs);
+  client.receive(server.frame(3, codec::PacketKind::predicted), 2'500 * kMs);
+  EXPECT_EQ(cs_connect_at(client.get()), silent + 1'000 * kMs);
+  client.receive(ScriptedServer::pong(1, 2), 3'000 * kMs);
+  EXPECT_EQ(cs_connect_at(client.get()), silent + 2'000 * kMs);
+}
+
 TEST(DatagramOffers, RefusalMeansNoDatagrams) {
   for (const bool isError : {false, true}) {
     ClientUnderTest client;

@@ -332,6 +332,21 @@ TEST_F(AgentsTest, FollowMovedClient) {
   EXPECT_EQ(client_->selected(now_), kServerAddress);
 }
 
+// The silence of the server, whose datagrams go to the old address, makes the client check at once: 100 ms,
+// then the client's check, the server's check, and its answer.
+TEST_F(AgentsTest, FollowMovedClientThatWasSent) {
+  start({kServerAddress});
+  run(kStart + 1s);
+  client_->arrived(now_);
+  clientAddress_ = kMobile;
+  run(now_ + 180ms);
+  EXPECT_EQ(server_.selected(now_), kMobile);
+  // A server that goes on to be silent is not asked more often than any other.
+  const int before = fromClient_;
+  run(now_ + 60s);
+  EXPECT_LE(fromClient_ - before, 30);
+}
+
 TEST_F(AgentsTest, PathIsLostAndFoundAgain) {
   start({kServerAddress});
   run(kStart + 1s);

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -59,6 +60,7 @@ class Association {
   Time now_;  // of the function that runs
   Time checkAt_{};
   bool wasOpen_ = false;
+  std::optional<Address> address_;  // newest one to which sending was allowed
   FrameLink link_;
   SecurePath path_;  // ends before the link, because it may deliver
 };

@@ -2,6 +2,7 @@
 // Frames and input of one peer in the payloads of datagrams, and the way back to the stream.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +19,8 @@ namespace clothstream::endpoint {
 
 // While the path is open, frames leave the mailbox by datagrams. When the peer's receipts stop
 // (FrameSender::silent), they leave by the stream again. A single packet then probes the path after
-// kFirstPause, and again after pauses that double up to kLongestPause; frames return when one is received.
+// kFirstPause, and again after pauses that double up to kLongestPause; frames return when one is received. A
+// new address of the peer is probed at once.
 //
 // Not thread-safe. Reads no clock.
 class FrameLink {
@@ -45,6 +47,8 @@ class FrameLink {
   // changes, and when the mailbox has something.
   void advance(bool open, Clock::time_point now, const Send& send);
   Clock::time_point nextTime() const;
+  // Probes a silent path at this time already.
+  void probeAt(Clock::time_point time) { probeAt_ = std::min(probeAt_, time); }
 
   const hosting::DatagramPeer& peer() const { return peer_; }
 

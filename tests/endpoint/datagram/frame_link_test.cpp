@@ -181,6 +181,19 @@ TEST_F(FrameLinkTest, FramesReturnWhenProbeArrives) {
   EXPECT_EQ(metrics.fallbacks.value(), 1u);
 }
 
+TEST_F(FrameLinkTest, NewAddressIsProbedAtOnce) {
+  link.probeAt(now);
+  pass(300ms);
+  EXPECT_EQ(metrics.fallbacks.value(), 0u);
+  carries = std::bernoulli_distribution(0);
+  pass(700ms);
+  ASSERT_EQ(metrics.fallbacks.value(), 1u);
+  carries = std::bernoulli_distribution(1);
+  link.probeAt(now);
+  pass(100ms);
+  EXPECT_EQ(metrics.peers, 1u);
+}
+
 TEST_F(FrameLinkTest, ClosedPathReturnsFramesToStream) {
   pass(300ms);
   const std::size_t before = byStream;
