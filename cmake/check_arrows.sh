@@ -36,7 +36,7 @@ server/saved_state | server/files server/scene server/model server/messages serv
 server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording proto/text clothstream
-server/fleet       | server/session server/hosting server/saved_state server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
+server/fleet       | server/session server/hosting server/saved_state server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec proto/datagram clothstream
 server/agones      | server/hosting server/scene server/schedule server/telemetry
 server/events      | server/files proto/text server/scene server/schedule server/telemetry
 server/step        | server/model server/vulkan server/simulation server/messages
