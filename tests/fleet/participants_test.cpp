@@ -280,8 +280,9 @@ TEST_F(EdgeDatagramsTest, CarryFramesAndPosesOfParticipants) {
   collider.mutable_sphere()->set_radius(0.1F);
   client.sendDatagram(poses);
   ASSERT_TRUE(until(client, [&] {
-    const auto& colliders = frameIn(client.datagramFrames.back()).colliders();
-    return std::ranges::any_of(colliders, [](const auto& each) { return each.participant_id() != 0; });
+    const v1::Frame frame = frameIn(client.datagramFrames.back());
+    return std::ranges::any_of(frame.colliders(),
+                               [](const auto& each) { return each.participant_id() != 0; });
   }));
   EXPECT_EQ(client.streamFrames.size(), byStream);
   for (std::size_t i = 1; i < client.datagramFrames.size(); ++i) {
