@@ -42,7 +42,7 @@ server/events      | server/files proto/text server/scene server/schedule server
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls server/files
 server/discovery   | proto/discovery
-server/doctor      | server/endpoint/listen server/encode server/messages server/model server/simulation server/tls server/vulkan
+server/doctor      | server/endpoint/datagram server/endpoint/listen server/encode server/messages server/model server/simulation server/tls server/vulkan
 server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health grpc/reflection
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry

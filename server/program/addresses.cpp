@@ -30,6 +30,14 @@ std::vector<std::string> addressesOf(const std::string& host) {
   return addresses;
 }
 
+endpoint::DatagramEndpointOptions datagramOptions(const NetworkOptions& network) {
+  return {.host = network.host,
+          .port = network.datagramPort.value_or(network.port),
+          .ownAddresses = addressesOf(network.host),
+          .publicAddresses = network.publicAddresses,
+          .maxPeers = 2 * network.maxConnections};
+}
+
 std::string addressInNetwork(const NetworkOptions& network) {
   if (isLoopback(network.host)) return {};
   if (network.host != "0.0.0.0" && network.host != "::") return network.host;
