@@ -54,11 +54,13 @@ Findings checkDatagramPort(const endpoint::DatagramEndpointOptions& options, boo
   try {
     boost::asio::io_context io;
     const endpoint::UdpPort udp(io, options.host, options.port);
+    const std::string port = options.port == 0
+                                 ? "any free UDP port"
+                                 : fmt::format("{} UDP port {} is free", options.host, options.port);
     finding.text = fmt::format(
-        "--datagram-port: {} UDP port {} is free{}. Clients try the address that they have reached (gRPC: "
-        "{}), "
-        "and --public-address ({})",
-        options.host, options.port, udp.hasIpv6() ? "" : ", for IPv4 alone: the kernel has no IPv6 sockets",
+        "--datagram-port: {}{}. Clients try the address that they have reached (gRPC: {}), and "
+        "--public-address ({})",
+        port, udp.hasIpv6() ? "" : ", for IPv4 alone: the kernel has no IPv6 sockets",
         listOf(options.ownAddresses), listOf(options.publicAddresses));
     const endpoint::UdpPort::Queues queues = udp.queues();
     return {finding, checkUdpQueues(queues.receive, queues.send)};

@@ -6,7 +6,9 @@
 #include <cerrno>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -44,11 +46,10 @@ bool forbidIpv6Sockets() {
          ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
 }
 
-// A datagram to a port, and its answer.
-void exchange(bool ipv6) {
+// A datagram to a port, and its answer. Returns whether the port has IPv6.
+bool exchange() {
   boost::asio::io_context io;
   UdpPort server(io, "0.0.0.0", 0), client(io, "127.0.0.1", 0);
-  EXPECT_EQ(server.hasIpv6(), ipv6);
   EXPECT_GT(server.queues().receive, 0);
   std::optional<Route> arrived, answered;
   server.receive(
@@ -69,20 +70,20 @@ void exchange(bool ipv6) {
   client.send({.peer = Address::ofIpv4(kLoopback, server.port())}, sent);
   io.run_for(20s);
   EXPECT_EQ(answer, sent);
-  ASSERT_TRUE(arrived && answered);
-  EXPECT_EQ(arrived->peer, Address::ofIpv4(kLoopback, client.port()));
-  EXPECT_EQ(arrived->local, Address::ofIpv4(kLoopback, 0).bytes);
-  EXPECT_EQ(answered->peer, Address::ofIpv4(kLoopback, server.port()));
+  EXPECT_EQ(arrived.value().peer, Address::ofIpv4(kLoopback, client.port()));
+  EXPECT_EQ(arrived.value().local, Address::ofIpv4(kLoopback, 0).bytes);
+  EXPECT_EQ(answered.value().peer, Address::ofIpv4(kLoopback, server.port()));
+  return server.hasIpv6();
 }
 
-TEST(UdpPortTest, AnswersFromTheAddressItWasReachedAt) {
-  exchange(true);
+TEST(UdpPortTest, AnswersFromReachedAddress) {
+  exchange();
 }
 
 TEST(UdpPortTest, WorksWithoutIpv6Sockets) {
   std::thread([] {
     ASSERT_TRUE(forbidIpv6Sockets());
-    exchange(false);
+    EXPECT_FALSE(exchange());
     boost::asio::io_context io;
     EXPECT_FALSE(UdpPort(io, "::", 0).hasIpv6());
     EXPECT_THROW(UdpPort(io, "::1", 0), std::runtime_error);
