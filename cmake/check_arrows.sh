@@ -36,13 +36,13 @@ server/saved_state | server/files server/scene server/model server/messages serv
 server/hosting     | proto/text server/identity server/scene server/delivery server/schedule server/model server/vulkan server/simulation server/messages server/telemetry clothstream
 server/session     | server/hosting server/identity server/scene server/delivery server/schedule server/messages server/telemetry proto/codec clothstream
 server/recording   | server/model server/vulkan server/simulation server/messages server/scene server/schedule server/telemetry proto/codec proto/recording proto/text clothstream
-server/fleet       | server/session server/hosting server/saved_state server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec clothstream
+server/fleet       | server/session server/hosting server/saved_state server/scene server/schedule server/delivery server/recording server/messages server/telemetry proto/codec proto/datagram clothstream
 server/agones      | server/hosting server/scene server/schedule server/telemetry
 server/events      | server/files proto/text server/scene server/schedule server/telemetry
 server/step        | server/model server/vulkan server/simulation server/messages
 server/tls         | proto/tls server/files
 server/discovery   | proto/discovery
-server/doctor      | server/endpoint/listen server/encode server/messages server/model server/simulation server/tls server/vulkan
+server/doctor      | server/endpoint/datagram server/endpoint/listen server/encode server/messages server/model server/simulation server/tls server/vulkan
 server/endpoint/listen | server/schedule server/telemetry
 server/endpoint/grpc | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry clothstream grpc/health grpc/reflection
 server/endpoint/web | server/endpoint/listen server/tls server/session server/hosting server/schedule server/telemetry

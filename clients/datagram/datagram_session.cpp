@@ -32,16 +32,20 @@ std::optional<std::span<const std::byte>> viewOf(const std::uint8_t* data, std::
 }
 
 // Nothing if the answer cannot be used.
-std::optional<DatagramPeer> peerOf(const cs_client& client, const cs_datagram_answer& answer) {
+std::optional<DatagramPeer> peerOf(const cs_client& client, const cs_datagram_answer& answer,
+                                   const std::string& streamAddress) {
   dtls::Digest digest{};
   std::ranges::copy(answer.fingerprint, digest.begin());
   DatagramPeer peer{.credentials = {answer.ufrag, answer.password},
                     .fingerprint = dtls::fingerprintOf(digest),
                     .addresses = {}};
-  for (std::uint32_t i = 0; i < answer.addresses; ++i)
-    if (const auto address =
-            readAddress(cs_datagram_address(&client, i), static_cast<std::uint16_t>(answer.port)))
+  const auto addText = [&](const std::string& text) {
+    const auto address = readAddress(text, static_cast<std::uint16_t>(answer.port));
+    if (address && std::ranges::find(peer.addresses, *address) == peer.addresses.end())
       peer.addresses.push_back(*address);
+  };
+  addText(streamAddress);
+  for (std::uint32_t i = 0; i < answer.addresses; ++i) addText(cs_datagram_address(&client, i));
   if (peer.addresses.empty() || !ice::isValid(peer.credentials)) return std::nullopt;
   return peer;
 }
@@ -73,14 +77,14 @@ void DatagramSession::close() {
   offerAt_ = Time::max();
 }
 
-void DatagramSession::negotiate(cs_client& client) {
+void DatagramSession::negotiate(cs_client& client, const std::function<std::string()>& streamAddress) {
   if (SteadyClock::now() >= offerAt_) offer(client);
   cs_datagram_answer answer;
   if (!awaitsAnswer_ || cs_get_datagram_answer(&client, &answer) == 0) return;
   awaitsAnswer_ = false;
   refused_ = answer.addresses == 0;
   if (refused_) return end("the server opens none for this client");
-  if (const auto peer = peerOf(client, answer)) return begin(*peer);
+  if (const auto peer = peerOf(client, answer, streamAddress())) return begin(*peer);
   end("the server's answer has no usable address");
 }
 

@@ -47,8 +47,9 @@ class DatagramSession {
   void connecting();
   void close();
 
-  // Makes the offer, and takes the answer. Call it before the client's messages are sent.
-  void negotiate(cs_client& client);
+  // Makes the offer, and takes the answer. Call it before the client's messages are sent. `streamAddress` is
+  // as Transport::serverAddress(): this address is tried first, because the server may not know it.
+  void negotiate(cs_client& client, const std::function<std::string()>& streamAddress);
   // Receives and sends datagrams. Call it at dueTime(), after arrivals, and after the functions below.
   void exchange();
   Time dueTime() const;

@@ -38,7 +38,10 @@ class DatagramTransport final : public Transport {
     stream_->cancel();
   }
 
-  void negotiate(cs_client& client) override { datagrams_.negotiate(client); }
+  std::string serverAddress() const override { return stream_->serverAddress(); }
+  void negotiate(cs_client& client) override {
+    datagrams_.negotiate(client, [this] { return stream_->serverAddress(); });
+  }
   std::optional<Missing> missing() const override {
     if (!required_ || datagrams_.hasOpened()) return std::nullopt;
     return Missing{.text = "Datagrams are required, but not open: " + datagrams_.why() +

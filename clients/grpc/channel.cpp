@@ -171,6 +171,18 @@ Failure notJoined(const ServerAddress& server, const grpc::Status& status) {
   }
 }
 
+std::string addressIn(std::string_view peer) {
+  const bool ipv6 = peer.starts_with("ipv6:");
+  const std::size_t port = peer.rfind(':');
+  constexpr std::size_t kScheme = 5;
+  if ((!ipv6 && !peer.starts_with("ipv4:")) || port < kScheme) return {};
+  std::string_view address = peer.substr(kScheme, port - kScheme);
+  for (const auto& [open, close] : {std::pair<std::string_view, std::string_view>("[", "]"), {"%5B", "%5D"}})
+    if (address.starts_with(open) && address.ends_with(close))
+      address = address.substr(open.size(), address.size() - open.size() - close.size());
+  return std::string(address);
+}
+
 Failure lost(const ServerAddress& server, const grpc::Status& status) {
   if (status.ok())
     return {Failure::Kind::lost, fmt::format("The server at {} ended the stream.", server.address)};

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
@@ -52,6 +53,10 @@ template <typename Response, typename Request, typename Method>
   if (!status.ok()) return tl::unexpected(notJoined(server, status));
   return response;
 }
+
+// Address in a URI of grpc::ClientContext::peer(), such as ipv4:192.0.2.1:50051 or ipv6:%5B::1%5D:50051,
+// where the brackets may also be plain. Empty for other URIs.
+std::string addressIn(std::string_view peer);
 
 // Failure of a stream that ended although the client had not left.
 Failure lost(const ServerAddress& server, const grpc::Status& status);

@@ -76,6 +76,10 @@ class GrpcTransport final : public Transport {
   }
   void cancel() override { call_->context.TryCancel(); }
 
+  std::string serverAddress() const override {
+    return call_ && call_->started ? addressIn(call_->context.peer()) : std::string();
+  }
+
   void wait(std::chrono::steady_clock::duration atMost) override {
     void* tag = nullptr;
     bool ok = false;

@@ -306,7 +306,7 @@ void Participant::send(std::string message) {
 }
 
 void Participant::flush() {
-  if (datagrams_) datagrams_->negotiate(*core_);
+  if (datagrams_) datagrams_->negotiate(*core_, [] { return std::string(); });  // not known
   std::size_t bytes = 0;
   while (const std::uint8_t* message = cs_next_outgoing(core_.get(), &bytes))
     send(std::string(reinterpret_cast<const char*>(message), bytes));

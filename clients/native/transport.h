@@ -44,6 +44,8 @@ class Transport {
   // Ends the connection without a goodbye. It may stay active until the next wait().
   virtual void cancel() = 0;
 
+  // Address that the open connection has reached, such as 192.0.2.1 or 2001:db8::1; empty: not known.
+  virtual std::string serverAddress() const { return {}; }
   // Called before each write(), on the thread of the client: a transport may talk to the server through it.
   virtual void negotiate(cs_client& /*client*/) {}
   // Requirement of the transport that a client with an open connection waits for before it counts as joined.

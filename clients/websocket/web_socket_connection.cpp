@@ -114,6 +114,11 @@ class Connection final : public WebSocketConnection {
     stream_.async_close(websocket::close_code::normal, tracked([this] { end({}); }));
   }
   void cancel() override { end(net::error::operation_aborted); }
+  std::string serverAddress() const override {
+    error_code unknown;
+    const tcp::endpoint server = beast::get_lowest_layer(stream_).socket().remote_endpoint(unknown);
+    return unknown ? std::string() : server.address().to_string();
+  }
 
  private:
   static Layer makeLayer(Shared& shared) {

@@ -55,6 +55,8 @@ class WebSocketConnection {
   virtual void close() = 0;
   // Ends the connection without a goodbye. ended() follows.
   virtual void cancel() = 0;
+  // As Transport::serverAddress().
+  virtual std::string serverAddress() const { return {}; }
 };
 
 // Shared by the connections to one server: its address, whom to trust, the lookup of its name.

@@ -48,6 +48,7 @@ class Link final : private WebSocketListener {
     connection_->close();
   }
   void cancel() { connection_->cancel(); }
+  std::string serverAddress() const { return opened_ && !end_ ? connection_->serverAddress() : ""; }
   std::optional<std::span<const std::byte>> receive() {
     if (message_ && !end_) connection_->read();
     return std::exchange(message_, std::nullopt);
@@ -121,6 +122,7 @@ class WebSocketTransport final : public Transport {
   void write(std::span<const std::byte> message) override { link_->write(message); }
   void leave() override { link_->leave(); }
   void cancel() override { link_->cancel(); }
+  std::string serverAddress() const override { return link_ ? link_->serverAddress() : ""; }
 
   void wait(std::chrono::steady_clock::duration atMost) override {
     const auto end = std::chrono::steady_clock::now() + atMost;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Kinds and largest size of the datagrams between server and client. docs/transport.md defines the bytes.
+// Kinds and largest size of the datagrams between server and client. docs/datagrams.md defines the bytes.
 #pragma once
 
 #include <bitset>

@@ -16,6 +16,7 @@
 #include "server/delivery/envelope.h"
 #include "server/delivery/held_frames.h"
 #include "server/delivery/link_adaptation.h"
+#include "server/delivery/link_outlet.h"
 #include "server/delivery/merged_announcements.h"
 #include "server/delivery/published_frame.h"
 #include "server/delivery/send_window.h"
@@ -45,7 +46,7 @@ namespace clothstream::delivery {
 // LinkAdaptation chooses the quality; the peer gets an OperatingPoint message when it changes. A new quality
 // begins with a key frame; until then the former quality continues. A subscriber that was sent a tick in one
 // quality never gets a key frame of the same tick in another one, because decoders reject it as stale.
-class Mailbox {
+class Mailbox final : public LinkOutlet {
  public:
   // Minimum distance, in frames, from one key frame to the next one that a requestKeyFrame() causes.
   static constexpr std::uint32_t kMinKeyFrameDistance = 16;
@@ -74,23 +75,11 @@ class Mailbox {
   // If the subscriber needs a key frame and has room for it: gives it `frames`, which were published before:
   // a key frame in its quality and those that follow, at most HeldFrames::kMax in all.
   void deliver(std::span<const PublishedFrame> frames);
-  // State of a link that a rate controller measures.
-  struct Link {
-    bool hasRoom = false;  // a frame may start
-    double frameRate = 0;  // bytes/s that frames may take, without parity and headers
-  };
-  // Frames travel over this link from now on; nothing: over the stream, where SendWindow gives the room. Call
-  // it after each frame that nextFrame() returns, and when the controller's state changes. Frames that left
-  // by the link and are not acknowledged when it ends may be lost: the stream then begins with a key frame.
-  void setLink(std::optional<Link> link);
-  // `wake` is called, from any thread, when nextFrame() may have something. It must not block. Null: it is
-  // not called any more after the return; the caller must then hold no lock that `wake` takes.
-  void setFrameWake(std::function<void()> wake);
-  // Returns the next frame for the link, or nothing.
-  std::optional<SharedBytes> nextFrame(Clock::time_point now);
-  // Returns whether the link has lowered the quality. The sender then fills frames with parity rows up to
-  // LinkAdaptation::kProbe times their size, as far as the link has room, to find out what it carries.
-  bool wantsFinerQuality() const;
+  // While frames travel over the stream, SendWindow gives the room.
+  void setLink(std::optional<Link> link) override;
+  void setFrameWake(std::function<void()> wake) override;
+  std::optional<SharedBytes> nextFrame(Clock::time_point now) override;
+  bool wantsFinerQuality() const override;
   // Returns what the subscriber asks of the next frame. Call it whenever a frame is made, because it also
   // measures the time in which the subscriber gets no frames.
   RequestedFrames requested(Clock::time_point now);

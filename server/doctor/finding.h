@@ -14,7 +14,7 @@ enum class Level : std::uint8_t { good, advice, problem };
 
 struct Finding {
   Level level = Level::good;
-  std::string topic;  // device, capacity, crowd, port, certificate, directory, tcp, clock
+  std::string topic;  // device, capacity, crowd, port, certificate, directory, tcp, udp, clock
   std::string text;
   std::string fix = {};                 // what to do; empty if all is well
   nlohmann::ordered_json figures = {};  // null if there are none

@@ -15,6 +15,7 @@
 #include <sys/timex.h>
 #include <unistd.h>
 
+#include "server/endpoint/datagram/udp_port.h"
 #include "server/endpoint/listen/listen.h"
 #include "server/tls/certificate.h"
 
@@ -41,6 +42,55 @@ Finding checkPort(const std::string& host, std::uint16_t port, const char* optio
     finding.text = error.what();
     finding.fix = fmt::format("`ss -ltnp` shows which program uses a port. {} chooses another port", option);
   }
+  return finding;
+}
+
+Findings checkDatagramPort(const endpoint::DatagramEndpointOptions& options, bool required) {
+  const auto listOf = [](const std::vector<std::string>& addresses) {
+    return addresses.empty() ? "none" : fmt::format("{}", fmt::join(addresses, ", "));
+  };
+  Finding finding{.level = Level::good, .topic = "port", .text = {}};
+  finding.figures = {{"ownAddresses", options.ownAddresses}, {"publicAddresses", options.publicAddresses}};
+  try {
+    boost::asio::io_context io;
+    const endpoint::UdpPort udp(io, options.host, options.port);
+    const std::string port = options.port == 0
+                                 ? "any free UDP port"
+                                 : fmt::format("{} UDP port {} is free", options.host, options.port);
+    finding.text = fmt::format(
+        "--datagram-port: {}{}. Clients try the address that they have reached (gRPC: {}), and "
+        "--public-address ({})",
+        port, udp.hasIpv6() ? "" : ", for IPv4 alone: the kernel has no IPv6 sockets",
+        listOf(options.ownAddresses), listOf(options.publicAddresses));
+    const endpoint::UdpPort::Queues queues = udp.queues();
+    return {finding, checkUdpQueues(queues.receive, queues.send)};
+  } catch (const std::exception& error) {
+    finding.level = required ? Level::problem : Level::advice;
+    finding.text = fmt::format("{}{}", error.what(), required ? "" : "; clients stay on their streams");
+    finding.fix =
+        "`ss -lunp` shows which program uses a port. --datagram-port chooses another one; --transport tcp "
+        "says "
+        "that datagrams are not wanted";
+    return {finding};
+  }
+}
+
+Finding checkUdpQueues(int receiveBytes, int sendBytes) {
+  constexpr int kWanted = endpoint::UdpPort::kQueueBytes;
+  Finding finding{.level = Level::good,
+                  .topic = "udp",
+                  .text = fmt::format("queues of {} kB for arriving, {} kB for leaving datagrams",
+                                      receiveBytes / 1024, sendBytes / 1024)};
+  finding.figures = {{"receiveBytes", receiveBytes}, {"sendBytes", sendBytes}};
+  if (std::min(receiveBytes, sendBytes) >= kWanted) return finding;
+  finding.level = Level::advice;
+  finding.text +=
+      fmt::format(", instead of {} kB: with many clients the kernel drops datagrams, which costs repeats",
+                  kWanted / 1024);
+  finding.fix = fmt::format(
+      "`sysctl -w net.core.rmem_max={0} net.core.wmem_max={0}` as root, and these two lines in "
+      "/etc/sysctl.d/clothstream.conf for the next start of the machine",
+      kWanted);
   return finding;
 }
 

@@ -25,6 +25,9 @@ constexpr std::size_t kMaxAnswers = 64;
 // Nor are requests that say who the peer is: Hello, and a token of at most 4096 bytes.
 constexpr std::size_t kMaxRequestBytes = 8192;
 
+// Interval of requests for a key frame that does not come.
+constexpr std::chrono::seconds kKeyFrameInterval{1};
+
 constexpr std::chrono::seconds kStrangerTime{30};
 constexpr std::size_t kMaxStrangers = 1024;
 
@@ -63,9 +66,13 @@ bool EdgeTunnel::send(std::span<const std::byte> message) {
   if (answerPing(message, Clock::now())) return true;
   if (channel_.bytes() + message.size() > kMaxWaiting) return false;
   if (message.size() <= kMaxRequestBytes) readRequest(message);
-  channel_.push(std::make_shared<std::vector<std::byte>>(message.begin(), message.end()), Clock::now());
+  pushLocked(message);
   pollLocked();
   return true;
+}
+
+void EdgeTunnel::pushLocked(std::span<const std::byte> message) {
+  channel_.push(std::make_shared<std::vector<std::byte>>(message.begin(), message.end()), Clock::now());
 }
 
 bool EdgeTunnel::answerPing(std::span<const std::byte> message, Clock::time_point now) {
@@ -78,24 +85,51 @@ bool EdgeTunnel::answerPing(std::span<const std::byte> message, Clock::time_poin
   answer.mutable_pong()->set_client_time_us(ping.ping().client_time_us());
   answer.mutable_pong()->set_server_time_us(schedule::microseconds(now) +
                                             static_cast<std::uint64_t>(*serverAheadUs_));
-  messages_.push_back({delivery::serialise(answer)});
+  messages_.add(delivery::serialise(answer));
   wake_();
   return true;
 }
 
 std::optional<SharedBytes> EdgeTunnel::next() {
   const std::lock_guard lock(mutex_);
-  if (messages_.empty()) return std::nullopt;
-  Waiting next = std::move(messages_.front());
-  messages_.pop_front();
-  if (next.sequence > 0) channel_.use(next.sequence);
+  SharedBytes next = messages_.next();
+  if (!next) return std::nullopt;
+  noteLeft();
+  // A frame that was too long for the link has left.
+  if (frameWake_ && messages_.hasNextFrame()) frameWake_();
+  return next;
+}
+
+std::optional<SharedBytes> EdgeTunnel::nextFrame(Clock::time_point /*now*/) {
+  const std::lock_guard lock(mutex_);
+  SharedBytes frame = messages_.nextFrame();
+  if (!frame) return std::nullopt;
+  noteLeft();
+  if (messages_.hasNext()) wake_();
+  return frame;
+}
+
+void EdgeTunnel::noteLeft() {
+  channel_.use(messages_.left());
   pollLocked();
-  return std::move(next.message);
+}
+
+void EdgeTunnel::setLink(std::optional<Link> link) {
+  const std::lock_guard lock(mutex_);
+  messages_.setLink(link);
+  if (!link) noteLeft();
+  if (messages_.hasNext()) wake_();
+  if (frameWake_ && messages_.hasNextFrame()) frameWake_();
+}
+
+void EdgeTunnel::setFrameWake(std::function<void()> wake) {
+  const std::lock_guard lock(mutex_);
+  frameWake_ = std::move(wake);
 }
 
 bool EdgeTunnel::ended() const {
   const std::lock_guard lock(mutex_);
-  return closed_ && messages_.empty();
+  return closed_ && !messages_.hasNext();
 }
 
 void EdgeTunnel::end(End how) {
@@ -119,9 +153,9 @@ void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) 
     if (segment.unknown()) {
       closed_ = true;
       if (!left_)
-        messages_.push_back({delivery::error(
+        messages_.add(delivery::error(
             v1::ERROR_CODE_CUT_OFF,
-            "the server that simulates the scene has lost this participant: join again", true)});
+            "the server that simulates the scene has lost this participant: join again", true));
     }
     const Clock::time_point now = Clock::now();
     heardAt_ = now;
@@ -136,10 +170,11 @@ void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) 
           received.message->size() <= kMaxPingBytes && parse(*received.message, pong) && pong.has_pong())
         serverAheadUs_ =
             static_cast<std::int64_t>(pong.pong().server_time_us() - schedule::microseconds(now));
-      messages_.push_back({std::move(received.message), received.sequence});
+      messages_.add(std::move(received.message), received.sequence);
     }
     pollLocked();
     if (left_) return;
+    if (frameWake_ && messages_.hasNextFrame()) frameWake_();
   }
   wake_();
 }
@@ -147,6 +182,7 @@ void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) 
 void EdgeTunnel::readRequest(std::span<const std::byte> message) {
   v1::ClientMessage parsed;
   if (!parse(message, parsed)) return;
+  if (parsed.has_frame_ack()) messages_.acknowledge(parsed.frame_ack().tick());
   if (parsed.has_hello() && !hello_.protocol_version()) hello_ = parsed.hello();
   if (!parsed.has_authenticate() || parsed.authenticate().token().empty()) return;
   token_ = parsed.authenticate().token();
@@ -180,7 +216,14 @@ void EdgeTunnel::pollLocked() {
   if (!nats_.connected()) return;
   const bool opens = !channel_.heard();
   known_ = true;
-  channel_.poll(Clock::now(), [&](const v1::Segment& segment) {
+  const Clock::time_point now = Clock::now();
+  if (messages_.needsKeyFrame() && !closed_ && !left_ && now - keyFrameAsked_ >= kKeyFrameInterval) {
+    keyFrameAsked_ = now;
+    v1::ClientMessage request;
+    request.mutable_key_frame_request();
+    pushLocked(*toBytes(request));
+  }
+  channel_.poll(now, [&](const v1::Segment& segment) {
     if (!opens) return nats_.publish(upSubject(stream_, id_), toBytes(segment));
     v1::Segment opening = segment;
     *opening.mutable_open() = open_;
@@ -193,14 +236,14 @@ void EdgeTunnel::moveTo(std::string stream) {
   if (closed_ || stream == stream_) return;
   if (!welcomed_) {
     closed_ = true;
-    messages_.push_back(
-        {delivery::error(v1::ERROR_CODE_CUT_OFF, "the scene has moved to another server: join again", true)});
+    messages_.add(
+        delivery::error(v1::ERROR_CODE_CUT_OFF, "the scene has moved to another server: join again", true));
     wake_();
     return;
   }
   stream_ = std::move(stream);
   channel_.restart();
-  for (Waiting& waiting : messages_) waiting.sequence = 0;  // of the former server
+  messages_.forgetChannel();
   *open_.mutable_continues() = hello_;
   pollLocked();
 }
@@ -210,7 +253,7 @@ void EdgeTunnel::close(const SharedBytes& last) {
     const std::lock_guard lock(mutex_);
     if (closed_) return;
     closed_ = true;
-    if (last && !left_) messages_.push_back({last});
+    if (last && !left_) messages_.add(last);
   }
   wake_();
 }
@@ -219,7 +262,7 @@ void EdgeTunnel::tell(SharedBytes message) {
   {
     const std::lock_guard lock(mutex_);
     if (closed_ || left_) return;
-    messages_.push_back({std::move(message)});
+    messages_.add(std::move(message));
   }
   wake_();
 }

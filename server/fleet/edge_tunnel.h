@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -18,6 +17,7 @@
 
 #include "server/fleet/channel.h"
 #include "server/fleet/nats.h"
+#include "server/fleet/relayed_messages.h"
 #include "server/fleet/subjects.h"
 #include "server/scene/remote_session.h"
 
@@ -34,7 +34,8 @@ class Strangers {
   std::map<std::string, schedule::Clock::time_point> until_;
 };
 
-// All bytes of the peer go through NATS, both ways, as they are. Thread-safe.
+// All bytes of the peer go through NATS, both ways, as they are. Datagrams end here: their input goes the
+// same way, and frames leave in them. Thread-safe.
 //
 // While nothing comes from the origin, pings are answered here, with its clock as it was last seen. A client
 // that waits for NATS thus stays connected.
@@ -54,6 +55,11 @@ class EdgeTunnel final : public scene::RemoteSession {
   std::optional<delivery::SharedBytes> next() override;
   bool ended() const override;
   void end(End how) override;
+  void setLink(std::optional<Link> link) override;
+  void setFrameWake(std::function<void()> wake) override;
+  std::optional<delivery::SharedBytes> nextFrame(schedule::Clock::time_point now) override;
+  // The origin chooses the quality by the acknowledgements of the peer.
+  bool wantsFinerQuality() const override { return false; }
 
   const TunnelId& id() const { return id_; }
   // From the origin. `stream` is the one that it comes from.
@@ -68,15 +74,13 @@ class EdgeTunnel final : public scene::RemoteSession {
   void tell(delivery::SharedBytes message);
 
  private:
-  struct Waiting {
-    delivery::SharedBytes message;
-    std::uint64_t sequence = 0;  // 0: not of the channel
-  };
-
   void pollLocked();
   // Answers a ping if the origin cannot. Returns false for other messages.
   bool answerPing(std::span<const std::byte> message, schedule::Clock::time_point now);
-  // The following two remember what another server needs to know the participant.
+  void pushLocked(std::span<const std::byte> message);
+  // Something has left: the origin may send more.
+  void noteLeft();
+  // The following two remember what another server needs to know the participant, and read acknowledgements.
   void readRequest(std::span<const std::byte> message);
   void readAnswer(const delivery::SharedBytes& message);
 
@@ -95,11 +99,13 @@ class EdgeTunnel final : public scene::RemoteSession {
   std::uint64_t tokenRequest_ = 0;
   Channel channel_;
   bool known_ = false;  // the origin may have heard of the peer
-  std::deque<Waiting> messages_;
-  schedule::Clock::time_point heardAt_{};      // newest segment
-  std::optional<std::int64_t> serverAheadUs_;  // clock of the origin, in its newest Pong
-  bool closed_ = false;                        // no message will follow
-  bool left_ = false;                          // the peer is gone
+  RelayedMessages messages_;
+  std::function<void()> frameWake_;
+  schedule::Clock::time_point heardAt_{};        // newest segment
+  schedule::Clock::time_point keyFrameAsked_{};  // by this edge
+  std::optional<std::int64_t> serverAheadUs_;    // clock of the origin, in its newest Pong
+  bool closed_ = false;                          // no message will follow
+  bool left_ = false;                            // the peer is gone
 };
 
 // Tunnels of one scene on an edge. Thread-safe.

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "clothstream/v1/session.pb.h"
-#include "server/delivery/mailbox.h"
+#include "server/delivery/link_outlet.h"
 #include "server/messages/datagram_offer.h"
 
 namespace clothstream::hosting {
@@ -21,8 +21,8 @@ struct DatagramPeer {
   // Address of this machine that the peer's stream has reached; empty: not known.
   std::string reached;
   messages::DatagramOffer offer;
-  // Its frames are taken by Mailbox::nextFrame().
-  std::shared_ptr<delivery::Mailbox> mailbox;
+  // Its frames are taken by nextFrame().
+  std::shared_ptr<delivery::LinkOutlet> outlet;
   // Takes a ClientMessage that came in a datagram. Called on a thread of the gate.
   std::function<void(std::span<const std::byte> message)> receive;
 };
@@ -37,7 +37,7 @@ class DatagramGate {
     std::shared_ptr<const void> association;  // datagrams end, soon after, when this is released
   };
   // Waits for the peer's datagrams. Nothing if there are too many peers. Does not block, and calls neither
-  // mailbox nor `receive` before it returns.
+  // outlet nor `receive` before it returns.
   [[nodiscard]] virtual std::optional<Opened> open(DatagramPeer peer) = 0;
 };
 

@@ -24,10 +24,21 @@ bool isAddress(const std::string& text) {
 std::vector<std::string> addressesOf(const std::string& host) {
   if (host == "localhost") return {"127.0.0.1"};
   if (isAddress(host) && host != "0.0.0.0" && host != "::") return {host};
+  const auto listens = [&](const std::string& address) {
+    return host != "0.0.0.0" || address.find(':') == std::string::npos;
+  };
   std::vector<std::string> addresses;
   for (const std::string& name : tls::namesOfThisMachine())
-    if (isAddress(name) && !isLoopback(name)) addresses.push_back(name);
+    if (isAddress(name) && !isLoopback(name) && listens(name)) addresses.push_back(name);
   return addresses;
+}
+
+endpoint::DatagramEndpointOptions datagramOptions(const NetworkOptions& network) {
+  return {.host = network.host,
+          .port = network.datagramPort.value_or(network.port),
+          .ownAddresses = addressesOf(network.host),
+          .publicAddresses = network.publicAddresses,
+          .maxPeers = 2 * network.maxConnections};
 }
 
 std::string addressInNetwork(const NetworkOptions& network) {

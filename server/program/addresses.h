@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/endpoint/datagram/datagram_endpoint.h"
 #include "server/options/program_options.h"
 
 namespace clothstream::program {
@@ -17,8 +18,12 @@ std::string localAddress(const std::string& host, std::uint16_t port);
 bool isAddress(const std::string& text);
 
 // Addresses of this machine that its peers can reach: `host`, or those of all interfaces if it stands for all
-// addresses. Loopback addresses are only among them if `host` is one.
+// addresses of IPv4 (0.0.0.0) or of both families (::). Loopback addresses are only among them if `host` is
+// one.
 std::vector<std::string> addressesOf(const std::string& host);
+
+// What the endpoint for datagrams is opened with.
+endpoint::DatagramEndpointOptions datagramOptions(const NetworkOptions& network);
 
 // The first address of this machine that others in its network can reach, or empty.
 std::string addressInNetwork(const NetworkOptions& network);

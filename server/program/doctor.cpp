@@ -13,6 +13,7 @@
 #include "server/doctor/device.h"
 #include "server/doctor/host.h"
 #include "server/endpoint/listen/listen.h"
+#include "server/program/addresses.h"
 #include "server/program/commands.h"
 #include "server/simulation/software_threads.h"
 
@@ -27,6 +28,9 @@ doctor::Findings checkHost(const ServeOptions& options) {
   doctor::Findings findings = {
       doctor::checkPort(options.network.host, options.network.port, "--port"),
       doctor::checkPort(options.network.host, options.network.grpcPort, "--grpc-port")};
+  if (options.network.datagrams != DatagramUse::off)
+    add(findings, doctor::checkDatagramPort(datagramOptions(options.network),
+                                            options.network.datagrams == DatagramUse::required));
   if (options.metrics.port)
     findings.push_back(doctor::checkPort(options.metrics.host, *options.metrics.port, "--metrics-port"));
   if (!options.tls.certificate.empty())

@@ -54,12 +54,7 @@ std::unique_ptr<endpoint::DatagramEndpoint> openDatagrams(hosting::SceneServer& 
                                                           const NetworkOptions& network) {
   if (network.datagrams == DatagramUse::off) return nullptr;
   try {
-    return std::make_unique<endpoint::DatagramEndpoint>(
-        server, endpoint::DatagramEndpointOptions{.host = network.host,
-                                                  .port = network.datagramPort.value_or(network.port),
-                                                  .ownAddresses = addressesOf(network.host),
-                                                  .publicAddresses = network.publicAddresses,
-                                                  .maxPeers = 2 * network.maxConnections});
+    return std::make_unique<endpoint::DatagramEndpoint>(server, datagramOptions(network));
   } catch (const std::exception& failure) {
     if (network.datagrams == DatagramUse::required)
       throw std::runtime_error(fmt::format("--transport datagrams: {}", failure.what()));

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "server/delivery/envelope.h"
+#include "server/delivery/link_outlet.h"
 
 namespace clothstream::scene {
 
@@ -23,16 +24,16 @@ struct RemotePeer {
 };
 
 // Thread-safe. The session ends with the destructor, as a lost connection, unless end() was called.
-class RemoteSession {
+//
+// Frames that the other server has sent may also leave by a link of this server.
+class RemoteSession : public delivery::LinkOutlet {
  public:
   enum class End : std::uint8_t { left, lost, pageClosed };
-
-  virtual ~RemoteSession() = default;
 
   // Sends a serialised ClientMessage. Messages arrive in their order, once. Returns false if too many wait,
   // because the other server does not answer.
   [[nodiscard]] virtual bool send(std::span<const std::byte> message) = 0;
-  // Next serialised ServerMessage for the peer, or nothing.
+  // Next serialised ServerMessage for the peer's stream, or nothing.
   virtual std::optional<delivery::SharedBytes> next() = 0;
   // Whether the other server has ended the session and next() has returned all its messages.
   virtual bool ended() const = 0;

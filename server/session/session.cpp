@@ -120,13 +120,14 @@ void Session::openDatagrams(const v1::DatagramOffer& message) {
   datagrams_.reset();
   v1::ServerMessage reply;
   v1::DatagramAnswer& answered = *reply.mutable_datagram_answer();
-  // Frames of another server come by its session with this peer, in their order.
-  const bool hasFrames = scene_ != nullptr && !inLockstep() && !mailbox_->atEdge();
+  // A participant at an edge has its datagrams there, with the frames of the server that simulates the scene.
+  const std::shared_ptr<scene::RemoteSession> remote = this->remote();
+  const bool hasFrames = remote || (scene_ != nullptr && !inLockstep() && !mailbox_->atEdge());
   if (hosting::DatagramGate* const gate = server_.datagrams.load(); gate != nullptr && hasFrames) {
     auto opened = gate->open({.name = peer_,
                               .reached = reached_,
                               .offer = std::move(*offer),
-                              .mailbox = mailbox_,
+                              .outlet = remote ? std::shared_ptr<delivery::LinkOutlet>(remote) : mailbox_,
                               .receive = [weak = weak_from_this()](std::span<const std::byte> bytes) {
                                 if (const std::shared_ptr<Session> session = weak.lock())
                                   session->receive(bytes);

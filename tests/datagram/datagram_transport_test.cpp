@@ -52,7 +52,7 @@ class Peer {
     answer.set_password(local.password);
     const auto own = dtls::digestOf(mode_ == Mode::opens ? certificate_.fingerprint() : fingerprint_);
     answer.set_fingerprint(own.data(), own.size());
-    answer.add_addresses("127.0.0.1");
+    answer.add_addresses(address);
     answer.set_port(socket_.port());
     return answer;
   }
@@ -82,6 +82,7 @@ class Peer {
       channel().send(std::span(out).first(frame.write({packet_++, 0, frame_}, i, out)));
     ++frame_;
   }
+  std::string address = "127.0.0.1";  // in answers
   // Messages of the client in datagrams.
   std::vector<v1::ClientMessage> input;
 
@@ -127,6 +128,9 @@ class Stream final : public Transport {
   // `idle` is called in each wait().
   Stream(Server server, std::function<void()> idle) : server_(std::move(server)), idle_(std::move(idle)) {}
 
+  std::string address;  // of serverAddress()
+
+  std::string serverAddress() const override { return address; }
   void say(std::string message) { incoming_.push_back(std::move(message)); }
 
   void connect(const std::string&) override { active_ = true; }
@@ -190,6 +194,7 @@ class DatagramTransportTest : public ::testing::Test {
             peer->sendFrame(
                 server_.frame(tick_, tick_ == 1 ? codec::PacketKind::key : codec::PacketKind::predicted));
         });
+    stream->address = streamAddress;
     NativeClientOptions options;
     options.joinTimeout = timeout;
     options.reconnectFor = std::chrono::milliseconds(0);
@@ -209,6 +214,7 @@ class DatagramTransportTest : public ::testing::Test {
   }
 
   std::shared_ptr<Peer> peer = std::make_shared<Peer>();
+  std::string streamAddress;
   std::atomic<int> acknowledgedByStream = 0, posesByStream = 0;
 
  private:
@@ -283,6 +289,13 @@ TEST_F(DatagramTransportTest, RequirementFailsWithAnotherKey) {
   ASSERT_FALSE(joined);
   EXPECT_EQ(joined.error().kind, Failure::Kind::unreachable);
   EXPECT_THAT(joined.error().text, HasSubstr("DTLS"));
+}
+
+TEST_F(DatagramTransportTest, TriesTheAddressOfTheStream) {
+  peer->address = "192.0.2.1";  // of no machine (RFC 5737)
+  streamAddress = "127.0.0.1";
+  const auto joined = join(Datagrams::required, std::chrono::seconds(20));
+  EXPECT_TRUE(joined) << joined.error().text;
 }
 
 TEST_F(DatagramTransportTest, OffMeansNoOffer) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "server/doctor/crowd.h"
 #include "server/doctor/device.h"
 #include "server/doctor/host.h"
+#include "server/endpoint/datagram/udp_port.h"
 #include "server/endpoint/listen/listen.h"
 #include "server/messages/scene_file.h"
 #include "server/tls/certificate.h"
@@ -53,6 +55,37 @@ TEST_F(Doctor, SeesWhetherAPortIsFree) {
   EXPECT_EQ(doctor::checkPort("127.0.0.1", port, "--port").level, Level::good);
   EXPECT_EQ(doctor::checkPort("127.0.0.1", 0, "--port").level, Level::good);
   EXPECT_EQ(doctor::checkPort("203.0.113.1", port, "--port").level, Level::problem);
+}
+
+TEST_F(Doctor, SeesWhetherTheDatagramPortIsFree) {
+  boost::asio::io_context io;
+  auto other = std::make_unique<endpoint::UdpPort>(io, "127.0.0.1", 0);
+  const endpoint::DatagramEndpointOptions options{.host = "127.0.0.1",
+                                                  .port = other->port(),
+                                                  .ownAddresses = {"192.0.2.1"},
+                                                  .publicAddresses = {"203.0.113.5", "2001:db8::1"}};
+  const doctor::Findings taken = doctor::checkDatagramPort(options, false);
+  ASSERT_EQ(taken.size(), 1u);
+  EXPECT_EQ(taken[0].level, Level::advice);
+  EXPECT_THAT(taken[0].text, HasSubstr("already in use; choose another with --datagram-port; clients stay"));
+  EXPECT_EQ(doctor::checkDatagramPort(options, true).at(0).level, Level::problem);
+  other.reset();
+  const doctor::Findings free = doctor::checkDatagramPort(options, true);
+  ASSERT_EQ(free.size(), 2u);
+  EXPECT_EQ(free[0].level, Level::good);
+  EXPECT_THAT(free[0].text, HasSubstr("(gRPC: 192.0.2.1), and --public-address (203.0.113.5, 2001:db8::1)"));
+  EXPECT_EQ(free[0].figures["ownAddresses"][0], "192.0.2.1");
+  EXPECT_GT(free[1].figures["receiveBytes"].get<int>(), 0);
+}
+
+TEST_F(Doctor, SeesShortUdpQueues) {
+  constexpr int kWanted = endpoint::UdpPort::kQueueBytes;
+  EXPECT_EQ(doctor::checkUdpQueues(kWanted, kWanted).level, Level::good);
+  const Finding tooShort = doctor::checkUdpQueues(212'992, kWanted);
+  EXPECT_EQ(tooShort.level, Level::advice);
+  EXPECT_THAT(tooShort.text, HasSubstr("208 kB for arriving, 4096 kB for leaving"));
+  EXPECT_THAT(tooShort.fix, HasSubstr("net.core.rmem_max=4194304"));
+  EXPECT_EQ(doctor::checkUdpQueues(kWanted, 212'992).level, Level::advice);
 }
 
 TEST_F(Doctor, SeesTheDaysAndNamesOfACertificate) {

@@ -13,6 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "clients/grpc/channel.h"
 #include "clients/grpc/grpc_client.h"
 #include "clients/websocket/web_socket_transport.h"
 #include "server/delivery/envelope.h"
@@ -92,14 +93,16 @@ class Redirects : public SmallServer, public ::testing::WithParamInterface<Endpo
     options.scene = scene;
     options.joinTimeout = std::chrono::seconds(60);  // for sanitizers on a busy machine
     options.onLog = [this](LogLevel, const std::string& text) { log_ += text + "\n"; };
-    return NativeClient::join(address,
-                              GetParam() == Endpoint::grpc ? clothstream::makeGrpcTransport(address)
-                                                           : makeWebSocketTransport(address),
-                              options, [this](cs_client*, std::uint32_t events) {
+    return NativeClient::join(address, makeTransport(address), options,
+                              [this](cs_client*, std::uint32_t events) {
                                 if ((events & CS_EVENT_FRAME) != 0) ++frames_;
                                 if ((events & CS_EVENT_RETURNED) != 0) ++returns_;
                                 if ((events & CS_EVENT_ERROR) != 0) ++errors_;
                               });
+  }
+  std::unique_ptr<Transport> makeTransport(const ServerAddress& address) const {
+    return GetParam() == Endpoint::grpc ? clothstream::makeGrpcTransport(address)
+                                        : makeWebSocketTransport(address);
   }
   std::string refusal(const ServerAddress& address, const std::string& scene) {
     const auto joined = join(address, scene);
@@ -148,6 +151,14 @@ class Redirects : public SmallServer, public ::testing::WithParamInterface<Endpo
   std::uint16_t port_ = 0;
 };
 
+TEST(GrpcPeerTest, HasAddress) {
+  EXPECT_EQ(addressIn("ipv4:192.0.2.1:50051"), "192.0.2.1");
+  EXPECT_EQ(addressIn("ipv6:%5B2001:db8::1%5D:50051"), "2001:db8::1");
+  EXPECT_EQ(addressIn("ipv6:[::1]:50051"), "::1");
+  for (const char* other : {"", "unknown", "unix:/run/server", "dns:///cloth.example:443", "ipv4:"})
+    EXPECT_EQ(addressIn(other), "") << other;
+}
+
 INSTANTIATE_TEST_SUITE_P(Transports, Redirects, ::testing::Values(Endpoint::grpc, Endpoint::web),
                          [](const auto& endpoint) {
                            return std::string(endpoint.param == Endpoint::grpc ? "Grpc" : "WebSocket");
@@ -163,6 +174,18 @@ TEST_P(Redirects, FirstJoinGoesToTheServerThatHasTheScene) {
   joined->reset();
   EXPECT_THAT(log_, HasSubstr("another server: connecting to " + addressOf(kSecond)));
   EXPECT_THAT(log_, HasSubstr("at " + addressOf(kSecond) + " as participant"));
+}
+
+// Datagrams go to the same address.
+TEST_P(Redirects, TransportKnowsServerAddress) {
+  listen();
+  const auto transport = makeTransport(first());
+  EXPECT_EQ(transport->serverAddress(), "");
+  transport->connect("");
+  EXPECT_TRUE(eventually([&] {
+    transport->wait(std::chrono::milliseconds(1));
+    return transport->hasOpened() && transport->serverAddress() == kFirst;
+  })) << transport->serverAddress();
 }
 
 TEST_P(Redirects, ReportsTheServerThatRefuses) {

@@ -2,6 +2,7 @@
 // Participants on an edge: their inputs reach the server that simulates the scene, in order and once.
 #include <algorithm>
 #include <chrono>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -9,6 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/codec/packet_header.h"
+#include "server/endpoint/datagram/datagram_endpoint.h"
+#include "tests/endpoint/datagram/datagram_client.h"
 #include "tests/fleet/fleet_test.h"
 
 namespace clothstream::fleet {
@@ -235,6 +239,73 @@ TEST_F(EdgeParticipantsTest, AnOriginThatIsLostCutsThemOff) {
   peer.join("small");
   origin.reset();
   EXPECT_THAT(peer.readToTheEnd().notice().text(), HasSubstr("stopping"));
+}
+
+class EdgeDatagramsTest : public EdgeParticipantsTest {
+ protected:
+  // Lets the client work until `holds` returns true.
+  static bool until(tests::DatagramClient& client, const auto& holds) {
+    for (int i = 0; i < 40'000 && !holds(); ++i) {
+      client.poll();
+      std::this_thread::sleep_for(500us);
+    }
+    return holds();
+  }
+  static v1::Frame frameIn(const std::vector<std::byte>& bytes) {
+    v1::ServerMessage message;
+    EXPECT_TRUE(message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
+    return message.frame();
+  }
+  static codec::PacketHeader headerIn(const std::vector<std::byte>& bytes) {
+    const v1::Frame frame = frameIn(bytes);
+    const auto packet = codec::parsePacket(std::as_bytes(std::span(frame.packet())));
+    EXPECT_TRUE(packet);
+    return packet ? packet->header : codec::PacketHeader{};
+  }
+};
+
+TEST_F(EdgeDatagramsTest, CarryFramesAndPosesOfParticipants) {
+  const auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  const endpoint::DatagramEndpoint endpoint(edge->server, {});
+  tests::DatagramClient client(edge->server, "small");
+  client.offer();
+  ASSERT_TRUE(until(client, [&] { return client.datagramFrames.size() >= 20; }));
+  EXPECT_EQ(origin->find("small")->roster.size(), 1u) << "a participant of the origin";
+  const std::size_t byStream = client.streamFrames.size();
+
+  v1::ClientMessage poses;
+  v1::ParticipantCollider& collider = *poses.mutable_collider_poses()->add_colliders();
+  collider.mutable_pose()->mutable_position()->set_x(0.25F);
+  collider.mutable_sphere()->set_radius(0.1F);
+  client.sendDatagram(poses);
+  ASSERT_TRUE(until(client, [&] {
+    const v1::Frame frame = frameIn(client.datagramFrames.back());
+    return std::ranges::any_of(frame.colliders(),
+                               [](const auto& each) { return each.participant_id() != 0; });
+  }));
+  EXPECT_EQ(client.streamFrames.size(), byStream);
+  for (std::size_t i = 1; i < client.datagramFrames.size(); ++i) {
+    const codec::PacketHeader header = headerIn(client.datagramFrames[i]);
+    if (header.kind == codec::PacketKind::key) continue;
+    EXPECT_EQ(header.references[0], headerIn(client.datagramFrames[i - 1]).tick);
+  }
+}
+
+TEST_F(EdgeDatagramsTest, EndWithKeyFrameOnStream) {
+  const auto origin = startOrigin();
+  const auto edge = startEdge("small");
+  const endpoint::DatagramEndpoint endpoint(edge->server, {});
+  tests::DatagramClient client(edge->server, "small");
+  client.offer();
+  ASSERT_TRUE(until(client, [&] { return client.datagramFrames.size() >= 5; }));
+  const std::size_t byStream = client.streamFrames.size();
+  // Frames leave in datagrams that the client does not read any more.
+  std::this_thread::sleep_for(100ms);
+  client.offer(false, std::string(32, 'x'));
+  ASSERT_TRUE(until(client, [&] { return client.streamFrames.size() >= byStream + 3; }));
+  EXPECT_EQ(headerIn(client.streamFrames[byStream]).kind, codec::PacketKind::key);
+  EXPECT_EQ(edge->server.metrics.datagrams.peers, 0u);
 }
 
 // A scene is replaced at an edge while somebody joins it there.

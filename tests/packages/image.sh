@@ -82,6 +82,9 @@ echo "The other parts"
 amtool check-config "$source/deploy/image/alertmanager.yml" >/dev/null
 CLOTHSTREAM_NAME=cloth.example.org docker-compose --file "$source/deploy/image/compose.yaml" config >"$work/compose"
 grep -q 'public-name=cloth.example.org' "$work/compose"
+CLOTHSTREAM_NAME=cloth.example.org CLOTHSTREAM_ADDRESS=192.0.2.1 docker-compose --file "$source/deploy/image/compose.yaml" config >"$work/addressed"
+grep -q 'CLOTHSTREAM_PUBLIC_ADDRESS.*192.0.2.1' "$work/addressed"
+grep -q '8080:8080/udp\|protocol: udp' "$work/addressed"
 grep -q "image: ${image#localhost/}\$" "$work/compose" || { echo "compose.yaml names another image than $image"; exit 1; }
 ! docker-compose --file "$source/deploy/image/compose.yaml" config >/dev/null 2>"$work/problem" || { echo "a name is needed"; exit 1; }
 grep -q 'the name of this machine' "$work/problem"

@@ -123,6 +123,9 @@ function selected(objects, selector, what) {
 }
 
 const portsOf = (workload) => podOf(workload).containers.flatMap((container) => container.ports.map((port) => port.name));
+// Whether a Service or a policy names the protocol of a port of the pod.
+const fitsProtocol = (workload, name, protocol) =>
+  podOf(workload).containers.some((container) => container.ports.some((port) => port.name === name && (port.protocol ?? "TCP") === (protocol ?? "TCP")));
 
 // Runs a check for each build.
 function testEach(title, check) {
@@ -243,6 +246,7 @@ testEach("probes ask the port for operators", (objects) => {
         web: config.port,
         grpc: config["grpc-port"],
         metrics: config["metrics-port"],
+        ...(config.transport === "tcp" ? {} : { datagrams: config["datagram-port"] }),
       });
       assert.equal(port.name, "metrics");
       assert.deepEqual([config.host, config["metrics-host"]], ["0.0.0.0", "0.0.0.0"]); // kubelet does not use the loopback address
@@ -306,7 +310,7 @@ testEach("selectors find pods with these ports", (objects) => {
   for (const service of ofKind(objects, "Service")) {
     const [workload, ...others] = selected(objects, { matchLabels: service.spec.selector }, nameOf(service));
     assert.deepEqual(others, []);
-    for (const { targetPort } of service.spec.ports) assert.ok(portsOf(workload).includes(targetPort), `${nameOf(service)}: ${targetPort}`);
+    for (const { targetPort, protocol } of service.spec.ports) assert.ok(fitsProtocol(workload, targetPort, protocol), `${nameOf(service)}: ${targetPort}`);
     if (service.spec.type === "LoadBalancer")
       assert.deepEqual(
         service.spec.ports.map(({ targetPort }) => targetPort),
@@ -342,15 +346,15 @@ testEach("network policies let in and out what is needed", (objects) => {
   const policies = ofKind(objects, "NetworkPolicy");
   for (const policy of policies) {
     const targets = selected(objects, policy.spec.podSelector, nameOf(policy));
-    for (const { port } of (policy.spec.ingress ?? []).flatMap((rule) => rule.ports))
-      for (const target of targets) assert.ok(portsOf(target).includes(port), `${nameOf(policy)}: ${port}`);
+    for (const { port, protocol } of (policy.spec.ingress ?? []).flatMap((rule) => rule.ports))
+      for (const target of targets) assert.ok(fitsProtocol(target, port, protocol), `${nameOf(policy)}: ${port}`);
     for (const rule of policy.spec.egress ?? [])
       for (const peer of rule.to ?? [])
         for (const { port } of rule.ports)
           for (const to of selected(objects, peer.podSelector, nameOf(policy))) assert.ok(portsOf(to).includes(port), `${nameOf(policy)}: ${port}`);
   }
   const kAllowed = {
-    server: { web: ["everyone"], grpc: [], metrics: ["namespace monitoring"] },
+    server: { web: ["everyone"], datagrams: ["everyone"], grpc: [], metrics: ["namespace monitoring"] },
     edge: { web: ["everyone"], grpc: [], metrics: ["namespace monitoring"] },
     nats: { nats: ["edge", "server"], routes: ["nats"], monitor: [] },
     backend: { http: ["namespace application", "server"] },
@@ -385,7 +389,7 @@ testEach("network policies let in and out what is needed", (objects) => {
 });
 
 // Values for fields that a pod refers to.
-const kFields = { "metadata.name": "pod-0", "metadata.namespace": "clothstream", "spec.nodeName": "node-1" };
+const kFields = { "metadata.name": "pod-0", "metadata.namespace": "clothstream", "spec.nodeName": "node-1", "status.hostIP": "192.0.2.7" };
 
 function expand(text, variables) {
   return text.replace(/\$\((\w+)\)/g, (_, name) => {
@@ -424,6 +428,26 @@ function effective(objects, container) {
   }
   return printed.get(key);
 }
+
+// The server tells clients the address of its node and its own port, so each step on the way has the same number.
+testEach("datagrams reach the server by its node", (objects) => {
+  for (const workload of workloads(objects)) {
+    for (const container of podOf(workload).containers.filter(isOurs)) {
+      const config = effective(objects, container);
+      const ways = ofKind(objects, "Service").filter((service) => service.spec.ports.some(({ targetPort }) => targetPort === "datagrams"));
+      const own = ways.filter((service) => matches({ matchLabels: service.spec.selector }, labelsOf(workload)));
+      assert.equal(own.length, config.transport === "tcp" ? 0 : 1, nameOf(workload));
+      for (const { spec } of own) {
+        const number = config["datagram-port"];
+        assert.deepEqual(spec.ports, [{ name: "datagrams", protocol: "UDP", port: number, targetPort: "datagrams", nodePort: number }]);
+        assert.ok(number >= 30000 && number <= 32767); // NodePorts of Kubernetes
+        assert.equal(spec.externalTrafficPolicy, "Local"); // another node would hide the address of the client
+        assert.deepEqual(config["public-address"], [kFields["status.hostIP"]]);
+        assert.equal(workload.spec.replicas, 1);
+      }
+    }
+  }
+});
 
 testEach("the server has every option", (objects) => {
   for (const container of workloads(objects)

@@ -31,8 +31,8 @@ class Association {
   // The same of all other addresses together: anybody who has seen a check can send others with its name.
   static constexpr double kUnprovenPerSecond = 100, kUnprovenBurst = 100;
 
-  // `local`: the server's credentials. `wake` is called, from any thread, when the mailbox has something. For
-  // the other functions see SecurePath::Callbacks.
+  // `local`: the server's credentials. `wake` is called, from any thread, when the peer's outlet has
+  // something. For the other functions see SecurePath::Callbacks.
   using Transmit = std::function<void(const Address& to, std::span<const std::byte> datagram)>;
   using Admit = std::function<std::shared_ptr<const void>(const Address& from)>;
   Association(const AssociationContext& context, ice::Credentials local, hosting::DatagramPeer peer,
@@ -45,7 +45,7 @@ class Association {
   };
   // Handles a datagram of any bytes.
   Handled handle(const Address& from, std::span<const std::byte> datagram, Time now);
-  // Does what is due. Call it at nextTime(), after handle(), and when the mailbox has something.
+  // Does what is due. Call it at nextTime(), after handle(), and when the peer's outlet has something.
   void advance(Time now);
   Time nextTime() const;
 

@@ -44,14 +44,14 @@ class AssociationTable {
   AssociationTable& operator=(const AssociationTable&) = delete;
 
   // `local`: new credentials of the server, whose fragment names the association. `wake` is called, from any
-  // thread, when the mailbox has something: wake() must follow.
+  // thread, when the peer's outlet has something: wake() must follow.
   void add(ice::Credentials local, hosting::DatagramPeer peer, std::function<void()> wake, Time now);
   // Does nothing if there is no such association.
   void remove(const std::string& ufrag);
   void clear();
   // Handles a datagram of any bytes.
   void handle(const Route& route, std::span<const std::byte> datagram, Time now);
-  // The mailbox of this association's peer has something.
+  // The outlet of this association's peer has something.
   void wake(const std::string& ufrag, Time now);
   // Does what is due. Call it at nextTime().
   void advance(Time now);

@@ -22,12 +22,12 @@ constexpr Clock::duration kSettled = 2 * delivery::RateController::kSilence;
 FrameLink::FrameLink(hosting::DatagramPeer peer, std::function<void()> wake, std::uint32_t headerBytes,
                      SharedPieces& pieces, telemetry::DatagramMetrics& metrics)
     : peer_(std::move(peer)), pieces_(pieces), metrics_(metrics), sender_(headerBytes) {
-  peer_.mailbox->setFrameWake(std::move(wake));
+  peer_.outlet->setFrameWake(std::move(wake));
 }
 
 FrameLink::~FrameLink() {
   enter(State::closed, {});
-  peer_.mailbox->setFrameWake(nullptr);
+  peer_.outlet->setFrameWake(nullptr);
 }
 
 void FrameLink::enter(State state, Clock::time_point now) {
@@ -35,7 +35,7 @@ void FrameLink::enter(State state, Clock::time_point now) {
   if (state == State::used) ++metrics_.peers;
   if (state_ == State::used) {
     --metrics_.peers;
-    peer_.mailbox->setLink(std::nullopt);
+    peer_.outlet->setLink(std::nullopt);
     sender_.forgetPath();
   }
   state_ = state;
@@ -84,9 +84,9 @@ void FrameLink::advance(bool open, Clock::time_point now, const Send& send) {
 }
 
 void FrameLink::takeFrames(Clock::time_point now) {
-  delivery::Mailbox& mailbox = *peer_.mailbox;
-  while (const std::optional<delivery::SharedBytes> frame = mailbox.nextFrame(now)) {
-    const unsigned rows = sender_.rowsFor((*frame)->size(), mailbox.wantsFinerQuality(), now);
+  delivery::LinkOutlet& outlet = *peer_.outlet;
+  while (const std::optional<delivery::SharedBytes> frame = outlet.nextFrame(now)) {
+    const unsigned rows = sender_.rowsFor((*frame)->size(), outlet.wantsFinerQuality(), now);
     sender_.add(pieces_.of(*frame, rows), rows, now);
     sent_ = now;
     updateLink(now);
@@ -95,7 +95,7 @@ void FrameLink::takeFrames(Clock::time_point now) {
 
 void FrameLink::updateLink(Clock::time_point now) {
   updated_ = now;
-  peer_.mailbox->setLink(sender_.link(now));
+  peer_.outlet->setLink(sender_.link(now));
 }
 
 Clock::time_point FrameLink::nextTime() const {

@@ -17,7 +17,7 @@
 
 namespace clothstream::endpoint {
 
-// While the path is open, frames leave the mailbox by datagrams. When the peer's receipts stop
+// While the path is open, frames leave by datagrams. When the peer's receipts stop
 // (FrameSender::silent), they leave by the stream again. A single packet then probes the path after
 // kFirstPause, and again after pauses that double up to kLongestPause; frames return when one is received. A
 // new address of the peer is probed at once.
@@ -26,10 +26,10 @@ namespace clothstream::endpoint {
 class FrameLink {
  public:
   static constexpr std::chrono::seconds kFirstPause{2}, kLongestPause{60};
-  // Interval of Mailbox::setLink() while frames are sent.
+  // Interval of LinkOutlet::setLink() while frames are sent.
   static constexpr std::chrono::milliseconds kUpdateInterval{20};
 
-  // `wake` as for Mailbox::setFrameWake(), `headerBytes` as for FrameSender. `pieces` and `metrics` must
+  // `wake` as for LinkOutlet::setFrameWake(), `headerBytes` as for FrameSender. `pieces` and `metrics` must
   // outlive the link.
   FrameLink(hosting::DatagramPeer peer, std::function<void()> wake, std::uint32_t headerBytes,
             SharedPieces& pieces, telemetry::DatagramMetrics& metrics);
@@ -44,7 +44,7 @@ class FrameLink {
   // Sends a payload. `last`: no other one follows at once.
   using Send = std::function<void(std::span<const std::byte> payload, bool last)>;
   // Does what is due. `open`: payloads can be sent. Call it at nextTime(), after receive(), when `open`
-  // changes, and when the mailbox has something.
+  // changes, and when the peer's outlet has something.
   void advance(bool open, Clock::time_point now, const Send& send);
   Clock::time_point nextTime() const;
   // Probes a silent path at this time already.
@@ -66,7 +66,7 @@ class FrameLink {
   datagram::InputReceiver input_;
   State state_ = State::closed;
   Clock::time_point since_{};    // beginning of the state
-  Clock::time_point updated_{};  // newest update of the mailbox
+  Clock::time_point updated_{};  // newest update of the outlet
   Clock::time_point sent_{};     // newest frame
   Clock::time_point probeAt_{};
   Clock::duration pause_ = kFirstPause;  // before probeAt_

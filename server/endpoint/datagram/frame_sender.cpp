@@ -91,7 +91,7 @@ std::optional<std::uint64_t> FrameSender::acknowledge(const datagram::Receipt& r
   return controller_.lostPackets() - lostBefore;
 }
 
-delivery::Mailbox::Link FrameSender::link(Clock::time_point now) {
+delivery::LinkOutlet::Link FrameSender::link(Clock::time_point now) {
   return {.hasRoom = controller_.hasRoom(pacer_.bytes(), now), .frameRate = controller_.rate() * frameShare_};
 }
 

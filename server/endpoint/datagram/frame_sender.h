@@ -12,7 +12,7 @@
 #include "proto/datagram/piece_request.h"
 #include "proto/datagram/receipt.h"
 #include "proto/datagram/sent_frames.h"
-#include "server/delivery/mailbox.h"
+#include "server/delivery/link_outlet.h"
 #include "server/delivery/packet_pacer.h"
 #include "server/delivery/parity_policy.h"
 #include "server/delivery/rate_controller.h"
@@ -51,8 +51,8 @@ class FrameSender {
   // receipt names a packet that was never sent.
   std::optional<std::uint64_t> acknowledge(const datagram::Receipt& receipt, Clock::time_point now);
 
-  // State of the link for the mailbox.
-  delivery::Mailbox::Link link(Clock::time_point now);
+  // State of the link for the outlet.
+  delivery::LinkOutlet::Link link(Clock::time_point now);
   // No receipt has come for RateController::kSilence although packets were sent.
   bool silent(Clock::time_point now) const { return controller_.silent(now); }
   // A packet that was sent since forgetPath() has arrived.

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cstddef>
 #include <cstring>
 #include <exception>
 #include <stdexcept>
@@ -24,27 +26,82 @@ using net::ip::udp;
 
 // Datagrams that are handled before others may use the thread.
 constexpr int kDatagramsInARow = 64;
-// Bytes of each of the kernel's queues. The kernel may allow less.
-constexpr int kQueueBytes = 4 * 1024 * 1024;
-
+// Of the IPv4 address in a mapped one.
+constexpr std::ptrdiff_t kIpv4Offset = 12;
+// Room for either family: the structure of IPv6 is the longer one.
 using PacketInfo = std::array<char, CMSG_SPACE(sizeof(in6_pktinfo))>;
 
-net::ip::address_v6 asV6(const net::ip::address& address) {
-  return address.is_v6() ? address.to_v6() : net::ip::make_address_v6(net::ip::v4_mapped, address.to_v4());
+// Whether the kernel has IPv6 sockets (not after ipv6.disable=1). The socket is then open.
+bool openIpv6(udp::socket& socket, boost::system::error_code& error) {
+  socket.open(udp::v6(), error);
+  return error != net::error::address_family_not_supported;
 }
 
-Address addressOf(const sockaddr_in6& from) {
-  Address address{.bytes = {}, .port = ntohs(from.sin6_port)};
-  std::memcpy(address.bytes.data(), &from.sin6_addr, address.bytes.size());
+// The same address for a socket of both families, or of IPv4 alone.
+net::ip::address ofFamily(const net::ip::address& address, bool ipv6, boost::system::error_code& error) {
+  if (ipv6) return address.is_v6() ? address : net::ip::make_address_v6(net::ip::v4_mapped, address.to_v4());
+  if (address.is_v6() && address.is_unspecified()) return net::ip::address_v4::any();
+  if (address.is_v6()) error = net::error::address_family_not_supported;
   return address;
 }
 
+Address addressOf(const sockaddr_storage& from) {
+  Address address;
+  if (from.ss_family == AF_INET) {
+    sockaddr_in ipv4;
+    std::memcpy(&ipv4, &from, sizeof ipv4);
+    return Address::ofIpv4(std::bit_cast<std::array<std::uint8_t, 4>>(ipv4.sin_addr), ntohs(ipv4.sin_port));
+  }
+  sockaddr_in6 ipv6;
+  std::memcpy(&ipv6, &from, sizeof ipv6);
+  std::memcpy(address.bytes.data(), &ipv6.sin6_addr, address.bytes.size());
+  address.port = ntohs(ipv6.sin6_port);
+  return address;
+}
+
+// Returns the length of the address that is written to `to`.
+socklen_t write(const Address& address, bool ipv6, sockaddr_storage& to) {
+  if (ipv6) {
+    sockaddr_in6 written{};
+    written.sin6_family = AF_INET6;
+    written.sin6_port = htons(address.port);
+    std::memcpy(&written.sin6_addr, address.bytes.data(), address.bytes.size());
+    std::memcpy(&to, &written, sizeof written);
+    return sizeof written;
+  }
+  sockaddr_in written{};
+  written.sin_family = AF_INET;
+  written.sin_port = htons(address.port);
+  std::memcpy(&written.sin_addr, address.bytes.data() + kIpv4Offset, sizeof written.sin_addr);
+  std::memcpy(&to, &written, sizeof written);
+  return sizeof written;
+}
+
 std::array<std::uint8_t, 16> destinationOf(msghdr& message) {
-  std::array<std::uint8_t, 16> destination{};
-  for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr; part = CMSG_NXTHDR(&message, part))
-    if (part->cmsg_level == IPPROTO_IPV6 && part->cmsg_type == IPV6_PKTINFO)
+  for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr; part = CMSG_NXTHDR(&message, part)) {
+    if (part->cmsg_level == IPPROTO_IPV6 && part->cmsg_type == IPV6_PKTINFO) {
+      std::array<std::uint8_t, 16> destination;
       std::memcpy(destination.data(), CMSG_DATA(part) + offsetof(in6_pktinfo, ipi6_addr), destination.size());
-  return destination;
+      return destination;
+    }
+    if (part->cmsg_level == IPPROTO_IP && part->cmsg_type == IP_PKTINFO) {
+      std::array<std::uint8_t, 4> destination;
+      std::memcpy(destination.data(), CMSG_DATA(part) + offsetof(in_pktinfo, ipi_addr), destination.size());
+      return Address::ofIpv4(destination, 0).bytes;
+    }
+  }
+  return {};
+}
+
+// Adds the source of a datagram to its message, which has room for a PacketInfo.
+template <typename Info>
+void setSource(msghdr& message, int level, int type, const Info& source) {
+  message.msg_controllen = CMSG_SPACE(sizeof source);
+  cmsghdr* const part = CMSG_FIRSTHDR(&message);
+  part->cmsg_level = level;
+  part->cmsg_type = type;
+  part->cmsg_len = CMSG_LEN(sizeof source);
+  std::memcpy(CMSG_DATA(part), &source, sizeof source);
 }
 
 }  // namespace
@@ -57,19 +114,33 @@ UdpPort::UdpPort(net::io_context& io, const std::string& host, std::uint16_t por
         fmt::format("cannot open UDP port {} of {} for datagrams: {}", port, host, why));
   };
   if (error) throw refuse(error.message());
-  const udp::endpoint endpoint(asV6(found.begin()->endpoint().address()), port);
-  socket_.open(udp::v6(), error);
-  if (!error) socket_.set_option(net::ip::v6_only(false), error);
-  if (!error) socket_.bind(endpoint, error);
+  hasIpv6_ = openIpv6(socket_, error);
+  if (!hasIpv6_) socket_.open(udp::v4(), error);
+  if (!error && hasIpv6_) socket_.set_option(net::ip::v6_only(false), error);
+  const net::ip::address address = ofFamily(found.begin()->endpoint().address(), hasIpv6_, error);
+  if (!error) socket_.bind({address, port}, error);
   if (!error) socket_.non_blocking(true, error);
   if (error == net::error::address_in_use)
     throw refuse("it is already in use; choose another with --datagram-port");
+  if (error == net::error::access_denied)
+    throw refuse(
+        "ports below 1024 need the capability CAP_NET_BIND_SERVICE; choose another with --datagram-port");
   if (error) throw refuse(error.message());
   const int on = 1;
-  if (::setsockopt(socket_.native_handle(), IPPROTO_IPV6, IPV6_RECVPKTINFO, &on, sizeof on) != 0)
+  if ((hasIpv6_ ? ::setsockopt(socket_.native_handle(), IPPROTO_IPV6, IPV6_RECVPKTINFO, &on, sizeof on)
+                : ::setsockopt(socket_.native_handle(), IPPROTO_IP, IP_PKTINFO, &on, sizeof on)) != 0)
     throw refuse("the kernel does not say to which address datagrams were sent");
   for (const int queue : {SO_RCVBUF, SO_SNDBUF})
     ::setsockopt(socket_.native_handle(), SOL_SOCKET, queue, &kQueueBytes, sizeof kQueueBytes);
+}
+
+UdpPort::Queues UdpPort::queues() const {
+  boost::system::error_code error;  // leaves 0
+  net::socket_base::receive_buffer_size receive;
+  net::socket_base::send_buffer_size send;
+  socket_.get_option(receive, error);
+  socket_.get_option(send, error);
+  return {.receive = receive.value(), .send = send.value()};
 }
 
 void UdpPort::receive(std::function<void(const Route&, std::span<const std::byte>)> handle,
@@ -90,7 +161,7 @@ void UdpPort::await() {
 void UdpPort::receiveSome() {
   std::array<std::byte, dtls::kMaxDatagramBytes> datagram;
   for (int i = 0; i < kDatagramsInARow; ++i) {
-    sockaddr_in6 from{};
+    sockaddr_storage from{};
     alignas(cmsghdr) PacketInfo info{};
     iovec bytes{.iov_base = datagram.data(), .iov_len = datagram.size()};
     msghdr message{};
@@ -110,25 +181,25 @@ void UdpPort::receiveSome() {
 }
 
 void UdpPort::send(const Route& route, std::span<const std::byte> datagram) {
-  sockaddr_in6 to{};
-  to.sin6_family = AF_INET6;
-  to.sin6_port = htons(route.peer.port);
-  std::memcpy(&to.sin6_addr, route.peer.bytes.data(), route.peer.bytes.size());
+  sockaddr_storage to{};
   iovec bytes{.iov_base = const_cast<std::byte*>(datagram.data()), .iov_len = datagram.size()};
   msghdr message{};
   message.msg_name = &to;
-  message.msg_namelen = sizeof to;
+  message.msg_namelen = write(route.peer, hasIpv6_, to);
   message.msg_iov = &bytes;
   message.msg_iovlen = 1;
   alignas(cmsghdr) PacketInfo info{};
   if (route.local != decltype(route.local){}) {
     message.msg_control = info.data();
-    message.msg_controllen = info.size();
-    cmsghdr* const part = CMSG_FIRSTHDR(&message);
-    part->cmsg_level = IPPROTO_IPV6;
-    part->cmsg_type = IPV6_PKTINFO;
-    part->cmsg_len = CMSG_LEN(sizeof(in6_pktinfo));
-    std::memcpy(CMSG_DATA(part) + offsetof(in6_pktinfo, ipi6_addr), route.local.data(), route.local.size());
+    if (hasIpv6_) {
+      in6_pktinfo source{};
+      std::memcpy(&source.ipi6_addr, route.local.data(), route.local.size());
+      setSource(message, IPPROTO_IPV6, IPV6_PKTINFO, source);
+    } else {
+      in_pktinfo source{};
+      std::memcpy(&source.ipi_spec_dst, route.local.data() + kIpv4Offset, sizeof source.ipi_spec_dst);
+      setSource(message, IPPROTO_IP, IP_PKTINFO, source);
+    }
   }
   static_cast<void>(::sendmsg(socket_.native_handle(), &message, 0));
 }

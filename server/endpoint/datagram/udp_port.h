@@ -17,14 +17,24 @@ namespace clothstream::endpoint {
 
 // Peers check that answers come from the address that they have sent to (RFC 8445, section 7.2.5.2.1), but a
 // machine may have several. So each datagram is received with its destination, and sent with a source
-// (IPV6_PKTINFO, RFC 3542, section 6). The socket has both families. Belongs to the io thread.
+// (IPV6_PKTINFO, RFC 3542, section 6; IP_PKTINFO of ip(7)). The socket has both families, or IPv4 alone if
+// the kernel has no IPv6 sockets. Belongs to the io thread.
 class UdpPort {
  public:
+  // Bytes of each of the kernel's two queues that the port asks for.
+  static constexpr int kQueueBytes = 4 * 1024 * 1024;
+
   // `host` is an address or a name of this machine; port 0 picks a free one. Throws std::runtime_error that
   // says what to do if the port is in use, or the host is not an address of this machine.
   UdpPort(boost::asio::io_context& io, const std::string& host, std::uint16_t port);
 
   std::uint16_t port() const { return socket_.local_endpoint().port(); }
+  bool hasIpv6() const { return hasIpv6_; }
+  struct Queues {
+    int receive, send;
+  };
+  // Bytes that the kernel allows for each queue.
+  Queues queues() const;
 
   // Calls `handle` with each datagram from now on, several in a row, and `done` after these. Longer datagrams
   // than dtls::kMaxDatagramBytes are dropped. Call it once.
@@ -39,6 +49,7 @@ class UdpPort {
   void receiveSome();
 
   boost::asio::ip::udp::socket socket_;
+  bool hasIpv6_ = true;
   std::function<void(const Route& route, std::span<const std::byte> datagram)> handle_;
   std::function<void()> done_;
 };

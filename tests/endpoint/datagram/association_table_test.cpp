@@ -10,6 +10,8 @@
 
 #include <gtest/gtest.h>
 
+#include "server/delivery/mailbox.h"
+
 namespace clothstream::endpoint {
 namespace {
 
@@ -25,7 +27,7 @@ class AssociationTableTest : public ::testing::Test {
         {.name = "peer",
          .reached = {},
          .offer = {.ufrag = client.ufrag, .password = client.password, .fingerprint = {}},
-         .mailbox = std::make_shared<delivery::Mailbox>([] {}),
+         .outlet = std::make_shared<delivery::Mailbox>([] {}),
          .receive = [](auto) {}},
         [] {}, now);
   }

@@ -11,6 +11,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "proto/codec/packet_header.h"
 #include "proto/codec/stream_layout.h"
 #include "proto/datagram/piece.h"
 #include "proto/datagram/piece_request.h"
@@ -52,13 +53,14 @@ std::uint64_t nowUs() {
 
 }  // namespace
 
-DatagramClient::DatagramClient(hosting::SceneServer& server)
+DatagramClient::DatagramClient(hosting::SceneServer& server, const std::string& scene)
     : session_(session::Session::open(
           server, {.peer = "client", .address = {}, .token = {}, .reached = "127.0.0.1"}, [] {})) {
   socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (socket_ < 0) throw std::runtime_error("no UDP socket");
   v1::ClientMessage message;
   message.mutable_hello()->set_protocol_version(1);
+  message.mutable_hello()->set_scene(scene);
   for (const std::uint32_t codec : codec::kCodecs) message.mutable_hello()->add_codecs(codec);
   send(message);
 }
@@ -162,9 +164,10 @@ void DatagramClient::acknowledge(std::span<const std::byte> frame) {
   v1::ServerMessage message;
   if (!message.ParseFromArray(frame.data(), static_cast<int>(frame.size())) || !message.has_frame())
     throw std::runtime_error("the bytes are not a frame");
+  // Packets of some tests are no packets; those have their tick as their time.
+  const auto packet = codec::parsePacket(std::as_bytes(std::span(message.frame().packet())));
   v1::ClientMessage ack;
-  ack.mutable_frame_ack()->set_tick(
-      message.frame().tick_time_us());  // frames of the test have their tick there
+  ack.mutable_frame_ack()->set_tick(packet ? packet->header.tick : message.frame().tick_time_us());
   send(ack);
 }
 

@@ -27,8 +27,8 @@ namespace clothstream::tests {
 // Belongs to one thread, which calls poll() again and again.
 class DatagramClient {
  public:
-  // Says hello.
-  explicit DatagramClient(hosting::SceneServer& server);
+  // Says hello. An empty name is that of the server's default scene.
+  explicit DatagramClient(hosting::SceneServer& server, const std::string& scene = {});
   ~DatagramClient();
   DatagramClient(const DatagramClient&) = delete;
   DatagramClient& operator=(const DatagramClient&) = delete;

@@ -18,6 +18,7 @@
 
 #include "proto/datagram/frame_assembly.h"
 #include "proto/datagram/piece.h"
+#include "server/delivery/mailbox.h"
 
 namespace clothstream::endpoint {
 namespace {
@@ -106,7 +107,7 @@ class FrameLinkTest : public ::testing::Test {
   FrameLink link{{.name = "peer",
                   .reached = {},
                   .offer = {},
-                  .mailbox = mailbox,
+                  .outlet = mailbox,
                   .receive = [this](auto message) { inputs.emplace_back(message.begin(), message.end()); }},
                  [] {},
                  kHeaders,

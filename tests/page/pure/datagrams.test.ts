@@ -14,7 +14,7 @@ import { FakeSocket } from "./fake_socket";
 const kBuilt = new URL("../../../build/release/web-wasm/clothstream_core.wasm", import.meta.url);
 const module = new WebAssembly.Module(readFileSync(process.env["CLOTHSTREAM_CORE_WASM"] ?? kBuilt));
 
-// Kinds of datagrams (docs/transport.md).
+// Kinds of datagrams (docs/datagrams.md).
 const kInput = 2;
 const kReceipt = 4;
 

@@ -14,7 +14,7 @@ export interface DatagramAnswer extends DatagramOffer {
   port: number;
 }
 
-const kMaxMessageBytes = 1150; // of a datagram (docs/transport.md)
+const kMaxMessageBytes = 1150; // of a datagram (docs/datagrams.md)
 
 // Reads a description of the browser. Undefined if something is missing.
 export function offerIn(description: string): DatagramOffer | undefined {
