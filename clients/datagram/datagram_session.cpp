@@ -32,12 +32,13 @@ std::optional<std::span<const std::byte>> viewOf(const std::uint8_t* data, std::
 }
 
 // Nothing if the answer cannot be used.
-std::optional<DatagramPeer> peerOf(const cs_client& client, const cs_datagram_answer& answer) {
+std::optional<DatagramPeer> peerOf(const cs_client& client, const cs_datagram_answer& answer, bool sctp) {
   dtls::Digest digest{};
   std::ranges::copy(answer.fingerprint, digest.begin());
   DatagramPeer peer{.credentials = {answer.ufrag, answer.password},
                     .fingerprint = dtls::fingerprintOf(digest),
-                    .addresses = {}};
+                    .addresses = {},
+                    .sctp = sctp};
   for (std::uint32_t i = 0; i < answer.addresses; ++i)
     if (const auto address =
             readAddress(cs_datagram_address(&client, i), static_cast<std::uint16_t>(answer.port)))
@@ -80,7 +81,7 @@ void DatagramSession::negotiate(cs_client& client) {
   awaitsAnswer_ = false;
   refused_ = answer.addresses == 0;
   if (refused_) return end("the server opens none for this client");
-  if (const auto peer = peerOf(client, answer)) return begin(*peer);
+  if (const auto peer = peerOf(client, answer, host_.sctp)) return begin(*peer);
   end("the server's answer has no usable address");
 }
 
@@ -95,7 +96,7 @@ void DatagramSession::offer(cs_client& client) {
                          .ufrag = local_.ufrag.c_str(),
                          .password = local_.password.c_str(),
                          .fingerprint = {},
-                         .sctp = 0};
+                         .sctp = host_.sctp ? 1 : 0};
   std::ranges::copy(dtls::digestOf(host_.certificate.fingerprint()), made.fingerprint);
   awaitsAnswer_ = cs_offer_datagrams(&client, &made) != 0;
 }
