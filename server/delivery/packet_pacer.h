@@ -15,15 +15,17 @@ namespace clothstream::delivery {
 
 using schedule::Clock;
 
-// Queue of packets that leave at a given rate, in their order; repeated ones leave before all others. A
-// packet that leaves late, because a timer was late, does not delay those after it, up to kCatchUp.
+// Queue of packets that leave at a given rate, in their order; repeated ones leave before all others. When
+// one is due, those of the next kQuantum leave with it, because to wake for each of them costs more than to
+// send them: a path that carries the rate then has a queue of at most this time. A packet that leaves late,
+// because a timer was late, does not delay those after it, up to kCatchUp.
 //
 // Not thread-safe. Reads no clock.
 template <typename Packet>
 class PacketPacer {
  public:
   static constexpr std::size_t kMost = 512;  // packets of either kind
-  static constexpr std::chrono::milliseconds kCatchUp{2};
+  static constexpr std::chrono::milliseconds kCatchUp{2}, kQuantum{4};
 
   // Returns false, and drops the packet, if kMost packets of its kind wait.
   [[nodiscard]] bool add(Packet packet, std::uint32_t bytes, bool repeated, Clock::time_point now) {
@@ -35,10 +37,13 @@ class PacketPacer {
     return true;
   }
 
-  // Takes the next packet if it is due. `rate`: bytes/s, above 0.
+  // Takes the next packet if it is due, or if it leaves with one that was taken at the same time. `rate`:
+  // bytes/s, above 0.
   std::optional<Packet> next(double rate, Clock::time_point now) {
     std::deque<Waiting>& queue = repeated_.empty() ? first_ : repeated_;
-    if (queue.empty() || now < due_) return std::nullopt;
+    const auto until = now == taken_ ? now + kQuantum : now;
+    if (queue.empty() || until < due_) return std::nullopt;
+    taken_ = now;
     Waiting taken = std::move(queue.front());
     queue.pop_front();
     bytes_ -= taken.bytes;
@@ -67,7 +72,7 @@ class PacketPacer {
 
   std::deque<Waiting> first_, repeated_;
   std::uint64_t bytes_ = 0;
-  Clock::time_point due_{};
+  Clock::time_point due_{}, taken_{};  // of the next packet, and of the newest one
 };
 
 }  // namespace clothstream::delivery
