@@ -15,17 +15,15 @@ namespace clothstream::delivery {
 
 using schedule::Clock;
 
-// Queue of packets that leave at a given rate, in their order; repeated ones leave before all others. When
-// one is due, those of the next kQuantum leave with it, because to wake for each of them costs more than to
-// send them: a path that carries the rate then has a queue of at most this time. A packet that leaves late,
-// because a timer was late, does not delay those after it, up to kCatchUp.
+// Queue of packets that leave at a given rate, in their order; repeated ones leave before all others. A
+// packet that leaves late, because a timer was late, does not delay those after it, up to kCatchUp.
 //
 // Not thread-safe. Reads no clock.
 template <typename Packet>
 class PacketPacer {
  public:
   static constexpr std::size_t kMost = 512;  // packets of either kind
-  static constexpr std::chrono::milliseconds kCatchUp{2}, kQuantum{4};
+  static constexpr std::chrono::milliseconds kCatchUp{2};
 
   // Returns false, and drops the packet, if kMost packets of its kind wait.
   [[nodiscard]] bool add(Packet packet, std::uint32_t bytes, bool repeated, Clock::time_point now) {
@@ -37,11 +35,11 @@ class PacketPacer {
     return true;
   }
 
-  // Takes the next packet if it is due, or if it leaves with one that was taken at the same time. `rate`:
-  // bytes/s, above 0.
-  std::optional<Packet> next(double rate, Clock::time_point now) {
+  // Takes the next packet if it is due, or will be in the time `quantum` and another one was taken now.
+  // `rate`: bytes/s, above 0.
+  std::optional<Packet> next(double rate, Clock::duration quantum, Clock::time_point now) {
     std::deque<Waiting>& queue = repeated_.empty() ? first_ : repeated_;
-    const auto until = now == taken_ ? now + kQuantum : now;
+    const auto until = now == taken_ ? now + quantum : now;
     if (queue.empty() || until < due_) return std::nullopt;
     taken_ = now;
     Waiting taken = std::move(queue.front());

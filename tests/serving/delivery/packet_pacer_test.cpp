@@ -13,6 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr double kPaceRate = 1e6;  // bytes/s: 1 ms for 1000 bytes
+constexpr auto kQuantum = 4ms;
 
 class PacketPacerTest : public testing::Test {
  protected:
@@ -21,7 +22,7 @@ class PacketPacerTest : public testing::Test {
     std::vector<int> taken;
     while (pacer_.due() && *pacer_.due() <= end) {
       now_ = std::max(now_, *pacer_.due());
-      while (const auto packet = pacer_.next(kPaceRate, now_)) taken.push_back(*packet);
+      while (const auto packet = pacer_.next(kPaceRate, kQuantum, now_)) taken.push_back(*packet);
     }
     now_ = end;
     return taken;
@@ -46,7 +47,8 @@ TEST_F(PacketPacerTest, LaterPacketsWaitTheirTurn) {
   add(0);
   takeUntil(now_ + 1us);
   add(1);
-  EXPECT_EQ(pacer_.next(kPaceRate, now_), std::nullopt) << "the quantum is that of a packet which is due";
+  EXPECT_EQ(pacer_.next(kPaceRate, kQuantum, now_), std::nullopt)
+      << "the quantum is that of a packet which is due";
   EXPECT_EQ(takeUntil(now_ + 1ms), std::vector{1});
 }
 
@@ -70,7 +72,7 @@ TEST_F(PacketPacerTest, LateTimerDelaysNoLaterPacket) {
   takeUntil(now_);
   now_ += 6500us;  // 1.5 ms late
   std::vector<int> taken;
-  while (const auto packet = pacer_.next(kPaceRate, now_)) taken.push_back(*packet);
+  while (const auto packet = pacer_.next(kPaceRate, kQuantum, now_)) taken.push_back(*packet);
   EXPECT_EQ(taken, (std::vector{5, 6, 7, 8, 9, 10}));
   EXPECT_EQ(*pacer_.due(), Clock::time_point(1h) + 11ms);
 }
@@ -87,7 +89,7 @@ TEST_F(PacketPacerTest, QueueIsBounded) {
 TEST(PacketPacer, MovesPackets) {
   PacketPacer<std::unique_ptr<int>> pacer;
   ASSERT_TRUE(pacer.add(std::make_unique<int>(7), 1, false, Clock::time_point(1h)));
-  EXPECT_EQ(**pacer.next(kPaceRate, Clock::time_point(1h)), 7);
+  EXPECT_EQ(**pacer.next(kPaceRate, kQuantum, Clock::time_point(1h)), 7);
 }
 
 }  // namespace
