@@ -36,7 +36,7 @@ from link import choice, number  # noqa: E402
 from network_link import CLIENT, SERVER, NetworkLink  # noqa: E402
 from programs import ProgramFailed, Server, wait_until  # noqa: E402
 
-# Arguments of `clothstream load`. WebSocket is what the others are compared with.
+# Arguments of `clothstream load`. WebSocket is what the others are compared with, and the stream next to datagrams.
 TRANSPORTS = {
     "websocket": ["--transport", "tcp"],
     "native": ["--transport", "datagrams"],
@@ -97,8 +97,9 @@ class Bench:
     def __init__(self, arguments, folder):
         self.arguments, self.folder = arguments, folder
 
-    def load(self, server, *options, within=()):
-        command = [*within, self.arguments.programs / "clothstream", "load", server.url.rstrip("/"), "--web", "--json", *options]
+    def load(self, server, transport, *options, within=()):
+        command = [*within, self.arguments.programs / "clothstream", "load", server.url.rstrip("/"), "--web", "--json",
+                   *TRANSPORTS[transport], *options]
         return subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     @staticmethod
@@ -140,7 +141,7 @@ class Bench:
 
     def watched(self, server, transport, viewers, *options):
         """What was read from the server during a load test, and its result."""
-        load = self.load(server, *TRANSPORTS[transport], "--participants", viewers, "--viewers", viewers, "--decoders", 0,
+        load = self.load(server, transport, "--participants", viewers, "--viewers", viewers, "--decoders", 0,
                          "--seconds", self.arguments.seconds + 2 * MARGIN, *options)
         try:
             count = "clothstream_scene_subscribers" if transport == "websocket" else "clothstream_datagram_peers"
@@ -186,7 +187,7 @@ class Bench:
             options = [*certificate(self.folder, address), "--host", address, "--insecure", "--scene", "flag"]
             with self.serve(options, within=link.within(SERVER)) as server:
                 for _ in range(JOINS):
-                    load = self.load(server, *TRANSPORTS[transport], "--participants", 1, "--viewers", 1, "--seconds", 1,
+                    load = self.load(server, transport, "--participants", 1, "--viewers", 1, "--seconds", 1,
                                      within=link.within(CLIENT))
                     result = self.result_of(load)
                     rows.append((result["joinToFrameMsP50"], result["joinToDatagramFrameMsP50"]))
