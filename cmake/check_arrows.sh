@@ -61,7 +61,7 @@ clients/native     | clients/core proto/text
 clients/grpc       | clients/core clients/native proto/tls clothstream
 clients/websocket  | clients/native proto/text proto/tls
 clients/websocket/winhttp | clients/websocket clients/native proto/text proto/tls
-clients/datagram   | clients/core clients/native proto/dtls proto/ice
+clients/datagram   | clients/core clients/native proto/dtls proto/ice proto/sctp
 clients/library    | clients/datagram clients/native clients/grpc clients/websocket proto/tls
 clients/testing    |
 clients/files      | proto/codec proto/text clothstream

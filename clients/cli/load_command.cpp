@@ -75,6 +75,21 @@ void addPoses(nlohmann::ordered_json& object, load::PoseTimes& poses) {
   }
 }
 
+// Adds the percentiles of times, which are null without samples.
+void addTimes(nlohmann::ordered_json& object, const std::string& name, std::vector<float>& samplesMs) {
+  const auto set = [&](const char* what, nlohmann::ordered_json value) {
+    object[name + what] = std::move(value);
+  };
+  if (samplesMs.empty()) {
+    set("MsP50", nullptr);
+    set("MsP99", nullptr);
+    return;
+  }
+  const Ages times = agesOf(samplesMs);
+  set("MsP50", times.p50);
+  set("MsP99", times.p99);
+}
+
 // Adds figures by participant, and those of created scenes, which are null without them.
 void addScenes(nlohmann::ordered_json& object, load::LoadReport& report) {
   load::SceneReport& scenes = report.scenes;
@@ -84,11 +99,9 @@ void addScenes(nlohmann::ordered_json& object, load::LoadReport& report) {
   object["scenes"] = scenes.wanted;
   object["scenesCreated"] = scenes.created;
   object["scenesNotDeleted"] = scenes.remaining;
-  object["firstFrameMsP50"] = object["firstFrameMsP99"] = nullptr;
-  if (scenes.firstFrameMs.empty()) return;
-  const Ages times = agesOf(scenes.firstFrameMs);
-  object["firstFrameMsP50"] = times.p50;
-  object["firstFrameMsP99"] = times.p99;
+  addTimes(object, "firstFrame", scenes.firstFrameMs);
+  addTimes(object, "joinToFrame", report.joinToFrameMs);
+  addTimes(object, "joinToDatagramFrame", report.joinToDatagramFrameMs);
 }
 
 std::string json(load::LoadReport& report, std::optional<double> serverCpu) {
@@ -272,6 +285,7 @@ void LoadCommand::add(CLI::App& app) {
       ->capture_default_str();
   addStreamLimit(*command_, options_.maxVertices);
   addTransport(*command_, options_.datagrams);
+  command_->add_flag("--sctp", options_.sctp, "Datagrams travel in SCTP, as those of browsers do");
   command_->add_flag("--web", web_, "Use WebSocket, as the page does, instead of gRPC");
   command_->add_option("--server-pid", serverPid_,
                        "Process id of the server on this machine; adds its CPU time to the report");

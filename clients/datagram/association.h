@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Encrypted datagrams with a server: ICE finds its address, DTLS encrypts. Without sockets.
+// Encrypted datagrams with a server: ICE finds its address, DTLS encrypts, and SCTP carries payloads if they
+// are to travel as those of a browser. Without sockets.
 #pragma once
 
 #include <chrono>
@@ -13,6 +14,7 @@
 #include "proto/dtls/dtls_channel.h"
 #include "proto/dtls/dtls_context.h"
 #include "proto/ice/checking_agent.h"
+#include "proto/sctp/data_channel.h"
 
 namespace clothstream {
 
@@ -21,6 +23,7 @@ struct DatagramPeer {
   ice::Credentials credentials;         // valid (ice::isValid)
   std::string fingerprint;              // in the form of dtls::readFingerprint()
   std::vector<ice::Address> addresses;  // the preferred one first
+  bool sctp = false;                    // as in the offer
 };
 
 // Pinned: the channel calls it. Not thread-safe. Reads no clock, but see dtls::DtlsChannel.
@@ -62,16 +65,20 @@ class Association {
 
  private:
   void send(const std::vector<ice::Datagram>& datagrams) const;
-  // Begins the handshake when the server has been found.
+  // Begins the handshakes, each when the one below is complete.
   void begin(Time now);
+  bool isOpen() const;
 
   const dtls::DtlsContext& context_;
   const std::string peerFingerprint_;
+  const bool sctp_;
   const Callbacks callbacks_;
+  Time now_;  // of the function that runs
   ice::CheckingAgent agent_;
   // Address to which the channel sends now; nothing while none answers.
   std::optional<ice::Address> path_;
   std::optional<dtls::DtlsChannel> channel_;
+  std::optional<sctp::DataChannel> data_;  // over an open channel
   bool hasOpened_ = false;
 };
 

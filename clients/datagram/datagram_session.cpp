@@ -33,12 +33,13 @@ std::optional<std::span<const std::byte>> viewOf(const std::uint8_t* data, std::
 
 // Nothing if the answer cannot be used.
 std::optional<DatagramPeer> peerOf(const cs_client& client, const cs_datagram_answer& answer,
-                                   const std::string& streamAddress) {
+                                   const std::string& streamAddress, bool sctp) {
   dtls::Digest digest{};
   std::ranges::copy(answer.fingerprint, digest.begin());
   DatagramPeer peer{.credentials = {answer.ufrag, answer.password},
                     .fingerprint = dtls::fingerprintOf(digest),
-                    .addresses = {}};
+                    .addresses = {},
+                    .sctp = sctp};
   const auto addText = [&](const std::string& text) {
     const auto address = readAddress(text, static_cast<std::uint16_t>(answer.port));
     if (address && std::ranges::find(peer.addresses, *address) == peer.addresses.end())
@@ -84,7 +85,7 @@ void DatagramSession::negotiate(cs_client& client, const std::function<std::stri
   awaitsAnswer_ = false;
   refused_ = answer.addresses == 0;
   if (refused_) return end("the server opens none for this client");
-  if (const auto peer = peerOf(client, answer, streamAddress())) return begin(*peer);
+  if (const auto peer = peerOf(client, answer, streamAddress(), host_.sctp)) return begin(*peer);
   end("the server's answer has no usable address");
 }
 
@@ -99,7 +100,7 @@ void DatagramSession::offer(cs_client& client) {
                          .ufrag = local_.ufrag.c_str(),
                          .password = local_.password.c_str(),
                          .fingerprint = {},
-                         .sctp = 0};
+                         .sctp = host_.sctp ? 1 : 0};
   std::ranges::copy(dtls::digestOf(host_.certificate.fingerprint()), made.fingerprint);
   awaitsAnswer_ = cs_offer_datagrams(&client, &made) != 0;
 }

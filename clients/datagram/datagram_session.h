@@ -25,6 +25,8 @@ struct DatagramHost {
   dtls::Certificate certificate;
   dtls::DtlsContext context{certificate};
   UdpThread thread;
+  // Whether payloads travel in SCTP, as those of browsers must. That costs both ends time and bytes.
+  bool sctp = false;
 };
 
 // Adds the counts.

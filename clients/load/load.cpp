@@ -36,7 +36,7 @@ class Load {
     report_.slow = options.slow;
     report_.hostileClients = options.hostileClients;
     report_.scenes.wanted = options.scenes;
-    if (options.datagrams != Datagrams::off) host_.emplace();
+    if (options.datagrams != Datagrams::off) host_.emplace().sctp = options.sctp;
     if (options.scenes > 0) scenes_.emplace(links, options.token, hungScene(options.nodes, options.rate));
     for (std::uint32_t i = 0; i < options.hostileClients; ++i)
       hostileClients_.push_back(std::make_unique<HostileClient>(links, sceneOf(i), i, options.token));
@@ -54,7 +54,13 @@ class Load {
           ++report_.withDatagrams;
           add(report_.datagrams, *datagrams);
         }
-        if (!isSlow(seat) && report_.seconds > 0)
+        if (isSlow(seat)) continue;
+        const auto addMs = [](std::vector<float>& to, std::optional<double> seconds) {
+          if (seconds) to.push_back(static_cast<float>(1000 * *seconds));
+        };
+        addMs(report_.joinToFrameMs, seat.participant->firstFrameSeconds());
+        addMs(report_.joinToDatagramFrameMs, seat.participant->firstDatagramFrameSeconds());
+        if (report_.seconds > 0)
           report_.participantRates.push_back(
               static_cast<float>(static_cast<double>(seat.frames) / report_.seconds));
       }

@@ -31,6 +31,7 @@ struct LoadOptions {
   std::uint32_t maxVertices = 0;               // as in limitVertices
   bool keepsFrames = false;                    // as in ParticipantOptions, for participants that are not slow
   Datagrams datagrams = Datagrams::automatic;  // of participants that are not slow
+  bool sctp = false;                           // as in DatagramHost
 };
 
 // The fate of the scenes that the test has created.
@@ -57,6 +58,9 @@ struct LoadReport {
   Failure firstLoss;
   SceneReport scenes;
   std::vector<float> participantRates;  // frames/s of each participant that is not slow
+  // Time of each participant that is not slow from connecting to its first frame, and to the first one that
+  // came in datagrams, ms.
+  std::vector<float> joinToFrameMs, joinToDatagramFrameMs;
   // Number of participants with datagrams at the end, and the sum of their figures.
   std::uint32_t withDatagrams = 0;
   cs_datagram_statistics datagrams{};

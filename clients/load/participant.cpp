@@ -122,6 +122,11 @@ std::optional<double> Participant::firstFrameSeconds() const {
   return firstFrameSeconds_;
 }
 
+std::optional<double> Participant::firstDatagramFrameSeconds() const {
+  const std::lock_guard lock(mutex_);
+  return firstDatagramFrameSeconds_;
+}
+
 void Participant::step(Clock::time_point now) {
   bool reads = false, fails = false;
   {
@@ -152,6 +157,8 @@ void Participant::datagramsArrived() {
 bool Participant::proceed() {
   if (datagrams_) {
     datagrams_->exchange();
+    if (!firstDatagramFrameSeconds_ && datagrams_->statistics().frames > 0)
+      firstDatagramFrameSeconds_ = secondsOpen();
     while (const auto message = datagrams_->nextMessage()) take(*message);
     if (options_.requiresDatagrams && datagrams_->isRefused() && !ended_) {
       ended_ = {Failure::Kind::refused, "datagrams are required, but " + datagrams_->why()};
@@ -274,7 +281,7 @@ void Participant::count(const codec::PacketHeader& header, std::uint32_t frameDi
   frameDivisor_ = frameDivisor;
   const std::chrono::duration<double> period(static_cast<double>(perFrame) / rate);
   if (!newestTick_)
-    firstFrameSeconds_ = std::chrono::duration<double>(now - opened_).count();
+    firstFrameSeconds_ = secondsOpen();
   else if (now - newestAt_ > 2 * period)
     ++figures_.late;
   newestAt_ = now;

@@ -87,6 +87,8 @@ class Participant final : private LinkListener {
   std::optional<cs_datagram_statistics> datagrams() const;
   // Seconds from connecting to the first frame. Nothing before it.
   std::optional<double> firstFrameSeconds() const;
+  // The same to the first frame that came in datagrams.
+  std::optional<double> firstDatagramFrameSeconds() const;
 
  private:
   void received(std::span<const std::byte> message) override;
@@ -102,6 +104,7 @@ class Participant final : private LinkListener {
   Failure refusal() const;
   bool timesPoses() const { return options_.moves && options_.decodes; }
   void frameReceived(const v1::Frame& frame, std::uint64_t nowUs);
+  double secondsOpen() const { return std::chrono::duration<double>(Clock::now() - opened_).count(); }
   // Measures poses after the core has decoded the frame.
   void frameDecoded(const v1::Frame& frame);
   void count(const codec::PacketHeader& header, std::uint32_t frameDivisor);
@@ -121,7 +124,7 @@ class Participant final : private LinkListener {
   std::optional<std::uint64_t> newestTick_;  // of the frames, to which the next one refers
   std::uint32_t frameDivisor_ = 1;           // of the newest frame
   Clock::time_point newestAt_;               // arrival of the newest frame
-  std::optional<double> firstFrameSeconds_;
+  std::optional<double> firstFrameSeconds_, firstDatagramFrameSeconds_;
   Clock::time_point readsAgainAt_{};
   bool readLater_ = false;
   std::optional<Failure> ended_;

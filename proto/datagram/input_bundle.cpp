@@ -9,17 +9,17 @@
 namespace clothstream::datagram {
 
 std::size_t InputSender::write(std::span<const std::byte> message, std::uint64_t nowUs,
-                               std::span<std::byte> out) {
+                               std::span<std::byte> out, bool repeats) {
   assert(!message.empty() && message.size() <= kMaxInputBytes);
   messages_[next_ % messages_.size()].assign(message.begin(), message.end());
   ++next_;
   count_ = std::min(count_ + 1, kBundledMessages);
-  copies_ = 0;
+  if (repeats) copies_ = 0;
   return writeNewest(nowUs, out);
 }
 
 std::optional<std::uint64_t> InputSender::repeatUs() const {
-  if (count_ == 0 || copies_ == kBundledMessages) return std::nullopt;
+  if (copies_ == kBundledMessages) return std::nullopt;
   return sentUs_ + kRepeatUs;
 }
 
@@ -40,7 +40,7 @@ std::size_t InputSender::writeNewest(std::uint64_t nowUs, std::span<std::byte> o
     writer.bytes(message);
   }
   sentUs_ = nowUs;
-  ++copies_;
+  copies_ = std::min(copies_ + 1, kBundledMessages);
   return writer.written();
 }
 

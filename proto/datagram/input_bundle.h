@@ -19,7 +19,7 @@ inline constexpr std::size_t kBundledMessages = 3;
 inline constexpr std::size_t kMaxInputBytes = kMaxDatagramBytes - 7;
 
 // Client's side. Each message is in the datagrams of the two messages after it, as far as they fit. Without
-// newer messages, the last datagram is sent twice more, every 20 ms.
+// newer messages, the last datagram is sent twice more, every 20 ms, if a message in it asks for that.
 class InputSender {
  public:
   static constexpr std::uint64_t kRepeatUs = 20'000;
@@ -28,8 +28,10 @@ class InputSender {
   explicit InputSender(std::uint32_t first = 0) : next_(first) {}
 
   // Writes the datagram of a new message, 1 to kMaxInputBytes long, to `out`, which has at least
-  // kMaxDatagramBytes. Returns its length.
-  std::size_t write(std::span<const std::byte> message, std::uint64_t nowUs, std::span<std::byte> out);
+  // kMaxDatagramBytes. Returns its length. `repeats`: it may be the last message for some time, and must not
+  // be lost then.
+  std::size_t write(std::span<const std::byte> message, std::uint64_t nowUs, std::span<std::byte> out,
+                    bool repeats = true);
 
   // Time at which the last datagram is to be repeated if no new message is written; nullopt if never.
   std::optional<std::uint64_t> repeatUs() const;
@@ -41,9 +43,9 @@ class InputSender {
 
   // Number n is at n modulo 4, a power of two, so that numbers may continue with 0.
   std::array<std::vector<std::byte>, 4> messages_;
-  std::uint32_t next_;      // number of the next message
-  std::size_t count_ = 0;   // messages that are kept
-  std::size_t copies_ = 0;  // datagrams with the newest message
+  std::uint32_t next_;                     // number of the next message
+  std::size_t count_ = 0;                  // messages that are kept
+  std::size_t copies_ = kBundledMessages;  // datagrams with the newest message that asks for repeats
   std::uint64_t sentUs_ = 0;
 };
 

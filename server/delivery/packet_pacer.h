@@ -35,10 +35,13 @@ class PacketPacer {
     return true;
   }
 
-  // Takes the next packet if it is due. `rate`: bytes/s, above 0.
-  std::optional<Packet> next(double rate, Clock::time_point now) {
+  // Takes the next packet if it is due, or will be in the time `quantum` and another one was taken now.
+  // `rate`: bytes/s, above 0.
+  std::optional<Packet> next(double rate, Clock::duration quantum, Clock::time_point now) {
     std::deque<Waiting>& queue = repeated_.empty() ? first_ : repeated_;
-    if (queue.empty() || now < due_) return std::nullopt;
+    const auto until = now == taken_ ? now + quantum : now;
+    if (queue.empty() || until < due_) return std::nullopt;
+    taken_ = now;
     Waiting taken = std::move(queue.front());
     queue.pop_front();
     bytes_ -= taken.bytes;
@@ -67,7 +70,7 @@ class PacketPacer {
 
   std::deque<Waiting> first_, repeated_;
   std::uint64_t bytes_ = 0;
-  Clock::time_point due_{};
+  Clock::time_point due_{}, taken_{};  // of the next packet, and of the newest one
 };
 
 }  // namespace clothstream::delivery

@@ -72,6 +72,11 @@ class RateController {
   double rate() const { return window_ / (controlTime() + delay_.filtered()); }
   // Rate for the pacer. It is close to the path's, so that a frame causes hardly any queue.
   double pace() const { return 1.25 * rate(); }
+  // Time for which packets may leave at once, because a wake for each costs more than to send it. 0 where the
+  // path may carry no more than the pace: frames need the whole window, or there is a queue.
+  Clock::duration quantum() const {
+    return mayGrow() || isQueued() ? Clock::duration::zero() : std::chrono::milliseconds(4);
+  }
 
   bool silent(Clock::time_point now) const {
     return awaited_ && awaitsSeveral() && now - *awaited_ >= kSilence;

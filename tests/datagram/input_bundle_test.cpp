@@ -17,8 +17,8 @@ class Sender {
  public:
   explicit Sender(std::uint32_t first = 0) : sender_(first) {}
 
-  Bytes write(const Bytes& message, std::uint64_t nowUs = 0) {
-    return cut(sender_.write(message, nowUs, out_));
+  Bytes write(const Bytes& message, std::uint64_t nowUs = 0, bool repeats = true) {
+    return cut(sender_.write(message, nowUs, out_, repeats));
   }
   Bytes repeat(std::uint64_t nowUs) { return cut(sender_.repeat(nowUs, out_)); }
   auto repeatUs() const { return sender_.repeatUs(); }
@@ -103,6 +103,17 @@ TEST(InputBundle, LastDatagramIsSentThreeTimes) {
   EXPECT_FALSE(sender.repeatUs());
   sender.write(text(1), 50'000);
   EXPECT_EQ(sender.repeatUs(), 70'000u);
+}
+
+TEST(InputBundle, RepeatsOnlyWhatAsksForIt) {
+  Sender sender;
+  sender.write(text(0), 1'000, false);
+  EXPECT_FALSE(sender.repeatUs());
+  sender.write(text(1), 2'000);
+  const Bytes newest = sender.write(text(2), 3'000, false);
+  EXPECT_EQ(sender.repeatUs(), 23'000u) << "the message before it is repeated with it";
+  EXPECT_EQ(sender.repeat(23'000), newest);
+  EXPECT_FALSE(sender.repeatUs());
 }
 
 TEST(InputBundle, RefusesOtherLengths) {

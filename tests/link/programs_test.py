@@ -40,7 +40,7 @@ class Programs(unittest.TestCase):
     def test_frames_arrive_and_are_right(self):
         web = ["--web", self.server.url.split("/")[2]]
         for way, options in (("tcp", [self.server.address]), ("tcp", web), ("datagrams", [self.server.address]),
-                             ("datagrams", web)):
+                             ("datagrams", web), ("datagrams", [*web, "--sctp"])):
             report = self.load(*options, "--transport", way)
             self.assertEqual((report["joined"], report["lost"]), (1, 0))
             self.assertEqual(report["hashMismatches"], 0)

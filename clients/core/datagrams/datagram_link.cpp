@@ -25,6 +25,7 @@ bool repeatsEverything(Bytes poses) {
 struct Outgoing {
   bool isPoses = false;
   bool mayBeLost = false;  // later messages replace it
+  bool isAcknowledgement = false;
 };
 
 Outgoing classify(Bytes message) {
@@ -35,6 +36,7 @@ Outgoing classify(Bytes message) {
       found = {.isPoses = true, .mayBeLost = repeatsEverything(reader.get_view())};
       return true;
     }
+    found.isAcknowledgement |= tag == F::kFrameAck.tag;
     found.mayBeLost |= tag == F::kFrameAck.tag || tag == F::kKeyFrameRequest.tag;
     return skip(reader);
   });
@@ -85,7 +87,8 @@ bool DatagramLink::sends(Bytes message, std::uint64_t nowUs) {
   if (outgoing.isPoses) unsettled_ = {std::string(message.data(), message.size()), nowUs};
   if (waiting_.size() == kMaxWaiting) waiting_.pop_front();
   Datagram& out = waiting_.emplace_back();
-  out.size = input_.write(asBytes(message), nowUs, out.bytes);
+  // The next frame is acknowledged soon, so that a repeat would cost more than a lost acknowledgement.
+  out.size = input_.write(asBytes(message), nowUs, out.bytes, !outgoing.isAcknowledgement);
   return true;
 }
 

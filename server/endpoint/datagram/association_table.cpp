@@ -22,15 +22,15 @@ AssociationTable::AssociationTable(const AssociationContext& context, Transmit t
 
 void AssociationTable::add(ice::Credentials local, hosting::DatagramPeer peer, std::function<void()> wake,
                            Time now) {
-  const std::string ufrag = local.ufrag;
-  auto association = std::make_unique<Association>(
+  decltype(entries_) added;  // the entry keeps its address when it moves to the others
+  Entry& entry = added[local.ufrag];
+  entry.association = std::make_unique<Association>(
       context_, std::move(local), std::move(peer), std::move(wake),
-      [this, ufrag](const Address& to, std::span<const std::byte> datagram) {
-        transmit(ufrag, to, datagram);
+      [this, &entry](const Address& to, std::span<const std::byte> datagram) {
+        transmit(entry, to, datagram);
       },
       [this](const Address& from) { return admit(from); }, now);
-  Entry& entry = entries_[ufrag];
-  entry.association = std::move(association);
+  entries_.merge(added);
   attempt(entry, [&] { advance(entry, now); });
 }
 
@@ -156,11 +156,10 @@ void AssociationTable::setDue(Entry& entry, Time due) {
   if (due != Time::max()) due_.emplace(due, &entry);
 }
 
-void AssociationTable::transmit(const std::string& ufrag, const Address& to,
+void AssociationTable::transmit(const Entry& entry, const Address& to,
                                 std::span<const std::byte> datagram) const {
-  const Entry& entry = entries_.at(ufrag);
-  for (const std::optional<Route>& route : {current_, entry.proven, entry.checked})
-    if (route && route->peer == to) return transmit_(*route, datagram);
+  for (const std::optional<Route>* route : {&current_, &entry.proven, &entry.checked})
+    if (*route && (*route)->peer == to) return transmit_(**route, datagram);
   transmit_({.peer = to}, datagram);
 }
 

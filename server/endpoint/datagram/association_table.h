@@ -24,6 +24,7 @@ namespace clothstream::endpoint {
 struct Route {
   Address peer;
   std::array<std::uint8_t, 16> local{};
+  friend bool operator==(const Route&, const Route&) = default;
 };
 
 // A check finds its association by the user name, and everything else by the address that it comes from: the
@@ -84,7 +85,7 @@ class AssociationTable {
   void advance(Entry& entry, Time now);
   void setDue(Entry& entry, Time due);
   void forget(Entry& entry, std::optional<Route> Entry::*route);
-  void transmit(const std::string& ufrag, const Address& to, std::span<const std::byte> datagram) const;
+  void transmit(const Entry& entry, const Address& to, std::span<const std::byte> datagram) const;
   std::shared_ptr<const void> admit(const Address& from);
 
   const AssociationContext context_;

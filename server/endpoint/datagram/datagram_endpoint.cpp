@@ -44,7 +44,7 @@ struct DatagramEndpoint::State : std::enable_shared_from_this<State> {
             [this](const Route& route, std::span<const std::byte> datagram) { udp.send(route, datagram); }) {
     udp.receive([this](const Route& route,
                        std::span<const std::byte> datagram) { table.handle(route, datagram, Clock::now()); },
-                [this] { setTimer(); });
+                [this] { settle(); });
   }
 
   // An exception ends the handler of one event and not the endpoint.
@@ -58,29 +58,28 @@ struct DatagramEndpoint::State : std::enable_shared_from_this<State> {
       }
   }
 
-  // Runs a function on the endpoint's thread, and then sets the timer.
+  // Runs a function on the endpoint's thread, and then settle().
   template <typename Step>
   void post(Step step) {
     net::post(io, [this, step = std::move(step)]() mutable {
       step();
-      setTimer();
+      settle();
     });
   }
 
-  void setTimer() {
+  // Sends what associations have given, and sets the timer. A timer that is set too early stays: that costs
+  // less than to set it again for each frame.
+  void settle() {
+    udp.flush();
     const Time due = table.nextTime();
-    if (due == timerSet) return;
+    if (due >= timerSet) return;
     timerSet = due;
-    if (due == Time::max()) {
-      timer.cancel();
-      return;
-    }
     timer.expires_at(due);
     timer.async_wait([this](boost::system::error_code cancelled) {
       if (cancelled) return;
       timerSet = Time::max();
       table.advance(Clock::now());
-      setTimer();
+      settle();
     });
   }
 
@@ -111,6 +110,7 @@ DatagramEndpoint::~DatagramEndpoint() {
   State& state = *state_;
   net::post(state.io, [&state] {
     state.table.clear();
+    state.udp.flush();
     state.udp.close();
     state.io.stop();
   });

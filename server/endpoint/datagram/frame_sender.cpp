@@ -63,7 +63,7 @@ void FrameSender::probe(Clock::time_point now) {
 
 std::size_t FrameSender::next(Clock::time_point now, std::span<std::byte> out) {
   if (deferred_ && now >= deferred_->due) queueDeferred(now);
-  const std::optional<Packet> packet = pacer_.next(controller_.pace(), now);
+  const std::optional<Packet> packet = pacer_.next(controller_.pace(), controller_.quantum(), now);
   if (!packet) return 0;
   const datagram::PiecePrefix prefix{.packet = nextPacket_++,
                                      .sentUs = static_cast<std::uint32_t>(schedule::microseconds(now)),

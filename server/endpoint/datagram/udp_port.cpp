@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cerrno>
 #include <cstddef>
 #include <cstring>
 #include <exception>
@@ -13,6 +14,7 @@
 #include <boost/asio/ip/v6_only.hpp>
 #include <fmt/format.h>
 #include <netinet/in.h>
+#include <netinet/udp.h>
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
@@ -30,6 +32,33 @@ constexpr int kDatagramsInARow = 64;
 constexpr std::ptrdiff_t kIpv4Offset = 12;
 // Room for either family: the structure of IPv6 is the longer one.
 using PacketInfo = std::array<char, CMSG_SPACE(sizeof(in6_pktinfo))>;
+
+// Datagrams of one call, and their bytes (UDP_MAX_SEGMENTS of Linux; a UDP packet of IPv4).
+constexpr std::size_t kMaxBatch = 64, kMaxBatchBytes = 65'507;
+
+// Control data of a message that is sent, up to a source and the length of its datagrams. Must outlive its
+// use.
+class SendControl {
+ public:
+  explicit SendControl(msghdr& message) : message_(message) { message.msg_control = bytes_.data(); }
+  SendControl(const SendControl&) = delete;
+  SendControl& operator=(const SendControl&) = delete;
+
+  template <typename Value>
+  void add(int level, int type, const Value& value) {
+    auto* const part = reinterpret_cast<cmsghdr*>(bytes_.data() + message_.msg_controllen);
+    part->cmsg_level = level;
+    part->cmsg_type = type;
+    part->cmsg_len = CMSG_LEN(sizeof value);
+    std::memcpy(CMSG_DATA(part), &value, sizeof value);
+    message_.msg_controllen += CMSG_SPACE(sizeof value);
+  }
+
+ private:
+  msghdr& message_;
+  alignas(
+      cmsghdr) std::array<char, CMSG_SPACE(sizeof(in6_pktinfo)) + CMSG_SPACE(sizeof(std::uint16_t))> bytes_{};
+};
 
 // Whether the kernel has IPv6 sockets (not after ipv6.disable=1). The socket is then open.
 bool openIpv6(udp::socket& socket, boost::system::error_code& error) {
@@ -91,17 +120,6 @@ std::array<std::uint8_t, 16> destinationOf(msghdr& message) {
     }
   }
   return {};
-}
-
-// Adds the source of a datagram to its message, which has room for a PacketInfo.
-template <typename Info>
-void setSource(msghdr& message, int level, int type, const Info& source) {
-  message.msg_controllen = CMSG_SPACE(sizeof source);
-  cmsghdr* const part = CMSG_FIRSTHDR(&message);
-  part->cmsg_level = level;
-  part->cmsg_type = type;
-  part->cmsg_len = CMSG_LEN(sizeof source);
-  std::memcpy(CMSG_DATA(part), &source, sizeof source);
 }
 
 }  // namespace
@@ -181,27 +199,58 @@ void UdpPort::receiveSome() {
 }
 
 void UdpPort::send(const Route& route, std::span<const std::byte> datagram) {
+  if (!joins(route, datagram.size())) {
+    flush();
+    batch_.route = route;
+    batch_.datagramBytes = datagram.size();
+  }
+  batch_.bytes.insert(batch_.bytes.end(), datagram.begin(), datagram.end());
+}
+
+bool UdpPort::joins(const Route& route, std::size_t bytes) const {
+  const std::size_t waiting = batch_.bytes.size(), each = batch_.datagramBytes;
+  return waiting > 0 && route == batch_.route && bytes <= each && waiting % each == 0 &&
+         waiting / each < kMaxBatch && waiting + bytes <= kMaxBatchBytes;
+}
+
+void UdpPort::flush() {
+  std::span<const std::byte> rest = batch_.bytes;
+  if (!rest.empty() && !transmit(rest)) {
+    while (!rest.empty()) {
+      const std::size_t bytes = std::min(batch_.datagramBytes, rest.size());
+      transmit(rest.first(bytes));
+      rest = rest.subspan(bytes);
+    }
+  }
+  batch_.bytes.clear();
+}
+
+bool UdpPort::transmit(std::span<const std::byte> bytes) {
+  const Route& route = batch_.route;
   sockaddr_storage to{};
-  iovec bytes{.iov_base = const_cast<std::byte*>(datagram.data()), .iov_len = datagram.size()};
+  iovec content{.iov_base = const_cast<std::byte*>(bytes.data()), .iov_len = bytes.size()};
   msghdr message{};
   message.msg_name = &to;
   message.msg_namelen = write(route.peer, hasIpv6_, to);
-  message.msg_iov = &bytes;
+  message.msg_iov = &content;
   message.msg_iovlen = 1;
-  alignas(cmsghdr) PacketInfo info{};
+  SendControl control(message);
   if (route.local != decltype(route.local){}) {
-    message.msg_control = info.data();
     if (hasIpv6_) {
       in6_pktinfo source{};
       std::memcpy(&source.ipi6_addr, route.local.data(), route.local.size());
-      setSource(message, IPPROTO_IPV6, IPV6_PKTINFO, source);
+      control.add(IPPROTO_IPV6, IPV6_PKTINFO, source);
     } else {
       in_pktinfo source{};
       std::memcpy(&source.ipi_spec_dst, route.local.data() + kIpv4Offset, sizeof source.ipi_spec_dst);
-      setSource(message, IPPROTO_IP, IP_PKTINFO, source);
+      control.add(IPPROTO_IP, IP_PKTINFO, source);
     }
   }
-  static_cast<void>(::sendmsg(socket_.native_handle(), &message, 0));
+  const bool several = bytes.size() > batch_.datagramBytes;
+  if (several) control.add(IPPROTO_UDP, UDP_SEGMENT, static_cast<std::uint16_t>(batch_.datagramBytes));
+  // The kernel refuses where the device makes no checksums (EIO), and datagrams that IP must fragment.
+  return ::sendmsg(socket_.native_handle(), &message, 0) >= 0 || !several ||
+         (errno != EIO && errno != EINVAL && errno != EMSGSIZE);
 }
 
 }  // namespace clothstream::endpoint

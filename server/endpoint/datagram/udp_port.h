@@ -7,6 +7,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/udp.hpp>
@@ -19,6 +20,9 @@ namespace clothstream::endpoint {
 // machine may have several. So each datagram is received with its destination, and sent with a source
 // (IPV6_PKTINFO, RFC 3542, section 6; IP_PKTINFO of ip(7)). The socket has both families, or IPv4 alone if
 // the kernel has no IPv6 sockets. Belongs to the io thread.
+//
+// Datagrams in a row for one peer leave in one call of the kernel, because a call costs more than a datagram:
+// the pieces of a frame have equal lengths.
 class UdpPort {
  public:
   // Bytes of each of the kernel's two queues that the port asks for.
@@ -40,16 +44,30 @@ class UdpPort {
   // than dtls::kMaxDatagramBytes are dropped. Call it once.
   void receive(std::function<void(const Route& route, std::span<const std::byte> datagram)> handle,
                std::function<void()> done);
-  // Sends a datagram, or loses it if the kernel has no room.
+  // Takes a datagram. flush() must follow.
   void send(const Route& route, std::span<const std::byte> datagram);
+  // Sends what was taken, or loses it if the kernel has no room.
+  void flush();
   void close() { socket_.close(); }
 
  private:
+  // Datagrams with one route, and with one length but for the last one, which may be shorter.
+  struct Batch {
+    Route route;
+    std::vector<std::byte> bytes;  // one datagram after the other
+    std::size_t datagramBytes = 0;
+  };
+
   void await();
   void receiveSome();
+  // Whether a datagram of this length can leave with the batch.
+  bool joins(const Route& route, std::size_t bytes) const;
+  // Sends whole datagrams of the batch. Returns false if the kernel cannot cut them for this route.
+  bool transmit(std::span<const std::byte> bytes);
 
   boost::asio::ip::udp::socket socket_;
   bool hasIpv6_ = true;
+  Batch batch_;
   std::function<void(const Route& route, std::span<const std::byte> datagram)> handle_;
   std::function<void()> done_;
 };

@@ -56,6 +56,7 @@ bool exchange() {
       [&](const Route& route, std::span<const std::byte> datagram) {
         arrived = route;
         server.send(route, datagram);
+        server.flush();
       },
       [] {});
   std::vector<std::byte> answer;
@@ -68,6 +69,7 @@ bool exchange() {
       [] {});
   const std::vector<std::byte> sent(100, std::byte{7});
   client.send({.peer = Address::ofIpv4(kLoopback, server.port())}, sent);
+  client.flush();
   io.run_for(20s);
   EXPECT_EQ(answer, sent);
   EXPECT_EQ(arrived.value().peer, Address::ofIpv4(kLoopback, client.port()));

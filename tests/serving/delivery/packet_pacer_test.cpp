@@ -13,6 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr double kPaceRate = 1e6;  // bytes/s: 1 ms for 1000 bytes
+constexpr auto kQuantum = 4ms;
 
 class PacketPacerTest : public testing::Test {
  protected:
@@ -21,7 +22,7 @@ class PacketPacerTest : public testing::Test {
     std::vector<int> taken;
     while (pacer_.due() && *pacer_.due() <= end) {
       now_ = std::max(now_, *pacer_.due());
-      while (const auto packet = pacer_.next(kPaceRate, now_)) taken.push_back(*packet);
+      while (const auto packet = pacer_.next(kPaceRate, kQuantum, now_)) taken.push_back(*packet);
     }
     now_ = end;
     return taken;
@@ -32,14 +33,23 @@ class PacketPacerTest : public testing::Test {
 };
 
 TEST_F(PacketPacerTest, SpreadsPacketsByRate) {
-  for (int i = 0; i < 5; ++i) add(i);
-  EXPECT_EQ(takeUntil(now_), std::vector{0});
-  EXPECT_EQ(pacer_.bytes(), 4000u);
-  EXPECT_EQ(takeUntil(now_ + 999us), std::vector<int>{});
-  EXPECT_EQ(takeUntil(now_ + 2001us), (std::vector{1, 2, 3}));
-  EXPECT_EQ(takeUntil(now_ + 1ms), std::vector{4});
+  for (int i = 0; i < 12; ++i) add(i);
+  EXPECT_EQ(takeUntil(now_), (std::vector{0, 1, 2, 3, 4}));
+  EXPECT_EQ(pacer_.bytes(), 7000u);
+  EXPECT_EQ(takeUntil(now_ + 4999us), std::vector<int>{});
+  EXPECT_EQ(takeUntil(now_ + 1us), (std::vector{5, 6, 7, 8, 9}));
+  EXPECT_EQ(takeUntil(now_ + 5ms), (std::vector{10, 11}));
   EXPECT_EQ(pacer_.due(), std::nullopt);
   EXPECT_EQ(pacer_.bytes(), 0u);
+}
+
+TEST_F(PacketPacerTest, LaterPacketsWaitTheirTurn) {
+  add(0);
+  takeUntil(now_ + 1us);
+  add(1);
+  EXPECT_EQ(pacer_.next(kPaceRate, kQuantum, now_), std::nullopt)
+      << "the quantum is that of a packet which is due";
+  EXPECT_EQ(takeUntil(now_ + 1ms), std::vector{1});
 }
 
 TEST_F(PacketPacerTest, RepeatedPacketsLeaveFirst) {
@@ -50,21 +60,21 @@ TEST_F(PacketPacerTest, RepeatedPacketsLeaveFirst) {
   EXPECT_EQ(takeUntil(now_ + 10ms), (std::vector{11, 12, 1, 2}));
 }
 
-TEST_F(PacketPacerTest, IdleTimeAllowsNoBurst) {
+TEST_F(PacketPacerTest, IdleTimeEnlargesNoBurst) {
   add(0);
   takeUntil(now_ + 1s);
   for (int i = 1; i < 10; ++i) add(i);
-  EXPECT_EQ(takeUntil(now_), std::vector{1});
+  EXPECT_EQ(takeUntil(now_), (std::vector{1, 2, 3, 4, 5}));
 }
 
 TEST_F(PacketPacerTest, LateTimerDelaysNoLaterPacket) {
-  for (int i = 0; i < 4; ++i) add(i);
+  for (int i = 0; i < 20; ++i) add(i);
   takeUntil(now_);
-  now_ += 2500us;
-  EXPECT_EQ(pacer_.next(kPaceRate, now_), 1);
-  EXPECT_EQ(pacer_.next(kPaceRate, now_), 2);
-  EXPECT_EQ(pacer_.next(kPaceRate, now_), std::nullopt);
-  EXPECT_EQ(*pacer_.due(), Clock::time_point(1h) + 3ms);
+  now_ += 6500us;  // 1.5 ms late
+  std::vector<int> taken;
+  while (const auto packet = pacer_.next(kPaceRate, kQuantum, now_)) taken.push_back(*packet);
+  EXPECT_EQ(taken, (std::vector{5, 6, 7, 8, 9, 10}));
+  EXPECT_EQ(*pacer_.due(), Clock::time_point(1h) + 11ms);
 }
 
 TEST_F(PacketPacerTest, QueueIsBounded) {
@@ -79,7 +89,7 @@ TEST_F(PacketPacerTest, QueueIsBounded) {
 TEST(PacketPacer, MovesPackets) {
   PacketPacer<std::unique_ptr<int>> pacer;
   ASSERT_TRUE(pacer.add(std::make_unique<int>(7), 1, false, Clock::time_point(1h)));
-  EXPECT_EQ(**pacer.next(kPaceRate, Clock::time_point(1h)), 7);
+  EXPECT_EQ(**pacer.next(kPaceRate, kQuantum, Clock::time_point(1h)), 7);
 }
 
 }  // namespace

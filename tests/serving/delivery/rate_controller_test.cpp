@@ -55,7 +55,7 @@ class DatagramFlow final : public Flow {
       nextFrame_ = start_ + static_cast<double>(++ticks_) / kFrameRate + 0.002 * path_.random();
       path_.wakeAt(*this, nextFrame_);
     }
-    while (const auto packet = pacer_.next(controller.pace(), at(now))) {
+    while (const auto packet = pacer_.next(controller.pace(), controller.quantum(), at(now))) {
       controller.sent(number_, packet->bytes, at(now));
       path_.send(*this, {.number = number_++, .bytes = packet->bytes, .first = packet->first});
     }
@@ -163,7 +163,8 @@ TEST_P(AtRate, AloneFillsTheLinkWithAShortQueue) {
   }
 }
 
-// Equal flows should have half each. Differences of a packet in the base delay shift that by up to 0.15. A
+// Equal flows should have half each. Differences of a packet in the base delay shift that by up to 0.15, and
+// at 2 Mbit/s, where a packet takes 5 ms, by up to 0.25; the time at which the other flow begins decides. A
 // packet of the other flow may be in front at any time.
 TEST_P(AtRate, SharesWithItsOwnKind) {
   for (const double oneWay : {0.01, 0.025}) {
@@ -174,7 +175,7 @@ TEST_P(AtRate, SharesWithItsOwnKind) {
     path.run(40);
     const double rate = flow.megabits(20, 40), otherRate = other.megabits(20, 40);
     print("two of a kind", shape, flow, rate, otherRate);
-    EXPECT_NEAR(rate / (rate + otherRate), 0.5, 0.15);
+    EXPECT_NEAR(rate / (rate + otherRate), 0.5, shape.megabits > 2 ? 0.15 : 0.25);
     EXPECT_GE(rate + otherRate, 0.9 * shape.megabits);
     EXPECT_LE(flow.queueQuantile(0.99), 0.03 + kPacket * 8e-6 / shape.megabits);
   }
