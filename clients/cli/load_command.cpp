@@ -304,6 +304,8 @@ void LoadCommand::check() {
   if (options_.participants < options_.scenes)
     throw CLI::ValidationError("--participants", "must be at least --scenes, so that each scene has one");
   options_.viewers = viewers_.value_or(creates ? options_.participants : options_.viewers);
+  if (options_.sctp && options_.datagrams == Datagrams::off)
+    throw CLI::ValidationError("--sctp", "needs datagrams, which --transport tcp turns off");
   if (options_.viewers > options_.participants)
     throw CLI::ValidationError("--viewers", "must not exceed --participants");
   options_.decoders = decoders_.value_or(options_.participants);

@@ -93,7 +93,7 @@ void Association::begin(Time now) {
                                                       [this](std::span<const std::byte> payload) {
                                                         if (data_)
                                                           data_->receive(now_, payload);
-                                                        else
+                                                        else if (!sctp_)
                                                           callbacks_.receive(payload);
                                                       }},
                      now);

@@ -53,13 +53,15 @@ HEADERS = {"native": 20 + 8 + 37, "browser": 20 + 8 + 37 + 28}
 COUNTERS = {"frames": "clothstream_scene_taken_frames_total", "packets": "clothstream_datagram_packets_total",
             "pieceBytes": "clothstream_datagram_bytes_total", "fallbacks": "clothstream_datagram_fallbacks_total",
             "repeats": "clothstream_datagram_repeats_total"}
-def certificate(folder, *addresses):
+
+
+def certificate(folder, address):
     """Options of a server. Programs that this one starts trust the certificate from now on."""
     key, file = folder / "key.pem", folder / "certificate.pem"
     make = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1", "-subj",
-            "/CN=localhost", "-addext", "subjectAltName=" + ",".join(f"IP:{address}" for address in addresses)]
+            "/CN=localhost", "-addext", f"subjectAltName=IP:{address}"]
     subprocess.run([*make, "-keyout", key, "-out", file], check=True, stderr=subprocess.DEVNULL)
-    os.environ.update(SSL_CERT_FILE=str(file), GRPC_DEFAULT_SSL_ROOTS_FILE_PATH=str(file))
+    os.environ["SSL_CERT_FILE"] = str(file)
     return ["--tls-certificate", file, "--tls-key", key]
 
 
@@ -270,7 +272,8 @@ def read_arguments(arguments=None):
     parser.add_argument("--figures", type=choice(FIGURES), default=list(FIGURES),
                         help=f"some of {','.join(FIGURES)}. Default: all")
     parser.add_argument("--rounds", type=number(1, 100, int), default=3, help="rounds (default: %(default)s)")
-    parser.add_argument("--seconds", type=number(2, 3600, float), default=8, help="time of each measurement (default: %(default)s)")
+    parser.add_argument("--seconds", type=number(2, 3600, float), default=8,
+                        help="time of each measurement (default: %(default)s)")
     parser.add_argument("--json", type=pathlib.Path, help="file for the rows")
     return parser.parse_args(arguments)
 
