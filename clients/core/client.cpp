@@ -109,7 +109,7 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
   const std::optional<ServerMessage> message = readServerMessage(bytes);
   if (!message) return failMalformed("ServerMessage");
   // A frame may have come by datagrams, and then says nothing about the connection. Pongs never do.
-  if (message->kind != Body::frame || !datagrams_.areOpened()) timer_.heard(nowUs);
+  if (message->kind != Body::frame || !datagrams_.serverOpens()) timer_.heard(nowUs);
   switch (message->kind) {
     case Body::welcome:
       return welcomed(message->body, nowUs);

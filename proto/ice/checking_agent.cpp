@@ -42,7 +42,10 @@ CheckingAgent::CheckingAgent(Credentials local, Credentials remote, std::span<co
 
 std::vector<Datagram> CheckingAgent::advance(Time now) {
   if (now < nextTime()) return {};
-  if (now >= std::exchange(silentAt_, Time::max())) repeatAfter_ = kSilence;
+  if (now >= silentAt_) {
+    silentAt_ = Time::max();
+    repeatAfter_ = kSilence;
+  }
   if (isOver(now)) {
     nextCheck_ = Time::max();
     return {};

@@ -35,8 +35,8 @@ class PacketPacer {
     return true;
   }
 
-  // Takes the next packet if it is due, or will be in the time `quantum` and another one was taken now.
-  // `rate`: bytes/s, above 0.
+  // Takes the next packet if it is due. After a packet that was taken at the same `now`, one that is due
+  // within `quantum` is taken, too. `rate`: bytes/s, above 0.
   std::optional<Packet> next(double rate, Clock::duration quantum, Clock::time_point now) {
     std::deque<Waiting>& queue = repeated_.empty() ? first_ : repeated_;
     const auto until = now == taken_ ? now + quantum : now;

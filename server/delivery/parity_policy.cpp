@@ -57,6 +57,7 @@ void ParityPolicy::update(PacketLoss measured, Clock::time_point now) {
     if (now - *lowerSince_ < kHold) return;
   } else if (measured.share <= loss_.share) {
     lowerSince_.reset();
+    loss_.burst = std::max(loss_.burst, measured.burst);
     return;
   }
   lowerSince_.reset();

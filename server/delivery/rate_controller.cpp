@@ -63,6 +63,10 @@ bool RateController::isQueued() const {
   return delay_.filtered() > kTarget / 2 + delay_.jitter();
 }
 
+bool RateController::queueStands(Clock::time_point now) const {
+  return queuedSince_ && now - *queuedSince_ >= kStanding;
+}
+
 bool RateController::awaitsSeveral() const {
   return !answered_ || sent_ - *answered_ >= kFrameTime;
 }
@@ -143,8 +147,7 @@ void RateController::measure(const SentPackets::Report& report, std::uint32_t ar
 
 void RateController::yield(const SentPackets::Report& report, Clock::time_point now) {
   const double queue = delay_.filtered();
-  const bool stands = queuedSince_ && now - *queuedSince_ >= kStanding;
-  if (queue > kTarget + delay_.jitter() || (report.lost > 0 && stands)) {
+  if (queue > kTarget + delay_.jitter() || (report.lost > 0 && queueStands(now))) {
     // Radio loss takes nothing from the rate that the bottleneck carries.
     const double carried = delivery_ / (1 - std::min(loss().share(), kRadioLoss));
     const double time = controlTime();
@@ -245,7 +248,7 @@ void RateController::compete(const SentPackets::Report& report, double passed, C
     const double time = controlTime();
     cut(std::min(delivery_ * time, window_ * time / (time + delay_.filtered())));
   } else {
-    if (report.lost > 0 && isQueued() && !isBefore(report.newestLost, competition.reduced)) {
+    if (report.lost > 0 && queueStands(now) && !isBefore(report.newestLost, competition.reduced)) {
       competition.window.reduce();
       competition.reduced = packets_.next();
     } else if (mayGrow()) {

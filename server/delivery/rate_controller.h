@@ -72,8 +72,8 @@ class RateController {
   double rate() const { return window_ / (controlTime() + delay_.filtered()); }
   // Rate for the pacer. It is close to the path's, so that a frame causes hardly any queue.
   double pace() const { return 1.25 * rate(); }
-  // Time for which packets may leave at once, because a wake for each costs more than to send it. 0 where the
-  // path may carry no more than the pace: frames need the whole window, or there is a queue.
+  // Time for which packets may leave at once, because a wake for each costs more than to send it. 0 while
+  // frames need the whole window or there is a queue: the path may then carry no more than the pace.
   Clock::duration quantum() const {
     return mayGrow() || isQueued() ? Clock::duration::zero() : std::chrono::milliseconds(4);
   }
@@ -119,6 +119,7 @@ class RateController {
   // Time between a change of the window and the first receipts that show it, without a queue.
   double controlTime() const;
   bool isQueued() const;
+  bool queueStands(Clock::time_point now) const;
   void measure(const SentPackets::Report& report, std::uint32_t arrivalUs, Clock::time_point now);
   void yield(const SentPackets::Report& report, Clock::time_point now);
   void compete(const SentPackets::Report& report, double passed, Clock::time_point now);

@@ -94,7 +94,7 @@ std::optional<SharedBytes> EdgeTunnel::next() {
   const std::lock_guard lock(mutex_);
   SharedBytes next = messages_.next();
   if (!next) return std::nullopt;
-  noteLeft();
+  noteTaken();
   // A frame that was too long for the link has left.
   if (frameWake_ && messages_.hasNextFrame()) frameWake_();
   return next;
@@ -104,20 +104,20 @@ std::optional<SharedBytes> EdgeTunnel::nextFrame(Clock::time_point /*now*/) {
   const std::lock_guard lock(mutex_);
   SharedBytes frame = messages_.nextFrame();
   if (!frame) return std::nullopt;
-  noteLeft();
+  noteTaken();
   if (messages_.hasNext()) wake_();
   return frame;
 }
 
-void EdgeTunnel::noteLeft() {
-  channel_.use(messages_.left());
+void EdgeTunnel::noteTaken() {
+  channel_.use(messages_.taken());
   pollLocked();
 }
 
 void EdgeTunnel::setLink(std::optional<Link> link) {
   const std::lock_guard lock(mutex_);
   messages_.setLink(link);
-  if (!link) noteLeft();
+  if (!link) noteTaken();
   if (messages_.hasNext()) wake_();
   if (frameWake_ && messages_.hasNextFrame()) frameWake_();
 }
@@ -172,7 +172,7 @@ void EdgeTunnel::receive(const std::string& stream, const v1::Segment& segment) 
             static_cast<std::int64_t>(pong.pong().server_time_us() - schedule::microseconds(now));
       messages_.add(std::move(received.message), received.sequence);
     }
-    pollLocked();
+    noteTaken();  // dropped frames, too
     if (left_) return;
     if (frameWake_ && messages_.hasNextFrame()) frameWake_();
   }

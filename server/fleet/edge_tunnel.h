@@ -79,8 +79,9 @@ class EdgeTunnel final : public scene::RemoteSession {
   bool answerPing(std::span<const std::byte> message, schedule::Clock::time_point now);
   void pushLocked(std::span<const std::byte> message);
   // Something has left: the origin may send more.
-  void noteLeft();
-  // The following two remember what another server needs to know the participant, and read acknowledgements.
+  void noteTaken();
+  // Both remember what another server needs to know the participant. readRequest() reads acknowledgements,
+  // too.
   void readRequest(std::span<const std::byte> message);
   void readAnswer(const delivery::SharedBytes& message);
 

@@ -84,11 +84,11 @@ void RelayedMessages::clear() {
   frames_.clear();
 }
 
-std::uint64_t RelayedMessages::left() const {
-  std::uint64_t left = newest_;
+std::uint64_t RelayedMessages::taken() const {
+  std::uint64_t taken = newest_;
   for (const auto* waiting : {&messages_, &frames_})
-    if (!waiting->empty()) left = std::min(left, waiting->front().after);
-  return left;
+    if (!waiting->empty()) taken = std::min(taken, waiting->front().after);
+  return taken;
 }
 
 void RelayedMessages::forgetChannel() {

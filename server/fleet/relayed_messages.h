@@ -44,7 +44,7 @@ class RelayedMessages {
   std::size_t size() const { return messages_.size() + frames_.size(); }
   void clear();
   // Newest message of the channel that has left with all before it; 0: none.
-  std::uint64_t left() const;
+  std::uint64_t taken() const;
   // The messages that wait are those of a former channel.
   void forgetChannel();
 

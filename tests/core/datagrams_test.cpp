@@ -438,13 +438,26 @@ TEST(DatagramInput, LastPosesSettleOnTheStream) {
   ways.receiveFrame(server.frame(1, codec::PacketKind::key));
   ASSERT_TRUE(ways.send(poses(1), 0));
   ASSERT_TRUE(ways.send(poses(2), 50 * kMs));
-  ASSERT_TRUE(ways.send(acknowledgement(), 60 * kMs));
   EXPECT_THAT(ways.streamMessages(149 * kMs), IsEmpty());
   EXPECT_THAT(ways.streamMessages(150 * kMs), ElementsAre(poses(2).SerializeAsString()));
   EXPECT_THAT(ways.streamMessages(900 * kMs), IsEmpty());
   ASSERT_TRUE(ways.send(poses(3), 200 * kMs));
   ASSERT_FALSE(ways.send(poses(4), 501 * kMs));
   EXPECT_THAT(ways.streamMessages(900 * kMs), IsEmpty()) << "the stream has newer poses";
+}
+
+// A server whose window is full sends no frame before an acknowledgement, and then no other one follows.
+TEST(DatagramInput, LastAcknowledgementSettlesOnTheStream) {
+  ScriptedServer server;
+  Ways ways;
+  ways.receiveFrame(server.frame(1, codec::PacketKind::key));
+  ASSERT_TRUE(ways.send(acknowledgement(), 0));
+  ASSERT_TRUE(ways.send(acknowledgement(), 50 * kMs));
+  ASSERT_TRUE(ways.send(poses(1), 60 * kMs));
+  EXPECT_THAT(ways.streamMessages(149 * kMs), IsEmpty());
+  EXPECT_THAT(ways.streamMessages(150 * kMs), ElementsAre(acknowledgement().SerializeAsString()));
+  EXPECT_THAT(ways.streamMessages(160 * kMs), ElementsAre(poses(1).SerializeAsString()));
+  EXPECT_THAT(ways.streamMessages(900 * kMs), IsEmpty());
 }
 
 TEST(DatagramInput, AttachmentsTravelOnTheStream) {

@@ -127,16 +127,16 @@ TEST_F(RelayedMessagesTest, OldestMessageHoldsUpChannel) {
   notice();
   add(frame(2));
   notice();
-  EXPECT_EQ(messages.left(), 0u);
+  EXPECT_EQ(messages.taken(), 0u);
   EXPECT_NE(messages.nextFrame(), nullptr);
-  EXPECT_EQ(messages.left(), 0u);
+  EXPECT_EQ(messages.taken(), 0u);
   EXPECT_NE(messages.next(), nullptr);
-  EXPECT_EQ(messages.left(), 2u);
+  EXPECT_EQ(messages.taken(), 2u);
   messages.add(delivery::notice(v1::NOTICE_KIND_SCENE_PAUSED, "", 0));
   EXPECT_NE(messages.next(), nullptr);
-  EXPECT_EQ(messages.left(), 3u);
+  EXPECT_EQ(messages.taken(), 3u);
   messages.forgetChannel();
-  EXPECT_EQ(messages.left(), 0u);
+  EXPECT_EQ(messages.taken(), 0u);
 }
 
 }  // namespace

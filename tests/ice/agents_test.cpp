@@ -347,6 +347,20 @@ TEST_F(AgentsTest, FollowMovedClientThatWasSent) {
   EXPECT_LE(fromClient_ - before, 30);
 }
 
+// A consent check that is due meanwhile, and goes unanswered, does not delay the checks for the silence.
+TEST_F(AgentsTest, SilenceCountsBesideConsent) {
+  start({kServerAddress});
+  run(kStart + 1s);
+  const Time check = client_->nextTime();
+  run(check - 10ms);
+  client_->arrived(now_);
+  reachable_.clear();
+  run(check + 100ms);
+  const int before = fromClient_;
+  run(check + 500ms);
+  EXPECT_GE(fromClient_ - before, 4);
+}
+
 TEST_F(AgentsTest, PathIsLostAndFoundAgain) {
   start({kServerAddress});
   run(kStart + 1s);

@@ -82,12 +82,15 @@ bool DatagramLink::holds(Bytes message, std::uint64_t nowUs) {
 
 bool DatagramLink::sends(Bytes message, std::uint64_t nowUs) {
   const Outgoing outgoing = classify(message);
-  if (outgoing.isPoses) unsettled_.reset();
+  std::optional<Unsettled>* const unsettled = outgoing.isPoses             ? &poses_
+                                              : outgoing.isAcknowledgement ? &acknowledgement_
+                                                                           : nullptr;
+  if (unsettled != nullptr) unsettled->reset();
   if (!outgoing.mayBeLost || !inUse(nowUs) || message.size() > datagram::kMaxInputBytes) return false;
-  if (outgoing.isPoses) unsettled_ = {std::string(message.data(), message.size()), nowUs};
+  if (unsettled != nullptr) *unsettled = {std::string(message.data(), message.size()), nowUs};
   if (waiting_.size() == kMaxWaiting) waiting_.pop_front();
   Datagram& out = waiting_.emplace_back();
-  // The next frame is acknowledged soon, so that a repeat would cost more than a lost acknowledgement.
+  // An acknowledgement that the next one does not replace soon travels on the stream.
   out.size = input_.write(asBytes(message), nowUs, out.bytes, !outgoing.isAcknowledgement);
   return true;
 }
@@ -125,9 +128,12 @@ std::span<const std::byte> DatagramLink::nextDatagram(std::uint64_t nowUs) {
 }
 
 Bytes DatagramLink::nextStreamMessage(std::uint64_t nowUs) {
-  if (!unsettled_ || nowUs < unsettled_->sentUs + kSettleUs) return {};
-  message_ = std::exchange(unsettled_, std::nullopt)->message;
-  return {message_.data(), message_.size()};
+  for (std::optional<Unsettled>* unsettled : {&poses_, &acknowledgement_})
+    if (*unsettled && nowUs >= (*unsettled)->sentUs + kSettleUs) {
+      message_ = std::exchange(*unsettled, std::nullopt)->message;
+      return {message_.data(), message_.size()};
+    }
+  return {};
 }
 
 std::optional<std::uint64_t> DatagramLink::dueUs() const {
@@ -139,7 +145,8 @@ std::optional<std::uint64_t> DatagramLink::dueUs() const {
   include(order_.dueUs());
   include(received_.dueUs());
   include(input_.repeatUs());
-  if (unsettled_) include(unsettled_->sentUs + kSettleUs);
+  for (const std::optional<Unsettled>* unsettled : {&poses_, &acknowledgement_})
+    if (*unsettled) include((*unsettled)->sentUs + kSettleUs);
   return due;
 }
 

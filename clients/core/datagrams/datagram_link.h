@@ -24,7 +24,8 @@ class DatagramLink {
  public:
   // Input travels in datagrams while one has arrived from the server in this time.
   static constexpr std::uint64_t kInUseUs = 500'000;
-  // The newest poses travel on the stream, too, if none follow them for this time.
+  // The newest poses travel on the stream, too, if none follow them for this time, and so does the newest
+  // acknowledgement: a server whose window is full sends nothing before it.
   static constexpr std::uint64_t kSettleUs = 100'000;
   // Input that the program has not taken yet; the oldest is dropped.
   static constexpr std::size_t kMaxWaiting = 16;
@@ -47,7 +48,8 @@ class DatagramLink {
     std::array<std::byte, datagram::kMaxDatagramBytes> bytes;
     std::size_t size = 0;
   };
-  struct SentPoses {
+  // The newest message of a kind, which only datagrams have carried.
+  struct Unsettled {
     std::string message;
     std::uint64_t sentUs = 0;
   };
@@ -63,9 +65,9 @@ class DatagramLink {
   bool completed_ = false;  // a frame, since the last receipt
   datagram::InputSender input_;
   std::deque<Datagram> waiting_;
-  std::optional<SentPoses> unsettled_;  // newest poses, which only datagrams have carried
-  std::string message_;                 // that the last call returned
-  Datagram datagram_;                   // that the last call returned
+  std::optional<Unsettled> poses_, acknowledgement_;
+  std::string message_;  // that the last call returned
+  Datagram datagram_;    // that the last call returned
   // Packets counted without a limit of 32 bits.
   std::uint64_t packets_ = 0, newestPacket_ = 0, parityPackets_ = 0;
 };

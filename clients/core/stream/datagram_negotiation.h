@@ -34,8 +34,8 @@ class DatagramNegotiation {
     return requestId != 0 && requestId == offerId_ && answered(DatagramAnswer{});
   }
   const std::optional<DatagramAnswer>& answer() const { return answer_; }
-  // Whether the server opens datagrams for this connection.
-  bool areOpened() const { return answer_ && !answer_->addresses.empty(); }
+  // Whether the server opens datagrams for this connection, if they arrive.
+  bool serverOpens() const { return answer_ && !answer_->addresses.empty(); }
 
  private:
   void begin(bool connected) {

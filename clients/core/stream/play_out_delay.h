@@ -18,10 +18,11 @@ namespace clothstream::client {
 // one second after a disturbance the delay falls.
 //
 // The first frames are slow while a connection starts. Until there are kFirst of them, the delay is what half
-// of them needed; then they are forgotten.
+// of them needed, and falls to it at once; then they are forgotten.
 //
-// The delay moves by at most kSlew of the time that passes, so that motion never jumps, and until there are
-// kSettled frames by at most the whole of that time. All times are microseconds.
+// Later it moves by at most kSlew of the time that passes, so that motion never jumps, and until there are
+// kSettled frames by at most the whole of that time, so that motion never goes back. All times are
+// microseconds.
 class PlayOutDelay {
  public:
   static constexpr double kSlew = 0.1;
@@ -54,7 +55,8 @@ class PlayOutDelay {
   void move(double aheadUs, std::optional<double> elapsedUs, double leastUs, double mostUs) {
     wantedUs_ = std::clamp(neededUs_ + aheadUs, leastUs, mostUs);
     const double most = (frames_ < kSettled ? 1 : kSlew) * elapsedUs.value_or(0);
-    us_ = elapsedUs ? us_ + std::clamp(wantedUs_ - us_, -most, most) : wantedUs_;
+    const bool falls = frames_ <= kFirst && wantedUs_ < us_;
+    us_ = elapsedUs && !falls ? us_ + std::clamp(wantedUs_ - us_, -most, most) : wantedUs_;
   }
   double us() const { return us_; }
   double wantedUs() const { return wantedUs_; }

@@ -20,9 +20,9 @@ class Reconnection {
   // Time limit of an attempt without Welcome. It is short in the grace period, because a recovering network
   // may have lost the first packets. Later it leaves time for slow networks.
   static constexpr std::uint64_t kGraceAttemptUs = 2'000'000, kAttemptUs = 10'000'000;
-  // A connection without any message for kSilenceUs is closed; servers answer pings. Frames do not count
-  // while datagrams are open, because they may have come by these. At most kLongestStepUs of the time between
-  // two updates counts.
+  // A connection without any message for kSilenceUs is closed; servers answer pings. Frames do not count if
+  // the server has answered an offer of datagrams, because they may come by these. At most kLongestStepUs of
+  // the time between two updates counts.
   static constexpr std::uint64_t kSilenceUs = 4'000'000, kLongestStepUs = 500'000;
   // After a connection that lasted this long, the first attempt is immediate.
   static constexpr std::uint64_t kStableUs = 2'000'000;

@@ -42,7 +42,7 @@ void Association::advance(Time now) {
   if (open != std::exchange(wasOpen_, open))
     spdlog::debug("{}: datagrams {}", link_.peer().name, open ? "are open" : path_.endReason());
   if (const auto address = path_.selected(now); address && address != std::exchange(address_, address))
-    link_.probeAt(now);
+    link_.peerMoved(now);
   link_.advance(open, now,
                 [&](std::span<const std::byte> payload, bool last) { path_.send(payload, last, now); });
 }

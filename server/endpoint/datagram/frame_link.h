@@ -47,8 +47,11 @@ class FrameLink {
   // changes, and when the peer's outlet has something.
   void advance(bool open, Clock::time_point now, const Send& send);
   Clock::time_point nextTime() const;
-  // Probes a silent path at this time already.
-  void probeAt(Clock::time_point time) { probeAt_ = std::min(probeAt_, time); }
+  // The peer has a new address: a silent path is probed now, and again after kFirstPause.
+  void peerMoved(Clock::time_point now) {
+    probeAt_ = std::min(probeAt_, now);
+    pause_ = kFirstPause;
+  }
 
   const hosting::DatagramPeer& peer() const { return peer_; }
 

@@ -27,7 +27,7 @@ unsigned FrameSender::rowsFor(std::size_t frameBytes, bool probes, Clock::time_p
       datagram::kPieceHeaderBytes + datagram::payloadBytes(frameBytes, pieces) + headerBytes_;
   const auto most = std::min<unsigned>(datagram::kMaxParityPieces,
                                        static_cast<unsigned>((LinkAdaptation::kProbe - 1) * pieces));
-  while (rows < most && controller_.hasRoom(pacer_.bytes() + (pieces + rows) * packet, now)) ++rows;
+  while (rows < most && controller_.hasRoom(waiting() + (pieces + rows) * packet, now)) ++rows;
   return rows;
 }
 
@@ -92,7 +92,12 @@ std::optional<std::uint64_t> FrameSender::acknowledge(const datagram::Receipt& r
 }
 
 delivery::LinkOutlet::Link FrameSender::link(Clock::time_point now) {
-  return {.hasRoom = controller_.hasRoom(pacer_.bytes(), now), .frameRate = controller_.rate() * frameShare_};
+  return {.hasRoom = controller_.hasRoom(waiting(), now), .frameRate = controller_.rate() * frameShare_};
+}
+
+std::uint64_t FrameSender::waiting() const {
+  if (!deferred_) return pacer_.bytes();
+  return pacer_.bytes() + (deferred_->end - deferred_->first.index) * packetBytes(*deferred_->first.frame);
 }
 
 std::optional<Clock::time_point> FrameSender::due() const {

@@ -76,6 +76,8 @@ class FrameSender {
 
   void queue(Packet first, unsigned end, Clock::time_point now);
   void queueDeferred(Clock::time_point now);
+  // Bytes that have not left.
+  std::uint64_t waiting() const;
   std::uint32_t packetBytes(const datagram::FramePieces& frame) const {
     return static_cast<std::uint32_t>(frame.datagramBytes()) + headerBytes_;
   }

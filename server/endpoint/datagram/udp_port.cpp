@@ -135,7 +135,10 @@ UdpPort::UdpPort(net::io_context& io, const std::string& host, std::uint16_t por
   hasIpv6_ = openIpv6(socket_, error);
   if (!hasIpv6_) socket_.open(udp::v4(), error);
   if (!error && hasIpv6_) socket_.set_option(net::ip::v6_only(false), error);
-  const net::ip::address address = ofFamily(found.begin()->endpoint().address(), hasIpv6_, error);
+  const auto isIpv4 = [](const auto& entry) { return entry.endpoint().address().is_v4(); };
+  auto chosen = hasIpv6_ ? found.begin() : std::find_if(found.begin(), found.end(), isIpv4);
+  if (chosen == found.end()) chosen = found.begin();
+  const net::ip::address address = ofFamily(chosen->endpoint().address(), hasIpv6_, error);
   if (!error) socket_.bind({address, port}, error);
   if (!error) socket_.non_blocking(true, error);
   if (error == net::error::address_in_use)
@@ -148,6 +151,8 @@ UdpPort::UdpPort(net::io_context& io, const std::string& host, std::uint16_t por
   if ((hasIpv6_ ? ::setsockopt(socket_.native_handle(), IPPROTO_IPV6, IPV6_RECVPKTINFO, &on, sizeof on)
                 : ::setsockopt(socket_.native_handle(), IPPROTO_IP, IP_PKTINFO, &on, sizeof on)) != 0)
     throw refuse("the kernel does not say to which address datagrams were sent");
+  const int whole = 0;
+  joins_ = ::setsockopt(socket_.native_handle(), IPPROTO_UDP, UDP_SEGMENT, &whole, sizeof whole) == 0;
   for (const int queue : {SO_RCVBUF, SO_SNDBUF})
     ::setsockopt(socket_.native_handle(), SOL_SOCKET, queue, &kQueueBytes, sizeof kQueueBytes);
 }
@@ -209,7 +214,7 @@ void UdpPort::send(const Route& route, std::span<const std::byte> datagram) {
 
 bool UdpPort::joins(const Route& route, std::size_t bytes) const {
   const std::size_t waiting = batch_.bytes.size(), each = batch_.datagramBytes;
-  return waiting > 0 && route == batch_.route && bytes <= each && waiting % each == 0 &&
+  return joins_ && waiting > 0 && route == batch_.route && bytes <= each && waiting % each == 0 &&
          waiting / each < kMaxBatch && waiting + bytes <= kMaxBatchBytes;
 }
 
@@ -249,8 +254,9 @@ bool UdpPort::transmit(std::span<const std::byte> bytes) {
   const bool several = bytes.size() > batch_.datagramBytes;
   if (several) control.add(IPPROTO_UDP, UDP_SEGMENT, static_cast<std::uint16_t>(batch_.datagramBytes));
   // The kernel refuses where the device makes no checksums (EIO), and datagrams that IP must fragment.
-  return ::sendmsg(socket_.native_handle(), &message, 0) >= 0 || !several ||
-         (errno != EIO && errno != EINVAL && errno != EMSGSIZE);
+  if (::sendmsg(socket_.native_handle(), &message, 0) >= 0 || !several) return true;
+  joins_ = joins_ && errno != EIO;
+  return errno != EIO && errno != EINVAL && errno != EMSGSIZE;
 }
 
 }  // namespace clothstream::endpoint

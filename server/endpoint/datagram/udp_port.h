@@ -67,6 +67,7 @@ class UdpPort {
 
   boost::asio::ip::udp::socket socket_;
   bool hasIpv6_ = true;
+  bool joins_ = true;  // the kernel has UDP_SEGMENT (Linux 4.18)
   Batch batch_;
   std::function<void(const Route& route, std::span<const std::byte> datagram)> handle_;
   std::function<void()> done_;

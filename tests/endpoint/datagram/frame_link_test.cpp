@@ -183,14 +183,14 @@ TEST_F(FrameLinkTest, FramesReturnWhenProbeArrives) {
 }
 
 TEST_F(FrameLinkTest, NewAddressIsProbedAtOnce) {
-  link.probeAt(now);
+  link.peerMoved(now);
   pass(300ms);
   EXPECT_EQ(metrics.fallbacks.value(), 0u);
   carries = std::bernoulli_distribution(0);
   pass(700ms);
   ASSERT_EQ(metrics.fallbacks.value(), 1u);
   carries = std::bernoulli_distribution(1);
-  link.probeAt(now);
+  link.peerMoved(now);
   pass(100ms);
   EXPECT_EQ(metrics.peers, 1u);
 }

@@ -107,6 +107,13 @@ TEST(ParityPolicy, DefersParityInBursts) {
   EXPECT_EQ(policy.rows(7), ParityPolicy::kMost) << "what it cannot repair is requested";
 }
 
+TEST(ParityPolicy, NoticesBurstsAtTheSameLoss) {
+  ParityPolicy policy;
+  policy.update({.share = 0.02, .burst = 1}, kStart);
+  policy.update({.share = 0.019, .burst = 4}, kStart + 1s);
+  EXPECT_TRUE(policy.defers());
+}
+
 TEST(ParityPolicy, KeepsBounds) {
   ParityPolicy policy;
   EXPECT_EQ(policy.rows(3), 1u) << "no loss was measured yet";

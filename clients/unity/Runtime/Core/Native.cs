@@ -426,7 +426,8 @@ namespace ClothStream.Core
         /// delay with which 98 % of the last 2,048 frames, or all frames of the last second, would have arrived in
         /// time, within the two limits below. The first 8 frames are slow while a connection starts: until then half
         /// of them are in time, and later they do not count. The adaptive delay changes by at most 10 % of the
-        /// elapsed time; during the first 16 frames, by at most the elapsed time.
+        /// elapsed time; during the first 16 frames, by at most the elapsed time, and during the first 8 it falls at
+        /// once.
         /// </summary>
         [FieldOffset(8)] public double delayMs;
         /// <summary>
