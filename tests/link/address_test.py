@@ -57,6 +57,7 @@ class Address(unittest.TestCase):
         # The stream was found dead, and opened again.
         self.assertEqual((names.count("connectionLost"), names.count("reconnected")), (1, 1))
         summary = events[-1]
+        self.assertEqual(summary["event"], "summary", events[-3:])
         self.assertEqual(summary["transport"], "datagrams")
         ticks = [event["tick"] for event in events if event["event"] == "frame"]
         missed = [later - tick - 1 for tick, later in zip(ticks, ticks[1:]) if tick >= moved_at]

@@ -83,6 +83,13 @@ void FrameLink::advance(bool open, Clock::time_point now, const Send& send) {
   }
 }
 
+void FrameLink::peerMoved(Clock::time_point now) {
+  sender_.forgetPath();
+  if (state_ == State::used) updateLink(now);
+  probeAt_ = std::min(probeAt_, now);
+  pause_ = kFirstPause;
+}
+
 void FrameLink::takeFrames(Clock::time_point now) {
   delivery::LinkOutlet& outlet = *peer_.outlet;
   while (const std::optional<delivery::SharedBytes> frame = outlet.nextFrame(now)) {

@@ -2,7 +2,6 @@
 // Frames and input of one peer in the payloads of datagrams, and the way back to the stream.
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -47,11 +46,9 @@ class FrameLink {
   // changes, and when the peer's outlet has something.
   void advance(bool open, Clock::time_point now, const Send& send);
   Clock::time_point nextTime() const;
-  // The peer has a new address: a silent path is probed now, and again after kFirstPause.
-  void peerMoved(Clock::time_point now) {
-    probeAt_ = std::min(probeAt_, now);
-    pause_ = kFirstPause;
-  }
+  // The peer has a new address. What is known of the old path is forgotten (RFC 9000, section 9.4): packets
+  // on it must not keep frames back. A silent path is probed now, and again after kFirstPause.
+  void peerMoved(Clock::time_point now);
 
   const hosting::DatagramPeer& peer() const { return peer_; }
 

@@ -182,10 +182,22 @@ TEST_F(FrameLinkTest, FramesReturnWhenProbeArrives) {
   EXPECT_EQ(metrics.fallbacks.value(), 1u);
 }
 
-TEST_F(FrameLinkTest, NewAddressIsProbedAtOnce) {
-  link.peerMoved(now);
+// Packets on the old path fill the window.
+TEST_F(FrameLinkTest, FramesGoOnAtNewAddress) {
   pass(300ms);
+  carries = std::bernoulli_distribution(0);
+  pass(300ms);
+  carries = std::bernoulli_distribution(1);
+  const std::size_t before = byLink;
+  link.peerMoved(now);
+  pass(150ms);
+  EXPECT_GT(byLink, before);
+  pass(1s);
   EXPECT_EQ(metrics.fallbacks.value(), 0u);
+}
+
+TEST_F(FrameLinkTest, NewAddressIsProbedAtOnce) {
+  pass(300ms);
   carries = std::bernoulli_distribution(0);
   pass(700ms);
   ASSERT_EQ(metrics.fallbacks.value(), 1u);
