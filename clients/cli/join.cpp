@@ -169,22 +169,22 @@ ExitCode join(const JoinOptions& options) {
   line.clear();
   ExitCode code = kOk;
   if (failure) code = printError(*failure);
-  const Report report = reportOf(client);
-  if (options.hash && report.statistics.hash_mismatches > 0)
-    code =
-        printError(kHashMismatch, fmt::format("{} of {} decoded frames differ from the server's",
-                                              report.statistics.hash_mismatches, report.statistics.frames));
-  if (obj && report.statistics.frames == 0) {
-    code = printError(kNotWritten, fmt::format("{} was not written: no frame arrived", options.objPath));
-  } else if (obj) {
-    client.visit([&](cs_client* core) {
+  client.visit([&](cs_client* core) {  // in which no event follows the summary
+    Report report = Report::of(core, NativeClient::nowUs());
+    report.datagrams = client.datagrams();
+    if (options.hash && report.statistics.hash_mismatches > 0)
+      code =
+          printError(kHashMismatch, fmt::format("{} of {} decoded frames differ from the server's",
+                                                report.statistics.hash_mismatches, report.statistics.frames));
+    if (obj && report.statistics.frames == 0)
+      code = printError(kNotWritten, fmt::format("{} was not written: no frame arrived", options.objPath));
+    else if (obj)
       if (auto written = writeObj(core, *obj); !written) code = printError(kNotWritten, written.error());
-    });
-  }
-  if (options.events)
-    put(summaryLine(report.json(options.hash)));
-  else
-    put((options.json ? report.json(options.hash) : report.text(options.hash)) + '\n');
+    if (options.events)
+      put(summaryLine(report.json(options.hash)));
+    else
+      put((options.json ? report.json(options.hash) : report.text(options.hash)) + '\n');
+  });
   return code;
 }
 
