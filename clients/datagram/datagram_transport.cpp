@@ -11,6 +11,8 @@
 namespace clothstream {
 namespace {
 
+using namespace std::chrono_literals;
+
 using SteadyClock = std::chrono::steady_clock;
 
 class DatagramTransport final : public Transport {
@@ -55,7 +57,9 @@ class DatagramTransport final : public Transport {
   void wait(SteadyClock::duration atMost) override {
     exchange();
     const auto now = SteadyClock::now(), due = datagrams_.dueTime();
-    const auto untilDue = due > now ? due - now : SteadyClock::duration::zero();
+    // What is due for the stream stays due until it can be written.
+    const SteadyClock::duration least = stream_->canWrite() ? 0ms : 1ms;
+    const auto untilDue = std::max(due - now, least);
     stream_->wait(std::exchange(hasMore_, false) ? SteadyClock::duration::zero()
                                                  : std::min(atMost, untilDue));
     exchange();

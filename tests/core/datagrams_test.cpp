@@ -532,6 +532,11 @@ class LossyLink {
       if (!ways_.send(message, nowUs_)) handle(message);
     for (const std::string& datagram : ways_.datagrams(nowUs_))
       carry(datagram, [this](const std::string& arrived) { up(arrived); });
+    for (const std::string& message : ways_.streamMessages(nowUs_)) {
+      v1::ClientMessage read;
+      ASSERT_TRUE(read.ParseFromString(message));
+      handle(read);
+    }
     const std::uint64_t due = cs_datagrams_due_at(ways_.get());
     ASSERT_GT(due, nowUs_) << "nothing is due once all three functions have returned NULL";
     if (due != UINT64_MAX && events_.find(due) == events_.end()) at(due, [this] { act(); });
