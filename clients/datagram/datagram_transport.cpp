@@ -59,7 +59,7 @@ class DatagramTransport final : public Transport {
     const auto now = SteadyClock::now(), due = datagrams_.dueTime();
     // What is due for the stream stays due until it can be written.
     const SteadyClock::duration least = stream_->canWrite() ? 0ms : 1ms;
-    const auto untilDue = std::max(due - now, least);
+    const auto untilDue = due > now + least ? due - now : least;
     stream_->wait(std::exchange(hasMore_, false) ? SteadyClock::duration::zero()
                                                  : std::min(atMost, untilDue));
     exchange();
