@@ -169,7 +169,8 @@ ExitCode join(const JoinOptions& options) {
   line.clear();
   ExitCode code = kOk;
   if (failure) code = printError(*failure);
-  client.visit([&](cs_client* core) {  // in which no event follows the summary
+  std::string summary;
+  client.visit([&](cs_client* core) {
     Report report = Report::of(core, NativeClient::nowUs());
     report.datagrams = client.datagrams();
     if (options.hash && report.statistics.hash_mismatches > 0)
@@ -180,11 +181,11 @@ ExitCode join(const JoinOptions& options) {
       code = printError(kNotWritten, fmt::format("{} was not written: no frame arrived", options.objPath));
     else if (obj)
       if (auto written = writeObj(core, *obj); !written) code = printError(kNotWritten, written.error());
-    if (options.events)
-      put(summaryLine(report.json(options.hash)));
-    else
-      put((options.json ? report.json(options.hash) : report.text(options.hash)) + '\n');
+    summary = options.events ? summaryLine(report.json(options.hash))
+                             : (options.json ? report.json(options.hash) : report.text(options.hash)) + '\n';
   });
+  joined->reset();  // no event follows the summary
+  put(summary);
   return code;
 }
 
