@@ -57,7 +57,7 @@ class DatagramTransport final : public Transport {
   void wait(SteadyClock::duration atMost) override {
     exchange();
     const auto now = SteadyClock::now(), due = datagrams_.dueTime();
-    // What is due for the stream stays due until it can be written.
+    // A message that is due for the stream stays due until the stream can be written.
     const SteadyClock::duration least = stream_->canWrite() ? 0ms : 1ms;
     const auto untilDue = due > now + least ? due - now : least;
     stream_->wait(std::exchange(hasMore_, false) ? SteadyClock::duration::zero()

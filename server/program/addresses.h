@@ -22,7 +22,7 @@ bool isAddress(const std::string& text);
 // one.
 std::vector<std::string> addressesOf(const std::string& host);
 
-// What the endpoint for datagrams is opened with.
+// Options of the endpoint for datagrams.
 endpoint::DatagramEndpointOptions datagramOptions(const NetworkOptions& network);
 
 // The first address of this machine that others in its network can reach, or empty.

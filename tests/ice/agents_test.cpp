@@ -348,7 +348,7 @@ TEST_F(AgentsTest, FollowMovedClientThatWasSent) {
 }
 
 // A consent check that is due meanwhile, and goes unanswered, does not delay the checks for the silence.
-TEST_F(AgentsTest, SilenceCountsBesideConsent) {
+TEST_F(AgentsTest, CheckAfterSilenceDespiteConsent) {
   start({kServerAddress});
   run(kStart + 1s);
   const Time check = client_->nextTime();

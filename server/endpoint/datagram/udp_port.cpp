@@ -28,7 +28,7 @@ using net::ip::udp;
 
 // Datagrams that are handled before others may use the thread.
 constexpr int kDatagramsInARow = 64;
-// Of the IPv4 address in a mapped one.
+// Offset of the IPv4 address in a mapped one.
 constexpr std::ptrdiff_t kIpv4Offset = 12;
 // Room for either family: the structure of IPv6 is the longer one.
 using PacketInfo = std::array<char, CMSG_SPACE(sizeof(in6_pktinfo))>;
