@@ -94,15 +94,6 @@ std::optional<ClosedMeshProblem> connect(ClosedMesh& mesh) {
   return std::nullopt;
 }
 
-// Arc cosine with an error below 7e-5: Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.4.45.
-// It gives the same bits on every machine, unlike the C library's.
-double arcCosine(double x) {
-  const double size = std::min(std::abs(x), 1.0);
-  const double angle =
-      std::sqrt(1 - size) * (1.5707288 + size * (-0.2121144 + size * (0.0742610 - size * 0.0187293)));
-  return x < 0 ? 3.14159265358979 - angle : angle;
-}
-
 double crowdingOf(const ClosedMesh& mesh) {
   struct Box {
     Vec3 low, high;
@@ -161,6 +152,13 @@ std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> ver
   for (const Vec3& vertex : mesh.vertices) mesh.reach = std::max(mesh.reach, kReachRounding * vertex.norm());
   mesh.crowding = crowdingOf(mesh);
   return mesh;
+}
+
+double arcCosine(double x) {
+  const double size = std::min(std::abs(x), 1.0);
+  const double angle =
+      std::sqrt(1 - size) * (1.5707288 + size * (-0.2121144 + size * (0.0742610 - size * 0.0187293)));
+  return x < 0 ? 3.14159265358979 - angle : angle;
 }
 
 std::vector<Eigen::Vector3d> vertexPseudonormals(const ClosedMesh& mesh) {

@@ -54,6 +54,10 @@ struct ClosedMeshProblem {
 std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> vertices,
                                                            std::vector<TriangleCorners> triangles);
 
+// Arc cosine with an error below 7e-5: Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.4.45.
+// It gives the same bits on every machine, unlike the C library's.
+double arcCosine(double x);
+
 // Normals at the vertices that tell inside from outside: the sum of the unit normals of the triangles around
 // a vertex, each weighted by its angle there. Baerentzen and Aanaes, "Signed distance computation using the
 // angle weighted pseudonormal", 2005. Not normalised.

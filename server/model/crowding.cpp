@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "server/model/cloth_skin.h"
 #include "server/model/mesh.h"
 
 namespace clothstream::model {
@@ -48,7 +49,7 @@ SceneCrowding crowdingOf(const Scene& scene) {
   for (const Cloth& cloth : scene.cloths) {
     if (!cloth.selfCollision) continue;
     radius = std::max(radius, cloth.selfCollision->radius);
-    const std::vector<Vec3> positions = restPositions(cloth);
+    const std::vector<Vec3> positions = startPositions(scene, cloth);
     balls.insert(balls.end(), positions.begin(), positions.end());
     if (!boundsMotion(cloth)) continue;
     for (const Triangle& triangle : clothTriangles(cloth)) {

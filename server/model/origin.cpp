@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/model/origin.h"
 
+#include "server/model/cloth_skin.h"
 #include "server/model/mesh.h"
 
 namespace clothstream::model {
@@ -10,12 +11,24 @@ struct Extent {
   Vec3 low, high;
 };
 
-// Box of the start positions of a cloth.
+// Box of the rest positions of a cloth.
 Extent extentOf(const Cloth& cloth) {
   if (cloth.mesh) return {cloth.mesh->low, cloth.mesh->high};
   Grid corners = cloth.grid;
   corners.rows = corners.columns = 2;
   const std::vector<Vec3> positions = restPositions(corners);
+  Extent extent{positions[0], positions[0]};
+  for (const Vec3& position : positions) {
+    extent.low = extent.low.cwiseMin(position);
+    extent.high = extent.high.cwiseMax(position);
+  }
+  return extent;
+}
+
+// Box of the start positions of a cloth.
+Extent extentOf(const Scene& scene, const Cloth& cloth) {
+  if (!cloth.skin) return extentOf(cloth);
+  const std::vector<Vec3> positions = startPositions(scene, cloth);
   Extent extent{positions[0], positions[0]};
   for (const Vec3& position : positions) {
     extent.low = extent.low.cwiseMin(position);
@@ -33,9 +46,9 @@ Vec3 originOf(const Extent& extent) {
 
 Vec3 originOf(const Scene& scene) {
   if (scene.cloths.empty()) return Vec3::Zero();
-  Extent all = extentOf(scene.cloths[0]);
+  Extent all = extentOf(scene, scene.cloths[0]);
   for (const Cloth& cloth : scene.cloths) {
-    const Extent extent = extentOf(cloth);
+    const Extent extent = extentOf(scene, cloth);
     all.low = all.low.cwiseMin(extent.low);
     all.high = all.high.cwiseMax(extent.high);
   }
@@ -46,8 +59,8 @@ Vec3 originOf(const Cloth& cloth) {
   return originOf(extentOf(cloth));
 }
 
-float farthestFrom(const Vec3& point, const Cloth& cloth) {
-  const Extent extent = extentOf(cloth);
+float farthestFrom(const Vec3& point, const Scene& scene, const Cloth& cloth) {
+  const Extent extent = extentOf(scene, cloth);
   return (extent.high - point).cwiseMax(point - extent.low).maxCoeff();
 }
 

@@ -19,9 +19,9 @@ Vec3 originOf(const Scene& scene);
 Vec3 originOf(const Cloth& cloth);
 
 // Largest distance along an axis of a node's start position from a point, m.
-float farthestFrom(const Vec3& point, const Cloth& cloth);
+float farthestFrom(const Vec3& point, const Scene& scene, const Cloth& cloth);
 
-// Start positions of the nodes relative to a point.
+// Rest positions of the nodes relative to a point.
 std::vector<Vec3> restPositions(const Cloth& cloth, const Vec3& origin);
 
 }  // namespace clothstream::model

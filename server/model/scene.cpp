@@ -8,6 +8,7 @@
 #include <span>
 
 #include "proto/codec/reach.h"
+#include "server/model/cloth_skin.h"
 #include "server/model/mesh.h"
 
 namespace clothstream::model {
@@ -136,6 +137,9 @@ std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth) {
   choose(cloth, cloth.pins, cloth.pinnedVertices, cloth.pinnedRegions, pinned);
   for (const Attachment& attachment : cloth.attachments)
     choose(cloth, attachment.ranges, attachment.vertices, attachment.regions, pinned);
+  if (cloth.skin)
+    for (std::size_t i = 0; i < pinned.size(); ++i)
+      if (cloth.skin->limits[i].followsExactly()) pinned[i] = 1;
   return pinned;
 }
 

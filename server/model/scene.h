@@ -136,7 +136,8 @@ inline constexpr float kOverlapCorrectionFraction = 0.5f;
 // Maximum speed of that correction, m/s.
 inline constexpr float kPushOutSpeed = 3;
 
-struct Mesh;  // mesh.h
+struct Mesh;       // mesh.h
+struct ClothSkin;  // cloth_skin.h
 
 // Sphere or box in space, its surface included.
 struct Region {
@@ -206,6 +207,9 @@ struct Cloth {
   std::vector<Attachment> attachments;
   std::optional<Tethers> tethers;
   std::optional<CoarseCorrection> coarse;  // absent: springs alone
+  std::shared_ptr<const ClothSkin> skin;   // null: the cloth follows no joints
+  // Of the gas inside a closed mesh above the pressure outside, at the volume at rest, Pa; 0: no gas.
+  float pressure = 0;
 
   std::uint32_t nodeCount() const;
   float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean
@@ -272,7 +276,7 @@ std::vector<Vec3> restPositions(const Cloth& cloth);
 // area.
 std::vector<double> nodeMasses(const Cloth& cloth);
 
-// One byte per node: 1 if it is pinned or attached, so that no force moves it. Ranges must lie inside the
+// One byte per node: 1 if it is pinned or attached, or follows its joints exactly, so that no force moves it. Ranges must lie inside the
 // grid and vertices must exist.
 std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth);
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "server/model/cloth_skin.h"
+
 namespace clothstream::reference {
 namespace {
 
@@ -37,14 +39,14 @@ void carryAlong(ReferenceCloth& cloth, const Carry& carry) {
 Attachments::Attachments(const model::Scene& scene) {
   for (std::size_t c = 0; c < scene.cloths.size(); ++c) {
     const model::Cloth& cloth = scene.cloths[c];
-    const std::vector<model::Vec3> rest = model::restPositions(cloth);
+    const std::vector<model::Vec3> places = model::startPositions(scene, cloth);
     for (const model::Attachment& attachment : cloth.attachments) {
       const Pose frame = toPose(model::frameAt(scene, attachment, 0));
       const std::vector<std::uint8_t> attached = model::attachedNodes(cloth, attachment);
       for (std::size_t node = 0; node < attached.size(); ++node)
         if (attached[node] != 0)
           attached_.push_back({c, node, start_.size(),
-                               frame.orientation.conjugate() * (rest[node].cast<double>() - frame.position)});
+                               frame.orientation.conjugate() * (places[node].cast<double>() - frame.position)});
       start_.push_back(frame);
     }
     tethers_.push_back(cloth.tethers ? model::nodeTethers(cloth) : std::vector<model::NodeTethers>());

@@ -193,7 +193,7 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       memory(on, offsets.back(), records.size()),
       stages(on, scene, memory, offsets, options, workgroupSize) {
   std::memcpy(memory.uploads[slot].mapped().data(), records.data(), memory.cloths.bytes());
-  memory.state.write(restState(scene.cloths, origin), stages.masses.inverseMasses());
+  memory.state.write(startState(scene, origin), stages.masses.inverseMasses());
   listStages();
   prepare();
 }

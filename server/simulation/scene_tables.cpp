@@ -6,7 +6,9 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 
+#include "server/model/cloth_skin.h"
 #include "server/model/origin.h"
 #include "server/model/springs.h"
 #include "server/model/stability.h"
@@ -138,14 +140,25 @@ std::vector<float> inverseMasses(std::span<const model::Cloth> cloths) {
   return all;
 }
 
-NodeState restState(std::span<const model::Cloth> cloths, const model::Vec3& origin) {
+namespace {
+
+void append(std::span<const model::Vec3> positions, NodeState& state) {
+  std::ranges::transform(positions, std::back_inserter(state.positions),
+                         [](const model::Vec3& p) { return model::Vec3(p.unaryExpr(&snapTiny)); });
+  state.velocities.resize(state.positions.size(), model::Vec3::Zero());
+}
+
+}  // namespace
+
+NodeState restState(std::span<const model::Cloth> cloths) {
   NodeState state;
-  for (const model::Cloth& cloth : cloths) {
-    const std::vector<model::Vec3> positions = model::restPositions(cloth, origin);
-    std::transform(positions.begin(), positions.end(), std::back_inserter(state.positions),
-                   [](const model::Vec3& p) { return model::Vec3(p.unaryExpr(&snapTiny)); });
-  }
-  state.velocities.assign(state.positions.size(), model::Vec3::Zero());
+  for (const model::Cloth& cloth : cloths) append(model::restPositions(cloth, model::Vec3::Zero()), state);
+  return state;
+}
+
+NodeState startState(const model::Scene& scene, const model::Vec3& origin) {
+  NodeState state;
+  for (const model::Cloth& cloth : scene.cloths) append(model::startPositions(scene, cloth, origin), state);
   return state;
 }
 

@@ -75,7 +75,9 @@ Tiles makeTiles(std::span<const model::Cloth> cloths, std::uint32_t rowsPerInvoc
 // 1/kg by node; 0 for pinned nodes.
 std::vector<float> inverseMasses(std::span<const model::Cloth> cloths);
 
+// Every node at its rest position, with zero velocity.
+NodeState restState(std::span<const model::Cloth> cloths);
 // Every node at its start position, relative to `origin`, with zero velocity.
-NodeState restState(std::span<const model::Cloth> cloths, const model::Vec3& origin = model::Vec3::Zero());
+NodeState startState(const model::Scene& scene, const model::Vec3& origin);
 
 }  // namespace clothstream::simulation

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "server/model/origin.h"
+#include "server/model/cloth_skin.h"
 #include "server/model/tethers.h"
 #include "server/simulation/texel.h"
 
@@ -15,7 +15,7 @@ namespace {
 // `first` is the cloth's first node in the scene.
 void addAttached(const model::Scene& scene, const model::Cloth& cloth, std::uint32_t first,
                  const model::Vec3& origin, AttachmentTables& tables) {
-  const std::vector<model::Vec3> rest = model::restPositions(cloth, origin);
+  const std::vector<model::Vec3> places = model::startPositions(scene, cloth, origin);
   for (const model::Attachment& attachment : cloth.attachments) {
     model::Pose start = model::frameAt(scene, attachment, 0);
     start.position -= origin;
@@ -24,7 +24,7 @@ void addAttached(const model::Scene& scene, const model::Cloth& cloth, std::uint
     const std::vector<std::uint8_t> attached = model::attachedNodes(cloth, attachment);
     for (std::uint32_t node = 0; node < attached.size(); ++node) {
       if (attached[node] == 0) continue;
-      const Eigen::Vector3d away = (rest[node] - start.position).cast<double>();
+      const Eigen::Vector3d away = (places[node] - start.position).cast<double>();
       const model::Vec3 place = (start.orientation.cast<double>().conjugate() * away).cast<float>();
       tables.attached.push_back({.node = static_cast<float>(first + node),
                                  .frame = frame,

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include "server/model/cloth_skin.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <variant>
+
+#include "server/model/closed_mesh.h"
+#include "server/model/mesh.h"
+#include "server/model/origin.h"
+
+namespace clothstream::model {
+
+std::size_t skinCollider(const Scene& scene, const Cloth& cloth) {
+  assert(cloth.skin);
+  const auto found = std::ranges::find(scene.colliders, cloth.skin->collider, &Collider::name);
+  assert(found != scene.colliders.end());
+  return static_cast<std::size_t>(found - scene.colliders.begin());
+}
+
+const Skin& skinOf(const Scene& scene, const Cloth& cloth) {
+  return *std::get<Solid>(scene.colliders[skinCollider(scene, cloth)].shape)->skin;
+}
+
+std::vector<Vec3> restNormals(const Cloth& cloth) {
+  const std::vector<Vec3> positions = restPositions(cloth, originOf(cloth));
+  std::vector<Eigen::Vector3d> sums(positions.size(), Eigen::Vector3d::Zero());
+  for (const Triangle& triangle : clothTriangles(cloth)) {
+    std::array<Eigen::Vector3d, 3> corners;
+    for (std::size_t i = 0; i < 3; ++i) corners[i] = positions[triangle[i]].cast<double>();
+    const Eigen::Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+    for (std::size_t i = 0; i < 3; ++i)
+      sums[triangle[i]] += arcCosine((corners[(i + 1) % 3] - corners[i])
+                                         .normalized()
+                                         .dot((corners[(i + 2) % 3] - corners[i]).normalized())) *
+                           normal;
+  }
+  std::vector<Vec3> normals;
+  normals.reserve(sums.size());
+  // Where triangles around a node face each other, it has no normal, and a backstop there does nothing.
+  for (const Eigen::Vector3d& sum : sums) {
+    const double length = sum.norm();
+    normals.push_back(length > 1e-6 ? Vec3((sum / length).cast<float>()) : Vec3(Vec3::Zero()));
+  }
+  return normals;
+}
+
+std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth, const Vec3& origin) {
+  if (!cloth.skin) return restPositions(cloth, origin);
+  const Collider& collider = scene.colliders[skinCollider(scene, cloth)];
+  const Skin& skin = skinOf(scene, cloth);
+  std::vector<Pose> local, joints;
+  jointsAt(skin, 0, local);
+  compose(skin, local, joints);
+  const std::vector<Transform> transforms = jointTransforms(skin, joints);
+  const Pose pose = poseAt(collider, 0);
+  const Eigen::Vector3d place = pose.position.cast<double>() - origin.cast<double>();
+  const Eigen::Matrix3d turn = pose.orientation.cast<double>().toRotationMatrix();
+  std::vector<Vec3> positions = restPositions(cloth);
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    positions[i] = (place + turn * skinned(cloth.skin->joints[i], transforms, positions[i].cast<double>()))
+                       .cast<float>();
+  return positions;
+}
+
+std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth) {
+  return cloth.skin ? startPositions(scene, cloth, Vec3::Zero()) : restPositions(cloth);
+}
+
+}  // namespace clothstream::model
