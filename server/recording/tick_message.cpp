@@ -328,6 +328,8 @@ tl::expected<std::vector<model::Cloth>, std::string> toCloths(const v1::Recorded
     cloth.mutable_pinned_vertices()->Swap(whole.mutable_pinned_vertices());
     cloth.mutable_pinned_regions()->Swap(whole.mutable_pinned_regions());
     cloth.mutable_attachments()->Swap(whole.mutable_attachments());
+    cloth.clear_skin();
+    if (whole.has_skin()) cloth.mutable_skin()->Swap(whole.mutable_skin());
     if (whole.has_mesh())
       cloth.mutable_mesh()->Swap(whole.mutable_mesh());
     else
