@@ -6,6 +6,7 @@
 #include <cassert>
 
 #include "server/model/distance_grid.h"
+#include "server/model/gas.h"
 #include "server/model/mesh.h"
 #include "server/model/springs.h"
 
@@ -16,6 +17,7 @@ namespace {
 // A node of a grid has six springs.
 constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
 constexpr double kRungeKutta = 14;  // as a factor
+constexpr double kGas = 1;          // of a node
 constexpr double kAir = 0.5, kLocalWind = 0.3, kHinge = 2, kSelfCollision = 20, kMotionBound = 120;
 // Crowding of a few layers, which kSelfCollision and kMotionBound include. Beyond it each node costs
 // kCrowdedBall in each of the searches of a tick, and kCrowdedTriangle in a substep, for one more ball or
@@ -59,6 +61,7 @@ constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kMotionBoundBytes = 2000, kHingeBytes = 200, kSystemBytes = 64,
                  kPairBytes = 40;
+constexpr double kGasBytes = 250;           // of a node of a mesh that can hold gas
 constexpr double kTriangleBytes = 400;      // of a solid
 constexpr double kDistancePointBytes = 48;  // of a solid's grid, three times 16
 constexpr double kSkinVertexBytes = 500;
@@ -233,6 +236,7 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
     if (cloth.mesh) step *= kMeshFactor;
     if (scene.integrator == Integrator::rungeKutta4) step *= kRungeKutta;
     if (isBlown(scene, cloth)) step += (kAir + kLocalWind * static_cast<double>(scene.winds.size())) * nodes;
+    if (hasGas(cloth)) step += kGas * nodes;
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
     if (cloth.selfCollision)
       step += (boundsMotion(cloth) ? kSelfCollision + kMotionBound : kSelfCollision) * nodes;
@@ -249,6 +253,7 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
   if (scene.integrator == Integrator::rungeKutta4) work.dispatches += 11 * substeps;
   const auto any = [&](auto has) { return std::ranges::any_of(scene.cloths, has) ? 1.0 : 0.0; };
   work.dispatches += 3 * substeps * any([](const Cloth& cloth) { return cloth.dihedralBending != 0; });
+  work.dispatches += 3 * substeps * static_cast<double>(std::ranges::count_if(scene.cloths, hasGas));
   const bool solids = std::ranges::any_of(scene.colliders, [](const Collider& collider) {
     return std::holds_alternative<Solid>(collider.shape);
   });
@@ -304,6 +309,7 @@ double PriceModel::bytes(const Scene& scene) const {
                listBytes(cloth.mesh->shape.uvTriangles);
     if (cloth.skin) bytes += kClothSkinBytes * nodes;
     if (cloth.selfCollision) bytes += kSelfCollisionBytes * nodes;
+    if (canHoldGas(cloth)) bytes += kGasBytes * nodes;
     if (cloth.coarse) bytes += cloth.coarse->levels * (cloth.mesh ? kCoarseMeshBytes : kCoarseBytes) * nodes;
     if (boundsMotion(cloth)) bytes += kMotionBoundBytes * nodes;
     if (cloth.dihedralBending != 0) bytes += kHingeBytes * static_cast<double>(counts.hinges);

@@ -416,6 +416,7 @@ class cs_cloth_settings(c.Structure):
         ("ball_radius", c.c_float),
         ("ball_friction", c.c_float),
         ("tether_slack", c.c_float),
+        ("pressure", c.c_float),
     ]
 
 

@@ -726,7 +726,7 @@ namespace ClothStream.Core
     /// same values for parameters that are not known, or that the cloth or its solver does not have. A compliance
     /// that was set cannot be set back to the server's default with cs_set_cloth.
     /// </summary>
-    [StructLayout(LayoutKind.Explicit, Size = 92)]
+    [StructLayout(LayoutKind.Explicit, Size = 96)]
     public unsafe struct ClothSettings
     {
         [FieldOffset(0)] public uint version;
@@ -809,6 +809,10 @@ namespace ClothStream.Core
         /// changed only for cloths that were created with them, and are NaN for others.
         /// </summary>
         [FieldOffset(88)] public float tetherSlack;
+        /// <summary>
+        /// Pa; of the gas inside a closed mesh
+        /// </summary>
+        [FieldOffset(92)] public float pressure;
     }
 
     /// <summary>
