@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The export of cloth from Unity, with mono and a stub of the engine: scenes show what Unity shows, their fields are those of
-// scene.proto, and the server accepts them. Two seconds, most of them for the compiler.
+// scene.proto, and the server accepts and moves them. About six seconds of one core, most of them for the compiler.
 //
 // Environment: CLOTHSTREAM_SERVER.
 
@@ -237,4 +237,26 @@ test("all fields are those of scene.proto", async () => {
   assert.ok(messages.get("ClothSkin").get("vertexJoints").repeated);
   for (const scene of [skirt, bare, flag]) checkMessage(messages, "Scene", scene, scene.name);
   assert.throws(() => checkMessage(messages, "Scene", { cloth: [] }, "scene"), /scene\.cloth is a field of Scene/);
+});
+
+test("the server accepts the scenes, and moves the cloth with the bones", async () => {
+  const { CLOTHSTREAM_SERVER: server } = process.env;
+  for (const name of ["skirt", "bare", "flag"]) {
+    const { stdout } = await run(server, ["print-scene", join(folder, `${name}.json`)], { maxBuffer: 1e8 });
+    assert.equal(JSON.parse(stdout).cloths[0].skin.collider, "figure");
+  }
+  // The second key is at 0.25 s: 18 ticks of 1/72 s. The upper ring has the distance 0.
+  const states = join(folder, "skirt.f32");
+  await run(server, ["step", "--scene", join(folder, "skirt.json"), "--ticks", "18", "--every", "18", "--out", states]);
+  const { shape } = JSON.parse(await readFile(`${states}.json`, "utf8"));
+  assert.deepEqual(shape, [2, 32, 6]);
+  const bytes = await readFile(states);
+  const values = new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4).slice(32 * 6);
+  const nodes = Array.from({ length: 32 }, (_, node) => [...values.slice(6 * node, 6 * node + 3)]);
+  const { cloth } = expected[2];
+  for (let vertex = 27; vertex < 36; ++vertex) {
+    const goal = [cloth[3 * vertex], cloth[3 * vertex + 1], -cloth[3 * vertex + 2]];
+    const away = Math.min(...nodes.map((node) => Math.hypot(...plus(node, times(goal, -1)))));
+    assert.ok(away < kTolerance, `vertex ${vertex} is ${away} m from its bones`);
+  }
 });

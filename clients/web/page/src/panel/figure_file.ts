@@ -15,7 +15,7 @@ const kFramesPerSecond = 30;
 const kScaleTolerance = 0.01;
 
 export interface FileFigure extends SceneFigure {
-  animation: string; // name of the clip; "" if there is none
+  animation: string; // name of the clip; empty without a clip
 }
 
 // Throws an Error whose text is for people. The place of the figure is where viewers show it without animation.

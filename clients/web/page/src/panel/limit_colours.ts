@@ -11,7 +11,7 @@ export function hueOf(limit: number, largest: number): number {
   return largest > 0 ? kLastHue * Math.min(limit / largest, 1) : 0;
 }
 
-// The largest limit, 0 if there is none.
+// The largest limit; 0 if no vertex has one.
 export function largestOf(limits: Float32Array): number {
   return limits.reduce((largest, limit) => Math.max(largest, limit), 0);
 }

@@ -71,7 +71,7 @@ export class Painter {
     return values.some((value) => value >= 0) ? values : undefined;
   }
 
-  // Shows who wears the cloth, and offers the tools for its limits. Undefined: nobody does.
+  // Shows who wears the cloth, and offers the tools for its limits. Undefined: the cloth has no figure.
   dress(figure: { positions: Float32Array; triangles: Uint32Array } | undefined): void {
     for (const tool of document.querySelectorAll<HTMLElement>("#pin-tools [data-limit]")) tool.hidden = figure === undefined;
     this.preview?.showFigure(figure);
