@@ -30,7 +30,7 @@ export async function readFigure(file: File): Promise<FileFigure> {
 export function figureOf(scene: THREE.Object3D, animations: readonly THREE.AnimationClip[], name: string): FileFigure {
   const meshes: THREE.SkinnedMesh[] = [];
   scene.traverse((object) => {
-    if (object instanceof THREE.SkinnedMesh) meshes.push(object);
+    if (object instanceof THREE.SkinnedMesh) meshes.push(object as THREE.SkinnedMesh);
   });
   const [first] = meshes;
   if (!first) throw new Error(`${name} has no mesh with a skin. Export the figure together with its skeleton.`);

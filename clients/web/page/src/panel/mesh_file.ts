@@ -38,7 +38,7 @@ export async function readMesh(file: File): Promise<FileMesh> {
     part.setAttribute("position", from.getAttribute("position").clone());
     if (from.hasAttribute("uv")) part.setAttribute("uv", from.getAttribute("uv").clone());
     if (from.index) part.setIndex(from.index.clone());
-    parts.push(part.applyMatrix4(placeOf(object)));
+    parts.push(part.applyMatrix4(placeOf(object as THREE.Mesh)));
   });
   return merged(parts, file.name, kind !== "obj");
 }
