@@ -211,6 +211,7 @@ static class ExportProgram
         Refuses("a renderer without mesh", dancer => dancer.Skirt.sharedMesh = null, "Skirt 1 has no mesh");
         Refuses("an unreadable mesh", dancer => dancer.Skirt.sharedMesh.isReadable = false, "Switch on Read/Write");
         Refuses("a missing bone", dancer => dancer.Skirt.bones[1] = null, "bone 1 is missing");
+        Refuses("a skeleton that Unity has removed", dancer => dancer.Skirt.bones = new Transform[0], "Switch off Optimize Game Objects");
         Refuses("a mesh without weights", dancer => dancer.Skirt.sharedMesh.boneWeights = new BoneWeight[0], "has no weights");
         Refuses("a vertex without weight", dancer => dancer.Skirt.sharedMesh.boneWeights[5] = new BoneWeight(), "vertex 5 has no weight");
         Refuses("a vertex with an unknown bone", dancer => dancer.Skirt.sharedMesh.boneWeights[35].boneIndex1 = 2, "vertex 35 has bone 2; the renderer has bones 0 to 1");

@@ -93,6 +93,9 @@ namespace ClothStream.Editor
             Transform[] bones = renderer.bones;
             for (int i = 0; i < bones.Length; ++i)
                 if (bones[i] == null) throw new ExportException(renderer.name + ": bone " + i + " is missing. Restore the skeleton of the renderer.");
+            BoneWeight[] weights = mesh.boneWeights;
+            if (bones.Length == 0 && weights.Length > 0)
+                throw new ExportException(renderer.name + ": the mesh has weights, but the renderer has no bones. Switch off Optimize Game Objects in the import settings of its model.");
             var source = new SkinnedMeshSource
             {
                 Name = renderer.name,
@@ -102,10 +105,9 @@ namespace ClothStream.Editor
                 Bones = bones.Select(bone => NodeOf(bone)).ToArray(),
                 BindPoses = mesh.bindposes.Select(pose => Numbers(pose)).ToArray()
             };
-            BoneWeight[] weights = mesh.boneWeights;
             source.VertexBones = weights.SelectMany(weight => new[] { weight.boneIndex0, weight.boneIndex1, weight.boneIndex2, weight.boneIndex3 }).ToArray();
             source.VertexWeights = weights.SelectMany(weight => new[] { weight.weight0, weight.weight1, weight.weight2, weight.weight3 }).ToArray();
-            if (bones.Length == 0 && weights.Length == 0) FollowTransform(renderer, source);
+            if (bones.Length == 0) FollowTransform(renderer, source);
             return source;
         }
 
