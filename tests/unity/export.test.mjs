@@ -176,6 +176,7 @@ test("settings of the cloth become those of ClothStream", () => {
   assert.equal(cloth.friction, 0.5);
   assert.ok(Math.abs(cloth.damping - 1.053605) < 1e-6);
   assert.deepEqual(cloth.solver, { xpbd: {} });
+  assert.deepEqual([cloth.tethers, bare.cloths[0].tethers], [{}, undefined]);
   // Area of a tube of eight sides, 0.2 kg/m^2, 32 nodes; the formula is in clients/unity/README.md.
   const mass = (0.2 * 8 * 2 * 0.15 * Math.sin(Math.PI / 8) * 0.7 * 1.5 * 1.5) / 32;
   const stiffness = (part) => (part * mass * 100) / (2 * (1 - part));

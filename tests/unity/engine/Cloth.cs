@@ -21,15 +21,13 @@ namespace UnityEngine
         public float maxDistance, collisionSphereDistance;
     }
 
-    public class Collider : Component { }
-
-    public sealed class SphereCollider : Collider
+    public sealed class SphereCollider : Component
     {
         public Vector3 center { get; set; }
         public float radius { get; set; } = 0.5f;
     }
 
-    public sealed class CapsuleCollider : Collider
+    public sealed class CapsuleCollider : Component
     {
         public Vector3 center { get; set; }
         public float radius { get; set; } = 0.5f;
@@ -55,6 +53,7 @@ namespace UnityEngine
         public float damping { get; set; }
         public float friction { get; set; } = 0.5f;
         public float selfCollisionDistance { get; set; }
+        public bool useTethers { get; set; } = true;
         public bool useGravity { get; set; } = true;
         public Vector3 externalAcceleration { get; set; }
         public Vector3 randomAcceleration { get; set; }

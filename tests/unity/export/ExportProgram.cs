@@ -302,7 +302,7 @@ static class ExportProgram
         File.WriteAllText(Path.Combine(folder, "expected.json"), "[" + string.Join(",", shown) + "]");
 
         var bare = new Dancer();
-        bare.Cloth.useGravity = false;
+        bare.Cloth.useGravity = bare.Cloth.useTethers = false;
         bare.Cloth.externalAcceleration = new Vector3();
         File.WriteAllText(Path.Combine(folder, "bare.json"), Export(new FigureChoice { cloth = bare.Skirt }, new ExportOptions { Material = "cotton" }).Json);
         var flag = new GameObject("Flag", typeof(SkinnedMeshRenderer), typeof(Cloth));

@@ -31,6 +31,7 @@ namespace ClothStream.Export
             var cloth = new JsonText().Add("name", Names.Allowed(mesh.Name)).Add("mesh", mesh.Message(true));
             AddFabric(cloth, mesh, figure.Cloth, options);
             AddSelfCollision(cloth, mesh, figure.Cloth, scene);
+            if (figure.Cloth.UseTethers) cloth.Add("tethers", new JsonText());
             cloth.Add("skin", skin);
 
             float[] gravity = figure.Cloth.Gravity, external = figure.Cloth.ExternalAcceleration;

@@ -42,6 +42,7 @@ namespace ClothStream.Export
         public float[] Vertices = new float[0]; // Cloth.vertices, three numbers each; empty: unknown
         public float StretchingStiffness = 1, BendingStiffness, StiffnessFrequency = 10, Damping, Friction = 0.5f;
         public float SelfCollisionDistance;
+        public bool UseTethers;
         public float[] Gravity = { 0, 0, 0 }; // of the physics, 0 without useGravity; m/s^2 in the frame of the figure
         public float[] ExternalAcceleration = { 0, 0, 0 }, RandomAcceleration = { 0, 0, 0 };
         public float WorldVelocityScale = 1, WorldAccelerationScale = 1;

@@ -77,6 +77,7 @@ namespace ClothStream.Editor
                 Damping = cloth.damping,
                 Friction = cloth.friction,
                 SelfCollisionDistance = cloth.selfCollisionDistance,
+                UseTethers = cloth.useTethers,
                 Gravity = cloth.useGravity ? Direction(Physics.gravity) : new[] { 0f, 0, 0 },
                 ExternalAcceleration = Direction(cloth.externalAcceleration),
                 RandomAcceleration = Direction(cloth.randomAcceleration),
