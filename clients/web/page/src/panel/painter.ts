@@ -31,7 +31,7 @@ export class Painter {
   private longest = 1; // side of the mesh, units of the file
   private preview: Preview | undefined;
   private tool: Tool = "pin";
-  private stroke: { pointer: number; x: number; y: number; erases: boolean } | undefined;
+  private stroke: { pointer: number; x: number; y: number; on: VertexNumbers; value: number } | undefined;
   private readonly touches = new Set<number>();
   private readonly canvas = element<HTMLCanvasElement>("preview");
   private readonly size = element<HTMLInputElement>("pin-brush");
@@ -141,8 +141,8 @@ export class Painter {
     if (event.button !== 0 || this.tool === "turn" || this.stroke) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.canvas.focus();
-    this.stroke = { pointer: event.pointerId, x: event.offsetX, y: event.offsetY, erases: event.shiftKey };
-    this.painting.begin();
+    this.stroke = { pointer: event.pointerId, x: event.offsetX, y: event.offsetY, on: this.painting, value: this.paintedValue(event.shiftKey) };
+    this.stroke.on.begin();
     this.paint(event.offsetX, event.offsetY);
   }
 
@@ -165,8 +165,9 @@ export class Painter {
   private release(event: PointerEvent): void {
     this.touches.delete(event.pointerId);
     if (event.pointerId !== this.stroke?.pointer) return;
+    const { on } = this.stroke;
     this.stroke = undefined;
-    if (this.painting.end()) this.order.push(this.painting);
+    if (on.end()) this.order.push(on);
     this.update();
     this.painted();
     if (event.pointerType === "touch") this.preview?.showBrush(undefined, 0);
@@ -174,8 +175,8 @@ export class Painter {
 
   private abandon(): void {
     if (!this.stroke) return;
+    this.stroke.on.cancel();
     this.stroke = undefined;
-    this.painting.cancel();
     this.preview?.showBrush(undefined, 0);
     this.update();
     this.painted();
@@ -191,7 +192,7 @@ export class Painter {
     this.preview?.showBrush(touched?.point, this.radius);
     if (!touched || !this.stroke) return;
     const vertices = within(this.positions, [touched.point.x, touched.point.y, touched.point.z], this.radius);
-    if (!this.painting.paint(vertices.concat(touched.corner), this.paintedValue(this.stroke.erases))) return;
+    if (!this.stroke.on.paint(vertices.concat(touched.corner), this.stroke.value)) return;
     this.preview?.showPins(this.pins.list());
     this.showLimits();
     this.painted();
@@ -216,8 +217,8 @@ export class Painter {
 
   // Each set keeps a bounded number of steps, so the oldest ones may be gone.
   private undo(): void {
+    this.stroke?.on.cancel();
     this.stroke = undefined;
-    this.painting.cancel();
     this.order.pop()?.undo();
     this.update();
     this.painted();
