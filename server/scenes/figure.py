@@ -265,7 +265,8 @@ def lowest(phase):
 
 
 def walk():
-    """Positions and orientations of all joints at KEYS + 1 phases. The hips rise and fall with two waves a step."""
+    """Positions and orientations of all joints at KEYS + 1 phases. The hips rise and fall with two waves a step. The
+    first phase is a quarter, where one leg passes the other one."""
     heights = [-lowest(key / KEYS) for key in range(KEYS)]
     mean = sum(heights) / KEYS
 
@@ -274,7 +275,7 @@ def walk():
 
     result = []
     for key in range(KEYS + 1):
-        phase = key / KEYS
+        phase = key / KEYS + 0.25
         sway = 0.014 * math.sin(2 * math.pi * (phase + 0.03))
         hips = (PLACE[0][0] + sway, PLACE[0][1] + mean + wave(2, phase) + wave(4, phase), PLACE[0][2])
         turn = orientations(phase)

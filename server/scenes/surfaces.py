@@ -108,17 +108,19 @@ def compact(points, triangles):
 
 
 def onto(p, functions, limit):
-    """Moves a point to where all functions are 0, by Newton's method; `limit` bounds each move."""
+    """Moves a point to where all functions are 0, within 20 um, by Newton's method; `limit` bounds each move."""
     for _ in range(6):
-        moved = 0.0
+        done = True
         for function in functions:
             value = function(p)
+            if abs(value) < 2e-5:
+                continue
+            done = False
             slope = [(function([p[i] + 1e-5 * (i == axis) for i in range(3)]) - value) / 1e-5 for axis in range(3)]
             way = value / max(sum(s * s for s in slope), 1e-2)
             way *= min(1.0, limit / max(abs(way) * math.sqrt(sum(s * s for s in slope)), 1e-12))
             p = [p[i] - way * slope[i] for i in range(3)]
-            moved = max(moved, abs(value))
-        if moved < 1e-5:
+        if done:
             break
     return p
 
@@ -265,7 +267,9 @@ class Surface:
                 places[a] = onto(self.points[a], [self.field] + [self.cuts[n] for n in self.borders(self.points[a])], length)
                 continue
             near = self.rim(a) if rim else sorted(self.around(a))
-            p = [(self.points[a][i] + sum(self.points[n][i] for n in near) / len(near)) / 2 for i in range(3)]
+            ways = [1 if rim else self.length(a, n) for n in near]  # long sides pull more than short ones
+            p = [(self.points[a][i] + sum(way * self.points[n][i] for way, n in zip(ways, near)) / sum(ways)) / 2
+                 for i in range(3)]
             functions = [self.field] + ([self.cuts[self.borders(self.points[a])[0]]] if rim else [])
             places[a] = onto(p, functions, length / 2)
         self.points = places
