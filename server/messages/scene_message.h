@@ -32,7 +32,7 @@ namespace clothstream::messages {
 // Sets every field, defaults included, and writes whole meshes. toScene() of the result returns the same
 // scene.
 v1::Scene toMessage(const model::Scene& scene);
-// Like toMessage(), but meshes are empty.
+// Like toMessage(), but meshes are empty, and skins of cloths name their colliders only.
 v1::Scene toMessageWithoutMeshes(const model::Scene& scene);
 v1::Normals toMessage(model::Normals normals);
 // All parameters of environment and cloths as one change. `areas` are the areas of the cloths in m²; a cloth

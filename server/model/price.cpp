@@ -39,6 +39,12 @@ constexpr double kSearch = 6, kFewAround = 16, kCrowdedSearch = 1.2, kMostSearch
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
 constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
+// Each node of a cloth that follows joints costs kClothSkinTick in a tick, for its places at both ends, like
+// a vertex of a solid that joints move, and for its normals there. It costs kClothSkinStep in a substep,
+// where it is kept near its place. Its joints, limits, and places and normals at both ends take
+// kClothSkinBytes.
+constexpr double kClothSkinTick = 30, kClothSkinStep = 0.5, kClothSkinBytes = 128;
+constexpr double kClothSkinDispatches = 4;
 // Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
 constexpr double kTickDispatches = 6, kFrameDispatches = 12, kBoundDispatches = 14;
@@ -236,6 +242,7 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
     work.nodeSteps +=
         substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
     work += solverWork(scene, cloth, counts);
+    if (cloth.skin) work.nodeSteps += (kClothSkinTick + kClothSkinStep * substeps) * nodes;
     if (cloth.coarse) work += coarseWork(*cloth.coarse, scene.substeps, nodes * (kCoarseNode + collisions));
   }
   for (const Collider& collider : scene.colliders) work += skinWork(collider.shape);
@@ -249,6 +256,8 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
   work.dispatches +=
       (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
   work.dispatches += kBoundDispatches * substeps * any(boundsMotion);
+  work.dispatches +=
+      (kClothSkinDispatches + substeps) * any([](const Cloth& cloth) { return cloth.skin != nullptr; });
   return work;
 }
 
@@ -293,6 +302,7 @@ double PriceModel::bytes(const Scene& scene) const {
     if (cloth.mesh)
       bytes += kMeshNodeBytes * nodes + listBytes(cloth.mesh->shape.uvs) +
                listBytes(cloth.mesh->shape.uvTriangles);
+    if (cloth.skin) bytes += kClothSkinBytes * nodes;
     if (cloth.selfCollision) bytes += kSelfCollisionBytes * nodes;
     if (cloth.coarse) bytes += cloth.coarse->levels * (cloth.mesh ? kCoarseMeshBytes : kCoarseBytes) * nodes;
     if (boundsMotion(cloth)) bytes += kMotionBoundBytes * nodes;

@@ -42,6 +42,7 @@ void writeCloths(const model::Scene& scene, v1::RecordedTick& message) {
     one.pinnedVertices.clear();
     one.pinnedRegions.clear();
     one.attachments.clear();
+    one.skin.reset();
   }
   v1::Scene parameters = messages::toMessage(bare);
   for (std::size_t i = 0; i < bare.cloths.size(); ++i) {
@@ -306,6 +307,8 @@ tl::expected<std::vector<model::Cloth>, std::string> toCloths(const v1::Recorded
     cloth.mutable_pinned_vertices()->Swap(whole.mutable_pinned_vertices());
     cloth.mutable_pinned_regions()->Swap(whole.mutable_pinned_regions());
     cloth.mutable_attachments()->Swap(whole.mutable_attachments());
+    cloth.clear_skin();
+    if (whole.has_skin()) cloth.mutable_skin()->Swap(whole.mutable_skin());
     if (whole.has_mesh())
       cloth.mutable_mesh()->Swap(whole.mutable_mesh());
     else
