@@ -14,6 +14,8 @@
 
 #include "server/model/origin.h"
 #include "server/simulation/attachment/attachment_stage.h"
+#include "server/simulation/cloth_skin/cloth_skin_stage.h"
+#include "server/simulation/cloth_skin/skin_limit_stage.h"
 #include "server/simulation/coarse/coarse_stage.h"
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/collision/skin_stage.h"
@@ -100,6 +102,11 @@ struct Stages {
     if (SkinTables tables = skinTables(solidTables); !tables.empty())
       skins = std::make_unique<SkinStage>(device, std::move(tables), solidTables, solids->solids(),
                                           workgroupSize);
+    if (ClothSkinTables tables = clothSkinTables(scene); !tables.empty()) {
+      clothSkins = std::make_unique<ClothSkinStage>(device, std::move(tables), state, workgroupSize);
+      if (clothSkins->limitCount() > 0)
+        skinLimits = std::make_unique<SkinLimitStage>(device, *clothSkins, state, workgroupSize);
+    }
     if (MotionBoundStage::isIn(scene))
       motionBound = std::make_unique<MotionBoundStage>(device, scene, state, workgroupSize);
     if (const AttachmentTables tables = attachmentTables(scene, model::originOf(scene)); !tables.empty()) {
@@ -108,13 +115,13 @@ struct Stages {
     }
   }
 
-  // In their order. Attachments carry nodes before CollisionStage lists the colliders near them, and joints
-  // move before it reads the reach of their meshes.
+  // In their order. Attachments and joints carry nodes before CollisionStage lists the colliders near them,
+  // and joints move before it reads the reach of their meshes.
   std::vector<Stage*> list() {
     std::vector<Stage*> all{coarse.get(), solvers.bending(), &forces};
     std::ranges::copy(solvers.afterForces(), std::back_inserter(all));
-    all.insert(all.end(), {attachments.get(), selfCollision.get(), skins.get(), solids.get(), &collision,
-                           motionBound.get(), &masses, &hash});
+    all.insert(all.end(), {attachments.get(), clothSkins.get(), selfCollision.get(), skins.get(),
+                           solids.get(), skinLimits.get(), &collision, motionBound.get(), &masses, &hash});
     std::erase(all, nullptr);
     return all;
   }
@@ -129,6 +136,8 @@ struct Stages {
   std::unique_ptr<SelfCollisionStage> selfCollision;  // null if no cloth uses it
   std::unique_ptr<SolidStage> solids;                 // null if no collider is a triangle mesh
   std::unique_ptr<SkinStage> skins;                   // null if no mesh has joints
+  std::unique_ptr<ClothSkinStage> clothSkins;         // null if no cloth follows joints
+  std::unique_ptr<SkinLimitStage> skinLimits;         // null if no node has limits
   std::unique_ptr<MotionBoundStage> motionBound;      // null if no cloth uses it
   std::unique_ptr<AttachmentStage> attachments;       // created when it is first needed
 };
@@ -214,7 +223,7 @@ const TickInputs& ClothSimulation::Pipeline::nearby(const TickInputs& inputs) {
   if (origin.isZero(0)) return inputs;
   moved = inputs;
   for (MovingCollider& collider : moved.colliders)
-    for (model::Pose* pose : {&collider.start, &collider.end}) pose->position -= origin;
+    for (model::Pose* pose : {&collider.start, &collider.end, &collider.before}) pose->position -= origin;
   for (model::LocalWind& wind : moved.winds) wind.pose.position -= origin;
   for (model::Pose& pose : moved.attachments) pose.position -= origin;
   for (model::Carry& carry : moved.carries)

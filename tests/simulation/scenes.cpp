@@ -90,7 +90,8 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
   for (const simulation::MovingCollider& collider : inputs.colliders)
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
                                 reference::toPose(collider.end), double{collider.friction},
-                                collider.jointsStart, collider.jointsEnd});
+                                collider.jointsStart, collider.jointsEnd, collider.jumped,
+                                reference::toPose(collider.before), collider.jointsBefore});
   for (const model::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
   for (const model::Carry& carry : inputs.carries)
     result.carries.push_back({carry.cloth, reference::toPose(carry.from), reference::toPose(carry.to)});

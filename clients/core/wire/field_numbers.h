@@ -613,6 +613,7 @@ struct HeldWind {
 struct ColliderJoints {
   static constexpr Field kCollider{1, WireType::kBytes};
   static constexpr Field kJoints{2, WireType::kBytes};
+  static constexpr Field kJumps{3, WireType::kVarint};
 };
 struct HandJoints {
   static constexpr Field kSide{1, WireType::kVarint};

@@ -796,7 +796,7 @@ FUNCTIONS = {
     "cs_set_grabs": (c.c_int, [c.c_void_p, c.POINTER(cs_grab), c.c_uint32, c.c_uint64]),
     "cs_set_winds": (c.c_int, [c.c_void_p, c.POINTER(cs_own_wind), c.c_uint32, c.c_uint64]),
     "cs_move_attachment": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_int, c.c_uint64]),
-    "cs_move_joints": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.c_uint32, c.c_uint64]),
+    "cs_move_joints": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.c_uint32, c.c_int, c.c_uint64]),
     "cs_grab_event_count": (c.c_uint32, [c.c_void_p]),
     "cs_get_grab_event": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_grab_event)]),
     "cs_want_contacts": (None, [c.c_void_p, c.c_int, c.c_uint64]),
