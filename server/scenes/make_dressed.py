@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 # Writes gown.json and dress.json: a figure that walks in a circle, in clothes that follow its joints. figure.py has the
-# figure and its walk, garments.py the clothes. `make_dressed.py FOLDER` writes into that folder.
+# figure and its walk, garments.py the clothes. With `--check` it writes nothing and compares. It takes a minute.
 import json
 import math
 import pathlib
@@ -97,7 +97,7 @@ def dress_distance(p):
         return 0
     if p[1] < 0.80:
         return -1  # unbounded
-    return round(0.12 * ((1.03 - p[1]) / 0.23) ** 1.5, 4)
+    return round(max(0.001, 0.12 * ((1.03 - p[1]) / 0.23) ** 1.5), 4)
 
 
 def cape_distance(p):
@@ -105,7 +105,7 @@ def cape_distance(p):
         return 0
     if p[1] < 0.90:
         return -1
-    return round(0.25 * ((1.37 - p[1]) / 0.47) ** 1.5, 4)
+    return round(max(0.001, 0.25 * ((1.37 - p[1]) / 0.47) ** 1.5), 4)
 
 
 def vector(p):
@@ -177,10 +177,13 @@ def cape_cloth(hem, length, settings):
 def write(name, description, body, cloths, settings):
     scene = {"name": name, "description": description, "simulationRate": 72, "streamRate": 72, **settings,
              "cloths": cloths, "colliders": [avatar(body), {"name": "floor", "plane": {}}]}
-    path = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parent) / f"{name}.json"
-    path.write_text(json.dumps(scene, separators=(",", ":")) + "\n")
-    print(f"{name}: {len(body.points)} vertices and {len(body.triangles)} triangles of the body, "
-          f"{path.stat().st_size} bytes")
+    text = json.dumps(scene, separators=(",", ":")) + "\n"
+    path = pathlib.Path(__file__).parent / f"{name}.json"
+    if "--check" not in sys.argv[1:]:
+        path.write_text(text)
+    elif path.read_text() != text:
+        sys.exit(f"{path} is not what {__file__} makes; run it without --check")
+    print(f"{name}: {len(body.points)} vertices and {len(body.triangles)} triangles of the body, {len(text)} bytes")
 
 
 def main():
