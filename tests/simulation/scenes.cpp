@@ -91,6 +91,9 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
                                 reference::toPose(collider.end), double{collider.friction},
                                 collider.jointsStart, collider.jointsEnd});
+  for (const simulation::PlacedSurface& placed : inputs.surfaces)
+    result.surfaces.push_back({std::shared_ptr<const model::Surface>(placed.table, &placed.table->surface),
+                               reference::toPose(placed.pose), placed.twoSided, double{placed.friction}});
   for (const model::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
   for (const model::Carry& carry : inputs.carries)
     result.carries.push_back({carry.cloth, reference::toPose(carry.from), reference::toPose(carry.to)});
