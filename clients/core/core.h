@@ -625,7 +625,7 @@ typedef struct cs_surface {
 typedef enum cs_surface_policy {
   CS_SURFACES_UNKNOWN = 0, /* not connected yet, or the server is of a release that knows none */
   CS_SURFACES_OFF = 1,     /* it refuses them */
-  CS_SURFACES_OWN = 2      /* they act on the cloth, and their shape is sent to nobody */
+  CS_SURFACES_OWN = 2      /* they act on the cloth, and their shape is sent to no client */
 } cs_surface_policy;
 
 /* HandSide of session.proto. */

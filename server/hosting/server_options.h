@@ -40,7 +40,7 @@ inline constexpr std::uint32_t kMaxParticipants =
     messages::limits::kMaxParticipantColliders;
 
 // What the server does with surfaces of the real rooms of participants: it refuses them, or they act on the
-// cloth and their shapes are sent to nobody.
+// cloth and their shapes are sent to no client.
 enum class SurfacePolicy : std::uint8_t { off, own };
 
 struct ServerOptions : Limits {

@@ -165,7 +165,7 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   CLI::Option* surfaces = table.choice(
       "--room-surfaces", parsed.roomSurfaces, kSurfacePolicies,
       "Surfaces of the real rooms of participants: own lets them act on the cloth of their scene and sends "
-      "their shape to nobody, off refuses them");
+      "their shape to no client, off refuses them");
   table.showDefault(surfaces, "own");
   parsed.ownersAloneOption =
       table.flag("--owners-alone", parsed.ownersAlone,

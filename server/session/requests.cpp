@@ -16,7 +16,6 @@
 #include "server/hosting/scene_server.h"
 #include "server/messages/client_message.h"
 #include "server/messages/surface_message.h"
-#include "server/model/surface.h"
 #include "server/session/session.h"
 
 namespace clothstream::session {
