@@ -155,7 +155,7 @@ TEST_F(Surfaces, MoveAndGo) {
   EXPECT_EQ(cs_move_surface(client.get(), 1, place, nullptr), 0);
 }
 
-TEST_F(Surfaces, ANewMeshReplacesOneThatIsUnderWay) {
+TEST_F(Surfaces, StopSendingAMeshWhenItIsReplaced) {
   join(v1::SURFACE_POLICY_OWN);
   set(1, 17'000, 10'000);
   EXPECT_EQ(sent().size(), 4u);

@@ -47,7 +47,7 @@ TEST(Surface, MergesVerticesInTheSamePlace) {
   EXPECT_EQ(made.rims, square.rims);
 }
 
-TEST(Surface, TakesAnEdgeThatIsNotOrientedOrHasMoreTrianglesForARim) {
+TEST(Surface, EndsAtEdgesThatAreNotManifold) {
   Triangles turned = flat(1, 1);
   std::swap(turned.triangles[1][0], turned.triangles[1][1]);
   for (const std::uint8_t rims : surfaceOf(turned).rims) EXPECT_EQ(rims, 0b111111);

@@ -125,7 +125,7 @@ TEST_F(RoomSurfacesTest, LimitTheNumberOfSurfaces) {
   EXPECT_FALSE(surfaces.begin(9, 32, {}, {}));
 }
 
-TEST_F(RoomSurfacesTest, OfAParticipantThatIsAwayDoNotAct) {
+TEST_F(RoomSurfacesTest, DoNotActWhileTheParticipantIsAway) {
   ASSERT_TRUE(put(7, 1, squares(1)));
   const RoomSurfaces::Ticket onItsWay = begin(7, 2);
   surfaces.withdraw(7);

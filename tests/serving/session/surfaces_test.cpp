@@ -76,7 +76,7 @@ class SurfacesTest : public tests::ServerTest {
   ASSERT_NO_FATAL_FAILURE(start(__VA_ARGS__)); \
   if (::testing::Test::IsSkipped()) return
 
-TEST_F(SurfacesTest, CarryTheClothForEveryoneAndAreSentToNobody) {
+TEST_F(SurfacesTest, CarryTheClothAndAreSentToNoOtherClient) {
   START_SURFACES({}, {falling()});
   TestPeer owner(server());
   owner.join("falling");
@@ -233,7 +233,7 @@ TEST_F(SurfacesTest, UseTheMemoryOfUploads) {
   awaitSurfaces(peer, "small", 1);
 }
 
-TEST_F(SurfacesTest, ThatCostTooMuchAreRefused) {
+TEST_F(SurfacesTest, AreRefusedBeyondTheBudget) {
   scene::BudgetLimits budget = kNoLimits;
   budget.sceneMegabytes = budget.megabytes = 20;  // less than the buffers for surfaces
   START_SURFACES({}, {}, budget);
