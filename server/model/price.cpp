@@ -38,6 +38,9 @@ constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
 // kFewAround that lies in one place (ClosedMesh::crowding), at most kMostSearch, as the device limits it
 // (kMostSolidVisits). Distances that are sampled cost it kGridWork.
 constexpr double kSearch = 6, kFewAround = 16, kCrowdedSearch = 1.2, kMostSearch = 4096, kGridWork = 3;
+// A surface of the real room costs each node kSurface, and a third of a search with three tests of each
+// triangle, instead of one, if the node is near.
+constexpr double kSurface = 0.3, kSurfaceTests = 3, kNearSurface = 1.0 / 3;
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
 constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
@@ -65,6 +68,9 @@ constexpr double kGasBytes = 250;           // of a node of a mesh that can hold
 constexpr double kTriangleBytes = 400;      // of a solid
 constexpr double kDistancePointBytes = 48;  // of a solid's grid, three times 16
 constexpr double kSkinVertexBytes = 500;
+// Of the surfaces of a scene: the buffers for the most triangles on the device, and for a triangle the mesh
+// and its tables on the host.
+constexpr double kSurfaceBuffersBytes = 27e6, kSurfaceTriangleBytes = 250;
 constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
 
 // Copies of a scene's lists: as it started, as it was accepted, as it runs, and as descriptions.
@@ -129,6 +135,11 @@ bool isSystem(SolverKind kind) {
 
 double searchWork(const ClosedMesh& mesh) {
   return std::min(kSearch + kCrowdedSearch * std::max(mesh.crowding - kFewAround, 0.0), kMostSearch);
+}
+
+double surfaceWork(const Surface& surface) {
+  const double search = kSearch + kCrowdedSearch * std::max(surface.crowding - kFewAround, 0.0);
+  return kSurface + kNearSurface * std::min(kSurfaceTests * search, kMostSearch);
 }
 
 double colliderWork(const Shape& shape) {
@@ -273,6 +284,20 @@ Work PriceModel::heldWindWork(const Scene& scene, std::size_t winds) const {
   Work work;
   work.nodeSteps = kLocalWind * static_cast<double>(winds) * nodes * scene.substeps;
   return work;
+}
+
+Work PriceModel::surfacesWork(const Scene& scene, double searches) const {
+  if (searches == 0) return {};
+  double nodes = 0;
+  for (const ClothCounts& counts : cloths_) nodes += static_cast<double>(counts.nodes);
+  Work work;
+  work.nodeSteps = searches * nodes * scene.substeps;
+  work.dispatches = scene.substeps;
+  return work;
+}
+
+double PriceModel::surfaceBytes(std::size_t triangles) const {
+  return triangles == 0 ? 0 : kSurfaceBuffersBytes + kSurfaceTriangleBytes * static_cast<double>(triangles);
 }
 
 // The path of a node that is near a fast body is followed in strides.

@@ -338,20 +338,51 @@ void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step
     if (inverseMasses_[i] == 0 || (!only.empty() && only[i] == 0)) continue;
     const std::optional<Contact> contact = contactOf(shape, cloth_.thickness, step, from[i], positions_[i]);
     if (!contact) continue;
-    positions_[i] += contact->depth * contact->normal;
-    const Vec3 carried =
-        step.velocity + contact->velocity + step.spin.cross(positions_[i] - step.after.position);
-    const double approach = (velocities_[i] - carried).dot(contact->normal);
-    velocities_[i] -= std::min(approach, 0.0) * contact->normal;
-    const double extents = (positions_[i] - step.after.position).lpNorm<1>() + positions_[i].lpNorm<1>();
-    const double wayOut =
-        (contact->depth - kDepthRounding * extents) / step.seconds - std::max(approach, 0.0);
-    std::optional<Press>& last = presses_[i];
-    const bool opposed = last && last->normal.dot(contact->normal) < kOpposed;
-    if (last) rub(i, *last, opposed ? Vec3(Vec3::Zero()) : contact->normal, from[i]);
-    last = Press{contact->normal, last && !opposed ? last->normal : Vec3(Vec3::Zero()), carried,
-                 cloth_.friction * friction * std::max({-approach, wayOut, 0.0}), step.seconds};
+    const Vec3 end = positions_[i] + contact->depth * contact->normal;
+    const Vec3 carried = step.velocity + contact->velocity + step.spin.cross(end - step.after.position);
+    leave(i, *contact, carried, step.after.position, friction, step.seconds, from[i]);
   }
+}
+
+void ReferenceCloth::leave(std::size_t i, const Contact& contact, const Vec3& carried, const Vec3& place,
+                           double friction, double seconds, const Vec3& from) {
+  positions_[i] += contact.depth * contact.normal;
+  const double approach = (velocities_[i] - carried).dot(contact.normal);
+  velocities_[i] -= std::min(approach, 0.0) * contact.normal;
+  const double extents = (positions_[i] - place).lpNorm<1>() + positions_[i].lpNorm<1>();
+  const double wayOut = (contact.depth - kDepthRounding * extents) / seconds - std::max(approach, 0.0);
+  std::optional<Press>& last = presses_[i];
+  const bool opposed = last && last->normal.dot(contact.normal) < kOpposed;
+  if (last) rub(i, *last, opposed ? Vec3(Vec3::Zero()) : contact.normal, from);
+  last = Press{contact.normal, last && !opposed ? last->normal : Vec3(Vec3::Zero()), carried,
+               cloth_.friction * friction * std::max({-approach, wayOut, 0.0}), seconds};
+}
+
+void ReferenceCloth::collide(std::span<const PlacedSurface> surfaces, double seconds,
+                             std::span<const Vec3> from) {
+  if (surfaces.empty()) return;
+  presses_.resize(positions_.size());
+  const double thickness = std::max(cloth_.thickness, model::kLeastSurfaceDistance);
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    if (inverseMasses_[i] == 0) continue;
+    bool touched = false;
+    for (std::uint32_t round = 0; round < model::kSurfaceRounds; ++round) {
+      const std::optional<SurfaceContact> found =
+          touchSurfaces(surfaces, thickness, seconds, from[i], positions_[i]);
+      if (!found) break;
+      touched = true;
+      const PlacedSurface& surface = surfaces[found->surface];
+      leave(i, {found->normal, found->depth}, Vec3::Zero(), surface.pose.position, surface.friction, seconds,
+            from[i]);
+    }
+    if (!touched) continue;
+    rub(i, *presses_[i], Vec3::Zero(), from[i]);
+    presses_[i].reset();
+    if (!crossesSurfaces(surfaces, from[i], positions_[i])) continue;
+    positions_[i] = from[i];
+    velocities_[i] = Vec3::Zero();
+  }
+  presses_.clear();
 }
 
 void ReferenceCloth::finishContacts(std::span<const Vec3> from) {

@@ -15,6 +15,7 @@
 #include "server/model/spring_colours.h"
 #include "server/model/springs.h"
 #include "server/reference/contact.h"
+#include "server/reference/surface.h"
 
 namespace clothstream::reference {
 
@@ -69,6 +70,10 @@ class ReferenceCloth {
   void collide(const model::Shape& shape, const ColliderStep& step, double friction,
                std::span<const Vec3> from, std::span<const std::uint8_t> only = {});
   void finishContacts(std::span<const Vec3> from);
+  // The same for surfaces of the real room, with the friction of all contacts: a node has at most
+  // model::kSurfaceRounds contacts, and stays where it was if it then crosses a surface. `seconds`: of the
+  // substep.
+  void collide(std::span<const PlacedSurface> surfaces, double seconds, std::span<const Vec3> from);
 
   // Unit normals; (0,0,1) if they vanish. A grid uses up to eight triangles around a node ([Va21] 3.5, Alg.
   // 5), a mesh the area vectors of a node's triangles.
@@ -90,6 +95,10 @@ class ReferenceCloth {
     double most;          // speed that friction takes
     double seconds;       // of the substep
   };
+  // Moves a node out of a contact, after the friction of the contact before it. `velocity` and `place`: those
+  // of the surface there and of what it belongs to.
+  void leave(std::size_t node, const Contact& contact, const Vec3& velocity, const Vec3& place,
+             double friction, double seconds, const Vec3& from);
   // Moves nothing into the surfaces of the contacts before and after this one (`next`), unless opposed.
   void rub(std::size_t node, const Press& press, const Vec3& next, const Vec3& from);
   void setMass(float mass);

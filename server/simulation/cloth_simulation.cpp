@@ -20,6 +20,7 @@
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/collision/skin_stage.h"
 #include "server/simulation/collision/solid_stage.h"
+#include "server/simulation/collision/surface_stage.h"
 #include "server/simulation/force_stage.h"
 #include "server/simulation/gas/gas_stage.h"
 #include "server/simulation/hash_stage.h"
@@ -130,8 +131,9 @@ struct Stages {
   std::vector<Stage*> list() {
     std::vector<Stage*> all{coarse.get(), solvers.bending(), &forces, gas.get()};
     std::ranges::copy(solvers.afterForces(), std::back_inserter(all));
-    all.insert(all.end(), {attachments.get(), clothSkins.get(), selfCollision.get(), skins.get(),
-                           solids.get(), skinLimits.get(), &collision, motionBound.get(), &masses, &hash});
+    all.insert(all.end(),
+               {attachments.get(), clothSkins.get(), selfCollision.get(), skins.get(), solids.get(),
+                surfaces.get(), skinLimits.get(), &collision, motionBound.get(), &masses, &hash});
     std::erase(all, nullptr);
     return all;
   }
@@ -149,6 +151,7 @@ struct Stages {
   std::unique_ptr<SkinStage> skins;                   // null if no mesh has joints
   std::unique_ptr<ClothSkinStage> clothSkins;         // null if no cloth follows joints
   std::unique_ptr<SkinLimitStage> skinLimits;         // null if no node has limits
+  std::shared_ptr<SurfaceStage> surfaces;             // null until the first surface of the real room
   std::unique_ptr<MotionBoundStage> motionBound;      // null if no cloth uses it
   std::unique_ptr<AttachmentStage> attachments;       // created when it is first needed
 };
@@ -243,6 +246,7 @@ const TickInputs& ClothSimulation::Pipeline::nearby(const TickInputs& inputs) {
     for (model::Pose* pose : {&carry.from, &carry.to}) pose->position -= origin;
   for (Grab& grab : moved.grabs)
     for (model::Pose* pose : {&grab.start, &grab.end}) pose->position -= origin;
+  for (PlacedSurface& surface : moved.surfaces) surface.pose.position -= origin;
   return moved;
 }
 
@@ -348,6 +352,7 @@ void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& i
   Pipeline& on = *pipeline_;
   assert(inWorld.colliders.size() <= kMaxColliders);
   if (!inWorld.grabs.empty()) on.makeAttachments();
+  if (!hasSurfaces() && !(inWorld.surfaces.empty() && inWorld.arriving.empty())) takeSurfaces(makeSurfaces());
   on.start(recorder);
   on.slot = 1 - on.slot;
   const Tick tick{.inputs = on.nearby(inWorld),
@@ -359,6 +364,26 @@ void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& i
   on.recordInputs(recorder, tick);
   on.recordSubsteps(recorder, tick);
   on.recordEnd(recorder, tick);
+}
+
+bool ClothSimulation::hasSurfaces() const {
+  return pipeline_->stages.surfaces != nullptr;
+}
+
+std::shared_ptr<SurfaceStage> ClothSimulation::makeSurfaces() const {
+  const Pipeline& on = *pipeline_;
+  return std::make_shared<SurfaceStage>(on.device, on.offsets, stateOf(on.memory, on.stages.collision),
+                                        on.workgroupSize);
+}
+
+void ClothSimulation::takeSurfaces(std::shared_ptr<SurfaceStage> stage) {
+  pipeline_->stages.surfaces = std::move(stage);
+  pipeline_->listStages();
+}
+
+std::size_t ClothSimulation::texelsToUpload(const SurfaceTable& table) const {
+  const SurfaceStage* const stage = pipeline_->stages.surfaces.get();
+  return stage == nullptr ? surfaceTexels(table) : stage->texelsToUpload(table);
 }
 
 void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {
