@@ -183,12 +183,8 @@ Contact contactOfSearch(SolidRecord solid, SurfaceSearch search, vec3 from, vec3
     precise float depth = min(thickness, reached) - (touches ? 0.0 : distance_);
     return Contact(away, depth);
   }
-  uint rims = uint(
-      texelFetch(solids, int(uint(solid.firstTriangle) + CLOTHSTREAM_TRIANGLE_TEXELS * search.nearest) + 1)
-          .w);
-  uint part = search.at.part;
-  uint rim = part == kFace ? 0u : part >= kEdge ? 1u << (part - kEdge) : 8u << (part - kCorner);
-  if ((rims & rim) != 0u || distance_ >= depthBound) {
+  precise float bound = depthBound * depthBound;
+  if (search.rimSquared < bound || distance_ >= depthBound) {
     return kNoContact;
   }
   // Behind: `away` leads back, out of the front is the other way.
