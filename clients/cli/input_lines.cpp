@@ -156,23 +156,28 @@ InputLine::Hand handOf(const Json& joints, std::uint32_t side, const std::string
   return hand;
 }
 
+bool jumpsOf(const Json& object, const std::string& where) {
+  const Json jumps = object.value("jumps", Json(false));
+  if (!jumps.is_boolean()) throw Wrong(fmt::format("{}.jumps must be true or false", where));
+  return jumps.get<bool>();
+}
+
 InputLine::Attachment attachmentOf(const Json& object, const std::string& where) {
   allowOnly(object, where, {"name", "position", "orientation", "jumps"});
   if (!object.contains("name") || !object["name"].is_string())
     throw Wrong(fmt::format("{} must have a \"name\", a text", where));
-  const Json jumps = object.value("jumps", Json(false));
-  if (!jumps.is_boolean()) throw Wrong(fmt::format("{}.jumps must be true or false", where));
   return {.name = object["name"].get<std::string>(),
           .position = positionOf(object, where),
           .orientation = orientationOf(object, where),
-          .jumps = jumps.get<bool>()};
+          .jumps = jumpsOf(object, where)};
 }
 
 InputLine::Joints jointsOf(const Json& object, const std::string& where) {
-  allowOnly(object, where, {"collider", "poses"});
+  allowOnly(object, where, {"collider", "poses", "jumps"});
   if (!object.contains("collider") || !object["collider"].is_string())
     throw Wrong(fmt::format("{} must have a \"collider\", a text", where));
-  InputLine::Joints joints{.collider = object["collider"].get<std::string>(), .poses = {}};
+  InputLine::Joints joints{
+      .collider = object["collider"].get<std::string>(), .poses = {}, .jumps = jumpsOf(object, where)};
   constexpr std::size_t kMost = 128;  // as in Skin of scene.proto
   forEach(object.value("poses", Json::array()), where + ".poses", kMost,
           [&](const Json& pose, const std::string& place) {
@@ -249,7 +254,7 @@ void InputLine::send(cs_client* client, std::uint64_t nowUs) const {
                        attachment.jumps ? 1 : 0, nowUs);
   for (const Joints& moved : joints)
     cs_move_joints(client, moved.collider.c_str(), moved.poses.data(),
-                   static_cast<std::uint32_t>(moved.poses.size() / 7), nowUs);
+                   static_cast<std::uint32_t>(moved.poses.size() / 7), moved.jumps ? 1 : 0, nowUs);
 }
 
 tl::expected<InputLine, std::string> parseInputLine(std::string_view line) {

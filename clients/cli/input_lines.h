@@ -38,6 +38,7 @@ struct InputLine {
   struct Joints {
     std::string collider;
     std::vector<float> poses;  // position and quaternion x y z w of each joint
+    bool jumps = false;
   };
 
   double after = 0;  // seconds to wait after the line before

@@ -75,27 +75,30 @@ void Client::wantConstraints(bool wants, std::uint64_t nowUs) {
   sendPoses(nowUs);
 }
 
-void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
-  const auto known =
-      std::find_if(poses_.attachments.begin(), poses_.attachments.end(),
-                   [&](const AttachmentPose& waiting) { return waiting.name == attachment.name; });
-  if (known != poses_.attachments.end()) {
-    attachment.jumps = attachment.jumps || known->jumps;  // a pose that waits jumps when it is sent
-    *known = std::move(attachment);
+namespace {
+
+// Replaces what waits for the same thing, or adds it. One that should jump still jumps.
+template <typename Moved, typename Name>
+void replace(std::vector<Moved>& waiting, Moved moved, Name name) {
+  const auto known = std::find_if(waiting.begin(), waiting.end(),
+                                  [&](const Moved& one) { return one.*name == moved.*name; });
+  if (known == waiting.end()) {
+    waiting.push_back(std::move(moved));
   } else {
-    poses_.attachments.push_back(std::move(attachment));
+    moved.jumps = moved.jumps || known->jumps;
+    *known = std::move(moved);
   }
+}
+
+}  // namespace
+
+void Client::move(AttachmentPose attachment, std::uint64_t nowUs) {
+  replace(poses_.attachments, std::move(attachment), &AttachmentPose::name);
   sendPoses(nowUs);
 }
 
 void Client::move(ColliderJoints joints, std::uint64_t nowUs) {
-  const auto known =
-      std::find_if(poses_.joints.begin(), poses_.joints.end(),
-                   [&](const ColliderJoints& waiting) { return waiting.collider == joints.collider; });
-  if (known != poses_.joints.end())
-    *known = std::move(joints);
-  else
-    poses_.joints.push_back(std::move(joints));
+  replace(poses_.joints, std::move(joints), &ColliderJoints::collider);
   sendPoses(nowUs);
 }
 

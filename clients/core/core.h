@@ -703,8 +703,9 @@ void cs_move_attachment(cs_client* client, const char* attachment, const float* 
                         const float* orientation4, int jumps, uint64_t now_us) CS_NOEXCEPT;
 /* Moves the joints of a collider of the scene that is a mesh with joints; they stay there. `poses` has seven
  * numbers for each joint: position and quaternion x, y, z, w, relative to its parent. At most 128 joints are
- * used; the rest is ignored. */
-void cs_move_joints(cs_client* client, const char* collider, const float* poses, uint32_t count,
+ * used; the rest is ignored. If they jump, they are there in one tick, however far the way is, and the cloth that
+ * follows them goes along: use this for teleports and cuts of an animation. */
+void cs_move_joints(cs_client* client, const char* collider, const float* poses, uint32_t count, int jumps,
                     uint64_t now_us) CS_NOEXCEPT;
 
 /* What the server does with surfaces of the real room, from the newest Welcome. */
@@ -782,6 +783,7 @@ typedef struct cs_cloth_settings {
   /* Self-collision: ball radius (m) and friction. Tethers: slack as a fraction of the length. They can be
    * changed only for cloths that were created with them, and are NaN for others. */
   float ball_radius, ball_friction, tether_slack;
+  float pressure; /* Pa; of the gas inside a closed mesh */
 } cs_cloth_settings;
 
 /* Fails before the description. */

@@ -94,10 +94,10 @@ void cs_move_attachment(cs_client* client, const char* attachment, const float* 
   client->client.move(std::move(pose), now_us);
 }
 
-void cs_move_joints(cs_client* client, const char* collider, const float* poses, uint32_t count,
+void cs_move_joints(cs_client* client, const char* collider, const float* poses, uint32_t count, int jumps,
                     uint64_t now_us) noexcept {
   const std::size_t numbers = kJointNumbers * std::min<std::size_t>(count, kMaxJoints);
-  client->client.move({.collider = collider, .poses = {poses, poses + numbers}}, now_us);
+  client->client.move({.collider = collider, .poses = {poses, poses + numbers}, .jumps = jumps != 0}, now_us);
 }
 
 cs_surface_policy cs_get_surface_policy(const cs_client* client) noexcept {

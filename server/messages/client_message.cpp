@@ -129,7 +129,8 @@ void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& mess
       return;
     }
     to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.begin()),
-                         toJoints(checks, path / "joints", from.joints(), (*solid)->skin->joints.size())});
+                         toJoints(checks, path / "joints", from.joints(), (*solid)->skin->joints.size()),
+                         from.jumps()});
   }
 }
 

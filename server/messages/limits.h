@@ -47,6 +47,7 @@ inline constexpr Range kScale{1e-6, 1e6};         // m per unit
 inline constexpr Range kDistanceCell{5e-4, 10};   // m
 inline constexpr Range kWeldDistance{0, 0.1};     // m
 inline constexpr Range kRegionLength{0, 1000};    // m
+inline constexpr Range kSkinDistance{0, 1000};    // m, of a node from its skinned place, and of a backstop
 inline constexpr Range kMass{1e-6, 1e6};          // kg
 inline constexpr Range kArealMass{1e-4, 1000};    // kg/m^2
 inline constexpr Range kFriction = parameters::kFriction;

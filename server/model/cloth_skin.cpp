@@ -54,15 +54,24 @@ std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth, const V
   std::vector<Pose> local, joints;
   jointsAt(skin, 0, local);
   compose(skin, local, joints);
-  const std::vector<Transform> transforms = jointTransforms(skin, joints);
-  const Pose pose = poseAt(collider, 0);
-  const Eigen::Vector3d place = pose.position.cast<double>() - origin.cast<double>();
-  const Eigen::Matrix3d turn = pose.orientation.cast<double>().toRotationMatrix();
-  std::vector<Vec3> positions = restPositions(cloth);
-  for (std::size_t i = 0; i < positions.size(); ++i)
-    positions[i] = (place + turn * skinned(cloth.skin->joints[i], transforms, positions[i].cast<double>()))
-                       .cast<float>();
+  Pose pose = poseAt(collider, 0);
+  pose.position -= origin;
+  std::vector<Vec3> positions;
+  positions.reserve(cloth.nodeCount());
+  for (const Eigen::Vector3d& place : skinnedPlaces(cloth, skin, pose, joints))
+    positions.emplace_back(place.cast<float>());
   return positions;
+}
+
+std::vector<Eigen::Vector3d> skinnedPlaces(const Cloth& cloth, const Skin& skin, const Pose& collider,
+                                           std::span<const Pose> joints) {
+  std::vector<Transform> transforms(joints.size());
+  jointTransforms(inverseRests(skin), joints, collider, transforms);
+  std::vector<Eigen::Vector3d> places;
+  places.reserve(cloth.nodeCount());
+  for (const Vec3& rest : restPositions(cloth))
+    places.push_back(skinned(cloth.skin->joints[places.size()], transforms, rest.cast<double>()));
+  return places;
 }
 
 std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth) {

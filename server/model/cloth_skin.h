@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Cloth that follows the joints of a collider: where joints take its nodes, and how far nodes may leave that place.
+// Cloth that follows the joints of a collider: where joints take its nodes, and how far nodes may leave that
+// place.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +15,8 @@
 
 namespace clothstream::model {
 
-// Limits of one node, metres. The backstop is a ball behind the skinned place, against the skinned normal; the
-// node stays outside.
+// Limits of one node, metres. The backstop is a ball behind the skinned place, against the skinned normal;
+// the node stays outside.
 struct SkinLimits {
   static constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
@@ -28,8 +29,8 @@ struct SkinLimits {
   bool operator==(const SkinLimits&) const = default;
 };
 
-// Joints of the nodes of a cloth. The nodes are at their rest positions where the joints rest, in the frame of the
-// collider.
+// Joints of the nodes of a cloth. The nodes are at their rest positions where the joints rest, in the frame
+// of the collider.
 struct ClothSkin {
   std::string collider;              // its shape is a Solid with a skin
   std::vector<VertexJoints> joints;  // one for each node
@@ -40,6 +41,10 @@ struct ClothSkin {
 std::size_t skinCollider(const Scene& scene, const Cloth& cloth);
 // The joints of that collider.
 const Skin& skinOf(const Scene& scene, const Cloth& cloth);
+
+// Places to which joints take the nodes. `joints` has the poses of the joints in the frame of the collider.
+std::vector<Eigen::Vector3d> skinnedPlaces(const Cloth& cloth, const Skin& skin, const Pose& collider,
+                                           std::span<const Pose> joints);
 
 // Unit normals of the nodes at rest: the mean of the unit normals of the triangles around a node, by their
 // angles there.

@@ -54,6 +54,7 @@ struct AttachmentPose {
 struct ColliderJoints {
   std::size_t collider = 0;  // index among the colliders of the scene
   std::vector<Pose> joints;  // of all joints, relative to their parents
+  bool jumps = false;        // in one tick, however far the way is
 };
 
 // Everything that a participant moves, at one time.

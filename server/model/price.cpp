@@ -6,6 +6,7 @@
 #include <cassert>
 
 #include "server/model/distance_grid.h"
+#include "server/model/gas.h"
 #include "server/model/mesh.h"
 #include "server/model/springs.h"
 
@@ -16,6 +17,7 @@ namespace {
 // A node of a grid has six springs.
 constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
 constexpr double kRungeKutta = 14;  // as a factor
+constexpr double kGas = 1;          // of a node
 constexpr double kAir = 0.5, kLocalWind = 0.3, kHinge = 2, kSelfCollision = 20, kMotionBound = 120;
 // Crowding of a few layers, which kSelfCollision and kMotionBound include. Beyond it each node costs
 // kCrowdedBall in each of the searches of a tick, and kCrowdedTriangle in a substep, for one more ball or
@@ -42,6 +44,12 @@ constexpr double kSurface = 0.3, kSurfaceTests = 3, kNearSurface = 1.0 / 3;
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
 constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
+// Each node of a cloth that follows joints costs kClothSkinTick in a tick, for its places at both ends, like
+// a vertex of a solid that joints move, and for its normals there. It costs kClothSkinStep in a substep,
+// where it is kept near its place. Its joints, limits, and places and normals at both ends take
+// kClothSkinBytes.
+constexpr double kClothSkinTick = 30, kClothSkinStep = 0.5, kClothSkinBytes = 128;
+constexpr double kClothSkinDispatches = 4;
 // Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
 constexpr double kTickDispatches = 6, kFrameDispatches = 12, kBoundDispatches = 14;
@@ -56,6 +64,7 @@ constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kMotionBoundBytes = 2000, kHingeBytes = 200, kSystemBytes = 64,
                  kPairBytes = 40;
+constexpr double kGasBytes = 250;           // of a node of a mesh that can hold gas
 constexpr double kTriangleBytes = 400;      // of a solid
 constexpr double kDistancePointBytes = 48;  // of a solid's grid, three times 16
 constexpr double kSkinVertexBytes = 500;
@@ -238,6 +247,7 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
     if (cloth.mesh) step *= kMeshFactor;
     if (scene.integrator == Integrator::rungeKutta4) step *= kRungeKutta;
     if (isBlown(scene, cloth)) step += (kAir + kLocalWind * static_cast<double>(scene.winds.size())) * nodes;
+    if (hasGas(cloth)) step += kGas * nodes;
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
     if (cloth.selfCollision)
       step += (boundsMotion(cloth) ? kSelfCollision + kMotionBound : kSelfCollision) * nodes;
@@ -247,12 +257,14 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
     work.nodeSteps +=
         substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
     work += solverWork(scene, cloth, counts);
+    if (cloth.skin) work.nodeSteps += (kClothSkinTick + kClothSkinStep * substeps) * nodes;
     if (cloth.coarse) work += coarseWork(*cloth.coarse, scene.substeps, nodes * (kCoarseNode + collisions));
   }
   for (const Collider& collider : scene.colliders) work += skinWork(collider.shape);
   if (scene.integrator == Integrator::rungeKutta4) work.dispatches += 11 * substeps;
   const auto any = [&](auto has) { return std::ranges::any_of(scene.cloths, has) ? 1.0 : 0.0; };
   work.dispatches += 3 * substeps * any([](const Cloth& cloth) { return cloth.dihedralBending != 0; });
+  work.dispatches += 3 * substeps * static_cast<double>(std::ranges::count_if(scene.cloths, hasGas));
   const bool solids = std::ranges::any_of(scene.colliders, [](const Collider& collider) {
     return std::holds_alternative<Solid>(collider.shape);
   });
@@ -260,6 +272,8 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
   work.dispatches +=
       (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
   work.dispatches += kBoundDispatches * substeps * any(boundsMotion);
+  work.dispatches +=
+      (kClothSkinDispatches + substeps) * any([](const Cloth& cloth) { return cloth.skin != nullptr; });
   return work;
 }
 
@@ -318,7 +332,9 @@ double PriceModel::bytes(const Scene& scene) const {
     if (cloth.mesh)
       bytes += kMeshNodeBytes * nodes + listBytes(cloth.mesh->shape.uvs) +
                listBytes(cloth.mesh->shape.uvTriangles);
+    if (cloth.skin) bytes += kClothSkinBytes * nodes;
     if (cloth.selfCollision) bytes += kSelfCollisionBytes * nodes;
+    if (canHoldGas(cloth)) bytes += kGasBytes * nodes;
     if (cloth.coarse) bytes += cloth.coarse->levels * (cloth.mesh ? kCoarseMeshBytes : kCoarseBytes) * nodes;
     if (boundsMotion(cloth)) bytes += kMotionBoundBytes * nodes;
     if (cloth.dihedralBending != 0) bytes += kHingeBytes * static_cast<double>(counts.hinges);

@@ -145,6 +145,14 @@ void jointTransforms(std::span<const JointFrame> inverseRests, std::span<const P
     transforms[i] = matrixOf(inFrame(frameOf(poses[i]), inverseRests[i]));
 }
 
+void jointTransforms(std::span<const JointFrame> inverseRests, std::span<const Pose> poses, const Pose& frame,
+                     std::span<Transform> transforms) {
+  assert(poses.size() == inverseRests.size() && transforms.size() == poses.size());
+  const Frame outer = frameOf(frame);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    transforms[i] = matrixOf(inFrame(inFrame(outer, frameOf(poses[i])), inverseRests[i]));
+}
+
 std::vector<Transform> jointTransforms(const Skin& skin, std::span<const Pose> poses) {
   std::vector<Transform> transforms(poses.size());
   jointTransforms(inverseRests(skin), poses, transforms);

@@ -68,6 +68,9 @@ std::vector<JointFrame> inverseRests(const Skin& skin);
 void jointTransforms(std::span<const JointFrame> inverseRests, std::span<const Pose> poses,
                      std::span<Transform> transforms);
 std::vector<Transform> jointTransforms(const Skin& skin, std::span<const Pose> poses);
+// The same to where the collider is at `frame`.
+void jointTransforms(std::span<const JointFrame> inverseRests, std::span<const Pose> poses, const Pose& frame,
+                     std::span<Transform> transforms);
 Eigen::Vector3d transformed(const Transform& transform, const Eigen::Vector3d& point);
 
 // Bounds of the vertices that joints move.

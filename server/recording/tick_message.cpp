@@ -2,6 +2,7 @@
 // Writes and reads the inputs of a tick field by field.
 #include "server/recording/tick_message.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +17,7 @@
 #include "server/messages/shapes.h"
 #include "server/messages/skin_message.h"
 #include "server/messages/vectors.h"
+#include "server/model/cloth_skin.h"
 
 namespace clothstream::recording {
 namespace {
@@ -42,6 +44,7 @@ void writeCloths(const model::Scene& scene, v1::RecordedTick& message) {
     one.pinnedVertices.clear();
     one.pinnedRegions.clear();
     one.attachments.clear();
+    one.skin.reset();
   }
   v1::Scene parameters = messages::toMessage(bare);
   for (std::size_t i = 0; i < bare.cloths.size(); ++i) {
@@ -66,6 +69,9 @@ void writeColliders(const scene::AppliedTick& tick, v1::RecordedTick& message) {
     messages::write(collider.shape, to);
     messages::writePoses(collider.jointsStart, *to.mutable_joints_start());
     messages::writePoses(collider.jointsEnd, *to.mutable_joints_end());
+    if (!collider.jumped) continue;
+    messages::write(collider.before, *to.mutable_before());
+    messages::writePoses(collider.jointsBefore, *to.mutable_joints_before());
   }
 }
 
@@ -197,6 +203,14 @@ std::size_t jointCountOf(const model::Shape& shape) {
   return solid != nullptr && (*solid)->skin ? (*solid)->skin->joints.size() : 0;
 }
 
+// Whether one of the colliders is this mesh.
+bool has(const std::vector<simulation::MovingCollider>& colliders, const model::Shape& mesh) {
+  return std::ranges::any_of(colliders, [&](const simulation::MovingCollider& collider) {
+    return simulation::isSolid(collider) &&
+           std::get<model::Solid>(collider.shape) == std::get<model::Solid>(mesh);
+  });
+}
+
 std::optional<simulation::WeightedNodes> placeOf(Numbers& numbers, const v1::AppliedGrip& message,
                                                  std::uint32_t nodeCount) {
   if (message.place_nodes().empty() && message.place_weights().empty()) return std::nullopt;
@@ -280,7 +294,15 @@ tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTic
                                 numbers.number(collider.friction()),
                                 jointsOf(numbers, collider.joints_start(), jointCountOf(shape)),
                                 jointsOf(numbers, collider.joints_end(), jointCountOf(shape))});
+    if (!collider.has_before()) continue;
+    simulation::MovingCollider& jumping = inputs.colliders.back();
+    jumping.jumped = true;
+    jumping.before = numbers.pose(collider.before());
+    jumping.jointsBefore = jointsOf(numbers, collider.joints_before(), jointCountOf(shape));
   }
+  for (const model::Cloth& cloth : scene.cloths)
+    if (cloth.skin && !has(inputs.colliders, scene.colliders[model::skinCollider(scene, cloth)].shape))
+      return wrong("it lacks the collider whose joints a cloth follows");
   for (const v1::Pose& pose : message.attachments()) inputs.attachments.push_back(numbers.pose(pose));
   if (static_cast<std::size_t>(message.carries_size()) > scene.cloths.size())
     return wrong("it carries more cloths than the scene has");
@@ -307,6 +329,8 @@ tl::expected<std::vector<model::Cloth>, std::string> toCloths(const v1::Recorded
     cloth.mutable_pinned_vertices()->Swap(whole.mutable_pinned_vertices());
     cloth.mutable_pinned_regions()->Swap(whole.mutable_pinned_regions());
     cloth.mutable_attachments()->Swap(whole.mutable_attachments());
+    cloth.clear_skin();
+    if (whole.has_skin()) cloth.mutable_skin()->Swap(whole.mutable_skin());
     if (whole.has_mesh())
       cloth.mutable_mesh()->Swap(whole.mutable_mesh());
     else

@@ -45,8 +45,9 @@ Attachments::Attachments(const model::Scene& scene) {
       const std::vector<std::uint8_t> attached = model::attachedNodes(cloth, attachment);
       for (std::size_t node = 0; node < attached.size(); ++node)
         if (attached[node] != 0)
-          attached_.push_back({c, node, start_.size(),
-                               frame.orientation.conjugate() * (places[node].cast<double>() - frame.position)});
+          attached_.push_back(
+              {c, node, start_.size(),
+               frame.orientation.conjugate() * (places[node].cast<double>() - frame.position)});
       start_.push_back(frame);
     }
     tethers_.push_back(cloth.tethers ? model::nodeTethers(cloth) : std::vector<model::NodeTethers>());

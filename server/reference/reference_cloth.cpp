@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "server/model/gas.h"
 #include "server/model/stability.h"
 #include "server/model/strain_limit.h"
 #include "server/reference/constraint_system.h"
@@ -74,6 +75,7 @@ void ReferenceCloth::setParameters(const model::Cloth& cloth) {
   cloth_.lift = cloth.lift;
   cloth_.friction = cloth.friction;
   cloth_.thickness = cloth.thickness;
+  cloth_.pressure = cloth.pressure;
   cloth_.solver = cloth.solver;
   setMass(cloth.mass);
 }
@@ -137,6 +139,34 @@ void ReferenceCloth::bend(double h) {
   for (std::size_t i = 0; i < forces_.size(); ++i) velocities_[i] += h * inverseMasses_[i] * forces_[i];
 }
 
+void ReferenceCloth::press(double h) {
+  if (!model::hasGas(cloth_)) {
+    gasPressure_ = foreseenVolume_ = squaredStep_ = 0;
+    return;
+  }
+  const double rest = cloth_.mesh->volume, squared = h * h;
+  const std::vector<Vec3> gradients = model::volumeGradients(triangles_, start_);
+  const double volume = model::enclosedVolume(triangles_, start_) / rest;
+  double growth = 0, response = 0;
+  for (std::size_t i = 0; i < gradients.size(); ++i) {
+    growth += gradients[i].dot(positions_[i] - start_[i]) / rest;
+    response += gradients[i].squaredNorm() * inverseMasses_[i];
+  }
+  response *= squared * model::kOutsidePressure / rest;
+  const double later = squaredStep_ == 0 ? 0 : squared / squaredStep_ * (volume - foreseenVolume_);
+  const double free = volume + growth + later;
+  const double lawful = model::gasPressure(cloth_.pressure / model::kOutsidePressure, free, response);
+  const double pressure = model::boundedPressure(lawful, volume, free, response);
+  foreseenVolume_ = volume + growth + response * pressure;
+  squaredStep_ = squared;
+  gasPressure_ = pressure * model::kOutsidePressure;
+  for (std::size_t i = 0; i < gradients.size(); ++i) {
+    const Vec3 change = h * gasPressure_ * inverseMasses_[i] * gradients[i];
+    velocities_[i] += change;
+    positions_[i] += h * change;
+  }
+}
+
 void ReferenceCloth::accumulateAirForces(const model::Environment& environment,
                                          std::span<Vec3> forces) const {
   const double density = environment.airDensity, drag = cloth_.drag, lift = cloth_.lift;
@@ -194,7 +224,7 @@ void ReferenceCloth::integrate(const model::Environment& environment, model::Int
   stiffnessShare_ = model::stiffnessShare(cloth_, h);
   const std::vector<Vec3>& rates = accelerations(environment);
   const model::SolverKind solver = cloth_.solver.kind;
-  if (solver != model::SolverKind::massSpring) start_ = positions_;
+  if (solver != model::SolverKind::massSpring || model::hasGas(cloth_)) start_ = positions_;
   if (solver == model::SolverKind::implicitEuler) startVelocities_ = velocities_;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     if (integrator == model::Integrator::explicitEuler) {
@@ -205,6 +235,7 @@ void ReferenceCloth::integrate(const model::Environment& environment, model::Int
       positions_[i] += h * velocities_[i];
     }
   }
+  press(h);
   if (model::isAcad(cloth_.solver, model::AcadMode::limit))
     limitStretch(h);
   else if (solver == model::SolverKind::constraint || solver == model::SolverKind::acad)

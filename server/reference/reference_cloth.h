@@ -33,8 +33,8 @@ class ReferenceCloth {
   // Starts at rest in its start pose. The springs are those of model::springLinks().
   explicit ReferenceCloth(const model::Cloth& cloth);
 
-  // Sets springs, bending, damping, drag, lift, friction, thickness, mass and solver. Shape and pins must
-  // stay the same.
+  // Sets springs, bending, damping, drag, lift, friction, thickness, pressure, mass and solver. Shape and
+  // pins must stay the same.
   void setParameters(const model::Cloth& cloth);
   // Sets the local winds, which add to the wind of the environment; at first there are none.
   void setWinds(std::span<const model::LocalWind> winds) { winds_.assign(winds.begin(), winds.end()); }
@@ -56,6 +56,9 @@ class ReferenceCloth {
   // Energy of dihedral bending, J, and its forces on the nodes, N: model/hinges.h.
   double bendingEnergy() const;
   void accumulateBendingForces(std::span<Vec3> forces) const;
+
+  // Pressure of the gas in the last step, above the pressure outside, Pa; 0 without gas.
+  double gasPressure() const { return gasPressure_; }
 
   // Computes forces, takes one step of h seconds, and enforces the cloth's constraints; without colliders.
   void integrate(const model::Environment& environment, model::Integrator integrator, double h);
@@ -103,6 +106,9 @@ class ReferenceCloth {
   const std::vector<Vec3>& accelerations(const model::Environment& environment);
   void integrateRungeKutta(const model::Environment& environment, double h);
   void bend(double h);
+  // Moves the nodes, which are at the end of their free motion from `start_`, by the impulses of the gas:
+  // model/gas.h.
+  void press(double h);
   // True if a spring of this length, m, is a constraint instead of a force: model::AcadMode::paper.
   bool isReplaced(const model::SpringLink& link, double length) const;
   void enforceConstraints(double h);
@@ -122,6 +128,10 @@ class ReferenceCloth {
   std::vector<Vec3> start_, startVelocities_;  // at the substep's start, for solvers of linear systems
   model::SpringColours colours_;               // of xpbd, created at first use
   std::vector<double> masses_, inverseMasses_;
+  double gasPressure_ = 0;  // Pa
+  // Volume that the last step has foreseen, as a fraction of the volume at rest, and the square of its
+  // length, s^2; 0: there was no gas.
+  double foreseenVolume_ = 0, squaredStep_ = 0;
   double stiffnessShare_ = 1;  // model::stiffnessShare() of the last substep
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "server/model/cloth_skin.h"
 #include "server/model/jump.h"
 #include "server/model/wind.h"
 #include "server/reference/solid.h"
@@ -18,19 +19,24 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const model::Collider& collider : scene.colliders) {
     const model::Pose before = model::poseAt(collider, start), after = model::poseAt(collider, end);
-    const bool jumps = model::hasJumped(before, after, scene.tickSeconds());
     MovingCollider& to = inputs.colliders.emplace_back(
-        MovingCollider{collider.shape, toPose(jumps ? after : before), toPose(after), collider.friction});
-    const auto* solid = std::get_if<model::Solid>(&collider.shape);
-    if (solid == nullptr || !(*solid)->skin) continue;
-    const auto jointsAt = [&](double seconds, std::vector<model::Pose>& poses) {
-      std::vector<model::Pose> local;
-      model::jointsAt(*(*solid)->skin, seconds, local);
-      model::compose(*(*solid)->skin, local, poses);
-    };
-    jointsAt(start, to.jointsStart);
-    jointsAt(end, to.jointsEnd);
-    if (model::hasJumped(to.jointsStart, to.jointsEnd, scene.tickSeconds())) to.jointsStart = to.jointsEnd;
+        MovingCollider{collider.shape, toPose(before), toPose(after), collider.friction});
+    if (const auto* solid = std::get_if<model::Solid>(&collider.shape); solid != nullptr && (*solid)->skin) {
+      const auto jointsAt = [&](double seconds, std::vector<model::Pose>& poses) {
+        std::vector<model::Pose> local;
+        model::jointsAt(*(*solid)->skin, seconds, local);
+        model::compose(*(*solid)->skin, local, poses);
+      };
+      jointsAt(start, to.jointsStart);
+      jointsAt(end, to.jointsEnd);
+    }
+    const bool moves = model::hasJumped(before, after, scene.tickSeconds()),
+               bends = model::hasJumped(to.jointsStart, to.jointsEnd, scene.tickSeconds());
+    to.jumped = moves || bends;
+    to.before = to.start;
+    to.jointsBefore = to.jointsStart;
+    if (moves) to.start = to.end;
+    if (bends) to.jointsStart = to.jointsEnd;
   }
   std::vector<model::Pose> before, after;
   for (const model::Cloth& cloth : scene.cloths)
@@ -48,10 +54,16 @@ ReferenceSimulation::ReferenceSimulation(const model::Scene& scene)
     : scene_(scene),
       cloths_(scene.cloths.begin(), scene.cloths.end()),
       attachments_(scene),
+      skins_(scene),
       selfCollision_(scene),
       motionBound_(scene),
       coarse_(scene.cloths.size()),
       before_(scene.cloths.size()) {
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
+    const std::vector<model::Vec3> start = model::startPositions(scene, scene.cloths[i]);
+    std::ranges::transform(start, cloths_[i].positions().begin(),
+                           [](const model::Vec3& position) -> Vec3 { return position.cast<double>(); });
+  }
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     if (scene.cloths[i].coarse)
       for (const model::CoarseLevel& level : coarseLevels(scene.cloths[i]))
@@ -70,6 +82,7 @@ void ReferenceSimulation::tick() {
 void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index) {
   if (index == 0)
     for (const Carry& carry : inputs.carries) carryAlong(cloths_[carry.cloth], carry);
+  if (index == 0) skins_.begin(cloths_, inputs.colliders, scene_.tickSeconds());
   if (index == 0) attachments_.begin(cloths_, inputs.attachments, inputs.grabs, scene_.tickSeconds());
   for (std::size_t i = 0; i < cloths_.size(); ++i) {
     ReferenceCloth& cloth = cloths_[i];
@@ -86,6 +99,7 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
     collide(inputs, index, i, true);
     cloths_[i].collide(inputs.surfaces, scene_.substepSeconds(), before_[i]);
   }
+  skins_.apply(cloths_, index, scene_.substeps, scene_.tickSeconds());
   if (motionBound_.exists()) boundMotion();
 }
 

@@ -8,6 +8,7 @@
 
 #include "server/model/scene.h"
 #include "server/reference/attachments.h"
+#include "server/reference/cloth_skins.h"
 #include "server/reference/coarse_correction.h"
 #include "server/reference/motion_bound.h"
 #include "server/reference/reference_cloth.h"
@@ -22,6 +23,10 @@ struct MovingCollider {
   double friction = 1;  // multiplied with the cloth's
   // Poses of the joints of a mesh in the frame of the collider, or empty.
   std::vector<model::Pose> jointsStart = {}, jointsEnd = {};
+  // True: it or its joints jumped to the tick's start, from `before` and `jointsBefore`.
+  bool jumped = false;
+  Pose before = {};
+  std::vector<model::Pose> jointsBefore = {};
 };
 
 struct TickInputs {
@@ -49,7 +54,7 @@ class ReferenceSimulation {
 
   // Simulates substep `index` of a tick: coarse corrections; forces, integration and colliders in order;
   // attachments, tethers and grabs; self-collision, and colliders again; colliders that are triangle meshes;
-  // surfaces of the real room; the bound on motion.
+  // surfaces of the real room; limits of skinned cloth; the bound on motion.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
   // Number of simulated ticks.
@@ -71,6 +76,7 @@ class ReferenceSimulation {
   model::Scene scene_;
   std::vector<ReferenceCloth> cloths_;
   Attachments attachments_;
+  ClothSkins skins_;
   SelfCollision selfCollision_;
   MotionBound motionBound_;
   std::vector<std::vector<CoarseCorrection>> coarse_;  // by cloth and level

@@ -52,7 +52,11 @@ void ColliderSet::place(std::uint64_t participant, std::span<const model::Partic
 }
 
 void ColliderSet::placeJoints(std::span<const model::ColliderJoints> moved) {
-  for (const model::ColliderJoints& put : moved) state_.joints[put.collider].target = put.joints;
+  for (const model::ColliderJoints& put : moved) {
+    Joints& joints = state_.joints[put.collider];
+    joints.target = put.joints;
+    joints.jumps = joints.jumps || put.jumps;
+  }
 }
 
 bool ColliderSet::isTouched() const {
@@ -74,13 +78,14 @@ void ColliderSet::advanceJoints(const model::Skin& skin, double endSeconds, doub
     if (joints.now.empty()) joints.now = end_;  // after letGo()
   } else {
     if (joints.now.empty()) joints.now = joints.target;
-    followers_[index]->follow(joints.now, joints.target, kMaxBodySpeed * static_cast<float>(tickSeconds),
-                              end_);
+    if (joints.jumps)
+      end_ = joints.target;
+    else
+      followers_[index]->follow(joints.now, joints.target, kMaxBodySpeed * static_cast<float>(tickSeconds),
+                                end_);
   }
   model::compose(skin, joints.now, collider.jointsStart);
   model::compose(skin, end_, collider.jointsEnd);
-  if (model::hasJumped(collider.jointsStart, collider.jointsEnd, tickSeconds))
-    collider.jointsStart = collider.jointsEnd;
   joints.now = end_;
 }
 
@@ -94,12 +99,12 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
     const model::Pose end = model::poseAt(collider, endSeconds);
     simulation::MovingCollider& to = colliders[i];
     to.shape = collider.shape;
-    const bool jumped = model::hasJumped(state_.scenePoses[i], end, scene.tickSeconds());
-    to.start = jumped ? end : state_.scenePoses[i];
+    to.start = state_.scenePoses[i];
     to.end = end;
     to.friction = collider.friction;
     if (const model::Skin* skin = skinOf(collider))
       advanceJoints(*skin, endSeconds, scene.tickSeconds(), i, to);
+    simulation::jump(to, scene.tickSeconds(), std::exchange(state_.joints[i].jumps, false));
     state_.scenePoses[i] = end;
   }
   for (std::size_t i = 0; i < state_.colliders.size(); ++i) {

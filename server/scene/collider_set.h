@@ -92,6 +92,7 @@ class ColliderSet {
   struct Joints {
     std::vector<model::Pose> now;     // at the tick's end
     std::vector<model::Pose> target;  // given by a message; empty: the animation moves the joints
+    bool jumps = false;               // to the target in the next tick
   };
   // Everything that a later tick depends on, after a complete tick.
   struct State {

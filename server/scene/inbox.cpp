@@ -9,11 +9,15 @@ namespace clothstream::scene {
 
 namespace {
 
-// Adds the joints of colliders that newer poses do not move.
+// Adds the joints of colliders that newer poses do not move. Joints that should jump still jump.
 void keepJoints(std::vector<model::ColliderJoints>& before, std::vector<model::ColliderJoints>& now) {
-  for (model::ColliderJoints& joints : before)
-    if (std::ranges::find(now, joints.collider, &model::ColliderJoints::collider) == now.end())
+  for (model::ColliderJoints& joints : before) {
+    const auto newer = std::ranges::find(now, joints.collider, &model::ColliderJoints::collider);
+    if (newer == now.end())
       now.push_back(std::move(joints));
+    else
+      newer->jumps = newer->jumps || joints.jumps;
+  }
   before.clear();
 }
 

@@ -81,8 +81,8 @@ class ClothSimulation {
   void setSubsteps(std::uint32_t substeps, std::span<const model::Cloth> cloths);
 
   // Records all substeps of one tick, and its status. At most one tick may be in flight at the call. Stages:
-  // "inputs", "attachments" (if cloth is attached or grabbed), "skins" (if a collider has joints), "near" (if
-  // there are colliders), "advance", "hash".
+  // "inputs", "attachments" (if cloth is attached, grabbed or follows joints), "skins" (if a collider has
+  // joints), "near" (if there are colliders), "advance", "hash".
   void recordTick(vulkan::Recorder& recorder, const TickInputs& inputs);
 
   // Returns whether the simulation has the stage that surfaces of the real room need.

@@ -13,18 +13,17 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const model::Collider& collider : scene.colliders) {
     const model::Pose before = model::poseAt(collider, start), after = model::poseAt(collider, end);
-    const bool jumps = model::hasJumped(before, after, scene.tickSeconds());
     MovingCollider& to = inputs.colliders.emplace_back(
-        MovingCollider{collider.shape, jumps ? after : before, after, collider.friction});
-    const auto* solid = std::get_if<model::Solid>(&collider.shape);
-    if (solid == nullptr || !(*solid)->skin) continue;
-    const model::Skin& skin = *(*solid)->skin;
-    std::vector<model::Pose> local;
-    model::jointsAt(skin, start, local);
-    model::compose(skin, local, to.jointsStart);
-    model::jointsAt(skin, end, local);
-    model::compose(skin, local, to.jointsEnd);
-    if (model::hasJumped(to.jointsStart, to.jointsEnd, scene.tickSeconds())) to.jointsStart = to.jointsEnd;
+        MovingCollider{collider.shape, before, after, collider.friction});
+    if (const auto* solid = std::get_if<model::Solid>(&collider.shape); solid != nullptr && (*solid)->skin) {
+      const model::Skin& skin = *(*solid)->skin;
+      std::vector<model::Pose> local;
+      model::jointsAt(skin, start, local);
+      model::compose(skin, local, to.jointsStart);
+      model::jointsAt(skin, end, local);
+      model::compose(skin, local, to.jointsEnd);
+    }
+    jump(to, scene.tickSeconds());
   }
   std::vector<model::Pose> before;
   for (const model::Cloth& cloth : scene.cloths)

@@ -145,9 +145,9 @@ TEST_F(Skins, RefusesASkinThatDoesNotFitItsMesh) {
 TEST(Joints, AreSentOnceWithTheirLastPoses) {
   JoinedClient joined;
   const std::vector<float> first = bent(0.1), last = bent(0.2);
-  cs_move_joints(joined.client.get(), "body", first.data(), 2, 1);
-  cs_move_joints(joined.client.get(), "tail", kStill.data(), 1, 1);
-  cs_move_joints(joined.client.get(), "body", last.data(), 2, 1);
+  cs_move_joints(joined.client.get(), "body", first.data(), 2, 1, 1);
+  cs_move_joints(joined.client.get(), "tail", kStill.data(), 1, 0, 1);
+  cs_move_joints(joined.client.get(), "body", last.data(), 2, 0, 1);
   const v1::ColliderPoses poses = joined.sent().collider_poses();
   ASSERT_THAT(poses.joints(), SizeIs(2));
   EXPECT_EQ(poses.joints(0).collider(), "body");
@@ -155,7 +155,9 @@ TEST(Joints, AreSentOnceWithTheirLastPoses) {
   EXPECT_EQ(poses.joints(0).joints(1).position().y(), 1);
   EXPECT_EQ(poses.joints(0).joints(1).orientation().z(), last[12]);
   EXPECT_EQ(poses.joints(0).joints(1).orientation().w(), last[13]);
+  EXPECT_TRUE(poses.joints(0).jumps());  // the first ones should jump
   EXPECT_EQ(poses.joints(1).collider(), "tail");
+  EXPECT_FALSE(poses.joints(1).jumps());
   cs_set_colliders(joined.client.get(), nullptr, 0, 2);
   EXPECT_THAT(joined.sent().collider_poses().joints(), SizeIs(0));
 }
@@ -163,7 +165,7 @@ TEST(Joints, AreSentOnceWithTheirLastPoses) {
 TEST(Joints, BeyondTheLimitAreNotSent) {
   JoinedClient joined;
   const std::vector<float> poses(kJointNumbers * (kMaxJoints + 5), 0.5f);
-  cs_move_joints(joined.client.get(), "body", poses.data(), kMaxJoints + 5, 1);
+  cs_move_joints(joined.client.get(), "body", poses.data(), kMaxJoints + 5, 0, 1);
   EXPECT_THAT(joined.sent().collider_poses().joints(0).joints(), SizeIs(kMaxJoints));
 }
 

@@ -90,7 +90,8 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
   for (const simulation::MovingCollider& collider : inputs.colliders)
     result.colliders.push_back({collider.shape, reference::toPose(collider.start),
                                 reference::toPose(collider.end), double{collider.friction},
-                                collider.jointsStart, collider.jointsEnd});
+                                collider.jointsStart, collider.jointsEnd, collider.jumped,
+                                reference::toPose(collider.before), collider.jointsBefore});
   for (const simulation::PlacedSurface& placed : inputs.surfaces)
     result.surfaces.push_back({std::shared_ptr<const model::Surface>(placed.table, &placed.table->surface),
                                reference::toPose(placed.pose), placed.twoSided, double{placed.friction}});

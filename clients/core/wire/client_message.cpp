@@ -196,6 +196,7 @@ void writeColliderPoses(std::string& out, const Poses& poses, std::uint64_t clie
         addPose(joints, field::ColliderJoints::kJoints, std::span<const float, 3>(at, 3),
                 std::span<const float, 4>(at + 3, 4));
       }
+      if (moved.jumps) joints.add_bool(field::ColliderJoints::kJumps.number, true);
     }
     for (std::size_t i = 0; i < poses.winds.size(); ++i)
       addWind(message, static_cast<std::uint32_t>(i), poses.winds[i]);

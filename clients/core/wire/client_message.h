@@ -49,6 +49,7 @@ struct AttachmentPose {
 struct ColliderJoints {
   std::string collider;
   std::vector<float> poses;
+  bool jumps = false;
 };
 
 struct OwnGrab {

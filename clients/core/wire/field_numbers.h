@@ -117,6 +117,32 @@ struct Cloth {
   static constexpr Field kMaterial{40, WireType::kBytes};
   static constexpr Field kArealMass{41, WireType::kFixed32};
   static constexpr Field kCoarse{42, WireType::kBytes};
+  static constexpr Field kSkin{43, WireType::kBytes};
+  static constexpr Field kPressure{44, WireType::kFixed32};
+};
+struct ClothSkin {
+  static constexpr Field kCollider{1, WireType::kBytes};
+  static constexpr Field kVertexJoints{2, WireType::kBytes};
+  static constexpr Field kVertexWeights{3, WireType::kBytes};
+  static constexpr Field kLimits{4, WireType::kBytes};
+  static constexpr Field kMaxDistances{5, WireType::kBytes};
+  static constexpr Field kBackstopDistances{6, WireType::kBytes};
+  static constexpr Field kBackstopRadii{7, WireType::kBytes};
+  static constexpr Field kColourDistance{8, WireType::kBytes};
+  static constexpr Field kRegions{9, WireType::kBytes};
+};
+struct SkinLimits {
+  static constexpr Field kMaxDistance{1, WireType::kFixed32};
+  static constexpr Field kBackstopDistance{2, WireType::kFixed32};
+  static constexpr Field kBackstopRadius{3, WireType::kFixed32};
+};
+struct ColourDistance {
+  static constexpr Field kChannel{1, WireType::kVarint};
+  static constexpr Field kDistance{2, WireType::kFixed32};
+};
+struct SkinRegion {
+  static constexpr Field kRegion{1, WireType::kBytes};
+  static constexpr Field kLimits{2, WireType::kBytes};
 };
 struct Attachment {
   static constexpr Field kName{1, WireType::kBytes};
@@ -620,6 +646,7 @@ struct HeldWind {
 struct ColliderJoints {
   static constexpr Field kCollider{1, WireType::kBytes};
   static constexpr Field kJoints{2, WireType::kBytes};
+  static constexpr Field kJumps{3, WireType::kVarint};
 };
 struct HandJoints {
   static constexpr Field kSide{1, WireType::kVarint};
@@ -681,6 +708,7 @@ struct ClothChange {
   static constexpr Field kDihedralBending{24, WireType::kFixed32};
   static constexpr Field kMaterial{40, WireType::kBytes};
   static constexpr Field kArealMass{41, WireType::kFixed32};
+  static constexpr Field kPressure{44, WireType::kFixed32};
 };
 struct ColliderChange {
   static constexpr Field kName{1, WireType::kBytes};
@@ -868,6 +896,7 @@ struct Checkpoint {
   static constexpr Field kGripsHold{4, WireType::kVarint};
   static constexpr Field kOrigin{6, WireType::kBytes};
   static constexpr Field kHeld{5, WireType::kBytes};
+  static constexpr Field kGas{7, WireType::kBytes};
   static constexpr Field kStart{50, WireType::kVarint};
 };
 struct HeldNodes {

@@ -19,7 +19,16 @@ struct MovingCollider {
   float friction = 1;  // Coulomb; multiplied with the cloth's
   // Poses of the joints of a mesh in the frame of the collider, or empty. Vertices move in straight lines.
   std::vector<model::Pose> jointsStart = {}, jointsEnd = {};
+  // True: it or its joints jumped to the tick's start, from `before` and `jointsBefore`. Cloth that follows
+  // the joints goes along.
+  bool jumped = false;
+  model::Pose before = {};
+  std::vector<model::Pose> jointsBefore = {};
 };
+
+// Lets a collider of the scene jump if the way to its end, or that of its joints, is too far for a tick
+// (model::hasJumped), or if its joints must jump.
+void jump(MovingCollider& collider, double tickSeconds, bool jointsMust = false);
 
 inline bool isSolid(const MovingCollider& collider) {
   return std::holds_alternative<model::Solid>(collider.shape);

@@ -438,6 +438,7 @@ class cs_cloth_settings(c.Structure):
         ("ball_radius", c.c_float),
         ("ball_friction", c.c_float),
         ("tether_slack", c.c_float),
+        ("pressure", c.c_float),
     ]
 
 
@@ -818,7 +819,7 @@ FUNCTIONS = {
     "cs_set_grabs": (c.c_int, [c.c_void_p, c.POINTER(cs_grab), c.c_uint32, c.c_uint64]),
     "cs_set_winds": (c.c_int, [c.c_void_p, c.POINTER(cs_own_wind), c.c_uint32, c.c_uint64]),
     "cs_move_attachment": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_int, c.c_uint64]),
-    "cs_move_joints": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.c_uint32, c.c_uint64]),
+    "cs_move_joints": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.c_uint32, c.c_int, c.c_uint64]),
     "cs_get_surface_policy": (c.c_int, [c.c_void_p]),
     "cs_set_surface": (c.c_int, [c.c_void_p, c.POINTER(cs_surface)]),
     "cs_move_surface": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_float), c.POINTER(c.c_float)]),

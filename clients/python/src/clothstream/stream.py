@@ -253,16 +253,18 @@ class Stream(ClientState):
             lib.cs_move_attachment(client, attachment.encode(), vector(position, 3), vector(orientation, 4), int(jumps),
                                    lib.clothstream_now_us())
 
-    def move_joints(self, collider: str, poses: Any) -> None:
+    def move_joints(self, collider: str, poses: Any, jumps: bool = False) -> None:
         """Moves the joints of a collider of the scene that is a mesh with joints; they stay there. poses: an array of shape
         (joints, 7) with all joints in the order of the scene: position and quaternion x, y, z, w, relative to the parent.
-        Event.ERROR reports a refusal."""
+        If they jump, they are there in one tick, and the cloth that follows them goes along: use this for teleports and cuts
+        of an animation. Event.ERROR reports a refusal."""
         numbers = [float(number) for pose in poses for number in pose]
         if len(numbers) % 7 != 0:
             raise ValueError(f"{len(numbers)} numbers; a pose has 7: position and quaternion x, y, z, w")
         array = (c.c_float * max(1, len(numbers)))(*numbers)
         with self._client() as client:
-            lib.cs_move_joints(client, collider.encode(), array, len(numbers) // 7, lib.clothstream_now_us())
+            lib.cs_move_joints(client, collider.encode(), array, len(numbers) // 7, int(jumps),
+                               lib.clothstream_now_us())
 
     @property
     def surface_policy(self) -> SurfacePolicy:

@@ -150,6 +150,7 @@ class ClothSettings:
     ball_radius: float  # m
     ball_friction: float
     tether_slack: float
+    pressure: float  # Pa, of the gas inside a closed mesh
 
 
 @dataclasses.dataclass(frozen=True)

@@ -92,11 +92,13 @@ namespace ClothStream.Core
 
         /// <summary>Moves the joints of a collider of the scene that is a mesh with joints; they stay there.</summary>
         /// <param name="poses">Seven numbers for each joint: position and quaternion x y z w, relative to its parent.</param>
-        public void MoveJoints(string collider, float[] poses, ulong timeUs)
+        /// <param name="jumps">Whether they are there in one tick, as at a teleport; the cloth that follows them goes
+        /// along.</param>
+        public void MoveJoints(string collider, float[] poses, bool jumps, ulong timeUs)
         {
             fixed (byte* name = Utf8.Bytes(collider))
             fixed (float* first = poses)
-                lock (Gate) Native.cs_move_joints(Handle, name, first, (uint)(poses.Length / 7), timeUs);
+                lock (Gate) Native.cs_move_joints(Handle, name, first, (uint)(poses.Length / 7), jumps ? 1 : 0, timeUs);
             Flush();
         }
     }

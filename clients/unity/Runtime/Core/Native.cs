@@ -779,7 +779,7 @@ namespace ClothStream.Core
     /// same values for parameters that are not known, or that the cloth or its solver does not have. A compliance
     /// that was set cannot be set back to the server's default with cs_set_cloth.
     /// </summary>
-    [StructLayout(LayoutKind.Explicit, Size = 92)]
+    [StructLayout(LayoutKind.Explicit, Size = 96)]
     public unsafe struct ClothSettings
     {
         [FieldOffset(0)] public uint version;
@@ -862,6 +862,10 @@ namespace ClothStream.Core
         /// changed only for cloths that were created with them, and are NaN for others.
         /// </summary>
         [FieldOffset(88)] public float tetherSlack;
+        /// <summary>
+        /// Pa; of the gas inside a closed mesh
+        /// </summary>
+        [FieldOffset(92)] public float pressure;
     }
 
     /// <summary>
@@ -1690,9 +1694,10 @@ namespace ClothStream.Core
         /// <summary>
         /// Moves the joints of a collider of the scene that is a mesh with joints; they stay there. `poses` has seven
         /// numbers for each joint: position and quaternion x, y, z, w, relative to its parent. At most 128 joints are
-        /// used; the rest is ignored.
+        /// used; the rest is ignored. If they jump, they are there in one tick, however far the way is, and the cloth that
+        /// follows them goes along: use this for teleports and cuts of an animation.
         /// </summary>
-        [DllImport(Library)] public static extern void cs_move_joints(IntPtr client, byte* collider, float* poses, uint count, ulong nowUs);
+        [DllImport(Library)] public static extern void cs_move_joints(IntPtr client, byte* collider, float* poses, uint count, int jumps, ulong nowUs);
         /// <summary>
         /// What the server does with surfaces of the real room, from the newest Welcome.
         /// </summary>

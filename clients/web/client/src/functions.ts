@@ -91,7 +91,7 @@ export interface CoreFunctions {
   cs_set_grabs(client: Pointer, grabs: Pointer, count: number, nowUs: bigint): number;
   cs_set_winds(client: Pointer, winds: Pointer, count: number, nowUs: bigint): number;
   cs_move_attachment(client: Pointer, attachment: Pointer, position3: Pointer, orientation4: Pointer, jumps: number, nowUs: bigint): void;
-  cs_move_joints(client: Pointer, collider: Pointer, poses: Pointer, count: number, nowUs: bigint): void;
+  cs_move_joints(client: Pointer, collider: Pointer, poses: Pointer, count: number, jumps: number, nowUs: bigint): void;
   cs_get_surface_policy(client: Pointer): number;
   cs_set_surface(client: Pointer, surface: Pointer): number;
   cs_move_surface(client: Pointer, id: number, position3: Pointer, orientation4: Pointer): number;

@@ -112,11 +112,19 @@ export class Input {
   }
 
   // Moves the joints of a collider of the scene that is a mesh with joints; they stay there. `poses` has seven numbers for
-  // each joint: position, then the quaternion x, y, z, w, relative to the parent.
-  moveJoints(collider: string, poses: readonly number[] | Float32Array): void {
+  // each joint: position, then the quaternion x, y, z, w, relative to the parent. If they jump, they are there in one
+  // tick, and the cloth that follows them goes along: use this for teleports and cuts of an animation.
+  moveJoints(collider: string, poses: readonly number[] | Float32Array, jumps = false): void {
     const { core, pointer } = this.handle;
     core.with([collider, Array.from(poses)], (name, numbers) =>
-      core.exports.cs_move_joints(pointer, name!, numbers!, Math.floor(poses.length / kPoseFloats), nowUs()),
+      core.exports.cs_move_joints(
+        pointer,
+        name!,
+        numbers!,
+        Math.floor(poses.length / kPoseFloats),
+        jumps ? 1 : 0,
+        nowUs(),
+      ),
     );
   }
 

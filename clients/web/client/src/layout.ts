@@ -237,7 +237,7 @@ export const cs_environment = {
   gust_seconds: 36,
 } as const;
 export const cs_cloth_settings = {
-  sizeof: 92,
+  sizeof: 96,
   version: 0,
   structural: 4,
   shear: 12,
@@ -258,6 +258,7 @@ export const cs_cloth_settings = {
   ball_radius: 80,
   ball_friction: 84,
   tether_slack: 88,
+  pressure: 92,
 } as const;
 export const cs_collider_change = {
   sizeof: 56,
