@@ -703,8 +703,8 @@ void cs_move_attachment(cs_client* client, const char* attachment, const float* 
                         const float* orientation4, int jumps, uint64_t now_us) CS_NOEXCEPT;
 /* Moves the joints of a collider of the scene that is a mesh with joints; they stay there. `poses` has seven
  * numbers for each joint: position and quaternion x, y, z, w, relative to its parent. At most 128 joints are
- * used; the rest is ignored. If they jump, they are there in one tick, however far the way is, and the cloth that
- * follows them goes along: use this for teleports and cuts of an animation. */
+ * used; the rest is ignored. If they jump, they are there in one tick, however far the way is, and the cloth
+ * that follows them goes along: use this for teleports and cuts of an animation. */
 void cs_move_joints(cs_client* client, const char* collider, const float* poses, uint32_t count, int jumps,
                     uint64_t now_us) CS_NOEXCEPT;
 

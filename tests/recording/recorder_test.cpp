@@ -166,7 +166,7 @@ TEST_F(RecorderTest, ContinuesAfterItsDeviceWasLost) {
 }
 
 TEST_F(RecorderTest, ResimulatesMeshesHullsAndAttachmentsToTheBit) {
-  for (const char* name : {"swing", "obstacles", "tablecloth", "figure_15", "solver_xpbd"}) {
+  for (const char* name : {"swing", "obstacles", "tablecloth", "figure_15", "solver_xpbd", "balloon"}) {
     auto scene = messages::loadScene(name);
     ASSERT_TRUE(scene.has_value());
     RecordedScene recorded(options(), *scene);

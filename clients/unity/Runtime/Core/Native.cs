@@ -1694,8 +1694,8 @@ namespace ClothStream.Core
         /// <summary>
         /// Moves the joints of a collider of the scene that is a mesh with joints; they stay there. `poses` has seven
         /// numbers for each joint: position and quaternion x, y, z, w, relative to its parent. At most 128 joints are
-        /// used; the rest is ignored. If they jump, they are there in one tick, however far the way is, and the cloth that
-        /// follows them goes along: use this for teleports and cuts of an animation.
+        /// used; the rest is ignored. If they jump, they are there in one tick, however far the way is, and the cloth
+        /// that follows them goes along: use this for teleports and cuts of an animation.
         /// </summary>
         [DllImport(Library)] public static extern void cs_move_joints(IntPtr client, byte* collider, float* poses, uint count, int jumps, ulong nowUs);
         /// <summary>
