@@ -27,7 +27,7 @@ SurfaceRecord surfaceRecordAt(uint surface) {
                        texelFetch(surfaces, first + 3));
 }
 
-// What a path meets on one surface, in the surface's frame.
+// Result of the search along a path on one surface, in the surface's frame.
 struct SurfaceSearch {
   float part;          // share of the path at its first crossing; above 1: it crosses nothing
   uint crossed;        // the triangle
