@@ -102,6 +102,12 @@ void Client::move(ColliderJoints joints, std::uint64_t nowUs) {
   sendPoses(nowUs);
 }
 
+bool Client::setSurface(OwnSurface surface) {
+  if (timer_.isWelcomed() && welcome_.surfacePolicy != CS_SURFACES_OWN) return false;
+  surfaces_.set(std::move(surface));
+  return true;
+}
+
 bool Client::mayCollide() const {
   return (timer_.isWelcomed() ? welcome_.role : hello_.role) != CS_ROLE_VIEWER;
 }

@@ -209,7 +209,7 @@ tl::expected<DracoMesh, std::string> decodeWith(draco::DecoderBuffer& buffer, co
   for (const auto& [id, components] : request.vectors)
     if (components > 4 || !readAttribute<4>(mesh, id, decoded.vectors.emplace_back(), components))
       return tl::unexpected(
-          fmt::format("has not {} numbers for each point in its attribute {}", components, id));
+          fmt::format("does not have {} numbers for each point in its attribute {}", components, id));
   decoded.indices.reserve(std::size_t{3} * mesh.num_faces());
   for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
     for (const draco::PointIndex& point : mesh.face(f)) {

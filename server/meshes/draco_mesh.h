@@ -37,7 +37,8 @@ struct DracoRequest {
 struct DracoMesh {
   std::vector<model::Vec3> positions;  // of points
   std::vector<model::Uv> uvs;          // of points; empty if not requested
-  // Of points, one for each of the request. Numbers that an attribute does not have are 0.
+  // Further attributes of the points, one for each of the request. Numbers that an attribute does not have
+  // are 0.
   std::vector<std::vector<Eigen::Vector4f>> vectors;
   std::vector<std::uint32_t> indices;  // of points, three per face; they exist
 };

@@ -17,6 +17,7 @@
 #include "server/messages/skin_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
+#include "server/model/cloth_skin.h"
 #include "server/model/origin.h"
 
 namespace clothstream::messages {
@@ -114,6 +115,36 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
   }
 }
 
+// Cloth that follows joints out of the stream's range would roll the scene back for everyone. The bound is
+// that of a sphere around the collider, which may be anywhere on its way.
+void checkJointReach(Checks& checks, const Path& path, const model::Collider& collider,
+                     const model::ColliderJoints& moved, const model::Scene& scene) {
+  const auto follows = [&](const model::Cloth& cloth) {
+    return cloth.skin && cloth.skin->collider == collider.name;
+  };
+  if (checks.failed() || std::ranges::none_of(scene.cloths, follows)) return;
+  const model::Skin& skin = *std::get<model::Solid>(collider.shape)->skin;
+  std::vector<model::Pose> poses;
+  model::compose(skin, moved.joints, poses);
+  const std::vector<model::Transform> transforms = model::jointTransforms(skin, poses);
+  const model::Vec3 origin = model::originOf(scene);
+  float away = (collider.pose.position - origin).cwiseAbs().maxCoeff();
+  if (!collider.motion.keys.empty()) away = 0;
+  for (const model::MotionKey& key : collider.motion.keys)
+    away = std::max(away, (key.position - origin).cwiseAbs().maxCoeff());
+  const float most = model::reachOf(scene.stream);
+  for (const model::Cloth& cloth : scene.cloths) {
+    if (!follows(cloth)) continue;
+    const float reach = model::motionBetween(cloth.skin->bounds, transforms, transforms).reach;
+    if (away + reach > most)
+      checks.fail(
+          path / "joints", "",
+          fmt::format("take the cloth \"{}\" up to {:.4g} m away from the middle of the scene; must stay "
+                      "within {:.4g} m, which the stream holds",
+                      cloth.name, away + reach, most));
+  }
+}
+
 void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
                 const model::Scene& scene, model::ParticipantPoses& to) {
   checks.count(poses / "joints", static_cast<std::size_t>(message.joints_size()), 0, limits::kMaxSolids);
@@ -131,6 +162,7 @@ void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& mess
     to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.begin()),
                          toJoints(checks, path / "joints", from.joints(), (*solid)->skin->joints.size()),
                          from.jumps()});
+    checkJointReach(checks, path, *found, to.joints.back(), scene);
   }
 }
 

@@ -87,6 +87,8 @@ class ClothSkinReader {
       applyRegion(path_.at("regions", i), message_.regions(i));
     if (!checks_.failed()) checkHeld();
     if (checks_.failed()) return nullptr;
+    model::complete(skin_, cloth_,
+                    *std::ranges::find(colliders, message_.collider(), &model::Collider::name));
     return std::make_shared<const model::ClothSkin>(std::move(skin_));
   }
 
@@ -208,7 +210,7 @@ class ClothSkinReader {
     setJoints(joints);
   }
 
-  // A number of the file for a vertex. Nothing if there is none, or if it is negative.
+  // A number of the file for a vertex. Nothing if it is absent or negative.
   std::optional<float> numberOfFile(const std::vector<float>& list, std::size_t vertex,
                                     std::string_view name) {
     if (list.empty() || list[vertex] < 0) return std::nullopt;
@@ -221,7 +223,7 @@ class ClothSkinReader {
     return list[vertex];
   }
 
-  // The number of the message's list. Nothing if there is none, or if it is negative.
+  // The number of the message's list. Nothing if it is absent or negative.
   std::optional<float> numberOfList(const Numbers& list, std::size_t vertex, std::string_view field) {
     if (list.empty()) return std::nullopt;
     const auto index = static_cast<int>(vertex);

@@ -19,6 +19,7 @@
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 #include "server/model/coarse_level.h"
+#include "server/model/gas.h"
 #include "server/model/hinges.h"
 #include "server/model/input.h"
 #include "server/model/mesh.h"
@@ -124,6 +125,13 @@ void checkSelfCollision(Checks& checks, const model::Scene& scene) {
                           limits::kMaxSelfCollisionNodes, scene.nodeCount()));
 }
 
+void checkPressure(Checks& checks, const model::Scene& scene) {
+  for (std::size_t i = 0; i < scene.cloths.size() && !checks.failed(); ++i)
+    if (const auto error = unfitPressure(scene, scene.cloths[i]))
+      checks.fail(Path().at("cloths", static_cast<int>(i)) / "pressure",
+                  fmt::format("{}", scene.cloths[i].pressure), *error);
+}
+
 void checkCoarse(Checks& checks, const model::Scene& scene) {
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     if (const auto error = unfitCoarse(scene, scene.cloths[i]))
@@ -189,7 +197,7 @@ void checkReach(Checks& checks, const model::Scene& scene) {
   const float reach = model::reachOf(scene.stream);
   const model::Vec3 origin = model::originOf(scene);
   for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
-    const float farthest = model::farthestFrom(origin, scene, scene.cloths[i]);
+    const float farthest = model::farthestFrom(origin, scene.cloths[i]);
     if (farthest <= reach) continue;
     return checks.fail(
         Path().at("cloths", static_cast<int>(i)), "",
@@ -316,6 +324,14 @@ std::optional<std::string> unfitBending(const model::Scene& scene) {
   return std::nullopt;
 }
 
+std::optional<std::string> unfitPressure(const model::Scene& scene, const model::Cloth& cloth) {
+  if (!model::hasGas(cloth)) return std::nullopt;
+  if (scene.integrator != model::Integrator::semiImplicitEuler)
+    return "must be 0: other values need INTEGRATOR_SEMI_IMPLICIT_EULER";
+  if (const auto reason = model::unfitForGas(cloth)) return fmt::format("must be 0: the cloth {}", *reason);
+  return std::nullopt;
+}
+
 std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::Cloth& cloth) {
   if (!cloth.coarse) return std::nullopt;
   if (scene.integrator != model::Integrator::semiImplicitEuler)
@@ -403,6 +419,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkParts(checks, scene);
   checkCoarse(checks, scene);
   if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
+  checkPressure(checks, scene);
   most.cancellation.check();
   if (!checks.failed())
     if (const auto error = instability(scene, model::StabilityBound(scene)))

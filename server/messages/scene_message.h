@@ -56,6 +56,9 @@ std::optional<std::string> unfitSolver(const model::Scene& scene, const model::C
 // Error text if the dihedral bending of the scene's cloths cannot be used; nullopt if it can.
 std::optional<std::string> unfitBending(const model::Scene& scene);
 
+// Error text if the cloth has a pressure that it cannot have in this scene; nullopt if it may.
+std::optional<std::string> unfitPressure(const model::Scene& scene, const model::Cloth& cloth);
+
 // Error text if the coarse correction of a cloth cannot be used in this scene; nullopt if it can.
 std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::Cloth& cloth);
 

@@ -24,8 +24,8 @@ VertexJoints largestJoints(std::vector<std::pair<std::uint8_t, double>> weights)
 // the same weights.
 //
 // Takes time in proportion to n log m for n points and m triangles. A search visits at most
-// kMostTransferVisits boxes. Where more lie in one heap, the nearest triangle that it has seen counts. Checks
-// the cancellation every few thousand points; throws Cancelled.
+// kMostTransferVisits boxes. If there are more near a point, the nearest triangle that it has seen counts.
+// Checks the cancellation every few thousand points; throws Cancelled.
 std::vector<VertexJoints> jointsNear(const ClosedMesh& mesh, std::span<const Vec3> points,
                                      const Cancellation& cancellation = {});
 inline constexpr std::uint32_t kMostTransferVisits = 4096;

@@ -263,6 +263,7 @@ void write(const scene::AppliedTick& tick, v1::RecordedTick& message) {
     messages::write(carry.to, *to.mutable_to());
   }
   for (const simulation::Grab& grab : tick.inputs.grabs) writeGrab(grab, *message.add_grips());
+  message.set_surfaces_left_out(static_cast<std::uint32_t>(tick.inputs.surfaces.size()));
 }
 
 tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTick& message,

@@ -20,6 +20,8 @@ const char* nameOf(Action action) {
       return "colliderPoses: attachments and joints";
     case Action::holdWinds:
       return "colliderPoses.winds";
+    case Action::placeSurfaces:
+      return "surface";
     case Action::changeEnvironment:
       return "parameterChange: the environment";
     case Action::changeCloths:
@@ -52,6 +54,7 @@ Role roleFor(Action action, const Permissions& participants) {
     case Action::collide:
     case Action::grab:
     case Action::moveAttachments:
+    case Action::placeSurfaces:
       return Role::participant;
     case Action::holdWinds:
     case Action::changeEnvironment:

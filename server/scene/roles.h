@@ -17,6 +17,7 @@ enum class Action : std::uint8_t {
   grab,
   moveAttachments,
   holdWinds,
+  placeSurfaces,  // of the real room
   changeEnvironment,
   changeCloths,
   changeColliders,  // the scene's own colliders

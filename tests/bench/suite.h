@@ -62,6 +62,7 @@ void runAssembled(vulkan::Device& device, const Settings& settings, const RowSin
 void runAcad(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runCurtain(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runColliders(vulkan::Device& device, const Settings& settings, const RowSink& add);
+void runGarment(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runSelfCollision(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runCodec(vulkan::Device& device, const Settings& settings, const RowSink& add);
 void runCodecDevice(vulkan::Device& device, const Settings& settings, const RowSink& add);

@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Colliders in frames whose memory is reused.
+// Colliders from tick to tick, and in frames whose memory is reused.
 #include "server/scene/collider_set.h"
 
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "tests/model/solids.h"
 #include "tests/serving/small_scene.h"
 
 namespace clothstream::scene {
@@ -41,6 +48,54 @@ TEST(ColliderSet, WritesTheSameIntoUsedFrames) {
   place({model::Sphere{0.2f}, tapered, tapered, even});
   place({});
   place({even});
+}
+
+// A rod of two joints; the second one turns.
+model::Scene sceneWithRod() {
+  model::Scene scene = tests::smallScene();
+  model::ClosedMesh rod = *model::rodMesh(0.03f, 0.4f, 4, 4);
+  model::Skin skin{.joints = {{"root", std::nullopt, {}}, {"elbow", 0, {}}}, .vertices = {}, .keys = {}};
+  for (const model::Vec3& vertex : rod.vertices)
+    skin.vertices.push_back({{vertex.x() > 0 ? std::uint8_t{1} : std::uint8_t{0}, 0, 0, 0}, {1, 0, 0, 0}});
+  rod.skin = skin;
+  scene.colliders.push_back({.name = "rod", .shape = std::make_shared<const model::ClosedMesh>(rod)});
+  return scene;
+}
+
+TEST(ColliderSet, JointsThatAParticipantMovesFollowAtTheSpeedOfABodyOrJump) {
+  const model::Scene scene = sceneWithRod();
+  const std::size_t rod = scene.colliders.size() - 1;
+  std::vector<model::Pose> turned =
+      model::restJoints(*std::get<model::Solid>(scene.colliders[rod].shape)->skin);
+  turned[1].orientation = model::Quaternion(0, 0, 0, 1);  // half a turn
+  const auto movedTo = [&](bool jumps) {
+    ColliderSet set(scene);
+    set.placeJoints(std::vector{model::ColliderJoints{rod, turned, jumps}});
+    std::vector<simulation::MovingCollider> moving;
+    set.advance(scene, scene.tickSeconds(), moving);
+    return moving[rod];
+  };
+  const simulation::MovingCollider follows = movedTo(false), jumps = movedTo(true);
+  EXPECT_FALSE(follows.jumped);
+  EXPECT_GT(std::abs(follows.jointsEnd[1].orientation.w()), 0.5f);  // less than 120 degrees
+  EXPECT_TRUE(jumps.jumped);
+  EXPECT_EQ(jumps.jointsBefore[1].orientation.w(), 1);
+  EXPECT_EQ(jumps.jointsStart[1].orientation.w(), 0);
+  EXPECT_EQ(jumps.jointsEnd[1].orientation.w(), 0);
+}
+
+TEST(ColliderSet, JointsJumpOnce) {
+  const model::Scene scene = sceneWithRod();
+  const std::size_t rod = scene.colliders.size() - 1;
+  std::vector<model::Pose> poses =
+      model::restJoints(*std::get<model::Solid>(scene.colliders[rod].shape)->skin);
+  ColliderSet set(scene);
+  std::vector<simulation::MovingCollider> moving;
+  set.placeJoints(std::vector{model::ColliderJoints{rod, poses, true}});
+  set.advance(scene, scene.tickSeconds(), moving);
+  EXPECT_TRUE(moving[rod].jumped);
+  set.advance(scene, 2 * scene.tickSeconds(), moving);
+  EXPECT_FALSE(moving[rod].jumped);
 }
 
 }  // namespace
