@@ -29,7 +29,7 @@ inline constexpr double kLeastTriangleHeight = 1e-4;
 // Contact keeps nodes at least this far from a surface, also those of a cloth without thickness, m. The
 // rounding of places near a surface of kMaxSurfaceExtent is far below it.
 inline constexpr float kLeastSurfaceDistance = 5e-4f;
-// A surface with one side pushes nodes to its front that are less than this behind it, and not so near to its
+// A surface that lifts pushes nodes to its front that are less than this behind it, and not so near to its
 // rim, where cloth that hangs down may swing below it, m.
 inline constexpr float kSurfaceDepth = 0.03f;
 // Speed at which a surface pushes nodes that it finds too near, or behind it, m/s.

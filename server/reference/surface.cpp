@@ -145,7 +145,7 @@ std::optional<SurfaceContact> touchSurfaces(std::span<const PlacedSurface> surfa
   SurfaceContact best{Vec3::UnitY(), 0, 0};
   double part = 2;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    if (behind && surfaces[i].twoSided) continue;
+    if (behind && (surfaces[i].twoSided || !surfaces[i].lifts)) continue;
     const Pose& pose = surfaces[i].pose;
     const auto inFrame = [&](const Vec3& p) {
       return Vec3(pose.orientation.conjugate() * (p - pose.position));

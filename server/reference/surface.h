@@ -19,6 +19,7 @@ struct PlacedSurface {
   Pose pose = {};
   bool twoSided = false;
   double friction = 1;  // multiplied with the cloth's
+  bool lifts = false;   // pushes nodes to its front that are near behind it
 };
 
 struct SurfaceContact {
@@ -29,8 +30,8 @@ struct SurfaceContact {
 };
 
 // The contact at the end of a path: that of its first crossing, or else the one that pushes farthest. With
-// `behind`, only surfaces with one side count, and they also push nodes that are behind them. `seconds`: of
-// the substep, in which a surface pushes a node that it finds too near by at most kSurfacePushSpeed.
+// `behind`, only surfaces that lift count, and they also push nodes that are behind them. `seconds`: of the
+// substep, in which a surface pushes a node that it finds too near by at most kSurfacePushSpeed.
 std::optional<SurfaceContact> touchSurfaces(std::span<const PlacedSurface> surfaces, double thickness,
                                             double seconds, bool behind, const Eigen::Vector3d& from,
                                             const Eigen::Vector3d& to);

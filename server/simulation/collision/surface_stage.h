@@ -78,6 +78,7 @@ class SurfaceStage final : public Stage {
   std::vector<Resident> residents_;
   std::vector<Part> parts_;  // of the tick that is recorded
   std::uint32_t count_ = 0;  // of the surfaces in the tick
+  bool lifts_ = false;       // one of them does
   std::uint64_t work_ = 0;   // of a node with all of them, in node-steps
 };
 

@@ -41,6 +41,9 @@ struct PlacedSurface {
   model::Pose pose = {};
   bool twoSided = false;
   float friction = 1;  // Coulomb; multiplied with the cloth's
+  // A surface with one side also pushes nodes to its front that are near behind it, because it has just
+  // appeared or moved.
+  bool lifts = false;
 };
 
 }  // namespace clothstream::simulation

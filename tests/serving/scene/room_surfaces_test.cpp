@@ -213,6 +213,17 @@ TEST_F(SurfacesInSceneTest, CarryClothUntilTheyAreRemoved) {
   EXPECT_LT(lowest(hosted), -2.5f);
 }
 
+TEST_F(SurfacesInSceneTest, LiftTheClothOnThemWhenTheyMoveUp) {
+  tests::HostedScene hosted(fallingScene());
+  hosted.live.surfaces.add(7, Role::participant);
+  ASSERT_TRUE(put(hosted, 1, squares(4), -2));
+  hosted.ticks(80);
+  ASSERT_LT(lowest(hosted), -1.9f);
+  ASSERT_TRUE(hosted.live.surfaces.move(7, 1, at(-1.98f)));
+  hosted.ticks(10);
+  EXPECT_GT(lowest(hosted), -1.98f);
+}
+
 TEST_F(SurfacesInSceneTest, ActInTheNextTickIfTheyAreSmall) {
   tests::HostedScene hosted(fallingScene());
   hosted.live.surfaces.add(7, Role::participant);
