@@ -38,9 +38,9 @@ constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
 // kFewAround that lies in one place (ClosedMesh::crowding), at most kMostSearch, as the device limits it
 // (kMostSolidVisits). Distances that are sampled cost it kGridWork.
 constexpr double kSearch = 6, kFewAround = 16, kCrowdedSearch = 1.2, kMostSearch = 4096, kGridWork = 3;
-// A surface of the real room costs each node kSurface, and a third of a search with three tests of each
-// triangle, instead of one, if the node is near.
-constexpr double kSurface = 0.3, kSurfaceTests = 3, kNearSurface = 1.0 / 3;
+// A search in a surface of the real room tests each triangle kSurfaceTests times. A third of the nodes are
+// near.
+constexpr double kSurfaceTests = 3, kNearSurface = 1.0 / 3;
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
 constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
@@ -139,7 +139,7 @@ double searchWork(const ClosedMesh& mesh) {
 
 double surfaceWork(const Surface& surface) {
   const double search = kSearch + kCrowdedSearch * std::max(surface.crowding - kFewAround, 0.0);
-  return kSurface + kNearSurface * std::min(kSurfaceTests * search, kMostSearch);
+  return kNearSurface * std::min(kSurfaceTests * search, kMostSearch);
 }
 
 double colliderWork(const Shape& shape) {

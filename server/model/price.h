@@ -60,8 +60,10 @@ struct Work {
 // Work of a search for the nearest point of a triangle mesh, in node-steps.
 double searchWork(const ClosedMesh& mesh);
 
-// Work of a surface of the real room for each node and substep, in node-steps. A third of the nodes are
-// assumed to be near each surface.
+// Work of surfaces of the real room for each node and substep, in node-steps: kSurfaceTestWork for each
+// surface, and for the costliest of them the search of a node that is near. Rooms have their surfaces side by
+// side, so that a node is near few of them.
+inline constexpr double kSurfaceTestWork = 0.3;
 double surfaceWork(const Surface& surface);
 
 // Work of a collider with this shape for each node and substep, in node-steps. A third of the nodes are
@@ -89,8 +91,8 @@ class PriceModel {
   Work movedJointsWork(const Scene& scene) const;
   // Work of a tick in addition to that, while participants hold this number of local winds.
   Work heldWindWork(const Scene& scene, std::size_t winds) const;
-  // Work of a tick in addition to that, while participants have surfaces of the real room whose surfaceWork()
-  // is `searches` together.
+  // Work of a tick in addition to that, while participants have surfaces of the real room that cost each node
+  // `searches` in a substep.
   Work surfacesWork(const Scene& scene, double searches) const;
   // Memory that they take, in bytes.
   double surfaceBytes(std::size_t triangles) const;

@@ -42,7 +42,8 @@ struct ColliderLoad {
 };
 ColliderLoad loadOf(std::span<const model::ParticipantCollider> colliders, const ClothBounds* cloth);
 
-// All surfaces of the real room in a scene: the sum of model::surfaceWork(), and their triangles.
+// All surfaces of the real room in a scene: their work for each node and substep (model::surfaceWork()), and
+// their triangles.
 struct SurfaceLoad {
   double searches = 0;
   std::size_t triangles = 0;

@@ -68,14 +68,17 @@ void RoomSurfaces::changed() {
 messages::Result<void> RoomSurfaces::charge() {
   if (budget_ == nullptr) return {};
   SurfaceLoad load;
+  double search = 0;
   for (const Owner& owner : owners_) {
     if (!owner.present) continue;
     for (const Entry& entry : owner.entries) {
       if (!entry.placed) continue;
-      load.searches += model::surfaceWork(entry.placed->table->surface);
+      load.searches += model::kSurfaceTestWork;
+      search = std::max(search, model::surfaceWork(entry.placed->table->surface));
       load.triangles += entry.placed->table->surface.triangles.size();
     }
   }
+  load.searches += search;
   return budget_->chargeSurfaces(load);
 }
 

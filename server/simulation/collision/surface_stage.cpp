@@ -174,15 +174,16 @@ void SurfaceStage::recordSurfaces(vulkan::Recorder& recorder, const Tick& tick) 
   if (count_ == 0) return;
   const Buffer& through = surfaceUploads_[tick.slot];
   const auto records = through.mapped<shared::SurfaceRecord>();
-  double work = 1;
+  double work = 1, search = 0;
   lifts_ = false;
   for (std::size_t i = 0; i < count_; ++i) {
     const PlacedSurface& placed = tick.inputs.surfaces[i];
     records[i] = recordOf(placed, find(*placed.table)->first);
-    work += model::surfaceWork(placed.table->surface);
+    work += model::kSurfaceTestWork;
+    search = std::max(search, model::surfaceWork(placed.table->surface));
     lifts_ = lifts_ || (placed.lifts && !placed.twoSided);
   }
-  work_ = static_cast<std::uint64_t>(work);
+  work_ = static_cast<std::uint64_t>(work + search);
   recorder.copy(through, surfaces_, count_ * sizeof(shared::SurfaceRecord));
 }
 
