@@ -621,7 +621,7 @@ typedef struct cs_surface {
   float friction;            /* coefficient of friction, 0 to 10, multiplied with the cloth's */
 } cs_surface;
 
-/* What the server does with surfaces. */
+/* Policy of the server for surfaces of the real room. */
 typedef enum cs_surface_policy {
   CS_SURFACES_UNKNOWN = 0, /* not connected yet, or the server is of a release that knows none */
   CS_SURFACES_OFF = 1,     /* it refuses them */
@@ -708,7 +708,7 @@ void cs_move_attachment(cs_client* client, const char* attachment, const float* 
 void cs_move_joints(cs_client* client, const char* collider, const float* poses, uint32_t count, int jumps,
                     uint64_t now_us) CS_NOEXCEPT;
 
-/* What the server does with surfaces of the real room, from the newest Welcome. */
+/* Returns the policy of the server for surfaces of the real room, from the newest Welcome. */
 cs_surface_policy cs_get_surface_policy(const cs_client* client) CS_NOEXCEPT;
 /* Adds a surface of the real room, or replaces the one with its id. The mesh is copied, and sent again after
  * a reconnect. It acts when it has arrived completely; until then the former one does. Fails, and changes

@@ -39,7 +39,7 @@ inline constexpr std::uint32_t kMaxParticipants =
     (simulation::kMaxColliders - messages::limits::kMaxColliders) /
     messages::limits::kMaxParticipantColliders;
 
-// What the server does with surfaces of the real rooms of participants: it refuses them, or they act on the
+// Policy for surfaces of the real rooms of participants: the server refuses them, or they act on the
 // cloth and their shapes are sent to no client.
 enum class SurfacePolicy : std::uint8_t { off, own };
 

@@ -47,7 +47,7 @@ struct Mesh {
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // box of the positions, m
   // The two nodes of an edge with one triangle; nothing: the surface is closed.
   std::optional<std::array<std::uint32_t, 2>> openEdge;
-  // Of a closed surface: parts without a common node, and the volume inside, m^3, negative if its fronts are
+  // Parts of a closed surface without a common node, and the volume inside, m^3, negative if its fronts are
   // inside.
   std::uint32_t pieces = 0;
   double volume = 0;

@@ -68,8 +68,8 @@ constexpr double kGasBytes = 250;           // of a node of a mesh that can hold
 constexpr double kTriangleBytes = 400;      // of a solid
 constexpr double kDistancePointBytes = 48;  // of a solid's grid, three times 16
 constexpr double kSkinVertexBytes = 500;
-// Of the surfaces of a scene: the buffers for the most triangles on the device, and for a triangle the mesh
-// and its tables on the host.
+// Memory of the surfaces of a scene: buffers for the most triangles on the device, and for each triangle the
+// mesh and its tables on the host.
 constexpr double kSurfaceBuffersBytes = 27e6, kSurfaceTriangleBytes = 250;
 constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
 

@@ -208,7 +208,7 @@ struct Cloth {
   std::optional<Tethers> tethers;
   std::optional<CoarseCorrection> coarse;  // absent: springs alone
   std::shared_ptr<const ClothSkin> skin;   // null: the cloth follows no joints
-  // Of the gas inside a closed mesh above the pressure outside, at the volume at rest, Pa; 0: no gas. gas.h
+  // Pressure of the gas in a closed mesh above that outside, at the volume at rest, Pa; 0: no gas. gas.h
   float pressure = initial(parameters::ClothNumber::pressure);
 
   std::uint32_t nodeCount() const;

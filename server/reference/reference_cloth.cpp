@@ -365,11 +365,14 @@ void ReferenceCloth::collide(std::span<const PlacedSurface> surfaces, double sec
   const double thickness = std::max(cloth_.thickness, model::kLeastSurfaceDistance);
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     if (inverseMasses_[i] == 0) continue;
-    bool touched = false;
+    bool touched = false, mayCross = false;
     for (std::uint32_t round = 0; round < model::kSurfaceRounds; ++round) {
-      const std::optional<SurfaceContact> found =
-          touchSurfaces(surfaces, thickness, seconds, from[i], positions_[i]);
+      std::optional<SurfaceContact> found =
+          touchSurfaces(surfaces, thickness, seconds, false, from[i], positions_[i]);
+      if (round == 0 && !found)
+        found = touchSurfaces(surfaces, thickness, seconds, true, from[i], positions_[i]);
       if (!found) break;
+      mayCross = mayCross || touched || found->crosses;
       touched = true;
       const PlacedSurface& surface = surfaces[found->surface];
       leave(i, {found->normal, found->depth}, Vec3::Zero(), surface.pose.position, surface.friction, seconds,
@@ -378,7 +381,7 @@ void ReferenceCloth::collide(std::span<const PlacedSurface> surfaces, double sec
     if (!touched) continue;
     rub(i, *presses_[i], Vec3::Zero(), from[i]);
     presses_[i].reset();
-    if (!crossesSurfaces(surfaces, from[i], positions_[i])) continue;
+    if (!mayCross || !crossesSurfaces(surfaces, from[i], positions_[i])) continue;
     positions_[i] = from[i];
     velocities_[i] = Vec3::Zero();
   }

@@ -96,7 +96,7 @@ struct OwnContact {
 
 // All in the frame of the surface.
 std::optional<OwnContact> touchSurface(const PlacedSurface& placed, double thickness, double pushed,
-                                       const Vec3& from, const Vec3& to) {
+                                       bool behind, const Vec3& from, const Vec3& to) {
   const model::Surface& surface = *placed.surface;
   double firstPart = 2, startDistance = std::numeric_limits<double>::infinity();
   double least = std::numeric_limits<double>::infinity(), fromRim = least;
@@ -123,13 +123,15 @@ std::optional<OwnContact> touchSurface(const PlacedSurface& placed, double thick
     const Vec3 normal = normalOf(corners), side = normal.dot(from - corners[0]) >= 0 ? normal : Vec3(-normal);
     return OwnContact{side, target - side.dot(to - corners[0]), firstPart};
   }
-  const double depthBound = placed.twoSided ? 0 : double{model::kSurfaceDepth};
+  const double depthBound = behind ? double{model::kSurfaceDepth} : 0;
   if (least >= std::max({thickness, depthBound, kSurfaceSeam})) return std::nullopt;
   const Vec3 outwards = pseudonormalAt(surface, point).normalized();
   const bool touches = least < kOnSurface;
   const bool inFront = (touches ? from - point : to - point).dot(outwards) >= 0;
   const Vec3 away = touches ? (inFront ? outwards : Vec3(-outwards)) : Vec3((to - point) / least);
   const double distance = touches ? 0 : least;
+  if (!placed.twoSided && inFront && (from - point).dot(outwards) < 0)
+    return OwnContact{away, std::min(thickness, away.dot(from - point) + pushed) - distance, 2};
   if (placed.twoSided || inFront) return OwnContact{away, target - distance, 2};
   if (fromRim < depthBound || distance >= depthBound) return std::nullopt;
   const double start = -away.dot(from - point) + pushed;
@@ -139,19 +141,21 @@ std::optional<OwnContact> touchSurface(const PlacedSurface& placed, double thick
 }  // namespace
 
 std::optional<SurfaceContact> touchSurfaces(std::span<const PlacedSurface> surfaces, double thickness,
-                                            double seconds, const Vec3& from, const Vec3& to) {
+                                            double seconds, bool behind, const Vec3& from, const Vec3& to) {
   SurfaceContact best{Vec3::UnitY(), 0, 0};
   double part = 2;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    if (behind && surfaces[i].twoSided) continue;
     const Pose& pose = surfaces[i].pose;
     const auto inFrame = [&](const Vec3& p) {
       return Vec3(pose.orientation.conjugate() * (p - pose.position));
     };
-    const std::optional<OwnContact> found = touchSurface(
-        surfaces[i], thickness, double{model::kSurfacePushSpeed} * seconds, inFrame(from), inFrame(to));
+    const std::optional<OwnContact> found =
+        touchSurface(surfaces[i], thickness, double{model::kSurfacePushSpeed} * seconds, behind,
+                     inFrame(from), inFrame(to));
     if (!found || (found->part > 1 && part <= 1)) continue;
     if (found->part <= 1 ? found->part >= part : found->depth <= best.depth) continue;
-    best = {pose.orientation * found->normal, found->depth, i};
+    best = {pose.orientation * found->normal, found->depth, i, found->part <= 1};
     part = found->part;
   }
   return best.depth > 0 ? std::optional(best) : std::nullopt;

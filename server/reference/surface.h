@@ -25,13 +25,14 @@ struct SurfaceContact {
   Eigen::Vector3d normal;
   double depth = 0;
   std::size_t surface = 0;  // index
+  bool crosses = false;
 };
 
-// The contact at the end of a path: that of its first crossing, or else the one that pushes farthest.
-// `seconds`: of the substep, in which a surface pushes a node that it finds too near by at most
-// kSurfacePushSpeed.
+// The contact at the end of a path: that of its first crossing, or else the one that pushes farthest. With
+// `behind`, only surfaces with one side count, and they also push nodes that are behind them. `seconds`: of
+// the substep, in which a surface pushes a node that it finds too near by at most kSurfacePushSpeed.
 std::optional<SurfaceContact> touchSurfaces(std::span<const PlacedSurface> surfaces, double thickness,
-                                            double seconds, const Eigen::Vector3d& from,
+                                            double seconds, bool behind, const Eigen::Vector3d& from,
                                             const Eigen::Vector3d& to);
 
 // Whether the path crosses a surface: from either side if it has two, else from its front.

@@ -395,7 +395,7 @@ void SceneHost::rebuild(std::unique_ptr<SceneOnDevice> loaded, std::string_view 
   continueOn(*loaded);
   surfacePreparation_.end();
   // Cloth would fall through the surfaces while another thread prepares them.
-  if (interaction_.hasSurfaces()) SurfacePreparation::prepareNow(*loaded);
+  if (interaction_.hasSurfaces()) surfacePreparation_.prepareNow(*loaded);
   onDevice_ = std::move(loaded);
   recovery_.rebuilt();
   if (live_.journal) live_.journal->restored(tick_, snapshot_.state);

@@ -28,26 +28,30 @@ std::shared_ptr<simulation::SurfaceStage> makeStage(SceneOnDevice& on) {
 bool SurfacePreparation::isReady(const std::shared_ptr<SceneOnDevice>& on) {
   if (on->simulation.hasSurfaces()) return true;
   if (failed_) return false;
+  if (loader_ == nullptr) {
+    prepareNow(*on);
+    return !failed_;
+  }
+  if (!making_.valid()) making_ = loader_->run([on] { return makeStage(*on); });
+  if (making_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+  take(*on, [this] { return making_.get(); });
+  return !failed_;
+}
+
+void SurfacePreparation::prepareNow(SceneOnDevice& on) {
+  if (!on.simulation.hasSurfaces()) take(on, [&on] { return makeStage(on); });
+}
+
+template <typename Make>
+void SurfacePreparation::take(SceneOnDevice& on, Make make) {
   try {
-    if (loader_ == nullptr) {
-      prepareNow(*on);
-      return true;
-    }
-    if (!making_.valid()) making_ = loader_->run([on] { return makeStage(*on); });
-    if (making_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
-    on->simulation.takeSurfaces(making_.get());
-    return true;
+    on.simulation.takeSurfaces(make());
   } catch (const vulkan::DeviceLost&) {
     throw;
   } catch (const std::exception& failure) {
     failed_ = true;
     problem_ = failure.what();
-    return false;
   }
-}
-
-void SurfacePreparation::prepareNow(SceneOnDevice& on) {
-  if (!on.simulation.hasSurfaces()) on.simulation.takeSurfaces(makeStage(on));
 }
 
 }  // namespace clothstream::scene

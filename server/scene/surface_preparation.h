@@ -22,14 +22,18 @@ class SurfacePreparation {
   // Returns whether the simulation can run a tick with surfaces, and begins to make the stage if it cannot.
   // Without memory for it, it returns false from then on. Throws vulkan::DeviceLost.
   bool isReady(const std::shared_ptr<SceneOnDevice>& on);
-  // Makes the stage on this thread if there is none, which may take tenths of a second.
-  static void prepareNow(SceneOnDevice& on);
+  // The same on this thread, which may take tenths of a second. Without memory, isReady() says so.
+  void prepareNow(SceneOnDevice& on);
   // Forgets a stage that is being made.
   void end() { making_ = {}; }
   // Why no stage can be made, once; empty otherwise. isReady() does not try again.
   std::string takeProblem() { return std::exchange(problem_, {}); }
 
  private:
+  // Gives the simulation the stage that make() returns, or notes why there is none.
+  template <typename Make>
+  void take(SceneOnDevice& on, Make make);
+
   SceneLoader* const loader_;
   std::future<std::shared_ptr<simulation::SurfaceStage>> making_;
   bool failed_ = false;

@@ -25,7 +25,14 @@ for side in (1, -1):
     for row in range(SIDE - 1):
         for column in range(SIDE - 1):
             corners = [(row, column), (row + 1, column), (row + 1, column + 1), (row, column + 1)]
-            faces.append([node(side, *corner) for corner in (corners if side > 0 else corners[::-1])])
+            ends = [corner for corner in corners if corner[0] in (0, SIDE - 1) and corner[1] in (0, SIDE - 1)]
+            parts = [corners]
+            if ends:  # two triangles: the other diagonal would be an edge of both sheets
+                first = corners.index(ends[0])
+                turned = corners[first:] + corners[:first]
+                parts = [turned[:3], [turned[0], turned[2], turned[3]]]
+            for part in parts:
+                faces.append([node(side, *corner) for corner in (part if side > 0 else part[::-1])])
 
 with open(sys.argv[1], "w") as out:
     out.write("# made by make_cushion.py\no cushion\n")

@@ -144,7 +144,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Sends what a peer that joins must know besides the description: pause, work, playback, recording.
   void tellPresentState(scene::LiveScene& scene);
   bool inLockstep() const;
-  // What this peer may do with surfaces of its real room.
+  // Limits of this peer for surfaces of its real room.
   v1::SurfaceLimits surfaceLimits() const;
   // Handles a part of the mesh of a surface.
   messages::Result<void> surfacePart(const messages::SurfaceUpdate& update, const v1::SurfacePart& message);

@@ -25,7 +25,7 @@ struct HeldNodes {
   std::vector<GrabStatus> grabs = {};  // by index into TickInputs::grabs
 };
 
-// What a substep has foreseen for the gas in a cloth; the next one compares it with what became of it.
+// Forecast of a substep for the gas in a cloth; the next one compares it with what became of it.
 struct GasState {
   float volume = 0;          // at its end, as a fraction of the volume at rest
   float squaredSubstep = 0;  // square of its length, s^2; 0: there was no gas

@@ -49,11 +49,16 @@ void main() {
   CollidingNode node = CollidingNode(index, uint(tile.cloth), here.w, thickness, cloth.friction);
   Press last = kNoPress;
   visitsLeft = kMostSurfaceVisits;
-  bool touches = true, touched = false;
+  bool touches = true, touched = false, mayCross = false;
   for (uint round = 0u; round < push.rounds && touches; ++round) {
-    SurfaceContact found = touchSurfaces(push, from, position, thickness, false);
+    SurfaceContact found = touchSurfaces(push, from, position, thickness, kContacts);
+    if (round == 0u && found.contact.depth <= 0.0) {
+      found = touchSurfaces(push, from, position, thickness, kBehind);
+    }
     touches = found.contact.depth > 0.0;
     if (touches) {
+      // A single contact without a crossing leads into nothing else, or the next round finds it.
+      mayCross = mayCross || touched || found.part <= 1.0;
       touched = true;
       SurfaceRecord surface = surfaceRecordAt(found.surface);
       precise float friction = cloth.friction * surface.friction;
@@ -65,7 +70,7 @@ void main() {
   }
   if (touched) {
     finishContacts(last, push.collision, node, from, position, velocity);
-    touches = touchSurfaces(push, from, position, thickness, true).part <= 1.0;
+    touches = mayCross && touchSurfaces(push, from, position, thickness, kCrossings).part <= 1.0;
   }
   // The node has found no place on its side, or its searches were cut short.
   if ((touched && touches) || visitsLeft == 0u) {

@@ -27,7 +27,7 @@ SurfaceRecord surfaceRecordAt(uint surface) {
                        texelFetch(surfaces, first + 3));
 }
 
-// What a path meets on one surface, in the surface's frame.
+// Result of the search along a path on one surface, in the surface's frame.
 struct SurfaceSearch {
   float part;          // share of the path at its first crossing; above 1: it crosses nothing
   uint crossed;        // the triangle
@@ -35,7 +35,7 @@ struct SurfaceSearch {
   float endSquared;    // the same of its end
   uint nearest;        // triangle that is nearest to the end
   TrianglePoint at;    // its nearest point
-  float rimSquared;    // squared distance of the path's end from the rim, if the surface has one side
+  float rimSquared;    // squared distance of the path's end from the rim, if it was asked for
 };
 
 // A contact, in the world. It is one of a crossing if `part` is at most 1.
@@ -101,7 +101,8 @@ float squaredFromRim(SolidRecord solid, uint triangle, Corners corners, vec3 p) 
 
 // Searches within `reach` of the path. Of triangles that are equally near, the first counts. Takes its visits
 // from those that are left.
-SurfaceSearch searchSurface(SolidRecord solid, vec3 from, vec3 to, float reach, bool twoSided) {
+SurfaceSearch searchSurface(SolidRecord solid, vec3 from, vec3 to, float reach, bool twoSided,
+                            bool needsRim) {
   uint leaves = uint(solid.leafCount), triangles = uint(solid.triangleCount);
   uint shift = uint(findMSB(leaves));
   precise vec3 low = min(from, to) - reach;
@@ -134,7 +135,7 @@ SurfaceSearch searchSurface(SolidRecord solid, vec3 from, vec3 to, float reach, 
           search.nearest = t;
           search.at = nearest;
         }
-        if (!twoSided) {
+        if (needsRim) {
           search.rimSquared = min(search.rimSquared, squaredFromRim(solid, t, corners, to));
         }
       }
@@ -151,7 +152,8 @@ float lengthOf(float squared) {
 }
 
 // The contact that the search found, in the frame of the surface. `pushed`: the farthest way that the surface
-// pushes a node which it finds too near, in this substep.
+// pushes a node which it finds too near, in this substep. A node behind a surface with one side has no
+// contact unless it is less than `depthBound` deep.
 Contact contactOfSearch(SolidRecord solid, SurfaceSearch search, vec3 from, vec3 to, bool twoSided,
                         float thickness, float depthBound, float pushed) {
   precise float reached = lengthOf(search.startSquared) + pushed;
@@ -180,6 +182,10 @@ Contact contactOfSearch(SolidRecord solid, SurfaceSearch search, vec3 from, vec3
     away = inFront ? along : back;
   }
   if (twoSided || inFront) {
+    // A node that comes from behind may be pushed no farther than from its depth there.
+    if (!twoSided && dotProduct(before, outwards) < 0.0) {
+      reached = dotProduct(away, before) + pushed;
+    }
     precise float depth = min(thickness, reached) - (touches ? 0.0 : distance_);
     return Contact(away, depth);
   }
@@ -194,27 +200,34 @@ Contact contactOfSearch(SolidRecord solid, SurfaceSearch search, vec3 from, vec3
   return Contact(front, depth);
 }
 
-// The contact of a path with all surfaces: the first crossing, or else the one that pushes farthest. Only
-// crossings count if `onlyCrossings`.
-SurfaceContact touchSurfaces(SurfacePush push, vec3 from, vec3 to, float thickness, bool onlyCrossings) {
+// What to look for: a crossing, a crossing or a node that is too near, or a node behind a surface with one
+// side.
+const uint kCrossings = 0u;
+const uint kContacts = 1u;
+const uint kBehind = 2u;
+
+// The contact of a path with all surfaces: the first crossing, or else the one that pushes farthest. Most
+// nodes that touch something do not need the wider search for what is behind a surface.
+SurfaceContact touchSurfaces(SurfacePush push, vec3 from, vec3 to, float thickness, uint what) {
   SurfaceContact best = SurfaceContact(kNoContact, kNoCrossing, 0u);
   for (uint number = 0u; number < push.surfaceCount; ++number) {
     SurfaceRecord surface = surfaceRecordAt(number);
     bool twoSided = surface.twoSided != 0.0;
-    float depthBound = twoSided ? 0.0 : push.depth;
-    float reach = onlyCrossings ? kSurfaceSeam : max(max(thickness, depthBound), kSurfaceSeam);
+    float depthBound = what == kBehind ? push.depth : 0.0;
+    float reach = what == kCrossings ? kSurfaceSeam : max(max(thickness, depthBound), kSurfaceSeam);
     precise vec3 low = min(from, to) - reach;
     precise vec3 high = max(from, to) + reach;
-    if (boxesOverlap(low, high, surface.low, surface.high)) {
+    bool searches = what != kBehind || !twoSided;
+    if (searches && boxesOverlap(low, high, surface.low, surface.high)) {
       SolidRecord solid = solidRecordAt(solids, uint(surface.solid));
       precise vec3 before = from - surface.position;
       precise vec3 after = to - surface.position;
       before = rotateBack(surface.orientation, before);
       after = rotateBack(surface.orientation, after);
       precise float bound = reach * reach;
-      SurfaceSearch search = searchSurface(solid, before, after, reach, twoSided);
+      SurfaceSearch search = searchSurface(solid, before, after, reach, twoSided, what == kBehind);
       bool crosses = search.part <= 1.0;
-      bool counts = crosses || (!onlyCrossings && best.part > 1.0 && search.endSquared < bound);
+      bool counts = crosses || (what != kCrossings && best.part > 1.0 && search.endSquared < bound);
       if (counts) {
         Contact contact =
             contactOfSearch(solid, search, before, after, twoSided, thickness, depthBound, push.pushed);

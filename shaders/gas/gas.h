@@ -8,7 +8,7 @@
 
 CLOTHSTREAM_SHARED_BEGIN
 
-// What a node contributes: two texels.
+// Contribution of a node: two texels.
 #define CLOTHSTREAM_GAS_SHARE_TEXELS 2
 
 // One cloth with gas. Pressures are fractions of the pressure outside, volumes of the volume at rest.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What clothes in glTF files have: several skins, many joints of a vertex, attributes, cubic animations.
+// Clothes in glTF files: several skins, many joints of a vertex, attributes, cubic animations.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -281,7 +281,7 @@ TEST(GltfClothes, RefusesAttributesThatAreNoNumbersOfItsVertices) {
       HasSubstr("primitive 0: _MAX_DISTANCE: has numbers of a type that is neither float, byte nor short"));
 }
 
-// Of a file whose geometry is compressed, with four numbers for each vertex: x, 1 - x, 0, 0.
+// A file with compressed geometry, whose attribute has four numbers for each vertex: x, 1 - x, 0, 0.
 std::string compressedWith(const std::string& attribute) {
   std::string bytes = glbOf(compressedSheet(kDracoCodings[2], 20, false, true), 441, 2400, true);
   const auto replace = [&](const std::string& from, std::string to) {

@@ -195,7 +195,7 @@ class ClothFile : public testing::Test {
   v1::Scene message_;
 };
 
-TEST_F(ClothFile, FindsItsJointsByNameAndTakesThoseOfTheFirstOfJoinedVertices) {
+TEST_F(ClothFile, FindsJointsByNameAndKeepsThoseOfTheFirstJoinedVertex) {
   const Result<model::Scene> made = scene();
   ASSERT_TRUE(made) << made.error().text;
   ASSERT_EQ(made->cloths[0].nodeCount(), 4u);

@@ -25,7 +25,7 @@ Parts pyramid() {
 }
 
 // Cube of 12 triangles, as modelling programs export it.
-Parts cube() {
+Parts cubeParts() {
   Parts parts;
   for (int i = 0; i < 8; ++i)
     parts.vertices.emplace_back(i & 1 ? 1.f : 0.f, i & 2 ? 1.f : 0.f, i & 4 ? 1.f : 0.f);
@@ -60,7 +60,7 @@ TEST(ConvexHull, HasPlanesOfItsFacesAndBoundingBox) {
 }
 
 TEST(ConvexHull, MergesPlanesOfCoplanarTriangles) {
-  EXPECT_EQ(std::get<ConvexHull>(make(cube())).planes.size(), 6u);
+  EXPECT_EQ(std::get<ConvexHull>(make(cubeParts())).planes.size(), 6u);
 }
 
 TEST(ConvexHull, RefusesAnOpenSurface) {
@@ -82,7 +82,7 @@ TEST(ConvexHull, RefusesAnInsideOutSurface) {
 }
 
 TEST(ConvexHull, RefusesAFlippedFace) {
-  Parts parts = cube();
+  Parts parts = cubeParts();
   std::ranges::reverse(parts.faces[7]);
   EXPECT_THAT(problemOf(parts).text, HasSubstr("as another face does"));
 }

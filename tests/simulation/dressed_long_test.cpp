@@ -12,11 +12,11 @@
 namespace clothstream::tests {
 namespace {
 
-class TenMinutes : public GpuTest, public testing::WithParamInterface<std::string> {};
-INSTANTIATE_TEST_SUITE_P(Dressed, TenMinutes, testing::Values("dress", "gown"),
+class TenMinutesOfWalking : public GpuTest, public testing::WithParamInterface<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Dressed, TenMinutesOfWalking, testing::Values("dress", "gown"),
                          [](const auto& name) { return name.param; });
 
-TEST_P(TenMinutes, OfWalkingLeaveTheClothesOnTheFigure) {
+TEST_P(TenMinutesOfWalking, KeepTheClothesOnTheFigure) {
   const model::Scene scene = *messages::loadScene(GetParam());
   Walk walk(scene);
   for (int minute = 0; minute < 10; ++minute) walk.on(60 * scene.simulationRate, 12);

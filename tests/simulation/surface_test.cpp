@@ -63,7 +63,7 @@ TEST_F(SurfaceCollision, NodesTouchSurfacesAsInTheReference) {
       model::Scene scene = looseScene(33, 33);
       std::mt19937 random(17);
       NodeState start = randomState(scene, random, 0, 8);
-      std::uniform_real_distribution<float> unit(-0.2f, 0.2f);
+      std::uniform_real_distribution<float> unit(-0.1f, 0.1f);
       for (model::Vec3& position : start.positions)
         position = model::Vec3(unit(random), unit(random), unit(random));
       const model::Pose pose{model::Vec3(0.01f, 0.02f, 0), turned(25, model::Vec3(1, 0.3f, 0.2f))};
@@ -97,6 +97,7 @@ TEST_F(SurfaceCollision, ClothRestsOnADeskAndHangsOverItsEdge) {
     cloth.thickness = 0.004f;
     cloth.friction = 1;
     cloth.damping = 1;
+    cloth.bend = {};  // else the part that hangs down would hold itself up
     const model::Scene scene = sceneOf({cloth});
     // The desk ends at 0.08 m, so that 30 % of the cloth hang down. Friction can hold half of it.
     const model::Pose pose{model::Vec3(-0.27f, 0, 0), model::Quaternion::Identity()};
@@ -313,7 +314,7 @@ TEST_F(SurfaceCollision, WorksFarFromTheOriginOfTheWorld) {
   EXPECT_NEAR(lowestOf(running.state()), far.y() + std::max(cloth.thickness, 5e-4f), 2e-4);
 }
 
-// The limit of a scene: two surfaces of 50,000 triangles. Costs about 2 s, most of them for the trees.
+// The limit of a scene: two surfaces of 50,000 triangles. Costs some seconds of one core.
 TEST_F(SurfaceCollision, CarriesClothOnOneHundredThousandTriangles) {
   const model::Scene scene = sceneOf({lying(calmCloth(21, 21), 0.06f)});
   const auto table = tableOf(model::terrain(4, 4, 158, model::waves));

@@ -16,7 +16,7 @@ export function largestOf(limits: Float32Array): number {
   return limits.reduce((largest, limit) => Math.max(largest, limit), 0);
 }
 
-// What the colours mean, for people.
+// Meaning of the colours, for people.
 export function legendOf(limits: Float32Array, none: string): string {
   if (limits.every((limit) => limit < 0)) return `No vertex has one yet: ${none} everywhere.`;
   const largest = largestOf(limits);

@@ -198,7 +198,7 @@ export class Painter {
     this.painted();
   }
 
-  // What the tool paints on.
+  // Numbers that the tool changes.
   private get painting(): VertexNumbers {
     return isLimit(this.tool) ? this.limits[this.tool] : this.pins.numbers;
   }
