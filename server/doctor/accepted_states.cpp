@@ -7,7 +7,10 @@ namespace clothstream::doctor {
 namespace {
 
 constexpr AcceptedState kStates[] = {
+    {"balloon", 0x08290ba97a7b524au},
     {"curtain", 0x207b382b6d173870u},
+    {"cushion", 0x5704e0d35e06026bu},
+    {"dress", 0x14712b8c2bb651a0u},
     {"figure_07", 0x864e4a384e8321c7u},
     {"figure_09", 0x944757b9bb8a4642u},
     {"figure_10", 0x75795af652c671d5u},
@@ -18,6 +21,7 @@ constexpr AcceptedState kStates[] = {
     {"figure_15", 0x236b053bf25874e8u},
     {"flag", 0x4aec43f3a916dfafu},
     {"folds", 0x5081340b01b55416u},
+    {"gown", 0x0e3638e7768f671eu},
     {"obstacles", 0x616ce6f10a7ba85du},
     {"solver_acad", 0xec9a152b77f0cddfu},
     {"solver_constraint", 0xe4f72c0d1a0900a9u},

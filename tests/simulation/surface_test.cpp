@@ -78,9 +78,9 @@ TEST_F(SurfaceCollision, NodesTouchSurfacesAsInTheReference) {
       reference.tick(referenceInputs(inputs));
       const NodeState after = running.state();
       // Each of up to four contacts has the rounding of some forty products of lengths below 1 m. The normal
-      // of one with the nearest point has that error divided by the distance, 0.1 mm at least. It acts over
+      // of one with the nearest point has that error divided by the distance, 0.05 mm at least. It acts over
       // the thickness at most, and on speeds of up to 14 m/s.
-      const double rounding = 40 * kRounding, turn = rounding / 1e-4;
+      const double rounding = 40 * kRounding, turn = rounding / 5e-5;
       const double distance = 4 * (rounding + turn * scene.cloths[0].thickness), speed = 4 * turn * 14;
       std::size_t different = 0;
       for (std::size_t i = 0; i < after.positions.size(); ++i) {
