@@ -15,12 +15,14 @@ RADIUS = 1.1  # m, of the circle
 LAPS = round(2 * math.pi * RADIUS / figure.STRIDE)  # of two steps on the circle
 HIPS = figure.NAMES.index("hips")
 CHEST = figure.NAMES.index("chest")
+TIGHT = 0.93  # m, height above which the dress is tight
 
 LONG = figure.Profile([(-0.05, 0.455, 0.460, 0.030), (0.05, 0.430, 0.430, 0.030), (0.50, 0.310, 0.295, 0.022),
-                       (0.80, 0.228, 0.190, 0.018), (0.90, 0.201, 0.150, 0.016), (0.95, 0.186, 0.130, 0.014),
-                       (0.99, 0.168, 0.112, 0.010), (1.03, 0.140, 0.092, 0.004)])
-SHORT = figure.Profile([(0.45, 0.350, 0.330, 0.020), (0.80, 0.240, 0.205, 0.018), (0.90, 0.203, 0.153, 0.016),
-                        (0.95, 0.186, 0.130, 0.014), (0.99, 0.168, 0.112, 0.010), (1.03, 0.140, 0.092, 0.004)])
+                       (0.80, 0.240, 0.200, 0.018), (0.88, 0.216, 0.170, 0.018), (0.93, 0.200, 0.146, 0.016),
+                       (0.97, 0.184, 0.126, 0.012), (1.01, 0.160, 0.106, 0.008), (1.04, 0.132, 0.088, 0.004)])
+SHORT = figure.Profile([(0.45, 0.375, 0.350, 0.018), (0.80, 0.260, 0.225, 0.018), (0.88, 0.225, 0.180, 0.018),
+                        (0.93, 0.202, 0.148, 0.016), (0.97, 0.184, 0.126, 0.012), (1.01, 0.160, 0.106, 0.008),
+                        (1.04, 0.132, 0.088, 0.004)])
 MANTLE = figure.Profile([(0.10, 0.460, 0.520, 0.030), (0.50, 0.370, 0.385, 0.022), (0.95, 0.250, 0.215, 0.014),
                          (1.15, 0.205, 0.155, 0.006), (1.25, 0.180, 0.135, 0.004), (1.33, 0.140, 0.100, 0.004),
                          (1.37, 0.090, 0.060, 0.006)])
@@ -85,19 +87,21 @@ class Body:
 
 
 def dress_weights(body, p):
-    """The bodice follows the body, the skirt the hips."""
-    share = garments.between(p[1], 0.95, 1.03)
-    result = {joint: share * weight for joint, weight in body.weights_at(p).items()} if share > 0 else {}
-    result[HIPS] = result.get(HIPS, 0) + 1 - share
+    """The bodice follows the body, except its arms, the skirt the hips."""
+    share = garments.between(p[1], 0.97, 1.05)
+    result = {HIPS: 1 - share}
+    for joint, weight in body.weights_at(p).items() if share > 0 else ():
+        kept = CHEST if figure.NAMES[joint].endswith("arm") else joint
+        result[kept] = result.get(kept, 0) + share * weight
     return figure.four(result)
 
 
 def dress_distance(p):
-    if p[1] >= 1.03:
+    if p[1] >= TIGHT:
         return 0
-    if p[1] < 0.80:
+    if p[1] < TIGHT - 0.10:
         return -1  # unbounded
-    return round(max(0.001, 0.12 * ((1.03 - p[1]) / 0.23) ** 1.5), 4)
+    return round(max(0.001, 0.10 * ((TIGHT - p[1]) / 0.10)), 4)
 
 
 def cape_distance(p):
@@ -188,9 +192,10 @@ def write(name, description, body, cloths, settings):
 
 def main():
     body = Body(0.042)
-    settings = {"material": "cotton", "thickness": 0.006, "friction": 0.3, "damping": 0.5, "tethers": {}}
+    settings = {"material": "cotton", "thickness": 0.006, "friction": 0.3, "damping": 0.5, "tethers": {},
+                "solver": {"xpbd": {"iterations": 2}}}
     write("dress", "A figure in a dress walks in a circle. The bodice follows its joints, the skirt swings.", body,
-          [dress_cloth(body, SHORT, 0.52, 0.0235, settings)], {"substeps": 8})
+          [dress_cloth(body, SHORT, 0.52, 0.026, settings)], {"substeps": 5})
     body = Body(0.032)
     length = 0.0195
     settings = {"material": "silk", "thickness": 0.006, "friction": 0.3, "damping": 0.5, "tethers": {},
