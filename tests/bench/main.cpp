@@ -47,7 +47,7 @@ constexpr std::array kSuites{
                  &bench::runColliders},
     bench::Suite{"self_collision", "a sheet with and without self-collision, flat and in folds",
                  &bench::runSelfCollision},
-    bench::Suite{"garment", "cloth with limits on its distance from a figure, and dressed figures that walk",
+    bench::Suite{"garment", "cloth with limits on its distance from a figure",
                  &bench::runGarment},
     bench::Suite{"codec", "the codec on the CPU over motions: bits, errors, flicker, times",
                  &bench::runCodec},

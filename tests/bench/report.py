@@ -117,9 +117,6 @@ def garment(rows):
              number(r["timesNotSkinned"], 2)] for r in rows if "limits" in r]
 
 
-def figures(rows):
-    return [[r["scene"], number(r["nodes"]), r["figures"], pair(r, "tickMs")] for r in rows if "figures" in r]
-
 
 def enforcement(rows):
     return [[number(r["nodes"]), number(r["springs"]), r["workgroups"], number(r["framesPerSecond"]),
@@ -177,7 +174,6 @@ TABLES = {
                                                             "touching pairs", "crossings"], self_collision),
     "garment": ("garment", [], ["nodes", "solver", "limits of the nodes", "ns a node and substep, median / min",
                                 "times not skinned"], garment),
-    "garment_figures": ("garment", [], ["scene", "nodes", "figures", "tick, ms, median / p99"], figures),
     "enforcement": ("enforcement", [], ["nodes", "springs", "workgroups", "frames/s", "best"], enforcement),
     "solvers": ("solvers", [], ["nodes", "solver", "substeps", "ns a node and substep, median / min", "strain, mean",
                                 "p99", "max"], solvers),

@@ -20,11 +20,10 @@ TEST_P(NamedScene, LoadsByName) {
 }
 
 // Scenes without triangle meshes as colliders. The reference tests every triangle of a mesh; Walker in
-// tests/encode and Dressed in tests/simulation run on the device.
+// tests/encode runs on the device.
 std::vector<std::string> scenesWithoutSolids() {
   std::vector<std::string> names = namedScenes();
-  std::erase_if(
-      names, [](const std::string& name) { return name == "dress" || name == "gown" || name == "walker"; });
+  std::erase(names, "walker");
   return names;
 }
 
@@ -61,7 +60,6 @@ TEST(NamedScenes, AreAllListed) {
   EXPECT_EQ(namedScenes(), (std::vector<std::string>{"balloon",
                                                      "curtain",
                                                      "cushion",
-                                                     "dress",
                                                      "figure_07",
                                                      "figure_09",
                                                      "figure_10",
@@ -72,7 +70,6 @@ TEST(NamedScenes, AreAllListed) {
                                                      "figure_15",
                                                      "flag",
                                                      "folds",
-                                                     "gown",
                                                      "obstacles",
                                                      "solver_acad",
                                                      "solver_constraint",
