@@ -112,12 +112,6 @@ def self_collision(rows):
              number(r["crossings"]) if "crossings" in r else ""] for r in rows]
 
 
-def garment(rows):
-    return [[number(r["nodes"]), r["solver"], r["limits"], f"{number(r['nsMedian'])} / {number(r['nsMin'])}",
-             number(r["timesNotSkinned"], 2)] for r in rows if "limits" in r]
-
-
-
 def enforcement(rows):
     return [[number(r["nodes"]), number(r["springs"]), r["workgroups"], number(r["framesPerSecond"]),
              number(r["framesPerSecondBest"])] for r in rows]
@@ -172,8 +166,6 @@ TABLES = {
                                              "times without"], colliders_touching),
     "self_collision": ("self_collision", ["--size", "64"], ["case", "ns a node and substep", "tick, ms, median / p99",
                                                             "touching pairs", "crossings"], self_collision),
-    "garment": ("garment", [], ["nodes", "solver", "limits of the nodes", "ns a node and substep, median / min",
-                                "times not skinned"], garment),
     "enforcement": ("enforcement", [], ["nodes", "springs", "workgroups", "frames/s", "best"], enforcement),
     "solvers": ("solvers", [], ["nodes", "solver", "substeps", "ns a node and substep, median / min", "strain, mean",
                                 "p99", "max"], solvers),
