@@ -76,6 +76,8 @@ bool readParticipant(Bytes message, Participant& out) {
         return set(out.role, reader.get_uint32());
       case F::kAway.tag:
         return set(out.away, reader.get_bool());
+      case F::kBody.tag:
+        return setText(out.body, reader) && out.body.size() <= kMaxNameBytes;
       default:
         return skip(reader);
     }
