@@ -18,6 +18,8 @@ const char* nameOf(Action action) {
       return "colliderPoses.grabs";
     case Action::moveAttachments:
       return "colliderPoses: attachments and joints";
+    case Action::wear:
+      return "wearBody";
     case Action::holdWinds:
       return "colliderPoses.winds";
     case Action::changeEnvironment:
@@ -52,6 +54,7 @@ Role roleFor(Action action, const Permissions& participants) {
     case Action::collide:
     case Action::grab:
     case Action::moveAttachments:
+    case Action::wear:
       return Role::participant;
     case Action::holdWinds:
     case Action::changeEnvironment:
