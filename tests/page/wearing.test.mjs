@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// A user of an emulated headset wears the body of the scene "walker": it follows the hands, elbows do not flip, and a
+// mirror stands before it.
+
+import assert from "node:assert/strict";
+import { existsSync } from "node:fs";
+import { after, before, test } from "node:test";
+import { kChromium, launchBrowser, takePicture, untilFrames, untilState } from "./browser.mjs";
+import { enter, moveTo, openHeadset, pressButton } from "./headset.mjs";
+import { startServer } from "./server.mjs";
+
+const kSkipped = 77; // CMake's SKIP_RETURN_CODE for this test
+if (!existsSync(kChromium)) {
+  console.log(`skipped: there is no ${kChromium} (apt install chromium)`);
+  process.exit(kSkipped);
+}
+
+const kRightHand = 4; // BodyPart of @clothstream/client
+const kRightElbow = 32;
+const kHead = 1;
+
+let server;
+let browser;
+before(async () => {
+  server = await startServer(0, ["--scene", "walker"]);
+  browser = await launchBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+
+// Runs in the page: the tracked wrist of the right hand, and the body's wrist, elbow and head.
+function look() {
+  const { limbs, worn } = window.clothstream.headset;
+  const hand = limbs.find(({ side, isHand }) => side === "right" && isHand);
+  const [wrist, elbow, head] = [4, 32, 1].map((part) => worn.part(part)?.position);
+  return { tracked: hand?.joints.slice(0, 3), wrist, elbow, head };
+}
+
+test("a worn body follows the head and the hands, and a mirror shows it", async () => {
+  const page = await openHeadset(browser, server.url, { input: "controller" });
+  try {
+    await untilState(page, "live");
+    await untilFrames(page, 10);
+    await enter(page, "vr");
+    await pressButton(page, "Wear avatar");
+    await page.waitForFunction(() => window.clothstream.headset.worn.name === "avatar" && window.clothstream.headset.worn.mirror);
+    await page.evaluate(() => (window.device.primaryInputMode = "hand"));
+    await page.waitForFunction((part) => window.clothstream.headset.worn.part(part), kRightHand);
+    const places = [[0.25, 1.2, -0.35], [0.1, 1.45, -0.3], [0.45, 1.3, -0.1], [0.2, 0.95, -0.2], [0.3, 1.25, -0.3]];
+    const seen = [];
+    for (const place of places) seen.push(...(await moveTo(page, "hands", "right", place, 0.03, look)));
+    const known = seen.filter(({ tracked, wrist }) => tracked && wrist);
+    assert.ok(known.length > 20, `${known.length} of ${seen.length} frames show the hand`);
+    // The arm of the body reaches all of these places. After 0.3 s the wrist has come to the hand that was not tracked.
+    const settled = known.slice(Math.floor(known.length / 3));
+    const worst = Math.max(...settled.map(({ tracked, wrist }) => distance(tracked, wrist)));
+    assert.ok(worst < 0.02, `a wrist is ${(100 * worst).toFixed(1)} cm from the tracked one`);
+    // A step of the hand of 3 cm moves the elbow of a bent arm by less than twice as much; a flip would move it by up to
+    // twice its distance from the way of the arm, about 25 cm.
+    for (let i = 1; i < settled.length; ++i) {
+      const way = distance(settled[i].elbow, settled[i - 1].elbow);
+      assert.ok(way < 0.12, `the elbow moved by ${(100 * way).toFixed(1)} cm in a frame`);
+    }
+    // The eyes are where the headset is, or lower if the user is taller than the body.
+    const head = await page.evaluate((part) => window.clothstream.headset.worn.part(part).position, kHead);
+    assert.ok(head[1] > 1.3 && head[1] < 1.7, `eyes at ${head[1]} m`);
+    // The server's body is there too.
+    await page.waitForFunction(
+      ([part, most]) => {
+        const { colliders, headset } = window.clothstream;
+        const body = colliders.find(({ name }) => name === "avatar");
+        const at = headset.worn.part(part)?.position;
+        return body && at && Math.hypot(body.position[0], body.position[2]) < most;
+      },
+      [kRightElbow, 3],
+    );
+    await takePicture(page, "vr_mirror");
+    await page.evaluate(() => (window.device.primaryInputMode = "controller"));
+    await pressButton(page, "Take off avatar");
+    await page.waitForFunction(() => window.clothstream.headset.worn.name === "" && !window.clothstream.headset.worn.mirror);
+    assert.deepEqual(page.errors, []);
+  } finally {
+    await page.context().close();
+  }
+});
+
+test("two users do not wear the same body", async () => {
+  const first = await openHeadset(browser, server.url, { input: "controller" });
+  const second = await openHeadset(browser, server.url, { input: "controller" });
+  try {
+    for (const page of [first, second]) {
+      await untilState(page, "live");
+      await enter(page, "vr");
+    }
+    await pressButton(first, "Wear avatar");
+    await first.waitForFunction(() => window.clothstream.headset.worn.name === "avatar");
+    await second.waitForFunction(() => window.clothstream.headset.panel.buttons.some(({ text, isEnabled }) => text === "Wear avatar" && !isEnabled));
+    await first.context().close();
+    // A closed page may come back for 20 s (--hold-page).
+    await second.waitForFunction(() => window.clothstream.headset.panel.buttons.some(({ text, isEnabled }) => text === "Wear avatar" && isEnabled));
+  } finally {
+    await second.context().close();
+  }
+});
