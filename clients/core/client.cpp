@@ -161,6 +161,7 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
 void Client::update(std::uint64_t nowUs) {
   timer_.update(nowUs);
   requests_.update(nowUs);
+  surfaces_.update(nowUs);
   if (stream_.newest().isMirror() || !timer_.isWelcomed() || state_ == CS_STATE_FAILED ||
       !clock_.pingDue(nowUs))
     return;
@@ -204,11 +205,30 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   if (inherited || (returned && posed_)) sendPoses(nowUs);
   // A server that has forgotten this participant has given its body back.
   if (returned && worn_ && participants_.bodyOf(welcome_.participantId) != worn_->collider()) sendWearing();
-  const std::uint32_t events = participants_.all().empty() ? 0 : CS_EVENT_PARTICIPANTS;
+  const std::uint32_t events = (participants_.all().empty() ? 0u : CS_EVENT_PARTICIPANTS) | sendSurfaces();
   if (!known) return events;
   state_ = CS_STATE_JOINED;
   redirection_.joined();
   return events | CS_EVENT_RETURNED;
+}
+
+std::uint32_t Client::sendSurfaces() {
+  if (welcome_.surfacePolicy == CS_SURFACES_OWN) {
+    surfaces_.sendAll();
+    return 0;
+  }
+  surfaces_.sendNothing();
+  if (surfaces_.empty()) return 0;
+  error_ = {
+      .code = 0,
+      .text = welcome_.surfacePolicy == CS_SURFACES_OFF
+                  ? "The server takes no surfaces of the real room (--room-surfaces off), so that cloth "
+                    "passes through yours."
+                  : "The server is of a release that knows no surfaces of the real room, so that cloth "
+                    "passes through yours. Update the server.",
+      .fatal = false,
+      .server = {}};
+  return CS_EVENT_ERROR;
 }
 
 std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
@@ -217,7 +237,8 @@ std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
   participants_.change(std::move(*presence), limits_.participants);
   const Participant& who = participants_.newest().participant;
   if (who.id == welcome_.participantId && who.role != welcome_.role) {
-    welcome_.role = who.role;
+    // The server drops the surfaces of viewers.
+    if (std::exchange(welcome_.role, who.role) == CS_ROLE_VIEWER) sendSurfaces();
     if (posed_) sendPoses(nowUs);
   }
   if (who.id == welcome_.participantId && worn_) worn_->announced(who.body);
@@ -410,6 +431,7 @@ std::uint32_t Client::answerReceived(const ServerMessage& message) {
 const std::string* Client::nextOutgoing() {
   const std::string* message = outbox_.next();
   if (!message && isConnected()) message = requests_.nextOfUpload();
+  if (!message && timer_.isWelcomed() && mayCollide()) message = surfaces_.next();
   // Attachments and joints stay where they were moved, so each pose is sent once.
   if (outbox_.poses().empty() && isConnected() && mayCollide()) {
     poses_.attachments.clear();

@@ -16,6 +16,7 @@
 #include "clients/core/stream/credentials.h"
 #include "clients/core/stream/datagram_negotiation.h"
 #include "clients/core/stream/outbox.h"
+#include "clients/core/stream/own_surfaces.h"
 #include "clients/core/stream/participants.h"
 #include "clients/core/stream/playback_position.h"
 #include "clients/core/stream/received_stream.h"
@@ -78,6 +79,9 @@ class Client {
   bool wear(std::string_view collider);
   // Returns false without a body.
   bool moveBody(const body::Tracked& tracked, std::uint64_t nowUs);
+  // Returns false if the server of the scene takes no surfaces.
+  bool setSurface(OwnSurface surface);
+  OwnSurfaces& surfaces() { return surfaces_; }
   void change(const ParameterChange& change);
   void changeCollider(std::string_view collider, const cs_collider_change& change);
   void listScenes();
@@ -154,6 +158,8 @@ class Client {
   bool isConnected() const { return state_ != CS_STATE_RECONNECTING || timer_.isWelcomed(); }
   bool mayCollide() const;
   std::uint32_t welcomed(Bytes body, std::uint64_t nowUs);
+  // Sends surfaces of the real room to a server that takes them. Returns CS_EVENT_ERROR if it takes none.
+  std::uint32_t sendSurfaces();
   std::uint32_t presenceReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t chunkReceived(Bytes body);
   std::uint32_t described();
@@ -203,6 +209,7 @@ class Client {
   Poses poses_;         // poses of this participant
   bool posed_ = false;  // whether the program has set a pose
   std::optional<body::WornBody> worn_;
+  OwnSurfaces surfaces_;
   Display display_;
   std::vector<SceneSummary> scenes_;
   Requests requests_;

@@ -134,7 +134,10 @@ void Client::sendWearing() {
 void Client::checkWorn() {
   if (!worn_) return;
   const auto found = stream_.description().hulls.find(worn_->collider());
-  if (found == stream_.description().hulls.end() || !worn_->fits(found->second)) worn_.reset();
+  if (found == stream_.description().hulls.end() || !worn_->fits(found->second)) {
+    worn_.reset();
+    sendWearing();
+  }
 }
 
 bool Client::moveBody(const body::Tracked& tracked, std::uint64_t nowUs) {
@@ -145,6 +148,12 @@ bool Client::moveBody(const body::Tracked& tracked, std::uint64_t nowUs) {
   if (collider == colliders().end()) return false;
   const bool jumps = worn_->update(tracked, *collider, nowUs);
   move({.collider = worn_->collider(), .poses = worn_->poses(), .jumps = jumps}, nowUs);
+  return true;
+}
+
+bool Client::setSurface(OwnSurface surface) {
+  if (timer_.isWelcomed() && welcome_.surfacePolicy != CS_SURFACES_OWN) return false;
+  surfaces_.set(std::move(surface));
   return true;
 }
 

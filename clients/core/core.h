@@ -533,7 +533,7 @@ uint32_t cs_receive_decoded(cs_client* mirror, const uint8_t* message, size_t by
                             const cs_decoded* decoded, uint64_t now_us) CS_NOEXCEPT;
 
 /* ---------------------------------------------------------------------------------------------------------------
- * Input: colliders, hands, grabs and attachments of this participant, and events of grabs and contacts.
+ * Input: colliders, hands, grabs, attachments and surfaces of this participant; events of grabs and contacts.
  *
  * now_us says for which time the pose holds; the server uses it to place the pose between ticks. It may be in
  * the near future, for example a headset's predicted display time. If the transport is slow, only the newest
@@ -601,6 +601,32 @@ typedef struct cs_own_wind {
   float spread;         /* of a fan: growth of its radius for each metre of distance */
   float reach;          /* m; a fan's range, or a vortex's reach */
 } cs_own_wind;
+
+#define CS_MAX_SURFACE_VERTICES 150000u
+#define CS_MAX_SURFACE_TRIANGLES 50000u
+
+#define CS_SURFACE_VERSION 1u
+/* Surface of the real room of this participant: a triangle mesh that cloth does not pass through, such as a
+ * floor, a desk, or a mesh that a headset has scanned (SurfaceUpdate in session.proto). */
+typedef struct cs_surface {
+  uint32_t version CS_INIT(CS_SURFACE_VERSION);
+  uint32_t id; /* a known id replaces its surface */
+  float position[3];
+  float orientation[4];      /* quaternion x y z w; all zero means no rotation */
+  const float* positions;    /* x, y, z of each vertex, -100 to 100, in the frame of the surface */
+  uint32_t vertex_count;     /* at most CS_MAX_SURFACE_VERTICES */
+  const uint32_t* triangles; /* three vertices of each triangle, counter-clockwise seen from the front */
+  uint32_t triangle_count;   /* 1 to CS_MAX_SURFACE_TRIANGLES */
+  uint32_t two_sided;        /* 1: cloth can be on both sides; 0: cloth passes it from behind */
+  float friction;            /* coefficient of friction, 0 to 10, multiplied with the cloth's */
+} cs_surface;
+
+/* What the server does with surfaces. */
+typedef enum cs_surface_policy {
+  CS_SURFACES_UNKNOWN = 0, /* not connected yet, or the server is of a release that knows none */
+  CS_SURFACES_OFF = 1,     /* it refuses them */
+  CS_SURFACES_OWN = 2      /* they act on the cloth, and their shape is sent to no client */
+} cs_surface_policy;
 
 /* HandSide of session.proto. */
 typedef enum cs_hand_side { CS_HAND_LEFT = 1, CS_HAND_RIGHT = 2 } cs_hand_side;
@@ -733,6 +759,20 @@ const float* cs_body_joints(const cs_client* client, uint32_t* count) CS_NOEXCEP
 const uint32_t* cs_body_below_neck(const cs_client* client, uint32_t collider,
                                    uint32_t* index_count) CS_NOEXCEPT;
 
+/* What the server does with surfaces of the real room, from the newest Welcome. */
+cs_surface_policy cs_get_surface_policy(const cs_client* client) CS_NOEXCEPT;
+/* Adds a surface of the real room, or replaces the one with its id. The mesh is copied, and sent again after
+ * a reconnect. It acts when it has arrived completely; until then the former one does. Fails, and changes
+ * nothing, if the version is unknown, if a count is not allowed, or if the client is in a scene whose server
+ * takes no surfaces. If the client joins such a scene later, CS_EVENT_ERROR says so. */
+int cs_set_surface(cs_client* client, const cs_surface* surface) CS_NOEXCEPT;
+/* Moves a surface, which stands in its new pose from the next tick on. orientation4 may be NULL: no rotation.
+ * Fails if there is no surface with this id. */
+int cs_move_surface(cs_client* client, uint32_t id, const float* position3,
+                    const float* orientation4) CS_NOEXCEPT;
+/* Removes a surface. Fails if there is no surface with this id. */
+int cs_remove_surface(cs_client* client, uint32_t id) CS_NOEXCEPT;
+
 /* Number of events in the newest CS_EVENT_GRABS, for the grabs of all participants. */
 uint32_t cs_grab_event_count(const cs_client* client) CS_NOEXCEPT;
 /* Fails if the index is out of range. */
@@ -794,6 +834,7 @@ typedef struct cs_cloth_settings {
   /* Self-collision: ball radius (m) and friction. Tethers: slack as a fraction of the length. They can be
    * changed only for cloths that were created with them, and are NaN for others. */
   float ball_radius, ball_friction, tether_slack;
+  float pressure; /* Pa; of the gas inside a closed mesh */
 } cs_cloth_settings;
 
 /* Fails before the description. */

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 // C interface: input of this participant, and events of grabs and contacts.
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <span>
 #include <utility>
@@ -96,6 +98,41 @@ void cs_move_joints(cs_client* client, const char* collider, const float* poses,
                     uint64_t now_us) noexcept {
   const std::size_t numbers = kJointNumbers * std::min<std::size_t>(count, kMaxJoints);
   client->client.move({.collider = collider, .poses = {poses, poses + numbers}, .jumps = jumps != 0}, now_us);
+}
+
+cs_surface_policy cs_get_surface_policy(const cs_client* client) noexcept {
+  const std::uint32_t policy = client->client.welcome().surfacePolicy;
+  return policy == CS_SURFACES_OFF || policy == CS_SURFACES_OWN ? static_cast<cs_surface_policy>(policy)
+                                                                : CS_SURFACES_UNKNOWN;
+}
+
+int cs_set_surface(cs_client* client, const cs_surface* surface) noexcept {
+  if (surface->version != CS_SURFACE_VERSION || surface->vertex_count > CS_MAX_SURFACE_VERTICES ||
+      surface->triangle_count == 0 || surface->triangle_count > CS_MAX_SURFACE_TRIANGLES)
+    return 0;
+  const std::size_t positions = std::size_t{3} * surface->vertex_count,
+                    triangles = std::size_t{3} * surface->triangle_count;
+  OwnSurface own{.id = surface->id,
+                 .positions = {surface->positions, surface->positions + positions},
+                 .triangles = {surface->triangles, surface->triangles + triangles},
+                 .twoSided = surface->two_sided != 0,
+                 .friction = surface->friction};
+  std::copy(std::begin(surface->position), std::end(surface->position), own.position.begin());
+  std::copy(std::begin(surface->orientation), std::end(surface->orientation), own.orientation.begin());
+  return client->client.setSurface(std::move(own)) ? 1 : 0;
+}
+
+int cs_move_surface(cs_client* client, uint32_t id, const float* position3,
+                    const float* orientation4) noexcept {
+  std::array<float, 3> position{};
+  std::array<float, 4> orientation{};
+  std::copy(position3, position3 + 3, position.begin());
+  if (orientation4 != nullptr) std::copy(orientation4, orientation4 + 4, orientation.begin());
+  return client->client.surfaces().move(id, position, orientation) ? 1 : 0;
+}
+
+int cs_remove_surface(cs_client* client, uint32_t id) noexcept {
+  return client->client.surfaces().remove(id) ? 1 : 0;
 }
 
 uint32_t cs_grab_event_count(const cs_client* client) noexcept {

@@ -15,7 +15,7 @@ if (sources.length === 0) {
 }
 const unity = fileURLToPath(new URL(".", import.meta.url));
 const root = resolve(unity, "../..");
-const kParts = ["package.json", "README.md", "CHANGELOG.md", "Runtime", "Samples~"];
+const kParts = ["package.json", "README.md", "CHANGELOG.md", "Editor", "Runtime", "Samples~"];
 const kLibrary = "Runtime/Plugins/Android/ClothStreamCore.androidlib";
 // Headers of others, from the packages libprotozero-dev, libexpected-dev and libsimde-dev of Debian.
 const kOthers = ["protozero", "tl", "simde"];

@@ -32,6 +32,7 @@ enum class ClothNumber : std::uint8_t {
   ballFriction,
   tetherSlack,
   dihedralBending,
+  pressure,
 };
 
 // Both ends included.
@@ -252,7 +253,17 @@ inline constexpr auto kClothTable = std::make_tuple(
          .optionGroup = "Springs",
          .help = "Flexural rigidity across edges between faces"},
         [](auto& cloth) { return &cloth.dihedralBending; },
-        [](auto& settings) { return &settings.dihedral_bending; }));
+        [](auto& settings) { return &settings.dihedral_bending; }),
+    row(
+        {.number = ClothNumber::pressure,
+         .name = "pressure",
+         .field = {44, 44},
+         .unit = "Pa",
+         .range = {-50'000, 1'000'000},
+         .option = "pressure",
+         .optionGroup = "Material",
+         .help = "Gas inside a closed mesh, above the pressure outside; 0: no gas"},
+        [](auto& cloth) { return &cloth.pressure; }, [](auto& settings) { return &settings.pressure; }));
 
 // The rows without what finds their numbers.
 inline constexpr auto kClothParameters =

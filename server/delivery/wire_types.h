@@ -40,6 +40,9 @@ class StartRecordingResponse;
 class StopRecordingRequest;
 class StopRecordingResponse;
 class StreamDescription;
+class SurfaceLimits;
+class SurfacePart;
+class SurfaceUpdate;
 class TickEvents;
 
 enum ErrorCode : int;

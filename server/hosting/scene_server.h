@@ -23,6 +23,7 @@
 #include "server/hosting/scene_registry.h"
 #include "server/hosting/scene_requests.h"
 #include "server/hosting/server_options.h"
+#include "server/hosting/surface_maker.h"
 #include "server/hosting/unary_calls.h"
 #include "server/hosting/upload_budget.h"
 #include "server/model/scene.h"
@@ -97,6 +98,7 @@ class SceneServer {
   DeviceThread device;
   CreatedScenes created;
   SceneMaker maker;
+  SurfaceMaker surfaceMaker;
   SceneRequests requests;
   UnaryCalls unaryCalls;
 

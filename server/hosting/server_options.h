@@ -39,6 +39,10 @@ inline constexpr std::uint32_t kMaxParticipants =
     (simulation::kMaxColliders - messages::limits::kMaxColliders) /
     messages::limits::kMaxParticipantColliders;
 
+// What the server does with surfaces of the real rooms of participants: it refuses them, or they act on the
+// cloth and their shapes are sent to no client.
+enum class SurfacePolicy : std::uint8_t { off, own };
+
 struct ServerOptions : Limits {
   vulkan::DeviceOptions device;
   // Scene of peers that name none. Must be one of the scenes.
@@ -83,6 +87,7 @@ struct ServerOptions : Limits {
   std::chrono::milliseconds silence{30'000};
   scene::ReconnectGrace reconnectGrace{};
   scene::Permissions participantsMay{};
+  SurfacePolicy roomSurfaces = SurfacePolicy::own;
   // Decides who peers are. Null: every peer counts as identity::local().
   std::shared_ptr<identity::Authenticator> authenticator{};
   // Created scenes of one tenant. Peers without a tenant share one number. Unset: if the authenticator has

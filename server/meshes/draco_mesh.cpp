@@ -174,17 +174,19 @@ class BoundedDecoder final : public Base {
   std::string problem_;
 };
 
-// Reads an attribute of `count` floats per point.
+// Reads an attribute of `count` floats per point, or of the first numbers of such a vector, and 0 for the
+// others.
 template <int count, typename Vector>
-bool readAttribute(const draco::Mesh& mesh, std::uint32_t id, std::vector<Vector>& values) {
+bool readAttribute(const draco::Mesh& mesh, std::uint32_t id, std::vector<Vector>& values,
+                   std::size_t components = count) {
   const draco::PointAttribute* attribute = mesh.GetAttributeByUniqueId(id);
   const bool isMapped = attribute != nullptr && !attribute->is_mapping_identity();
-  if (attribute == nullptr || attribute->num_components() != count) return false;
+  if (attribute == nullptr || attribute->num_components() != static_cast<int>(components)) return false;
   if (isMapped && attribute->indices_map_size() < mesh.num_points()) return false;
   values.reserve(mesh.num_points());
   for (draco::PointIndex i(0); i < mesh.num_points(); ++i) {
     const draco::AttributeValueIndex at = attribute->mapped_index(i);
-    Vector value;
+    Vector value = Vector::Zero();
     if (at.value() >= attribute->size() || !attribute->ConvertValue<float, count>(at, value.data()))
       return false;
     values.push_back(value);
@@ -204,9 +206,10 @@ tl::expected<DracoMesh, std::string> decodeWith(draco::DecoderBuffer& buffer, co
     return tl::unexpected(fmt::format("has no positions in its attribute {}", request.positions));
   if (request.uvs && !readAttribute<2>(mesh, *request.uvs, decoded.uvs))
     return tl::unexpected(fmt::format("has no texture coordinates in its attribute {}", *request.uvs));
-  for (const std::uint32_t id : request.vectors)
-    if (!readAttribute<4>(mesh, id, decoded.vectors.emplace_back()))
-      return tl::unexpected(fmt::format("has no four numbers for each point in its attribute {}", id));
+  for (const auto& [id, components] : request.vectors)
+    if (components > 4 || !readAttribute<4>(mesh, id, decoded.vectors.emplace_back(), components))
+      return tl::unexpected(
+          fmt::format("does not have {} numbers for each point in its attribute {}", components, id));
   decoded.indices.reserve(std::size_t{3} * mesh.num_faces());
   for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
     for (const draco::PointIndex& point : mesh.face(f)) {

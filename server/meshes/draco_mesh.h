@@ -22,18 +22,25 @@ inline constexpr int kMaxDracoPointBytes = 256;
 inline constexpr int kMaxDracoComponents = 64;
 
 struct DracoRequest {
-  std::uint32_t positions = 0;              // unique id of the attribute
-  std::optional<std::uint32_t> uvs;         // likewise
-  std::vector<std::uint32_t> vectors = {};  // likewise, of further attributes with four numbers each
+  std::uint32_t positions = 0;       // unique id of the attribute
+  std::optional<std::uint32_t> uvs;  // likewise
+  // Further attribute with one to four numbers for each point.
+  struct Vector {
+    std::uint32_t id = 0;
+    std::size_t components = 4;
+  };
+  std::vector<Vector> vectors = {};
   // Most points and faces: what the file states outside of the compressed data, which the caller has checked.
   std::uint64_t maxPoints = 0, maxFaces = 0;
 };
 
 struct DracoMesh {
-  std::vector<model::Vec3> positions;                 // of points
-  std::vector<model::Uv> uvs;                         // of points; empty if not requested
-  std::vector<std::vector<Eigen::Vector4f>> vectors;  // of points, one for each of the request
-  std::vector<std::uint32_t> indices;                 // of points, three per face; they exist
+  std::vector<model::Vec3> positions;  // of points
+  std::vector<model::Uv> uvs;          // of points; empty if not requested
+  // Further attributes of the points, one for each of the request. Numbers that an attribute does not have
+  // are 0.
+  std::vector<std::vector<Eigen::Vector4f>> vectors;
+  std::vector<std::uint32_t> indices;  // of points, three per face; they exist
 };
 
 // Decodes a buffer of version 2.2. The sizes in the buffer are read first. Larger ones than requested are

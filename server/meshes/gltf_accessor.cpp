@@ -12,6 +12,11 @@
 
 namespace clothstream::meshes {
 
+std::size_t componentsOf(const tinygltf::Accessor& accessor) {
+  const int components = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type));
+  return components > 0 ? static_cast<std::size_t>(components) : 0;
+}
+
 tl::expected<GltfElements, std::string> elementsOf(const tinygltf::Model& model, int index, int type) {
   const tinygltf::Accessor* accessor = elementAt(model.accessors, index);
   if (!accessor) return tl::unexpected(fmt::format("accessor {} does not exist", index));

@@ -29,6 +29,9 @@ struct GltfElements {
   }
 };
 
+// Numbers of an element.
+std::size_t componentsOf(const tinygltf::Accessor& accessor);
+
 // `type` is the TINYGLTF_TYPE of an element. Allocates nothing but the text of an error.
 [[nodiscard]] tl::expected<GltfElements, std::string> elementsOf(const tinygltf::Model& model, int index,
                                                                  int type);

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "proto/text/excerpt.h"
 #include "server/meshes/gltf_accessor.h"
 #include "server/meshes/gltf_primitive.h"
 
@@ -31,47 +32,72 @@ Expected<std::vector<float>> readTimes(const tinygltf::Model& model, int accesso
   return times;
 }
 
-bool areUnit(const std::vector<float>& quaternions) {
-  for (std::size_t i = 0; i < quaternions.size(); i += 4) {
+using Curve = GltfChannel::Curve;
+
+// Elements of a sampler's output for each key: with a cubic curve slopes before and after the value.
+std::size_t elementsOfKey(Curve curve) {
+  return curve == Curve::cubic ? 3 : 1;
+}
+std::size_t componentsOf(GltfChannel::Path path) {
+  return path == GltfChannel::Path::rotation ? 4 : 3;
+}
+
+Expected<Curve> curveOf(const std::string& interpolation) {
+  if (interpolation == "LINEAR") return Curve::lines;
+  if (interpolation == "STEP") return Curve::steps;
+  if (interpolation == "CUBICSPLINE") return Curve::cubic;
+  return tl::unexpected(fmt::format(
+      "has the interpolation \"{}\", which glTF does not have: export it with LINEAR, STEP or CUBICSPLINE",
+      excerpt(interpolation, 20)));
+}
+
+// `step` is the distance of two quaternions, and the first one is at `first`.
+bool areUnit(const std::vector<float>& quaternions, std::size_t first, std::size_t step) {
+  for (std::size_t i = first; i < quaternions.size(); i += step) {
     const Eigen::Map<const Eigen::Vector4f> q(&quaternions[i]);
     if (std::abs(q.norm() - 1) > 0.01f) return false;
   }
   return true;
 }
 
-// A scale along each axis at each key must be that of the node.
-Expected<void> checkScale(const tinygltf::Model& model, int accessor, double scale, std::size_t keys) {
-  const auto values = readFloats(model, accessor, TINYGLTF_TYPE_VEC3, keys, "scales");
+// A scale along each axis at each key must be that of the node. A cubic curve stays there if no slope moves
+// it by more in a second.
+Expected<void> checkScale(const tinygltf::Model& model, const tinygltf::AnimationSampler& sampler,
+                          double scale, std::size_t keys) {
+  const Expected<Curve> curve = curveOf(sampler.interpolation);
+  if (!curve) return tl::unexpected(curve.error());
+  const std::size_t elements = elementsOfKey(*curve);
+  const auto values = readFloats(model, sampler.output, TINYGLTF_TYPE_VEC3, elements * keys, "scales");
   if (!values) return tl::unexpected(values.error());
-  for (const float value : *values)
-    if (std::abs(double{value} - scale) > kSameScale * scale)
-      return tl::unexpected(std::string("changes the scale, which is not supported: remove these keys"));
+  for (std::size_t i = 0; i < values->size(); ++i) {
+    const bool isSlope = *curve == Curve::cubic && i / 3 % elements != 1;
+    if (std::abs(double{(*values)[i]} - (isSlope ? 0 : scale)) > kSameScale * scale)
+      return tl::unexpected(std::string(
+          "changes the scale, which is not supported: remove these keys, or move joints instead of scaling "
+          "them"));
+  }
   return {};
 }
 
 Expected<GltfChannel> readChannel(const tinygltf::Model& model, const tinygltf::AnimationSampler& sampler,
                                   GltfChannel::Path path, std::size_t node, std::size_t keys) {
-  if (sampler.interpolation != "LINEAR" && sampler.interpolation != "STEP")
-    return tl::unexpected(
-        fmt::format("has the interpolation {}, which is not supported: export it with linear interpolation "
-                    "(Blender: Always Sample Animations)",
-                    sampler.interpolation.substr(0, 20)));
+  const Expected<Curve> curve = curveOf(sampler.interpolation);
+  if (!curve) return tl::unexpected(curve.error());
+  const std::size_t elements = elementsOfKey(*curve), components = componentsOf(path);
   const bool turns = path == GltfChannel::Path::rotation;
   auto times = readTimes(model, sampler.input, keys);
   if (!times) return tl::unexpected(std::move(times.error()));
-  auto values =
-      readFloats(model, sampler.output, turns ? TINYGLTF_TYPE_VEC4 : TINYGLTF_TYPE_VEC3, keys, "values");
+  auto values = readFloats(model, sampler.output, turns ? TINYGLTF_TYPE_VEC4 : TINYGLTF_TYPE_VEC3,
+                           elements * keys, "values");
   if (!values) return tl::unexpected(std::move(values.error()));
-  const std::size_t count = values->size() / (turns ? 4 : 3);
-  if (count != times->size())
-    return tl::unexpected(fmt::format("has {} values for {} keys", count, times->size()));
-  if (turns && !areUnit(*values))
+  const std::size_t count = values->size() / components;
+  if (count != elements * times->size())
+    return tl::unexpected(fmt::format("has {} values for {} keys{}", count, times->size(),
+                                      elements == 1 ? "" : "; a key of CUBICSPLINE has three"));
+  if (turns && !areUnit(*values, elements == 1 ? 0 : components, elements * components))
     return tl::unexpected(std::string("has rotations that are not quaternions of length 1"));
-  return GltfChannel{.node = node,
-                     .path = path,
-                     .inSteps = sampler.interpolation == "STEP",
-                     .times = std::move(*times),
-                     .values = std::move(*values)};
+  return GltfChannel{
+      .node = node, .path = path, .curve = *curve, .times = std::move(*times), .values = std::move(*values)};
 }
 
 }  // namespace
@@ -81,8 +107,14 @@ void GltfChannel::apply(double seconds, Similarity& pose) const {
   const std::size_t from = after == 0 ? 0 : after - 1,
                     to = std::min(from + (after == 0 ? 0 : 1), times.size() - 1);
   const double length = double{times[to]} - times[from];
-  const double part = inSteps || length <= 0 ? 0 : (seconds - times[from]) / length;
-  if (path == Path::translation) {
+  const double part = curve == Curve::steps || length <= 0 ? 0 : (seconds - times[from]) / length;
+  if (curve == Curve::cubic) {
+    const Eigen::Vector4d value = onCubic(from, to, part, length);
+    if (path == Path::translation)
+      pose.translation = value.head<3>();
+    else
+      pose.rotation = Eigen::Quaterniond(value).normalized();
+  } else if (path == Path::translation) {
     const auto at = [&](std::size_t key) {
       return Eigen::Vector3d(values[3 * key], values[3 * key + 1], values[3 * key + 2]);
     };
@@ -94,6 +126,20 @@ void GltfChannel::apply(double seconds, Similarity& pose) const {
     };
     pose.rotation = at(from).slerp(part, at(to)).normalized();
   }
+}
+
+// glTF 2.0, appendix C.5. A translation has 0 as its fourth number.
+Eigen::Vector4d GltfChannel::onCubic(std::size_t from, std::size_t to, double part, double length) const {
+  const std::size_t components = componentsOf(path);
+  const auto at = [&](std::size_t key, std::size_t element) {
+    Eigen::Vector4d four = Eigen::Vector4d::Zero();
+    for (std::size_t c = 0; c < components; ++c)
+      four[static_cast<Eigen::Index>(c)] = values[components * (elementsOfKey(curve) * key + element) + c];
+    return four;
+  };
+  const double t = part, t2 = t * t, t3 = t2 * t;
+  return (2 * t3 - 3 * t2 + 1) * at(from, 1) + length * (t3 - 2 * t2 + t) * at(from, 2) +
+         (3 * t2 - 2 * t3) * at(to, 1) + length * (t3 - t2) * at(to, 0);
 }
 
 Expected<std::vector<GltfChannel>> readChannels(const tinygltf::Model& model,
@@ -118,7 +164,7 @@ Expected<std::vector<GltfChannel>> readChannels(const tinygltf::Model& model,
       return refuse(fmt::format("is the second one for the {} of node {}", channel.target_path.substr(0, 20),
                                 channel.target_node));
     if (channel.target_path == "scale") {
-      if (auto done = checkScale(model, sampler->output, poses[node].scale, keys); !done)
+      if (auto done = checkScale(model, *sampler, poses[node].scale, keys); !done)
         return refuse(done.error());
       continue;
     }

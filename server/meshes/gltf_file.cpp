@@ -20,10 +20,12 @@
 #include "proto/text/lines.h"
 #include "proto/text/utf8.h"
 #include "server/files/regular_file.h"
+#include "server/meshes/gltf_attributes.h"
 #include "server/meshes/gltf_container.h"
 #include "server/meshes/gltf_primitive.h"
 #include "server/meshes/gltf_skeleton.h"
 #include "server/meshes/gltf_skin.h"
+#include "server/meshes/gltf_vertex_joints.h"
 
 namespace clothstream::meshes {
 namespace {
@@ -32,10 +34,14 @@ using Affine = Eigen::Affine3d;
 template <typename T>
 using Expected = tl::expected<T, std::string>;
 
+// Skins of the meshes of a file. Each may name its joints again.
+constexpr std::size_t kMostSkins = 256;
+
 // Where a mesh is in the scene.
 struct Placement {
   Affine transform = Affine::Identity();        // of its node
   const std::vector<Affine>* joints = nullptr;  // matrices of the joints of its skin, which replace it
+  const SkinBinding* binding = nullptr;         // to the joints that were asked for, which replace it, too
   std::span<const double> weights = {};         // of its morph targets
 };
 
@@ -46,6 +52,8 @@ class Gatherer {
 
   Expected<MeshSource> gather() {
     const tinygltf::Scene* scene = elementAt(model_.scenes, std::max(0, model_.defaultScene));
+    if (joints_ && scene)
+      if (auto done = readSkins(*scene); !done) return tl::unexpected(std::move(done.error()));
     if (scene) {
       for (const int node : scene->nodes)
         if (auto done = addTree(node); !done) return tl::unexpected(done.error());
@@ -59,6 +67,7 @@ class Gatherer {
     if (skeleton_ && !rigidMesh_.empty())
       return tl::unexpected(fmt::format(
           "{} has no skin, in contrast to others: remove it, or give it the same joints", rigidMesh_));
+    completeAttributes(source_.vertices.size(), source_.attributes);
     if (skeleton_)
       source_.skin = std::move(skeleton_->skin);
     else if (joints_ && !joints_->animation.empty())
@@ -82,11 +91,12 @@ class Gatherer {
       if (node->mesh >= 0) {
         const tinygltf::Mesh* mesh = elementAt(model_.meshes, node->mesh);
         if (!mesh) return tl::unexpected(fmt::format("mesh {} does not exist", node->mesh));
-        if (auto done = takeSkin(*node, *mesh); !done) return done;
+        if (joints_ && node->skin < 0) rigidMesh_ = fmt::format("mesh \"{}\"", excerpt(mesh->name, 64));
         const auto matrices = matricesOf(*node);
         if (!matrices) return tl::unexpected(matrices.error());
         const Placement placement{.transform = transform,
                                   .joints = *matrices,
+                                  .binding = bindingOf(*node),
                                   .weights = node->weights.empty() ? mesh->weights : node->weights};
         if (auto done = addMesh(*mesh, placement); !done) return done;
       }
@@ -97,22 +107,35 @@ class Gatherer {
     return {};
   }
 
-  // The first mesh with a skin decides on the skeleton.
-  Expected<void> takeSkin(const tinygltf::Node& node, const tinygltf::Mesh& mesh) {
-    if (!joints_) return {};
-    if (node.skin < 0) {
-      rigidMesh_ = fmt::format("mesh \"{}\"", mesh.name.substr(0, 64));
-      return {};
+  // Reads the skins of all meshes of the scene, in the order of its nodes.
+  Expected<void> readSkins(const tinygltf::Scene& scene) {
+    std::vector<bool> isSeen(model_.nodes.size(), false);
+    std::vector<int> open(scene.nodes.rbegin(), scene.nodes.rend());
+    while (!open.empty()) {
+      const int index = open.back();
+      open.pop_back();
+      const tinygltf::Node* node = elementAt(model_.nodes, index);
+      if (!node || isSeen[static_cast<std::size_t>(index)]) continue;  // addTree() refuses them
+      isSeen[static_cast<std::size_t>(index)] = true;
+      if (node->mesh >= 0 && node->skin >= 0 && std::ranges::find(skins_, node->skin) == skins_.end()) {
+        if (skins_.size() == kMostSkins)
+          return tl::unexpected(fmt::format("has meshes with more than {} skins: join meshes", kMostSkins));
+        skins_.push_back(node->skin);
+      }
+      open.insert(open.end(), node->children.rbegin(), node->children.rend());
     }
-    if (skeleton_ && node.skin != skinIndex_)
-      return tl::unexpected(
-          fmt::format("mesh \"{}\" has another skin than the meshes before: join the meshes", mesh.name));
-    if (skeleton_) return {};
-    auto read = readSkeleton(model_, node.skin, *joints_);
+    if (skins_.empty()) return {};
+    auto read = readSkeleton(model_, skins_, *joints_);
     if (!read) return tl::unexpected(std::move(read.error()));
     skeleton_ = std::move(*read);
-    skinIndex_ = node.skin;
     return {};
+  }
+
+  const SkinBinding* bindingOf(const tinygltf::Node& node) const {
+    const auto skin = std::ranges::find(skins_, node.skin);
+    return skeleton_ && skin != skins_.end()
+               ? &skeleton_->bindings[static_cast<std::size_t>(skin - skins_.begin())]
+               : nullptr;
   }
 
   // Matrices of the joints that place a mesh. Null for a mesh without a skin, and if the skin is requested,
@@ -139,8 +162,13 @@ class Gatherer {
     const std::size_t firstVertex = source_.vertices.size(), firstUv = source_.uvs.size();
     Expected<GltfPrimitive> read = readPrimitive(
         model_, primitive,
-        {.vertices = maxVertices_ - firstVertex, .triangles = 2 * maxVertices_ - source_.faces.size()});
+        {.vertices = maxVertices_ - firstVertex, .triangles = 2 * maxVertices_ - source_.faces.size()},
+        hasAttributes() ? std::span<const std::string_view>(kSkinAttributes)
+                        : std::span<const std::string_view>());
     if (!read) return tl::unexpected(read.error());
+    if (hasAttributes())
+      if (auto done = addAttributes(model_, primitive, *read, firstVertex, source_.attributes); !done)
+        return done;
     if (auto done = addTargets(model_, primitive, placement.weights, read->positions); !done) return done;
     const auto isMirrored = place(primitive, placement, *read);
     if (!isMirrored) return tl::unexpected(isMirrored.error());
@@ -165,11 +193,11 @@ class Gatherer {
         return tl::unexpected(std::move(done.error()));
       return placement.joints->front().linear().determinant() < 0;
     }
-    const Affine transform = skeleton_ ? Affine(Eigen::Scaling(skeleton_->scale)) : placement.transform;
+    const Affine transform = placement.binding ? placement.binding->vertices : placement.transform;
     for (model::Vec3& position : read.positions)
       position = (transform * position.cast<double>()).cast<float>();
-    if (skeleton_) {
-      const auto vertices = readVertexJoints(model_, primitive, read, *skeleton_);
+    if (placement.binding) {
+      const auto vertices = readVertexJoints(model_, primitive, read, *placement.binding);
       if (!vertices) return tl::unexpected(vertices.error());
       skeleton_->skin.vertices.insert(skeleton_->skin.vertices.end(), vertices->begin(), vertices->end());
     }
@@ -191,13 +219,15 @@ class Gatherer {
     }
   }
 
+  bool hasAttributes() const { return joints_ && joints_->attributes; }
+
   const tinygltf::Model& model_;
   std::uint64_t maxVertices_;
   const JointRequest* joints_;           // null: joints place the vertices once, and the result has no skin
   std::optional<NodeTransforms> nodes_;  // made for the first skin
   std::unordered_map<int, std::vector<Affine>> matrices_;  // of the joints of each skin
+  std::vector<int> skins_;                                 // that were asked for
   std::optional<GltfSkeleton> skeleton_;
-  int skinIndex_ = -1;
   std::string rigidMesh_;  // a mesh without a skin
   std::vector<bool> visited_;
   MeshSource source_;

@@ -156,18 +156,27 @@ int numberIn(const tinygltf::Value& object, const std::string& name) {
   return isThere ? object.Get(name).GetNumberAsInt() : -1;
 }
 
-// Names of the compressed attributes for skins.
-std::vector<std::string> influencesIn(const tinygltf::Value& attributes) {
+// Names of the compressed attributes for skins, and of those that are wanted. Their accessors must exist.
+std::vector<std::string> vectorsIn(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
+                                   const tinygltf::Value& compressed,
+                                   std::span<const std::string_view> wanted) {
   std::vector<std::string> names;
-  for (const std::string& name : attributes.Keys())
-    if ((name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_")) && numberIn(attributes, name) >= 0)
-      names.push_back(name);
+  for (const std::string& name : compressed.Keys()) {
+    if (numberIn(compressed, name) < 0) continue;
+    const auto attribute = primitive.attributes.find(name);
+    const bool isWanted = std::ranges::find(wanted, name) != wanted.end() &&
+                          attribute != primitive.attributes.end() &&
+                          elementAt(model.accessors, attribute->second);
+    if (isWanted || name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_")) names.push_back(name);
+  }
   if (names.size() > kMaxDracoAttributes) names.resize(kMaxDracoAttributes);
   return names;
 }
 
-Expected<GltfPrimitive> readDraco(const tinygltf::Model& model, const tinygltf::Value& extension,
-                                  std::size_t vertices, std::size_t indices, std::size_t triangles) {
+Expected<GltfPrimitive> readDraco(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
+                                  const tinygltf::Value& extension, std::size_t vertices, std::size_t indices,
+                                  std::span<const std::string_view> wanted) {
+  const std::size_t triangles = trianglesOf(modeOf(primitive), indices);
   const auto refuse = [](std::string_view what) {
     return tl::unexpected(fmt::format("its compressed data ({}) {}", kDracoExtension, what));
   };
@@ -191,14 +200,18 @@ Expected<GltfPrimitive> readDraco(const tinygltf::Model& model, const tinygltf::
                        .maxPoints = vertices,
                        .maxFaces = triangles};
   if (uv >= 0) request.uvs = static_cast<std::uint32_t>(uv);
-  const std::vector<std::string> names = influencesIn(extension.Get("attributes"));
-  for (const std::string& name : names)
-    request.vectors.push_back(static_cast<std::uint32_t>(numberIn(extension.Get("attributes"), name)));
+  const std::vector<std::string> names = vectorsIn(model, primitive, extension.Get("attributes"), wanted);
+  for (const std::string& name : names) {
+    DracoRequest::Vector& vector = request.vectors.emplace_back();
+    vector.id = static_cast<std::uint32_t>(numberIn(extension.Get("attributes"), name));
+    if (std::ranges::find(wanted, name) != wanted.end())
+      vector.components = componentsOf(*elementAt(model.accessors, primitive.attributes.at(name)));
+  }
   auto decoded = decodeDraco(
       std::as_bytes(std::span(buffer->data).subspan(view->byteOffset, view->byteLength)), request);
   if (!decoded) return refuse(decoded.error());
   GltfPrimitive read{std::move(decoded->positions), std::move(decoded->uvs), std::move(decoded->indices)};
-  for (std::size_t i = 0; i < names.size(); ++i) read.influences[names[i]] = std::move(decoded->vectors[i]);
+  for (std::size_t i = 0; i < names.size(); ++i) read.vectors[names[i]] = std::move(decoded->vectors[i]);
   return read;
 }
 
@@ -213,7 +226,8 @@ std::string meshoptError() {
 }
 
 Expected<GltfPrimitive> readPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
-                                      const PrimitiveLimits& limits) {
+                                      const PrimitiveLimits& limits,
+                                      std::span<const std::string_view> attributes) {
   const int mode = modeOf(primitive);
   if (auto problem = checkMode(mode)) return tl::unexpected(std::move(*problem));
   const auto position = primitive.attributes.find("POSITION");
@@ -226,7 +240,7 @@ Expected<GltfPrimitive> readPrimitive(const tinygltf::Model& model, const tinygl
     return tl::unexpected(std::string("has no accessors for its POSITION and indices"));
   if (auto problem = checkCounts(mode, vertices->count, corners->count, limits))
     return tl::unexpected(std::move(*problem));
-  return readDraco(model, draco->second, vertices->count, corners->count, trianglesOf(mode, corners->count));
+  return readDraco(model, primitive, draco->second, vertices->count, corners->count, attributes);
 }
 
 Expected<void> addTargets(const tinygltf::Model& model, const tinygltf::Primitive& primitive,

@@ -7,6 +7,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <tiny_gltf.h>
@@ -34,8 +35,9 @@ struct GltfPrimitive {
   std::vector<model::Vec3> positions;  // without the transform of a node
   std::vector<model::Uv> uvs;  // TEXCOORD_0, as many as positions, v downwards; empty if there are none
   std::vector<std::uint32_t> indices;  // three per triangle; of any vertices
-  // JOINTS_n and WEIGHTS_n that are compressed, by their names. Others stay in their accessors.
-  std::map<std::string, std::vector<Eigen::Vector4f>> influences = {};
+  // JOINTS_n, WEIGHTS_n and requested attributes that are compressed, by their names. Others stay in their
+  // accessors. Those with fewer than four numbers have 0 for the others.
+  std::map<std::string, std::vector<Eigen::Vector4f>> vectors = {};
 };
 
 struct PrimitiveLimits {
@@ -43,10 +45,10 @@ struct PrimitiveLimits {
 };
 
 // Reads the triangles of a primitive, which may be a strip or a fan, or compressed with Draco. Larger ones
-// are refused before anything is allocated for them.
-[[nodiscard]] tl::expected<GltfPrimitive, std::string> readPrimitive(const tinygltf::Model& model,
-                                                                     const tinygltf::Primitive& primitive,
-                                                                     const PrimitiveLimits& limits);
+// are refused before anything is allocated for them. `attributes` are those to decode if they are compressed.
+[[nodiscard]] tl::expected<GltfPrimitive, std::string> readPrimitive(
+    const tinygltf::Model& model, const tinygltf::Primitive& primitive, const PrimitiveLimits& limits,
+    std::span<const std::string_view> attributes = {});
 
 // Adds the morph targets of the primitive to its positions, each times its weight. Targets without a weight,
 // or with the weight 0, change nothing.

@@ -5,14 +5,15 @@
 #include <cmath>
 #include <optional>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "proto/text/excerpt.h"
 #include "server/meshes/gltf_accessor.h"
 #include "server/meshes/gltf_channels.h"
 #include "server/meshes/gltf_primitive.h"
-#include "server/meshes/gltf_skin.h"
 
 namespace clothstream::meshes {
 namespace {
@@ -30,6 +31,11 @@ constexpr double kSimilar = 1e-3;
 constexpr double kLargestTurn = 0.9659;
 constexpr double kShortest = 1e-4;  // s; a step between closer keys is no rotation
 constexpr float kStillSeconds = 1;  // period of an animation without motion
+// A straight path leaves a cubic one by t (1 - t) (a + b t), for a part t of the way. If that is at most 1 at
+// t = 1/4, 1/2 and 3/4, it is below 1.1 everywhere.
+constexpr double kSampled = 0.9;
+// Distances of skins that share joints, in metres and as the distance of two quaternions.
+constexpr double kSamePlace = 1e-3, kSameTurn = 1e-3;
 
 std::optional<Similarity> similarityOf(const Eigen::Matrix4d& matrix) {
   const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
@@ -60,18 +66,30 @@ model::Pose rigid(const Similarity& pose) {
   return {pose.translation.cast<float>(), pose.rotation.cast<float>()};
 }
 
+// False if the orientation is no rotation, as where a cubic path passes through 0.
 bool isFinite(const model::Pose& pose) {
-  return pose.position.allFinite() && pose.orientation.coeffs().allFinite();
+  return pose.position.allFinite() && std::abs(pose.orientation.norm() - 1) < 0.01f;
+}
+
+// Distance of two rotations as quaternions: half the angle between them, if it is small.
+double turnBetween(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+  return std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
+}
+
+std::string nameOf(const tinygltf::Skin& skin) {
+  return fmt::format("skin \"{}\"", excerpt(skin.name, 64));
 }
 
 class SkeletonReader {
  public:
-  SkeletonReader(const tinygltf::Model& model, const tinygltf::Skin& skin, const JointRequest& request)
-      : model_(model), skin_(skin), request_(request) {}
+  SkeletonReader(const tinygltf::Model& model, std::vector<const tinygltf::Skin*> skins,
+                 const JointRequest& request)
+      : model_(model), skins_(std::move(skins)), request_(request) {}
 
   Expected<GltfSkeleton> read() {
-    for (const auto step : {&SkeletonReader::findNodes, &SkeletonReader::readPoses,
-                            &SkeletonReader::orderJoints, &SkeletonReader::bind, &SkeletonReader::animate})
+    for (const auto step :
+         {&SkeletonReader::listJoints, &SkeletonReader::findNodes, &SkeletonReader::readPoses,
+          &SkeletonReader::orderJoints, &SkeletonReader::bind, &SkeletonReader::animate})
       if (auto done = (this->*step)(); !done) return tl::unexpected(std::move(done.error()));
     return std::move(result_);
   }
@@ -79,11 +97,35 @@ class SkeletonReader {
  private:
   using Done = Expected<void>;
 
+  // An error of one skin of several.
+  tl::unexpected<std::string> refuse(const tinygltf::Skin& skin, const std::string& text) const {
+    return tl::unexpected(skins_.size() == 1 ? std::string(text) : fmt::format("{}: {}", nameOf(skin), text));
+  }
+
+  // Lists each joint once, in the order of the skins.
+  Done listJoints() {
+    std::unordered_set<int> listed;
+    for (const tinygltf::Skin* skin : skins_) {
+      if (skin->joints.empty() || skin->joints.size() > request_.joints)
+        return refuse(*skin,
+                      fmt::format("has {} joints; must have 1 to {}", skin->joints.size(), request_.joints));
+      std::unordered_set<int> own;
+      for (const int joint : skin->joints) {
+        if (!own.insert(joint).second)
+          return refuse(*skin, fmt::format("has node {} twice as a joint", joint));
+        if (listed.insert(joint).second) joints_.push_back(joint);
+      }
+    }
+    if (joints_.size() > request_.joints)
+      return tl::unexpected(
+          fmt::format("have {} joints in all; must have at most {}: remove joints that move no "
+                      "vertex",
+                      joints_.size(), request_.joints));
+    return {};
+  }
+
   // Lists the joints and the nodes above them, parents first.
   Done findNodes() {
-    if (skin_.joints.empty() || skin_.joints.size() > request_.joints)
-      return tl::unexpected(
-          fmt::format("has {} joints; must have 1 to {}", skin_.joints.size(), request_.joints));
     std::vector<int> parents(model_.nodes.size(), kNoParent);
     for (std::size_t i = 0; i < model_.nodes.size(); ++i)
       for (const int child : model_.nodes[i].children) {
@@ -93,7 +135,7 @@ class SkeletonReader {
         if (parent != kNoParent) return tl::unexpected(fmt::format("node {} has two parents", child));
         parent = static_cast<int>(i);
       }
-    for (const int joint : skin_.joints) {
+    for (const int joint : joints_) {
       if (!elementAt(model_.nodes, joint))
         return tl::unexpected(fmt::format("node {} does not exist", joint));
       std::vector<int> branch;
@@ -129,66 +171,106 @@ class SkeletonReader {
   // Numbers the joints in the order of the file, but parents before children.
   Done orderJoints() {
     constexpr std::size_t kNone = ~std::size_t{0};
-    std::vector<std::size_t> fileNumber(nodes_.size(), kNone), number(nodes_.size(), kNone);
-    for (std::size_t i = 0; i < skin_.joints.size(); ++i) {
-      std::size_t& own = fileNumber[places_.at(skin_.joints[i])];
-      if (own != kNone) return tl::unexpected(fmt::format("has node {} twice as a joint", skin_.joints[i]));
-      own = i;
-    }
+    std::vector<std::size_t> number(nodes_.size(), kNone);
+    std::vector<bool> isJoint(nodes_.size(), false);
+    for (const int joint : joints_) isJoint[places_.at(joint)] = true;
     const auto parentOf = [&](std::size_t place) {
       std::optional<std::size_t> above = parents_[place];
-      while (above && fileNumber[*above] == kNone) above = parents_[*above];
+      while (above && !isJoint[*above]) above = parents_[*above];
       return above;
     };
-    result_.numberOf.resize(skin_.joints.size());
-    while (jointPlaces_.size() < skin_.joints.size())
-      for (const int joint : skin_.joints) {
+    while (jointPlaces_.size() < joints_.size())
+      for (const int joint : joints_) {
         const std::size_t place = places_.at(joint);
         const std::optional<std::size_t> parent = parentOf(place);
         if (number[place] != kNone || (parent && number[*parent] == kNone)) continue;
         number[place] = jointPlaces_.size();
-        result_.numberOf[fileNumber[place]] = static_cast<std::uint8_t>(jointPlaces_.size());
         jointPlaces_.push_back(place);
         model::Joint& to = result_.skin.joints.emplace_back();
         to.name = model_.nodes[static_cast<std::size_t>(joint)].name;
         if (parent) to.parent = static_cast<std::uint32_t>(number[*parent]);
       }
+    for (const tinygltf::Skin* skin : skins_) {
+      SkinBinding& binding = result_.bindings.emplace_back();
+      for (const int joint : skin->joints)
+        binding.numberOf.push_back(static_cast<std::uint8_t>(number[places_.at(joint)]));
+    }
     return {};
   }
 
-  // Sets the poses at which the joints are bound to the vertices, and the scale of the vertices.
-  //
+  // Poses at which a skin binds its joints to its vertices, which are scaled by `scale`.
+  struct Bound {
+    std::vector<Similarity> rests;
+    double scale = 1;
+  };
+
   // A joint with the matrix G moves the point v to G N v, where N is its inverse bind matrix. With the scales
   // g and n, the point a v with a = g n moves rigidly: from the pose that has the rotation of the inverse of
   // N and a times its translation, to the rotation and translation of G.
-  Done bind() {
+  Expected<Bound> boundOf(const tinygltf::Skin& skin, const SkinBinding& binding,
+                          const std::vector<Similarity>& globals) const {
     std::vector<float> matrices;
-    if (skin_.inverseBindMatrices >= 0) {
-      auto read = readFloats(model_, skin_.inverseBindMatrices, TINYGLTF_TYPE_MAT4, request_.joints,
+    if (skin.inverseBindMatrices >= 0) {
+      auto read = readFloats(model_, skin.inverseBindMatrices, TINYGLTF_TYPE_MAT4, request_.joints,
                              "inverse bind matrices");
-      if (!read) return tl::unexpected(std::move(read.error()));
+      if (!read) return refuse(skin, read.error());
       matrices = std::move(*read);
-      if (matrices.size() < 16 * skin_.joints.size())
-        return tl::unexpected(fmt::format("has {} inverse bind matrices for {} joints", matrices.size() / 16,
-                                          skin_.joints.size()));
+      if (matrices.size() < 16 * skin.joints.size())
+        return refuse(skin, fmt::format("has {} inverse bind matrices for {} joints", matrices.size() / 16,
+                                        skin.joints.size()));
     }
-    const std::vector<Similarity> globals = globalsOf(poses_);
-    std::vector<Similarity> rests(jointPlaces_.size());
-    for (std::size_t i = 0; i < skin_.joints.size(); ++i) {
+    Bound bound;
+    for (std::size_t i = 0; i < skin.joints.size(); ++i) {
       Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
       if (!matrices.empty()) matrix = Eigen::Map<const Eigen::Matrix4f>(&matrices[16 * i]).cast<double>();
       const std::optional<Similarity> back = similarityOf(matrix);
       if (!back)
-        return tl::unexpected(
-            fmt::format("inverse bind matrix {} mirrors, or scales differently along the axes", i));
-      const std::size_t number = result_.numberOf[i];
-      const double scale = globals[jointPlaces_[number]].scale * back->scale;
-      if (i == 0) result_.scale = scale;
-      if (!(std::abs(scale - result_.scale) < kSimilar * result_.scale))
-        return tl::unexpected(fmt::format("joint {} has another scale than joint 0: apply the scale", i));
-      rests[number] = back->inverse();
-      rests[number].translation *= result_.scale;
-      rests[number].scale = 1;
+        return refuse(skin,
+                      fmt::format("inverse bind matrix {} mirrors, or scales differently along the axes", i));
+      const double scale = globals[jointPlaces_[binding.numberOf[i]]].scale * back->scale;
+      if (i == 0) bound.scale = scale;
+      if (!(std::abs(scale - bound.scale) < kSimilar * bound.scale))
+        return refuse(skin, fmt::format("joint {} has another scale than joint 0: apply the scale", i));
+      Similarity& rest = bound.rests.emplace_back(back->inverse());
+      rest.translation *= bound.scale;
+      rest.scale = 1;
+    }
+    return bound;
+  }
+
+  // Sets the poses at which the joints rest, and where the vertices of the skins are then. Meshes of one file
+  // may be bound in different frames. The first joint that a skin shares with those before it decides how its
+  // vertices move to their frame, and all other shared joints must agree.
+  Done bind() {
+    const std::vector<Similarity> globals = globalsOf(poses_);
+    std::vector<Similarity> rests(jointPlaces_.size());
+    std::vector<const tinygltf::Skin*> boundBy(jointPlaces_.size(), nullptr);
+    for (std::size_t s = 0; s < skins_.size(); ++s) {
+      const tinygltf::Skin& skin = *skins_[s];
+      SkinBinding& binding = result_.bindings[s];
+      const Expected<Bound> bound = boundOf(skin, binding, globals);
+      if (!bound) return tl::unexpected(bound.error());
+      Similarity move;
+      const auto shared =
+          std::ranges::find_if(binding.numberOf, [&](std::uint8_t number) { return boundBy[number]; });
+      if (shared != binding.numberOf.end())
+        move = rests[*shared] *
+               bound->rests[static_cast<std::size_t>(shared - binding.numberOf.begin())].inverse();
+      for (std::size_t i = 0; i < skin.joints.size(); ++i) {
+        const std::size_t number = binding.numberOf[i];
+        const Similarity rest = move * bound->rests[i];
+        if (boundBy[number] && !((rest.translation - rests[number].translation).norm() < kSamePlace &&
+                                 turnBetween(rest.rotation, rests[number].rotation) < kSameTurn))
+          return refuse(skin,
+                        fmt::format("binds joint {} at another place than {}: join their meshes, or export "
+                                    "both in the same pose",
+                                    i, nameOf(*boundBy[number])));
+        if (boundBy[number]) continue;
+        rests[number] = shared == binding.numberOf.end() ? bound->rests[i] : rest;
+        boundBy[number] = &skin;
+      }
+      binding.vertices =
+          Eigen::Translation3d(move.translation) * move.rotation * Eigen::Scaling(bound->scale);
     }
     for (std::size_t i = 0; i < rests.size(); ++i) {
       result_.skin.joints[i].rest = rigid(local(rests, i));
@@ -199,6 +281,7 @@ class SkeletonReader {
   }
 
   Done animate() {
+    if (!request_.animated) return {};
     std::vector<GltfChannel> channels;
     const tinygltf::Animation* animation = nullptr;
     if (!request_.animation.empty()) {
@@ -231,7 +314,8 @@ class SkeletonReader {
     std::vector<float> times;
     for (const GltfChannel& channel : channels)
       for (std::size_t i = 0; i < channel.times.size(); ++i) {
-        if (channel.inSteps && i > 0) times.push_back(std::nextafter(channel.times[i], 0.0f));
+        if (channel.curve == GltfChannel::Curve::steps && i > 0)
+          times.push_back(std::nextafter(channel.times[i], 0.0f));
         times.push_back(channel.times[i]);
       }
     std::ranges::sort(times);
@@ -249,12 +333,18 @@ class SkeletonReader {
       keys[0].time = 0;
       keys[1] = {kStillSeconds, keys[0].joints};
     } else {
+      const bool isCurved = std::ranges::any_of(
+          channels, [](const GltfChannel& channel) { return channel.curve == GltfChannel::Curve::cubic; });
       for (std::size_t i = 0; i < times.size(); ++i) {
         model::JointKey key = keyAt(channels, times[i]);
-        if (i > 0) addBetween(channels, times[i - 1], key);
+        if (i > 0 && isCurved)
+          addCurve(channels, times[0], keyAt(channels, times[i - 1]),
+                   keyAt(channels, middleOf(times[i - 1], times[i])), key);
+        else if (i > 0)
+          addBetween(channels, times[i - 1], key);
         key.time = times[i] - times[0];
         keys.push_back(std::move(key));
-        if (keys.size() > request_.keys || keys.size() * jointPlaces_.size() > request_.poses)
+        if (hasTooManyKeys())
           return tl::unexpected(
               fmt::format("has an animation of more than {} keys, or of more than {} poses of joints: export "
                           "it with fewer keys",
@@ -269,6 +359,42 @@ class SkeletonReader {
         return tl::unexpected(std::string("has poses of joints that are not finite"));
     }
     return {};
+  }
+
+  bool hasTooManyKeys() const {
+    const std::size_t keys = result_.skin.keys.size();
+    return keys > request_.keys || keys * jointPlaces_.size() > request_.poses;
+  }
+
+  static float middleOf(float a, float b) { return static_cast<float>((double{a} + double{b}) / 2); }
+
+  // Whether joints that move in a straight line between two keys are close enough to `real` at its time.
+  static bool isNear(const model::JointKey& from, const model::JointKey& to, const model::JointKey& real) {
+    const double part = (double{real.time} - from.time) / (double{to.time} - from.time);
+    const double mostTurn = kSampled * kCurveDegrees * (std::acos(-1.0) / 180) / 2;
+    for (std::size_t i = 0; i < real.joints.size(); ++i) {
+      const model::Pose straight = model::between(from.joints[i], to.joints[i], part);
+      const double away = double{(straight.position - real.joints[i].position).norm()};
+      const double turn =
+          turnBetween(straight.orientation.cast<double>(), real.joints[i].orientation.cast<double>());
+      if (!(away <= kSampled * kCurveMetres && turn <= mostTurn)) return false;
+    }
+    return true;
+  }
+
+  // Adds keys between two, which have times of the file, until the path is followed. `first` is the time of
+  // the first key.
+  void addCurve(const std::vector<GltfChannel>& channels, float first, const model::JointKey& from,
+                const model::JointKey& middle, const model::JointKey& to) {
+    const bool isShort =
+        double{to.time} - from.time < kShortest || !(from.time < middle.time && middle.time < to.time);
+    if (isShort || hasTooManyKeys()) return;
+    const model::JointKey before = keyAt(channels, middleOf(from.time, middle.time)),
+                          after = keyAt(channels, middleOf(middle.time, to.time));
+    if (isNear(from, to, before) && isNear(from, to, middle) && isNear(from, to, after)) return;
+    addCurve(channels, first, from, before, middle);
+    result_.skin.keys.push_back({middle.time - first, middle.joints});
+    addCurve(channels, first, middle, after, to);
   }
 
   // Adds keys between the newest one, at the time `from` of the file, and `to`.
@@ -316,8 +442,9 @@ class SkeletonReader {
   }
 
   const tinygltf::Model& model_;
-  const tinygltf::Skin& skin_;
+  std::vector<const tinygltf::Skin*> skins_;
   const JointRequest& request_;
+  std::vector<int> joints_;  // nodes, each once
   // Nodes, parents first; the place of each in this list, of its parent, and its pose relative to that.
   std::vector<int> nodes_;
   std::unordered_map<int, std::size_t> places_;
@@ -329,33 +456,17 @@ class SkeletonReader {
 
 }  // namespace
 
-Expected<GltfSkeleton> readSkeleton(const tinygltf::Model& model, int skin, const JointRequest& request) {
-  const tinygltf::Skin* found = elementAt(model.skins, skin);
-  if (!found) return tl::unexpected(fmt::format("skin {} does not exist", skin));
-  return SkeletonReader(model, *found, request).read().map_error([&](const std::string& text) {
-    return fmt::format("skin \"{}\": {}", found->name.substr(0, 64), text);
-  });
-}
-
-Expected<std::vector<model::VertexJoints>> readVertexJoints(const tinygltf::Model& model,
-                                                            const tinygltf::Primitive& primitive,
-                                                            const GltfPrimitive& read,
-                                                            const GltfSkeleton& skeleton) {
-  auto influences = VertexInfluences::read(model, primitive, read, skeleton.numberOf.size());
-  if (!influences) return tl::unexpected(std::move(influences.error()));
-  std::vector<model::VertexJoints> result(read.positions.size());
-  for (std::size_t i = 0; i < result.size(); ++i) {
-    const auto joints = influences->of(i);
-    if (!joints) return tl::unexpected(joints.error());
-    if (joints->size() > model::kVertexJoints)
-      return tl::unexpected(fmt::format("vertex {} has {} joints with a weight: export it with at most {}", i,
-                                        joints->size(), model::kVertexJoints));
-    for (std::size_t k = 0; k < joints->size(); ++k) {
-      result[i].joints[k] = skeleton.numberOf[(*joints)[k].joint];
-      result[i].weights[k] = (*joints)[k].weight;
-    }
+Expected<GltfSkeleton> readSkeleton(const tinygltf::Model& model, std::span<const int> skins,
+                                    const JointRequest& request) {
+  std::vector<const tinygltf::Skin*> found;
+  for (const int skin : skins) {
+    found.push_back(elementAt(model.skins, skin));
+    if (!found.back()) return tl::unexpected(fmt::format("skin {} does not exist", skin));
   }
-  return result;
+  const std::string who = found.size() == 1 ? nameOf(*found[0]) : fmt::format("its {} skins", found.size());
+  return SkeletonReader(model, std::move(found), request).read().map_error([&](const std::string& text) {
+    return fmt::format("{}: {}", who, text);
+  });
 }
 
 }  // namespace clothstream::meshes

@@ -41,7 +41,7 @@ std::uint32_t jointAt(const GltfElements& joints, std::size_t vertex, std::size_
 // Four numbers for each vertex.
 Expected<GltfElements> attributeOf(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
                                    const GltfPrimitive& read, const std::string& name) {
-  if (const auto decoded = read.influences.find(name); decoded != read.influences.end())
+  if (const auto decoded = read.vectors.find(name); decoded != read.vectors.end())
     return GltfElements{reinterpret_cast<const unsigned char*>(decoded->second.data()),
                         sizeof(Eigen::Vector4f), decoded->second.size(), TINYGLTF_COMPONENT_TYPE_FLOAT,
                         false};

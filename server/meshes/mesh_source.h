@@ -30,6 +30,15 @@ struct SourceCorner {
   std::uint32_t vertex = 0, uv = 0;
 };
 
+// Numbers that a glTF file gives its vertices for a cloth that follows joints. Each list has an element for
+// each vertex, or none if no primitive has the attribute. They are not checked.
+struct VertexAttributes {
+  static constexpr float kAbsent = -1;  // for vertices of a primitive without the attribute
+
+  std::vector<float> maxDistances, backstopDistances, backstopRadii;  // m
+  std::vector<Eigen::Vector4f> colours;                               // red, green, blue, alpha
+};
+
 // Mesh with the numbering of its source.
 struct MeshSource {
   std::vector<model::Vec3> vertices;
@@ -45,6 +54,7 @@ struct MeshSource {
   std::vector<Part>
       parts;  // in the order of their faces, the first starts at face 0; empty: one part without name
   std::optional<model::Skin> skin;  // joints of the vertices of a glTF file, if they were requested
+  VertexAttributes attributes;      // likewise
 
   // Corner of a face, less than its cornerCount.
   SourceCorner cornerOf(const SourceFace& face, std::uint32_t corner) const {

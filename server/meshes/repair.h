@@ -30,8 +30,8 @@ struct RepairedMesh {
 // each
 //    other most smoothly, and the others become separate. Where this leaves more than two triangles at an
 //    edge, all become separate.
-// 4. Triangles are turned so that neighbours have their fronts on one side, as few of each piece as possible.
-//    Neighbours for which this is impossible become separate.
+// 4. Triangles are turned so that neighbours have their fronts on one side: that outside if their piece is
+//    closed, else as few of each piece as possible. Neighbours for which this is impossible become separate.
 // 5. A node gets a copy for each further fan of neighbouring triangles around it.
 //
 // The order of faces, parts and texture coordinates is kept. Returns an error that says what to do if no face

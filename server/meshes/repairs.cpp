@@ -46,8 +46,9 @@ std::vector<std::string> Repairs::sentences() const {
         counted(splitEdges, "edge with more than two triangles", "edges with more than two triangles") +
         " split: at most two triangles of an edge are still joined.");
   if (turnedTriangles > 0)
-    text.push_back(counted(turnedTriangles, "triangle", "triangles") +
-                   " turned, so that neighbours have their fronts on one side.");
+    text.push_back(
+        counted(turnedTriangles, "triangle", "triangles") +
+        " turned, so that neighbours have their fronts on one side, and closed surfaces theirs outside.");
   if (cutEdges > 0)
     text.push_back(counted(cutEdges, "edge", "edges") +
                    " cut, because no turning gives the triangles there one front, as on a Moebius strip.");

@@ -148,7 +148,8 @@ class Separation {
     return nodeOf(side) == nodeOf(nextCorner(other));
   }
 
-  // Turns triangles, piece by piece, and separates neighbours that cannot agree.
+  // Turns triangles, piece by piece, and separates neighbours that cannot agree. A closed piece gets its
+  // fronts outside, and another one as few turned triangles as possible.
   void orient() {
     cutEdges_ = 0;
     turned_.assign(count_, 0);
@@ -174,9 +175,29 @@ class Separation {
             ++cutEdges_;
           }
         }
-      if (2 * turns > piece.size())
+      if (isClosed(piece) ? isInsideOut(piece) : 2 * turns > piece.size())
         for (const std::uint32_t triangle : piece) turned_[triangle] ^= 1;
     }
+  }
+
+  bool isClosed(std::span<const std::uint32_t> piece) const {
+    return std::ranges::all_of(piece, [&](std::uint32_t triangle) {
+      return std::ranges::none_of(std::span(neighbours_).subspan(3 * std::size_t{triangle}, 3),
+                                  [](std::uint32_t other) { return other == kNone; });
+    });
+  }
+
+  // Whether the volume of a closed piece is negative. Places are relative to its first corner.
+  bool isInsideOut(std::span<const std::uint32_t> piece) const {
+    const auto at = [&](std::uint32_t corner) { return placed_[nodeOf(corner)].cast<double>().eval(); };
+    const Eigen::Vector3d first = at(3 * piece[0]);
+    double volume = 0;
+    for (const std::uint32_t triangle : piece) {
+      const std::uint32_t corner = 3 * triangle;
+      const double part = (at(corner) - first).dot((at(corner + 1) - first).cross(at(corner + 2) - first));
+      volume += turned_[triangle] != 0 ? -part : part;
+    }
+    return volume < 0;
   }
 
   // Gives each fan of neighbouring triangles around a node its own copy; the first fan keeps the node.

@@ -40,8 +40,8 @@ model::Grid toGrid(Checks& checks, const Path& path, const v1::Grid& message) {
 }
 
 // Returns the result of toMeshCloth(); empty for a grid.
-VertexNodes toShape(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
-                    const SceneLimits& most, model::Cloth& cloth, std::vector<v1::MeshRepair>& repairs) {
+ClothVertices toShape(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
+                      const SceneLimits& most, model::Cloth& cloth, std::vector<v1::MeshRepair>& repairs) {
   switch (message.shape_case()) {
     case v1::Cloth::kGrid:
       cloth.grid = toGrid(checks, path / "grid", message.grid());
@@ -164,6 +164,7 @@ const model::Material* toMaterial(Checks& checks, const Path& path, const std::s
 void checkAttached(Checks& checks, const Path& path, const model::Cloth& cloth) {
   model::Cloth pinnedOnly = cloth;
   pinnedOnly.attachments.clear();
+  pinnedOnly.skin = nullptr;
   std::vector<std::uint8_t> held = model::pinnedNodes(pinnedOnly);
   for (std::size_t i = 0; i < cloth.attachments.size(); ++i) {
     const Path element = path.at("attachments", static_cast<int>(i));
@@ -181,13 +182,13 @@ void checkAttached(Checks& checks, const Path& path, const model::Cloth& cloth) 
 }
 
 model::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
-                     const SceneLimits& most, std::vector<v1::MeshRepair>& repairs) {
+                     const SceneLimits& most, ClothVertices& vertices, std::vector<v1::MeshRepair>& repairs) {
   model::Cloth cloth;
   cloth.name = checks.name(path / "name", message.name());
-  const VertexNodes nodes = toShape(checks, path, message, readMesh, most, cloth, repairs);
+  vertices = toShape(checks, path, message, readMesh, most, cloth, repairs);
   if (checks.failed()) return cloth;
-  readPins(checks, path, message, nodes, cloth);
-  readAttachments(checks, path, message, nodes, cloth);
+  readPins(checks, path, message, vertices.nodes, cloth);
+  readAttachments(checks, path, message, vertices.nodes, cloth);
   if (checks.failed()) return cloth;
   addParts(checks, path, message, cloth);
   cloth.mass = static_cast<float>(double{limits::kDefaultArealMass} * model::areaOf(cloth));

@@ -15,10 +15,11 @@
 
 namespace clothstream::messages {
 
-// Applies defaults and checks what concerns this cloth alone. Refuses a mesh file if there is no reader. Adds
-// to `repairs` if something was repaired. Throws model::Cancelled.
+// Applies defaults and checks what concerns this cloth alone. Its skin is read once the colliders are known
+// (cloth_skin_message.h); `vertices` is what that needs. Refuses a mesh file if there is no reader. Adds to
+// `repairs` if something was repaired. Throws model::Cancelled.
 model::Cloth toCloth(Checks& checks, const Path& path, const v1::Cloth& message, const MeshReader& readMesh,
-                     const SceneLimits& most, std::vector<v1::MeshRepair>& repairs);
+                     const SceneLimits& most, ClothVertices& vertices, std::vector<v1::MeshRepair>& repairs);
 // A node is pinned or attached at most once.
 void checkAttached(Checks& checks, const Path& path, const model::Cloth& cloth);
 

@@ -47,6 +47,7 @@ inline constexpr Range kScale{1e-6, 1e6};         // m per unit
 inline constexpr Range kDistanceCell{5e-4, 10};   // m
 inline constexpr Range kWeldDistance{0, 0.1};     // m
 inline constexpr Range kRegionLength{0, 1000};    // m
+inline constexpr Range kSkinDistance{0, 1000};    // m, of a node from its skinned place, and of a backstop
 inline constexpr Range kMass{1e-6, 1e6};          // kg
 inline constexpr Range kArealMass{1e-4, 1000};    // kg/m^2
 inline constexpr Range kFriction = parameters::kFriction;
@@ -91,6 +92,7 @@ inline constexpr std::size_t kMaxClientMessageBytes = 64 * 1024;
 inline constexpr std::size_t kMaxParticipantColliders = 60;  // includes the bones of hands
 inline constexpr std::size_t kMaxParticipantGrabs = 10;
 inline constexpr std::size_t kMaxParticipantWinds = 2;
+inline constexpr std::uint32_t kMaxSurfaceParts = 4096;  // of the mesh of a surface
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
 inline constexpr std::size_t kMaxParsedBytes = 128'000'000;  // of a content, in memory

@@ -91,7 +91,8 @@ void checkPartNames(Checks& checks, const Path& path, std::string_view shown,
   }
 }
 
-meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& message,
+// With the joints of the file if the cloth has a skin.
+meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& message, bool hasSkin,
                               const MeshReader& readMesh) {
   const std::string shown = '"' + message.file() + '"';
   if (message.positions_size() > 0 || message.triangles_size() > 0) {
@@ -103,7 +104,13 @@ meshes::MeshSource readSource(Checks& checks, const Path& path, const v1::Mesh& 
                 "files can only be named in scene files; send positions and triangles instead");
     return {};
   }
-  auto source = readMesh(message.file(), nullptr);
+  const meshes::JointRequest joints{.animation = {},
+                                    .joints = limits::kMaxJoints,
+                                    .keys = limits::kMaxMotionKeys,
+                                    .poses = limits::kMaxAnimationPoses,
+                                    .animated = false,
+                                    .attributes = true};
+  auto source = readMesh(message.file(), hasSkin ? &joints : nullptr);
   if (source) checkPartNames(checks, path / "file", shown, *source);
   if (source) return std::move(*source);
   checks.fail(path / "file", shown, source.error());
@@ -128,9 +135,9 @@ v1::MeshRepair toMessage(const std::string& cloth, const meshes::Repairs& repair
 
 }  // namespace
 
-VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                        const MeshReader& readMesh, const SceneLimits& most, model::Cloth& cloth,
-                        std::vector<v1::MeshRepair>& repairs) {
+ClothVertices toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
+                          const MeshReader& readMesh, const SceneLimits& most, model::Cloth& cloth,
+                          std::vector<v1::MeshRepair>& repairs) {
   const v1::Mesh& mesh = message.mesh();
   const Path at = path / "mesh";
   meshes::MeshOptions options{.pose = toPose(checks, at / "pose", mesh.pose()),
@@ -142,8 +149,9 @@ VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& messa
   if (mesh.has_weld_distance())
     options.weldDistance = checks.number(at / "weldDistance", mesh.weld_distance(), limits::kWeldDistance);
   if (checks.failed()) return {};
-  const meshes::MeshSource source =
-      mesh.file().empty() ? toSource(checks, at, mesh) : readSource(checks, at, mesh, readMesh);
+  meshes::MeshSource source = mesh.file().empty()
+                                  ? toSource(checks, at, mesh)
+                                  : readSource(checks, at, mesh, message.has_skin(), readMesh);
   if (checks.failed()) return {};
   auto built = meshes::buildMesh(source, options, meshLimits(most));
   if (!built) {
@@ -156,7 +164,9 @@ VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& messa
   }
   if (!built->repairs.isEmpty()) repairs.push_back(toMessage(message.name(), built->repairs));
   cloth.mesh = std::make_shared<const model::Mesh>(std::move(built->mesh));
-  return {std::move(built->nodeOfVertex), std::move(built->nextCopy)};
+  return {.nodes = {std::move(built->nodeOfVertex), std::move(built->nextCopy)},
+          .skin = std::move(source.skin),
+          .attributes = std::move(source.attributes)};
 }
 
 void write(const model::Mesh& mesh, v1::Mesh& message) {

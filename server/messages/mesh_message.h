@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,11 +32,19 @@ struct VertexNodes {
   std::vector<std::uint32_t> nextCopy;
 };
 
+// Vertices of a cloth, as its message or file has them.
+struct ClothVertices {
+  VertexNodes nodes;  // empty for a grid
+  // Joints and attributes of the vertices of a glTF file, if the cloth has a skin.
+  std::optional<model::Skin> skin;
+  meshes::VertexAttributes attributes;
+};
+
 // Sets the mesh of the cloth. Refuses a file name if there is no reader, and more nodes, or springs of a
 // node, than `most`. Adds to `repairs` if something was repaired. Throws model::Cancelled.
-VertexNodes toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
-                        const MeshReader& readMesh, const SceneLimits& most, model::Cloth& cloth,
-                        std::vector<v1::MeshRepair>& repairs);
+ClothVertices toMeshCloth(Checks& checks, const Path& path, const v1::Cloth& message,
+                          const MeshReader& readMesh, const SceneLimits& most, model::Cloth& cloth,
+                          std::vector<v1::MeshRepair>& repairs);
 
 // Writes the mesh itself, not the name of its file: in world space, welded and repaired, in the order of its
 // nodes.

@@ -29,6 +29,19 @@ model::GridRange toRange(Checks& checks, const Path& path, const v1::GridRange& 
   return range;
 }
 
+std::uint32_t toNode(Checks& checks, const Path& path, std::uint32_t vertex, const model::Cloth& cloth,
+                     const std::vector<std::uint32_t>& nodeOfVertex) {
+  if (!cloth.mesh) return checks.integer(path, vertex, 0, cloth.grid.nodeCount() - 1);
+  checks.integer(path, vertex, 0, static_cast<std::uint32_t>(nodeOfVertex.size()) - 1);
+  if (checks.failed()) return 0;
+  if (nodeOfVertex[vertex] == meshes::kNoNode)
+    checks.fail(path, fmt::format("{}", vertex),
+                "is a vertex without a face, so it has no node; name a vertex of a face");
+  return nodeOfVertex[vertex];
+}
+
+}  // namespace
+
 model::Region toRegion(Checks& checks, const Path& path, const v1::Region& message) {
   model::Region region;
   region.centre = toVec3(checks, path / "centre", message.centre(), limits::kPosition);
@@ -44,19 +57,6 @@ model::Region toRegion(Checks& checks, const Path& path, const v1::Region& messa
   }
   return region;
 }
-
-std::uint32_t toNode(Checks& checks, const Path& path, std::uint32_t vertex, const model::Cloth& cloth,
-                     const std::vector<std::uint32_t>& nodeOfVertex) {
-  if (!cloth.mesh) return checks.integer(path, vertex, 0, cloth.grid.nodeCount() - 1);
-  checks.integer(path, vertex, 0, static_cast<std::uint32_t>(nodeOfVertex.size()) - 1);
-  if (checks.failed()) return 0;
-  if (nodeOfVertex[vertex] == meshes::kNoNode)
-    checks.fail(path, fmt::format("{}", vertex),
-                "is a vertex without a face, so it has no node; name a vertex of a face");
-  return nodeOfVertex[vertex];
-}
-
-}  // namespace
 
 NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& named,
                           const model::Cloth& cloth, const VertexNodes& nodes) {

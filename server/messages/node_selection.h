@@ -32,6 +32,8 @@ struct NamedNodes {
 NodeSelection toSelection(Checks& checks, const Path& path, const NamedNodes& named,
                           const model::Cloth& cloth, const VertexNodes& nodes);
 
+model::Region toRegion(Checks& checks, const Path& path, const v1::Region& message);
+
 void write(const model::GridRange& range, v1::GridRange& message);
 void write(const model::Region& region, v1::Region& message);
 

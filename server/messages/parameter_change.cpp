@@ -91,6 +91,20 @@ void checkMasses(Checks& checks, const Path& path, const model::Scene& changed,
   }
 }
 
+// Cloths that get gas must be able to hold it.
+void checkPressures(Checks& checks, const Path& path, const model::Scene& changed,
+                    const model::ParameterChange& change) {
+  for (std::size_t i = 0; i < change.cloths.size() && !checks.failed(); ++i) {
+    const model::ClothChange& chosen = change.cloths[i];
+    if (!chosen.numbers.has(parameters::ClothNumber::pressure)) continue;
+    for (const model::Cloth* cloth : addressed(changed, chosen.name))
+      if (const auto error = unfitPressure(changed, *cloth); error && !checks.failed())
+        checks.fail(path.at("cloths", static_cast<int>(i)) / "pressure",
+                    fmt::format("{}", chosen.numbers[parameters::ClothNumber::pressure]),
+                    fmt::format("{} (\"{}\")", *error, cloth->name));
+  }
+}
+
 model::ColliderChange toColliderChange(Checks& checks, const Path& path, const v1::ColliderChange& message,
                                        const model::Scene& scene) {
   model::ColliderChange change;
@@ -240,6 +254,7 @@ Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& mess
     checkSolvers(checks, path, changed, change);
     checkMasses(checks, path, changed, change);
     if (const auto error = unfitBending(changed)) checks.fail(path / "cloths[].dihedralBending", "", *error);
+    checkPressures(checks, path, changed, change);
     for (const model::Cloth& cloth : changed.cloths)
       if (const auto error = unfitCoarse(changed, cloth))
         checks.fail(path, "", fmt::format("the coarse correction of \"{}\" {}", cloth.name, *error));

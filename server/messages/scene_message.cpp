@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "server/messages/cloth_message.h"
+#include "server/messages/cloth_skin_message.h"
 #include "server/messages/description.h"
 #include "server/messages/limits.h"
 #include "server/messages/local_wind.h"
@@ -18,6 +19,7 @@
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
 #include "server/model/coarse_level.h"
+#include "server/model/gas.h"
 #include "server/model/hinges.h"
 #include "server/model/input.h"
 #include "server/model/mesh.h"
@@ -123,6 +125,13 @@ void checkSelfCollision(Checks& checks, const model::Scene& scene) {
                           limits::kMaxSelfCollisionNodes, scene.nodeCount()));
 }
 
+void checkPressure(Checks& checks, const model::Scene& scene) {
+  for (std::size_t i = 0; i < scene.cloths.size() && !checks.failed(); ++i)
+    if (const auto error = unfitPressure(scene, scene.cloths[i]))
+      checks.fail(Path().at("cloths", static_cast<int>(i)) / "pressure",
+                  fmt::format("{}", scene.cloths[i].pressure), *error);
+}
+
 void checkCoarse(Checks& checks, const model::Scene& scene) {
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     if (const auto error = unfitCoarse(scene, scene.cloths[i]))
@@ -161,9 +170,12 @@ void checkParts(Checks& checks, const model::Scene& scene) {
 
 // Selecting nodes takes time for every node of a range, and for every node and region. Checked before any
 // node is selected.
-void checkSelections(Checks& checks, const model::Scene& scene) {
+void checkSelections(Checks& checks, const model::Scene& scene, const v1::Scene& message) {
   std::uint64_t tests = 0;
-  for (const model::Cloth& cloth : scene.cloths) {
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
+    const model::Cloth& cloth = scene.cloths[i];
+    const int regions = message.cloths(static_cast<int>(i)).skin().regions_size();
+    tests += std::uint64_t{cloth.nodeCount()} * static_cast<std::uint64_t>(regions);
     const auto add = [&](const std::vector<model::GridRange>& ranges,
                          const std::vector<model::Region>& regions) {
       for (const model::GridRange& range : ranges) tests += range.nodeCount();
@@ -175,8 +187,8 @@ void checkSelections(Checks& checks, const model::Scene& scene) {
   if (tests > limits::kMaxSelectionTests)
     checks.fail(
         Path("cloths"), "",
-        fmt::format("have pins and attachments that select nodes in {} steps, one for each node of a range, "
-                    "and for each region and node; must have at most {}: use fewer regions",
+        fmt::format("have pins, attachments and skins that select nodes in {} steps, one for each node of a "
+                    "range, and for each region and node; must have at most {}: use fewer regions",
                     tests, limits::kMaxSelectionTests));
 }
 
@@ -312,6 +324,14 @@ std::optional<std::string> unfitBending(const model::Scene& scene) {
   return std::nullopt;
 }
 
+std::optional<std::string> unfitPressure(const model::Scene& scene, const model::Cloth& cloth) {
+  if (!model::hasGas(cloth)) return std::nullopt;
+  if (scene.integrator != model::Integrator::semiImplicitEuler)
+    return "must be 0: other values need INTEGRATOR_SEMI_IMPLICIT_EULER";
+  if (const auto reason = model::unfitForGas(cloth)) return fmt::format("must be 0: the cloth {}", *reason);
+  return std::nullopt;
+}
+
 std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::Cloth& cloth) {
   if (!cloth.coarse) return std::nullopt;
   if (scene.integrator != model::Integrator::semiImplicitEuler)
@@ -359,13 +379,16 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkSolids(checks, message);
   const std::uint64_t mostNodes = std::min(most.nodes, limits::kMaxNodes);
   std::uint64_t nodes = 0;
+  std::vector<ClothVertices> vertices(static_cast<std::size_t>(message.cloths_size()));
   for (int i = 0; i < message.cloths_size() && !checks.failed(); ++i) {
     const v1::Cloth& cloth = message.cloths(i);
     // A repair adds nodes that the message does not state: at most those that earlier cloths have left.
     SceneLimits left = most;
     if (cloth.mesh().repair()) left.nodes = mostNodes - nodes;
+    ClothVertices& own = vertices[static_cast<std::size_t>(i)];
     scene.cloths.push_back(
-        toCloth(checks, root.at("cloths", i), cloth, readMesh, left, repairs ? *repairs : unasked));
+        toCloth(checks, root.at("cloths", i), cloth, readMesh, left, own, repairs ? *repairs : unasked));
+    if (!cloth.has_skin()) own = {};
     nodes = std::min(mostNodes, nodes + scene.cloths.back().nodeCount());
   }
   for (int i = 0; i < message.colliders_size() && !checks.failed(); ++i)
@@ -374,7 +397,12 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   // Sizes first: the other checks take time in proportion to them.
   checkSize(checks, scene, most);
   most.cancellation.check();
-  if (!checks.failed()) checkSelections(checks, scene);
+  if (!checks.failed()) checkSelections(checks, scene, message);
+  for (std::size_t i = 0; i < scene.cloths.size() && !checks.failed(); ++i)
+    if (const v1::Cloth& cloth = message.cloths(static_cast<int>(i)); cloth.has_skin())
+      scene.cloths[i].skin =
+          toClothSkin(checks, root.at("cloths", static_cast<int>(i)) / "skin", cloth.skin(), scene.colliders,
+                      scene.cloths[i], vertices[i], most.cancellation);
   for (std::size_t i = 0; i < scene.cloths.size() && !checks.failed(); ++i)
     if (!scene.cloths[i].attachments.empty())
       checkAttached(checks, root.at("cloths", static_cast<int>(i)), scene.cloths[i]);
@@ -391,6 +419,7 @@ Result<model::Scene> toScene(const v1::Scene& message, const MeshReader& readMes
   checkParts(checks, scene);
   checkCoarse(checks, scene);
   if (const auto error = unfitBending(scene)) checks.fail(Path("cloths[].dihedralBending"), "", *error);
+  checkPressure(checks, scene);
   most.cancellation.check();
   if (!checks.failed())
     if (const auto error = instability(scene, model::StabilityBound(scene)))

@@ -32,7 +32,7 @@ namespace clothstream::messages {
 // Sets every field, defaults included, and writes whole meshes. toScene() of the result returns the same
 // scene.
 v1::Scene toMessage(const model::Scene& scene);
-// Like toMessage(), but meshes are empty.
+// Like toMessage(), but meshes are empty, and skins of cloths name their colliders only.
 v1::Scene toMessageWithoutMeshes(const model::Scene& scene);
 v1::Normals toMessage(model::Normals normals);
 // All parameters of environment and cloths as one change. `areas` are the areas of the cloths in m²; a cloth
@@ -55,6 +55,9 @@ std::optional<std::string> unfitSolver(const model::Scene& scene, const model::C
 
 // Error text if the dihedral bending of the scene's cloths cannot be used; nullopt if it can.
 std::optional<std::string> unfitBending(const model::Scene& scene);
+
+// Error text if the cloth has a pressure that it cannot have in this scene; nullopt if it may.
+std::optional<std::string> unfitPressure(const model::Scene& scene, const model::Cloth& cloth);
 
 // Error text if the coarse correction of a cloth cannot be used in this scene; nullopt if it can.
 std::optional<std::string> unfitCoarse(const model::Scene& scene, const model::Cloth& cloth);

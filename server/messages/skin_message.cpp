@@ -38,29 +38,6 @@ model::Joint toJoint(Checks& checks, const Path& path, const v1::Joint& message,
   return joint;
 }
 
-model::VertexJoints toVertex(Checks& checks, const Path& path, const v1::Skin& message, int vertex) {
-  constexpr auto kJoints = static_cast<int>(model::kVertexJoints);
-  model::VertexJoints joints;
-  double sum = 0;
-  for (int k = 0; k < kJoints; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    const int index = kJoints * vertex + k;
-    joints.joints[at] =
-        static_cast<std::uint8_t>(checks.integer(path.at("vertexJoints", index), message.vertex_joints(index),
-                                                 0, static_cast<std::uint32_t>(message.joints_size()) - 1));
-    joints.weights[at] =
-        checks.number(path.at("vertexWeights", index), message.vertex_weights(index), Range{0, 1});
-    sum += double{joints.weights[at]};
-  }
-  if (!checks.failed() && std::abs(sum - 1) > kWeightTolerance)
-    checks.fail(path.at("vertexWeights", kJoints * vertex), "",
-                fmt::format("and the next three add up to {}; must add up to 1", sum));
-  // Weights that were normalised before keep their bits, so that a recorded scene is the same.
-  if (std::abs(sum - 1) > kNormalised)
-    for (float& weight : joints.weights) weight = static_cast<float>(double{weight} / sum);
-  return joints;
-}
-
 std::vector<model::JointKey> toKeys(Checks& checks, const Path& path, const v1::JointAnimation& message,
                                     std::size_t jointCount) {
   const auto count = static_cast<std::size_t>(message.keys_size());
@@ -83,6 +60,29 @@ std::vector<model::JointKey> toKeys(Checks& checks, const Path& path, const v1::
 }
 
 }  // namespace
+
+model::VertexJoints toVertexJoints(Checks& checks, const Path& path,
+                                   const google::protobuf::RepeatedField<std::uint32_t>& indices,
+                                   const google::protobuf::RepeatedField<float>& weights, std::size_t vertex,
+                                   std::size_t jointCount) {
+  model::VertexJoints joints;
+  const auto first = static_cast<int>(model::kVertexJoints * vertex);
+  double sum = 0;
+  for (std::size_t k = 0; k < model::kVertexJoints; ++k) {
+    const int index = first + static_cast<int>(k);
+    joints.joints[k] = static_cast<std::uint8_t>(checks.integer(
+        path.at("vertexJoints", index), indices[index], 0, static_cast<std::uint32_t>(jointCount) - 1));
+    joints.weights[k] = checks.number(path.at("vertexWeights", index), weights[index], Range{0, 1});
+    sum += double{joints.weights[k]};
+  }
+  if (!checks.failed() && std::abs(sum - 1) > kWeightTolerance)
+    checks.fail(path.at("vertexWeights", first), "",
+                fmt::format("and the next three add up to {}; must add up to 1", sum));
+  // Weights that were normalised before keep their bits, so that a recorded scene is the same.
+  if (std::abs(sum - 1) > kNormalised)
+    for (float& weight : joints.weights) weight = static_cast<float>(double{weight} / sum);
+  return joints;
+}
 
 std::vector<model::Pose> toJoints(Checks& checks, const Path& path,
                                   const google::protobuf::RepeatedPtrField<v1::Pose>& message,
@@ -109,7 +109,8 @@ std::optional<model::Skin> toSkin(Checks& checks, const Path& path, const v1::Sk
     skin.joints.push_back(
         toJoint(checks, path.at("joints", i), message.joints(i), static_cast<std::uint32_t>(i)));
   for (std::size_t i = 0; i < sources.size() && !checks.failed(); ++i)
-    skin.vertices.push_back(toVertex(checks, path, message, static_cast<int>(sources[i])));
+    skin.vertices.push_back(toVertexJoints(checks, path, message.vertex_joints(), message.vertex_weights(),
+                                           sources[i], skin.joints.size()));
   if (message.has_animation())
     skin.keys = toKeys(checks, path / "animation", message.animation(), skin.joints.size());
   if (checks.failed()) return std::nullopt;

@@ -2,6 +2,7 @@
 // Converts joints of meshes between messages and the model.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -20,6 +21,13 @@ namespace clothstream::messages {
 // Absent if the checks fail.
 std::optional<model::Skin> toSkin(Checks& checks, const Path& path, const v1::Skin& message,
                                   std::size_t vertexCount, std::span<const std::uint32_t> sources);
+
+// The four joints of a vertex, from lists with four numbers for each vertex. Weights whose sum is 1 within
+// 0.01 are normalised.
+model::VertexJoints toVertexJoints(Checks& checks, const Path& path,
+                                   const google::protobuf::RepeatedField<std::uint32_t>& indices,
+                                   const google::protobuf::RepeatedField<float>& weights, std::size_t vertex,
+                                   std::size_t jointCount);
 
 // Poses of all joints, relative to their parents.
 std::vector<model::Pose> toJoints(Checks& checks, const Path& path,

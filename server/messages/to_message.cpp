@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Converts a scene to its message.
+#include "server/messages/cloth_skin_message.h"
 #include "server/messages/local_wind.h"
 #include "server/messages/node_selection.h"
 #include "server/messages/parameter_numbers.h"
@@ -8,6 +9,7 @@
 #include "server/messages/solid_message.h"
 #include "server/messages/solver_message.h"
 #include "server/messages/vectors.h"
+#include "server/model/cloth_skin.h"
 #include "server/model/mesh.h"
 
 namespace clothstream::messages {
@@ -58,6 +60,7 @@ void writeCloth(const model::Cloth& cloth, v1::Cloth& message) {
   for (const model::Region& region : cloth.pinnedRegions) write(region, *message.add_pinned_regions());
   for (const model::Attachment& attachment : cloth.attachments)
     writeAttachment(attachment, *message.add_attachments());
+  if (cloth.skin) message.mutable_skin()->set_collider(cloth.skin->collider);
 }
 
 void writeCollider(const model::Collider& collider, v1::Collider& message) {
@@ -87,9 +90,12 @@ v1::Normals toMessage(model::Normals normals) {
 
 v1::Scene toMessage(const model::Scene& scene) {
   v1::Scene message = toMessageWithoutMeshes(scene);
-  for (std::size_t i = 0; i < scene.cloths.size(); ++i)
-    if (const model::Cloth& cloth = scene.cloths[i]; cloth.mesh)
-      write(*cloth.mesh, *message.mutable_cloths(static_cast<int>(i))->mutable_mesh());
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
+    const model::Cloth& cloth = scene.cloths[i];
+    v1::Cloth& to = *message.mutable_cloths(static_cast<int>(i));
+    if (cloth.mesh) write(*cloth.mesh, *to.mutable_mesh());
+    if (cloth.skin) write(*cloth.skin, *to.mutable_skin());
+  }
   for (std::size_t i = 0; i < scene.colliders.size(); ++i)
     if (const auto* solid = std::get_if<model::Solid>(&scene.colliders[i].shape))
       write(**solid, *message.mutable_colliders(static_cast<int>(i))->mutable_mesh());

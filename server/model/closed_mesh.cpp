@@ -29,13 +29,41 @@ ClosedMeshProblem wholeProblem(std::string text) {
   return {std::nullopt, std::move(text)};
 }
 
-Eigen::Vector3d areaVector(const std::vector<Vec3>& vertices, const TriangleCorners& triangle) {
+// Sets the neighbours, or returns why there are none.
+std::optional<ClosedMeshProblem> connect(ClosedMesh& mesh) {
+  std::vector<HalfEdge> edges;
+  edges.reserve(3 * mesh.triangles.size());
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    for (std::uint32_t side = 0; side < 3; ++side) {
+      const std::uint32_t from = mesh.triangles[t][side], to = mesh.triangles[t][(side + 1) % 3];
+      edges.push_back({std::min(from, to), std::max(from, to), from < to, t, side});
+    }
+  std::ranges::sort(edges, [](const HalfEdge& a, const HalfEdge& b) {
+    return std::tuple(a.low, a.high, a.triangle, a.side) < std::tuple(b.low, b.high, b.triangle, b.side);
+  });
+  mesh.neighbours.assign(mesh.triangles.size(), {});
+  for (std::size_t i = 0; i < edges.size(); i += 2) {
+    const HalfEdge& one = edges[i];
+    const bool alone = i + 1 == edges.size() || endsOf(edges[i + 1]) != endsOf(one);
+    if (alone) return ClosedMeshProblem{one.triangle, "is not closed: one of its edges has no neighbour"};
+    const HalfEdge& other = edges[i + 1];
+    if (i + 2 < edges.size() && endsOf(edges[i + 2]) == endsOf(one))
+      return ClosedMeshProblem{edges[i + 2].triangle, "has an edge that two other triangles have"};
+    if (one.forwards == other.forwards)
+      return ClosedMeshProblem{other.triangle, "shows its other side than its neighbour"};
+    mesh.neighbours[one.triangle][one.side] = other.triangle;
+    mesh.neighbours[other.triangle][other.side] = one.triangle;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Eigen::Vector3d areaVector(std::span<const Vec3> vertices, const TriangleCorners& triangle) {
   const Eigen::Vector3d a = vertices[triangle[0]].cast<double>();
   return (vertices[triangle[1]].cast<double>() - a).cross(vertices[triangle[2]].cast<double>() - a) / 2;
 }
 
-// Merges vertices in the same place. The first of them stays. Vertices without a triangle are removed.
-// Returns the index that each of the others had.
 std::vector<std::uint32_t> weld(std::vector<Vec3>& vertices, std::vector<TriangleCorners>& triangles) {
   std::vector<std::uint32_t> order(vertices.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -66,63 +94,31 @@ std::vector<std::uint32_t> weld(std::vector<Vec3>& vertices, std::vector<Triangl
   return sources;
 }
 
-// Sets the neighbours, or returns why there are none.
-std::optional<ClosedMeshProblem> connect(ClosedMesh& mesh) {
-  std::vector<HalfEdge> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    for (std::uint32_t side = 0; side < 3; ++side) {
-      const std::uint32_t from = mesh.triangles[t][side], to = mesh.triangles[t][(side + 1) % 3];
-      edges.push_back({std::min(from, to), std::max(from, to), from < to, t, side});
-    }
-  std::ranges::sort(edges, [](const HalfEdge& a, const HalfEdge& b) {
-    return std::tuple(a.low, a.high, a.triangle, a.side) < std::tuple(b.low, b.high, b.triangle, b.side);
-  });
-  mesh.neighbours.assign(mesh.triangles.size(), {});
-  for (std::size_t i = 0; i < edges.size(); i += 2) {
-    const HalfEdge& one = edges[i];
-    const bool alone = i + 1 == edges.size() || endsOf(edges[i + 1]) != endsOf(one);
-    if (alone) return ClosedMeshProblem{one.triangle, "is not closed: one of its edges has no neighbour"};
-    const HalfEdge& other = edges[i + 1];
-    if (i + 2 < edges.size() && endsOf(edges[i + 2]) == endsOf(one))
-      return ClosedMeshProblem{edges[i + 2].triangle, "has an edge that two other triangles have"};
-    if (one.forwards == other.forwards)
-      return ClosedMeshProblem{other.triangle, "shows its other side than its neighbour"};
-    mesh.neighbours[one.triangle][one.side] = other.triangle;
-    mesh.neighbours[other.triangle][other.side] = one.triangle;
-  }
-  return std::nullopt;
-}
-
-double crowdingOf(const ClosedMesh& mesh) {
+double triangleCrowding(std::span<const Vec3> vertices, std::span<const TriangleCorners> triangles,
+                        std::size_t samples) {
   struct Box {
     Vec3 low, high;
   };
   std::vector<Box> boxes;
-  boxes.reserve(mesh.triangles.size());
-  for (const TriangleCorners& triangle : mesh.triangles) {
-    const Vec3 &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]],
-               &c = mesh.vertices[triangle[2]];
+  boxes.reserve(triangles.size());
+  for (const TriangleCorners& triangle : triangles) {
+    const Vec3 &a = vertices[triangle[0]], &b = vertices[triangle[1]], &c = vertices[triangle[2]];
     boxes.push_back({a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)});
   }
-  double squares = 0, samples = 0;
+  double squares = 0, sampled = 0;
   const auto sample = [&](const Vec3& point) {
     const Eigen::Array3f at = point.array();
     const auto around = static_cast<double>(std::ranges::count_if(boxes, [&](const Box& box) {
       return (box.low.array() <= at).all() && (at <= box.high.array()).all();
     }));
     squares += around * around;
-    ++samples;
+    ++sampled;
   };
-  const auto strideOf = [](const auto& list) {
-    return (list.size() + kCrowdingSamples - 1) / kCrowdingSamples;
-  };
-  for (std::size_t i = 0; i < mesh.vertices.size(); i += strideOf(mesh.vertices)) sample(mesh.vertices[i]);
+  const auto strideOf = [samples](const auto& list) { return (list.size() + samples - 1) / samples; };
+  for (std::size_t i = 0; i < vertices.size(); i += strideOf(vertices)) sample(vertices[i]);
   for (std::size_t i = 0; i < boxes.size(); i += strideOf(boxes)) sample((boxes[i].low + boxes[i].high) / 2);
-  return std::sqrt(squares / samples);
+  return std::sqrt(squares / sampled);
 }
-
-}  // namespace
 
 std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> vertices,
                                                            std::vector<TriangleCorners> triangles) {
@@ -150,7 +146,7 @@ std::variant<ClosedMesh, ClosedMeshProblem> makeClosedMesh(std::vector<Vec3> ver
     volume += areaVector(mesh.vertices, triangle).dot(mesh.vertices[triangle[0]].cast<double>()) / 3;
   if (volume <= 0) return wholeProblem("is inside out: its triangles must be counter-clockwise from outside");
   for (const Vec3& vertex : mesh.vertices) mesh.reach = std::max(mesh.reach, kReachRounding * vertex.norm());
-  mesh.crowding = crowdingOf(mesh);
+  mesh.crowding = triangleCrowding(mesh.vertices, mesh.triangles, kCrowdingSamples);
   return mesh;
 }
 
@@ -161,14 +157,15 @@ double arcCosine(double x) {
   return x < 0 ? 3.14159265358979 - angle : angle;
 }
 
-std::vector<Eigen::Vector3d> vertexPseudonormals(const ClosedMesh& mesh) {
-  std::vector<Eigen::Vector3d> normals(mesh.vertices.size(), Eigen::Vector3d::Zero());
-  for (const TriangleCorners& triangle : mesh.triangles) {
-    const Eigen::Vector3d normal = areaVector(mesh.vertices, triangle).normalized();
+std::vector<Eigen::Vector3d> vertexPseudonormals(std::span<const Vec3> vertices,
+                                                 std::span<const TriangleCorners> triangles) {
+  std::vector<Eigen::Vector3d> normals(vertices.size(), Eigen::Vector3d::Zero());
+  for (const TriangleCorners& triangle : triangles) {
+    const Eigen::Vector3d normal = areaVector(vertices, triangle).normalized();
     for (std::size_t i = 0; i < 3; ++i) {
-      const Eigen::Vector3d corner = mesh.vertices[triangle[i]].cast<double>();
-      const Eigen::Vector3d next = mesh.vertices[triangle[(i + 1) % 3]].cast<double>() - corner;
-      const Eigen::Vector3d last = mesh.vertices[triangle[(i + 2) % 3]].cast<double>() - corner;
+      const Eigen::Vector3d corner = vertices[triangle[i]].cast<double>();
+      const Eigen::Vector3d next = vertices[triangle[(i + 1) % 3]].cast<double>() - corner;
+      const Eigen::Vector3d last = vertices[triangle[(i + 2) % 3]].cast<double>() - corner;
       normals[triangle[i]] += arcCosine(next.normalized().dot(last.normalized())) * normal;
     }
   }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -61,6 +62,18 @@ double arcCosine(double x);
 // Normals at the vertices that tell inside from outside: the sum of the unit normals of the triangles around
 // a vertex, each weighted by its angle there. Baerentzen and Aanaes, "Signed distance computation using the
 // angle weighted pseudonormal", 2005. Not normalised.
-std::vector<Eigen::Vector3d> vertexPseudonormals(const ClosedMesh& mesh);
+std::vector<Eigen::Vector3d> vertexPseudonormals(std::span<const Vec3> vertices,
+                                                 std::span<const TriangleCorners> triangles);
+
+// Merges vertices in the same place. The first of them stays. Vertices without a triangle are removed.
+// Corners must exist. Returns the index that each of the others had.
+std::vector<std::uint32_t> weld(std::vector<Vec3>& vertices, std::vector<TriangleCorners>& triangles);
+
+// Half of the cross product of two edges: its length is the area of the triangle, m^2.
+Eigen::Vector3d areaVector(std::span<const Vec3> vertices, const TriangleCorners& triangle);
+
+// ClosedMesh::crowding, over at most `samples` vertices and as many boxes.
+double triangleCrowding(std::span<const Vec3> vertices, std::span<const TriangleCorners> triangles,
+                        std::size_t samples);
 
 }  // namespace clothstream::model

@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include "server/model/gas.h"
+
 namespace clothstream::model {
 namespace {
 
@@ -32,6 +34,16 @@ std::vector<Side> sidesOf(const std::vector<Triangle>& triangles) {
   return sides;
 }
 
+template <typename Visit>
+void forEachEdge(const std::vector<Side>& sides, Visit&& visit) {
+  for (std::size_t i = 0; i < sides.size();) {
+    const bool shared =
+        i + 1 < sides.size() && sides[i].low == sides[i + 1].low && sides[i].high == sides[i + 1].high;
+    visit(sides[i], shared ? &sides[i + 1] : nullptr);
+    i += shared ? 2 : 1;
+  }
+}
+
 // Corners of a quad relative to one of its halves.
 struct Half {
   std::uint32_t diagonal[2] = {kNone, kNone};
@@ -48,9 +60,7 @@ class LinkFinder {
     }
   }
 
-  std::vector<SpringLink> find(const Cancellation& cancellation) {
-    const std::vector<Side> sides = sidesOf(shape_.triangles);
-    cancellation.check();
+  std::vector<SpringLink> find(const std::vector<Side>& sides, const Cancellation& cancellation) {
     forEachEdge(sides, [&](const Side& first, const Side* second) {
       if (second != nullptr && partner_[first.triangle] == second->triangle) addDiagonals(first, *second);
     });
@@ -66,16 +76,6 @@ class LinkFinder {
   }
 
  private:
-  template <typename Visit>
-  static void forEachEdge(const std::vector<Side>& sides, Visit&& visit) {
-    for (std::size_t i = 0; i < sides.size();) {
-      const bool shared =
-          i + 1 < sides.size() && sides[i].low == sides[i + 1].low && sides[i].high == sides[i + 1].high;
-      visit(sides[i], shared ? &sides[i + 1] : nullptr);
-      i += shared ? 2 : 1;
-    }
-  }
-
   void add(std::uint32_t a, std::uint32_t b, SpringKind kind) {
     if (a == b) return;
     const float length = (shape_.positions[a] - shape_.positions[b]).norm();
@@ -116,6 +116,41 @@ class LinkFinder {
   std::vector<SpringLink> links_;
 };
 
+// Number of parts without a common node.
+std::uint32_t piecesOf(const MeshShape& shape) {
+  std::vector<std::uint32_t> parents(shape.positions.size());
+  std::iota(parents.begin(), parents.end(), 0u);
+  const auto rootOf = [&](std::uint32_t node) {
+    while (parents[node] != node) node = parents[node] = parents[parents[node]];
+    return node;
+  };
+  auto pieces = static_cast<std::uint32_t>(parents.size());
+  const auto join = [&](std::uint32_t a, std::uint32_t b) {
+    a = rootOf(a), b = rootOf(b);
+    if (a == b) return;
+    parents[std::max(a, b)] = std::min(a, b);
+    --pieces;
+  };
+  for (const auto& [a, b, c] : shape.triangles) {
+    join(a, b);
+    join(b, c);
+  }
+  return pieces;
+}
+
+// Sets what the mesh encloses.
+void close(const std::vector<Side>& sides, Mesh& mesh) {
+  forEachEdge(sides, [&](const Side& first, const Side* second) {
+    if (second == nullptr && !mesh.openEdge) mesh.openEdge = {first.low, first.high};
+  });
+  if (mesh.openEdge || sides.empty()) return;
+  mesh.pieces = piecesOf(mesh.shape);
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(mesh.shape.positions.size());
+  for (const Vec3& position : mesh.shape.positions) positions.push_back(position.cast<double>());
+  mesh.volume = enclosedVolume(mesh.shape.triangles, positions);
+}
+
 std::vector<double> lumpedAreas(const MeshShape& shape) {
   std::vector<double> areas(shape.positions.size(), 0);
   for (const Triangle& triangle : shape.triangles) {
@@ -139,7 +174,10 @@ Mesh makeMesh(MeshShape shape, const Cancellation& cancellation) {
     mesh.high = mesh.high.cwiseMax(position);
   }
   cancellation.check();
-  mesh.links = LinkFinder(mesh.shape).find(cancellation);
+  const std::vector<Side> sides = sidesOf(mesh.shape.triangles);
+  cancellation.check();
+  mesh.links = LinkFinder(mesh.shape).find(sides, cancellation);
+  close(sides, mesh);
   for (const double area : mesh.areas) mesh.shares.push_back(area / mesh.area);
   return mesh;
 }

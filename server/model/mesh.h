@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,12 @@ struct Mesh {
   std::vector<double> shares;     // fraction of the cloth's mass per node, proportional to its area
   std::vector<SpringLink> links;  // ordered as springLinks() says
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // box of the positions, m
+  // The two nodes of an edge with one triangle; nothing: the surface is closed.
+  std::optional<std::array<std::uint32_t, 2>> openEdge;
+  // Of a closed surface: parts without a common node, and the volume inside, m^3, negative if its fronts are
+  // inside.
+  std::uint32_t pieces = 0;
+  double volume = 0;
 
   std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(shape.positions.size()); }
 };

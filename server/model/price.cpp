@@ -6,6 +6,7 @@
 #include <cassert>
 
 #include "server/model/distance_grid.h"
+#include "server/model/gas.h"
 #include "server/model/mesh.h"
 #include "server/model/springs.h"
 
@@ -16,6 +17,7 @@ namespace {
 // A node of a grid has six springs.
 constexpr double kNode = 0.4, kSpring = 0.1, kMeshFactor = 2;
 constexpr double kRungeKutta = 14;  // as a factor
+constexpr double kGas = 1;          // of a node
 constexpr double kAir = 0.5, kLocalWind = 0.3, kHinge = 2, kSelfCollision = 20, kMotionBound = 120;
 // Crowding of a few layers, which kSelfCollision and kMotionBound include. Beyond it each node costs
 // kCrowdedBall in each of the searches of a tick, and kCrowdedTriangle in a substep, for one more ball or
@@ -36,9 +38,18 @@ constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
 // kFewAround that lies in one place (ClosedMesh::crowding), at most kMostSearch, as the device limits it
 // (kMostSolidVisits). Distances that are sampled cost it kGridWork.
 constexpr double kSearch = 6, kFewAround = 16, kCrowdedSearch = 1.2, kMostSearch = 4096, kGridWork = 3;
+// A surface of the real room costs each node kSurface, and a third of a search with three tests of each
+// triangle, instead of one, if the node is near.
+constexpr double kSurface = 0.3, kSurfaceTests = 3, kNearSurface = 1.0 / 3;
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
 constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
+// Each node of a cloth that follows joints costs kClothSkinTick in a tick, for its places at both ends, like
+// a vertex of a solid that joints move, and for its normals there. It costs kClothSkinStep in a substep,
+// where it is kept near its place. Its joints, limits, and places and normals at both ends take
+// kClothSkinBytes.
+constexpr double kClothSkinTick = 30, kClothSkinStep = 0.5, kClothSkinBytes = 128;
+constexpr double kClothSkinDispatches = 4;
 // Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
 constexpr double kTickDispatches = 6, kFrameDispatches = 12, kBoundDispatches = 14;
@@ -53,9 +64,13 @@ constexpr double kSceneBytes = 8e6;
 constexpr double kNodeBytes = 1200, kSpringBytes = 64, kMeshNodeBytes = 400;
 constexpr double kSelfCollisionBytes = 600, kMotionBoundBytes = 2000, kHingeBytes = 200, kSystemBytes = 64,
                  kPairBytes = 40;
+constexpr double kGasBytes = 250;           // of a node of a mesh that can hold gas
 constexpr double kTriangleBytes = 400;      // of a solid
 constexpr double kDistancePointBytes = 48;  // of a solid's grid, three times 16
 constexpr double kSkinVertexBytes = 500;
+// Of the surfaces of a scene: the buffers for the most triangles on the device, and for a triangle the mesh
+// and its tables on the host.
+constexpr double kSurfaceBuffersBytes = 27e6, kSurfaceTriangleBytes = 250;
 constexpr double kCoarseBytes = 40, kCoarseMeshBytes = 250;
 
 // Copies of a scene's lists: as it started, as it was accepted, as it runs, and as descriptions.
@@ -120,6 +135,11 @@ bool isSystem(SolverKind kind) {
 
 double searchWork(const ClosedMesh& mesh) {
   return std::min(kSearch + kCrowdedSearch * std::max(mesh.crowding - kFewAround, 0.0), kMostSearch);
+}
+
+double surfaceWork(const Surface& surface) {
+  const double search = kSearch + kCrowdedSearch * std::max(surface.crowding - kFewAround, 0.0);
+  return kSurface + kNearSurface * std::min(kSurfaceTests * search, kMostSearch);
 }
 
 double colliderWork(const Shape& shape) {
@@ -227,6 +247,7 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
     if (cloth.mesh) step *= kMeshFactor;
     if (scene.integrator == Integrator::rungeKutta4) step *= kRungeKutta;
     if (isBlown(scene, cloth)) step += (kAir + kLocalWind * static_cast<double>(scene.winds.size())) * nodes;
+    if (hasGas(cloth)) step += kGas * nodes;
     if (cloth.dihedralBending != 0) step += kHinge * static_cast<double>(counts.hinges);
     if (cloth.selfCollision)
       step += (boundsMotion(cloth) ? kSelfCollision + kMotionBound : kSelfCollision) * nodes;
@@ -236,12 +257,14 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
     work.nodeSteps +=
         substeps * step + nodes * (kTick + kFrame * framesPerTick + kGatherCollider * colliders);
     work += solverWork(scene, cloth, counts);
+    if (cloth.skin) work.nodeSteps += (kClothSkinTick + kClothSkinStep * substeps) * nodes;
     if (cloth.coarse) work += coarseWork(*cloth.coarse, scene.substeps, nodes * (kCoarseNode + collisions));
   }
   for (const Collider& collider : scene.colliders) work += skinWork(collider.shape);
   if (scene.integrator == Integrator::rungeKutta4) work.dispatches += 11 * substeps;
   const auto any = [&](auto has) { return std::ranges::any_of(scene.cloths, has) ? 1.0 : 0.0; };
   work.dispatches += 3 * substeps * any([](const Cloth& cloth) { return cloth.dihedralBending != 0; });
+  work.dispatches += 3 * substeps * static_cast<double>(std::ranges::count_if(scene.cloths, hasGas));
   const bool solids = std::ranges::any_of(scene.colliders, [](const Collider& collider) {
     return std::holds_alternative<Solid>(collider.shape);
   });
@@ -249,6 +272,8 @@ Work PriceModel::work(const Scene& scene, double colliders) const {
   work.dispatches +=
       (6 + 4 * substeps) * any([](const Cloth& cloth) { return cloth.selfCollision.has_value(); });
   work.dispatches += kBoundDispatches * substeps * any(boundsMotion);
+  work.dispatches +=
+      (kClothSkinDispatches + substeps) * any([](const Cloth& cloth) { return cloth.skin != nullptr; });
   return work;
 }
 
@@ -259,6 +284,20 @@ Work PriceModel::heldWindWork(const Scene& scene, std::size_t winds) const {
   Work work;
   work.nodeSteps = kLocalWind * static_cast<double>(winds) * nodes * scene.substeps;
   return work;
+}
+
+Work PriceModel::surfacesWork(const Scene& scene, double searches) const {
+  if (searches == 0) return {};
+  double nodes = 0;
+  for (const ClothCounts& counts : cloths_) nodes += static_cast<double>(counts.nodes);
+  Work work;
+  work.nodeSteps = searches * nodes * scene.substeps;
+  work.dispatches = scene.substeps;
+  return work;
+}
+
+double PriceModel::surfaceBytes(std::size_t triangles) const {
+  return triangles == 0 ? 0 : kSurfaceBuffersBytes + kSurfaceTriangleBytes * static_cast<double>(triangles);
 }
 
 // The path of a node that is near a fast body is followed in strides.
@@ -293,7 +332,9 @@ double PriceModel::bytes(const Scene& scene) const {
     if (cloth.mesh)
       bytes += kMeshNodeBytes * nodes + listBytes(cloth.mesh->shape.uvs) +
                listBytes(cloth.mesh->shape.uvTriangles);
+    if (cloth.skin) bytes += kClothSkinBytes * nodes;
     if (cloth.selfCollision) bytes += kSelfCollisionBytes * nodes;
+    if (canHoldGas(cloth)) bytes += kGasBytes * nodes;
     if (cloth.coarse) bytes += cloth.coarse->levels * (cloth.mesh ? kCoarseMeshBytes : kCoarseBytes) * nodes;
     if (boundsMotion(cloth)) bytes += kMotionBoundBytes * nodes;
     if (cloth.dihedralBending != 0) bytes += kHingeBytes * static_cast<double>(counts.hinges);

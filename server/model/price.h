@@ -10,6 +10,7 @@
 #include "server/model/crowding.h"
 #include "server/model/scene.h"
 #include "server/model/springs.h"
+#include "server/model/surface.h"
 
 namespace clothstream::model {
 
@@ -59,6 +60,10 @@ struct Work {
 // Work of a search for the nearest point of a triangle mesh, in node-steps.
 double searchWork(const ClosedMesh& mesh);
 
+// Work of a surface of the real room for each node and substep, in node-steps. A third of the nodes are
+// assumed to be near each surface.
+double surfaceWork(const Surface& surface);
+
 // Work of a collider with this shape for each node and substep, in node-steps. A third of the nodes are
 // assumed to be near each collider.
 double colliderWork(const Shape& shape);
@@ -84,6 +89,11 @@ class PriceModel {
   Work movedJointsWork(const Scene& scene) const;
   // Work of a tick in addition to that, while participants hold this number of local winds.
   Work heldWindWork(const Scene& scene, std::size_t winds) const;
+  // Work of a tick in addition to that, while participants have surfaces of the real room whose surfaceWork()
+  // is `searches` together.
+  Work surfacesWork(const Scene& scene, double searches) const;
+  // Memory that they take, in bytes.
+  double surfaceBytes(std::size_t triangles) const;
   // Memory on the device and on the host, in bytes.
   double bytes(const Scene& scene) const;
 

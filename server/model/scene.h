@@ -208,8 +208,8 @@ struct Cloth {
   std::optional<Tethers> tethers;
   std::optional<CoarseCorrection> coarse;  // absent: springs alone
   std::shared_ptr<const ClothSkin> skin;   // null: the cloth follows no joints
-  // Of the gas inside a closed mesh above the pressure outside, at the volume at rest, Pa; 0: no gas.
-  float pressure = 0;
+  // Of the gas inside a closed mesh above the pressure outside, at the volume at rest, Pa; 0: no gas. gas.h
+  float pressure = initial(parameters::ClothNumber::pressure);
 
   std::uint32_t nodeCount() const;
   float nodeMass() const { return mass / static_cast<float>(nodeCount()); }  // kg, mean

@@ -49,6 +49,7 @@ struct Parsed {
   std::string record, recordings, playSpeed = "1", config, tls = "off", announce = "auto", transport = "auto",
                                   overload = "adapt", tokenValid = "8h", kernels = "auto";
   std::optional<scene::Role> anonymousRole, tokenRole;
+  std::optional<hosting::SurfacePolicy> roomSurfaces;
   std::optional<hosting::Profile> chosenProfile;
   // Limits of the profile that are set alone.
   std::optional<std::chrono::milliseconds> sceneLifetime;
@@ -129,6 +130,9 @@ std::string toText(const scene::Permissions& permissions) {
   return words.empty() ? "none" : fmt::format("{}", fmt::join(words, ","));
 }
 
+const std::map<std::string, hosting::SurfacePolicy> kSurfacePolicies{{"off", hosting::SurfacePolicy::off},
+                                                                     {"own", hosting::SurfacePolicy::own}};
+
 void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   ServeOptions& options = parsed.options.serve;
   table.group("Participants");
@@ -158,6 +162,11 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
       checkChoice({"create", "delete", "control", "record", "own", "none"}));
   allowed->delimiter(',')->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)->default_str("none");
   table.showDefault(allowed, "none");
+  CLI::Option* surfaces = table.choice(
+      "--room-surfaces", parsed.roomSurfaces, kSurfacePolicies,
+      "Surfaces of the real rooms of participants: own lets them act on the cloth of their scene and sends "
+      "their shape to no client, off refuses them");
+  table.showDefault(surfaces, "own");
   parsed.ownersAloneOption =
       table.flag("--owners-alone", parsed.ownersAlone,
                  "Only its owners may pause, reset, record and delete a scene that has an owner");
@@ -753,6 +762,7 @@ std::variant<ProgramOptions, int> parseOptions(int argc, const char* const* argv
 
   options.log.level = CLI::detail::to_lower(options.log.level);
   options.log.format = CLI::detail::to_lower(options.log.format);
+  serve.server.roomSurfaces = parsed.roomSurfaces.value_or(serve.server.roomSurfaces);
   serve.server.adaptsToLoad = CLI::detail::to_lower(parsed.overload) == "adapt";
   serve.record.onRequest = !parsed.recordings.empty();
   serve.record.directory = serve.record.onRequest ? parsed.recordings : parsed.record;

@@ -163,6 +163,11 @@ Done Replay::take(const v1::RecordedTick& message) {
     lose("it rolled back to a state that is not in the recording");
     return {};
   }
+  if (message.surfaces_left_out() > 0) {
+    lose(fmt::format("{} surfaces of a real room acted in tick {}, and recordings leave their shapes out",
+                     message.surfaces_left_out(), message.tick()));
+    return {};
+  }
   keeps_ |= message.keeps_state();
   const auto inputs = toInputs(message, scene_);
   if (!inputs) return tl::unexpected(inputs.error());

@@ -263,6 +263,7 @@ void write(const scene::AppliedTick& tick, v1::RecordedTick& message) {
     messages::write(carry.to, *to.mutable_to());
   }
   for (const simulation::Grab& grab : tick.inputs.grabs) writeGrab(grab, *message.add_grips());
+  message.set_surfaces_left_out(static_cast<std::uint32_t>(tick.inputs.surfaces.size()));
 }
 
 tl::expected<simulation::TickInputs, std::string> toInputs(const v1::RecordedTick& message,
@@ -328,6 +329,8 @@ tl::expected<std::vector<model::Cloth>, std::string> toCloths(const v1::Recorded
     cloth.mutable_pinned_vertices()->Swap(whole.mutable_pinned_vertices());
     cloth.mutable_pinned_regions()->Swap(whole.mutable_pinned_regions());
     cloth.mutable_attachments()->Swap(whole.mutable_attachments());
+    cloth.clear_skin();
+    if (whole.has_skin()) cloth.mutable_skin()->Swap(whole.mutable_skin());
     if (whole.has_mesh())
       cloth.mutable_mesh()->Swap(whole.mutable_mesh());
     else

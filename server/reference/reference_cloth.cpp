@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "server/model/gas.h"
 #include "server/model/stability.h"
 #include "server/model/strain_limit.h"
 #include "server/reference/constraint_system.h"
@@ -74,6 +75,7 @@ void ReferenceCloth::setParameters(const model::Cloth& cloth) {
   cloth_.lift = cloth.lift;
   cloth_.friction = cloth.friction;
   cloth_.thickness = cloth.thickness;
+  cloth_.pressure = cloth.pressure;
   cloth_.solver = cloth.solver;
   setMass(cloth.mass);
 }
@@ -137,6 +139,34 @@ void ReferenceCloth::bend(double h) {
   for (std::size_t i = 0; i < forces_.size(); ++i) velocities_[i] += h * inverseMasses_[i] * forces_[i];
 }
 
+void ReferenceCloth::press(double h) {
+  if (!model::hasGas(cloth_)) {
+    gasPressure_ = foreseenVolume_ = squaredStep_ = 0;
+    return;
+  }
+  const double rest = cloth_.mesh->volume, squared = h * h;
+  const std::vector<Vec3> gradients = model::volumeGradients(triangles_, start_);
+  const double volume = model::enclosedVolume(triangles_, start_) / rest;
+  double growth = 0, response = 0;
+  for (std::size_t i = 0; i < gradients.size(); ++i) {
+    growth += gradients[i].dot(positions_[i] - start_[i]) / rest;
+    response += gradients[i].squaredNorm() * inverseMasses_[i];
+  }
+  response *= squared * model::kOutsidePressure / rest;
+  const double later = squaredStep_ == 0 ? 0 : squared / squaredStep_ * (volume - foreseenVolume_);
+  const double free = volume + growth + later;
+  const double lawful = model::gasPressure(cloth_.pressure / model::kOutsidePressure, free, response);
+  const double pressure = model::boundedPressure(lawful, volume, free, response);
+  foreseenVolume_ = volume + growth + response * pressure;
+  squaredStep_ = squared;
+  gasPressure_ = pressure * model::kOutsidePressure;
+  for (std::size_t i = 0; i < gradients.size(); ++i) {
+    const Vec3 change = h * gasPressure_ * inverseMasses_[i] * gradients[i];
+    velocities_[i] += change;
+    positions_[i] += h * change;
+  }
+}
+
 void ReferenceCloth::accumulateAirForces(const model::Environment& environment,
                                          std::span<Vec3> forces) const {
   const double density = environment.airDensity, drag = cloth_.drag, lift = cloth_.lift;
@@ -194,7 +224,7 @@ void ReferenceCloth::integrate(const model::Environment& environment, model::Int
   stiffnessShare_ = model::stiffnessShare(cloth_, h);
   const std::vector<Vec3>& rates = accelerations(environment);
   const model::SolverKind solver = cloth_.solver.kind;
-  if (solver != model::SolverKind::massSpring) start_ = positions_;
+  if (solver != model::SolverKind::massSpring || model::hasGas(cloth_)) start_ = positions_;
   if (solver == model::SolverKind::implicitEuler) startVelocities_ = velocities_;
   for (std::size_t i = 0; i < positions_.size(); ++i) {
     if (integrator == model::Integrator::explicitEuler) {
@@ -205,6 +235,7 @@ void ReferenceCloth::integrate(const model::Environment& environment, model::Int
       positions_[i] += h * velocities_[i];
     }
   }
+  press(h);
   if (model::isAcad(cloth_.solver, model::AcadMode::limit))
     limitStretch(h);
   else if (solver == model::SolverKind::constraint || solver == model::SolverKind::acad)
@@ -307,20 +338,51 @@ void ReferenceCloth::collide(const model::Shape& shape, const ColliderStep& step
     if (inverseMasses_[i] == 0 || (!only.empty() && only[i] == 0)) continue;
     const std::optional<Contact> contact = contactOf(shape, cloth_.thickness, step, from[i], positions_[i]);
     if (!contact) continue;
-    positions_[i] += contact->depth * contact->normal;
-    const Vec3 carried =
-        step.velocity + contact->velocity + step.spin.cross(positions_[i] - step.after.position);
-    const double approach = (velocities_[i] - carried).dot(contact->normal);
-    velocities_[i] -= std::min(approach, 0.0) * contact->normal;
-    const double extents = (positions_[i] - step.after.position).lpNorm<1>() + positions_[i].lpNorm<1>();
-    const double wayOut =
-        (contact->depth - kDepthRounding * extents) / step.seconds - std::max(approach, 0.0);
-    std::optional<Press>& last = presses_[i];
-    const bool opposed = last && last->normal.dot(contact->normal) < kOpposed;
-    if (last) rub(i, *last, opposed ? Vec3(Vec3::Zero()) : contact->normal, from[i]);
-    last = Press{contact->normal, last && !opposed ? last->normal : Vec3(Vec3::Zero()), carried,
-                 cloth_.friction * friction * std::max({-approach, wayOut, 0.0}), step.seconds};
+    const Vec3 end = positions_[i] + contact->depth * contact->normal;
+    const Vec3 carried = step.velocity + contact->velocity + step.spin.cross(end - step.after.position);
+    leave(i, *contact, carried, step.after.position, friction, step.seconds, from[i]);
   }
+}
+
+void ReferenceCloth::leave(std::size_t i, const Contact& contact, const Vec3& carried, const Vec3& place,
+                           double friction, double seconds, const Vec3& from) {
+  positions_[i] += contact.depth * contact.normal;
+  const double approach = (velocities_[i] - carried).dot(contact.normal);
+  velocities_[i] -= std::min(approach, 0.0) * contact.normal;
+  const double extents = (positions_[i] - place).lpNorm<1>() + positions_[i].lpNorm<1>();
+  const double wayOut = (contact.depth - kDepthRounding * extents) / seconds - std::max(approach, 0.0);
+  std::optional<Press>& last = presses_[i];
+  const bool opposed = last && last->normal.dot(contact.normal) < kOpposed;
+  if (last) rub(i, *last, opposed ? Vec3(Vec3::Zero()) : contact.normal, from);
+  last = Press{contact.normal, last && !opposed ? last->normal : Vec3(Vec3::Zero()), carried,
+               cloth_.friction * friction * std::max({-approach, wayOut, 0.0}), seconds};
+}
+
+void ReferenceCloth::collide(std::span<const PlacedSurface> surfaces, double seconds,
+                             std::span<const Vec3> from) {
+  if (surfaces.empty()) return;
+  presses_.resize(positions_.size());
+  const double thickness = std::max(cloth_.thickness, model::kLeastSurfaceDistance);
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    if (inverseMasses_[i] == 0) continue;
+    bool touched = false;
+    for (std::uint32_t round = 0; round < model::kSurfaceRounds; ++round) {
+      const std::optional<SurfaceContact> found =
+          touchSurfaces(surfaces, thickness, seconds, from[i], positions_[i]);
+      if (!found) break;
+      touched = true;
+      const PlacedSurface& surface = surfaces[found->surface];
+      leave(i, {found->normal, found->depth}, Vec3::Zero(), surface.pose.position, surface.friction, seconds,
+            from[i]);
+    }
+    if (!touched) continue;
+    rub(i, *presses_[i], Vec3::Zero(), from[i]);
+    presses_[i].reset();
+    if (!crossesSurfaces(surfaces, from[i], positions_[i])) continue;
+    positions_[i] = from[i];
+    velocities_[i] = Vec3::Zero();
+  }
+  presses_.clear();
 }
 
 void ReferenceCloth::finishContacts(std::span<const Vec3> from) {

@@ -15,6 +15,7 @@
 #include "server/model/spring_colours.h"
 #include "server/model/springs.h"
 #include "server/reference/contact.h"
+#include "server/reference/surface.h"
 
 namespace clothstream::reference {
 
@@ -32,8 +33,8 @@ class ReferenceCloth {
   // Starts at rest in its start pose. The springs are those of model::springLinks().
   explicit ReferenceCloth(const model::Cloth& cloth);
 
-  // Sets springs, bending, damping, drag, lift, friction, thickness, mass and solver. Shape and pins must
-  // stay the same.
+  // Sets springs, bending, damping, drag, lift, friction, thickness, pressure, mass and solver. Shape and
+  // pins must stay the same.
   void setParameters(const model::Cloth& cloth);
   // Sets the local winds, which add to the wind of the environment; at first there are none.
   void setWinds(std::span<const model::LocalWind> winds) { winds_.assign(winds.begin(), winds.end()); }
@@ -56,6 +57,9 @@ class ReferenceCloth {
   double bendingEnergy() const;
   void accumulateBendingForces(std::span<Vec3> forces) const;
 
+  // Pressure of the gas in the last step, above the pressure outside, Pa; 0 without gas.
+  double gasPressure() const { return gasPressure_; }
+
   // Computes forces, takes one step of h seconds, and enforces the cloth's constraints; without colliders.
   void integrate(const model::Environment& environment, model::Integrator integrator, double h);
 
@@ -66,6 +70,10 @@ class ReferenceCloth {
   void collide(const model::Shape& shape, const ColliderStep& step, double friction,
                std::span<const Vec3> from, std::span<const std::uint8_t> only = {});
   void finishContacts(std::span<const Vec3> from);
+  // The same for surfaces of the real room, with the friction of all contacts: a node has at most
+  // model::kSurfaceRounds contacts, and stays where it was if it then crosses a surface. `seconds`: of the
+  // substep.
+  void collide(std::span<const PlacedSurface> surfaces, double seconds, std::span<const Vec3> from);
 
   // Unit normals; (0,0,1) if they vanish. A grid uses up to eight triangles around a node ([Va21] 3.5, Alg.
   // 5), a mesh the area vectors of a node's triangles.
@@ -87,6 +95,10 @@ class ReferenceCloth {
     double most;          // speed that friction takes
     double seconds;       // of the substep
   };
+  // Moves a node out of a contact, after the friction of the contact before it. `velocity` and `place`: those
+  // of the surface there and of what it belongs to.
+  void leave(std::size_t node, const Contact& contact, const Vec3& velocity, const Vec3& place,
+             double friction, double seconds, const Vec3& from);
   // Moves nothing into the surfaces of the contacts before and after this one (`next`), unless opposed.
   void rub(std::size_t node, const Press& press, const Vec3& next, const Vec3& from);
   void setMass(float mass);
@@ -94,6 +106,9 @@ class ReferenceCloth {
   const std::vector<Vec3>& accelerations(const model::Environment& environment);
   void integrateRungeKutta(const model::Environment& environment, double h);
   void bend(double h);
+  // Moves the nodes, which are at the end of their free motion from `start_`, by the impulses of the gas:
+  // model/gas.h.
+  void press(double h);
   // True if a spring of this length, m, is a constraint instead of a force: model::AcadMode::paper.
   bool isReplaced(const model::SpringLink& link, double length) const;
   void enforceConstraints(double h);
@@ -113,6 +128,10 @@ class ReferenceCloth {
   std::vector<Vec3> start_, startVelocities_;  // at the substep's start, for solvers of linear systems
   model::SpringColours colours_;               // of xpbd, created at first use
   std::vector<double> masses_, inverseMasses_;
+  double gasPressure_ = 0;  // Pa
+  // Volume that the last step has foreseen, as a fraction of the volume at rest, and the square of its
+  // length, s^2; 0: there was no gas.
+  double foreseenVolume_ = 0, squaredStep_ = 0;
   double stiffnessShare_ = 1;  // model::stiffnessShare() of the last substep
 };
 

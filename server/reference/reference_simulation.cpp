@@ -95,7 +95,10 @@ void ReferenceSimulation::substep(const TickInputs& inputs, std::uint32_t index)
   attachments_.apply(cloths_, inputs.grabs, index, scene_.substeps, scene_.tickSeconds());
   if (selfCollision_.exists())
     for (int i = 0; i < model::kContactIterations; ++i) collideWithCloth(inputs, index);
-  for (std::size_t i = 0; i < cloths_.size(); ++i) collide(inputs, index, i, true);
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    collide(inputs, index, i, true);
+    cloths_[i].collide(inputs.surfaces, scene_.substepSeconds(), before_[i]);
+  }
   skins_.apply(cloths_, index, scene_.substeps, scene_.tickSeconds());
   if (motionBound_.exists()) boundMotion();
 }

@@ -36,6 +36,7 @@ struct TickInputs {
   std::vector<Grab> grabs = {};
   std::vector<Carry> carries = {};
   std::vector<model::LocalWind> winds = {};
+  std::vector<PlacedSurface> surfaces = {};
 };
 
 // Environment, local winds, colliders and attachments of the scene itself in a tick: from tick * dt to (tick
@@ -53,7 +54,7 @@ class ReferenceSimulation {
 
   // Simulates substep `index` of a tick: coarse corrections; forces, integration and colliders in order;
   // attachments, tethers and grabs; self-collision, and colliders again; colliders that are triangle meshes;
-  // limits of skinned cloth; the bound on motion.
+  // surfaces of the real room; limits of skinned cloth; the bound on motion.
   void substep(const TickInputs& inputs, std::uint32_t index);
 
   // Number of simulated ticks.

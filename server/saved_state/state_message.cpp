@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/messages/cloth_skin_message.h"
 #include "server/messages/grab_place.h"
 #include "server/messages/local_wind.h"
 #include "server/messages/scene_message.h"
@@ -345,9 +346,13 @@ Read<model::Scene> withParameters(const v1::Scene& parameters, const model::Scen
   for (std::size_t i = 0; i < start.colliders.size(); ++i)
     if (const auto* solid = std::get_if<model::Solid>(&start.colliders[i].shape))
       messages::write(**solid, *whole.mutable_colliders(static_cast<int>(i))->mutable_mesh());
-  for (std::size_t i = 0; i < start.cloths.size(); ++i)
-    if (start.cloths[i].mesh)
-      messages::write(*start.cloths[i].mesh, *whole.mutable_cloths(static_cast<int>(i))->mutable_mesh());
+  for (std::size_t i = 0; i < start.cloths.size(); ++i) {
+    const model::Cloth& from = start.cloths[i];
+    v1::Cloth& cloth = *whole.mutable_cloths(static_cast<int>(i));
+    if (from.mesh) messages::write(*from.mesh, *cloth.mutable_mesh());
+    cloth.clear_skin();
+    if (from.skin) messages::write(*from.skin, *cloth.mutable_skin());
+  }
   Read<model::Scene> scene = toScene(whole);
   const bool same =
       scene && scene->name == start.name && scene->colliders.size() == start.colliders.size() &&
@@ -358,6 +363,7 @@ Read<model::Scene> withParameters(const v1::Scene& parameters, const model::Scen
   for (std::size_t i = 0; scene && i < start.colliders.size(); ++i)
     if (std::holds_alternative<model::Solid>(start.colliders[i].shape))
       scene->colliders[i].shape = start.colliders[i].shape;
+  for (std::size_t i = 0; scene && i < start.cloths.size(); ++i) scene->cloths[i].skin = start.cloths[i].skin;
   return scene;
 }
 

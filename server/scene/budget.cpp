@@ -107,7 +107,9 @@ void Charge::release() {
 
 Charge::Amount Charge::priceOf(const model::Scene& scene) const {
   return {.load = std::max(0.0, loadWith(scene, colliders_.others)),
-          .megabytes = std::max(0.0, model_.bytes(scene) / kMegabyte - freeMegabytes_)};
+          .megabytes =
+              std::max(0.0, (model_.bytes(scene) + model_.surfaceBytes(surfaces_.triangles)) / kMegabyte -
+                                freeMegabytes_)};
 }
 
 double Charge::secondsOf(const model::Scene& scene, double colliders) const {
@@ -127,6 +129,7 @@ model::Work Charge::workWith(const model::Scene& scene, double colliders) const 
   model::Work work = model_.work(scene, colliders);
   if (movesJoints_) work += model_.movedJointsWork(scene);
   work += model_.heldWindWork(scene, heldWinds_);
+  work += model_.surfacesWork(scene, surfaces_.searches);
   return work;
 }
 
@@ -149,6 +152,20 @@ messages::Result<void> Charge::chargeWinds(const std::string& path, const model:
   }
   messages::Result<void> charged = charge(path, scene);
   if (!charged) heldWinds_ = before;
+  return charged;
+}
+
+messages::Result<void> Charge::chargeSurfaces(const std::string& path, const model::Scene& scene,
+                                              const SurfaceLoad& surfaces) {
+  const SurfaceLoad before = std::exchange(surfaces_, surfaces);
+  if (released_) return {};
+  if (surfaces.searches <= before.searches && surfaces.triangles <= before.triangles) {
+    const std::lock_guard lock(budget_->mutex_);
+    replace(priceOf(scene));
+    return {};
+  }
+  messages::Result<void> charged = charge(path, scene);
+  if (!charged) surfaces_ = before;
   return charged;
 }
 

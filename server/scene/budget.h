@@ -80,6 +80,9 @@ class Charge {
   messages::Result<void> chargeJoints(const std::string& path, const model::Scene& scene);
   // Charges the scene with this number of local winds that participants hold, like charge().
   messages::Result<void> chargeWinds(const std::string& path, const model::Scene& scene, std::size_t count);
+  // Charges the scene with the surfaces of the real room of its participants, like charge().
+  messages::Result<void> chargeSurfaces(const std::string& path, const model::Scene& scene,
+                                        const SurfaceLoad& surfaces);
   // The scene starts again: nobody has moved joints.
   void forgetJoints() { movesJoints_ = false; }
   // Charges the scene with parameters that it had before, also beyond the budget.
@@ -130,6 +133,7 @@ class Charge {
   ColliderLoad colliders_;  // of participants
   bool movesJoints_ = false;
   std::size_t heldWinds_ = 0;  // of participants
+  SurfaceLoad surfaces_;       // of participants
   model::Work freeWork_;
   double freeMegabytes_ = 0;
   Amount charged_;

@@ -2,6 +2,7 @@
 // Divides the room for colliders among participants.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -41,6 +42,13 @@ struct ColliderLoad {
 };
 ColliderLoad loadOf(std::span<const model::ParticipantCollider> colliders, const ClothBounds* cloth);
 
+// All surfaces of the real room in a scene: the sum of model::surfaceWork(), and their triangles.
+struct SurfaceLoad {
+  double searches = 0;
+  std::size_t triangles = 0;
+  bool operator==(const SurfaceLoad&) const = default;
+};
+
 // The largest amount that each may have if all together have `room`: one that needs less leaves the rest to
 // the others. Infinite if there is room for all. Sorts the needs.
 double fairShare(std::span<double> needs, double room);
@@ -62,6 +70,9 @@ class ColliderBudget {
   // Charges the local winds that participants hold, `count` together, or returns why there is no room for
   // them. There is always room for fewer than before.
   [[nodiscard]] virtual messages::Result<void> chargeWinds(std::size_t /*count*/) { return {}; }
+  // Charges the surfaces of the real room that participants have, or returns why there is no room for them.
+  // There is always room for fewer than before.
+  [[nodiscard]] virtual messages::Result<void> chargeSurfaces(const SurfaceLoad& /*load*/) { return {}; }
   // Charges what the participants have, also beyond the room.
   virtual void chargeColliders(const ColliderLoad& load) = 0;
   // Place of the cloth after the newest tick. Returns false if there was none.

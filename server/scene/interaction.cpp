@@ -43,10 +43,12 @@ void Interaction::letGo() {
   colliders_.letGo();
   grabs_.letGo();
   winds_.letGo();
+  surfaces_.letGo();
   poses_.repeat();
 }
 
-void Interaction::advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery, float windRoom) {
+void Interaction::advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery, float windRoom,
+                          const simulation::ClothSimulation* withSurfaces) {
   const double endSeconds = static_cast<double>(tick + 1) * scene.tickSeconds();
   colliders_.advance(scene, endSeconds, inputs_.colliders);
   if (recovery != Recovery::none) grabs_.clothsWentBack(scene, recovery == Recovery::reset);
@@ -55,6 +57,7 @@ void Interaction::advance(const model::Scene& scene, std::uint64_t tick, Recover
   inputs_.namesConstraints = constraintRequests_.any();
   inputs_.environment = model::environmentAt(scene, tick);
   winds_.advance(scene, windRoom, inputs_.winds);
+  surfaces_.advance(withSurfaces, inputs_);
 }
 
 void Interaction::takeArrivals(std::vector<Clock::time_point>& arrivals) {

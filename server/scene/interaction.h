@@ -16,6 +16,7 @@
 #include "server/scene/journal.h"
 #include "server/scene/pose_history.h"
 #include "server/scene/requests.h"
+#include "server/scene/surface_set.h"
 #include "server/simulation/cloth_simulation.h"
 
 namespace clothstream::scene {
@@ -34,14 +35,21 @@ class Interaction {
   void add(Poses&& poses);
   // Places what participants move as their poses are at this time.
   void place(Clock::time_point time);
+  // Sets the surfaces of the real room, which act as soon as the device has them.
+  void placeSurfaces(std::span<const RoomSurface> surfaces) { surfaces_.set(surfaces); }
+  bool hasSurfaces() const { return !surfaces_.empty(); }
   // Participants act on nothing until they send poses again.
   void letGo();
   // Returns whether participants act on the cloth: by colliders, grabs, winds, or what they moved.
-  bool isTouched() const { return colliders_.isTouched() || grabs_.isTouched() || !winds_.empty(); }
+  bool isTouched() const {
+    return colliders_.isTouched() || grabs_.isTouched() || !winds_.empty() || hasSurfaces();
+  }
 
   // Makes the inputs of the tick after `tick`, before which the cloths have this recovery. The winds that
-  // participants hold have at most the speed `windRoom` together, m/s.
-  void advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery, float windRoom);
+  // participants hold have at most the speed `windRoom` together, m/s. `withSurfaces` is the simulation of
+  // the tick, if it is ready for surfaces of the real room; else null.
+  void advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery, float windRoom,
+               const simulation::ClothSimulation* withSurfaces);
   // Inputs of the newest advance(), and the identities of their colliders.
   const simulation::TickInputs& inputs() const { return inputs_; }
   const ColliderSet& colliders() const { return colliders_; }
@@ -65,6 +73,7 @@ class Interaction {
   ColliderSet colliders_;
   GrabsAndAttachments grabs_;
   HeldWinds winds_;
+  SurfaceSet surfaces_;
   ContactLog contacts_;
   Requests contactRequests_, constraintRequests_;
   PoseHistory poses_;

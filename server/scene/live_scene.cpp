@@ -74,7 +74,8 @@ LiveScene::LiveScene(model::Scene definition, SceneTerms agreed, std::shared_ptr
     : terms(std::move(agreed)),
       journal(std::move(kept)),
       subscribers(tapOf(journal)),
-      poses(subscribers, inbox, &definition_, model::kMaxLocalWinds - definition.winds.size()),
+      surfaces(&definition_),
+      poses(subscribers, inbox, &definition_, model::kMaxLocalWinds - definition.winds.size(), &surfaces),
       roster(subscribers, poses, journal.get()),
       work(schedule::WorkLevel{1, definition.substeps}),
       definition_(std::move(definition), std::move(budget), !terms.created) {}

@@ -23,6 +23,7 @@
 #include "server/scene/newest_poses.h"
 #include "server/scene/priced_definition.h"
 #include "server/scene/quarantine.h"
+#include "server/scene/room_surfaces.h"
 #include "server/scene/roster.h"
 #include "server/scene/scene_observer.h"
 #include "server/scene/scene_store.h"
@@ -143,6 +144,7 @@ class LiveScene {
 
   Inbox inbox;
   delivery::Subscribers subscribers;
+  RoomSurfaces surfaces;  // of the real rooms of participants
   NewestPoses poses;
   Roster roster;
   telemetry::SceneMetrics metrics;

@@ -35,6 +35,7 @@ void NewestPoses::add(std::uint64_t participant, Role role, bool posed) {
   entry.participant = participant;
   entry.role = role;
   entry.posed = posed;
+  if (surfaces_ != nullptr) surfaces_->add(participant, role);
 }
 
 void NewestPoses::setRole(std::uint64_t participant, Role role, Clock::time_point now) {
@@ -42,6 +43,7 @@ void NewestPoses::setRole(std::uint64_t participant, Role role, Clock::time_poin
   const auto entry = find(participant);
   if (entry == entries_.end()) return;
   const Role before = std::exchange(entry->role, role);
+  if (surfaces_ != nullptr) surfaces_->setRole(participant, role);
   if (role == Role::viewer) {
     removeFromScene(*entry, now);
     entry->poses = {};
@@ -59,10 +61,12 @@ void NewestPoses::setBody(std::uint64_t participant, const std::string& body) {
 void NewestPoses::withdraw(std::uint64_t participant, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (const auto entry = find(participant); entry != entries_.end()) removeFromScene(*entry, now);
+  if (surfaces_ != nullptr) surfaces_->withdraw(participant);
 }
 
 void NewestPoses::resume(std::uint64_t participant, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
+  if (surfaces_ != nullptr) surfaces_->resume(participant);
   const auto entry = find(participant);
   if (entry == entries_.end() || entry->posed) return;
   if (!entry->poses.acts()) return;
@@ -76,11 +80,13 @@ void NewestPoses::remove(std::uint64_t participant, Clock::time_point now) {
   if (entry == entries_.end()) return;
   removeFromScene(*entry, now);
   entries_.erase(entry);
+  if (surfaces_ != nullptr) surfaces_->remove(participant);
 }
 
 void NewestPoses::clear() {
   const std::lock_guard lock(mutex_);
   entries_.clear();
+  if (surfaces_ != nullptr) surfaces_->clear();
   inbox_.dropPoses();
   if (budget_ != nullptr) static_cast<void>(budget_->chargeWinds(0));
   charge();

@@ -15,6 +15,7 @@
 #include "server/scene/collider_shares.h"
 #include "server/scene/inbox.h"
 #include "server/scene/roles.h"
+#include "server/scene/room_surfaces.h"
 #include "server/schedule/clock.h"
 
 namespace clothstream::scene {
@@ -32,10 +33,11 @@ class NewestPoses {
   static constexpr std::chrono::milliseconds kMaxAhead{100}, kMaxBehind{10'000};
 
   // All must outlive the object. Without `budget` there is room for all colliders. `windRoom` is the number
-  // of local winds that participants may hold together.
+  // of local winds that participants may hold together. `surfaces` learns which participants there are; it
+  // may be null.
   NewestPoses(const delivery::Subscribers& subscribers, Inbox& inbox, ColliderBudget* budget = nullptr,
-              std::size_t windRoom = model::kMaxLocalWinds)
-      : subscribers_(subscribers), inbox_(inbox), budget_(budget), windRoom_(windRoom) {}
+              std::size_t windRoom = model::kMaxLocalWinds, RoomSurfaces* surfaces = nullptr)
+      : subscribers_(subscribers), inbox_(inbox), budget_(budget), windRoom_(windRoom), surfaces_(surfaces) {}
 
   // A participant joins. `posed`: the scene may have colliders or grabs of it, from a checkpoint, which has
   // no winds.
@@ -104,6 +106,7 @@ class NewestPoses {
   Inbox& inbox_;
   ColliderBudget* const budget_;
   const std::size_t windRoom_;
+  RoomSurfaces* const surfaces_;
 
   std::mutex mutex_;
   Entries entries_;     // in the order in which the participants joined

@@ -185,6 +185,13 @@ messages::Result<void> PricedDefinition::chargeWinds(std::size_t count) {
   return charged;
 }
 
+messages::Result<void> PricedDefinition::chargeSurfaces(const SurfaceLoad& load) {
+  const std::lock_guard lock(mutex_);
+  auto charged = charge_.chargeSurfaces("surface", definition_.accepted(), load);
+  comparePrice();
+  return charged;
+}
+
 void PricedDefinition::chargeColliders(const ColliderLoad& load) {
   const std::lock_guard lock(mutex_);
   charge_.chargeColliders(definition_.accepted(), load);

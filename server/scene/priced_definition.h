@@ -76,6 +76,7 @@ class PricedDefinition : public ColliderBudget {
   double roomForOthers(double hands) const override;
   messages::Result<void> chargeJoints() override;
   messages::Result<void> chargeWinds(std::size_t count) override;
+  messages::Result<void> chargeSurfaces(const SurfaceLoad& load) override;
   void chargeColliders(const ColliderLoad& load) override;
   bool boundsOfCloth(ClothBounds& bounds) const override;
 

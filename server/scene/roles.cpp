@@ -22,6 +22,8 @@ const char* nameOf(Action action) {
       return "wearBody";
     case Action::holdWinds:
       return "colliderPoses.winds";
+    case Action::placeSurfaces:
+      return "surface";
     case Action::changeEnvironment:
       return "parameterChange: the environment";
     case Action::changeCloths:
@@ -55,6 +57,7 @@ Role roleFor(Action action, const Permissions& participants) {
     case Action::grab:
     case Action::moveAttachments:
     case Action::wear:
+    case Action::placeSurfaces:
       return Role::participant;
     case Action::holdWinds:
     case Action::changeEnvironment:

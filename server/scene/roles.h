@@ -18,6 +18,7 @@ enum class Action : std::uint8_t {
   moveAttachments,
   wear,  // a body
   holdWinds,
+  placeSurfaces,  // of the real room
   changeEnvironment,
   changeCloths,
   changeColliders,  // the scene's own colliders

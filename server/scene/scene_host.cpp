@@ -26,6 +26,7 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
       onDevice_(std::move(loaded)),
       parameters_(scene.start(), loader),
       interaction_(scene.start()),
+      surfacePreparation_(loader),
       frames_(scene, publisher, reportRate),
       recovery_(scene.start()),
       snapshot_{.state = onDevice_->start},
@@ -117,7 +118,7 @@ void SceneHost::begin(Clock::time_point now) {
   parameters_.endEasing(*onDevice_, tick_);
   applyInputs();
   applyWork();
-  interaction_.advance(parameters_.scene(), tick_, recovery_.next(), windRoom_);
+  interaction_.advance(parameters_.scene(), tick_, recovery_.next(), windRoom_, readyForSurfaces());
   record();
   current_.recording = Clock::now() - began;
   onDevice_->slices.begin();
@@ -155,7 +156,24 @@ void SceneHost::applyInputs() {
   live_.inbox.drain(inputs_);
   applyChanges();
   for (Poses& poses : inputs_.poses) interaction_.add(std::move(poses));
-  if (!recovery_.ignoresParticipants(tick_)) interaction_.place(current_.start);
+  if (recovery_.ignoresParticipants(tick_)) return;
+  interaction_.place(current_.start);
+  takeSurfaces();
+}
+
+void SceneHost::takeSurfaces() {
+  if (live_.surfaces.take(surfaceVersion_, roomSurfaces_)) interaction_.placeSurfaces(roomSurfaces_);
+}
+
+const simulation::ClothSimulation* SceneHost::readyForSurfaces() {
+  if (!interaction_.hasSurfaces() && !onDevice_->simulation.hasSurfaces()) return nullptr;
+  if (surfacePreparation_.isReady(onDevice_)) return &onDevice_->simulation;
+  if (const std::string problem = surfacePreparation_.takeProblem(); !problem.empty()) {
+    const std::string text = fmt::format("surfaces of the real room do not act in this scene: {}", problem);
+    telemetry::log({live_.name()}, spdlog::level::warn, "tick {}: {}", tick_, text);
+    live_.subscribers.announce(delivery::notice(v1::NOTICE_KIND_CHANGE_UNDONE, text, tick_));
+  }
+  return nullptr;
 }
 
 void SceneHost::applyChanges() {
@@ -335,7 +353,10 @@ void SceneHost::recover() {
   using Cure = SceneRecovery::Cure;
   const Cure cure = recovery_.unhealthy(tick_, interaction_.isTouched());
   (cure == Cure::rollback ? live_.metrics.rollbacks : live_.metrics.resets).add();
-  if (cure == Cure::resetAndLetGo) interaction_.letGo();
+  if (cure == Cure::resetAndLetGo) {
+    interaction_.letGo();
+    surfaceVersion_ = 0;
+  }
   if (cure == Cure::resetAndUndo) {
     parameters_.undo(recovery_.proven().environment, recovery_.proven().cloths);
     announceParameters();
@@ -365,12 +386,16 @@ void SceneHost::releaseCoarseEncoders() {
 void SceneHost::release() {
   frames_.drain();  // they use the encoders
   parameters_.endRehearsal();
+  surfacePreparation_.end();
   onDevice_.reset();
 }
 
 void SceneHost::rebuild(std::unique_ptr<SceneOnDevice> loaded, std::string_view why) {
   interaction_.goBack(snapshot_.grabs, snapshot_.state.held);
   continueOn(*loaded);
+  surfacePreparation_.end();
+  // Cloth would fall through the surfaces while another thread prepares them.
+  if (interaction_.hasSurfaces()) SurfacePreparation::prepareNow(*loaded);
   onDevice_ = std::move(loaded);
   recovery_.rebuilt();
   if (live_.journal) live_.journal->restored(tick_, snapshot_.state);

@@ -23,6 +23,7 @@
 #include "server/scene/scene_parameters.h"
 #include "server/scene/scene_recovery.h"
 #include "server/scene/slices.h"
+#include "server/scene/surface_preparation.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream::scene {
@@ -142,6 +143,10 @@ class SceneHost {
   void reset();
   void applyInputs();
   void applyChanges();
+  // Takes surfaces of the real room that have changed.
+  void takeSurfaces();
+  // The simulation, if it is ready for the surfaces; null if it is not, or if there are none.
+  const simulation::ClothSimulation* readyForSurfaces();
   // Begins the work that setWork() asks for.
   void applyWork();
   void record();
@@ -167,6 +172,9 @@ class SceneHost {
 
   SceneParameters parameters_;
   Interaction interaction_;
+  SurfacePreparation surfacePreparation_;
+  std::vector<RoomSurface> roomSurfaces_;  // of the newest change
+  std::uint64_t surfaceVersion_ = 0;       // of `roomSurfaces_`; 0: they are taken again
   SceneFrames frames_;
   SceneRecovery recovery_;
   Inputs inputs_;             // of the newest tick

@@ -2,6 +2,7 @@
 #include "server/scene/snapshot_message.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <span>
@@ -17,6 +18,7 @@ using simulation::HeldNode;
 using simulation::HeldNodes;
 
 constexpr std::size_t kVectorBytes = 12;
+static_assert(sizeof(simulation::GasState) == 8);  // as in the message
 
 void write(const HeldNodes& held, v1::HeldNodes& message) {
   std::string& places = *message.mutable_places();
@@ -73,6 +75,8 @@ void write(const simulation::StateSnapshot& snapshot, v1::Checkpoint& message) {
   message.set_tick(snapshot.tick);
   message.set_state(snapshot.bytes.data(), snapshot.bytes.size());
   if (!snapshot.origin.isZero(0)) messages::write(snapshot.origin, *message.mutable_origin());
+  if (!snapshot.gas.empty())
+    message.set_gas(snapshot.gas.data(), snapshot.gas.size() * sizeof(simulation::GasState));
   message.set_grips_hold(!snapshot.held.nodes.empty());
   if (!snapshot.held.grabs.empty()) write(snapshot.held, *message.mutable_held());
 }
@@ -86,6 +90,14 @@ tl::expected<simulation::StateSnapshot, std::string> toSnapshot(const v1::Checkp
   snapshot.origin = {message.origin().x(), message.origin().y(), message.origin().z()};
   if (!(snapshot.origin.cwiseAbs().maxCoeff() <= simulation::kWorldExtent))
     return tl::unexpected(std::string("has an origin outside of the world"));
+  const std::string& gas = message.gas();
+  if (gas.size() % sizeof(simulation::GasState) != 0 || gas.size() / sizeof(simulation::GasState) > nodeCount)
+    return tl::unexpected(std::string("has the gas of another scene"));
+  snapshot.gas.resize(gas.size() / sizeof(simulation::GasState));
+  std::memcpy(snapshot.gas.data(), gas.data(), gas.size());
+  for (const simulation::GasState& each : snapshot.gas)
+    if (!std::isfinite(each.volume) || !(each.squaredSubstep >= 0 && each.squaredSubstep <= 1))
+      return tl::unexpected(std::string("has gas with a number out of range"));
   if (message.has_held()) {
     auto held = toHeldNodes(message.held(), nodeCount);
     if (!held) return tl::unexpected(std::move(held).error());

@@ -141,6 +141,7 @@ void Session::welcome(const scene::Roster::Admission& admission, const messages:
   welcome.set_hold_ms(static_cast<std::uint32_t>(
       std::chrono::duration_cast<std::chrono::milliseconds>(server_.options.reconnectGrace.place).count()));
   welcome.set_acknowledge_every_frame(scene_->shape().lockstep);
+  *welcome.mutable_surfaces() = surfaceLimits();
   answer(reply);
 }
 

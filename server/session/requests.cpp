@@ -15,6 +15,7 @@
 #include "server/delivery/mailbox.h"
 #include "server/hosting/scene_server.h"
 #include "server/messages/client_message.h"
+#include "server/messages/surface_message.h"
 #include "server/session/session.h"
 
 namespace clothstream::session {
@@ -148,6 +149,10 @@ struct Session::Messages {
          .state = State::inScene,
          .limit = RateLimit{Rate::changes, "parameter changes"},
          .handle = parameterChange},
+        {.body = Message::kSurface,
+         .state = State::inScene,
+         .limit = RateLimit{Rate::surfaces, "messages about surfaces"},
+         .handle = surface},
         {.body = Message::kSetRole, .state = State::inScene, .limit = kParticipants, .handle = setRole},
         {.body = Message::kRemoveParticipant,
          .state = State::inScene,
@@ -285,6 +290,30 @@ struct Session::Messages {
                                           session.server_.options.participantsMay, session.now_));
   }
 
+  static void surface(Session& session, const Message& message) {
+    scene::LiveScene& scene = *session.scene_;
+    if (session.surfaceLimits().policy() != v1::SURFACE_POLICY_OWN)
+      return session.refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
+                             scene.source
+                                 ? fmt::format("surface: '{}' is not simulated, so that no surface acts "
+                                               "in it",
+                                               scene.name())
+                                 : "surface: this server takes no surfaces of the real room "
+                                   "(--room-surfaces off)"});
+    const auto update = messages::toSurfaceUpdate(message.surface());
+    if (!update) {
+      session.surfaceUpload_.drop(scene.surfaces, message.surface().id());
+      return session.refuse(update.error());
+    }
+    if (update->remove) {
+      session.surfaceUpload_.drop(scene.surfaces, update->id);
+      return scene.surfaces.remove(session.participant_, update->id);
+    }
+    if (!update->part)
+      return session.refuseUnless(scene.surfaces.move(session.participant_, update->id, *update->pose));
+    session.refuseUnless(session.surfacePart(*update, message.surface().part()));
+  }
+
   static void parameterChange(Session& session, const Message& message) {
     scene::LiveScene& scene = *session.scene_;
     const v1::ParameterChange& change = message.parameter_change();
@@ -376,6 +405,44 @@ void Session::dispatch(const v1::ClientMessage& message) {
     if (!permitted) return refuse(permitted.error());
   }
   row->handle(*this, message);
+}
+
+messages::Result<void> Session::surfacePart(const messages::SurfaceUpdate& update,
+                                            const v1::SurfacePart& message) {
+  if (update.part->index == 0) {
+    const auto ticket = scene_->surfaces.begin(participant_, update.id, update.pose.value_or(model::Pose{}),
+                                               server_.options.participantsMay);
+    if (!ticket) return tl::unexpected(ticket.error());
+    surfaceUpload_.begin(scene_->surfaces, *ticket, *update.part);
+  }
+  auto complete = surfaceUpload_.add(scene_->surfaces, update.id, *update.part, message);
+  if (!complete) return tl::unexpected(std::move(complete.error()));
+  if (!*complete) return {};
+  const scene::RoomSurfaces::Ticket ticket = (*complete)->ticket;
+  auto queued = server_.surfaceMaker.make(scene_, std::move(**complete),
+                                          [weak = weak_from_this()](const messages::Result<void>& put) {
+                                            const std::shared_ptr<Session> session = weak.lock();
+                                            if (put || !session) return;
+                                            const std::lock_guard lock(session->mutex_);
+                                            if (session->mailbox_->closed()) return;
+                                            session->now_ = Clock::now();
+                                            session->requestId_ = 0;
+                                            session->refuse(put.error());
+                                          });
+  if (!queued) scene_->surfaces.cancel(ticket);
+  return queued;
+}
+
+v1::SurfaceLimits Session::surfaceLimits() const {
+  v1::SurfaceLimits limits;
+  if (scene_->source || server_.options.roomSurfaces == hosting::SurfacePolicy::off) {
+    limits.set_policy(v1::SURFACE_POLICY_OFF);
+    return limits;
+  }
+  limits.set_policy(v1::SURFACE_POLICY_OWN);
+  limits.set_max_triangles(model::kMaxSurfaceTriangles);
+  limits.set_max_surfaces(model::kMaxSurfacesOfParticipant);
+  return limits;
 }
 
 bool Session::inLockstep() const {

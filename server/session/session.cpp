@@ -42,6 +42,7 @@ Session::Session(hosting::SceneServer& server, Arrival arrival, std::function<vo
       lastHeard_(opened_),
       identity_(server.connections),
       upload_(server.uploads, address_),
+      surfaceUpload_(server.uploads, address_),
       readRate_(server.options.maxReadRate * kMegabyte, server.options.maxReadRate * kMegabyte) {}
 
 std::shared_ptr<Session> Session::open(hosting::SceneServer& server, Arrival arrival,

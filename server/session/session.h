@@ -27,6 +27,7 @@
 #include "server/schedule/token_bucket.h"
 #include "server/session/peer_identity.h"
 #include "server/session/rates.h"
+#include "server/session/surface_upload.h"
 #include "server/session/upload.h"
 
 namespace clothstream::delivery {
@@ -143,6 +144,10 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   // Sends what a peer that joins must know besides the description: pause, work, playback, recording.
   void tellPresentState(scene::LiveScene& scene);
   bool inLockstep() const;
+  // What this peer may do with surfaces of its real room.
+  v1::SurfaceLimits surfaceLimits() const;
+  // Handles a part of the mesh of a surface.
+  messages::Result<void> surfacePart(const messages::SurfaceUpdate& update, const v1::SurfacePart& message);
   // Returns a function that answers the current message when its result is known.
   template <typename Response>
   std::function<void(tl::expected<Response, v1::Error>)> answering(Response* (v1::ServerMessage::*body)());
@@ -185,6 +190,7 @@ class Session final : public hosting::Peer, public std::enable_shared_from_this<
   std::string whyUnknown_;                 // error for a peer without identity
   std::shared_ptr<const void> datagrams_;  // while the peer may exchange datagrams
   Upload upload_;
+  SurfaceUpload surfaceUpload_;
   std::uint32_t asked_ = 0;  // requests whose answers another thread makes
   // Request id and arrival of the current message.
   std::uint64_t requestId_ = 0;

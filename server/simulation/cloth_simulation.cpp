@@ -20,7 +20,9 @@
 #include "server/simulation/collision/collision_stage.h"
 #include "server/simulation/collision/skin_stage.h"
 #include "server/simulation/collision/solid_stage.h"
+#include "server/simulation/collision/surface_stage.h"
 #include "server/simulation/force_stage.h"
+#include "server/simulation/gas/gas_stage.h"
 #include "server/simulation/hash_stage.h"
 #include "server/simulation/mass_stage.h"
 #include "server/simulation/motion_bound/motion_bound_stage.h"
@@ -42,11 +44,17 @@ std::uint32_t workgroupSizeOn(const vulkan::Device& device, const SimulationOpti
   return std::min(wanted, device.limits().maxWorkgroupInvocations);
 }
 
+std::vector<Follow> followsOf(std::span<const model::Cloth> cloths) {
+  std::vector<Follow> follows;
+  for (const model::Cloth& cloth : cloths) follows.push_back(followOf(cloth));
+  return follows;
+}
+
 // State and parameters of a scene on the device. The parameters have two uploads, because a tick may be in
 // flight while the next one is recorded.
 struct Memory {
-  Memory(const vulkan::Device& device, std::uint32_t nodes, std::size_t clothCount)
-      : state(device, nodes),
+  Memory(const vulkan::Device& device, const model::Scene& scene, std::uint32_t nodes, std::size_t clothCount)
+      : state(device, nodes, GasStage::isIn(scene) ? static_cast<std::uint32_t>(clothCount) : 0),
         normals(device, BufferPurpose::texels, nodes * kTexelBytes),
         cloths(device, BufferPurpose::texels, clothCount * sizeof(shared::ClothRecord)),
         stretches(device, BufferPurpose::indirect,
@@ -95,6 +103,8 @@ struct Stages {
     const StateBuffers state = stateOf(memory, collision);
     if (CoarseStage::isIn(scene.cloths))
       coarse = std::make_unique<CoarseStage>(device, scene.cloths, state, workgroupSize);
+    if (GasStage::isIn(scene))
+      gas = std::make_unique<GasStage>(device, scene, state, memory.state.gas, workgroupSize);
     if (SelfCollisionStage::isIn(scene))
       selfCollision = std::make_unique<SelfCollisionStage>(device, scene, state, workgroupSize);
     if (!solidTables.empty())
@@ -115,13 +125,15 @@ struct Stages {
     }
   }
 
-  // In their order. Attachments and joints carry nodes before CollisionStage lists the colliders near them,
-  // and joints move before it reads the reach of their meshes.
+  // In their order. Gas knows the free motion that springs give as forces, and solvers hold their springs
+  // against it. Attachments and joints carry nodes before CollisionStage lists the colliders near them, and
+  // joints move before it reads the reach of their meshes.
   std::vector<Stage*> list() {
-    std::vector<Stage*> all{coarse.get(), solvers.bending(), &forces};
+    std::vector<Stage*> all{coarse.get(), solvers.bending(), &forces, gas.get()};
     std::ranges::copy(solvers.afterForces(), std::back_inserter(all));
-    all.insert(all.end(), {attachments.get(), clothSkins.get(), selfCollision.get(), skins.get(),
-                           solids.get(), skinLimits.get(), &collision, motionBound.get(), &masses, &hash});
+    all.insert(all.end(),
+               {attachments.get(), clothSkins.get(), selfCollision.get(), skins.get(), solids.get(),
+                surfaces.get(), skinLimits.get(), &collision, motionBound.get(), &masses, &hash});
     std::erase(all, nullptr);
     return all;
   }
@@ -133,11 +145,13 @@ struct Stages {
   MassStage masses;
   HashStage hash;
   std::unique_ptr<CoarseStage> coarse;                // null if no cloth uses it
+  std::unique_ptr<GasStage> gas;                      // null if no cloth can hold gas
   std::unique_ptr<SelfCollisionStage> selfCollision;  // null if no cloth uses it
   std::unique_ptr<SolidStage> solids;                 // null if no collider is a triangle mesh
   std::unique_ptr<SkinStage> skins;                   // null if no mesh has joints
   std::unique_ptr<ClothSkinStage> clothSkins;         // null if no cloth follows joints
   std::unique_ptr<SkinLimitStage> skinLimits;         // null if no node has limits
+  std::shared_ptr<SurfaceStage> surfaces;             // null until the first surface of the real room
   std::unique_ptr<MotionBoundStage> motionBound;      // null if no cloth uses it
   std::unique_ptr<AttachmentStage> attachments;       // created when it is first needed
 };
@@ -175,6 +189,7 @@ struct ClothSimulation::Pipeline {
   double substepSeconds;
   std::vector<shared::ClothRecord> records;
   std::vector<SpringStiffness> stiffness;  // of the cloths' springs
+  std::vector<Follow> follows;             // of the cloths' forces
   Memory memory;
   Stages stages;
   std::vector<Stage*> order;            // of the stages
@@ -199,7 +214,8 @@ ClothSimulation::Pipeline::Pipeline(const vulkan::Device& on, const model::Scene
       substepSeconds(scene.substepSeconds()),
       records(clothRecords(scene.cloths, substepSeconds)),
       stiffness(springStiffness(scene.cloths)),
-      memory(on, offsets.back(), records.size()),
+      follows(followsOf(scene.cloths)),
+      memory(on, scene, offsets.back(), records.size()),
       stages(on, scene, memory, offsets, options, workgroupSize) {
   std::memcpy(memory.uploads[slot].mapped().data(), records.data(), memory.cloths.bytes());
   memory.state.write(startState(scene, origin), stages.masses.inverseMasses());
@@ -230,6 +246,7 @@ const TickInputs& ClothSimulation::Pipeline::nearby(const TickInputs& inputs) {
     for (model::Pose* pose : {&carry.from, &carry.to}) pose->position -= origin;
   for (Grab& grab : moved.grabs)
     for (model::Pose* pose : {&grab.start, &grab.end}) pose->position -= origin;
+  for (PlacedSurface& surface : moved.surfaces) surface.pose.position -= origin;
   return moved;
 }
 
@@ -291,8 +308,12 @@ void ClothSimulation::setCloths(std::span<const model::Cloth> cloths) {
                       return a.rows == b.rows && a.columns == b.columns;
                     }));
   on.stages.masses.prepare(cloths);
-  const bool divides = on.stages.solvers.set(cloths);
+  bool divides = on.stages.solvers.set(cloths);
   on.listStages();
+  if (std::vector<Follow> follows = followsOf(cloths); follows != on.follows) {
+    on.follows = std::move(follows);
+    divides = true;
+  }
   if (divides) on.stages.forces.setTiles(cloths);
   for (Stage* stage : on.order) stage->setCloths(cloths);
   on.stiffness = springStiffness(cloths);
@@ -331,6 +352,7 @@ void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& i
   Pipeline& on = *pipeline_;
   assert(inWorld.colliders.size() <= kMaxColliders);
   if (!inWorld.grabs.empty()) on.makeAttachments();
+  if (!hasSurfaces() && !(inWorld.surfaces.empty() && inWorld.arriving.empty())) takeSurfaces(makeSurfaces());
   on.start(recorder);
   on.slot = 1 - on.slot;
   const Tick tick{.inputs = on.nearby(inWorld),
@@ -342,6 +364,26 @@ void ClothSimulation::recordTick(vulkan::Recorder& recorder, const TickInputs& i
   on.recordInputs(recorder, tick);
   on.recordSubsteps(recorder, tick);
   on.recordEnd(recorder, tick);
+}
+
+bool ClothSimulation::hasSurfaces() const {
+  return pipeline_->stages.surfaces != nullptr;
+}
+
+std::shared_ptr<SurfaceStage> ClothSimulation::makeSurfaces() const {
+  const Pipeline& on = *pipeline_;
+  return std::make_shared<SurfaceStage>(on.device, on.offsets, stateOf(on.memory, on.stages.collision),
+                                        on.workgroupSize);
+}
+
+void ClothSimulation::takeSurfaces(std::shared_ptr<SurfaceStage> stage) {
+  pipeline_->stages.surfaces = std::move(stage);
+  pipeline_->listStages();
+}
+
+std::size_t ClothSimulation::texelsToUpload(const SurfaceTable& table) const {
+  const SurfaceStage* const stage = pipeline_->stages.surfaces.get();
+  return stage == nullptr ? surfaceTexels(table) : stage->texelsToUpload(table);
 }
 
 void ClothSimulation::recordNormals(vulkan::Recorder& recorder) {

@@ -21,6 +21,8 @@
 
 namespace clothstream::simulation {
 
+class SurfaceStage;
+
 // All cloths of a scene on one device. The model (sizes, springs, pins) is immutable; the state (positions,
 // velocities) changes. All cloths share one set of buffers, and a stage is one dispatch for all of them.
 // Belongs to the device's thread. It records work, but never submits or waits. Every record...() begins with
@@ -82,6 +84,18 @@ class ClothSimulation {
   // "inputs", "attachments" (if cloth is attached, grabbed or follows joints), "skins" (if a collider has
   // joints), "near" (if there are colliders), "advance", "hash".
   void recordTick(vulkan::Recorder& recorder, const TickInputs& inputs);
+
+  // Returns whether the simulation has the stage that surfaces of the real room need.
+  bool hasSurfaces() const;
+  // Makes that stage: buffers and a kernel. Another thread may call it, also while this simulation works.
+  // Throws std::runtime_error if the device has too little memory.
+  std::shared_ptr<SurfaceStage> makeSurfaces() const;
+  // Uses the stage from the next recorded tick on. A tick with surfaces otherwise makes one itself, which on
+  // a software device takes tenths of a second.
+  void takeSurfaces(std::shared_ptr<SurfaceStage> stage);
+  // Texels of the surface that the next recorded tick has to upload if it has this surface. A tick uploads
+  // kSurfaceUploadTexels without being late.
+  std::size_t texelsToUpload(const SurfaceTable& table) const;
 
   // Records the vertex normals of the present positions ([Va21] 3.5, Alg. 5; of meshes from their triangles).
   // Call it only if normals are needed. Stage "normals".

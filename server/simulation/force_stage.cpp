@@ -19,7 +19,7 @@ bool isBlown(const shared::ClothRecord& cloth) {
   return cloth.drag != 0 || cloth.lift != 0;
 }
 
-// Cloths collide in the advance kernel if no other stage follows.
+// Cloths collide in the advance kernel if no other stage follows, and in that stage otherwise.
 AdvanceVariant variantOf(std::span<const shared::ClothRecord> cloths, float airDensity, bool localWinds,
                          bool colliders, Follow follow) {
   const bool springs = follow != Follow::corrections;

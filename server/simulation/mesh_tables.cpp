@@ -36,7 +36,8 @@ void appendSprings(const model::Mesh& mesh, std::uint32_t firstNode, std::span<s
   }
 }
 
-// In the order of the triangles.
+}  // namespace
+
 void appendCorners(const model::Mesh& mesh, std::uint32_t firstNode, std::span<shared::MeshNodeRecord> nodes,
                    std::vector<shared::CornerPairRecord>& pairs) {
   std::vector<std::uint32_t> counts(mesh.nodeCount(), 0);
@@ -60,15 +61,13 @@ void appendCorners(const model::Mesh& mesh, std::uint32_t firstNode, std::span<s
     }
 }
 
-}  // namespace
-
 MeshTiles meshTiles(std::span<const model::Cloth> cloths, std::uint32_t workgroupSize) {
   MeshTiles tiles;
   for (const Follow follow : kFollows) {
     std::size_t nodes = 0;
     for (std::uint32_t i = 0; i < cloths.size(); ++i) {
       if (!cloths[i].mesh) continue;
-      if (followOf(cloths[i].solver) == follow)
+      if (followOf(cloths[i]) == follow)
         appendTiles(i, cloths[i].nodeCount(), nodes, workgroupSize, tiles.records);
       nodes += cloths[i].nodeCount();
     }

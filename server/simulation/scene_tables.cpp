@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "server/model/cloth_skin.h"
+#include "server/model/gas.h"
 #include "server/model/origin.h"
 #include "server/model/springs.h"
 #include "server/model/stability.h"
@@ -52,6 +53,11 @@ Follow followOf(const model::Solver& solver) {
   if (solver.kind == model::SolverKind::massSpring) return Follow::nothing;
   if (solver.kind == model::SolverKind::xpbd) return Follow::corrections;
   return solver.kind == model::SolverKind::acad ? followOf(solver.acadMode) : Follow::solve;
+}
+
+Follow followOf(const model::Cloth& cloth) {
+  const Follow follow = followOf(cloth.solver);
+  return follow == Follow::nothing && model::hasGas(cloth) ? Follow::gas : follow;
 }
 
 Follow followOf(model::AcadMode mode) {
@@ -114,7 +120,7 @@ Tiles makeTiles(std::span<const model::Cloth> cloths, std::uint32_t rowsPerInvoc
   Tiles tiles;
   for (const Follow follow : kFollows) {
     for (std::uint32_t cloth = 0; cloth < cloths.size(); ++cloth) {
-      if (cloths[cloth].mesh || followOf(cloths[cloth].solver) != follow) continue;
+      if (cloths[cloth].mesh || followOf(cloths[cloth]) != follow) continue;
       const model::Grid& grid = cloths[cloth].grid;
       const std::uint32_t strips = (grid.rows + rowsPerInvocation - 1) / rowsPerInvocation;
       const std::uint64_t invocations = std::uint64_t{strips} * grid.columns;

@@ -29,9 +29,13 @@ enum class Follow : std::uint8_t {
   limit,    // SolveStage with acad, by its mode
   paper,
   corrections,  // XpbdStage: springs are no forces
+  gas,          // GasStage alone, which also collides
 };
-inline constexpr std::array kFollows{Follow::nothing, Follow::solve, Follow::limit, Follow::paper,
-                                     Follow::corrections};
+inline constexpr std::array kFollows{Follow::nothing, Follow::solve,       Follow::limit,
+                                     Follow::paper,   Follow::corrections, Follow::gas};
+// With any solver but mass_spring, gas acts before the stage of the solver.
+Follow followOf(const model::Cloth& cloth);
+// Without gas.
 Follow followOf(const model::Solver& solver);
 // The Follow of acad with this mode.
 Follow followOf(model::AcadMode mode);

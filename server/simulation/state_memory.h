@@ -17,11 +17,13 @@ namespace clothstream::simulation {
 // index of the pair. The caller records a barrier before and after each recording.
 class StateMemory {
  public:
-  StateMemory(const vulkan::Device& device, std::uint32_t nodes);
+  // `gasCloths`: number of cloths if one of them can hold gas, else 0.
+  StateMemory(const vulkan::Device& device, std::uint32_t nodes, std::uint32_t gasCloths);
 
   // RGBA32F texels: xyz; w of positions is the inverse mass, 1/kg, 0 for pinned nodes.
   std::array<vulkan::Buffer, 2> positions, velocities;
   vulkan::Buffer checkpointPositions, checkpointVelocities;
+  vulkan::Buffer gas, checkpointGas;  // RGBA32F texel for each cloth: GasState, pressure; empty without gas
 
   // Sets the state that recordUpload() uploads. No such upload may be in flight.
   void write(const NodeState& state, std::span<const float> inverseMasses);
@@ -35,10 +37,12 @@ class StateMemory {
 
  private:
   std::size_t bytes() const { return checkpointPositions.bytes(); }
+  std::size_t gasBytes() const { return gas.bytes(); }
+  std::size_t allBytes() const { return 2 * bytes() + gasBytes(); }
 
   const vulkan::Device& device_;
-  std::uint32_t nodes_;
-  vulkan::Buffer upload_;    // positions, then velocities
+  std::uint32_t nodes_, gasCloths_;
+  vulkan::Buffer upload_;    // positions, then velocities, then gas
   vulkan::Buffer readback_;  // the same; created when a state is first saved
 };
 

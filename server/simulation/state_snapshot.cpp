@@ -28,6 +28,7 @@ NodeState unpack(const StateSnapshot& snapshot, const model::Vec3& origin) {
   const model::Vec3 shift = snapshot.origin - origin;
   if (!shift.isZero(0))
     for (model::Vec3& position : state.positions) position += shift;
+  state.gas = snapshot.gas;
   return state;
 }
 
@@ -39,6 +40,7 @@ StateSnapshot pack(const NodeState& state, std::uint64_t tick) {
     std::memcpy(to, state.positions[i].data(), 12);
     std::memcpy(to + 12, state.velocities[i].data(), 12);
   }
+  snapshot.gas = state.gas;
   return snapshot;
 }
 

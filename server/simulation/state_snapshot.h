@@ -25,7 +25,14 @@ struct HeldNodes {
   std::vector<GrabStatus> grabs = {};  // by index into TickInputs::grabs
 };
 
-// Everything on the device that a later tick depends on: positions and velocities of all nodes, and what
+// What a substep has foreseen for the gas in a cloth; the next one compares it with what became of it.
+struct GasState {
+  float volume = 0;          // at its end, as a fraction of the volume at rest
+  float squaredSubstep = 0;  // square of its length, s^2; 0: there was no gas
+  bool operator==(const GasState&) const = default;
+};
+
+// Everything on the device that a later tick depends on: positions and velocities of all nodes, gas, and what
 // grabs hold. Usable for another ClothSimulation of the same scene on any device. `bytes` has six
 // little-endian floats per node, in order: position relative to `origin`, velocity.
 struct StateSnapshot {
@@ -33,12 +40,14 @@ struct StateSnapshot {
   std::vector<std::byte> bytes;
   HeldNodes held = {};
   model::Vec3 origin = model::Vec3::Zero();  // m
+  std::vector<GasState> gas = {};            // one for each cloth, or empty: there was no gas
 };
 inline constexpr std::size_t kSnapshotBytesPerNode = 24;
 
 // The state as numbers.
 struct NodeState {
   std::vector<model::Vec3> positions, velocities;
+  std::vector<GasState> gas = {};  // as in StateSnapshot
 };
 // A snapshot must have whole nodes, and a state as many velocities as positions. Positions of the result are
 // relative to `origin`, zero for those in the world.

@@ -9,6 +9,7 @@
 #include "server/model/scene.h"
 #include "server/simulation/attachment/grab.h"
 #include "server/simulation/collision/moving_collider.h"
+#include "server/simulation/collision/surface_table.h"
 
 namespace clothstream::simulation {
 
@@ -29,6 +30,11 @@ struct TickInputs {
   // At most kMaxGrabs. A grab keeps its index while it is active. An index must be free for one tick before
   // another grab uses it.
   std::vector<Grab> grabs = {};
+  // At most model::kMaxSceneSurfaces, in the order in which they act: surfaces of the real room, which stand
+  // still in the tick. They have at most model::kMaxSceneSurfaceTriangles together.
+  std::vector<PlacedSurface> surfaces = {};
+  // Surfaces that later ticks will have: the tick uploads a part of them, and does not depend on them.
+  std::vector<SharedSurface> arriving = {};
 };
 
 // Inputs that the scene itself gives to a tick (from 0): its wind, its colliders and its attachments. A

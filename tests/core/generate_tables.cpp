@@ -115,9 +115,12 @@ std::string file() {
          settingText("activation", kActivation) + countText("iterations", kIterations) +
          countText("xpbdIterations", kXpbdIterations) + "} satisfies Record<string, NumberRange>;\n\n";
   namespace v1 = clothstream::v1;
-  for (const auto* message : {v1::Vec3::descriptor(), v1::Pose::descriptor(), v1::Scene::descriptor(),
-                              v1::Environment::descriptor(), v1::Cloth::descriptor(), v1::Mesh::descriptor(),
-                              v1::SelfCollision::descriptor(), v1::Collider::descriptor()})
+  for (const auto* message :
+       {v1::Vec3::descriptor(), v1::Pose::descriptor(), v1::Scene::descriptor(),
+        v1::Environment::descriptor(), v1::Cloth::descriptor(), v1::Mesh::descriptor(),
+        v1::SelfCollision::descriptor(), v1::Collider::descriptor(), v1::Quaternion::descriptor(),
+        v1::ColliderMesh::descriptor(), v1::Skin::descriptor(), v1::Joint::descriptor(),
+        v1::JointAnimation::descriptor(), v1::JointKey::descriptor(), v1::ClothSkin::descriptor()})
     out += fieldsText(*message);
   return out;
 }

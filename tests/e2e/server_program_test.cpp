@@ -435,6 +435,7 @@ TEST_F(ServerOptions, PrintedConfigurationReadsBackWithEveryOptionSet) {
                                        "--max-participants=12",
                                        "--participants-change=cloths,colliders",
                                        "--participants-may=create,own",
+                                       "--room-surfaces=off",
                                        "--owners-alone",
                                        "--token-keys=keys",
                                        "--token-audience=studio",

@@ -197,6 +197,38 @@ v1::Scene smallMesh() {
   return scene;
 }
 
+// A sheet that follows the two joints of a tetrahedron.
+v1::Scene smallClothes() {
+  v1::Scene scene;
+  scene.set_name("clothes");
+  v1::Cloth& cloth = *scene.add_cloths();
+  cloth.set_name("sheet");
+  cloth.mutable_grid()->set_rows(2);
+  cloth.mutable_grid()->set_columns(2);
+  cloth.mutable_grid()->set_width(1);
+  cloth.mutable_grid()->set_height(1);
+  cloth.mutable_skin()->set_collider("ball");
+  cloth.mutable_skin()->mutable_limits()->set_max_distance(0.5f);
+  v1::SkinRegion& region = *cloth.mutable_skin()->add_regions();
+  region.mutable_region()->set_radius(0.75f);
+  region.mutable_limits()->set_backstop_radius(1);
+  v1::Collider& ball = *scene.add_colliders();
+  ball.set_name("ball");
+  for (const float number : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f})
+    ball.mutable_mesh()->add_positions(number);
+  for (const std::uint32_t corner : {0u, 2u, 1u, 0u, 1u, 3u, 0u, 3u, 2u, 1u, 2u, 3u})
+    ball.mutable_mesh()->add_triangles(corner);
+  v1::Skin& skin = *ball.mutable_mesh()->mutable_skin();
+  skin.add_joints()->set_name("a");
+  skin.add_joints()->set_parent(0);
+  for (const std::uint32_t joint : {0u, 1u, 0u, 1u})
+    for (int k = 0; k < 4; ++k) {
+      skin.add_vertex_joints(joint);
+      skin.add_vertex_weights(k == 0 ? 1 : 0);
+    }
+  return scene;
+}
+
 void writeScenes(const std::filesystem::path& directory) {
   Folder folder(directory, "scene"), json(directory, "scene_json");
   for (const messages::EmbeddedScene& embedded : messages::embeddedScenes()) {
@@ -218,6 +250,9 @@ void writeScenes(const std::filesystem::path& directory) {
   SceneInput mesh;
   *mesh.mutable_scene() = smallMesh();
   folder.add(mesh);
+  SceneInput clothes;
+  *clothes.mutable_scene() = smallClothes();
+  folder.add(clothes);
   SceneInput wire;
   wire.set_wire(smallMesh().SerializeAsString());
   folder.add(wire);

@@ -144,6 +144,16 @@ void addFeatures(std::vector<SurveyScene>& scenes) {
       },
       kLarge);
   add(
+      scenes, "gas",
+      [&](std::uint32_t size) {
+        model::Cloth cloth = sheet(plain, 4);
+        cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::icosphere(size / 3, 0.5f)));
+        cloth.pins.clear();
+        cloth.pressure = 100;
+        return cloth;
+      },
+      kLarge);
+  add(
       scenes, "tethers_and_attachments",
       [&](std::uint32_t size) {
         model::Cloth cloth = grid(size);

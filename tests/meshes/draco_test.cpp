@@ -89,8 +89,9 @@ TEST(Draco, HasJointsAndWeights) {
 
 TEST(Draco, RefusesJointsThatTheCompressedDataDoesNotHave) {
   const std::string bytes = compressed(kDracoCodings[0]);
-  EXPECT_THAT(refusal(glbOf(bytes, kPoints, 3 * kFaces, true)),
-              HasSubstr("(KHR_draco_mesh_compression) has no four numbers for each point in its attribute"));
+  EXPECT_THAT(
+      refusal(glbOf(bytes, kPoints, 3 * kFaces, true)),
+      HasSubstr("(KHR_draco_mesh_compression) does not have 4 numbers for each point in its attribute"));
 }
 
 TEST(Draco, RefusesSizesThatTheFileDoesNotState) {

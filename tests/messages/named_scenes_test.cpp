@@ -57,7 +57,9 @@ INSTANTIATE_TEST_SUITE_P(All, SimulatedScene, testing::ValuesIn(scenesWithoutSol
                          [](const auto& name) { return name.param; });
 
 TEST(NamedScenes, AreAllListed) {
-  EXPECT_EQ(namedScenes(), (std::vector<std::string>{"curtain",
+  EXPECT_EQ(namedScenes(), (std::vector<std::string>{"balloon",
+                                                     "curtain",
+                                                     "cushion",
                                                      "figure_07",
                                                      "figure_09",
                                                      "figure_10",

@@ -14,6 +14,7 @@
 #include "server/model/material.h"
 #include "server/model/mesh.h"
 #include "tests/messages/scenes.h"
+#include "tests/model/meshes.h"
 
 namespace clothstream::messages {
 namespace {
@@ -123,6 +124,28 @@ TEST_F(ToParameterChange, RefusesDihedralBendingThatIsUnstableOrUnsupported) {
   EXPECT_EQ(error(),
             "parameterChange.cloths[].dihedralBending: must be 0: other values need "
             "INTEGRATOR_SEMI_IMPLICIT_EULER");
+}
+
+TEST_F(ToParameterChange, RefusesPressureThatTheClothCannotHold) {
+  v1::ClothChange& change = *message_.add_cloths();
+  change.set_pressure(100);
+  EXPECT_EQ(error(),
+            "parameterChange.cloths[0].pressure = 100: must be 0: the cloth is a grid, which is open; only a "
+            "closed "
+            "mesh holds gas (\"sheet\")");
+  change.set_pressure(0);
+  EXPECT_EQ(error(), "no error");
+  change.set_pressure(100);
+  scene_.cloths[0].mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::cube(1)));
+  EXPECT_EQ(error(), "no error");
+  change.set_pressure(1'000'001);
+  EXPECT_EQ(error(),
+            "parameterChange.cloths[0].pressure = 1000001: must be a finite number from -50000 to 1e+06");
+  change.set_pressure(-50'000);
+  EXPECT_EQ(error(), "no error");
+  scene_.integrator = model::Integrator::explicitEuler;
+  EXPECT_THAT(error(), testing::HasSubstr("pressure = -50000: must be 0: other values need "
+                                          "INTEGRATOR_SEMI_IMPLICIT_EULER (\"sheet\")"));
 }
 
 TEST_F(ToParameterChange, RefusesARadiusForShapesWithoutOne) {

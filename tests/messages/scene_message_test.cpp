@@ -14,6 +14,7 @@
 #include "server/model/material.h"
 #include "server/model/springs.h"
 #include "tests/messages/scenes.h"
+#include "tests/model/meshes.h"
 
 namespace clothstream::messages {
 namespace {
@@ -61,6 +62,51 @@ TEST(ToScene, AppliesTheDefaultsOfTheProto) {
   EXPECT_TRUE(cloth.grid.pose.orientation.coeffs() == model::Quaternion::Identity().coeffs());
   EXPECT_EQ(scene->colliders.at(0).friction, 1);
   EXPECT_TRUE(scene->colliders.at(0).motion.keys.empty());
+}
+
+// smallScene() with a cube of 1 m, whose cloth has a pressure.
+v1::Scene sceneWithGas(const std::function<void(model::MeshShape&)>& change = {}) {
+  model::MeshShape shape = model::cube(1);
+  if (change) change(shape);
+  v1::Scene scene = smallScene();
+  v1::Cloth& cloth = *scene.mutable_cloths(0);
+  for (const model::Vec3& position : shape.positions)
+    for (const float x : {position.x(), position.y(), position.z()}) cloth.mutable_mesh()->add_positions(x);
+  for (const model::Triangle& triangle : shape.triangles)
+    for (const std::uint32_t node : triangle) cloth.mutable_mesh()->add_triangles(node);
+  cloth.set_pressure(500);
+  return scene;
+}
+
+TEST(ToScene, ReadsThePressureOfClosedMeshes) {
+  const Result<model::Scene> scene = toScene(sceneWithGas());
+  ASSERT_TRUE(scene) << scene.error().text;
+  EXPECT_EQ(scene->cloths[0].pressure, 500);
+  EXPECT_EQ(toMessage(*scene).cloths(0).pressure(), 500);
+}
+
+TEST(ToScene, RefusesPressureInOpenAndTurnedMeshes) {
+  const auto errorOf = [](const v1::Scene& message) {
+    const Result<model::Scene> scene = toScene(message);
+    return scene ? "no error" : scene.error().text;
+  };
+  const auto open = [](model::MeshShape& shape) { shape.triangles.pop_back(); };
+  EXPECT_THAT(
+      errorOf(sceneWithGas(open)),
+      StartsWith("cloths[0].pressure = 500: must be 0: the cloth is open, among others at the edge from "));
+  const auto turn = [](model::MeshShape& shape) {
+    for (model::Triangle& triangle : shape.triangles) std::swap(triangle[1], triangle[2]);
+  };
+  v1::Scene turned = sceneWithGas(turn);
+  EXPECT_EQ(errorOf(turned),
+            "cloths[0].pressure = 500: must be 0: the cloth is inside out; turn all its faces, which must be "
+            "counter-clockwise from outside, or set mesh.repair");
+  turned.mutable_cloths(0)->mutable_mesh()->set_repair(true);
+  EXPECT_EQ(errorOf(turned), "no error");
+  v1::Scene otherIntegrator = sceneWithGas();
+  otherIntegrator.set_integrator(v1::INTEGRATOR_RUNGE_KUTTA_4);
+  EXPECT_EQ(errorOf(otherIntegrator),
+            "cloths[0].pressure = 500: must be 0: other values need INTEGRATOR_SEMI_IMPLICIT_EULER");
 }
 
 TEST(ToScene, StreamsASlowSimulationAtTheSimulationRate) {

@@ -83,7 +83,7 @@ TEST(ClosedMesh, RefusesUnknownCornersAndFlatTriangles) {
 // At a corner of a box three right angles meet, however its sides are divided.
 TEST(ClosedMesh, WeightsTheNormalsOfAVertexByAngle) {
   const Solid box = boxMesh(Vec3(2, 2, 2));
-  const std::vector<Eigen::Vector3d> normals = vertexPseudonormals(*box);
+  const std::vector<Eigen::Vector3d> normals = vertexPseudonormals(box->vertices, box->triangles);
   for (std::size_t i = 0; i < normals.size(); ++i)
     EXPECT_LT((normals[i].normalized() - box->vertices[i].cast<double>().normalized()).norm(), 1e-4);
 }

@@ -50,4 +50,11 @@ inline Cloth asMesh(const Cloth& grid) {
 // almost every node has different surroundings from its neighbours.
 MeshShape disc(std::uint32_t rings, float radius);
 
+// Sphere around the origin: an icosahedron whose faces are divided into `parts` times `parts` triangles. It
+// has 10 parts^2 + 2 nodes, with fronts outside.
+MeshShape icosphere(std::uint32_t parts, float radius);
+
+// Cube of 8 nodes and 12 triangles around `centre`, with fronts outside.
+MeshShape cube(float edge, const Vec3& centre = Vec3::Zero());
+
 }  // namespace clothstream::model

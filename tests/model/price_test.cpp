@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/model/cloth_skin.h"
 #include "tests/model/meshes.h"
 #include "tests/model/solids.h"
 
@@ -55,6 +56,15 @@ TEST(Price, TimeGrowsWithNodesSubstepsIterationsAndColliders) {
     EXPECT_GT(secondsOf(few), before);
     EXPECT_GT(secondsOf(many), 30 * secondsOf(few)) << static_cast<int>(kind);
   }
+}
+
+TEST(Price, AClothThatFollowsJointsCostsMoreTimeAndMemory) {
+  const Scene free = sheetScene(100);
+  Scene bound = free;
+  bound.cloths[0].skin = std::make_shared<const ClothSkin>();
+  EXPECT_GT(secondsOf(bound), 1.1 * secondsOf(free));
+  EXPECT_LT(secondsOf(bound), 2 * secondsOf(free));
+  EXPECT_EQ(PriceModel(bound).bytes(bound) - PriceModel(free).bytes(free), 128.0 * 100 * 100);
 }
 
 // A GPU sweeps cloths of 33 to 64 nodes a side with all of its workgroups (XpbdStage, SolveStage).

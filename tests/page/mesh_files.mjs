@@ -45,6 +45,55 @@ export function sheetGlb(size, { flat = false } = {}) {
   return glb(json, Buffer.concat([Buffer.from(positions.buffer), Buffer.from(triangles.buffer)]));
 }
 
+// A figure behind the hanging sheet, as the bytes of a GLB file: a box from (-0.4, 0, -0.3) to (0.4, 1, -0.1) with the joints
+// "base" and "tip". The animation moves the base by 0.4 m to the right and back, in two seconds.
+export function figureGlb() {
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1 ? 0.4 : -0.4, i & 2 ? 1 : 0, i & 4 ? -0.1 : -0.3]);
+  const arrays = [
+    Float32Array.from(corners.flat()),
+    Uint16Array.from([0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5]),
+    Uint16Array.from(corners.flatMap(([, y]) => [y > 0 ? 1 : 0, 0, 0, 0])),
+    Float32Array.from(corners.flatMap(() => [1, 0, 0, 0])),
+    // Inverses of the places of the joints, column by column.
+    Float32Array.from([0, 1].flatMap((height) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -height, 0.2, 1])),
+    Float32Array.from([0, 1, 2]),
+    Float32Array.from([0, 0, -0.2, 0.4, 0, -0.2, 0, 0, -0.2]),
+  ];
+  const kinds = [
+    [5126, "VEC3"],
+    [5123, "SCALAR"],
+    [5123, "VEC4"],
+    [5126, "VEC4"],
+    [5126, "MAT4"],
+    [5126, "SCALAR"],
+    [5126, "VEC3"],
+  ];
+  const components = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
+  const bytes = arrays.map((array) => Buffer.from(array.buffer));
+  const offset = (index) => bytes.slice(0, index).reduce((sum, part) => sum + part.length, 0);
+  const json = {
+    asset: { version: "2.0" },
+    scene: 0,
+    scenes: [{ nodes: [0, 2] }],
+    nodes: [
+      { name: "base", translation: [0, 0, -0.2], children: [1] },
+      { name: "tip", translation: [0, 1, 0] },
+      { mesh: 0, skin: 0 },
+    ],
+    meshes: [{ primitives: [{ attributes: { POSITION: 0, JOINTS_0: 2, WEIGHTS_0: 3 }, indices: 1 }] }],
+    skins: [{ joints: [0, 1], inverseBindMatrices: 4 }],
+    animations: [{ name: "sway", samplers: [{ input: 5, output: 6 }], channels: [{ sampler: 0, target: { node: 0, path: "translation" } }] }],
+    buffers: [{ byteLength: offset(bytes.length) }],
+    bufferViews: bytes.map((part, i) => ({ buffer: 0, byteOffset: offset(i), byteLength: part.length })),
+    accessors: arrays.map((array, i) => {
+      const [componentType, type] = kinds[i];
+      const extent = i === 0 ? { min: [-0.4, 0, -0.3], max: [0.4, 1, -0.1] } : i === 5 ? { min: [0], max: [2] } : {};
+      return { bufferView: i, componentType, count: array.length / components[type], type, ...extent };
+    }),
+  };
+  return glb(json, Buffer.concat(bytes));
+}
+
 // The hanging sheet as the bytes of a GLB file that is compressed with Draco.
 export async function dracoGlb(size) {
   const { positions, triangles } = sheet(size, false);

@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
 import { after, before, test } from "node:test";
 import { kChromium, launchBrowser, openPage, takePicture, untilScene, untilState, untilText } from "./browser.mjs";
-import { dracoGlb, dropFile, fineObj, sheetGlb } from "./mesh_files.mjs";
+import { dracoGlb, dropFile, figureGlb, fineObj, sheetGlb } from "./mesh_files.mjs";
 import { startServer } from "./server.mjs";
 import { fingersOn } from "./touch.mjs";
 
@@ -256,6 +256,103 @@ test("pins are chosen by a box with the keyboard, and by fingers", () =>
     await fingers.up();
     assert.deepEqual(await pinned(page), painted);
     assert.notDeepEqual(await page.locator("#preview").screenshot(), before);
+  }));
+
+// Gives the form a figure.
+const dress = (page, name, bytes) => page.setInputFiles("#create-figure", { name, mimeType: "model/gltf-binary", buffer: Buffer.from(bytes) });
+const limits = (page) => page.evaluate(() => Object.fromEntries(Object.entries(window.clothstream.limits).map(([name, values]) => [name, Array.from(values)])));
+const choose = (page, tool) => page.check(`input[name="pin-tool"][value="${tool}"]`, { force: true });
+
+// A hanging sheet of 21 x 21 vertices, 5 cm apart, in front of a figure that sways by 0.4 m.
+test("a cloth follows a figure where the distance 0 is painted, and hangs freely elsewhere", () =>
+  withPage("", { viewport: { width: 1000, height: 1000 } }, async (page) => {
+    const size = 21;
+    await dropFile(page, "apron.glb", sheetGlb(size));
+    await page.waitForSelector("#create-fields:not([hidden])");
+    assert.ok(await page.isHidden('input[name="pin-tool"][value="distance"]'), "limits need a figure");
+    await dress(page, "rigid.glb", sheetGlb(4));
+    await untilText(page, "#create-error", /rigid\.glb has no mesh with a skin\. Export the figure together with its skeleton\./);
+    await dress(page, "figure.glb", figureGlb());
+    await untilText(page, "#create-figure-text", /figure\.glb: 2 joints, 12 triangles, sway\./);
+    assert.match(await page.textContent("#create-mesh"), /no pins/);
+    assert.equal(await page.inputValue("#create-size"), "1");
+
+    // The upper edge follows; a stroke below it may leave by 0.25 m. Shift removes limits again.
+    await choose(page, "distance");
+    await page.fill("#pin-brush", "12");
+    assert.match(await page.textContent("#limit-legend"), /unbounded everywhere/);
+    const { at } = await previewOf(page);
+    // The sheet is 1 m wide and has a margin: its corners are at 4 and 96 % of the height of the picture.
+    const stroke = async (y, from = 0.1, to = 0.9) => {
+      await page.mouse.move(...at(from, y));
+      await page.mouse.down();
+      await page.mouse.move(...at(to, y), { steps: 8 });
+      await page.mouse.up();
+    };
+    await stroke(0.05);
+    await page.fill("#limit-value", "0.25");
+    await stroke(0.5);
+    const painted = await limits(page);
+    assert.deepEqual(Object.keys(painted), ["maxDistances"]);
+    const row = (index) => painted.maxDistances.slice(size * index, size * (index + 1));
+    assert.deepEqual([...new Set(row(0))], [0]);
+    assert.deepEqual([...new Set(row(10))], [0.25]);
+    assert.deepEqual([...new Set(row(20))], [-1]);
+    assert.match(await page.textContent("#limit-legend"), /^Red: 0 m, blue: 0\.25 m, grey: unbounded\.$/);
+    await takePicture(page, "panel_figure");
+    await page.keyboard.down("Shift");
+    await page.mouse.click(...at(0.5, 0.5));
+    await page.keyboard.up("Shift");
+    assert.equal((await limits(page)).maxDistances[10 * size + 10], -1);
+    await page.click("#pin-undo");
+    assert.deepEqual(await limits(page), painted);
+
+    // Backstops are painted in the same way, and undone before what was painted earlier.
+    await choose(page, "backstop");
+    await page.fill("#limit-value", "0.02");
+    await stroke(0.5);
+    const both = await limits(page);
+    assert.ok(Math.abs(both.backstopDistances[10 * size + 10] - 0.02) < 1e-6);
+    assert.equal(both.backstopDistances[0], -1);
+    await page.focus("#preview");
+    await page.keyboard.press("Control+z");
+    assert.deepEqual(await limits(page), painted);
+    await page.click("#pin-undo");
+    assert.equal((await limits(page)).maxDistances[10 * size + 10], -1);
+    await choose(page, "distance");
+    await page.fill("#limit-value", "0.25");
+    await stroke(0.5);
+    await choose(page, "backstop");
+    await stroke(0.5);
+    await page.uncheck("#create-self");
+    await page.uncheck("#create-floor");
+    await page.click("#create-send");
+    await untilScene(page, "apron");
+
+    // In the course of the animation the upper edge goes along with the figure as a whole.
+    const look = () => {
+      const { positions, restPositions: rest } = window.clothstream;
+      const top = [];
+      for (let i = 0; i < rest.length; i += 3) if (rest[i + 1] > 0.999) top.push([0, 1, 2].map((axis) => positions[i + axis] - rest[i + axis]));
+      const along = top.map(([x]) => x);
+      return { count: top.length, least: Math.min(...along), most: Math.max(...along), off: Math.max(...top.map(([, y, z]) => Math.hypot(y, z))) };
+    };
+    for (const isThere of ["most < 0.1", "least > 0.3"])
+      await page.waitForFunction(([source, condition]) => {
+        const { most, least } = eval(`(${source})`)();
+        return eval(`((most, least) => ${condition})`)(most, least);
+      }, [String(look), isThere]);
+    for (let i = 0; i < 5; ++i) {
+      const { count, least, most, off } = await page.evaluate(look);
+      assert.equal(count, size);
+      // The error of the stream is below 0.5 mm.
+      assert.ok(most - least < 0.002 && off < 0.002, `the upper edge is stretched by ${most - least} m, and off by ${off} m`);
+    }
+    assert.deepEqual(await page.evaluate(() => window.clothstream.colliders.map(({ name }) => name)), ["figure"]);
+    await takePicture(page, "figure_scene");
+    await page.click("#scene-delete");
+    await page.click("#confirm-yes");
+    await untilScene(page, "sphere_drop");
   }));
 
 test("a mesh that does not fit the world is scaled after a question", () =>

@@ -2,6 +2,7 @@
 """The installed package: its structs, recordings of every version, a real server, and simulating."""
 import contextlib
 import ctypes
+import dataclasses
 import gzip
 import os
 import pathlib
@@ -282,6 +283,39 @@ class Streams(unittest.TestCase):
             stream.move_joints("leg", poses)
             while clothstream.Event.ERROR not in stream.wait(10):
                 pass
+
+    def test_surfaces_of_the_real_room_carry_cloth(self):
+        corners = [(-2, 0, -2), (-2, 0, 2), (2, 0, 2), (2, 0, -2)]
+        floor = clothstream.Surface(1, corners, [(0, 1, 2), (0, 2, 3)], (0, 1.2, 0))
+        with running_server() as address, clothstream.join(address, role="owner") as stream:
+            self.assertEqual(stream.surface_policy, clothstream.SurfacePolicy.OWN)
+            lowest = lambda: float(stream.next_frame().positions[:, 1].min())
+            height = lowest() - 0.02
+            stream.set_surface(dataclasses.replace(floor, position=(0, height - 1, 0)))
+            stream.move_surface(1, (0, height, 0))
+            stream.next_frame()
+            stream.set_environment(gravity=(0, -60, 0), wind=(0, 0, 0))
+            for _ in range(72):
+                self.assertGreater(lowest(), height)
+            stream.remove_surface(1)
+            while lowest() > height - 0.02:
+                pass
+            with self.assertRaisesRegex(ValueError, "no surface 1"):
+                stream.move_surface(1, (0, 0, 0))
+            with self.assertRaisesRegex(ValueError, "no surface 1"):
+                stream.remove_surface(1)
+            with self.assertRaisesRegex(ValueError, "0 triangles and 4 vertices"):
+                stream.set_surface(clothstream.Surface(1, corners, []))
+            with self.assertRaisesRegex(ValueError, "2 numbers"):
+                stream.set_surface(clothstream.Surface(1, corners, [(0, 1)]))
+            stream.set_surface(clothstream.Surface(2, corners, [(0, 1, 4)]))
+            while clothstream.Event.ERROR not in stream.wait(10):
+                pass
+        with running_server("--room-surfaces", "off") as address, clothstream.join(address) as stream:
+            stream.next_frame()
+            self.assertEqual(stream.surface_policy, clothstream.SurfacePolicy.OFF)
+            with self.assertRaisesRegex(RuntimeError, "takes no surfaces"):
+                stream.set_surface(floor)
 
     def test_joining_says_why_it_fails(self):
         with self.assertRaisesRegex(ValueError, "HOST"):

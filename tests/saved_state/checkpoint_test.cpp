@@ -82,6 +82,43 @@ class FailingJournal final : public scene::Journal {
   bool fails = true;
 };
 
+// A sheet on a tetrahedron, whose file gave it joints and limits that no definition without meshes has.
+v1::Scene clothes() {
+  v1::Scene scene;
+  scene.set_name("clothes");
+  v1::Cloth& cloth = *scene.add_cloths();
+  cloth.set_name("sheet");
+  for (const float number : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 1.f, 1.f, 0.f, 0.f, 1.f, 0.f})
+    cloth.mutable_mesh()->add_positions(number);
+  for (const std::uint32_t vertex : {0u, 1u, 2u, 0u, 2u, 3u}) cloth.mutable_mesh()->add_triangles(vertex);
+  cloth.mutable_skin()->set_collider("body");
+  for (const float number : {0.5f, -1.0f, 0.25f, 0.0f}) cloth.mutable_skin()->add_max_distances(number);
+  v1::Collider& body = *scene.add_colliders();
+  body.set_name("body");
+  for (const float number : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f})
+    body.mutable_mesh()->add_positions(number);
+  for (const std::uint32_t corner : {0u, 2u, 1u, 0u, 1u, 3u, 0u, 3u, 2u, 1u, 2u, 3u})
+    body.mutable_mesh()->add_triangles(corner);
+  v1::Skin& joints = *body.mutable_mesh()->mutable_skin();
+  joints.add_joints()->set_name("root");
+  for (int i = 0; i < 16; ++i) {
+    joints.add_vertex_joints(0);
+    joints.add_vertex_weights(i % 4 == 0 ? 1 : 0);
+  }
+  return scene;
+}
+
+TEST(SavedParameters, KeepWhatJointsTheClothsFollow) {
+  const messages::Result<model::Scene> start = messages::toScene(clothes());
+  ASSERT_TRUE(start) << start.error().text;
+  v1::Scene parameters = messages::toMessageWithoutMeshes(*start);
+  parameters.mutable_cloths(0)->set_thickness(0.25f);
+  const auto changed = withParameters(parameters, *start);
+  ASSERT_TRUE(changed) << changed.error();
+  EXPECT_EQ(changed->cloths[0].thickness, 0.25f);
+  EXPECT_EQ(changed->cloths[0].skin, start->cloths[0].skin) << "the same, not a copy";
+}
+
 class CheckpointTest : public tests::GpuTest {};
 class EverySolver : public CheckpointTest, public ::testing::WithParamInterface<SolverKind> {};
 

@@ -92,6 +92,9 @@ reference::TickInputs referenceInputs(const simulation::TickInputs& inputs) {
                                 reference::toPose(collider.end), double{collider.friction},
                                 collider.jointsStart, collider.jointsEnd, collider.jumped,
                                 reference::toPose(collider.before), collider.jointsBefore});
+  for (const simulation::PlacedSurface& placed : inputs.surfaces)
+    result.surfaces.push_back({std::shared_ptr<const model::Surface>(placed.table, &placed.table->surface),
+                               reference::toPose(placed.pose), placed.twoSided, double{placed.friction}});
   for (const model::Pose& pose : inputs.attachments) result.attachments.push_back(reference::toPose(pose));
   for (const model::Carry& carry : inputs.carries)
     result.carries.push_back({carry.cloth, reference::toPose(carry.from), reference::toPose(carry.to)});

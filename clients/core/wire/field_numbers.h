@@ -117,6 +117,32 @@ struct Cloth {
   static constexpr Field kMaterial{40, WireType::kBytes};
   static constexpr Field kArealMass{41, WireType::kFixed32};
   static constexpr Field kCoarse{42, WireType::kBytes};
+  static constexpr Field kSkin{43, WireType::kBytes};
+  static constexpr Field kPressure{44, WireType::kFixed32};
+};
+struct ClothSkin {
+  static constexpr Field kCollider{1, WireType::kBytes};
+  static constexpr Field kVertexJoints{2, WireType::kBytes};
+  static constexpr Field kVertexWeights{3, WireType::kBytes};
+  static constexpr Field kLimits{4, WireType::kBytes};
+  static constexpr Field kMaxDistances{5, WireType::kBytes};
+  static constexpr Field kBackstopDistances{6, WireType::kBytes};
+  static constexpr Field kBackstopRadii{7, WireType::kBytes};
+  static constexpr Field kColourDistance{8, WireType::kBytes};
+  static constexpr Field kRegions{9, WireType::kBytes};
+};
+struct SkinLimits {
+  static constexpr Field kMaxDistance{1, WireType::kFixed32};
+  static constexpr Field kBackstopDistance{2, WireType::kFixed32};
+  static constexpr Field kBackstopRadius{3, WireType::kFixed32};
+};
+struct ColourDistance {
+  static constexpr Field kChannel{1, WireType::kVarint};
+  static constexpr Field kDistance{2, WireType::kFixed32};
+};
+struct SkinRegion {
+  static constexpr Field kRegion{1, WireType::kBytes};
+  static constexpr Field kLimits{2, WireType::kBytes};
 };
 struct Attachment {
   static constexpr Field kName{1, WireType::kBytes};
@@ -337,6 +363,11 @@ struct GrabEventKind {
   static constexpr std::uint32_t kSlipped = 2;
   static constexpr std::uint32_t kReleased = 3;
 };
+struct SurfacePolicy {
+  static constexpr std::uint32_t kUnspecified = 0;
+  static constexpr std::uint32_t kOff = 1;
+  static constexpr std::uint32_t kOwn = 2;
+};
 struct NoticeKind {
   static constexpr std::uint32_t kUnspecified = 0;
   static constexpr std::uint32_t kRolledBack = 1;
@@ -394,6 +425,7 @@ struct ClientMessage {
   static constexpr Field kListBans{62, WireType::kBytes};
   static constexpr Field kLiftBan{63, WireType::kBytes};
   static constexpr Field kDatagramOffer{70, WireType::kBytes};
+  static constexpr Field kSurface{80, WireType::kBytes};
 };
 struct ServerMessage {
   static constexpr Field kRequestId{1, WireType::kVarint};
@@ -448,6 +480,7 @@ struct Welcome {
   static constexpr Field kParticipants{33, WireType::kBytes};
   static constexpr Field kHoldMs{34, WireType::kVarint};
   static constexpr Field kAcknowledgeEveryFrame{80, WireType::kVarint};
+  static constexpr Field kSurfaces{90, WireType::kBytes};
 };
 struct Participant {
   static constexpr Field kId{1, WireType::kVarint};
@@ -683,6 +716,7 @@ struct ClothChange {
   static constexpr Field kDihedralBending{24, WireType::kFixed32};
   static constexpr Field kMaterial{40, WireType::kBytes};
   static constexpr Field kArealMass{41, WireType::kFixed32};
+  static constexpr Field kPressure{44, WireType::kFixed32};
 };
 struct ColliderChange {
   static constexpr Field kName{1, WireType::kBytes};
@@ -732,6 +766,25 @@ struct DatagramAnswer {
   static constexpr Field kFingerprint{3, WireType::kBytes};
   static constexpr Field kAddresses{4, WireType::kBytes};
   static constexpr Field kPort{5, WireType::kVarint};
+};
+struct SurfaceLimits {
+  static constexpr Field kPolicy{1, WireType::kVarint};
+  static constexpr Field kMaxTriangles{2, WireType::kVarint};
+  static constexpr Field kMaxSurfaces{3, WireType::kVarint};
+};
+struct SurfaceUpdate {
+  static constexpr Field kId{1, WireType::kVarint};
+  static constexpr Field kPose{2, WireType::kBytes};
+  static constexpr Field kRemove{3, WireType::kVarint};
+  static constexpr Field kPart{4, WireType::kBytes};
+};
+struct SurfacePart {
+  static constexpr Field kIndex{1, WireType::kVarint};
+  static constexpr Field kCount{2, WireType::kVarint};
+  static constexpr Field kPositions{3, WireType::kBytes};
+  static constexpr Field kTriangles{4, WireType::kBytes};
+  static constexpr Field kTwoSided{5, WireType::kVarint};
+  static constexpr Field kFriction{6, WireType::kFixed32};
 };
 struct Ping {
   static constexpr Field kClientTimeUs{1, WireType::kVarint};
@@ -851,6 +904,7 @@ struct Checkpoint {
   static constexpr Field kGripsHold{4, WireType::kVarint};
   static constexpr Field kOrigin{6, WireType::kBytes};
   static constexpr Field kHeld{5, WireType::kBytes};
+  static constexpr Field kGas{7, WireType::kBytes};
   static constexpr Field kStart{50, WireType::kVarint};
 };
 struct HeldNodes {
@@ -877,6 +931,7 @@ struct RecordedTick {
   static constexpr Field kCarries{13, WireType::kBytes};
   static constexpr Field kSubsteps{60, WireType::kVarint};
   static constexpr Field kWinds{61, WireType::kBytes};
+  static constexpr Field kSurfacesLeftOut{62, WireType::kVarint};
 };
 struct AppliedCarry {
   static constexpr Field kCloth{1, WireType::kVarint};

@@ -147,6 +147,12 @@ std::optional<Welcome> readWelcome(Bytes message, const Limits& limits) {
         return set(welcome.graceMs, reader.get_uint32());
       case F::kAcknowledgeEveryFrame.tag:
         return set(welcome.acknowledgeEveryFrame, reader.get_bool());
+      case F::kSurfaces.tag:
+        return readFields(reader.get_view(), [&](std::uint32_t limit, Reader& numbers) {
+          if (limit == field::SurfaceLimits::kPolicy.tag)
+            return set(welcome.surfacePolicy, numbers.get_uint32());
+          return skip(numbers);
+        });
       default:
         return skip(reader);
     }

@@ -70,6 +70,7 @@ struct Welcome {
   std::vector<Participant> participants;
   std::uint32_t graceMs = 0;
   bool acknowledgeEveryFrame = false;
+  std::uint32_t surfacePolicy = 0;  // SurfacePolicy; 0: the server knows no surfaces
 };
 
 struct Presence {

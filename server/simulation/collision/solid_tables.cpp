@@ -6,6 +6,7 @@
 
 #include "server/model/distance_grid.h"
 #include "server/simulation/collision/triangle_tree.h"
+#include "server/simulation/scene_tables.h"
 #include "server/simulation/texel.h"
 
 namespace clothstream::simulation {
@@ -20,7 +21,7 @@ vec4 numbers(const model::TriangleCorners& triangle) {
 
 // Appends a mesh and its tree. Returns the number of its leaves.
 std::uint32_t append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
-  const TriangleTree tree = makeTriangleTree(mesh);
+  const TriangleTree tree = makeTriangleTree(mesh.vertices, mesh.triangles);
   const std::size_t record = texels.size();
   const std::size_t firstTriangle = record + CLOTHSTREAM_SOLID_TEXELS;
   const std::size_t firstVertex = firstTriangle + CLOTHSTREAM_TRIANGLE_TEXELS * mesh.triangles.size();
@@ -41,7 +42,7 @@ std::uint32_t append(const model::ClosedMesh& mesh, std::vector<vec4>& texels) {
     texels.push_back(numbers(mesh.triangles[triangle]));
     texels.push_back(numbers(neighbours));
   }
-  const std::vector<Eigen::Vector3d> normals = model::vertexPseudonormals(mesh);
+  const std::vector<Eigen::Vector3d> normals = model::vertexPseudonormals(mesh.vertices, mesh.triangles);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     for (std::size_t k = 0; k < vertexTexels; k += CLOTHSTREAM_VERTEX_TEXELS) {
       texels.push_back(texel(mesh.vertices[i], 0));
@@ -89,9 +90,13 @@ SolidTables solidTables(std::span<const model::Collider> colliders) {
 }
 
 std::vector<shared::NodeTileRecord> nodeTiles(std::span<const model::Cloth> cloths, std::uint32_t size) {
+  return nodeTiles(clothOffsets(cloths), size);
+}
+
+std::vector<shared::NodeTileRecord> nodeTiles(std::span<const std::uint32_t> offsets, std::uint32_t size) {
   std::vector<shared::NodeTileRecord> tiles;
-  for (std::size_t cloth = 0; cloth < cloths.size(); ++cloth)
-    for (std::uint32_t first = 0; first < cloths[cloth].nodeCount(); first += size)
+  for (std::size_t cloth = 0; cloth + 1 < offsets.size(); ++cloth)
+    for (std::uint32_t first = 0; first < offsets[cloth + 1] - offsets[cloth]; first += size)
       tiles.push_back({static_cast<float>(cloth), static_cast<float>(first), 0, 0});
   return tiles;
 }

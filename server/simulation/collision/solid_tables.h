@@ -42,5 +42,7 @@ SolidTables solidTables(std::span<const model::Collider> colliders);
 
 // Tiles of `size` nodes of every cloth.
 std::vector<shared::NodeTileRecord> nodeTiles(std::span<const model::Cloth> cloths, std::uint32_t size);
+// The same for cloths whose first nodes are `offsets`, with the number of all nodes at its end.
+std::vector<shared::NodeTileRecord> nodeTiles(std::span<const std::uint32_t> offsets, std::uint32_t size);
 
 }  // namespace clothstream::simulation

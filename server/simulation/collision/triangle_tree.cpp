@@ -24,15 +24,15 @@ void include(Box& box, const model::Vec3& point) {
 
 class Builder {
  public:
-  explicit Builder(const model::ClosedMesh& mesh) : mesh_(mesh) {
-    const std::size_t count = mesh.triangles.size();
+  Builder(std::span<const model::Vec3> vertices, std::span<const model::TriangleCorners> triangles)
+      : vertices_(vertices), triangles_(triangles) {
+    const std::size_t count = triangles.size();
     tree_.leafCount =
         static_cast<std::uint32_t>(std::bit_ceil((count + kLeafTriangles - 1) / kLeafTriangles));
     tree_.order.resize(count);
     std::iota(tree_.order.begin(), tree_.order.end(), 0u);
-    for (const model::TriangleCorners& triangle : mesh.triangles)
-      centres_.push_back(mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] +
-                         mesh.vertices[triangle[2]]);
+    for (const model::TriangleCorners& triangle : triangles)
+      centres_.push_back(vertices[triangle[0]] + vertices[triangle[1]] + vertices[triangle[2]]);
     tree_.boxes.assign(2 * std::size_t{tree_.leafCount}, emptyBox());
   }
 
@@ -40,8 +40,8 @@ class Builder {
     divide(0, tree_.leafCount);
     for (std::size_t leaf = 0; leaf < tree_.leafCount; ++leaf)
       for (std::size_t i = tree_.firstOf(leaf); i < tree_.firstOf(leaf + 1); ++i)
-        for (const std::uint32_t corner : mesh_.triangles[tree_.order[i]])
-          include(tree_.boxes[tree_.leafCount + leaf], mesh_.vertices[corner]);
+        for (const std::uint32_t corner : triangles_[tree_.order[i]])
+          include(tree_.boxes[tree_.leafCount + leaf], vertices_[corner]);
     for (std::size_t node = tree_.leafCount - 1; node > 0; --node)
       for (const std::size_t child : {2 * node, 2 * node + 1}) {
         include(tree_.boxes[node], tree_.boxes[child].low);
@@ -72,15 +72,17 @@ class Builder {
     divide(middle, end);
   }
 
-  const model::ClosedMesh& mesh_;
+  std::span<const model::Vec3> vertices_;
+  std::span<const model::TriangleCorners> triangles_;
   std::vector<model::Vec3> centres_;  // times three
   TriangleTree tree_;
 };
 
 }  // namespace
 
-TriangleTree makeTriangleTree(const model::ClosedMesh& mesh) {
-  return Builder(mesh).build();
+TriangleTree makeTriangleTree(std::span<const model::Vec3> vertices,
+                              std::span<const model::TriangleCorners> triangles) {
+  return Builder(vertices, triangles).build();
 }
 
 }  // namespace clothstream::simulation

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Tree of boxes over the triangles of a closed mesh.
+// Tree of boxes over the triangles of a mesh.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "server/model/closed_mesh.h"
@@ -29,6 +30,7 @@ inline constexpr std::uint32_t kLeafTriangles = 4;
 
 // Splits the triangles at the median of their centres, along the longest side of the box of the centres. The
 // result is the same on every machine.
-TriangleTree makeTriangleTree(const model::ClosedMesh& mesh);
+TriangleTree makeTriangleTree(std::span<const model::Vec3> vertices,
+                              std::span<const model::TriangleCorners> triangles);
 
 }  // namespace clothstream::simulation

@@ -3,8 +3,11 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <string>
 #include <thread>
 #include <vector>
@@ -163,6 +166,46 @@ std::string solveAtTheEnd(const Target& target) {
   return fmt::format("accepted with {} nodes a side", size);
 }
 
+// A part of the mesh of a surface: `vertices` corners at random within the cloth, and as many triangles of
+// them. Some are not numbers.
+v1::ClientMessage surfacePart(std::uint32_t id, std::uint32_t index, std::uint32_t count,
+                              std::mt19937& random, bool valid) {
+  constexpr int kElements = 1'500;
+  std::uniform_real_distribution<float> place(-0.5f, 0.5f);
+  std::uniform_int_distribution<std::uint32_t> corner(0, kElements - 1);
+  v1::ClientMessage message;
+  v1::SurfaceUpdate& update = *message.mutable_surface();
+  update.set_id(id);
+  v1::SurfacePart& part = *update.mutable_part();
+  part.set_index(index);
+  part.set_count(count);
+  part.set_two_sided(true);
+  for (int i = 0; i < kElements; ++i)
+    for (const float base : {0.0f, 1.0f, 0.0f}) part.add_positions(base + place(random));
+  if (!valid) part.set_positions(7, std::numeric_limits<float>::quiet_NaN());
+  for (int i = 0; i < 3 * kElements; ++i) part.add_triangles(corner(random));
+  return message;
+}
+
+// Heaps of triangles in the cloth, which are replaced without end, and between them parts that do not fit.
+std::string sendSurfaces(const Target& target) {
+  const auto stub = stubOf(target);
+  v1::Scene scene = sheet("heaped", 32, 10);
+  if (const grpc::Status made = create(*stub, scene); !made.ok()) return answerOf(made);
+  Joined joined(*stub, scene.name());
+  std::mt19937 random(3);
+  std::uint32_t number = 0;
+  repeat(target, [&] {
+    const std::uint32_t id = ++number % 70;
+    for (std::uint32_t index = 0; index < 4; ++index)
+      joined.send(surfacePart(id, number % 5 == 0 ? index ^ 1u : index, 4, random, number % 3 != 0));
+    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+  });
+  const std::string error = joined.lastError();
+  return fmt::format("{}, {}", joined.open() ? "the stream stays open" : "the stream was closed",
+                     error.empty() ? "no error" : "refused: " + brief(error));
+}
+
 constexpr Attack kAttacksWork[] = {
     {"huge_solve", "create 512x512 constraints with 10,000 iterations and 64 substeps", &createHugeSolve,
      "refused: .*--max-load.*"},
@@ -181,6 +224,9 @@ constexpr Attack kAttacksWork[] = {
      "[0-9]+ scenes accepted, .*"},
     {"create_and_delete", "create and delete a scene without end", &createAndDelete,
      "[0-9]+ accepted(, [0-9]+ refused with code (8|6))*"},
+    {"surfaces",
+     "send heaps of triangles as surfaces of a real room, in wrong order and with NaN, without end",
+     &sendSurfaces, "the stream .*, refused: .*surface.*"},
     {"solve_at_the_end", "join an expensive scene, while the server gets SIGTERM", &solveAtTheEnd,
      "accepted with .*", "", Access::open, true},
 };

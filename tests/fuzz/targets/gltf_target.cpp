@@ -12,7 +12,8 @@ namespace clothstream::fuzz {
 namespace {
 
 constexpr meshes::FileLimits kLimits{.bytes = 1 << 20, .vertices = 16'384};
-const meshes::JointRequest kJoints{.animation = {}, .joints = 128, .keys = 1024, .poses = 16'384};
+const meshes::JointRequest kJoints{
+    .animation = {}, .joints = 128, .keys = 1024, .poses = 16'384, .attributes = true};
 
 // Checks what the server checks later.
 bool isInWorld(const model::Vec3& point) {
@@ -42,11 +43,20 @@ void pose(const meshes::MeshSource& source) {
   }
 }
 
+void checkAttributes(const meshes::MeshSource& source) {
+  const auto fits = [&](const auto& list) { return list.empty() || list.size() == source.vertices.size(); };
+  const meshes::VertexAttributes& all = source.attributes;
+  require(
+      fits(all.maxDistances) && fits(all.backstopDistances) && fits(all.backstopRadii) && fits(all.colours),
+      "every vertex has an element of an attribute");
+}
+
 void run(std::span<const std::byte> input) {
   const bool binary = textOf(input).starts_with("glTF");
   const TemporaryFile file(binary ? ".glb" : ".gltf", input);
   if (const auto source = meshes::readMeshFile(file.path(), kLimits)) buildAndCheck(*source);
   const auto source = meshes::readMeshFile(file.path(), kLimits, &kJoints);
+  if (source) checkAttributes(*source);
   if (source && source->skin) pose(*source);
 }
 

@@ -65,3 +65,53 @@ test("a scene has its cloth, mesh, pins and floor", () => {
   assert.equal(fieldsOf(fields.bytes(9)).bytes(4).length, 0);
   assert.deepEqual([...packed([0, 127, 128, 2 ** 31])], [0, 127, 128, 1, 128, 128, 128, 128, 8]);
 });
+
+test("a cloth on a figure has the figure as a collider with joints, in metres, and its limits", () => {
+  const pose = (x: number) => ({ position: [x, 0, 0], orientation: [0, 0, 0, 1] });
+  const scene = sceneBytes({
+    name: "skirt",
+    description: "From a file",
+    positions: new Float32Array(9),
+    triangles: Uint32Array.from([0, 1, 2]),
+    scale: 0.5,
+    position: [0, 0, 0],
+    material: "",
+    pinned: [],
+    repair: false,
+    fit: false,
+    selfCollision: false,
+    floor: false,
+    figure: {
+      positions: new Float32Array(12),
+      triangles: Uint32Array.from([0, 1, 2, 0, 2, 3]),
+      joints: [
+        { name: "hips", parent: undefined, rest: pose(4) },
+        { name: "leg", parent: 0, rest: pose(6) },
+      ],
+      vertexJoints: Uint32Array.from([1, 0, 0, 0]),
+      vertexWeights: Float32Array.from([1, 0, 0, 0]),
+      keys: [{ time: 0, joints: [pose(8), pose(2)] }],
+    },
+    limits: { maxDistances: Float32Array.from([0, -1, 0.25]) },
+  });
+  const fields = fieldsOf(scene);
+  const floatAt = (bytes: Uint8Array, index = 0) => new DataView(bytes.slice().buffer).getFloat32(4 * index, true);
+  const skin = fieldsOf(fieldsOf(fields.bytes(8)).bytes(43));
+  assert.equal(skin.text(1), "figure");
+  assert.deepEqual([0, 1, 2].map((i) => floatAt(skin.bytes(5), i)), [0, -1, 0.25]);
+  assert.equal(skin.bytes(6), undefined, "there are no backstops");
+  const collider = fieldsOf(fields.bytes(9));
+  assert.equal(collider.text(1), "figure");
+  const mesh = fieldsOf(collider.bytes(30));
+  assert.equal(floatAt(mesh.bytes(4)), 0.5);
+  assert.deepEqual([...mesh.bytes(3)], [0, 1, 2, 0, 2, 3]);
+  const joints = fieldsOf(mesh.bytes(5));
+  assert.deepEqual([...joints.bytes(2)], [1, 0, 0, 0]);
+  // The last of the joints, and of the poses of the key. Lengths are scaled.
+  const leg = fieldsOf(joints.bytes(1));
+  assert.deepEqual([leg.text(1), leg.number(2)], ["leg", 0]);
+  assert.equal(floatAt(fieldsOf(fieldsOf(leg.bytes(3)).bytes(1)).bytes(1)), 3);
+  assert.equal(floatAt(fieldsOf(fieldsOf(leg.bytes(3)).bytes(2)).bytes(4)), 1);
+  const key = fieldsOf(fieldsOf(joints.bytes(4)).bytes(1));
+  assert.equal(floatAt(fieldsOf(fieldsOf(key.bytes(2)).bytes(1)).bytes(1)), 1);
+});

@@ -28,6 +28,14 @@ namespace UnityEngine
         byte[] indices = new byte[0];
         SubMeshDescriptor[] subMeshes = new SubMeshDescriptor[0];
 
+        // Arrays of a mesh with bones, which a test sets. Unity derives them from the same buffers as those below.
+        public Vector3[] vertices { get; set; } = new Vector3[0];
+        public Vector2[] uv { get; set; } = new Vector2[0];
+        public int[] triangles { get; set; } = new int[0];
+        public BoneWeight[] boneWeights { get; set; } = new BoneWeight[0];
+        public Matrix4x4[] bindposes { get; set; } = new Matrix4x4[0];
+        public bool isReadable { get; set; } = true;
+
         public int vertexCount { get; private set; }
         public Bounds bounds { get; private set; }
         public bool IsDynamic { get; private set; }

@@ -38,7 +38,7 @@ namespace UnityEngine
     {
         bool isDestroyed;
 
-        public string name { get; set; }
+        public virtual string name { get; set; }
 
         // A destroyed object equals null.
         public static bool operator ==(Object a, Object b) { return IsGone(a) ? IsGone(b) : ReferenceEquals(a, b); }
@@ -97,6 +97,13 @@ namespace UnityEngine
     public class Component : Object
     {
         public GameObject gameObject { get; internal set; }
+
+        public override string name
+        {
+            get { return gameObject.name; }
+            set { gameObject.name = value; }
+        }
+
         public Transform transform { get { return gameObject.transform; } }
         public T GetComponent<T>() where T : class { return gameObject.GetComponent<T>(); }
 

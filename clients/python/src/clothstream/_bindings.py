@@ -26,6 +26,9 @@ CS_OWN_COLLIDER_VERSION = 1
 CS_CLOTH_POINT_VERSION = 1
 CS_GRAB_VERSION = 1
 CS_OWN_WIND_VERSION = 1
+CS_MAX_SURFACE_VERTICES = 150000
+CS_MAX_SURFACE_TRIANGLES = 50000
+CS_SURFACE_VERSION = 1
 CS_GRAB_EVENT_VERSION = 1
 CS_CONTACT_EVENT_VERSION = 1
 CS_TRACKED_BODY_VERSION = 1
@@ -94,6 +97,9 @@ CS_DECODING_REFUSED = 1
 CS_DECODING_SKIPPED = 2
 CS_WIND_FAN = 0
 CS_WIND_VORTEX = 1
+CS_SURFACES_UNKNOWN = 0
+CS_SURFACES_OFF = 1
+CS_SURFACES_OWN = 2
 CS_HAND_LEFT = 1
 CS_HAND_RIGHT = 2
 CS_GRAB_TAKEN = 1
@@ -364,6 +370,22 @@ class cs_own_wind(c.Structure):
     ]
 
 
+class cs_surface(c.Structure):
+    VERSION = CS_SURFACE_VERSION
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("id", c.c_uint32),
+        ("position", c.c_float * 3),
+        ("orientation", c.c_float * 4),
+        ("positions", c.POINTER(c.c_float)),
+        ("vertex_count", c.c_uint32),
+        ("triangles", c.POINTER(c.c_uint32)),
+        ("triangle_count", c.c_uint32),
+        ("two_sided", c.c_uint32),
+        ("friction", c.c_float),
+    ]
+
+
 class cs_grab_event(c.Structure):
     VERSION = CS_GRAB_EVENT_VERSION
     _fields_ = [
@@ -443,6 +465,7 @@ class cs_cloth_settings(c.Structure):
         ("ball_radius", c.c_float),
         ("ball_friction", c.c_float),
         ("tether_slack", c.c_float),
+        ("pressure", c.c_float),
     ]
 
 
@@ -831,6 +854,10 @@ FUNCTIONS = {
     "cs_get_body_part": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_float)]),
     "cs_body_joints": (c.POINTER(c.c_float), [c.c_void_p, c.POINTER(c.c_uint32)]),
     "cs_body_below_neck": (c.POINTER(c.c_uint32), [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
+    "cs_get_surface_policy": (c.c_int, [c.c_void_p]),
+    "cs_set_surface": (c.c_int, [c.c_void_p, c.POINTER(cs_surface)]),
+    "cs_move_surface": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_float), c.POINTER(c.c_float)]),
+    "cs_remove_surface": (c.c_int, [c.c_void_p, c.c_uint32]),
     "cs_grab_event_count": (c.c_uint32, [c.c_void_p]),
     "cs_get_grab_event": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_grab_event)]),
     "cs_want_contacts": (None, [c.c_void_p, c.c_int, c.c_uint64]),

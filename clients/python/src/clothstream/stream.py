@@ -10,7 +10,7 @@ from typing import Any, Iterator, Sequence
 from . import _bindings as b
 from ._library import Error, lib, new, text, to, vector
 from .client_state import ClientState, Frame
-from .types import DatagramStatistics, Event, Grab, OwnCollider, OwnWind, Quaternion, Role, SceneSummary, Vec3
+from .types import DatagramStatistics, Event, Grab, OwnCollider, OwnWind, Quaternion, Role, SceneSummary, Surface, SurfacePolicy, Vec3
 
 
 class ConnectionFailed(Error):
@@ -265,6 +265,47 @@ class Stream(ClientState):
         with self._client() as client:
             lib.cs_move_joints(client, collider.encode(), array, len(numbers) // 7, int(jumps),
                                lib.clothstream_now_us())
+
+    @property
+    def surface_policy(self) -> SurfacePolicy:
+        """What the server does with surfaces of the real room."""
+        with self._client() as client:
+            return SurfacePolicy(lib.cs_get_surface_policy(client))
+
+    def set_surface(self, surface: Surface) -> None:
+        """Adds a surface of the real room, or replaces the one with its id. Event.ERROR reports a refusal by the server."""
+        positions = [float(number) for vertex in surface.positions for number in vector(vertex, 3)]
+        triangles = [int(corner) for triangle in surface.triangles for corner in triangle]
+        if len(triangles) != 3 * len(surface.triangles):
+            raise ValueError(f"{len(triangles)} numbers; a triangle has 3 vertices")
+        struct = b.cs_surface(version=b.CS_SURFACE_VERSION, id=surface.id, vertex_count=len(positions) // 3,
+                              triangle_count=len(surface.triangles), two_sided=int(surface.two_sided),
+                              friction=surface.friction)
+        struct.position, struct.orientation = tuple(surface.position), tuple(surface.orientation)
+        numbers = (c.c_float * max(1, len(positions)))(*positions)
+        corners = (c.c_uint32 * max(1, len(triangles)))(*triangles)
+        struct.positions = c.cast(numbers, c.POINTER(c.c_float))
+        struct.triangles = c.cast(corners, c.POINTER(c.c_uint32))
+        with self._client() as client:
+            if lib.cs_set_surface(client, c.byref(struct)):
+                return
+            policy = SurfacePolicy(lib.cs_get_surface_policy(client))
+        if policy is SurfacePolicy.OWN:
+            raise ValueError(f"{len(surface.triangles)} triangles and {len(positions) // 3} vertices; a surface has 1 to "
+                             f"{b.CS_MAX_SURFACE_TRIANGLES} and at most {b.CS_MAX_SURFACE_VERTICES}")
+        raise RuntimeError(f"this server takes no surfaces of the real room ({policy.name.lower()})")
+
+    def move_surface(self, id: int, position: Vec3, orientation: Quaternion | None = None) -> None:
+        """Moves a surface of the real room, which stands in its new pose from the next tick on."""
+        with self._client() as client:
+            if not lib.cs_move_surface(client, id, vector(position, 3), vector(orientation, 4)):
+                raise ValueError(f"there is no surface {id}; call set_surface() first")
+
+    def remove_surface(self, id: int) -> None:
+        """Removes a surface of the real room."""
+        with self._client() as client:
+            if not lib.cs_remove_surface(client, id):
+                raise ValueError(f"there is no surface {id}; call set_surface() first")
 
     def want_contacts(self, wants: bool = True) -> None:
         """Turns Event.CONTACTS on or off."""

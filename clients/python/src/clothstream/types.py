@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+from typing import Sequence
 
 from . import _bindings as b
 
@@ -56,6 +57,14 @@ class Shape(enum.IntEnum):
 class WindKind(enum.IntEnum):
     FAN = b.CS_WIND_FAN
     VORTEX = b.CS_WIND_VORTEX
+
+
+class SurfacePolicy(enum.IntEnum):
+    """What the server does with surfaces of the real room."""
+
+    UNKNOWN = b.CS_SURFACES_UNKNOWN  # not connected yet, or the server is of a release that knows none
+    OFF = b.CS_SURFACES_OFF  # it refuses them
+    OWN = b.CS_SURFACES_OWN  # they act on the cloth, and their shape is sent to no client
 
 
 class Solver(enum.IntEnum):
@@ -141,6 +150,7 @@ class ClothSettings:
     ball_radius: float  # m
     ball_friction: float
     tether_slack: float
+    pressure: float  # Pa, of the gas inside a closed mesh
 
 
 @dataclasses.dataclass(frozen=True)
@@ -251,6 +261,19 @@ class Grab:
     reach: float = float("nan")  # m
     max_force: float = float("nan")  # N
     slip_distance: float = float("nan")  # m
+
+
+@dataclasses.dataclass(frozen=True)
+class Surface:
+    """Surface of the real room of this participant: a triangle mesh that cloth does not pass through."""
+
+    id: int  # a known id replaces its surface
+    positions: Sequence[Vec3]  # m, -100 to 100, of each vertex, in the frame of the surface
+    triangles: Sequence[tuple[int, int, int]]  # vertices, counter-clockwise seen from the front
+    position: Vec3 = (0, 0, 0)  # m
+    orientation: Quaternion = (0, 0, 0, 1)
+    two_sided: bool = False  # cloth can be on both sides; else it passes the surface from behind
+    friction: float = 1.0  # coefficient, 0 to 10, multiplied with the cloth's
 
 
 @dataclasses.dataclass(frozen=True)

@@ -110,6 +110,16 @@ namespace ClothStream.Core
     }
 
     /// <summary>
+    /// What the server does with surfaces.
+    /// </summary>
+    public enum SurfacePolicy : uint
+    {
+        Unknown = 0,
+        Off = 1,
+        Own = 2,
+    }
+
+    /// <summary>
     /// HandSide of session.proto.
     /// </summary>
     public enum HandSide : uint
@@ -657,6 +667,49 @@ namespace ClothStream.Core
         [FieldOffset(48)] public float reach;
     }
 
+    /// <summary>
+    /// Surface of the real room of this participant: a triangle mesh that cloth does not pass through, such as a
+    /// floor, a desk, or a mesh that a headset has scanned (SurfaceUpdate in session.proto).
+    /// </summary>
+    [StructLayout(LayoutKind.Explicit, Size = 80)]
+    public unsafe struct Surface
+    {
+        [FieldOffset(0)] public uint version;
+        /// <summary>
+        /// a known id replaces its surface
+        /// </summary>
+        [FieldOffset(4)] public uint id;
+        [FieldOffset(8)] public fixed float position[3];
+        /// <summary>
+        /// quaternion x y z w; all zero means no rotation
+        /// </summary>
+        [FieldOffset(20)] public fixed float orientation[4];
+        /// <summary>
+        /// x, y, z of each vertex, -100 to 100, in the frame of the surface
+        /// </summary>
+        [FieldOffset(40)] public float* positions;
+        /// <summary>
+        /// at most CS_MAX_SURFACE_VERTICES
+        /// </summary>
+        [FieldOffset(48)] public uint vertexCount;
+        /// <summary>
+        /// three vertices of each triangle, counter-clockwise seen from the front
+        /// </summary>
+        [FieldOffset(56)] public uint* triangles;
+        /// <summary>
+        /// 1 to CS_MAX_SURFACE_TRIANGLES
+        /// </summary>
+        [FieldOffset(64)] public uint triangleCount;
+        /// <summary>
+        /// 1: cloth can be on both sides; 0: cloth passes it from behind
+        /// </summary>
+        [FieldOffset(68)] public uint twoSided;
+        /// <summary>
+        /// coefficient of friction, 0 to 10, multiplied with the cloth's
+        /// </summary>
+        [FieldOffset(72)] public float friction;
+    }
+
     [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct GrabEvent
     {
@@ -791,7 +844,7 @@ namespace ClothStream.Core
     /// same values for parameters that are not known, or that the cloth or its solver does not have. A compliance
     /// that was set cannot be set back to the server's default with cs_set_cloth.
     /// </summary>
-    [StructLayout(LayoutKind.Explicit, Size = 92)]
+    [StructLayout(LayoutKind.Explicit, Size = 96)]
     public unsafe struct ClothSettings
     {
         [FieldOffset(0)] public uint version;
@@ -874,6 +927,10 @@ namespace ClothStream.Core
         /// changed only for cloths that were created with them, and are NaN for others.
         /// </summary>
         [FieldOffset(88)] public float tetherSlack;
+        /// <summary>
+        /// Pa; of the gas inside a closed mesh
+        /// </summary>
+        [FieldOffset(92)] public float pressure;
     }
 
     /// <summary>
@@ -1293,6 +1350,9 @@ namespace ClothStream.Core
         public const uint CS_CLOTH_POINT_VERSION = 1;
         public const uint CS_GRAB_VERSION = 1;
         public const uint CS_OWN_WIND_VERSION = 1;
+        public const uint CS_MAX_SURFACE_VERTICES = 150000;
+        public const uint CS_MAX_SURFACE_TRIANGLES = 50000;
+        public const uint CS_SURFACE_VERSION = 1;
         public const uint CS_GRAB_EVENT_VERSION = 1;
         public const uint CS_CONTACT_EVENT_VERSION = 1;
         public const uint CS_TRACKED_BODY_VERSION = 1;
@@ -1740,6 +1800,26 @@ namespace ClothStream.Core
         /// the head. NULL and 0 if it is not a body. Valid until the next call.
         /// </summary>
         [DllImport(Library)] public static extern uint* cs_body_below_neck(IntPtr client, uint collider, uint* indexCount);
+        /// <summary>
+        /// What the server does with surfaces of the real room, from the newest Welcome.
+        /// </summary>
+        [DllImport(Library)] public static extern SurfacePolicy cs_get_surface_policy(IntPtr client);
+        /// <summary>
+        /// Adds a surface of the real room, or replaces the one with its id. The mesh is copied, and sent again after
+        /// a reconnect. It acts when it has arrived completely; until then the former one does. Fails, and changes
+        /// nothing, if the version is unknown, if a count is not allowed, or if the client is in a scene whose server
+        /// takes no surfaces. If the client joins such a scene later, CS_EVENT_ERROR says so.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_set_surface(IntPtr client, Surface* surface);
+        /// <summary>
+        /// Moves a surface, which stands in its new pose from the next tick on. orientation4 may be NULL: no rotation.
+        /// Fails if there is no surface with this id.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_move_surface(IntPtr client, uint id, float* position3, float* orientation4);
+        /// <summary>
+        /// Removes a surface. Fails if there is no surface with this id.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_remove_surface(IntPtr client, uint id);
         /// <summary>
         /// Number of events in the newest CS_EVENT_GRABS, for the grabs of all participants.
         /// </summary>

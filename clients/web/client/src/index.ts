@@ -8,7 +8,15 @@ export { Input } from "./input";
 export type { Proof } from "./thread_messages";
 export * from "./types";
 export { BodyPart, Wearing, type BodyPose, type TrackedBody } from "./wearing";
-export { sceneBytes, type MeshScene } from "./scene_bytes";
+export {
+  sceneBytes,
+  type FigureJoint,
+  type FigureKey,
+  type FigurePose,
+  type MeshScene,
+  type SceneFigure,
+  type SkinLimitLists,
+} from "./scene_bytes";
 export { kClothParameters, kSettings, type ClothParameter, type NumberRange } from "./tables";
 export type { ClothChange, ClothSettings, SolverSettings } from "./cloth_settings";
 export type { Answer, Ban, SceneRequests, SceneSummary } from "./scene_requests";

@@ -18,6 +18,7 @@ export const CS_OWN_COLLIDER_VERSION = 1;
 export const CS_CLOTH_POINT_VERSION = 1;
 export const CS_GRAB_VERSION = 1;
 export const CS_OWN_WIND_VERSION = 1;
+export const CS_SURFACE_VERSION = 1;
 export const CS_GRAB_EVENT_VERSION = 1;
 export const CS_CONTACT_EVENT_VERSION = 1;
 export const CS_TRACKED_BODY_VERSION = 1;
@@ -193,6 +194,19 @@ export const cs_own_wind = {
   spread: 44,
   reach: 48,
 } as const;
+export const cs_surface = {
+  sizeof: 60,
+  version: 0,
+  id: 4,
+  position: 8,
+  orientation: 20,
+  positions: 36,
+  vertex_count: 40,
+  triangles: 44,
+  triangle_count: 48,
+  two_sided: 52,
+  friction: 56,
+} as const;
 export const cs_grab_event = {
   sizeof: 40,
   version: 0,
@@ -238,7 +252,7 @@ export const cs_environment = {
   gust_seconds: 36,
 } as const;
 export const cs_cloth_settings = {
-  sizeof: 92,
+  sizeof: 96,
   version: 0,
   structural: 4,
   shear: 12,
@@ -259,6 +273,7 @@ export const cs_cloth_settings = {
   ball_radius: 80,
   ball_friction: 84,
   tether_slack: 88,
+  pressure: 92,
 } as const;
 export const cs_collider_change = {
   sizeof: 56,

@@ -49,6 +49,8 @@ export const kClothParameters: readonly ClothParameter[] = [
     help: "Extra length that tethers allow, as a fraction of the distance along the cloth" },
   { option: "dihedral-bending", group: "Springs", unit: "N m", min: 0, max: 1, initial: 0, offset: 76,
     help: "Flexural rigidity across edges between faces" },
+  { option: "pressure", group: "Material", unit: "Pa", min: -50000, max: 1e+06, initial: 0, offset: 92,
+    help: "Gas inside a closed mesh, above the pressure outside; 0: no gas" },
 ];
 
 export const kSettings = {
@@ -68,7 +70,14 @@ export const Vec3Fields = { x: 1, y: 2, z: 3 } as const;
 export const PoseFields = { position: 1, orientation: 2 } as const;
 export const SceneFields = { name: 1, description: 2, simulationRate: 3, streamRate: 4, substeps: 5, integrator: 6, environment: 7, cloths: 8, colliders: 9, stream: 10 } as const;
 export const EnvironmentFields = { gravity: 1, wind: 2, airDensity: 3, gust: 4, winds: 5 } as const;
-export const ClothFields = { name: 1, grid: 2, mesh: 14, mass: 4, structural: 5, shear: 6, bend: 7, damping: 8, drag: 9, lift: 10, friction: 11, thickness: 12, pins: 13, pinnedVertices: 15, pinnedRegions: 16, solver: 20, selfCollision: 21, attachments: 22, tethers: 23, dihedralBending: 24, material: 40, arealMass: 41, coarse: 42 } as const;
+export const ClothFields = { name: 1, grid: 2, mesh: 14, mass: 4, structural: 5, shear: 6, bend: 7, damping: 8, drag: 9, lift: 10, friction: 11, thickness: 12, pins: 13, pinnedVertices: 15, pinnedRegions: 16, solver: 20, selfCollision: 21, attachments: 22, tethers: 23, dihedralBending: 24, material: 40, arealMass: 41, coarse: 42, skin: 43, pressure: 44 } as const;
 export const MeshFields = { file: 1, positions: 2, triangles: 3, quads: 4, uvs: 5, uvTriangles: 6, submeshes: 7, pose: 8, scale: 9, weldDistance: 10, repair: 70, fit: 71 } as const;
 export const SelfCollisionFields = { radius: 1, friction: 2, nothingPasses: 42 } as const;
 export const ColliderFields = { name: 1, sphere: 2, capsule: 3, plane: 4, box: 5, hull: 6, mesh: 30, pose: 8, friction: 9, motion: 10 } as const;
+export const QuaternionFields = { x: 1, y: 2, z: 3, w: 4 } as const;
+export const ColliderMeshFields = { file: 1, animation: 25, positions: 2, triangles: 3, scale: 4, skin: 5, distanceCell: 6 } as const;
+export const SkinFields = { joints: 1, vertexJoints: 2, vertexWeights: 3, animation: 4 } as const;
+export const JointFields = { name: 1, parent: 2, rest: 3 } as const;
+export const JointAnimationFields = { keys: 1 } as const;
+export const JointKeyFields = { time: 1, joints: 2 } as const;
+export const ClothSkinFields = { collider: 1, vertexJoints: 2, vertexWeights: 3, limits: 4, maxDistances: 5, backstopDistances: 6, backstopRadii: 7, colourDistance: 8, regions: 9 } as const;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
-import type { BodyPart, BodyPose, Client, ClothLayout, ClothReport, Collider, Link, Participant, Playback, Session, SessionState, Stages, Statistics, Vec3 } from "@clothstream/client";
+import type { BodyPart, BodyPose, Client, ClothLayout, ClothReport, Collider, Link, Participant, Playback, Session, SessionState, SkinLimitLists, Stages, Statistics, Vec3 } from "@clothstream/client";
 import * as THREE from "three";
 import type { CanvasPanel, Doing, Headset } from "@clothstream/three";
 import type { FrameWork } from "./frame_work";
@@ -49,6 +49,7 @@ export interface Probe {
   readonly headset: HeadsetProbe;
   readonly canvas: HTMLCanvasElement;
   // Vertices that the form for a new scene pins.
+  readonly limits: SkinLimitLists;
   readonly pinned: Uint32Array;
   // Projects a point of the scene to CSS pixels of the page.
   project(point: Vec3): [number, number];
@@ -196,6 +197,9 @@ export function expose(session: Session, view: View, { headset, panel, work, his
       };
     },
     canvas: view.canvas,
+    get limits() {
+      return create?.limits ?? {};
+    },
     get pinned() {
       return create?.pinned ?? new Uint32Array();
     },

@@ -3,7 +3,7 @@
 
 import * as THREE from "three";
 import { DRACOLoader } from "three/examples/jsm/loaders/DRACOLoader.js";
-import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
+import { GLTFLoader, type GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
 import { mergeVertices } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { checkGltf } from "./gltf_header";
@@ -23,9 +23,8 @@ const kMaxVertices = 4e6;
 export async function readMesh(file: File): Promise<FileMesh> {
   const kind = /\.(obj|glb|gltf)$/i.exec(file.name)?.[1]?.toLowerCase();
   if (!kind) throw new Error(`${file.name} is not an OBJ, GLB or glTF file.`);
-  if (file.size > kMaxBytes)
-    throw new Error(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB; at most ${kMaxBytes / 1e6} MB are allowed.`);
-  const root = kind === "obj" ? new OBJLoader().parse(await file.text()) : await readGltf(file);
+  checkSize(file);
+  const root = kind === "obj" ? new OBJLoader().parse(await file.text()) : (await readGltf(file)).scene;
   const parts: THREE.BufferGeometry[] = [];
   let vertices = 0;
   root.updateMatrixWorld(true);
@@ -39,18 +38,32 @@ export async function readMesh(file: File): Promise<FileMesh> {
     part.setAttribute("position", from.getAttribute("position").clone());
     if (from.hasAttribute("uv")) part.setAttribute("uv", from.getAttribute("uv").clone());
     if (from.index) part.setIndex(from.index.clone());
-    parts.push(part.applyMatrix4(object.matrixWorld));
+    parts.push(part.applyMatrix4(placeOf(object as THREE.Mesh)));
   });
   return merged(parts, file.name, kind !== "obj");
 }
 
-async function readGltf(file: File): Promise<THREE.Object3D> {
+// Map of the points of a mesh to the scene. One with a skin is where its first joint has it, because glTF has no other
+// place for it.
+function placeOf(mesh: THREE.Mesh): THREE.Matrix4 {
+  if (!(mesh instanceof THREE.SkinnedMesh)) return mesh.matrixWorld;
+  const { bones, boneInverses } = mesh.skeleton;
+  return bones[0]!.matrixWorld.clone().multiply(boneInverses[0]!);
+}
+
+function checkSize(file: File): void {
+  if (file.size > kMaxBytes)
+    throw new Error(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB; at most ${kMaxBytes / 1e6} MB are allowed.`);
+}
+
+// Throws an Error whose text is for people.
+export async function readGltf(file: File): Promise<GLTF> {
+  checkSize(file);
   const bytes = await file.arrayBuffer();
   checkGltf(bytes, file.name, kMaxVertices);
   const draco = new DRACOLoader().setDecoderPath({ js: kDraco.js.href, wasm: kDraco.wasm.href }).setWorkerLimit(1);
   try {
-    const { scene } = await new GLTFLoader().setDRACOLoader(draco).parseAsync(bytes, "");
-    return scene;
+    return await new GLTFLoader().setDRACOLoader(draco).parseAsync(bytes, "");
   } catch (error) {
     const why = reasonOf(error);
     if (/draco/i.test(why)) throw new Error(`${file.name} is compressed with Draco, but cannot be decoded: ${why}`);

@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Paints pins on the mesh of the preview by mouse, pen and finger, with a brush that is a ball on the mesh.
+// Paints pins and limits on the mesh of the preview by mouse, pen and finger, with a brush that is a ball on the mesh.
 
 import * as THREE from "three";
 import { element, write } from "./dom";
+import { kNoLimit, legendOf } from "./limit_colours";
 import { PinSet } from "./pin_set";
 import { boundsOf, sizeOf, within } from "./pins";
 import { Preview } from "./preview";
+import { VertexNumbers } from "./vertex_numbers";
 
-type Tool = "pin" | "free" | "turn";
+// Limits are those of a cloth on a figure: the distance from the place on the figure, and the one behind it.
+type LimitTool = "distance" | "backstop";
+type Tool = "pin" | "free" | "turn" | LimitTool;
+
+const kNone: Record<LimitTool, string> = { distance: "unbounded", backstop: "no backstop" };
+const kFirstLimits: Record<LimitTool, string> = { distance: "0", backstop: "0" };
 
 const kMostBalls = 24; // of one motion of the pointer
 // Triangles times balls of one motion, so that painting on large meshes stays fluent.
@@ -16,16 +23,21 @@ const kLargestStep = 6; // pixels between two balls, or else half of the ball
 
 export class Painter {
   private pins = new PinSet(0);
+  private limits = { distance: new VertexNumbers(0, kNoLimit), backstop: new VertexNumbers(0, kNoLimit) };
+  private order: { undo(): void; readonly canUndo: boolean }[] = []; // what each step has changed, newest last
+  private readonly chosen = { ...kFirstLimits }; // text of the field for each tool
   private positions: Float32Array = new Float32Array();
   private triangles = 0;
   private longest = 1; // side of the mesh, units of the file
   private preview: Preview | undefined;
   private tool: Tool = "pin";
-  private stroke: { pointer: number; x: number; y: number; pins: boolean } | undefined;
+  private stroke: { pointer: number; x: number; y: number; on: VertexNumbers; value: number } | undefined;
   private readonly touches = new Set<number>();
   private readonly canvas = element<HTMLCanvasElement>("preview");
   private readonly size = element<HTMLInputElement>("pin-brush");
   private readonly undoButton = element<HTMLButtonElement>("pin-undo");
+  private readonly limit = element<HTMLInputElement>("limit-value");
+  private readonly noLimit = element<HTMLInputElement>("limit-none");
 
   // `painted` is called when the pins have changed by painting or undoing.
   constructor(private readonly painted: () => void) {
@@ -33,6 +45,10 @@ export class Painter {
       tool.addEventListener("change", () => this.choose(tool.value as Tool));
     this.size.addEventListener("input", () => this.showSize());
     this.undoButton.addEventListener("click", () => this.undo());
+    this.limit.addEventListener("input", () => {
+      if (isLimit(this.tool)) this.chosen[this.tool] = this.limit.value;
+      this.noLimit.checked = false;
+    });
     this.canvas.addEventListener("pointerdown", (event) => this.press(event));
     this.canvas.addEventListener("pointermove", (event) => this.move(event));
     for (const end of ["pointerup", "pointercancel"] as const) this.canvas.addEventListener(end, (event) => this.release(event));
@@ -49,6 +65,21 @@ export class Painter {
     return this.pins.list();
   }
 
+  // Limits of each vertex, metres, kNoLimit for none. Undefined if no vertex has one.
+  listLimits(tool: LimitTool): Float32Array | undefined {
+    const { values } = this.limits[tool];
+    return values.some((value) => value >= 0) ? values : undefined;
+  }
+
+  // Shows who wears the cloth, and offers the tools for its limits. Undefined: the cloth has no figure.
+  dress(figure: { positions: Float32Array; triangles: Uint32Array } | undefined): void {
+    for (const tool of document.querySelectorAll<HTMLElement>("#pin-tools [data-limit]")) tool.hidden = figure === undefined;
+    this.preview?.showFigure(figure);
+    if (figure || !isLimit(this.tool)) return;
+    element("pin-tools").querySelector<HTMLInputElement>('[value="pin"]')!.checked = true;
+    this.choose("pin");
+  }
+
   // Shows a mesh with its first pins. Throws if the browser refuses another WebGL context.
   show(positions: Float32Array, triangles: Uint32Array, pinned: readonly number[]): void {
     if (!this.preview) {
@@ -58,7 +89,10 @@ export class Painter {
     this.positions = positions;
     this.triangles = triangles.length / 3;
     this.longest = Math.max(...sizeOf(boundsOf(positions)));
-    this.pins = new PinSet(positions.length / 3, pinned);
+    const vertices = positions.length / 3;
+    this.pins = new PinSet(vertices, pinned);
+    this.limits = { distance: new VertexNumbers(vertices, kNoLimit), backstop: new VertexNumbers(vertices, kNoLimit) };
+    this.order = [];
     this.preview.show(positions, triangles);
     this.update();
   }
@@ -66,7 +100,7 @@ export class Painter {
   // Pins exactly these vertices.
   replace(vertices: readonly number[]): void {
     this.stroke = undefined;
-    this.pins.replace(vertices);
+    if (this.pins.replace(vertices)) this.order.push(this.pins);
     this.update();
   }
 
@@ -74,6 +108,16 @@ export class Painter {
   private choose(tool: Tool): void {
     this.tool = tool;
     this.canvas.dataset["tool"] = tool;
+    const limit = isLimit(tool) ? tool : undefined;
+    element("limit-row").hidden = limit === undefined;
+    this.limit.disabled = limit === undefined; // so that the form does not check it
+    if (limit) {
+      write(element("limit-name"), limit === "distance" ? "Largest distance" : "Distance behind");
+      write(element("limit-none-name"), limit === "distance" ? "Unbounded" : "No backstop");
+      this.limit.value = this.chosen[limit];
+      this.noLimit.checked = false;
+    }
+    this.showLimits();
     if (!this.preview) return;
     const { orbit } = this.preview;
     const first = tool === "turn" ? THREE.MOUSE.ROTATE : null;
@@ -97,8 +141,8 @@ export class Painter {
     if (event.button !== 0 || this.tool === "turn" || this.stroke) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.canvas.focus();
-    this.stroke = { pointer: event.pointerId, x: event.offsetX, y: event.offsetY, pins: this.tool === "pin" && !event.shiftKey };
-    this.pins.begin();
+    this.stroke = { pointer: event.pointerId, x: event.offsetX, y: event.offsetY, on: this.painting, value: this.paintedValue(event.shiftKey) };
+    this.stroke.on.begin();
     this.paint(event.offsetX, event.offsetY);
   }
 
@@ -121,8 +165,9 @@ export class Painter {
   private release(event: PointerEvent): void {
     this.touches.delete(event.pointerId);
     if (event.pointerId !== this.stroke?.pointer) return;
+    const { on } = this.stroke;
     this.stroke = undefined;
-    this.pins.end();
+    if (on.end()) this.order.push(on);
     this.update();
     this.painted();
     if (event.pointerType === "touch") this.preview?.showBrush(undefined, 0);
@@ -130,8 +175,8 @@ export class Painter {
 
   private abandon(): void {
     if (!this.stroke) return;
+    this.stroke.on.cancel();
     this.stroke = undefined;
-    this.pins.cancel();
     this.preview?.showBrush(undefined, 0);
     this.update();
     this.painted();
@@ -147,13 +192,34 @@ export class Painter {
     this.preview?.showBrush(touched?.point, this.radius);
     if (!touched || !this.stroke) return;
     const vertices = within(this.positions, [touched.point.x, touched.point.y, touched.point.z], this.radius);
-    if (!this.pins.paint(vertices.concat(touched.corner), this.stroke.pins)) return;
+    if (!this.stroke.on.paint(vertices.concat(touched.corner), this.stroke.value)) return;
     this.preview?.showPins(this.pins.list());
+    this.showLimits();
     this.painted();
   }
 
+  // What the tool paints on.
+  private get painting(): VertexNumbers {
+    return isLimit(this.tool) ? this.limits[this.tool] : this.pins.numbers;
+  }
+
+  private paintedValue(erases: boolean): number {
+    if (!isLimit(this.tool)) return Number(this.tool === "pin" && !erases);
+    const value = this.limit.valueAsNumber;
+    return erases || this.noLimit.checked || !(value >= 0) ? kNoLimit : value;
+  }
+
+  private showLimits(): void {
+    const limits = isLimit(this.tool) ? this.limits[this.tool].values : undefined;
+    this.preview?.showLimits(limits);
+    if (limits) write(element("limit-legend"), legendOf(limits, kNone[this.tool as LimitTool]));
+  }
+
+  // Each set keeps a bounded number of steps, so the oldest ones may be gone.
   private undo(): void {
-    this.pins.undo();
+    this.stroke?.on.cancel();
+    this.stroke = undefined;
+    this.order.pop()?.undo();
     this.update();
     this.painted();
   }
@@ -180,8 +246,13 @@ export class Painter {
   // Shows the pins and whether there is something to undo.
   private update(): void {
     this.preview?.showPins(this.pins.list());
-    this.undoButton.disabled = !this.pins.canUndo;
+    this.showLimits();
+    this.undoButton.disabled = !this.order.at(-1)?.canUndo;
     const text = `The mesh with ${this.pins.count} pinned vertices. Arrow keys turn it, plus and minus zoom. Choose "a box" to pin with the keyboard.`;
     if (this.canvas.getAttribute("aria-label") !== text) this.canvas.setAttribute("aria-label", text);
   }
+}
+
+function isLimit(tool: Tool): tool is LimitTool {
+  return tool === "distance" || tool === "backstop";
 }

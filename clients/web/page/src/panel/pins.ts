@@ -61,7 +61,8 @@ function shown(value: number): string {
   return Number(value.toPrecision(3)).toLocaleString("en", { maximumSignificantDigits: 3 });
 }
 
-function meanEdge(positions: Float32Array, triangles: Uint32Array): number {
+// Mean length of the edges of all triangles, in the unit of the positions; 0 without triangles.
+export function meanEdge(positions: Float32Array, triangles: Uint32Array): number {
   let sum = 0;
   for (let i = 0; i < triangles.length; ++i) {
     const a = 3 * triangles[i]!;

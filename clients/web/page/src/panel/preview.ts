@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Picture of a mesh that is to become cloth, with its pins. It can be turned, and finds the place under the pointer.
+// Picture of a mesh that is to become cloth, with its pins, its limits and the figure that wears it. It can be turned, and
+// finds the place under the pointer.
 
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { hueOf, largestOf } from "./limit_colours";
 import { boundsOf, sizeOf, within } from "./pins";
 
 const kFieldOfView = 30; // degrees
@@ -27,10 +29,12 @@ export class Preview {
   private readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
   private readonly edges: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly pins: THREE.Points<THREE.BufferGeometry, THREE.PointsMaterial>;
+  private readonly figure: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
   private readonly brush: THREE.Mesh<THREE.SphereGeometry, THREE.MeshBasicMaterial>;
   private readonly raycaster = new THREE.Raycaster();
   private readonly corner = new THREE.Vector3();
   private positions: Float32Array = new Float32Array();
+  private limits: Float32Array | undefined; // that the colours show
   private drawing = 0; // handle of the next drawing
 
   // Throws if the browser refuses another WebGL context.
@@ -43,11 +47,12 @@ export class Preview {
     this.pins = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ sizeAttenuation: false }));
     this.brush = new THREE.Mesh(new THREE.SphereGeometry(1, 24, 16), new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.3, depthWrite: false }));
     this.brush.visible = false;
+    this.figure = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshStandardMaterial({ transparent: true, opacity: 0.35, roughness: 1 }));
     const light = new THREE.DirectionalLight(0xffffff, 2.2);
     light.position.set(0.4, 0.8, 1);
     this.camera.add(light, light.target);
     light.target.position.set(0, 0, -1);
-    this.scene.add(this.camera, new THREE.AmbientLight(0xffffff, 1.6), this.mesh, this.edges, this.pins, this.brush);
+    this.scene.add(this.camera, new THREE.AmbientLight(0xffffff, 1.6), this.mesh, this.edges, this.pins, this.figure, this.brush);
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.addEventListener("change", () => this.draw());
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -57,6 +62,7 @@ export class Preview {
   // Shows a mesh from its largest side.
   show(positions: Float32Array, triangles: Uint32Array): void {
     this.positions = positions;
+    this.limits = undefined;
     for (const object of [this.mesh, this.edges, this.pins]) {
       object.geometry.dispose();
       object.geometry = new THREE.BufferGeometry();
@@ -70,6 +76,23 @@ export class Preview {
 
   showPins(vertices: Uint32Array): void {
     this.pins.geometry.setIndex(new THREE.BufferAttribute(vertices, 1));
+    this.draw();
+  }
+
+  // Colours the mesh by limits of its vertices, kNoLimit for none. Undefined: it has one colour.
+  showLimits(limits: Float32Array | undefined): void {
+    this.limits = limits;
+    this.draw();
+  }
+
+  // Shows who wears the cloth. Undefined removes it.
+  showFigure(figure: { positions: Float32Array; triangles: Uint32Array } | undefined): void {
+    this.figure.geometry.dispose();
+    this.figure.geometry = new THREE.BufferGeometry();
+    if (figure) {
+      this.figure.geometry.setAttribute("position", new THREE.BufferAttribute(figure.positions, 3)).setIndex(new THREE.BufferAttribute(figure.triangles, 1));
+      this.figure.geometry.computeVertexNormals();
+    }
     this.draw();
   }
 
@@ -173,12 +196,34 @@ export class Preview {
       this.drawing = 0;
       const style = getComputedStyle(this.canvas);
       const colour = (name: string) => style.getPropertyValue(`--${name}`).trim();
-      this.mesh.material.color.set(colour("edge"));
+      this.colourMesh(colour("edge"));
+      this.figure.material.color.set(colour("quiet"));
       this.edges.material.color.set(colour("text"));
       this.pins.material.color.set(colour("accent"));
       this.pins.material.size = kPinSize * this.renderer.getPixelRatio();
       this.brush.material.color.set(colour("accent"));
       this.renderer.render(this.scene, this.camera);
     });
+  }
+
+  // A material with colours of vertices multiplies them with its own colour.
+  private colourMesh(plain: string): void {
+    const { geometry, material } = this.mesh;
+    if (material.vertexColors !== (this.limits !== undefined)) {
+      material.vertexColors = this.limits !== undefined;
+      material.needsUpdate = true;
+    }
+    material.color.set(this.limits ? "white" : plain);
+    if (!this.limits) return;
+    if (!geometry.hasAttribute("color")) geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(this.positions.length), 3));
+    const colours = geometry.getAttribute("color");
+    const none = new THREE.Color(plain);
+    const colour = new THREE.Color();
+    const largest = largestOf(this.limits);
+    this.limits.forEach((limit, vertex) => {
+      const { r, g, b } = limit < 0 ? none : colour.setHSL(hueOf(limit, largest), 0.75, 0.5);
+      colours.setXYZ(vertex, r, g, b);
+    });
+    colours.needsUpdate = true;
   }
 }

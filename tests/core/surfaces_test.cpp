@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+// Surfaces of the real room: parts, order, windows, reconnects, and servers that take none.
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/core/stream/own_surfaces.h"
+#include "tests/core/scripted_server.h"
+
+namespace clothstream::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+std::string welcomeWith(const ScriptedServer& server, v1::SurfacePolicy policy,
+                        v1::Role role = v1::ROLE_PARTICIPANT) {
+  v1::ServerMessage message;
+  message.ParseFromString(server.welcome());
+  message.mutable_welcome()->set_role(role);
+  if (policy != v1::SURFACE_POLICY_UNSPECIFIED)
+    message.mutable_welcome()->mutable_surfaces()->set_policy(policy);
+  return message.SerializeAsString();
+}
+
+class Surfaces : public ::testing::Test {
+ protected:
+  Surfaces() {
+    // Large enough for three parts of vertices and five of triangles.
+    for (std::uint32_t i = 0; i < 10'000; ++i)
+      for (const float number : {static_cast<float>(i), 1.0f, -2.0f}) positions.push_back(number);
+    for (std::uint32_t i = 0; i < 3 * 17'000; ++i) triangles.push_back(i % 10'000);
+  }
+  std::uint32_t join(v1::SurfacePolicy policy, v1::Role role = v1::ROLE_PARTICIPANT) {
+    const std::uint32_t events = client.receive(welcomeWith(server, policy, role), now);
+    client.receiveAll(server.chunks(), now);
+    client.receive(server.frame(++tick, codec::PacketKind::key), now);
+    return events;
+  }
+  cs_surface surface(std::uint32_t id, std::uint32_t triangleCount, std::uint32_t vertexCount = 3) const {
+    cs_surface made{};
+    made.version = CS_SURFACE_VERSION;
+    made.id = id;
+    made.position[1] = 2;
+    made.positions = positions.data();
+    made.vertex_count = vertexCount;
+    made.triangles = triangles.data();
+    made.triangle_count = triangleCount;
+    made.friction = 0.5f;
+    return made;
+  }
+  int set(std::uint32_t id, std::uint32_t triangleCount = 1, std::uint32_t vertexCount = 3) {
+    const cs_surface made = surface(id, triangleCount, vertexCount);
+    return cs_set_surface(client.get(), &made);
+  }
+  // Messages about surfaces that the client sends now.
+  std::vector<v1::SurfaceUpdate> sent() {
+    std::vector<v1::SurfaceUpdate> updates;
+    for (const v1::ClientMessage& message : client.outgoing())
+      if (message.has_surface()) updates.push_back(message.surface());
+    return updates;
+  }
+  // The same over the next seconds, as text: "id part/count", "id moves" or "id removed".
+  std::vector<std::string> allSent() {
+    std::vector<std::string> texts;
+    for (int window = 0; window < 20; ++window) {
+      for (const v1::SurfaceUpdate& update : sent())
+        texts.push_back(std::to_string(update.id()) + (update.remove() ? " removed"
+                                                       : update.has_part()
+                                                           ? " " + std::to_string(update.part().index()) +
+                                                                 "/" + std::to_string(update.part().count())
+                                                           : " moves"));
+      now += OwnSurfaces::kWindowUs;
+      cs_update(client.get(), now);
+    }
+    return texts;
+  }
+  void reconnect(v1::SurfacePolicy policy) {
+    cs_disconnected(client.get(), now);
+    cs_connecting(client.get(), now);
+    client.outgoing();
+    events = join(policy);
+  }
+
+  ScriptedServer server;
+  ClientUnderTest client;
+  std::vector<float> positions;
+  std::vector<std::uint32_t> triangles;
+  std::uint64_t now = 1'000'000, tick = 0;
+  std::uint32_t events = 0;
+};
+
+TEST_F(Surfaces, AreSentInPartsOfAFewMessagesAtATime) {
+  join(v1::SURFACE_POLICY_OWN);
+  EXPECT_EQ(cs_get_surface_policy(client.get()), CS_SURFACES_OWN);
+  ASSERT_EQ(set(5, 17'000, 10'000), 1);
+  std::vector<float> gotPositions;
+  std::vector<std::uint32_t> gotTriangles;
+  std::uint32_t parts = 0;
+  for (int window = 0; window < 2; ++window) {
+    const std::vector<v1::SurfaceUpdate> updates = sent();
+    EXPECT_EQ(updates.size(), OwnSurfaces::kWindow);
+    for (const v1::SurfaceUpdate& update : updates) {
+      EXPECT_LT(update.ByteSizeLong(), 60'000u);
+      EXPECT_EQ(update.id(), 5u);
+      EXPECT_EQ(update.part().index(), parts++);
+      EXPECT_EQ(update.part().count(), 8u);
+      EXPECT_EQ(update.has_pose(), update.part().index() == 0);
+      EXPECT_EQ(update.part().has_friction(), update.part().index() == 0);
+      gotPositions.insert(gotPositions.end(), update.part().positions().begin(),
+                          update.part().positions().end());
+      gotTriangles.insert(gotTriangles.end(), update.part().triangles().begin(),
+                          update.part().triangles().end());
+    }
+    EXPECT_THAT(sent(), IsEmpty());
+    now += OwnSurfaces::kWindowUs;
+    cs_update(client.get(), now);
+  }
+  EXPECT_EQ(gotPositions, positions);
+  EXPECT_EQ(gotTriangles, triangles);
+  EXPECT_THAT(sent(), IsEmpty());
+}
+
+TEST_F(Surfaces, CarryPoseAndProperties) {
+  join(v1::SURFACE_POLICY_OWN);
+  cs_surface desk = surface(2, 1);
+  desk.two_sided = 1;
+  desk.orientation[3] = 1;
+  ASSERT_EQ(cs_set_surface(client.get(), &desk), 1);
+  const std::vector<v1::SurfaceUpdate> updates = sent();
+  ASSERT_EQ(updates.size(), 2u);
+  EXPECT_EQ(updates[0].pose().position().y(), 2);
+  EXPECT_EQ(updates[0].pose().orientation().w(), 1);
+  EXPECT_TRUE(updates[0].part().two_sided());
+  EXPECT_EQ(updates[0].part().friction(), 0.5f);
+}
+
+TEST_F(Surfaces, MoveAndGo) {
+  join(v1::SURFACE_POLICY_OWN);
+  const float place[3] = {1, 2, 3};
+  EXPECT_EQ(cs_move_surface(client.get(), 1, place, nullptr), 0);
+  EXPECT_EQ(cs_remove_surface(client.get(), 1), 0);
+  set(1);
+  EXPECT_EQ(cs_move_surface(client.get(), 1, place, nullptr), 1);  // goes along with the mesh
+  std::vector<v1::SurfaceUpdate> updates = sent();
+  ASSERT_EQ(updates.size(), 2u);
+  EXPECT_EQ(updates[0].pose().position().z(), 3);
+  EXPECT_EQ(cs_move_surface(client.get(), 1, place, nullptr), 1);
+  EXPECT_EQ(cs_remove_surface(client.get(), 1), 1);
+  EXPECT_THAT(allSent(), ElementsAre("1 removed"));
+  EXPECT_EQ(cs_move_surface(client.get(), 1, place, nullptr), 0);
+}
+
+TEST_F(Surfaces, StopSendingAMeshWhenItIsReplaced) {
+  join(v1::SURFACE_POLICY_OWN);
+  set(1, 17'000, 10'000);
+  EXPECT_EQ(sent().size(), 4u);
+  set(1);
+  EXPECT_THAT(allSent(), ElementsAre("1 0/2", "1 1/2"));
+}
+
+TEST_F(Surfaces, AreSentAgainAfterAReconnect) {
+  set(1);
+  set(2);
+  join(v1::SURFACE_POLICY_OWN);
+  EXPECT_THAT(allSent(), ElementsAre("1 0/2", "1 1/2", "2 0/2", "2 1/2"));
+  cs_remove_surface(client.get(), 1);
+  set(2, 17'000, 10'000);
+  EXPECT_EQ(sent().size(), 4u);  // and then the connection is lost
+  reconnect(v1::SURFACE_POLICY_OWN);
+  EXPECT_EQ(events & CS_EVENT_ERROR, 0u);
+  EXPECT_THAT(allSent(), ElementsAre("2 0/8", "2 1/8", "2 2/8", "2 3/8", "2 4/8", "2 5/8", "2 6/8", "2 7/8"));
+}
+
+TEST_F(Surfaces, WaitWhileTheParticipantIsAViewer) {
+  join(v1::SURFACE_POLICY_OWN, v1::ROLE_VIEWER);
+  EXPECT_EQ(set(1), 1);
+  EXPECT_THAT(allSent(), IsEmpty());
+  for (const v1::Role role : {v1::ROLE_PARTICIPANT, v1::ROLE_VIEWER, v1::ROLE_OWNER}) {
+    v1::ServerMessage message;
+    v1::Presence& presence = *message.mutable_presence();
+    presence.set_kind(v1::PRESENCE_KIND_ROLE_CHANGED);
+    v1::ServerMessage welcome;
+    welcome.ParseFromString(server.welcome());
+    presence.mutable_participant()->set_id(welcome.welcome().participant_id());
+    presence.mutable_participant()->set_role(role);
+    client.receive(message.SerializeAsString(), now);
+    if (role == v1::ROLE_VIEWER)
+      EXPECT_THAT(allSent(), IsEmpty());
+    else
+      EXPECT_THAT(allSent(), ElementsAre("1 0/2", "1 1/2"));
+  }
+}
+
+TEST_F(Surfaces, SayClearlyThatAServerTakesNone) {
+  const struct {
+    v1::SurfacePolicy policy;
+    cs_surface_policy seen;
+    const char* text;
+  } servers[] = {{v1::SURFACE_POLICY_UNSPECIFIED, CS_SURFACES_UNKNOWN, "knows no surfaces of the real room"},
+                 {v1::SURFACE_POLICY_OFF, CS_SURFACES_OFF, "--room-surfaces off"}};
+  join(v1::SURFACE_POLICY_OWN);
+  for (const auto& one : servers) {
+    set(1);
+    reconnect(one.policy);
+    EXPECT_NE(events & CS_EVENT_ERROR, 0u);
+    EXPECT_EQ(cs_get_surface_policy(client.get()), one.seen);
+    EXPECT_THAT(cs_error_text(client.get()), HasSubstr(one.text));
+    EXPECT_EQ(cs_get_state(client.get()), CS_STATE_JOINED);
+    EXPECT_EQ(set(2), 0);
+    EXPECT_THAT(allSent(), IsEmpty());
+    reconnect(v1::SURFACE_POLICY_OWN);
+    EXPECT_THAT(allSent(), ElementsAre("1 0/2", "1 1/2"));
+  }
+}
+
+TEST_F(Surfaces, RefuseWhatNoServerTakes) {
+  cs_surface made = surface(1, 1);
+  made.version = 2;
+  EXPECT_EQ(cs_set_surface(client.get(), &made), 0);
+  EXPECT_EQ(set(1, 0), 0);
+  EXPECT_EQ(set(1, CS_MAX_SURFACE_TRIANGLES + 1), 0);
+  EXPECT_EQ(set(1, 1, CS_MAX_SURFACE_VERTICES + 1), 0);
+  join(v1::SURFACE_POLICY_OWN);
+  EXPECT_THAT(allSent(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace clothstream::client

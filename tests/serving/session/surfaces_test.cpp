@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+// Surfaces of the real room of a peer: parts, errors, the policy of the server, and who gets their shape.
+#include "tests/model/surfaces.h"
+
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/serving/server_test.h"
+
+namespace clothstream::session {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using tests::TestPeer;
+using Body = v1::ServerMessage::BodyCase;
+
+// A mesh in parts of this number of vertices and triangles.
+std::vector<v1::ClientMessage> partsOf(std::uint32_t id, const model::Triangles& mesh, std::size_t each,
+                                       float y) {
+  std::vector<v1::ClientMessage> messages;
+  const std::size_t all = std::max(mesh.vertices.size(), mesh.triangles.size());
+  const auto count = static_cast<std::uint32_t>((all + each - 1) / each);
+  for (std::uint32_t index = 0; index < count; ++index) {
+    v1::SurfaceUpdate& update = *messages.emplace_back().mutable_surface();
+    update.set_id(id);
+    if (index == 0) update.mutable_pose()->mutable_position()->set_y(y);
+    v1::SurfacePart& part = *update.mutable_part();
+    part.set_index(index);
+    part.set_count(count);
+    for (std::size_t i = each * index; i < std::min(each * (index + 1), mesh.vertices.size()); ++i)
+      for (int axis = 0; axis < 3; ++axis) part.add_positions(mesh.vertices[i][axis]);
+    for (std::size_t i = each * index; i < std::min(each * (index + 1), mesh.triangles.size()); ++i)
+      for (const std::uint32_t corner : mesh.triangles[i]) part.add_triangles(corner);
+  }
+  return messages;
+}
+
+class SurfacesTest : public tests::ServerTest {
+ protected:
+  static model::Scene falling() {
+    model::Scene scene = tests::smallScene("falling");
+    scene.colliders.clear();
+    scene.cloths[0].pins.clear();
+    return scene;
+  }
+  static void sendAll(TestPeer& peer, const std::vector<v1::ClientMessage>& messages) {
+    for (const v1::ClientMessage& message : messages) peer.send(message);
+  }
+  static v1::Error refused(TestPeer& peer) { return peer.readUntil(Body::kError).error(); }
+  static v1::Error refused(TestPeer& peer, const v1::ClientMessage& message) {
+    peer.send(message);
+    return refused(peer);
+  }
+  std::size_t surfacesOf(const std::string& scene) {
+    std::vector<scene::RoomSurface> all;
+    std::uint64_t version = 0;
+    server().scenes.find(scene)->surfaces.take(version, all);
+    return all.size();
+  }
+  // Waits until the scene has this number of surfaces.
+  void awaitSurfaces(TestPeer& peer, const std::string& scene, std::size_t count) {
+    while (surfacesOf(scene) != count) peer.readFrames(1);
+  }
+  static float lowest(const TestPeer& peer) {
+    const auto positions = peer.decoder().positions();
+    float lowest = positions[1];
+    for (std::size_t i = 1; i < positions.size(); i += 3) lowest = std::min(lowest, positions[i]);
+    return lowest;
+  }
+};
+
+#define START_SURFACES(...)                    \
+  ASSERT_NO_FATAL_FAILURE(start(__VA_ARGS__)); \
+  if (::testing::Test::IsSkipped()) return
+
+TEST_F(SurfacesTest, CarryTheClothAndAreSentToNoOtherClient) {
+  START_SURFACES({}, {falling()});
+  TestPeer owner(server());
+  owner.join("falling");
+  EXPECT_EQ(owner.welcome().surfaces().policy(), v1::SURFACE_POLICY_OWN);
+  EXPECT_EQ(owner.welcome().surfaces().max_triangles(), 50'000u);
+  EXPECT_EQ(owner.welcome().surfaces().max_surfaces(), 64u);
+  sendAll(owner, partsOf(3, model::flat(40, 40, 6), 10, -3));
+  awaitSurfaces(owner, "falling", 1);
+  TestPeer other(server());
+  other.join("falling");
+  other.readFrames(80);
+  EXPECT_GT(lowest(other), -3.1f);
+  for (const tests::SeenFrame& frame : other.frames()) EXPECT_TRUE(frame.colliders.empty());
+  v1::ClientMessage removal;
+  removal.mutable_surface()->set_id(3);
+  removal.mutable_surface()->set_remove(true);
+  owner.send(removal);
+  while (lowest(other) > -4) other.readFrames(1);
+}
+
+TEST_F(SurfacesTest, GoWithTheirParticipantAndComeBackWithIt) {
+  START_SURFACES({}, {falling()});
+  TestPeer stays(server()), leaves(server()), returns(server());
+  for (TestPeer* peer : {&stays, &leaves, &returns}) {
+    peer->join("falling");
+    sendAll(*peer, partsOf(1, model::flat(4, 4), 10, -9));
+  }
+  awaitSurfaces(stays, "falling", 3);
+  leaves.leave();
+  EXPECT_EQ(surfacesOf("falling"), 2u);
+  v1::Hello hello;
+  hello.set_protocol_version(1);
+  hello.add_codecs(returns.welcome().codec());
+  hello.set_scene("falling");
+  hello.set_resume_token(returns.welcome().resume_token());
+  returns.vanish();
+  TestPeer again(server());
+  again.hello(hello);
+  again.readUntil(Body::kWelcome);
+  EXPECT_EQ(surfacesOf("falling"), 2u);
+}
+
+TEST_F(SurfacesTest, AreRefusedByAServerThatTakesNone) {
+  hosting::ServerOptions options;
+  options.roomSurfaces = hosting::SurfacePolicy::off;
+  START_SURFACES(options);
+  TestPeer peer(server());
+  peer.join();
+  EXPECT_EQ(peer.welcome().surfaces().policy(), v1::SURFACE_POLICY_OFF);
+  const v1::Error error = refused(peer, partsOf(1, model::flat(1, 1), 10, 0)[0]);
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_INVALID_ARGUMENT);
+  EXPECT_THAT(error.text(), HasSubstr("--room-surfaces off"));
+}
+
+TEST_F(SurfacesTest, NeedTheRoleParticipant) {
+  START_SURFACES();
+  TestPeer viewer(server());
+  viewer.role = v1::ROLE_VIEWER;
+  viewer.join();
+  const v1::Error error = refused(viewer, partsOf(1, model::flat(1, 1), 10, 0)[0]);
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_PERMISSION_DENIED);
+  EXPECT_THAT(error.text(), HasSubstr("surface: requires the role participant"));
+}
+
+TEST_F(SurfacesTest, HostilePartsGetAnErrorAndChangeNothing) {
+  START_SURFACES();
+  TestPeer peer(server());
+  peer.join();
+  const std::vector<v1::ClientMessage> good = partsOf(1, model::flat(1, 1, 4), 10, 0);
+  ASSERT_EQ(good.size(), 4u);
+  const auto changed = [&](std::size_t index, const auto& change) {
+    v1::ClientMessage message = good[index];
+    change(*message.mutable_surface());
+    return message;
+  };
+  const struct {
+    v1::ClientMessage message;
+    const char* text;
+  } cases[] = {
+      {changed(0, [](v1::SurfaceUpdate& update) { update.clear_part(), update.clear_pose(); }),
+       "must have a part, a pose, or remove = true"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.set_remove(true); }), "surface.remove = true"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_part()->set_count(0); }),
+       "surface.part.count = 0"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_part()->set_count(4097); }), "4096"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_part()->set_index(4); }),
+       "surface.part.index = 4"},
+      {changed(1, [](v1::SurfaceUpdate&) {}), "index = 1 of 4, surface 1: must be 0; send the mesh"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_part()->add_positions(1); }),
+       "three numbers"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_part()->add_triangles(1); }),
+       "three numbers"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_part()->set_friction(-1); }),
+       "friction = -1"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_pose()->mutable_position()->set_x(NAN); }),
+       "pose.position.x = nan"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.clear_part(), update.set_id(8); }),
+       "id = 8: you have no such surface"},
+  };
+  for (const auto& wrong : cases) EXPECT_THAT(refused(peer, wrong.message).text(), HasSubstr(wrong.text));
+  // A part that is missing, or of another surface, drops the mesh.
+  peer.send(good[0]);
+  EXPECT_THAT(refused(peer, good[2]).text(), HasSubstr("must be 0, or part 1 of 4 of surface 1"));
+  EXPECT_THAT(refused(peer, good[1]).text(), HasSubstr("must be 0; send"));
+  peer.send(good[0]);
+  EXPECT_THAT(refused(peer, changed(1, [](v1::SurfaceUpdate& update) { update.set_id(2); })).text(),
+              HasSubstr("surface 2: must be 0, or part 1 of 4 of surface 1"));
+  // What a whole mesh shows.
+  model::Triangles nan = model::flat(1, 1), far = nan, thin = nan;
+  nan.vertices[2].y() = NAN;
+  far.triangles[1][0] = 1'000'000;
+  thin.vertices.assign(4, model::Vec3::Zero());
+  sendAll(peer, partsOf(1, nan, 10, 0));
+  EXPECT_THAT(refused(peer).text(), HasSubstr("surface.id = 1: vertex 2 must have finite coordinates"));
+  sendAll(peer, partsOf(1, far, 10, 0));
+  EXPECT_THAT(refused(peer).text(), HasSubstr("triangle 1 has the corner 1000000, but there are 4"));
+  sendAll(peer, partsOf(1, thin, 10, 0));
+  EXPECT_THAT(refused(peer).text(), HasSubstr("has no triangle"));
+  EXPECT_EQ(surfacesOf("small"), 0u);
+  sendAll(peer, good);
+  awaitSurfaces(peer, "small", 1);
+}
+
+TEST_F(SurfacesTest, AreLimitedWhileTheyArrive) {
+  START_SURFACES();
+  TestPeer peer(server());
+  peer.join();
+  v1::ClientMessage message;
+  v1::SurfaceUpdate& update = *message.mutable_surface();
+  v1::SurfacePart& part = *update.mutable_part();
+  part.set_count(20);
+  for (int i = 0; i < 3 * 5'000; ++i) part.add_triangles(0);
+  for (std::uint32_t index = 0; index < 10; ++index) {
+    part.set_index(index);
+    peer.send(message);
+  }
+  part.set_index(10);
+  const v1::Error error = refused(peer, message);
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(error.text(), HasSubstr("55000 triangles"));
+}
+
+TEST_F(SurfacesTest, UseTheMemoryOfUploads) {
+  hosting::ServerOptions options;
+  options.maxUploadBytes = options.maxUploadBytesOfAddress = 1'000;
+  START_SURFACES(options);
+  TestPeer peer(server());
+  peer.join();
+  const v1::Error error = refused(peer, partsOf(1, model::flat(1, 1, 8), 200, 0)[0]);
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(error.text(), HasSubstr("--max-upload-memory"));
+  // What was refused leaves nothing behind.
+  sendAll(peer, partsOf(1, model::flat(1, 1), 10, 0));
+  awaitSurfaces(peer, "small", 1);
+}
+
+TEST_F(SurfacesTest, AreRefusedBeyondTheBudget) {
+  scene::BudgetLimits budget = kNoLimits;
+  budget.sceneMegabytes = budget.megabytes = 20;  // less than the buffers for surfaces
+  START_SURFACES({}, {}, budget);
+  TestPeer peer(server());
+  peer.join();
+  sendAll(peer, partsOf(1, model::flat(1, 1), 10, 0));
+  const v1::Error error = refused(peer);
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
+  EXPECT_THAT(error.text(), AllOf(HasSubstr("surface: would take"), HasSubstr("--max-memory")));
+}
+
+}  // namespace
+}  // namespace clothstream::session
