@@ -109,7 +109,7 @@ export class HeadsetPanel {
     const { wearing, frames, people } = this.session.client;
     if (this.session.state.kind !== "live") return [];
     const { own } = wearing;
-    const taken = new Set(people.participants().filter(({ self }) => !self).map(({ id }) => wearing.bodyOf(id)));
+    const taken = new Set(people.participants().filter(({ self }) => !self).map(({ body }) => body));
     const names = frames
       .colliders()
       .filter(({ index, participantId }) => participantId === 0n && wearing.isBody(index))

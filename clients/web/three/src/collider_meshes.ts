@@ -156,12 +156,12 @@ function taperedCapsule(radius: number, topRadius: number, length: number): THRE
   return new THREE.LatheGeometry(outline, 48);
 }
 
-// Puts the triangles below the neck first, so that the others can be left out. Bodies that are drawn without an index have
-// too few triangles to be worn.
+// Puts the triangles below the neck first, so that the others can be left out. Hulls of few corners have no
+// index, and are drawn whole.
 function sortByNeck(mesh: ColliderMesh, client: Client, collider: Collider): void {
   const { geometry } = mesh;
   const below = client.wearing.belowNeck(collider.index);
-  mesh.userData["shown"] = below.length;
+  mesh.userData["shown"] = geometry.index ? below.length : 0;
   if (!geometry.index || below.length === 0) return;
   const key = (corners: ArrayLike<number>, i: number) => `${corners[i]} ${corners[i + 1]} ${corners[i + 2]}`;
   const known = new Set<string>();
