@@ -13,7 +13,7 @@ using namespace clothstream::client;
 
 namespace {
 
-bool areFinite(std::span<const float> numbers) {
+bool allFinite(std::span<const float> numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](float number) { return std::isfinite(number); });
 }
 
@@ -24,22 +24,22 @@ const Hull* meshOf(const cs_client* client, std::uint32_t index) {
   return isOfScene ? hullOf(*collider, client->client.stream().description()) : nullptr;
 }
 
-body::Point pointOf(const float* numbers) {
+body::Point trackedPoint(const float* numbers) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
 // nullopt if a number of a tracked part is not finite, or the head is not tracked.
 std::optional<body::Tracked> trackedOf(const cs_tracked_body& from) {
   const auto has = [&](std::uint32_t part) { return (from.parts & part) != 0; };
-  if (!has(CS_BODY_HEAD) || !std::isfinite(from.floor) || !areFinite(from.head)) return std::nullopt;
+  if (!has(CS_BODY_HEAD) || !std::isfinite(from.floor) || !allFinite(from.head)) return std::nullopt;
   body::Tracked tracked{.head = body::frameOf(from.head), .floor = from.floor};
   const auto readFrame = [&](std::uint32_t part, std::span<const float> numbers, auto& to) {
     if (has(part)) to = body::frameOf(numbers.data());
-    return !has(part) || areFinite(numbers);
+    return !has(part) || allFinite(numbers);
   };
   const auto readPoint = [&](std::uint32_t part, std::span<const float> numbers, auto& to) {
-    if (has(part)) to = pointOf(numbers.data());
-    return !has(part) || areFinite(numbers);
+    if (has(part)) to = trackedPoint(numbers.data());
+    return !has(part) || allFinite(numbers);
   };
   const bool read = readFrame(CS_BODY_LEFT_HAND, from.left_hand, tracked.hands[0]) &&
                     readFrame(CS_BODY_RIGHT_HAND, from.right_hand, tracked.hands[1]) &&

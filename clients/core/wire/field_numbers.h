@@ -335,6 +335,7 @@ struct PresenceKind {
   static constexpr std::uint32_t kRoleChanged = 3;
   static constexpr std::uint32_t kDisconnected = 4;
   static constexpr std::uint32_t kReturned = 5;
+  static constexpr std::uint32_t kBodyChanged = 6;
 };
 struct LeaveReason {
   static constexpr std::uint32_t kUnspecified = 0;

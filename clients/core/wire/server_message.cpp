@@ -19,7 +19,8 @@ static_assert(CS_PRESENCE_JOINED == field::PresenceKind::kJoined &&
               CS_PRESENCE_LEFT == field::PresenceKind::kLeft &&
               CS_PRESENCE_ROLE_CHANGED == field::PresenceKind::kRoleChanged &&
               CS_PRESENCE_DISCONNECTED == field::PresenceKind::kDisconnected &&
-              CS_PRESENCE_RETURNED == field::PresenceKind::kReturned);
+              CS_PRESENCE_RETURNED == field::PresenceKind::kReturned &&
+              CS_PRESENCE_BODY_CHANGED == field::PresenceKind::kBodyChanged);
 static_assert(CS_LEAVE_LEFT == field::LeaveReason::kLeft &&
               CS_LEAVE_TIMED_OUT == field::LeaveReason::kTimedOut &&
               CS_LEAVE_REMOVED == field::LeaveReason::kRemoved);
