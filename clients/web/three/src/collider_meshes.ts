@@ -68,8 +68,9 @@ export class ColliderMeshes {
       mesh.position.fromArray(collider.position);
       mesh.quaternion.fromArray(collider.orientation);
       if (collider.shape === Shape.hull) follow(mesh, client.frames.hullVertices(collider));
-      if (collider.name === this.worn && mesh.userData["shown"] === undefined) sortByNeck(mesh, client, collider);
-      showHead(mesh, collider.name !== this.worn);
+      const isOwn = this.worn !== "" && collider.name === this.worn;
+      if (isOwn && mesh.userData["shown"] === undefined) sortByNeck(mesh, client, collider);
+      showHead(mesh, !isOwn);
       ++count;
     }
     while (this.meshes.length > count) this.remove(this.meshes.pop()!);
