@@ -104,7 +104,10 @@ void Client::move(ColliderJoints joints, std::uint64_t nowUs) {
 
 bool Client::wear(std::string_view collider) {
   if (collider.empty()) {
-    if (std::exchange(worn_, std::nullopt)) sendWearing();
+    // The body may also be of an earlier client of this participant.
+    const bool wears = worn_.has_value() || !participants_.bodyOf(welcome_.participantId).empty();
+    worn_.reset();
+    if (wears) sendWearing();
     return true;
   }
   const Description& description = stream_.description();

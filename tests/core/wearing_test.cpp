@@ -102,8 +102,12 @@ TEST_F(Wearing, TakesABodyWhereItIsAndGivesItBack) {
   EXPECT_TRUE(given.has_wear_body());
   EXPECT_EQ(given.wear_body().collider(), "");
   EXPECT_FALSE(given.wear_body().has_stands());
+  announce("");
   EXPECT_EQ(cs_wear(client(), ""), 1);
   EXPECT_THAT(client_.outgoing(), SizeIs(0)) << "nothing to give back";
+  announce("avatar");
+  EXPECT_EQ(cs_wear(client(), ""), 1);
+  EXPECT_EQ(sent().wear_body().collider(), "") << "the body of an earlier client of this participant";
 }
 
 TEST_F(Wearing, SendsTheJointsOfTheBody) {

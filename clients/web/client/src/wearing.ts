@@ -38,6 +38,9 @@ export interface TrackedBody {
 }
 
 export class Wearing {
+  // Whether this client moves a body: from wear() until it is given back, or follow() finds that it is lost.
+  isWearing = false;
+
   constructor(private readonly handle: CoreHandle) {}
 
   // Whether the collider with this index is a human body.
@@ -49,7 +52,9 @@ export class Wearing {
   // Returns false if there is no such body.
   wear(collider: string | undefined): boolean {
     const { core, pointer } = this.handle;
-    return core.with([collider ?? ""], (name) => core.exports.cs_wear(pointer, name!)) !== 0;
+    const taken = core.with([collider ?? ""], (name) => core.exports.cs_wear(pointer, name!)) !== 0;
+    if (taken) this.isWearing = collider !== undefined;
+    return taken;
   }
 
   // Name of the collider that a participant wears; "" for none.
@@ -89,7 +94,8 @@ export class Wearing {
     point(BodyPart.rightAnkle, cs_tracked_body.right_ankle, tracked.rightAnkle);
     view.setUint32(at + cs_tracked_body.parts, parts, true);
     view.setFloat32(at + cs_tracked_body.floor, tracked.floor, true);
-    return core.exports.cs_set_body(pointer, at, nowUs()) !== 0;
+    this.isWearing = core.exports.cs_set_body(pointer, at, nowUs()) !== 0;
+    return this.isWearing;
   }
 
   // Where the newest follow() has put a part; undefined before.

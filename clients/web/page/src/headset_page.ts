@@ -82,7 +82,7 @@ export class HeadsetPage {
   // Call first in each frame of a session.
   draw(frame: XRFrame, now: number, client: Client | undefined): void {
     this.headset.update(frame, now, client);
-    this.showBody(client?.wearing.own ?? "");
+    this.showBody(client?.wearing.isWearing ? client.wearing.own : "");
     if (client) this.session.flush();
   }
 

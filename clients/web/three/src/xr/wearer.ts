@@ -34,7 +34,7 @@ export class Wearer {
   // whose floor is at 0, to the scene; `scale` is metres of the room per metre of the scene. Does nothing without a body
   // or a head.
   send(wearing: Wearing, body: Body, frame: XRFrame, space: XRReferenceSpace, toScene: THREE.Matrix4, scale: number): void {
-    if (!body.headPresent) return;
+    if (!wearing.isWearing || !body.headPresent) return;
     const tracked: TrackedBody = {
       floor: this.point.set(0, 0, 0).applyMatrix4(toScene).y,
       head: { position: body.head.toArray(), orientation: body.headOrientation.toArray() as [number, number, number, number] },
