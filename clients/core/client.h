@@ -148,7 +148,7 @@ class Client {
 
  private:
   void sendWearing();
-  // Drops the own body if the server has given it to nobody, or the description does not have it any more.
+  // Drops the own body if the server has given it back, or the description does not have it any more.
   void checkWorn();
   void sendPoses(std::uint64_t nowUs);
   // Tick of the frame that is shown; 0 before the first.

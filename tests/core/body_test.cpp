@@ -59,7 +59,7 @@ void expectNear(const Point& a, const Point& b, double tolerance, const std::str
       << what << ": " << ::testing::PrintToString(a) << " and " << ::testing::PrintToString(b);
 }
 
-// One second of a person who stands still, so that nothing moves any more.
+// Five seconds of a person who stands still, so that nothing moves any more.
 void settle(BodySolver& solver, const Tracked& tracked) {
   for (int i = 0; i < 450; ++i) solver.update(tracked, kFrame);
 }
@@ -110,7 +110,7 @@ TEST(Humanoids, AreFoundBySkeletonAndMeasured) {
   EXPECT_EQ(body.head, 4u);
   EXPECT_EQ(body.neck, 3u);
   EXPECT_THAT(body.spine, ::testing::ElementsAre(0u, 1u, 2u, 3u));
-  EXPECT_LT(body.rest[body.arms[0].upper].position.x, 0) << "the left side of who looks along -Z";
+  EXPECT_LT(body.rest[body.arms[0].upper].position.x, 0) << "the left side of a figure that looks along -Z";
   ASSERT_TRUE(body.legs.has_value());
   EXPECT_NEAR(body.height, 1.75, 1e-6);
   EXPECT_NEAR(body.rest[body.head].position.y + body.eyes.y, kEyes, 1e-6);

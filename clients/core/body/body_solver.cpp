@@ -121,7 +121,7 @@ void BodySolver::turnAndMove(const Tracked& tracked, double seconds) {
   if (tracked.hips) {
     lean = size * horizontal(direction(head_ - *tracked.hips, kUp)) - upright;
   } else if (begun_) {
-    // Who stands upright has the head above the hips again after a while.
+    // The hips of a person who stands upright come below the head after a while.
     const double straightens = std::clamp(1 - lowered / (0.3 * scale_), 0.0, 1.0) * seconds;
     lean = (1 - straightens) * (horizontal(head_) - hips_ - upright);
   }

@@ -108,7 +108,7 @@ TEST_F(WornBodiesTest, AreNotForViewers) {
 
 TEST_F(WornBodiesTest, AreMovedByTheirParticipantOnly) {
   const Member ada = join(), ben = join();
-  EXPECT_THAT(moved(ben), ElementsAre(0u, 1u)) << "everyone moves bodies that nobody wears";
+  EXPECT_THAT(moved(ben), ElementsAre(0u, 1u)) << "every participant moves bodies that are free";
   ASSERT_TRUE(wear(ada, "avatar"));
   messages::Result<void> answer;
   EXPECT_THAT(moved(ben, &answer), ElementsAre(1u));

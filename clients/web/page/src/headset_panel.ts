@@ -104,7 +104,7 @@ export class HeadsetPanel {
     return { buttons: [button("Reset", () => scenes.reset()), button(scenes.isPaused ? "Continue" : "Pause", () => scenes.pause()), fan] };
   }
 
-  // A button for each body of the scene that nobody else wears. None if the scene has no bodies.
+  // A button for each body of the scene that no other participant wears. None if the scene has no bodies.
   private bodies(): PanelRow[] {
     const { wearing, frames, people } = this.session.client;
     if (this.session.state.kind !== "live") return [];

@@ -129,7 +129,7 @@ export class View {
     this.people.name(client.people.participants());
   }
 
-  // Hides the head of the own body, and puts a mirror before who wears it: `eyes` and `look` in the scene. "" for no body.
+  // Hides the head of the own body, and puts a mirror before its wearer: `eyes` and `look` in the scene. "" for no body.
   wear(body: string, eyes: THREE.Vector3, look: THREE.Vector3): void {
     this.colliderMeshes.wear(body);
     if (!body) return this.mirror.hide();

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A mirror that stands in the scene, for who wears a body.
+// A mirror that stands in the scene, for a user who wears a body.
 
 import * as THREE from "three";
 import { Reflector } from "three/examples/jsm/objects/Reflector.js";
 
 const kWidth = 1; // m
 const kHeight = 2;
-const kBefore = 1.6; // m, from who looks into it
+const kBefore = 1.6; // m, from the user
 const kPixels = 768; // of its height
 
 export class Mirror {
