@@ -17,6 +17,7 @@
 #include "server/messages/skin_message.h"
 #include "server/messages/validation.h"
 #include "server/messages/vectors.h"
+#include "server/model/cloth_skin.h"
 #include "server/model/origin.h"
 
 namespace clothstream::messages {
@@ -114,6 +115,7 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
   }
 }
 
+<<<<<<< HEAD
 // Returns nullptr after a failed check if the scene has no such collider, or it has no joints.
 const model::Collider* findWithJoints(Checks& checks, const Path& path, const std::string& name,
                                       const model::Scene& scene) {
@@ -124,6 +126,36 @@ const model::Collider* findWithJoints(Checks& checks, const Path& path, const st
   if (solid != nullptr && (*solid)->skin) return &*found;
   checks.fail(path, '"' + name + '"', "has no joints");
   return nullptr;
+=======
+// Cloth that follows joints out of the stream's range would roll the scene back for everyone. The bound is
+// that of a sphere around the collider, which may be anywhere on its way.
+void checkJointReach(Checks& checks, const Path& path, const model::Collider& collider,
+                     const model::ColliderJoints& moved, const model::Scene& scene) {
+  const auto follows = [&](const model::Cloth& cloth) {
+    return cloth.skin && cloth.skin->collider == collider.name;
+  };
+  if (checks.failed() || std::ranges::none_of(scene.cloths, follows)) return;
+  const model::Skin& skin = *std::get<model::Solid>(collider.shape)->skin;
+  std::vector<model::Pose> poses;
+  model::compose(skin, moved.joints, poses);
+  const std::vector<model::Transform> transforms = model::jointTransforms(skin, poses);
+  const model::Vec3 origin = model::originOf(scene);
+  float away = (collider.pose.position - origin).cwiseAbs().maxCoeff();
+  if (!collider.motion.keys.empty()) away = 0;
+  for (const model::MotionKey& key : collider.motion.keys)
+    away = std::max(away, (key.position - origin).cwiseAbs().maxCoeff());
+  const float most = model::reachOf(scene.stream);
+  for (const model::Cloth& cloth : scene.cloths) {
+    if (!follows(cloth)) continue;
+    const float reach = model::motionBetween(cloth.skin->bounds, transforms, transforms).reach;
+    if (away + reach > most)
+      checks.fail(
+          path / "joints", "",
+          fmt::format("take the cloth \"{}\" up to {:.4g} m away from the middle of the scene; must stay "
+                      "within {:.4g} m, which the stream holds",
+                      cloth.name, away + reach, most));
+  }
+>>>>>>> garment
 }
 
 void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
@@ -132,11 +164,26 @@ void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& mess
   for (int i = 0; i < message.joints_size() && !checks.failed(); ++i) {
     const v1::ColliderJoints& from = message.joints(i);
     const Path path = poses.at("joints", i);
+<<<<<<< HEAD
     const model::Collider* const found = findWithJoints(checks, path / "collider", from.collider(), scene);
     if (found == nullptr) return;
     const model::Skin& skin = *std::get<model::Solid>(found->shape)->skin;
     to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.data()),
                          toJoints(checks, path / "joints", from.joints(), skin.joints.size()), from.jumps()});
+=======
+    checkKnown(checks, path / "collider", from.collider(), scene.colliders);
+    if (checks.failed()) return;
+    const auto found = std::ranges::find(scene.colliders, from.collider(), &model::Collider::name);
+    const auto* solid = std::get_if<model::Solid>(&found->shape);
+    if (solid == nullptr || !(*solid)->skin) {
+      checks.fail(path / "collider", '"' + from.collider() + '"', "has no joints");
+      return;
+    }
+    to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.begin()),
+                         toJoints(checks, path / "joints", from.joints(), (*solid)->skin->joints.size()),
+                         from.jumps()});
+    checkJointReach(checks, path, *found, to.joints.back(), scene);
+>>>>>>> garment
   }
 }
 

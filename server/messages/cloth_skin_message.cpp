@@ -87,6 +87,8 @@ class ClothSkinReader {
       applyRegion(path_.at("regions", i), message_.regions(i));
     if (!checks_.failed()) checkHeld();
     if (checks_.failed()) return nullptr;
+    model::complete(skin_, cloth_,
+                    *std::ranges::find(colliders, message_.collider(), &model::Collider::name));
     return std::make_shared<const model::ClothSkin>(std::move(skin_));
   }
 

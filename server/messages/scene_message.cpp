@@ -197,7 +197,7 @@ void checkReach(Checks& checks, const model::Scene& scene) {
   const float reach = model::reachOf(scene.stream);
   const model::Vec3 origin = model::originOf(scene);
   for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
-    const float farthest = model::farthestFrom(origin, scene, scene.cloths[i]);
+    const float farthest = model::farthestFrom(origin, scene.cloths[i]);
     if (farthest <= reach) continue;
     return checks.fail(
         Path().at("cloths", static_cast<int>(i)), "",

@@ -47,10 +47,22 @@ std::vector<Vec3> restNormals(const Cloth& cloth) {
   return normals;
 }
 
-std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth, const Vec3& origin) {
-  if (!cloth.skin) return restPositions(cloth, origin);
-  const Collider& collider = scene.colliders[skinCollider(scene, cloth)];
-  const Skin& skin = skinOf(scene, cloth);
+namespace {
+
+std::vector<Eigen::Vector3d> placesOf(const ClothSkin& clothSkin, const Cloth& cloth, const Skin& skin,
+                                      const Pose& collider, std::span<const Pose> joints) {
+  std::vector<Transform> transforms(joints.size());
+  jointTransforms(inverseRests(skin), joints, collider, transforms);
+  std::vector<Eigen::Vector3d> places;
+  places.reserve(cloth.nodeCount());
+  for (const Vec3& rest : restPositions(cloth))
+    places.push_back(skinned(clothSkin.joints[places.size()], transforms, rest.cast<double>()));
+  return places;
+}
+
+std::vector<Vec3> startPlaces(const ClothSkin& clothSkin, const Cloth& cloth, const Collider& collider,
+                              const Vec3& origin) {
+  const Skin& skin = *std::get<Solid>(collider.shape)->skin;
   std::vector<Pose> local, joints;
   jointsAt(skin, 0, local);
   compose(skin, local, joints);
@@ -58,20 +70,32 @@ std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth, const V
   pose.position -= origin;
   std::vector<Vec3> positions;
   positions.reserve(cloth.nodeCount());
-  for (const Eigen::Vector3d& place : skinnedPlaces(cloth, skin, pose, joints))
+  for (const Eigen::Vector3d& place : placesOf(clothSkin, cloth, skin, pose, joints))
     positions.emplace_back(place.cast<float>());
   return positions;
 }
 
+}  // namespace
+
+void complete(ClothSkin& skin, const Cloth& cloth, const Collider& collider) {
+  skin.bounds =
+      skinBounds(skin.joints, std::get<Solid>(collider.shape)->skin->joints.size(), restPositions(cloth));
+  const std::vector<Vec3> places = startPlaces(skin, cloth, collider, Vec3::Zero());
+  skin.low = skin.high = places[0];
+  for (const Vec3& place : places) {
+    skin.low = skin.low.cwiseMin(place);
+    skin.high = skin.high.cwiseMax(place);
+  }
+}
+
+std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth, const Vec3& origin) {
+  if (!cloth.skin) return restPositions(cloth, origin);
+  return startPlaces(*cloth.skin, cloth, scene.colliders[skinCollider(scene, cloth)], origin);
+}
+
 std::vector<Eigen::Vector3d> skinnedPlaces(const Cloth& cloth, const Skin& skin, const Pose& collider,
                                            std::span<const Pose> joints) {
-  std::vector<Transform> transforms(joints.size());
-  jointTransforms(inverseRests(skin), joints, collider, transforms);
-  std::vector<Eigen::Vector3d> places;
-  places.reserve(cloth.nodeCount());
-  for (const Vec3& rest : restPositions(cloth))
-    places.push_back(skinned(cloth.skin->joints[places.size()], transforms, rest.cast<double>()));
-  return places;
+  return placesOf(*cloth.skin, cloth, skin, collider, joints);
 }
 
 std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth) {

@@ -35,7 +35,13 @@ struct ClothSkin {
   std::string collider;              // its shape is a Solid with a skin
   std::vector<VertexJoints> joints;  // one for each node
   std::vector<SkinLimits> limits;    // one for each node
+  // By complete().
+  SkinBounds bounds = {};                        // of the rest positions
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // box of the start positions
 };
+
+// Sets what follows from the shape of the cloth and the collider.
+void complete(ClothSkin& skin, const Cloth& cloth, const Collider& collider);
 
 // Index of the collider whose joints the cloth follows. The cloth must have a skin.
 std::size_t skinCollider(const Scene& scene, const Cloth& cloth);

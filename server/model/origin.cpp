@@ -26,15 +26,8 @@ Extent extentOf(const Cloth& cloth) {
 }
 
 // Box of the start positions of a cloth.
-Extent extentOf(const Scene& scene, const Cloth& cloth) {
-  if (!cloth.skin) return extentOf(cloth);
-  const std::vector<Vec3> positions = startPositions(scene, cloth);
-  Extent extent{positions[0], positions[0]};
-  for (const Vec3& position : positions) {
-    extent.low = extent.low.cwiseMin(position);
-    extent.high = extent.high.cwiseMax(position);
-  }
-  return extent;
+Extent startExtentOf(const Cloth& cloth) {
+  return cloth.skin ? Extent{cloth.skin->low, cloth.skin->high} : extentOf(cloth);
 }
 
 Vec3 originOf(const Extent& extent) {
@@ -46,9 +39,9 @@ Vec3 originOf(const Extent& extent) {
 
 Vec3 originOf(const Scene& scene) {
   if (scene.cloths.empty()) return Vec3::Zero();
-  Extent all = extentOf(scene, scene.cloths[0]);
+  Extent all = startExtentOf(scene.cloths[0]);
   for (const Cloth& cloth : scene.cloths) {
-    const Extent extent = extentOf(scene, cloth);
+    const Extent extent = startExtentOf(cloth);
     all.low = all.low.cwiseMin(extent.low);
     all.high = all.high.cwiseMax(extent.high);
   }
@@ -59,8 +52,8 @@ Vec3 originOf(const Cloth& cloth) {
   return originOf(extentOf(cloth));
 }
 
-float farthestFrom(const Vec3& point, const Scene& scene, const Cloth& cloth) {
-  const Extent extent = extentOf(scene, cloth);
+float farthestFrom(const Vec3& point, const Cloth& cloth) {
+  const Extent extent = startExtentOf(cloth);
   return (extent.high - point).cwiseMax(point - extent.low).maxCoeff();
 }
 

@@ -19,7 +19,7 @@ Vec3 originOf(const Scene& scene);
 Vec3 originOf(const Cloth& cloth);
 
 // Largest distance along an axis of a node's start position from a point, m.
-float farthestFrom(const Vec3& point, const Scene& scene, const Cloth& cloth);
+float farthestFrom(const Vec3& point, const Cloth& cloth);
 
 // Rest positions of the nodes relative to a point.
 std::vector<Vec3> restPositions(const Cloth& cloth, const Vec3& origin);

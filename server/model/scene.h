@@ -276,8 +276,8 @@ std::vector<Vec3> restPositions(const Cloth& cloth);
 // area.
 std::vector<double> nodeMasses(const Cloth& cloth);
 
-// One byte per node: 1 if it is pinned or attached, or follows its joints exactly, so that no force moves it. Ranges must lie inside the
-// grid and vertices must exist.
+// One byte per node: 1 if it is pinned or attached, or follows its joints exactly, so that no force moves it.
+// Ranges must lie inside the grid and vertices must exist.
 std::vector<std::uint8_t> pinnedNodes(const Cloth& cloth);
 
 // One byte per node: 1 if it belongs to the attachment.

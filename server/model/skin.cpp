@@ -164,13 +164,14 @@ Eigen::Vector3d transformed(const Transform& transform, const Eigen::Vector3d& p
   return {p[0], p[1], p[2]};
 }
 
-SkinBounds skinBounds(const Skin& skin, std::span<const Vec3> vertices) {
+SkinBounds skinBounds(std::span<const VertexJoints> joints, std::size_t jointCount,
+                      std::span<const Vec3> vertices) {
   const float far = std::numeric_limits<float>::max();
-  SkinBounds bounds{{skin.joints.size(), {Vec3::Constant(far), Vec3::Constant(-far)}}};
+  SkinBounds bounds{{jointCount, {Vec3::Constant(far), Vec3::Constant(-far)}}};
   for (std::size_t i = 0; i < vertices.size(); ++i)
     for (std::size_t k = 0; k < kVertexJoints; ++k) {
-      if (skin.vertices[i].weights[k] == 0) continue;
-      SkinBounds::Box& box = bounds.boxes[skin.vertices[i].joints[k]];
+      if (joints[i].weights[k] == 0) continue;
+      SkinBounds::Box& box = bounds.boxes[joints[i].joints[k]];
       box.low = box.low.cwiseMin(vertices[i]);
       box.high = box.high.cwiseMax(vertices[i]);
     }

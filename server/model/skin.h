@@ -81,7 +81,8 @@ struct SkinBounds {
   // Box of the vertices that each joint moves, at rest. Empty (low above high) if there are none.
   std::vector<Box> boxes;
 };
-SkinBounds skinBounds(const Skin& skin, std::span<const Vec3> vertices);
+SkinBounds skinBounds(std::span<const VertexJoints> joints, std::size_t jointCount,
+                      std::span<const Vec3> vertices);
 // Radius of a sphere around the origin that contains all vertices while they move in straight lines between
 // two poses, and the farthest of these moves, m. A vertex is in the convex hull of the places that its joints
 // give it.

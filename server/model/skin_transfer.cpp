@@ -17,6 +17,10 @@ using Point = Eigen::Vector3d;
 // 0.
 constexpr double kLeastWeight = 1e-6;
 
+// More than the rounding of a squared distance, so that the result does not depend on the order of the
+// visits.
+constexpr double kVisitSlack = 1 + 1e-12;
+
 // Barycentric coordinates of a point of a triangle, and the squared distance of another point from it.
 struct Nearest {
   std::array<double, 3> shares{1, 0, 0};
@@ -71,8 +75,8 @@ class TriangleTree {
     for (std::uint32_t visits = 0; count > 0 && visits < kMostTransferVisits; ++visits) {
       const std::uint32_t number = open[--count];
       const Box& box = boxes_[number];
-      // A triangle at the same distance may have a lower number.
-      if (squaredDistance(box, point) > best.nearest.squaredDistance) continue;
+      // A triangle at the same distance may have a lower number. Distances are rounded.
+      if (squaredDistance(box, point) > kVisitSlack * best.nearest.squaredDistance) continue;
       if (box.second == 0) {
         for (std::uint32_t i = box.first; i < box.end; ++i) take(order_[i], point, best);
         continue;

@@ -33,10 +33,9 @@ bool isTooThin(const std::vector<Vec3>& vertices, const TriangleCorners& triangl
   return area < kMinTriangleArea || 2 * area < kLeastTriangleHeight * longest;
 }
 
-void markRim(Surface& surface, const SurfaceEdge& edge, std::vector<std::uint8_t>& rimVertices) {
+void markRim(Surface& surface, const SurfaceEdge& edge) {
   surface.neighbours[edge.triangle][edge.side] = edge.triangle;
   surface.rims[edge.triangle] |= static_cast<std::uint8_t>(1u << edge.side);
-  rimVertices[edge.low] = rimVertices[edge.high] = 1;
 }
 
 void connectSurface(Surface& surface) {
@@ -52,7 +51,6 @@ void connectSurface(Surface& surface) {
   });
   surface.neighbours.assign(surface.triangles.size(), {});
   surface.rims.assign(surface.triangles.size(), 0);
-  std::vector<std::uint8_t> rimVertices(surface.vertices.size());
   for (std::size_t first = 0, end = 0; first < edges.size(); first = end) {
     while (end < edges.size() && haveSameEnds(edges[end], edges[first])) ++end;
     const SurfaceEdge &one = edges[first], &last = edges[end - 1];
@@ -60,12 +58,9 @@ void connectSurface(Surface& surface) {
       surface.neighbours[one.triangle][one.side] = last.triangle;
       surface.neighbours[last.triangle][last.side] = one.triangle;
     } else {
-      for (std::size_t i = first; i < end; ++i) markRim(surface, edges[i], rimVertices);
+      for (std::size_t i = first; i < end; ++i) markRim(surface, edges[i]);
     }
   }
-  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
-    for (std::size_t k = 0; k < 3; ++k)
-      if (rimVertices[surface.triangles[t][k]] != 0) surface.rims[t] |= static_cast<std::uint8_t>(8u << k);
 }
 
 std::optional<SurfaceProblem> problemOf(const std::vector<Vec3>& vertices,

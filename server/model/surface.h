@@ -29,7 +29,8 @@ inline constexpr double kLeastTriangleHeight = 1e-4;
 // Contact keeps nodes at least this far from a surface, also those of a cloth without thickness, m. The
 // rounding of places near a surface of kMaxSurfaceExtent is far below it.
 inline constexpr float kLeastSurfaceDistance = 5e-4f;
-// A surface with one side pushes nodes to its front that are this deep behind it, m.
+// A surface with one side pushes nodes to its front that are less than this behind it, and not so near to its
+// rim, where cloth that hangs down may swing below it, m.
 inline constexpr float kSurfaceDepth = 0.03f;
 // Speed at which a surface pushes nodes that it finds too near, or behind it, m/s.
 inline constexpr float kSurfacePushSpeed = 3;
@@ -43,7 +44,7 @@ struct Surface {
   // The triangles across the edges from corner 0 to 1, 1 to 2 and 2 to 0 of each triangle; at the rim, the
   // triangle itself. An edge of more than two triangles, or of two that show different sides, is a rim.
   std::vector<TriangleCorners> neighbours;
-  // What is at the rim, for each triangle: bit k the edge k, bit 3 + k the corner k.
+  // The edges at the rim, for each triangle: bit k is the edge k.
   std::vector<std::uint8_t> rims;
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // box, m
   double crowding = 0;                           // crowdingOf()

@@ -44,14 +44,18 @@ Vec3 nearestOfTriangle(const Vec3& p, const SurfaceCorners& t) {
   return inside ? foot : nearest;
 }
 
-// Number of the edge or corner of a triangle that has a point, as model::Surface::rims numbers them; nothing
-// in the middle.
-std::optional<unsigned> partOf(const SurfaceCorners& t, const Vec3& point) {
-  for (unsigned k = 0; k < 3; ++k)
-    if ((point - t[k]).norm() < kSamePlace) return 3 + k;
-  for (unsigned k = 0; k < 3; ++k)
-    if ((point - nearestOfEdge(point, t[k], t[(k + 1) % 3])).norm() < kSamePlace) return k;
+// Number of the corner of a triangle that is at a point; nothing elsewhere.
+std::optional<std::size_t> cornerAt(const SurfaceCorners& t, const Vec3& point) {
+  for (std::size_t k = 0; k < 3; ++k)
+    if ((point - t[k]).norm() < kSamePlace) return k;
   return std::nullopt;
+}
+
+double distanceFromRim(const SurfaceCorners& t, std::uint8_t rims, const Vec3& p) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < 3; ++k)
+    if ((rims >> k & 1) != 0) least = std::min(least, (p - nearestOfEdge(p, t[k], t[(k + 1) % 3])).norm());
+  return least;
 }
 
 // Sum of the normals of all triangles that have the point, each weighted by its angle there.
@@ -60,10 +64,9 @@ Vec3 pseudonormalAt(const model::Surface& surface, const Vec3& point) {
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     const SurfaceCorners corners = cornersOf(surface, t);
     if ((nearestOfTriangle(point, corners) - point).norm() >= kSamePlace) continue;
-    const std::optional<unsigned> part = partOf(corners, point);
     double angle = 1;
-    if (part && *part >= 3) {
-      const unsigned k = *part - 3;
+    if (const std::optional<std::size_t> corner = cornerAt(corners, point)) {
+      const std::size_t k = *corner;
       angle = std::acos(std::clamp((corners[(k + 1) % 3] - corners[k])
                                        .normalized()
                                        .dot((corners[(k + 2) % 3] - corners[k]).normalized()),
@@ -96,8 +99,8 @@ std::optional<OwnContact> touchSurface(const PlacedSurface& placed, double thick
                                        const Vec3& from, const Vec3& to) {
   const model::Surface& surface = *placed.surface;
   double firstPart = 2, startDistance = std::numeric_limits<double>::infinity();
-  double least = std::numeric_limits<double>::infinity();
-  std::size_t crossed = 0, nearest = 0;
+  double least = std::numeric_limits<double>::infinity(), fromRim = least;
+  std::size_t crossed = 0;
   Vec3 point = Vec3::Zero();
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     const SurfaceCorners corners = cornersOf(surface, t);
@@ -106,11 +109,11 @@ std::optional<OwnContact> touchSurface(const PlacedSurface& placed, double thick
       firstPart = *part;
       crossed = t;
     }
+    fromRim = std::min(fromRim, distanceFromRim(corners, surface.rims[t], to));
     startDistance = std::min(startDistance, (from - nearestOfTriangle(from, corners)).norm());
     const Vec3 here = nearestOfTriangle(to, corners);
     if ((to - here).norm() < least) {
       least = (to - here).norm();
-      nearest = t;
       point = here;
     }
   }
@@ -128,8 +131,7 @@ std::optional<OwnContact> touchSurface(const PlacedSurface& placed, double thick
   const Vec3 away = touches ? (inFront ? outwards : Vec3(-outwards)) : Vec3((to - point) / least);
   const double distance = touches ? 0 : least;
   if (placed.twoSided || inFront) return OwnContact{away, target - distance, 2};
-  const std::optional<unsigned> part = partOf(cornersOf(surface, nearest), point);
-  if ((part && (surface.rims[nearest] >> *part & 1u) != 0) || distance >= depthBound) return std::nullopt;
+  if (fromRim < depthBound || distance >= depthBound) return std::nullopt;
   const double start = -away.dot(from - point) + pushed;
   return OwnContact{-away, std::min(thickness, start) + distance, 2};
 }

@@ -15,7 +15,7 @@ constexpr int kTries = 4;
 JointFollower::JointFollower(model::Solid solid)
     : solid_(std::move(solid)),
       inverseRests_(model::inverseRests(*solid_->skin)),
-      bounds_(model::skinBounds(*solid_->skin, solid_->vertices)),
+      bounds_(model::skinBounds(solid_->skin->vertices, solid_->skin->joints.size(), solid_->vertices)),
       from_(inverseRests_.size()),
       to_(inverseRests_.size()) {}
 

@@ -13,10 +13,13 @@ namespace {
 
 std::shared_ptr<simulation::SurfaceStage> makeStage(SceneOnDevice& on) {
   std::shared_ptr<simulation::SurfaceStage> stage = on.simulation.makeSurfaces();
-  vulkan::Recorder recorder(on.device);
-  recorder.begin();
-  stage->recordFirstRun(recorder);
-  on.device.wait(on.device.submit(recorder));
+  if (const vulkan::Kernel& kernel = stage->kernel().kernel(); !kernel.isReady()) {
+    vulkan::Recorder recorder(on.device);
+    recorder.begin();
+    recorder.touch(stage->kernel());
+    on.device.wait(on.device.submit(recorder));
+    kernel.setReady();
+  }
   return stage;
 }
 

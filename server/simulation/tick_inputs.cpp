@@ -13,8 +13,8 @@ TickInputs inputsAt(const model::Scene& scene, std::uint64_t tick) {
   const double end = static_cast<double>(tick + 1) * scene.tickSeconds();
   for (const model::Collider& collider : scene.colliders) {
     const model::Pose before = model::poseAt(collider, start), after = model::poseAt(collider, end);
-    MovingCollider& to = inputs.colliders.emplace_back(
-        MovingCollider{collider.shape, before, after, collider.friction});
+    MovingCollider& to =
+        inputs.colliders.emplace_back(MovingCollider{collider.shape, before, after, collider.friction});
     if (const auto* solid = std::get_if<model::Solid>(&collider.shape); solid != nullptr && (*solid)->skin) {
       const model::Skin& skin = *(*solid)->skin;
       std::vector<model::Pose> local;

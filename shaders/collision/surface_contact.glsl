@@ -4,7 +4,8 @@
 // A path stays on the side of its beginning: it is stopped where it first crosses a triangle. A path that
 // crosses none ends at the distance `thickness` from the nearest point of the surface, or farther away, as
 // far as the surface may push it in a substep. A surface with one side can be crossed from behind. It pushes
-// nodes to its front that are near behind it, except behind its rim, where nodes hang down next to it.
+// nodes to its front that are near behind it, except near its rim, where cloth hangs down and may swing
+// below.
 //
 // The including kernel defines kSolidBinding and kSurfaceBinding.
 #ifndef CLOTHSTREAM_SHADERS_COLLISION_SURFACE_CONTACT_GLSL
@@ -34,6 +35,7 @@ struct SurfaceSearch {
   float endSquared;    // the same of its end
   uint nearest;        // triangle that is nearest to the end
   TrianglePoint at;    // its nearest point
+  float rimSquared;    // squared distance of the path's end from the rim, if the surface has one side
 };
 
 // A contact, in the world. It is one of a crossing if `part` is at most 1.
@@ -72,6 +74,31 @@ float crossingOf(Corners corners, vec3 from, vec3 to, bool twoSided) {
   return dotProduct(apart, apart) <= seam ? part : kNoCrossing;
 }
 
+float squaredFromEdge(vec3 p, vec3 a, vec3 b) {
+  precise vec3 edge = b - a;
+  precise vec3 from = p - a;
+  float along = dotProduct(from, edge);
+  float part = along <= 0.0 ? 0.0 : min(quotient(along, dotProduct(edge, edge)), 1.0);
+  precise vec3 apart = from - part * edge;
+  return dotProduct(apart, apart);
+}
+
+float squaredFromRim(SolidRecord solid, uint triangle, Corners corners, vec3 p) {
+  int texel = int(uint(solid.firstTriangle) + CLOTHSTREAM_TRIANGLE_TEXELS * triangle) + 1;
+  uint rims = uint(texelFetch(solids, texel).w);
+  float squared = 1e30;
+  if ((rims & 1u) != 0u) {
+    squared = squaredFromEdge(p, corners.a, corners.b);
+  }
+  if ((rims & 2u) != 0u) {
+    squared = min(squared, squaredFromEdge(p, corners.b, corners.c));
+  }
+  if ((rims & 4u) != 0u) {
+    squared = min(squared, squaredFromEdge(p, corners.c, corners.a));
+  }
+  return squared;
+}
+
 // Searches within `reach` of the path. Of triangles that are equally near, the first counts. Takes its visits
 // from those that are left.
 SurfaceSearch searchSurface(SolidRecord solid, vec3 from, vec3 to, float reach, bool twoSided) {
@@ -80,7 +107,8 @@ SurfaceSearch searchSurface(SolidRecord solid, vec3 from, vec3 to, float reach, 
   precise vec3 low = min(from, to) - reach;
   precise vec3 high = max(from, to) + reach;
   precise float bound = reach * reach;
-  SurfaceSearch search = SurfaceSearch(kNoCrossing, 0u, bound, bound, 0u, TrianglePoint(0.0, 0.0, kFace));
+  SurfaceSearch search =
+      SurfaceSearch(kNoCrossing, 0u, bound, bound, 0u, TrianglePoint(0.0, 0.0, kFace), bound);
   uint node = visitsLeft == 0u ? 0u : 1u;
   while (node != 0u) {
     --visitsLeft;
@@ -105,6 +133,9 @@ SurfaceSearch searchSurface(SolidRecord solid, vec3 from, vec3 to, float reach, 
           search.endSquared = squared;
           search.nearest = t;
           search.at = nearest;
+        }
+        if (!twoSided) {
+          search.rimSquared = min(search.rimSquared, squaredFromRim(solid, t, corners, to));
         }
       }
     }
@@ -152,12 +183,8 @@ Contact contactOfSearch(SolidRecord solid, SurfaceSearch search, vec3 from, vec3
     precise float depth = min(thickness, reached) - (touches ? 0.0 : distance_);
     return Contact(away, depth);
   }
-  uint rims = uint(
-      texelFetch(solids, int(uint(solid.firstTriangle) + CLOTHSTREAM_TRIANGLE_TEXELS * search.nearest) + 1)
-          .w);
-  uint part = search.at.part;
-  uint rim = part == kFace ? 0u : part >= kEdge ? 1u << (part - kEdge) : 8u << (part - kCorner);
-  if ((rims & rim) != 0u || distance_ >= depthBound) {
+  precise float bound = depthBound * depthBound;
+  if (search.rimSquared < bound || distance_ >= depthBound) {
     return kNoContact;
   }
   // Behind: `away` leads back, out of the front is the other way.

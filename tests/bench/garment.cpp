@@ -63,6 +63,7 @@ model::Scene sheetScene(std::uint32_t size, model::SolverKind solver, Limits lim
   cloth.damping = 0.5f;
   cloth.solver.kind = solver;
   cloth.pins = {{.firstRow = 0, .lastRow = 0, .firstColumn = 0, .lastColumn = size - 1}};
+  const model::Collider collider{.name = "rod", .shape = rod()};
   if (limits != Limits::none) {
     auto skin = std::make_shared<model::ClothSkin>();
     skin->collider = "rod";
@@ -73,12 +74,13 @@ model::Scene sheetScene(std::uint32_t size, model::SolverKind solver, Limits lim
                               .backstopDistance = 0.001f,
                               .backstopRadius = limits == Limits::backstop ? 1.0f : 0.0f});
     }
+    model::complete(*skin, cloth, collider);
     cloth.skin = skin;
   }
   model::Scene scene;
   scene.name = "sheet";
   scene.cloths = {cloth};
-  scene.colliders.push_back({.name = "rod", .shape = rod()});
+  scene.colliders.push_back(collider);
   return scene;
 }
 

@@ -120,12 +120,13 @@ TEST(GltfClothes, SkinsMayHaveJointsThatOthersDoNotHave) {
   ASSERT_TRUE(source) << source.error();
   ASSERT_EQ(source->skin->joints.size(), 3u);
   EXPECT_EQ(source->skin->joints[0].name, "lower");
-  EXPECT_EQ(source->skin->joints[2].name, "tail");
-  EXPECT_EQ(source->skin->joints[2].parent, 0u);
+  EXPECT_EQ(source->skin->joints[1].name, "tail");
+  EXPECT_EQ(source->skin->joints[1].parent, 0u);
+  EXPECT_EQ(source->skin->joints[2].name, "upper") << "the first of the file, but its parent comes later";
   // 40 cm from the lower joint, where its skin binds it.
-  EXPECT_NEAR(source->skin->joints[2].rest.position.x(), 0.4, 1e-6);
-  EXPECT_NEAR(source->skin->joints[2].rest.position.y(), 0, 1e-6);
-  EXPECT_EQ(source->skin->vertices.back().joints[0], 2);
+  EXPECT_NEAR(source->skin->joints[1].rest.position.x(), 0.4, 1e-6);
+  EXPECT_NEAR(source->skin->joints[1].rest.position.y(), 0, 1e-6);
+  EXPECT_EQ(source->skin->vertices.back().joints[0], 1);
   joints.joints = 2;
   EXPECT_THAT(
       errorOf(glb, joints),
@@ -141,6 +142,16 @@ TEST(GltfClothes, RefusesSkinsThatBindAJointAtTwoPlaces) {
       HasSubstr(
           ": its 2 skins: skin \"shirt\": binds joint 1 at another place than skin \"bones\": join their "
           "meshes, or export both in the same pose"));
+}
+
+TEST(GltfClothes, RefusesMoreSkinsThanAFigureNeeds) {
+  SkinnedGlb glb;
+  for (int i = 1; i <= 256; ++i) {
+    glb.root["skins"].push_back(glb.root["skins"][0]);
+    glb.root["nodes"].push_back({{"mesh", 0}, {"skin", i}});
+    glb.root["nodes"][kArmature]["children"].push_back(glb.root["nodes"].size() - 1);
+  }
+  EXPECT_THAT(errorOf(glb, ofAvatar()), HasSubstr("has meshes with more than 256 skins: join meshes"));
 }
 
 TEST(GltfClothes, KeepsTheFourLargestWeightsOfAVertex) {
@@ -277,7 +288,7 @@ std::string compressedWith(const std::string& attribute) {
     to.resize(from.size(), ' ');
     bytes.replace(bytes.find(from), from.size(), to);
   };
-  replace(R"("skin": 0,)", "");
+  replace(R"(, "skin": 0, "translation": [9, 9, 9])", "");
   replace(R"("JOINTS_0": 3, "WEIGHTS_0": 4)", '"' + attribute + "\": 4");
   replace(R"("JOINTS_0": 2, "WEIGHTS_0": 3)", '"' + attribute + "\": 3");
   return bytes;

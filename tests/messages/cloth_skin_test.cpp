@@ -56,12 +56,6 @@ const model::ClothSkin& skinOf(const Result<model::Scene>& scene) {
   return *scene->cloths[0].skin;
 }
 
-std::vector<float> maxDistances(const Result<model::Scene>& scene) {
-  std::vector<float> all;
-  for (const SkinLimits& limits : skinOf(scene).limits) all.push_back(limits.maxDistance);
-  return all;
-}
-
 // Binds all nodes to the joint "left".
 void bindToLeft(v1::ClothSkin& message, int vertices) {
   for (int i = 0; i < vertices; ++i)

@@ -78,7 +78,7 @@ TEST(ParameterTable, ListsEveryFieldOfAChangeThatIsANumber) {
   EXPECT_THAT(
       unlisted(v1::Cloth::descriptor(), &WireField::inScene),
       testing::UnorderedElementsAre("name", "grid", "mesh", "mass", "areal_mass", "pins", "pinned_vertices",
-                                    "pinned_regions", "solver", "attachments", "material", "coarse"));
+                                    "pinned_regions", "solver", "attachments", "material", "coarse", "skin"));
   for (const ClothParameter& parameter : kClothParameters) {
     if (parameter.group == nullptr) continue;
     const Descriptor* group = v1::Cloth::descriptor()

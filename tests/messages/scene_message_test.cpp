@@ -332,7 +332,7 @@ const BadScene kBadScenes[] = {
      "one or the other"},
     {"cloths[0].attachments[0].motion.keys: has 1 elements",
      [](v1::Scene& s) { attachment(s, "rod").mutable_motion()->add_keys(); }},
-    {"cloths: have pins and attachments that select nodes in 83886080 steps",
+    {"cloths: have pins, attachments and skins that select nodes in 83886080 steps",
      [](v1::Scene& s) {
        grid(s).set_rows(8192);
        grid(s).set_columns(1024);

@@ -24,6 +24,7 @@
 #include "server/recording/resimulate.h"
 #include "server/scene/scene_host.h"
 #include "tests/e2e/temporary_directory.h"
+#include "tests/model/surfaces.h"
 #include "tests/serving/small_scene.h"
 #include "tests/vulkan/gpu_test.h"
 
@@ -165,7 +166,7 @@ TEST_F(RecorderTest, ContinuesAfterItsDeviceWasLost) {
 }
 
 TEST_F(RecorderTest, ResimulatesMeshesHullsAndAttachmentsToTheBit) {
-  for (const char* name : {"swing", "obstacles", "tablecloth", "figure_15", "solver_xpbd"}) {
+  for (const char* name : {"swing", "obstacles", "tablecloth", "figure_15", "solver_xpbd", "balloon"}) {
     auto scene = messages::loadScene(name);
     ASSERT_TRUE(scene.has_value());
     RecordedScene recorded(options(), *scene);
@@ -174,6 +175,34 @@ TEST_F(RecorderTest, ResimulatesMeshesHullsAndAttachmentsToTheBit) {
     EXPECT_EQ(result.ticks, 8u);
     EXPECT_EQ(result.different, 0u) << name << ": " << toText(result);
   }
+}
+
+// The file must not show the room of a participant, and must say that it leaves it out.
+TEST_F(RecorderTest, LeavesSurfacesOfRealRoomsOutAndSaysSo) {
+  RecordedScene recorded(options());
+  scene::RoomSurfaces& surfaces = recorded.live.surfaces;
+  surfaces.add(9, scene::Role::participant);
+  recorded.ticks(5);
+  model::Triangles floor = model::flat(0.4f, 0.4f, 3);
+  for (model::Vec3& vertex : floor.vertices) vertex.y() = 12.345678f;
+  ASSERT_TRUE(surfaces.put(*surfaces.begin(9, 1, {}, {}),
+                           simulation::makeSurfaceTable(model::surfaceOf(floor)), false, 1));
+  recorded.ticks(5);
+  surfaces.remove(9, 1);
+  recorded.ticks(5);
+  const std::string path = recorded.finish();
+  const Resimulation result = again(path);
+  EXPECT_EQ(result.ticks, 5u);
+  EXPECT_EQ(result.different, 0u);
+  ASSERT_EQ(result.missing.size(), 1u);
+  EXPECT_EQ(result.missing[0].after, 5u);
+  EXPECT_THAT(result.missing[0].reason, HasSubstr("1 surfaces of a real room acted in tick 6"));
+  EXPECT_EQ(result.verdict(), Verdict::missing);
+  auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  const std::string height(reinterpret_cast<const char*>(&floor.vertices[0].y()), sizeof(float));
+  for (auto message = reader->next(); *message; message = reader->next())
+    EXPECT_EQ((*message)->bytes.find(height), std::string_view::npos);
 }
 
 TEST_F(RecorderTest, HoldsTheStreamAndRegularKeyFrames) {

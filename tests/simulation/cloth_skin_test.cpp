@@ -50,7 +50,7 @@ model::SkinLimits limitsOfRow(std::uint32_t row) {
 }
 
 // A sheet in the frame of the rod, above it, whose nodes follow the joint on their side.
-model::Scene sleeveScene(model::Cloth cloth) {
+model::Scene sleeveScene(model::Cloth cloth, const model::Pose& pose = {}) {
   const model::Solid rod = lowRod();
   auto skin = std::make_shared<model::ClothSkin>();
   skin->collider = "rod";
@@ -60,9 +60,11 @@ model::Scene sleeveScene(model::Cloth cloth) {
     skin->joints.push_back({{0, 1, 0, 0}, {1 - bent, bent, 0, 0}});
     skin->limits.push_back(limitsOfRow(node / cloth.grid.columns));
   }
+  const model::Collider collider{.name = "rod", .shape = rod, .pose = pose};
+  model::complete(*skin, cloth, collider);
   cloth.skin = skin;
   model::Scene scene = sceneOf({std::move(cloth)});
-  scene.colliders.push_back({.name = "rod", .shape = rod});
+  scene.colliders.push_back(collider);
   return scene;
 }
 
@@ -292,8 +294,8 @@ TEST_F(ClothSkins, AJumpIsFoundByItsSpeed) {
 
 TEST_F(ClothSkins, FarFromTheOriginTheMotionIsTheSame) {
   const auto run = [](const model::Vec3& place) {
-    model::Scene scene = sleeveScene(calmCloth(kRows, kColumns));
-    scene.colliders[0].pose.position = place;
+    const model::Scene scene =
+        sleeveScene(calmCloth(kRows, kColumns), {place, model::Quaternion::Identity()});
     Running running(scene);
     for (int tick = 0; tick < 10; ++tick) {
       MovingCollider collider{scene.colliders[0].shape, scene.colliders[0].pose, scene.colliders[0].pose, 1};

@@ -59,19 +59,20 @@ SkinTables skinTables(const SolidTables& solids) {
     const auto joints = static_cast<std::uint32_t>(mesh.skin->joints.size());
     std::vector<model::Pose> rest;
     model::compose(*mesh.skin, model::restJoints(*mesh.skin), rest);
-    tables.skinned.push_back({.solid = i,
-                              .push = {.vertexCount = static_cast<std::uint32_t>(mesh.vertices.size()),
-                                       .firstRest = CLOTHSTREAM_SKIN_VERTEX_TEXELS *
-                                                    static_cast<std::uint32_t>(tables.rests.size()),
-                                       .firstFan = static_cast<std::uint32_t>(tables.fans.size()),
-                                       .firstVertex = solids.firstVertexOf(i),
-                                       .firstJoint = tables.transformCount,
-                                       .jointCount = joints,
-                                       .reserved0 = 0,
-                                       .reserved1 = 0},
-                              .bounds = model::skinBounds(*mesh.skin, mesh.vertices),
-                              .inverseRests = model::inverseRests(*mesh.skin),
-                              .rest = std::move(rest)});
+    tables.skinned.push_back(
+        {.solid = i,
+         .push = {.vertexCount = static_cast<std::uint32_t>(mesh.vertices.size()),
+                  .firstRest =
+                      CLOTHSTREAM_SKIN_VERTEX_TEXELS * static_cast<std::uint32_t>(tables.rests.size()),
+                  .firstFan = static_cast<std::uint32_t>(tables.fans.size()),
+                  .firstVertex = solids.firstVertexOf(i),
+                  .firstJoint = tables.transformCount,
+                  .jointCount = joints,
+                  .reserved0 = 0,
+                  .reserved1 = 0},
+         .bounds = model::skinBounds(mesh.skin->vertices, mesh.skin->joints.size(), mesh.vertices),
+         .inverseRests = model::inverseRests(*mesh.skin),
+         .rest = std::move(rest)});
     for (std::size_t k = 0; k < mesh.vertices.size(); ++k)
       tables.rests.push_back(restOf(mesh.vertices[k], mesh.skin->vertices[k]));
     appendFans(mesh, tables.fans);

@@ -64,12 +64,6 @@ SurfaceStage::SurfaceStage(const vulkan::Device& device, std::span<const std::ui
   }
 }
 
-void SurfaceStage::recordFirstRun(vulkan::Recorder& recorder) {
-  if (collide_[0].kernel().isReady()) return;
-  recorder.touch(collide_[0]);
-  collide_[0].kernel().setReady();
-}
-
 void SurfaceStage::recordTables(vulkan::Recorder& recorder) {
   tiles_.recordUpload(recorder);
 }

@@ -31,9 +31,8 @@ class SurfaceStage final : public Stage {
   SurfaceStage(const vulkan::Device& device, std::span<const std::uint32_t> clothOffsets,
                const StateBuffers& state, std::uint32_t workgroupSize);
 
-  // Records a run of the kernel on no data, if the device has never run it, and notes that it did. A software
-  // device compiles it then. The recording must be submitted, and complete, before a tick uses the stage.
-  void recordFirstRun(vulkan::Recorder& recorder);
+  // The kernel, for a first run before ticks use it (vulkan::Recorder::touch).
+  const vulkan::Bindings& kernel() const { return collide_[0]; }
 
   // Texels of the surface that the next recorded tick would still have to upload; 0 if the device has it.
   std::size_t texelsToUpload(const SurfaceTable& table) const;
