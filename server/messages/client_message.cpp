@@ -115,7 +115,6 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
   }
 }
 
-<<<<<<< HEAD
 // Returns nullptr after a failed check if the scene has no such collider, or it has no joints.
 const model::Collider* findWithJoints(Checks& checks, const Path& path, const std::string& name,
                                       const model::Scene& scene) {
@@ -126,7 +125,8 @@ const model::Collider* findWithJoints(Checks& checks, const Path& path, const st
   if (solid != nullptr && (*solid)->skin) return &*found;
   checks.fail(path, '"' + name + '"', "has no joints");
   return nullptr;
-=======
+}
+
 // Cloth that follows joints out of the stream's range would roll the scene back for everyone. The bound is
 // that of a sphere around the collider, which may be anywhere on its way.
 void checkJointReach(Checks& checks, const Path& path, const model::Collider& collider,
@@ -155,7 +155,6 @@ void checkJointReach(Checks& checks, const Path& path, const model::Collider& co
                       "within {:.4g} m, which the stream holds",
                       cloth.name, away + reach, most));
   }
->>>>>>> garment
 }
 
 void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& message,
@@ -164,26 +163,12 @@ void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& mess
   for (int i = 0; i < message.joints_size() && !checks.failed(); ++i) {
     const v1::ColliderJoints& from = message.joints(i);
     const Path path = poses.at("joints", i);
-<<<<<<< HEAD
     const model::Collider* const found = findWithJoints(checks, path / "collider", from.collider(), scene);
     if (found == nullptr) return;
     const model::Skin& skin = *std::get<model::Solid>(found->shape)->skin;
     to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.data()),
                          toJoints(checks, path / "joints", from.joints(), skin.joints.size()), from.jumps()});
-=======
-    checkKnown(checks, path / "collider", from.collider(), scene.colliders);
-    if (checks.failed()) return;
-    const auto found = std::ranges::find(scene.colliders, from.collider(), &model::Collider::name);
-    const auto* solid = std::get_if<model::Solid>(&found->shape);
-    if (solid == nullptr || !(*solid)->skin) {
-      checks.fail(path / "collider", '"' + from.collider() + '"', "has no joints");
-      return;
-    }
-    to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.begin()),
-                         toJoints(checks, path / "joints", from.joints(), (*solid)->skin->joints.size()),
-                         from.jumps()});
     checkJointReach(checks, path, *found, to.joints.back(), scene);
->>>>>>> garment
   }
 }
 
