@@ -228,6 +228,12 @@ Result<v1::ParameterChange> toWornBody(const v1::WearBody& message, const model:
   findWithJoints(checks, path / "collider", message.collider(), scene);
   if (message.has_stands()) {
     const model::Pose stands = toPose(checks, path / "stands", message.stands());
+    // As for attachments: cloth that follows the body must stay in the stream's range.
+    const double reach = model::reachOf(scene.stream);
+    const model::Vec3 origin = model::originOf(scene);
+    for (int axis = 0; axis < 3; ++axis)
+      checks.number(path / "stands", stands.position[axis],
+                    {.min = origin[axis] - reach, .max = origin[axis] + reach});
     v1::ColliderChange& collider = *change.add_colliders();
     collider.set_name(message.collider());
     write(stands.position, *collider.mutable_position());

@@ -257,6 +257,8 @@ TEST(SolidMessage, BodiesThatAreTakenHaveJointsAndMayStand) {
   EXPECT_THAT(toWornBody(message, scene).error().text,
               StartsWith("wearBody.collider = \"nobody\": must be one of ball"));
   message.set_collider("ball");
+  message.mutable_stands()->mutable_position()->set_y(1000);
+  EXPECT_THAT(toWornBody(message, scene).error().text, StartsWith("wearBody.stands = 1000: must be"));
   message.mutable_stands()->mutable_position()->set_y(std::numeric_limits<float>::quiet_NaN());
   EXPECT_THAT(toWornBody(message, scene).error().text, StartsWith("wearBody.stands.position.y = nan"));
 }
