@@ -39,13 +39,13 @@ inline constexpr std::uint32_t kSurfaceRounds = 4;
 
 // Vertices in the same place are one.
 struct Surface {
-  std::vector<Vec3> vertices;              // m; each has a triangle
-  std::vector<TriangleCorners> triangles;  // counter-clockwise seen from the front
+  std::vector<Vec3> vertices = {};              // m; each has a triangle
+  std::vector<TriangleCorners> triangles = {};  // counter-clockwise seen from the front
   // The triangles across the edges from corner 0 to 1, 1 to 2 and 2 to 0 of each triangle; at the rim, the
   // triangle itself. An edge of more than two triangles, or of two that show different sides, is a rim.
-  std::vector<TriangleCorners> neighbours;
+  std::vector<TriangleCorners> neighbours = {};
   // The edges at the rim, for each triangle: bit k is the edge k.
-  std::vector<std::uint8_t> rims;
+  std::vector<std::uint8_t> rims = {};
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // box, m
   double crowding = 0;                           // crowdingOf()
 };
@@ -56,7 +56,7 @@ struct SurfaceProblem {
 };
 
 struct MadeSurface {
-  Surface surface;
+  Surface surface = {};
   std::size_t dropped = 0;  // triangles that were left out: too thin, or with the same corner twice
 };
 
