@@ -16,7 +16,6 @@ enum class Action : std::uint8_t {
   collide,
   grab,
   moveAttachments,
-  wear,  // a body
   holdWinds,
   placeSurfaces,  // of the real room
   changeEnvironment,

@@ -13,8 +13,7 @@ const kMostLimbs = 8;
 
 export class Body {
   readonly head = new THREE.Vector3();
-  // Orientation of the head in the scene.
-  readonly headOrientation = new THREE.Quaternion();
+  private readonly look = new THREE.Quaternion(); // of the head
   private readonly turn = new THREE.Quaternion(); // from the room to the scene
   headPresent = false;
   private readonly rotation = new THREE.Matrix4();
@@ -58,8 +57,8 @@ export class Body {
       const { x, y, z } = viewer.transform.position;
       this.head.set(x, y, z).applyMatrix4(toScene);
       const { orientation } = viewer.transform;
-      this.headOrientation.set(orientation.x, orientation.y, orientation.z, orientation.w);
-      this.headOrientation.premultiply(this.turn.setFromRotationMatrix(this.rotation.extractRotation(toScene)));
+      this.look.set(orientation.x, orientation.y, orientation.z, orientation.w);
+      this.look.premultiply(this.turn.setFromRotationMatrix(this.rotation.extractRotation(toScene)));
     }
     this.limbOf.clear();
     for (const source of session.inputSources) this.limb(source);
@@ -122,7 +121,7 @@ export class Body {
   }
 
   private ownHead(scale: number): Head {
-    const { x, y, z, w } = this.headOrientation;
+    const { x, y, z, w } = this.look;
     return { position: this.head.toArray(), orientation: [x, y, z, w], radius: kHeadRadius / scale };
   }
 
