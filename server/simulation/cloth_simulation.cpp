@@ -112,7 +112,7 @@ struct Stages {
     if (SkinTables tables = skinTables(solidTables); !tables.empty())
       skins = std::make_unique<SkinStage>(device, std::move(tables), solidTables, solids->solids(),
                                           workgroupSize);
-    if (ClothSkinTables tables = clothSkinTables(scene); !tables.empty()) {
+    if (ClothSkinTables tables = clothSkinTables(scene, model::originOf(scene)); !tables.empty()) {
       clothSkins = std::make_unique<ClothSkinStage>(device, std::move(tables), state, workgroupSize);
       if (clothSkins->limitCount() > 0)
         skinLimits = std::make_unique<SkinLimitStage>(device, *clothSkins, state, workgroupSize);

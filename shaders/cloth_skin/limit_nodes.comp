@@ -43,7 +43,8 @@ State leaveBackstop(State node, vec3 normal, vec3 turn, float distance_, float r
   precise vec3 fromCentre = q + radius * n;
   precise float squared = dotProduct(fromCentre, fromCentre);
   // At the centre every direction is as good; the normal leads to the front.
-  if (squared < 1e-12 * (radius * radius)) {
+  precise float tiny = 1e-12 * (radius * radius);
+  if (squared < tiny) {
     fromCentre = radius * n;
     squared = radius * radius;
     q = vec3(0.0);

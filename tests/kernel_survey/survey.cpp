@@ -12,6 +12,7 @@
 
 #include "server/encode/frame_encoder.h"
 #include "server/vulkan/recorder.h"
+#include "tests/model/surfaces.h"
 
 namespace clothstream::kernel_survey {
 namespace {
@@ -73,7 +74,9 @@ class CompiledScene {
       encoder_.record(recorder_, static_cast<std::uint64_t>(tick + 1), false);
       inputs = simulation::inputsAt(scene, 1);
       inputs.namesConstraints = true;
+      for (simulation::MovingCollider& collider : inputs.colliders) collider.jumped = true;
       inputs.colliders.emplace_back();
+      inputs.surfaces = {{.table = simulation::makeSurfaceTable(model::surfaceOf(model::flat(1, 1)))}};
       inputs.grabs.push_back({.state = simulation::Grab::State::takes});
       inputs.carries.push_back({});
     }

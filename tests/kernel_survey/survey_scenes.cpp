@@ -3,10 +3,14 @@
 #include "tests/kernel_survey/survey_scenes.h"
 
 #include <functional>
+#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "server/messages/scene_file.h"
+#include "server/model/cloth_skin.h"
 #include "tests/model/meshes.h"
 #include "tests/model/solids.h"
 
@@ -200,6 +204,22 @@ void addFeatures(std::vector<SurveyScene>& scenes) {
           scene.colliders.emplace_back().shape = model::sampled(ball, 0.02f);
           if (triangles) scene.colliders.emplace_back().shape = ball;
         });
+  add(scenes, "clothes", grid, kLarge, [](model::Scene& scene) {
+    model::ClosedMesh rod = *model::rodMesh(0.03f, 0.4f, 8, 4);
+    rod.skin = model::Skin{
+        .joints = {{"root", std::nullopt, {}}},
+        .vertices = std::vector(rod.vertices.size(), model::VertexJoints{{0, 0, 0, 0}, {1, 0, 0, 0}}),
+        .keys = {}};
+    model::Collider& collider = scene.colliders.emplace_back();
+    collider.name = "rod";
+    collider.shape = std::make_shared<const model::ClosedMesh>(std::move(rod));
+    model::Cloth& cloth = scene.cloths[0];
+    model::ClothSkin skin{.collider = collider.name, .joints = {}, .limits = {}};
+    skin.joints.assign(cloth.nodeCount(), {{0, 0, 0, 0}, {1, 0, 0, 0}});
+    skin.limits.assign(cloth.nodeCount(), {.maxDistance = 0.1f, .backstopRadius = 1});
+    model::complete(skin, cloth, collider);
+    cloth.skin = std::make_shared<const model::ClothSkin>(std::move(skin));
+  });
   add(scenes, "normals", grid, kLarge,
       [](model::Scene& scene) { scene.stream.normals = model::Normals::octahedral; });
   add(

@@ -310,6 +310,14 @@ TEST_F(ClothSkins, FarFromTheOriginTheMotionIsTheSame) {
   EXPECT_EQ(near.bytes, far.bytes);
 }
 
+TEST_F(ClothSkins, JointsOfAColliderThatATickLacksRest) {
+  const model::Scene scene = sleeveScene(calmCloth(kRows, kColumns));
+  Running without(scene), with(scene);
+  without.tick(inputsOf(scene));
+  with.tick(inputsOf(scene, {{scene.colliders[0].shape, {}, {}, 1}}));
+  EXPECT_EQ(without.save().bytes, with.save().bytes);
+}
+
 TEST_F(ClothSkins, GivesTheSameBitsForEveryPartitionOfTheWork) {
   const model::Scene scene = sleeveScene(calmCloth(kRows, kColumns));
   const simulation::SimulationOptions ways[] = {{.workgroupSize = 32}, {.workgroupSize = 128}};

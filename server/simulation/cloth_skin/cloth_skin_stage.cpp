@@ -2,7 +2,6 @@
 #include "server/simulation/cloth_skin/cloth_skin_stage.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -20,13 +19,13 @@ using vulkan::BufferPurpose;
 
 constexpr std::size_t kClothJointBytes = CLOTHSTREAM_CLOTH_JOINT_TEXELS * kTexelBytes;
 
-const MovingCollider& colliderOf(const ClothSkinTables::Skinned& skinned, const TickInputs& inputs) {
+// Null if the tick does not have it.
+const MovingCollider* colliderOf(const ClothSkinTables::Skinned& skinned, const TickInputs& inputs) {
   const auto found = std::ranges::find_if(inputs.colliders, [&](const MovingCollider& collider) {
     const auto* solid = std::get_if<model::Solid>(&collider.shape);
     return solid != nullptr && *solid == skinned.solid;
   });
-  assert(found != inputs.colliders.end());
-  return *found;
+  return found == inputs.colliders.end() ? nullptr : &*found;
 }
 
 void copyTo(std::span<const model::Transform> transforms, std::span<float> texels) {
@@ -66,7 +65,7 @@ void ClothSkinStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) 
   const Buffer& upload = uploads_[tick.slot];
   for (std::size_t i = 0; i < tables_.cloths.size(); ++i) {
     const ClothSkinTables::Skinned& skinned = tables_.cloths[i];
-    const MovingCollider& collider = colliderOf(skinned, tick.inputs);
+    const MovingCollider* const collider = colliderOf(skinned, tick.inputs);
     const std::size_t count = skinned.push.jointCount;
     const std::span<model::Transform> transforms = std::span(transforms_).first(count);
     std::uint32_t first = skinned.push.firstJoint - skinned.push.jointCount;
@@ -75,11 +74,15 @@ void ClothSkinStage::recordInputs(vulkan::Recorder& recorder, const Tick& tick) 
       copyTo(transforms, upload.mapped<float>().subspan(std::size_t{12} * first, 12 * count));
       first += skinned.push.jointCount;
     };
-    jumps_[i] = collider.jumped ? 1 : 0;
-    write(collider.jumped ? collider.jointsBefore : collider.jointsStart,
-          collider.jumped ? collider.before : collider.start);
-    write(collider.jointsStart, collider.start);
-    write(collider.jointsEnd, collider.end);
+    jumps_[i] = collider != nullptr && collider->jumped ? 1 : 0;
+    if (collider == nullptr) {
+      for (int k = 0; k < 3; ++k) write(skinned.rest, skinned.start);
+      continue;
+    }
+    write(collider->jumped ? collider->jointsBefore : collider->jointsStart,
+          collider->jumped ? collider->before : collider->start);
+    write(collider->jointsStart, collider->start);
+    write(collider->jointsEnd, collider->end);
   }
   recorder.copy(upload, transformTexels_, transformTexels_.bytes());
 }

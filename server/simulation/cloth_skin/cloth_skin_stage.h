@@ -23,7 +23,7 @@ class ClothSkinStage final : public Stage {
   ClothSkinStage(const vulkan::Device& device, ClothSkinTables tables, const StateBuffers& state,
                  std::uint32_t workgroupSize);
 
-  // Uploads the joints. The colliders of the tick contain those whose joints cloths follow. Allocates
+  // Uploads the joints. Those of a collider that the tick does not have rest where it starts. Allocates
   // nothing.
   void recordInputs(vulkan::Recorder& recorder, const Tick& tick) override;
   // Takes cloths along where joints jump, gives nodes that follow exactly their velocities, and computes the

@@ -51,7 +51,7 @@ std::uint32_t add(const model::ClothSkin& skin, std::uint32_t first, std::span<c
 
 }  // namespace
 
-ClothSkinTables clothSkinTables(const model::Scene& scene) {
+ClothSkinTables clothSkinTables(const model::Scene& scene, const model::Vec3& origin) {
   ClothSkinTables tables;
   std::uint32_t first = 0;
   for (const model::Cloth& cloth : scene.cloths) {
@@ -61,7 +61,10 @@ ClothSkinTables clothSkinTables(const model::Scene& scene) {
     const model::Skin& skin = model::skinOf(scene, cloth);
     const std::vector<model::Vec3> places = model::restPositions(cloth), normals = model::restNormals(cloth);
     ClothSkinTables::Skinned skinned;
-    skinned.solid = std::get<model::Solid>(scene.colliders[model::skinCollider(scene, cloth)].shape);
+    const model::Collider& collider = scene.colliders[model::skinCollider(scene, cloth)];
+    skinned.solid = std::get<model::Solid>(collider.shape);
+    skinned.start = model::poseAt(collider, 0);
+    skinned.start.position -= origin;
     skinned.nodeCount = cloth.nodeCount();
     skinned.inverseRests = model::inverseRests(skin);
     model::compose(skin, model::restJoints(skin), skinned.rest);

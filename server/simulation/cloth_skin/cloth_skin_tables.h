@@ -18,6 +18,7 @@ struct ClothSkinTables {
     std::uint32_t nodeCount = 0;
     std::vector<model::JointFrame> inverseRests;
     std::vector<model::Pose> rest;  // of the joints, in the frame of the collider
+    model::Pose start;              // of the collider, relative to the origin
   };
   std::vector<Skinned> cloths;
   std::vector<shared::SkinnedRecord> nodes;  // of each cloth those with limits, the exact ones, the free ones
@@ -28,6 +29,7 @@ struct ClothSkinTables {
 
   bool empty() const { return cloths.empty(); }
 };
-ClothSkinTables clothSkinTables(const model::Scene& scene);
+// Poses are relative to `origin`.
+ClothSkinTables clothSkinTables(const model::Scene& scene, const model::Vec3& origin);
 
 }  // namespace clothstream::simulation

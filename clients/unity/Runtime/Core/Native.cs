@@ -110,7 +110,7 @@ namespace ClothStream.Core
     }
 
     /// <summary>
-    /// What the server does with surfaces.
+    /// Policy of the server for surfaces of the real room.
     /// </summary>
     public enum SurfacePolicy : uint
     {
@@ -1699,7 +1699,7 @@ namespace ClothStream.Core
         /// </summary>
         [DllImport(Library)] public static extern void cs_move_joints(IntPtr client, byte* collider, float* poses, uint count, int jumps, ulong nowUs);
         /// <summary>
-        /// What the server does with surfaces of the real room, from the newest Welcome.
+        /// Returns the policy of the server for surfaces of the real room, from the newest Welcome.
         /// </summary>
         [DllImport(Library)] public static extern SurfacePolicy cs_get_surface_policy(IntPtr client);
         /// <summary>
