@@ -946,6 +946,8 @@ struct AppliedCollider {
   static constexpr Field kBox{9, WireType::kBytes};
   static constexpr Field kJointsStart{29, WireType::kBytes};
   static constexpr Field kJointsEnd{30, WireType::kBytes};
+  static constexpr Field kBefore{31, WireType::kBytes};
+  static constexpr Field kJointsBefore{32, WireType::kBytes};
 };
 struct AppliedGrip {
   static constexpr Field kState{1, WireType::kVarint};
