@@ -203,7 +203,8 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   if (returned && !resumed_) clock_ = {};
   // The colliders and grabs of an earlier client end, even if this one has none yet.
   if (inherited || (returned && posed_)) sendPoses(nowUs);
-  const std::uint32_t events = (participants_.all().empty() ? 0u : CS_EVENT_PARTICIPANTS) | sendSurfaces();
+  const std::uint32_t events =
+      (participants_.all().empty() ? 0u : std::uint32_t{CS_EVENT_PARTICIPANTS}) | sendSurfaces();
   if (!known) return events;
   state_ = CS_STATE_JOINED;
   redirection_.joined();

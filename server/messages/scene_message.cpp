@@ -174,8 +174,8 @@ void checkSelections(Checks& checks, const model::Scene& scene, const v1::Scene&
   std::uint64_t tests = 0;
   for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
     const model::Cloth& cloth = scene.cloths[i];
-    const int regions = message.cloths(static_cast<int>(i)).skin().regions_size();
-    tests += std::uint64_t{cloth.nodeCount()} * static_cast<std::uint64_t>(regions);
+    const int ofSkin = message.cloths(static_cast<int>(i)).skin().regions_size();
+    tests += std::uint64_t{cloth.nodeCount()} * static_cast<std::uint64_t>(ofSkin);
     const auto add = [&](const std::vector<model::GridRange>& ranges,
                          const std::vector<model::Region>& regions) {
       for (const model::GridRange& range : ranges) tests += range.nodeCount();

@@ -23,7 +23,7 @@ struct SkinnedRecord {
 
 const float kJointBase = 128;
 // Its square is finite.
-const float kUnboundedDistance = 1e18;
+const float kUnboundedDistance = 1e18f;
 
 // Where the joints take a node with limits during a tick. It moves in a straight line.
 #define CLOTHSTREAM_LIMIT_TEXELS 4

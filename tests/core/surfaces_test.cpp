@@ -36,10 +36,10 @@ class Surfaces : public ::testing::Test {
     for (std::uint32_t i = 0; i < 3 * 17'000; ++i) triangles.push_back(i % 10'000);
   }
   std::uint32_t join(v1::SurfacePolicy policy, v1::Role role = v1::ROLE_PARTICIPANT) {
-    const std::uint32_t events = client.receive(welcomeWith(server, policy, role), now);
+    const std::uint32_t received = client.receive(welcomeWith(server, policy, role), now);
     client.receiveAll(server.chunks(), now);
     client.receive(server.frame(++tick, codec::PacketKind::key), now);
-    return events;
+    return received;
   }
   cs_surface surface(std::uint32_t id, std::uint32_t triangleCount, std::uint32_t vertexCount = 3) const {
     cs_surface made{};

@@ -165,7 +165,7 @@ class ClothFile : public testing::Test {
     joints.joints = {{.name = "unused", .parent = {}, .rest = {}},
                      {.name = "right", .parent = 0, .rest = {}},
                      {.name = "left", .parent = 0, .rest = {}}};
-    for (const std::uint8_t joint : {1, 2, 1, 1, 2, 2})
+    for (const std::uint8_t joint : std::array<std::uint8_t, 6>{1, 2, 1, 1, 2, 2})
       joints.vertices.push_back({.joints = {joint, 0, 0, 0}, .weights = {1, 0, 0, 0}});
     message_ = dressedScene();
     message_.mutable_cloths(0)->mutable_mesh()->set_file("shirt.glb");
@@ -327,7 +327,9 @@ void expectErrors(const std::vector<WrongSkin>& wrong) {
     one.spoil(message);
     const Result<model::Scene> scene = toScene(message);
     EXPECT_EQ(scene ? "no error" : scene.error().text, one.error);
-    if (!scene) EXPECT_EQ(scene.error().code, v1::ERROR_CODE_INVALID_ARGUMENT);
+    if (!scene) {
+      EXPECT_EQ(scene.error().code, v1::ERROR_CODE_INVALID_ARGUMENT);
+    }
   }
 }
 
