@@ -199,7 +199,7 @@ Contact contactOfSearch(SolidRecord solid, SurfaceSearch search, vec3 from, vec3
   return Contact(front, depth);
 }
 
-// What to look for: a crossing; a crossing, or a node that is too near; a node behind a surface that lifts.
+// Kinds of search: for a crossing; for a crossing or a node too near; for a node behind a surface that lifts.
 const uint kCrossings = 0u;
 const uint kContacts = 1u;
 const uint kBehind = 2u;

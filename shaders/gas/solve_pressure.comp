@@ -58,7 +58,7 @@ void main() {
   }
   vec4 before = gas[push.cloth];
   precise float foreseen = volumeAndGrowth.x + volumeAndGrowth.y;
-  // What the stages after the gas did to the volume in the last substep, they do in this one, too.
+  // The stages after the gas are assumed to change the volume as in the last substep.
   precise float scale =
       before.y == push.squaredSubstep ? 1.0 : push.squaredSubstep * reciprocal(max(before.y, 1e-20));
   precise float later = before.y == 0.0 ? 0.0 : scale * (volumeAndGrowth.x - before.x);

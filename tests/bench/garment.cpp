@@ -19,7 +19,7 @@ namespace {
 
 constexpr float kSpacing = 0.02f;      // m
 constexpr float kMaxDistance = 0.02f;  // m
-// Of a distance by the rounding of places and by that of the limit.
+// Excess of a distance by the rounding of places and by that of the limit.
 constexpr double kMostExcess = 1e-5;  // m
 
 enum class Limits { none, distance, backstop };

@@ -55,7 +55,7 @@ double volumeOf(const model::Cloth& cloth, const NodeState& state) {
   return model::enclosedVolume(cloth.mesh->shape.triangles, placesOf(state)) / cloth.mesh->volume;
 }
 
-// Of the law, at the volume of the state, Pa.
+// Pressure of the law at the volume of the state, Pa.
 double pressureOf(const model::Cloth& cloth, const NodeState& state) {
   return (model::kOutsidePressure + double{cloth.pressure}) / volumeOf(cloth, state) -
          model::kOutsidePressure;
@@ -229,7 +229,7 @@ TEST_F(Gas, GivesTheSameBitsForEveryPartitionOfWork) {
       scene, [](const model::Scene& of, int) { return inputsOf(of); }, 5, ways);
 }
 
-// What the last substep has foreseen belongs to the state.
+// The forecast of the last substep belongs to the state.
 TEST_F(Gas, ContinuesFromASnapshotWithTheSameBits) {
   const model::Scene scene = weightless({balloon(0), balloon(3000, SolverKind::implicitEuler)}, 4);
   Running running(scene);

@@ -185,7 +185,7 @@ TEST_F(SurfacesTest, HostilePartsGetAnErrorAndChangeNothing) {
   peer.send(good[0]);
   EXPECT_THAT(refused(peer, changed(1, [](v1::SurfaceUpdate& update) { update.set_id(2); })).text(),
               HasSubstr("surface 2: must be 0, or part 1 of 4 of surface 1"));
-  // What a whole mesh shows.
+  // Faults that only a whole mesh shows.
   model::Triangles nan = model::flat(1, 1), far = nan, thin = nan;
   nan.vertices[2].y() = NAN;
   far.triangles[1][0] = 1'000'000;
@@ -229,7 +229,7 @@ TEST_F(SurfacesTest, UseTheMemoryOfUploads) {
   const v1::Error error = refused(peer, partsOf(1, model::flat(1, 1, 8), 200, 0)[0]);
   EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
   EXPECT_THAT(error.text(), HasSubstr("--max-upload-memory"));
-  // What was refused leaves nothing behind.
+  // Refused meshes leave nothing behind.
   sendAll(peer, partsOf(1, model::flat(1, 1), 10, 0));
   awaitSurfaces(peer, "small", 1);
 }
