@@ -41,11 +41,11 @@ double membraneRadius(double stiffness, double radius, double pressure) {
 // nodes have five. With 362 nodes this changes the pressure for a radius by 1 %, and the radius, which the
 // gas holds, by less. Bounds are twice that.
 TEST_F(GasLaws, ABalloonIsAsLargeAsAMembrane) {
-  constexpr float kRadius = 0.3f, kStiffness = 400;
+  constexpr float kAtRest = 0.3f, kStiffness = 400;
   for (const float pressure : {1000.0f, 5000.0f, 20'000.0f, 100'000.0f}) {
     model::Cloth cloth;
     cloth.name = "balloon";
-    cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::icosphere(6, kRadius)));
+    cloth.mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::icosphere(6, kAtRest)));
     cloth.mass = 0.5f;
     cloth.structural = {kStiffness, 0.02f};
     cloth.damping = 8;
@@ -59,13 +59,13 @@ TEST_F(GasLaws, ABalloonIsAsLargeAsAMembrane) {
     double measured = 0;
     for (const model::Vec3& position : state.positions)
       measured += double{position.norm()} / static_cast<double>(state.positions.size());
-    const double expected = membraneRadius(kStiffness, kRadius, pressure);
-    EXPECT_NEAR(measured - kRadius, expected - kRadius, 0.02 * (expected - kRadius)) << pressure;
+    const double expected = membraneRadius(kStiffness, kAtRest, pressure);
+    EXPECT_NEAR(measured - kAtRest, expected - kAtRest, 0.02 * (expected - kAtRest)) << pressure;
     std::vector<Vector3d> places;
     for (const model::Vec3& position : state.positions) places.push_back(position.cast<double>());
     const double growth = model::enclosedVolume(cloth.mesh->shape.triangles, places) / cloth.mesh->volume;
     const double gas = (model::kOutsidePressure + pressure) / growth - model::kOutsidePressure;
-    EXPECT_NEAR(gas, membranePressure(kStiffness, kRadius, measured), 0.02 * gas) << pressure;
+    EXPECT_NEAR(gas, membranePressure(kStiffness, kAtRest, measured), 0.02 * gas) << pressure;
   }
 }
 
