@@ -41,7 +41,7 @@ std::vector<Carry> carriesOf(const Scene& scene, std::span<const Pose> before, s
     const bool isTold =
         std::ranges::any_of(told, [&](std::size_t one) { return one >= first && one < first + count; });
     first += count;
-    if (count == 0 || isPinned(scene.cloths[i])) continue;
+    if (count == 0 || isPinned(scene.cloths[i]) || scene.cloths[i].skin) continue;
     const Carry carry{i, starts[0], ends[0]};
     if (!isTold && !hasJumped(carry.from, carry.to, scene.tickSeconds())) continue;
     bool together = true;

@@ -31,8 +31,9 @@ struct Carry {
 
 // The cloths that attachments carry along in a tick. A cloth goes along with its first attachment if that one
 // jumps, or any of its attachments must jump; if no other attachment is too fast after that motion; and if it
-// is not pinned. `before` and `now` are the poses of all attachments at the tick's start and end, in the
-// order of the cloths. `told` has the indices of those that must jump, however short their way is.
+// is neither pinned nor follows joints, which take it along themselves. `before` and `now` are the poses of
+// all attachments at the tick's start and end, in the order of the cloths. `told` has the indices of those
+// that must jump, however short their way is.
 std::vector<Carry> carriesOf(const Scene& scene, std::span<const Pose> before, std::span<const Pose> now,
                              std::span<const std::size_t> told = {});
 

@@ -3,8 +3,11 @@
 #include "server/model/jump.h"
 
 #include <cmath>
+#include <memory>
 
 #include <gtest/gtest.h>
+
+#include "server/model/cloth_skin.h"
 
 namespace clothstream::model {
 namespace {
@@ -76,6 +79,15 @@ TEST(Carry, LeavesAClothThatIsHeldElsewhere) {
     pin(pinned.cloths[1]);
     EXPECT_TRUE(carriesOf(pinned, before, together).empty());
   }
+}
+
+// Its joints take it along, and it would go twice as far.
+TEST(Carry, LeavesAClothThatFollowsJoints) {
+  Scene scene = twoCloths();
+  const std::vector before = {at(0), at(1)}, together = {at(5), at(6)};
+  ASSERT_EQ(carriesOf(scene, before, together).size(), 1u);
+  scene.cloths[1].skin = std::make_shared<const ClothSkin>();
+  EXPECT_TRUE(carriesOf(scene, before, together).empty());
 }
 
 }  // namespace
