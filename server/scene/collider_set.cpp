@@ -21,6 +21,10 @@ const model::Skin* skinOf(const model::Collider& collider) {
   return solid != nullptr && (*solid)->skin ? &*(*solid)->skin : nullptr;
 }
 
+bool isSame(const model::Pose& a, const model::Pose& b) {
+  return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
+}
+
 }  // namespace
 
 ColliderSet::ColliderSet(const model::Scene& scene) {
@@ -33,6 +37,7 @@ ColliderSet::ColliderSet(const model::Scene& scene) {
     model::jointsAt(*skin, 0, joints.now);
     follower.emplace(std::get<model::Solid>(collider.shape));
   }
+  start_ = kept_ = followed();
 }
 
 void ColliderSet::place(std::uint64_t participant, std::span<const model::ParticipantCollider> colliders) {
@@ -89,6 +94,15 @@ void ColliderSet::advanceJoints(const model::Skin& skin, double endSeconds, doub
   joints.now = end_;
 }
 
+void ColliderSet::takeAlong(const model::Skin& skin, std::size_t index,
+                            simulation::MovingCollider& collider) const {
+  collider.before = kept_.colliders[index];
+  model::compose(skin, kept_.joints[index], collider.jointsBefore);
+  // A cloth that is where it was is not even rounded.
+  collider.jumped = !isSame(collider.before, collider.start) ||
+                    !std::ranges::equal(collider.jointsBefore, collider.jointsStart, isSame);
+}
+
 // Elements keep the memory of their joints.
 void ColliderSet::advance(const model::Scene& scene, double endSeconds,
                           std::vector<simulation::MovingCollider>& colliders) {
@@ -102,11 +116,13 @@ void ColliderSet::advance(const model::Scene& scene, double endSeconds,
     to.start = state_.scenePoses[i];
     to.end = end;
     to.friction = collider.friction;
-    if (const model::Skin* skin = skinOf(collider))
-      advanceJoints(*skin, endSeconds, scene.tickSeconds(), i, to);
+    const model::Skin* const skin = skinOf(collider);
+    if (skin != nullptr) advanceJoints(*skin, endSeconds, scene.tickSeconds(), i, to);
     simulation::jump(to, scene.tickSeconds(), std::exchange(state_.joints[i].jumps, false));
+    if (skin != nullptr && takesAlong_) takeAlong(*skin, i, to);
     state_.scenePoses[i] = end;
   }
+  takesAlong_ = false;
   for (std::size_t i = 0; i < state_.colliders.size(); ++i) {
     Placed& collider = state_.colliders[i];
     const float radius = model::reachOf(collider.now.shape);
@@ -162,6 +178,24 @@ void ColliderSet::settle(std::span<const float> depths) {
 void ColliderSet::restore(State state) {
   assert(state.scenePoses.size() == state_.scenePoses.size() && state.joints.size() == state_.joints.size());
   state_ = std::move(state);
+  kept_ = followed();
+}
+
+ColliderSet::Followed ColliderSet::followed() const {
+  Followed followed{.colliders = state_.scenePoses, .joints = {}};
+  for (const Joints& joints : state_.joints) followed.joints.push_back(joints.now);
+  return followed;
+}
+
+// Reuses the memory of the former ones.
+void ColliderSet::keepFollowed() {
+  kept_.colliders = state_.scenePoses;
+  for (std::size_t i = 0; i < state_.joints.size(); ++i) kept_.joints[i] = state_.joints[i].now;
+}
+
+void ColliderSet::clothsWentBack(const Followed& then) {
+  kept_ = then;
+  clothsWentBack();
 }
 
 ColliderSet::Identity ColliderSet::identity(std::size_t index) const {

@@ -104,11 +104,31 @@ class ColliderSet {
   // Continues from a state of this scene.
   void restore(State state);
 
+  // Poses of the scene's colliders and of their joints, where cloth follows them.
+  struct Followed {
+    std::vector<model::Pose> colliders;
+    std::vector<std::vector<model::Pose>> joints;  // relative to their parents; empty without joints
+  };
+  // Those after the newest tick, and those of the scene's start.
+  Followed followed() const;
+  const Followed& followedAtStart() const { return start_; }
+  // Keeps those after the newest tick, because the device keeps the state of the cloths.
+  void keepFollowed();
+  // The cloths went back to the kept state, or to one at which the joints had these poses. In the next tick,
+  // cloth that follows joints is taken along to where they are now.
+  void clothsWentBack() { takesAlong_ = true; }
+  void clothsWentBack(const Followed& then);
+
  private:
   void advanceJoints(const model::Skin& skin, double endSeconds, double tickSeconds, std::size_t index,
                      simulation::MovingCollider& collider);
+  // Lets cloth that follows the joints of this collider go along from where they were when the cloth was
+  // kept.
+  void takeAlong(const model::Skin& skin, std::size_t index, simulation::MovingCollider& collider) const;
 
   State state_;
+  Followed start_, kept_;
+  bool takesAlong_ = false;
   std::vector<std::optional<JointFollower>> followers_;  // of the colliders of the scene
   std::vector<model::Pose> end_;                         // reused in every tick
 };

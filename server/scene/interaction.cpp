@@ -50,6 +50,8 @@ void Interaction::letGo() {
 void Interaction::advance(const model::Scene& scene, std::uint64_t tick, Recovery recovery, float windRoom,
                           const simulation::ClothSimulation* withSurfaces) {
   const double endSeconds = static_cast<double>(tick + 1) * scene.tickSeconds();
+  if (recovery == Recovery::reset) colliders_.clothsWentBack(colliders_.followedAtStart());
+  if (recovery == Recovery::rollback) colliders_.clothsWentBack();
   colliders_.advance(scene, endSeconds, inputs_.colliders);
   if (recovery != Recovery::none) grabs_.clothsWentBack(scene, recovery == Recovery::reset);
   grabs_.advance(scene, endSeconds, inputs_);

@@ -64,9 +64,13 @@ class Interaction {
 
   const GrabsAndAttachments::State& grabs() const { return grabs_.state(); }
   const std::vector<HeldWinds::Placed>& winds() const { return winds_.state(); }
-  // The device goes back to a snapshot (GrabsAndAttachments::goBack).
-  void goBack(std::span<const GrabsAndAttachments::Slot> then, simulation::HeldNodes& held) {
+  // The device keeps the state of the cloths after the newest tick, to which Recovery::rollback goes back.
+  void keepState() { colliders_.keepFollowed(); }
+  // The device goes back to a snapshot (GrabsAndAttachments::goBack), when joints had these poses.
+  void goBack(std::span<const GrabsAndAttachments::Slot> then, const ColliderSet::Followed& followed,
+              simulation::HeldNodes& held) {
     grabs_.goBack(then, held);
+    colliders_.clothsWentBack(followed);
   }
 
  private:

@@ -29,7 +29,7 @@ SceneHost::SceneHost(std::unique_ptr<SceneOnDevice> loaded, LiveScene& scene,
       surfacePreparation_(loader),
       frames_(scene, publisher, reportRate),
       recovery_(scene.start()),
-      snapshot_{.state = onDevice_->start},
+      snapshot_{.state = onDevice_->start, .followed = interaction_.colliders().followedAtStart()},
       wantedWork_(scene.allWork()),
       work_(wantedWork_),
       leastSubsteps_(scene.leastSubsteps(scene.start())),
@@ -54,7 +54,9 @@ void SceneHost::continueFrom(const LiveScene::Restored& restored) {
     parameters_.restore(from.scene, from.easeUntil);
     interaction_.restore(from.colliders, from.grabs, from.winds);
     recovery_.restore(from.lastRecovery);
-    snapshot_ = {.state = from.state, .grabs = interaction_.grabs().slots};
+    snapshot_ = {.state = from.state,
+                 .grabs = interaction_.grabs().slots,
+                 .followed = interaction_.colliders().followed()};
     wantedWork_ = work_ = from.work;
     live_.work = work_;
     continueOn(*onDevice_);
@@ -106,7 +108,9 @@ void SceneHost::readState() {
   on.recorder.begin();
   on.simulation.recordSaveState(on.recorder);
   on.device.wait(on.device.submit(on.recorder));
-  snapshot_ = {.state = on.simulation.collectState(tick_), .grabs = interaction_.grabs().slots};
+  snapshot_ = {.state = on.simulation.collectState(tick_),
+               .grabs = interaction_.grabs().slots,
+               .followed = interaction_.colliders().followed()};
 }
 
 void SceneHost::begin(Clock::time_point now) {
@@ -118,6 +122,9 @@ void SceneHost::begin(Clock::time_point now) {
   parameters_.endEasing(*onDevice_, tick_);
   applyInputs();
   applyWork();
+  // The first tick of a recording keeps a checkpoint, so that no rollback goes back to before it.
+  current_.keepsState = recovery_.checkpointDue() || (current_.beginsJournal && recovery_.isHealthy());
+  if (current_.keepsState) interaction_.keepState();
   interaction_.advance(parameters_.scene(), tick_, recovery_.next(), windRoom_, readyForSurfaces());
   record();
   current_.recording = Clock::now() - began;
@@ -148,7 +155,7 @@ void SceneHost::beginJournal(const simulation::StateSnapshot& state) {
 void SceneHost::reset() {
   recovery_.reset();
   frames_.owe();
-  snapshot_ = {.state = onDevice_->start};
+  snapshot_ = {.state = onDevice_->start, .followed = interaction_.colliders().followedAtStart()};
   snapshot_.state.tick = tick_;
 }
 
@@ -229,8 +236,6 @@ void SceneHost::record() {
   SceneOnDevice& on = *onDevice_;
   on.recorder.begin();
   recordRecovery();
-  // The first tick of a recording keeps a checkpoint, so that no rollback goes back to before it.
-  current_.keepsState = recovery_.checkpointDue() || (current_.beginsJournal && recovery_.isHealthy());
   if (current_.keepsState) on.simulation.recordCheckpoint(on.recorder);
   on.simulation.recordTick(on.recorder, interaction_.inputs());
   parameters_.tickRecorded();
@@ -338,6 +343,7 @@ void SceneHost::announceEvents() {
 void SceneHost::keepSnapshot() {
   // The slots now know the events that were announced, so that none is announced again later.
   snapshot_.grabs = interaction_.grabs().slots;
+  snapshot_.followed = interaction_.colliders().followed();
   if (live_.keeper) live_.keeper->save(checkpoint());
 }
 
@@ -391,7 +397,7 @@ void SceneHost::release() {
 }
 
 void SceneHost::rebuild(std::unique_ptr<SceneOnDevice> loaded, std::string_view why) {
-  interaction_.goBack(snapshot_.grabs, snapshot_.state.held);
+  interaction_.goBack(snapshot_.grabs, snapshot_.followed, snapshot_.state.held);
   continueOn(*loaded);
   surfacePreparation_.end();
   // Cloth would fall through the surfaces while another thread prepares them.

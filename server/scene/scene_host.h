@@ -184,6 +184,7 @@ class SceneHost {
   struct Snapshot {
     simulation::StateSnapshot state;
     std::vector<GrabsAndAttachments::Slot> grabs = {};  // with it
+    ColliderSet::Followed followed = {};                // with it
   };
   Snapshot snapshot_;
 

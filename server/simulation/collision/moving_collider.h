@@ -19,8 +19,8 @@ struct MovingCollider {
   float friction = 1;  // Coulomb; multiplied with the cloth's
   // Poses of the joints of a mesh in the frame of the collider, or empty. Vertices move in straight lines.
   std::vector<model::Pose> jointsStart = {}, jointsEnd = {};
-  // True: it or its joints jumped to the tick's start, from `before` and `jointsBefore`. Cloth that follows
-  // the joints goes along.
+  // True: it or its joints jumped to the tick's start, from `before` and `jointsBefore`, or the cloth went
+  // back to a state when they were there. Cloth that follows the joints goes along.
   bool jumped = false;
   model::Pose before = {};
   std::vector<model::Pose> jointsBefore = {};

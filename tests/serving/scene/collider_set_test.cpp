@@ -98,5 +98,30 @@ TEST(ColliderSet, JointsJumpOnce) {
   EXPECT_FALSE(moving[rod].jumped);
 }
 
+TEST(ColliderSet, ClothThatWentBackComesAlongOnce) {
+  const model::Scene scene = sceneWithRod();
+  const std::size_t rod = scene.colliders.size() - 1;
+  std::vector<model::Pose> turned =
+      model::restJoints(*std::get<model::Solid>(scene.colliders[rod].shape)->skin);
+  turned[1].orientation = model::Quaternion(0, 0, 0, 1);  // half a turn
+  ColliderSet set(scene);
+  std::vector<simulation::MovingCollider> moving;
+  auto advance = [&, tick = 0]() mutable { set.advance(scene, ++tick * scene.tickSeconds(), moving); };
+  set.placeJoints(std::vector{model::ColliderJoints{rod, turned, true}});
+  advance();
+  set.clothsWentBack(set.followedAtStart());
+  advance();
+  EXPECT_TRUE(moving[rod].jumped);
+  EXPECT_EQ(moving[rod].jointsBefore[1].orientation.w(), 1);
+  EXPECT_EQ(moving[rod].jointsStart[1].orientation.w(), 0);
+  advance();
+  EXPECT_FALSE(moving[rod].jumped);
+  // The joints have not moved since this state, so that not even rounding moves the cloth.
+  set.keepFollowed();
+  set.clothsWentBack();
+  advance();
+  EXPECT_FALSE(moving[rod].jumped);
+}
+
 }  // namespace
 }  // namespace clothstream::scene
