@@ -204,16 +204,16 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   // The colliders and grabs of an earlier client end, even if this one has none yet.
   if (inherited || (returned && posed_)) sendPoses(nowUs);
   const std::uint32_t events =
-      (participants_.all().empty() ? 0u : std::uint32_t{CS_EVENT_PARTICIPANTS}) | sendSurfaces();
+      (participants_.all().empty() ? 0u : std::uint32_t{CS_EVENT_PARTICIPANTS}) | sendSurfaces(resumed_);
   if (!known) return events;
   state_ = CS_STATE_JOINED;
   redirection_.joined();
   return events | CS_EVENT_RETURNED;
 }
 
-std::uint32_t Client::sendSurfaces() {
+std::uint32_t Client::sendSurfaces(bool mayHaveOthers) {
   if (welcome_.surfacePolicy == CS_SURFACES_OWN) {
-    surfaces_.sendAll();
+    surfaces_.sendAll(mayHaveOthers);
     return 0;
   }
   surfaces_.sendNothing();
@@ -237,7 +237,7 @@ std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
   const Participant& who = participants_.newest().participant;
   if (who.id == welcome_.participantId && who.role != welcome_.role) {
     // The server drops the surfaces of viewers.
-    if (std::exchange(welcome_.role, who.role) == CS_ROLE_VIEWER) sendSurfaces();
+    if (std::exchange(welcome_.role, who.role) == CS_ROLE_VIEWER) sendSurfaces(false);
     if (posed_) sendPoses(nowUs);
   }
   return CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE;

@@ -148,7 +148,8 @@ class Client {
   bool mayCollide() const;
   std::uint32_t welcomed(Bytes body, std::uint64_t nowUs);
   // Sends surfaces of the real room to a server that takes them. Returns CS_EVENT_ERROR if it takes none.
-  std::uint32_t sendSurfaces();
+  // `mayHaveOthers`: OwnSurfaces::sendAll().
+  std::uint32_t sendSurfaces(bool mayHaveOthers);
   std::uint32_t presenceReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t chunkReceived(Bytes body);
   std::uint32_t described();

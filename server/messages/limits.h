@@ -93,6 +93,7 @@ inline constexpr std::size_t kMaxParticipantColliders = 60;  // includes the bon
 inline constexpr std::size_t kMaxParticipantGrabs = 10;
 inline constexpr std::size_t kMaxParticipantWinds = 2;
 inline constexpr std::uint32_t kMaxSurfaceParts = 4096;  // of the mesh of a surface
+inline constexpr std::size_t kMaxKeptSurfaces = 4096;    // ids
 inline constexpr std::size_t kMaxChunkBytes = 256 * 1024;
 inline constexpr std::size_t kMaxContentBytes = 256 * 1024 * 1024;
 inline constexpr std::size_t kMaxParsedBytes = 128'000'000;  // of a content, in memory

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/messages/surface_message.h"
 
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,10 +17,19 @@ Result<SurfaceUpdate> toSurfaceUpdate(const v1::SurfaceUpdate& message) {
   const Path path("surface");
   SurfaceUpdate update{.id = message.id(), .remove = message.remove()};
   if (message.has_pose()) update.pose = toPose(checks, path / "pose", message.pose());
-  if (message.remove() && (message.has_pose() || message.has_part()))
-    checks.fail(path / "remove", "true", "must be false in a message with a pose or a part");
-  if (!message.remove() && !message.has_pose() && !message.has_part())
-    checks.fail(path, "", "must have a part, a pose, or remove = true");
+  const bool removes = message.remove() || message.has_keep();
+  if (removes && (message.has_pose() || message.has_part()))
+    checks.fail(path / (message.remove() ? "remove" : "keep"), message.remove() ? "true" : "",
+                "must be absent in a message with a pose or a part");
+  if (message.remove() && message.has_keep())
+    checks.fail(path / "keep", "", "must be absent in a message with remove = true");
+  if (!removes && !message.has_pose() && !message.has_part())
+    checks.fail(path, "", "must have a part, a pose, remove = true, or keep");
+  if (message.has_keep()) {
+    const auto& ids = message.keep().ids();
+    checks.count(path / "keep", static_cast<std::size_t>(ids.size()), 0, limits::kMaxKeptSurfaces);
+    if (!checks.failed()) std::ranges::sort(update.keep.emplace(ids.begin(), ids.end()));
+  }
   if (message.has_part()) {
     const v1::SurfacePart& from = message.part();
     const Path at = path / "part";

@@ -27,9 +27,10 @@ struct SurfaceUpdate {
   std::optional<model::Pose> pose = {};
   bool remove = false;
   std::optional<SurfacePart> part = {};
+  std::optional<std::vector<std::uint32_t>> keep = {};  // ascending; all others are removed
 };
 
-// Returns INVALID_ARGUMENT unless the message has a part, or else a pose, or else removes.
+// Returns INVALID_ARGUMENT unless the message has a part, or else a pose, or else removes, or else keeps.
 [[nodiscard]] Result<SurfaceUpdate> toSurfaceUpdate(const v1::SurfaceUpdate& message);
 
 // Mesh of a surface whose parts arrive. Values are checked by model::makeSurface() when it is complete.

@@ -222,6 +222,16 @@ void RoomSurfaces::remove(std::uint64_t participant, std::uint32_t id) {
   changed();
 }
 
+void RoomSurfaces::removeOthers(std::uint64_t participant, std::span<const std::uint32_t> ids) {
+  const std::lock_guard lock(mutex_);
+  Owner* const owner = findOwner(participant);
+  if (owner == nullptr) return;
+  const auto isOther = [&](const Entry& entry) { return !std::ranges::binary_search(ids, entry.id); };
+  if (std::erase_if(owner->entries, isOther) == 0) return;
+  static_cast<void>(charge());  // fewer are never refused
+  changed();
+}
+
 std::size_t RoomSurfaces::roomOf(std::uint64_t participant) const {
   const std::lock_guard lock(mutex_);
   const auto owner = std::ranges::find(owners_, participant, &Owner::participant);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "server/messages/field_error.h"
@@ -59,6 +60,8 @@ class RoomSurfaces {
   [[nodiscard]] messages::Result<void> move(std::uint64_t participant, std::uint32_t id,
                                             const model::Pose& pose);
   void remove(std::uint64_t participant, std::uint32_t id);
+  // Removes the surfaces of the participant that are not in `ids`, which ascend.
+  void removeOthers(std::uint64_t participant, std::span<const std::uint32_t> ids);
 
   // Triangles that the surfaces of this participant may have together.
   std::size_t roomOf(std::uint64_t participant) const;

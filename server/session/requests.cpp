@@ -304,6 +304,10 @@ struct Session::Messages {
       session.surfaceUpload_.drop(scene.surfaces, message.surface().id());
       return session.refuse(update.error());
     }
+    if (update->keep) {
+      session.surfaceUpload_.dropOthers(scene.surfaces, *update->keep);
+      return scene.surfaces.removeOthers(session.participant_, *update->keep);
+    }
     if (update->remove) {
       session.surfaceUpload_.drop(scene.surfaces, update->id);
       return scene.surfaces.remove(session.participant_, update->id);

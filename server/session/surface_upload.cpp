@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "server/session/surface_upload.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "clothstream/v1/session.pb.h"
@@ -54,6 +56,10 @@ void SurfaceUpload::drop(scene::RoomSurfaces& surfaces, std::uint32_t id) {
   if (!begun_ || begun_->ticket.id != id) return;
   surfaces.cancel(begun_->ticket);
   begun_.reset();
+}
+
+void SurfaceUpload::dropOthers(scene::RoomSurfaces& surfaces, std::span<const std::uint32_t> ids) {
+  if (begun_ && !std::ranges::binary_search(ids, begun_->ticket.id)) drop(surfaces, begun_->ticket.id);
 }
 
 }  // namespace clothstream::session

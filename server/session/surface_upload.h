@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -32,6 +33,8 @@ class SurfaceUpload {
       const v1::SurfacePart& message);
   // Drops a mesh that is not complete, if it is of this surface.
   void drop(scene::RoomSurfaces& surfaces, std::uint32_t id);
+  // Drops a mesh that is not complete, unless it is of one of these surfaces, in ascending order.
+  void dropOthers(scene::RoomSurfaces& surfaces, std::span<const std::uint32_t> ids);
 
  private:
   hosting::UploadBudget& budget_;

@@ -18,10 +18,11 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 std::string welcomeWith(const ScriptedServer& server, v1::SurfacePolicy policy,
-                        v1::Role role = v1::ROLE_PARTICIPANT) {
+                        v1::Role role = v1::ROLE_PARTICIPANT, bool resumed = false) {
   v1::ServerMessage message;
   message.ParseFromString(server.welcome());
   message.mutable_welcome()->set_role(role);
+  message.mutable_welcome()->set_resumed(resumed);
   if (policy != v1::SURFACE_POLICY_UNSPECIFIED)
     message.mutable_welcome()->mutable_surfaces()->set_policy(policy);
   return message.SerializeAsString();
@@ -35,8 +36,8 @@ class Surfaces : public ::testing::Test {
       for (const float number : {static_cast<float>(i), 1.0f, -2.0f}) positions.push_back(number);
     for (std::uint32_t i = 0; i < 3 * 17'000; ++i) triangles.push_back(i % 10'000);
   }
-  std::uint32_t join(v1::SurfacePolicy policy, v1::Role role = v1::ROLE_PARTICIPANT) {
-    const std::uint32_t received = client.receive(welcomeWith(server, policy, role), now);
+  std::uint32_t join(v1::SurfacePolicy policy, v1::Role role = v1::ROLE_PARTICIPANT, bool resumed = false) {
+    const std::uint32_t received = client.receive(welcomeWith(server, policy, role, resumed), now);
     client.receiveAll(server.chunks(), now);
     client.receive(server.frame(++tick, codec::PacketKind::key), now);
     return received;
@@ -64,26 +65,31 @@ class Surfaces : public ::testing::Test {
       if (message.has_surface()) updates.push_back(message.surface());
     return updates;
   }
-  // The same over the next seconds, as text: "id part/count", "id moves" or "id removed".
+  static std::string textOf(const v1::SurfaceUpdate& update) {
+    const std::string id = std::to_string(update.id());
+    if (update.remove()) return id + " removed";
+    if (update.has_part())
+      return id + " " + std::to_string(update.part().index()) + "/" + std::to_string(update.part().count());
+    if (!update.has_keep()) return id + " moves";
+    std::string kept = "only";
+    for (const std::uint32_t one : update.keep().ids()) kept += " " + std::to_string(one);
+    return kept;
+  }
+  // The same over the next seconds, as text: "id part/count", "id moves", "id removed", or "only id id".
   std::vector<std::string> allSent() {
     std::vector<std::string> texts;
     for (int window = 0; window < 20; ++window) {
-      for (const v1::SurfaceUpdate& update : sent())
-        texts.push_back(std::to_string(update.id()) + (update.remove() ? " removed"
-                                                       : update.has_part()
-                                                           ? " " + std::to_string(update.part().index()) +
-                                                                 "/" + std::to_string(update.part().count())
-                                                           : " moves"));
+      for (const v1::SurfaceUpdate& update : sent()) texts.push_back(textOf(update));
       now += OwnSurfaces::kWindowUs;
       cs_update(client.get(), now);
     }
     return texts;
   }
-  void reconnect(v1::SurfacePolicy policy) {
+  void reconnect(v1::SurfacePolicy policy, bool resumed = false) {
     cs_disconnected(client.get(), now);
     cs_connecting(client.get(), now);
     client.outgoing();
-    events = join(policy);
+    events = join(policy, v1::ROLE_PARTICIPANT, resumed);
   }
 
   ScriptedServer server;
@@ -174,6 +180,27 @@ TEST_F(Surfaces, AreSentAgainAfterAReconnect) {
   reconnect(v1::SURFACE_POLICY_OWN);
   EXPECT_EQ(events & CS_EVENT_ERROR, 0u);
   EXPECT_THAT(allSent(), ElementsAre("2 0/8", "2 1/8", "2 2/8", "2 3/8", "2 4/8", "2 5/8", "2 6/8", "2 7/8"));
+}
+
+// The server has kept the surfaces meanwhile.
+TEST_F(Surfaces, EndIfTheyWereRemovedWhileTheClientWasAway) {
+  join(v1::SURFACE_POLICY_OWN);
+  for (const std::uint32_t id : {1u, 2u, 3u}) set(id);
+  allSent();
+  cs_remove_surface(client.get(), 1);
+  sent();  // and this is lost with the connection
+  cs_disconnected(client.get(), now);
+  cs_remove_surface(client.get(), 3);
+  reconnect(v1::SURFACE_POLICY_OWN, true);
+  EXPECT_THAT(allSent(), ElementsAre("only 2", "2 0/2", "2 1/2"));
+}
+
+TEST_F(Surfaces, OfAnEarlierClientEnd) {
+  ASSERT_EQ(cs_set_resume_token(client.get(), "30313233343536373839616263646566-1"), 1);
+  cs_connecting(client.get(), now);
+  client.outgoing();
+  join(v1::SURFACE_POLICY_OWN, v1::ROLE_PARTICIPANT, true);
+  EXPECT_THAT(allSent(), ElementsAre("only"));
 }
 
 TEST_F(Surfaces, WaitWhileTheParticipantIsAViewer) {

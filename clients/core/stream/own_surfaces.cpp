@@ -16,7 +16,8 @@ void OwnSurfaces::forgetOrders(std::uint32_t id) {
   // The server drops a mesh that is not complete when the next one begins.
   if (!orders_.empty() && orders_.front().id == id) nextPart_ = 0;
   orders_.erase(
-      std::remove_if(orders_.begin(), orders_.end(), [&](const Order& order) { return order.id == id; }),
+      std::remove_if(orders_.begin(), orders_.end(),
+                     [&](const Order& order) { return order.id == id && order.what != What::others; }),
       orders_.end());
 }
 
@@ -53,10 +54,11 @@ bool OwnSurfaces::remove(std::uint32_t id) {
   return true;
 }
 
-void OwnSurfaces::sendAll() {
+void OwnSurfaces::sendAll(bool mayHaveOthers) {
   sends_ = true;
   orders_.clear();
   nextPart_ = 0;
+  if (mayHaveOthers) orders_.push_back({0, What::others});
   for (const OwnSurface& surface : surfaces_) orders_.push_back({surface.id, What::mesh});
 }
 
@@ -81,6 +83,11 @@ const std::string* OwnSurfaces::next() {
   if (orders_.empty() || left_ == 0) return nullptr;
   --left_;
   const Order order = orders_.front();
+  if (order.what == What::others) {
+    writeKeptSurfaces(message_, surfaces_);
+    finish();
+    return &message_;
+  }
   if (order.what == What::removal) {
     writeSurfaceRemoval(message_, order.id);
     finish();

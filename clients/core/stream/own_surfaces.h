@@ -28,8 +28,9 @@ class OwnSurfaces {
   // Returns false if there is no such surface.
   bool remove(std::uint32_t id);
 
-  // The server has none of them: all are sent.
-  void sendAll();
+  // All are sent. `mayHaveOthers`: the participant was there before, and the server may have surfaces of it
+  // that are no longer there. Else the server has none.
+  void sendAll(bool mayHaveOthers);
   // The server takes none: nothing is sent until sendAll().
   void sendNothing();
 
@@ -38,9 +39,10 @@ class OwnSurfaces {
   const std::string* next();
 
  private:
-  enum class What : std::uint8_t { mesh, pose, removal };
+  // The last one removes what the server has and this object has not.
+  enum class What : std::uint8_t { mesh, pose, removal, others };
   struct Order {
-    std::uint32_t id;
+    std::uint32_t id;  // 0 with What::others
     What what;
   };
   OwnSurface* find(std::uint32_t id);

@@ -769,6 +769,10 @@ struct SurfaceUpdate {
   static constexpr Field kPose{2, WireType::kBytes};
   static constexpr Field kRemove{3, WireType::kVarint};
   static constexpr Field kPart{4, WireType::kBytes};
+  static constexpr Field kKeep{5, WireType::kBytes};
+};
+struct KeptSurfaces {
+  static constexpr Field kIds{1, WireType::kBytes};
 };
 struct SurfacePart {
   static constexpr Field kIndex{1, WireType::kVarint};

@@ -83,4 +83,14 @@ void writeSurfaceRemoval(std::string& out, std::uint32_t id) {
                [](SurfaceWriter& update) { update.add_bool(field::SurfaceUpdate::kRemove.number, true); });
 }
 
+void writeKeptSurfaces(std::string& out, const std::vector<OwnSurface>& surfaces) {
+  writeSurface(out, 0, [&](SurfaceWriter& update) {
+    SurfaceWriter keep(update, field::SurfaceUpdate::kKeep.number);
+    std::vector<std::uint32_t> ids;
+    for (std::size_t i = 0; i < std::min(surfaces.size(), kMaxKeptSurfaces); ++i)
+      ids.push_back(surfaces[i].id);
+    if (!ids.empty()) keep.add_packed_uint32(field::KeptSurfaces::kIds.number, ids.begin(), ids.end());
+  });
+}
+
 }  // namespace clothstream::client

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -30,5 +31,8 @@ std::uint32_t surfacePartCount(const OwnSurface& surface);
 void writeSurfacePart(std::string& out, const OwnSurface& surface, std::uint32_t index);
 void writeSurfacePose(std::string& out, const OwnSurface& surface);
 void writeSurfaceRemoval(std::string& out, std::uint32_t id);
+// The server removes all surfaces but these, of which the first kMaxKeptSurfaces count.
+void writeKeptSurfaces(std::string& out, const std::vector<OwnSurface>& surfaces);
+inline constexpr std::size_t kMaxKeptSurfaces = 4096;
 
 }  // namespace clothstream::client

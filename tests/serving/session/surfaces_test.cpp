@@ -120,6 +120,30 @@ TEST_F(SurfacesTest, GoWithTheirParticipantAndComeBackWithIt) {
   EXPECT_EQ(surfacesOf("falling"), 2u);
 }
 
+TEST_F(SurfacesTest, EndIfTheClientDoesNotKeepThem) {
+  START_SURFACES();
+  TestPeer peer(server());
+  peer.join();
+  for (const std::uint32_t id : {1u, 2u, 3u}) sendAll(peer, partsOf(id, model::flat(1, 1), 10, 0));
+  awaitSurfaces(peer, "small", 3);
+  const auto keep = [&](const std::vector<std::uint32_t>& ids) {
+    v1::ClientMessage message;
+    auto& kept = *message.mutable_surface()->mutable_keep();
+    kept.mutable_ids()->Add(ids.begin(), ids.end());
+    peer.send(message);
+  };
+  // A mesh that is not complete stays if its surface does.
+  const std::vector<v1::ClientMessage> parts = partsOf(3, model::flat(1, 1, 4), 10, 0);
+  peer.send(parts[0]);
+  keep({3, 1, 7});
+  sendAll(peer, {parts.begin() + 1, parts.end()});
+  awaitSurfaces(peer, "small", 2);
+  peer.send(parts[0]);
+  keep({});
+  awaitSurfaces(peer, "small", 0);
+  EXPECT_THAT(refused(peer, parts[1]).text(), HasSubstr("must be 0; send"));
+}
+
 TEST_F(SurfacesTest, AreRefusedByAServerThatTakesNone) {
   hosting::ServerOptions options;
   options.roomSurfaces = hosting::SurfacePolicy::off;
@@ -158,8 +182,22 @@ TEST_F(SurfacesTest, HostilePartsGetAnErrorAndChangeNothing) {
     const char* text;
   } cases[] = {
       {changed(0, [](v1::SurfaceUpdate& update) { update.clear_part(), update.clear_pose(); }),
-       "must have a part, a pose, or remove = true"},
+       "must have a part, a pose, remove = true, or keep"},
       {changed(0, [](v1::SurfaceUpdate& update) { update.set_remove(true); }), "surface.remove = true"},
+      {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_keep(); }), "surface.keep: must be absent"},
+      {changed(0,
+               [](v1::SurfaceUpdate& update) {
+                 update.Clear();
+                 update.set_remove(true);
+                 update.mutable_keep();
+               }),
+       "surface.keep: must be absent in a message with remove"},
+      {changed(0,
+               [](v1::SurfaceUpdate& update) {
+                 update.Clear();
+                 update.mutable_keep()->mutable_ids()->Resize(4097, 1);
+               }),
+       "4096"},
       {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_part()->set_count(0); }),
        "surface.part.count = 0"},
       {changed(0, [](v1::SurfaceUpdate& update) { update.mutable_part()->set_count(4097); }), "4096"},
