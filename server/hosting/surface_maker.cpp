@@ -17,6 +17,8 @@ namespace clothstream::hosting {
 namespace {
 
 messages::Result<void> makeNow(scene::LiveScene& scene, CompleteSurface& surface) {
+  // A participant that replaces its meshes faster than they can be made keeps only the newest ones waiting.
+  if (!scene.surfaces.isAwaited(surface.ticket)) return {};
   auto made = model::makeSurface(std::move(surface.parts.vertices), std::move(surface.parts.triangles));
   if (const auto* problem = std::get_if<model::SurfaceProblem>(&made)) {
     scene.surfaces.cancel(surface.ticket);

@@ -30,6 +30,11 @@ RoomSurfaces::Entry* RoomSurfaces::findEntry(Owner& owner, std::uint32_t id) {
   return entry != owner.entries.end() && entry->id == id ? &*entry : nullptr;
 }
 
+RoomSurfaces::Entry* RoomSurfaces::findAwaiting(Owner* owner, const Ticket& ticket) {
+  Entry* const entry = owner == nullptr ? nullptr : findEntry(*owner, ticket.id);
+  return entry != nullptr && entry->number == ticket.number && entry->nextPose ? entry : nullptr;
+}
+
 std::size_t RoomSurfaces::trianglesOf(const Owner& owner) {
   std::size_t triangles = 0;
   for (const Entry& entry : owner.entries)
@@ -165,8 +170,8 @@ messages::Result<void> RoomSurfaces::put(const Ticket& ticket, simulation::Share
                                          float friction) {
   const std::lock_guard lock(mutex_);
   Owner* const owner = findOwner(ticket.participant);
-  Entry* const entry = owner == nullptr ? nullptr : findEntry(*owner, ticket.id);
-  if (entry == nullptr || entry->number != ticket.number || !entry->nextPose) return {};
+  Entry* const entry = findAwaiting(owner, ticket);
+  if (entry == nullptr) return {};
   const std::size_t before = entry->placed ? entry->placed->table->surface.triangles.size() : 0;
   const std::size_t all = trianglesOf(*owner) - before + table->surface.triangles.size();
   if (const std::size_t room = roomFor(*owner); all > room) {
@@ -187,6 +192,11 @@ messages::Result<void> RoomSurfaces::put(const Ticket& ticket, simulation::Share
   entry->nextPose.reset();
   if (owner->present) changed();
   return {};
+}
+
+bool RoomSurfaces::isAwaited(const Ticket& ticket) {
+  const std::lock_guard lock(mutex_);
+  return findAwaiting(findOwner(ticket.participant), ticket) != nullptr;
 }
 
 void RoomSurfaces::cancel(const Ticket& ticket) {

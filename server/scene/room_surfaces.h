@@ -54,6 +54,8 @@ class RoomSurfaces {
   // another mesh of this surface has begun. Returns an error, and keeps the former one, if there is no room.
   [[nodiscard]] messages::Result<void> put(const Ticket& ticket, simulation::SharedSurface table,
                                            bool twoSided, float friction);
+  // Returns whether put() would use the mesh: its participant is there, and no newer mesh has begun.
+  bool isAwaited(const Ticket& ticket);
   // The mesh will never be complete.
   void cancel(const Ticket& ticket);
   // Returns an error if there is no such surface.
@@ -84,9 +86,11 @@ class RoomSurfaces {
     std::vector<Entry> entries = {};  // ascending by id
   };
 
-  // The caller of the following holds the lock. Both find functions return null for what is unknown.
+  // The caller of the following holds the lock. The find functions return null for what is unknown.
   Owner* findOwner(std::uint64_t participant);
   static Entry* findEntry(Owner& owner, std::uint32_t id);
+  // The entry, if its newest mesh is that of the ticket and not complete.
+  static Entry* findAwaiting(Owner* owner, const Ticket& ticket);
   static std::size_t trianglesOf(const Owner& owner);
   // Forgets a mesh that is not complete, and the entry if it has no other.
   static void forgetNext(Owner& owner, std::uint32_t id);

@@ -2,6 +2,8 @@
 // Surfaces of the real rooms of participants: their share, their order, and their way into the ticks.
 #include "server/scene/room_surfaces.h"
 
+#include <cmath>
+#include <future>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +13,8 @@
 #include <gtest/gtest.h>
 
 #include "clothstream/v1/session.pb.h"
+#include "server/hosting/surface_maker.h"
+#include "server/hosting/upload_budget.h"
 #include "tests/model/surfaces.h"
 #include "tests/serving/scene/hosted_scene.h"
 
@@ -147,6 +151,28 @@ TEST_F(RoomSurfacesTest, NeedTheRoleParticipant) {
 }
 
 // A budget with room for this number of triangles.
+// What nothing waits for costs the thread that makes surfaces nothing: it does not even find the fault.
+TEST(SurfaceMaker, MakesOnlyTheNewestMeshOfASurface) {
+  const auto live = std::make_shared<LiveScene>(tests::smallScene());
+  live->surfaces.add(7, Role::participant);
+  hosting::UploadBudget budget(1'000'000, 1'000'000);
+  const auto nan = [&](const RoomSurfaces::Ticket& ticket) {
+    hosting::CompleteSurface surface{.parts = {}, .ticket = ticket, .reservation = {budget, ""}};
+    surface.parts.vertices.assign(3, model::Vec3::Constant(NAN));
+    surface.parts.triangles = {{0, 1, 2}};
+    return surface;
+  };
+  const RoomSurfaces::Ticket former = *live->surfaces.begin(7, 1, {}, {}),
+                             newest = *live->surfaces.begin(7, 1, {}, {});
+  hosting::SurfaceMaker maker;
+  std::vector<std::promise<bool>> accepted(2);
+  for (std::size_t i = 0; i < 2; ++i)
+    ASSERT_TRUE(maker.make(live, nan(i == 0 ? former : newest),
+                           [&accepted, i](const auto& put) { accepted[i].set_value(put.has_value()); }));
+  EXPECT_TRUE(accepted[0].get_future().get());
+  EXPECT_FALSE(accepted[1].get_future().get());
+}
+
 struct SmallBudget : ColliderBudget {
   double roomForHands() const override { return 0; }
   double roomForOthers(double) const override { return 0; }
