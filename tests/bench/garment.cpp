@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Suite garment: cost of a substep of cloth that follows joints.
+#include "tests/bench/garment.h"
+
 #include <algorithm>
 #include <cstddef>
 #include <memory>
@@ -140,6 +142,8 @@ void runGarment(vulkan::Device& device, const Settings& settings, const RowSink&
   for (const std::uint32_t size : sizes)
     for (const model::SolverKind solver : {model::SolverKind::massSpring, model::SolverKind::xpbd})
       addSheets(device, settings, add, size, solver);
+  addSurfaces(device, settings, add);
+  addFigures(device, settings, add);
 }
 
 }  // namespace clothstream::bench

@@ -47,7 +47,10 @@ constexpr std::array kSuites{
                  &bench::runColliders},
     bench::Suite{"self_collision", "a sheet with and without self-collision, flat and in folds",
                  &bench::runSelfCollision},
-    bench::Suite{"garment", "cloth with limits on its distance from a figure", &bench::runGarment},
+    bench::Suite{
+        "garment",
+        "cloth with limits on its distance from a figure, on surfaces of a room, and dressed figures",
+        &bench::runGarment},
     bench::Suite{"codec", "the codec on the CPU over motions: bits, errors, flicker, times",
                  &bench::runCodec},
     bench::Suite{"codec_device", "cost of key and predicted frames of a hung cloth on the device",
