@@ -783,7 +783,7 @@ typedef struct cs_cloth_settings {
   /* Self-collision: ball radius (m) and friction. Tethers: slack as a fraction of the length. They can be
    * changed only for cloths that were created with them, and are NaN for others. */
   float ball_radius, ball_friction, tether_slack;
-  float pressure; /* Pa; of the gas inside a closed mesh */
+  float pressure; /* Pa; of the gas inside; NaN for cloths that cannot hold gas */
 } cs_cloth_settings;
 
 /* Fails before the description. */

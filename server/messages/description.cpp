@@ -12,6 +12,8 @@
 #include "server/messages/shapes.h"
 #include "server/messages/solid_message.h"
 #include "server/messages/vectors.h"
+#include "server/model/gas.h"
+#include "server/model/material.h"
 #include "server/model/mesh.h"
 #include "server/model/origin.h"
 
@@ -111,6 +113,10 @@ v1::StreamDescription descriptionWithoutCloths(const model::Scene& scene, std::u
     if (const auto* solid = std::get_if<model::Solid>(&collider.shape)) write(**solid, *state.mutable_mesh());
   }
   *description.mutable_definition() = toMessageWithoutMeshes(scene);
+  // A cloth that cannot hold gas has no pressure, so that clients do not offer it.
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i)
+    if (scene.integrator != model::Integrator::semiImplicitEuler || !model::canHoldGas(scene.cloths[i]))
+      description.mutable_definition()->mutable_cloths(static_cast<int>(i))->clear_pressure();
   for (const model::Material& material : model::materials())
     description.add_materials(std::string(material.name));
   return description;

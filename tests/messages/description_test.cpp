@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <memory>
 #include <string_view>
 
 #include <gtest/gtest.h>
 
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
+#include "server/model/mesh.h"
 #include "tests/messages/scenes.h"
+#include "tests/model/meshes.h"
 
 namespace clothstream::messages {
 namespace {
@@ -48,6 +51,17 @@ TEST(ToDescription, HasTheOriginOfAFarScene) {
   message.mutable_cloths(0)->mutable_grid()->mutable_pose()->mutable_position()->set_x(-700);
   const v1::Vec3 origin = toDescription(*toScene(message), 3, 1, 0).origin();
   EXPECT_EQ(model::Vec3(origin.x(), origin.y(), origin.z()), model::Vec3(-704, 0, 0));
+}
+
+TEST(ToDescription, HasThePressureOfClothsThatCanHoldGas) {
+  model::Scene scene = *toScene(smallScene());
+  scene.cloths.push_back(scene.cloths[0]);
+  scene.cloths[1].mesh = std::make_shared<const model::Mesh>(model::makeMesh(model::cube(1)));
+  const auto cloths = [&] { return toDescription(scene, 3, 1, 0).definition().cloths(); };
+  EXPECT_FALSE(cloths()[0].has_pressure());
+  EXPECT_TRUE(cloths()[1].has_pressure());
+  scene.integrator = model::Integrator::rungeKutta4;
+  EXPECT_FALSE(cloths()[1].has_pressure());
 }
 
 TEST(ToDescription, EqualsItsTwoPartsConcatenated) {

@@ -302,15 +302,19 @@ void writeFields(Writer& message, const ParameterChange& change) {
 
 ClothNumbers ClothParameters::defaultNumbers() {
   ClothNumbers numbers;
+  // A description has the pressure of the cloths that can hold gas.
   for (const ClothParameter& parameter : kClothParameters)
-    if (parameter.group == nullptr || parameter.group->isReplaced)
+    if ((parameter.group == nullptr || parameter.group->isReplaced) &&
+        parameter.number != parameters::ClothNumber::pressure)
       numbers[parameter.number] = parameter.initial;
   return numbers;
 }
 
 void apply(const ClothChange& change, ClothParameters& cloth) {
-  parameters::applyNumbers(change.numbers,
-                           [&](parameters::ClothNumber number) { return &cloth.numbers[number]; });
+  parameters::applyNumbers(change.numbers, [&](parameters::ClothNumber number) {
+    const bool lacks = number == parameters::ClothNumber::pressure && !cloth.numbers.has(number);
+    return lacks ? nullptr : &cloth.numbers[number];
+  });
   parameters::assign(cloth.material, change.material);
   if (!change.solver) return;
   cloth.solver = *change.solver;

@@ -150,7 +150,7 @@ class ClothSettings:
     ball_radius: float  # m
     ball_friction: float
     tether_slack: float
-    pressure: float  # Pa, of the gas inside a closed mesh
+    pressure: float  # Pa, of the gas inside; NaN for cloths that cannot hold gas
 
 
 @dataclasses.dataclass(frozen=True)

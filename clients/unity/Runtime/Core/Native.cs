@@ -863,7 +863,7 @@ namespace ClothStream.Core
         /// </summary>
         [FieldOffset(88)] public float tetherSlack;
         /// <summary>
-        /// Pa; of the gas inside a closed mesh
+        /// Pa; of the gas inside; NaN for cloths that cannot hold gas
         /// </summary>
         [FieldOffset(92)] public float pressure;
     }
