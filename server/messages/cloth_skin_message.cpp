@@ -305,8 +305,13 @@ class ClothSkinReader {
     SkinLimits checked;
     applyLimits(checks_, path / "limits", limits, checked);
     if (checks_.failed()) return;
-    for (std::size_t node = 0; node < nodes_.size(); ++node)
-      if (region.contains(nodes_[node])) applyLimits(checks_, path / "limits", limits, skin_.limits[node]);
+    for (std::size_t node = 0; node < nodes_.size(); ++node) {
+      if (!region.contains(nodes_[node])) continue;
+      SkinLimits& own = skin_.limits[node];
+      if (limits.has_max_distance()) own.maxDistance = checked.maxDistance;
+      if (limits.has_backstop_distance()) own.backstopDistance = checked.backstopDistance;
+      if (limits.has_backstop_radius()) own.backstopRadius = checked.backstopRadius;
+    }
   }
 
   // Joints alone move a node that follows them exactly.

@@ -169,9 +169,9 @@ std::string holdConnections(const Target& target, const std::string& address, in
 std::span<const Attack> attacks() {
   static const std::vector<Attack> all = [] {
     std::vector<Attack> attacks;
-    for (const auto part :
-         {workAttacks(), contentAttacks(), messageAttacks(), connectionAttacks(), identityAttacks(),
-          handAttacks(), clientAttacks(), endpointAttacks(), hiddenCostAttacks(), datagramAttacks()})
+    for (const auto part : {workAttacks(), contentAttacks(), messageAttacks(), connectionAttacks(),
+                            identityAttacks(), handAttacks(), clientAttacks(), endpointAttacks(),
+                            hiddenCostAttacks(), datagramAttacks(), clothesAttacks()})
       attacks.insert(attacks.end(), part.begin(), part.end());
     return attacks;
   }();

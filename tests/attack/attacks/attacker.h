@@ -134,5 +134,6 @@ std::span<const Attack> clientAttacks();
 std::span<const Attack> endpointAttacks();
 std::span<const Attack> handAttacks();
 std::span<const Attack> datagramAttacks();
+std::span<const Attack> clothesAttacks();
 
 }  // namespace clothstream::attack
