@@ -28,6 +28,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/meshes/draco_sheet.h"
 #include "tests/meshes/skinned_glb.h"
+#include "tests/messages/scenes.h"
 
 namespace clothstream::fuzz {
 namespace {
@@ -212,20 +213,7 @@ v1::Scene smallClothes() {
   v1::SkinRegion& region = *cloth.mutable_skin()->add_regions();
   region.mutable_region()->set_radius(0.75f);
   region.mutable_limits()->set_backstop_radius(1);
-  v1::Collider& ball = *scene.add_colliders();
-  ball.set_name("ball");
-  for (const float number : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f})
-    ball.mutable_mesh()->add_positions(number);
-  for (const std::uint32_t corner : {0u, 2u, 1u, 0u, 1u, 3u, 0u, 3u, 2u, 1u, 2u, 3u})
-    ball.mutable_mesh()->add_triangles(corner);
-  v1::Skin& skin = *ball.mutable_mesh()->mutable_skin();
-  skin.add_joints()->set_name("a");
-  skin.add_joints()->set_parent(0);
-  for (const std::uint32_t joint : {0u, 1u, 0u, 1u})
-    for (int k = 0; k < 4; ++k) {
-      skin.add_vertex_joints(joint);
-      skin.add_vertex_weights(k == 0 ? 1 : 0);
-    }
+  *scene.add_colliders() = messages::jointedTetrahedron("ball", 2);
   return scene;
 }
 
@@ -607,89 +595,91 @@ void writeDtls(const std::filesystem::path& directory) {
     for (const std::string& record : {changeCipherSpec, alert})
       folder.add(role + std::string({'\0', static_cast<char>(record.size())}) + record + recorded);
   }
-  // Chunks of the peer, which has tag 2. `value` in hexadecimal digits, where spaces mean nothing.
-  void addChunk(SctpInput & input, sctp::ChunkType type, std::uint32_t flags, std::string_view value) {
-    SctpInput::Packet& packet = *input.add_steps()->mutable_packet();
-    packet.set_tag(type == sctp::ChunkType::init ? 0 : 1);
-    SctpInput::Chunk& chunk = *packet.add_chunks();
-    chunk.set_type(static_cast<std::uint32_t>(type));
-    chunk.set_flags(flags);
-    std::string digits(value);
-    std::erase(digits, ' ');
-    for (std::size_t i = 0; i + 1 < digits.size(); i += 2)
-      *chunk.mutable_value() += static_cast<char>(std::stoi(digits.substr(i, 2), nullptr, 16));
-  }
+}
 
-  void writeSctp(const std::filesystem::path& directory) {
-    using sctp::ChunkType;
-    Folder folder(directory, "sctp");
-    constexpr std::string_view kInit =
-        "00000002 00020000 00080008 00000001 c0000004 80080006 82c00000 80010008 00000001";
-    SctpInput accepts;
-    addChunk(accepts, ChunkType::init, 0, kInit);
-    addChunk(accepts, ChunkType::cookieEcho, 0, "00000001 00000002");
-    // DCEP OPEN of the channel "frames", and a message.
-    constexpr std::string_view kOpen = "00000001 00000000 00000032 03810000 00000000 00060000 6672616d6573";
-    addChunk(accepts, ChunkType::data, 3, kOpen);
-    addChunk(accepts, ChunkType::data, 15, "00000002 00000000 00000035 010203");
-    folder.add(accepts);
+// Chunks of the peer, which has tag 2. `value` in hexadecimal digits, where spaces mean nothing.
+void addChunk(SctpInput& input, sctp::ChunkType type, std::uint32_t flags, std::string_view value) {
+  SctpInput::Packet& packet = *input.add_steps()->mutable_packet();
+  packet.set_tag(type == sctp::ChunkType::init ? 0 : 1);
+  SctpInput::Chunk& chunk = *packet.add_chunks();
+  chunk.set_type(static_cast<std::uint32_t>(type));
+  chunk.set_flags(flags);
+  std::string digits(value);
+  std::erase(digits, ' ');
+  for (std::size_t i = 0; i + 1 < digits.size(); i += 2)
+    *chunk.mutable_value() += static_cast<char>(std::stoi(digits.substr(i, 2), nullptr, 16));
+}
 
-    SctpInput connects;
-    connects.set_connects(true);
-    addChunk(connects, ChunkType::initAck, 0, std::string(kInit) + "00070008 00000005");
-    addChunk(connects, ChunkType::cookieAck, 0, "");
-    addChunk(connects, ChunkType::sack, 0, "00000001 00020000 0000 0000");
-    addChunk(connects, ChunkType::data, 3, "00000001 00000000 00000032 02");
-    connects.add_steps()->set_send(100);
-    folder.add(connects);
+void writeSctp(const std::filesystem::path& directory) {
+  using sctp::ChunkType;
+  Folder folder(directory, "sctp");
+  constexpr std::string_view kInit =
+      "00000002 00020000 00080008 00000001 c0000004 80080006 82c00000 80010008 00000001";
+  SctpInput accepts;
+  addChunk(accepts, ChunkType::init, 0, kInit);
+  addChunk(accepts, ChunkType::cookieEcho, 0, "00000001 00000002");
+  // DCEP OPEN of the channel "frames", and a message.
+  constexpr std::string_view kOpen = "00000001 00000000 00000032 03810000 00000000 00060000 6672616d6573";
+  addChunk(accepts, ChunkType::data, 3, kOpen);
+  addChunk(accepts, ChunkType::data, 15, "00000002 00000000 00000035 010203");
+  folder.add(accepts);
 
-    SctpInput open;
-    open.set_established(true);
-    addChunk(open, ChunkType::data, 3, kOpen);
-    for (int i = 0; i < 6; ++i) open.add_steps()->set_send(1000);
-    addChunk(open, ChunkType::sack, 0, "00000001 00020000 0001 0000 00020003");
-    open.add_steps()->set_milliseconds(40);
-    addChunk(open, ChunkType::data, 7, "00000004 00000000 00000035 01");
-    addChunk(open, ChunkType::forwardTsn, 0, "00000003");
-    addChunk(open, ChunkType::heartbeat, 0, "0001 0008 01020304");
-    addChunk(open, ChunkType::data, 6, "00000005 00000000 00000035 01");
-    folder.add(open);
+  SctpInput connects;
+  connects.set_connects(true);
+  addChunk(connects, ChunkType::initAck, 0, std::string(kInit) + "00070008 00000005");
+  addChunk(connects, ChunkType::cookieAck, 0, "");
+  addChunk(connects, ChunkType::sack, 0, "00000001 00020000 0000 0000");
+  addChunk(connects, ChunkType::data, 3, "00000001 00000000 00000032 02");
+  connects.add_steps()->set_send(100);
+  folder.add(connects);
 
-    SctpInput ends;
-    ends.set_established(true);
-    addChunk(ends, ChunkType::data, 3, "00000001 00020000 00000032 03000000 00000000 00010000 61");
-    addChunk(ends, ChunkType::reconfig, 0, "0010000c 00000001 00000001");
-    addChunk(ends, ChunkType::reconfig, 0, "000d0012 00000001 00000000 00000001 0002");
-    addChunk(ends, static_cast<ChunkType>(0x7f), 0, "01");
-    addChunk(ends, static_cast<ChunkType>(0xff), 0, "01");
-    addChunk(ends, ChunkType::error, 0, "00060004");
-    addChunk(ends, ChunkType::shutdown, 0, "00000001");
-    addChunk(ends, ChunkType::shutdownComplete, 0, "");
-    folder.add(ends);
+  SctpInput open;
+  open.set_established(true);
+  addChunk(open, ChunkType::data, 3, kOpen);
+  for (int i = 0; i < 6; ++i) open.add_steps()->set_send(1000);
+  addChunk(open, ChunkType::sack, 0, "00000001 00020000 0001 0000 00020003");
+  open.add_steps()->set_milliseconds(40);
+  addChunk(open, ChunkType::data, 7, "00000004 00000000 00000035 01");
+  addChunk(open, ChunkType::forwardTsn, 0, "00000003");
+  addChunk(open, ChunkType::heartbeat, 0, "0001 0008 01020304");
+  addChunk(open, ChunkType::data, 6, "00000005 00000000 00000035 01");
+  folder.add(open);
 
-    SctpInput raw;
-    raw.add_steps()->set_raw(std::string("\x13\x88\x13\x88\0\0\0\1\0\0\0\0\6\0\0\4", 16));
-    folder.add(raw);
-  }
+  SctpInput ends;
+  ends.set_established(true);
+  addChunk(ends, ChunkType::data, 3, "00000001 00020000 00000032 03000000 00000000 00010000 61");
+  addChunk(ends, ChunkType::reconfig, 0, "0010000c 00000001 00000001");
+  addChunk(ends, ChunkType::reconfig, 0, "000d0012 00000001 00000000 00000001 0002");
+  addChunk(ends, static_cast<ChunkType>(0x7f), 0, "01");
+  addChunk(ends, static_cast<ChunkType>(0xff), 0, "01");
+  addChunk(ends, ChunkType::error, 0, "00060004");
+  addChunk(ends, ChunkType::shutdown, 0, "00000001");
+  addChunk(ends, ChunkType::shutdownComplete, 0, "");
+  folder.add(ends);
 
-  void writeAll(const std::filesystem::path& directory) {
-    writeCore(directory);
-    writeDatagrams(directory);
-    writeDecoder(directory);
-    writeScenes(directory);
-    writeSession(directory);
-    writeRecording(directory);
-    writeSavedState(directory);
-    writeHulls(directory);
-    writeHttp(directory);
-    writePieces(directory);
-    writeMeshes(directory);
-    writeFiles(directory);
-    writeTokens(directory);
-    writeStun(directory);
-    writeDtls(directory);
-    writeSctp(directory);
-  }
+  SctpInput raw;
+  raw.add_steps()->set_raw(std::string("\x13\x88\x13\x88\0\0\0\1\0\0\0\0\6\0\0\4", 16));
+  folder.add(raw);
+}
+
+void writeAll(const std::filesystem::path& directory) {
+  writeCore(directory);
+  writeDatagrams(directory);
+  writeDecoder(directory);
+  writeScenes(directory);
+  writeSession(directory);
+  writeRecording(directory);
+  writeSavedState(directory);
+  writeHulls(directory);
+  writeHttp(directory);
+  writePieces(directory);
+  writeMeshes(directory);
+  writeFiles(directory);
+  writeTokens(directory);
+  writeStun(directory);
+  writeDtls(directory);
+  writeSctp(directory);
+}
 
 }  // namespace
 }  // namespace clothstream::fuzz

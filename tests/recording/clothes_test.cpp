@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Ticks of scenes with cloths that follow joints.
-#include <cstdint>
-
 #include <gtest/gtest.h>
 
 #include "server/messages/scene_message.h"
 #include "server/model/cloth_skin.h"
 #include "server/recording/tick_message.h"
+#include "tests/messages/scenes.h"
 
 namespace clothstream::recording {
 namespace {
@@ -22,18 +21,7 @@ v1::Scene sheetOnATetrahedron() {
   cloth.mutable_grid()->set_height(1);
   cloth.mutable_skin()->set_collider("body");
   cloth.mutable_skin()->mutable_limits()->set_max_distance(0.5f);
-  v1::Collider& body = *scene.add_colliders();
-  body.set_name("body");
-  for (const float number : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f})
-    body.mutable_mesh()->add_positions(number);
-  for (const std::uint32_t corner : {0u, 2u, 1u, 0u, 1u, 3u, 0u, 3u, 2u, 1u, 2u, 3u})
-    body.mutable_mesh()->add_triangles(corner);
-  v1::Skin& joints = *body.mutable_mesh()->mutable_skin();
-  joints.add_joints()->set_name("root");
-  for (int i = 0; i < 16; ++i) {
-    joints.add_vertex_joints(0);
-    joints.add_vertex_weights(i % 4 == 0 ? 1 : 0);
-  }
+  *scene.add_colliders() = messages::jointedTetrahedron("body", 1);
   return scene;
 }
 

@@ -14,6 +14,7 @@
 #include "server/messages/scene_message.h"
 #include "server/saved_state/state_message.h"
 #include "server/scene/resume_token.h"
+#include "tests/messages/scenes.h"
 #include "tests/serving/scene/busy_scene.h"
 
 namespace clothstream::saved_state {
@@ -93,18 +94,7 @@ v1::Scene clothes() {
   for (const std::uint32_t vertex : {0u, 1u, 2u, 0u, 2u, 3u}) cloth.mutable_mesh()->add_triangles(vertex);
   cloth.mutable_skin()->set_collider("body");
   for (const float number : {0.5f, -1.0f, 0.25f, 0.0f}) cloth.mutable_skin()->add_max_distances(number);
-  v1::Collider& body = *scene.add_colliders();
-  body.set_name("body");
-  for (const float number : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f})
-    body.mutable_mesh()->add_positions(number);
-  for (const std::uint32_t corner : {0u, 2u, 1u, 0u, 1u, 3u, 0u, 3u, 2u, 1u, 2u, 3u})
-    body.mutable_mesh()->add_triangles(corner);
-  v1::Skin& joints = *body.mutable_mesh()->mutable_skin();
-  joints.add_joints()->set_name("root");
-  for (int i = 0; i < 16; ++i) {
-    joints.add_vertex_joints(0);
-    joints.add_vertex_weights(i % 4 == 0 ? 1 : 0);
-  }
+  *scene.add_colliders() = messages::jointedTetrahedron("body", 1);
   return scene;
 }
 

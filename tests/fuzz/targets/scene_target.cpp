@@ -15,6 +15,7 @@
 #include "server/simulation/assembled/assembled_tables.h"
 #include "server/simulation/attachment/attachment_tables.h"
 #include "server/simulation/bending/bending_tables.h"
+#include "server/simulation/cloth_skin/cloth_skin_tables.h"
 #include "server/simulation/mesh_tables.h"
 #include "server/simulation/scene_tables.h"
 #include "server/simulation/solve_tables.h"
@@ -45,8 +46,9 @@ struct Tables {
                                                    .rounds = 1 << 20})),
         bending(simulation::bendingTables(scene.cloths)),
         attachments(simulation::attachmentTables(scene, model::originOf(scene))),
+        clothSkins(simulation::clothSkinTables(scene, model::originOf(scene))),
         masses(simulation::inverseMasses(scene.cloths)),
-        state(simulation::restState(scene.cloths)) {}
+        state(simulation::startState(scene, model::originOf(scene))) {}
 
   simulation::MeshTables meshes;
   simulation::SolveTables solve;
@@ -54,6 +56,7 @@ struct Tables {
   simulation::XpbdTables xpbd;
   simulation::BendingTables bending;
   simulation::AttachmentTables attachments;
+  simulation::ClothSkinTables clothSkins;
   std::vector<float> masses;
   simulation::NodeState state;
 };

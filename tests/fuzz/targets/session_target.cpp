@@ -2,6 +2,8 @@
 #include "tests/fuzz/targets/session_target.h"
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <future>
 #include <memory>
 #include <optional>
@@ -16,8 +18,10 @@
 #include "server/hosting/scene_server.h"
 #include "server/messages/limits.h"
 #include "server/model/input.h"
+#include "server/model/surface.h"
 #include "server/scene/interaction.h"
 #include "server/scene/live_scene.h"
+#include "server/scene/room_surfaces.h"
 #include "server/session/session.h"
 #include "server/simulation/cloth_simulation.h"
 #include "tests/fuzz/targets/still_server.h"
@@ -57,7 +61,13 @@ class Ticks {
     }
     for (scene::Poses& poses : inputs_.poses) interaction_.add(std::move(poses));
     interaction_.place(schedule::Clock::now());
-    interaction_.advance(scene_, tick_, scene::Recovery::none, model::kMaxHeldSpeed);
+    if (live_.surfaces.take(surfaceVersion_, surfaces_)) interaction_.placeSurfaces(surfaces_);
+    std::size_t triangles = 0;
+    for (const scene::RoomSurface& surface : surfaces_)
+      triangles += surface.placed.table->surface.triangles.size();
+    require(surfaces_.size() <= model::kMaxSceneSurfaces && triangles <= model::kMaxSceneSurfaceTriangles,
+            "the simulation has room for all surfaces");
+    interaction_.advance(scene_, tick_, scene::Recovery::none, model::kMaxHeldSpeed, nullptr);
     const simulation::TickInputs& inputs = interaction_.inputs();
     require(inputs.colliders.size() <= simulation::kMaxColliders,
             "the simulation has room for all colliders");
@@ -70,6 +80,8 @@ class Ticks {
   model::Scene scene_;
   std::uint64_t tick_ = 0;
   scene::Inputs inputs_;
+  std::vector<scene::RoomSurface> surfaces_;
+  std::uint64_t surfaceVersion_ = 0;
   scene::Interaction interaction_;
 };
 
