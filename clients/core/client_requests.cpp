@@ -102,6 +102,58 @@ void Client::move(ColliderJoints joints, std::uint64_t nowUs) {
   sendPoses(nowUs);
 }
 
+bool Client::wear(std::string_view collider) {
+  if (collider.empty()) {
+    // The body may also be of an earlier client of this participant.
+    const bool wears = worn_.has_value() || !participants_.bodyOf(welcome_.participantId).empty();
+    worn_.reset();
+    if (wears) sendWearing();
+    return true;
+  }
+  const Description& description = stream_.description();
+  const auto found = description.hulls.find(std::string(collider));
+  if (state_ != CS_STATE_JOINED || found == description.hulls.end()) return false;
+  std::optional<body::Humanoid> humanoid = body::findHumanoid(found->second);
+  if (!humanoid) return false;
+  worn_.emplace(std::string(collider), std::move(*humanoid));
+  sendWearing();
+  return true;
+}
+
+void Client::sendWearing() {
+  std::optional<StandingBody> standing;
+  if (worn_)
+    for (const Collider& collider : colliders())
+      if (collider.participantId == 0 && collider.name == worn_->collider())
+        standing = {
+            .collider = collider.name, .position = collider.position, .orientation = collider.orientation};
+  const std::uint64_t id = requests_.nextId();
+  if (worn_) worn_->requested(id);
+  std::string message;
+  writeWearBody(message, id, standing);
+  send(std::move(message));
+}
+
+void Client::checkWorn() {
+  if (!worn_) return;
+  const auto found = stream_.description().hulls.find(worn_->collider());
+  if (found == stream_.description().hulls.end() || !worn_->fits(found->second)) {
+    worn_.reset();
+    sendWearing();
+  }
+}
+
+bool Client::moveBody(const body::Tracked& tracked, std::uint64_t nowUs) {
+  if (!worn_) return false;
+  const auto collider = std::find_if(colliders().begin(), colliders().end(), [&](const Collider& one) {
+    return one.participantId == 0 && one.name == worn_->collider();
+  });
+  if (collider == colliders().end()) return false;
+  const bool jumps = worn_->update(tracked, *collider, nowUs);
+  move({.collider = worn_->collider(), .poses = worn_->poses(), .jumps = jumps}, nowUs);
+  return true;
+}
+
 bool Client::setSurface(OwnSurface surface) {
   if (timer_.isWelcomed() && welcome_.surfacePolicy != CS_SURFACES_OWN) return false;
   surfaces_.set(std::move(surface));

@@ -158,6 +158,7 @@ struct Session::Messages {
          .state = State::inScene,
          .limit = kParticipants,
          .handle = removeParticipant},
+        {.body = Message::kWearBody, .state = State::inScene, .limit = kParticipants, .handle = wearBody},
         {.body = Message::kFrameAck, .state = State::inScene, .handle = frameAck},
         {.body = Message::kDatagramOffer,
          .state = State::inScene,
@@ -330,6 +331,19 @@ struct Session::Messages {
   static void removeParticipant(Session& session, const Message& message) {
     session.refuseUnless(
         session.scene_->roster.remove(*session.mailbox_, message.remove_participant(), session.now_));
+  }
+
+  static void wearBody(Session& session, const Message& message) {
+    scene::LiveScene& scene = *session.scene_;
+    auto worn = messages::toWornBody(message.wear_body(), scene.start());
+    if (!worn) return session.refuse(worn.error());
+    if (auto taken = scene.roster.wear(*session.mailbox_, message.wear_body().collider()); !taken)
+      return session.refuse(taken.error());
+    if (worn->colliders().empty()) return;
+    const auto stopped = scene.change(session.participant_, *worn, scene.roster.roleOf(*session.mailbox_));
+    if (stopped) return;
+    static_cast<void>(scene.roster.wear(*session.mailbox_, {}));
+    session.refuse(stopped.error());
   }
 
   static void frameAck(Session& session, const Message& message) {
