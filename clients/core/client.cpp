@@ -342,7 +342,7 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::ui
   std::optional<ServerError> error = readError(body);
   if (!error) return failMalformed("Error");
   if (!error->fatal) {
-    if (worn_ && worn_->isRequest(requestId)) worn_.reset();
+    if (requestId != 0 && requestId == wearRequest_) wearingRefused();
     if (datagrams_.refused(requestId)) return CS_EVENT_DATAGRAMS;
     // Pieces that were under way when the server refused an upload are refused as well.
     if (requests_.isOfEndedUpload(requestId)) return 0;

@@ -147,7 +147,11 @@ class Client {
   const body::WornBody* worn() const { return worn_ ? &*worn_ : nullptr; }
 
  private:
+  // Person that the collider of the scene with this name is; nullopt if it is none.
+  std::optional<body::Humanoid> humanoidOf(std::string_view collider) const;
   void sendWearing();
+  // The participant keeps the body that it had before.
+  void wearingRefused();
   // Drops the own body if the server has given it back, or the description does not have it any more.
   void checkWorn();
   void sendPoses(std::uint64_t nowUs);
@@ -209,6 +213,7 @@ class Client {
   Poses poses_;         // poses of this participant
   bool posed_ = false;  // whether the program has set a pose
   std::optional<body::WornBody> worn_;
+  std::uint64_t wearRequest_ = 0;  // newest one for a body
   OwnSurfaces surfaces_;
   Display display_;
   std::vector<SceneSummary> scenes_;

@@ -110,14 +110,19 @@ bool Client::wear(std::string_view collider) {
     if (wears) sendWearing();
     return true;
   }
-  const Description& description = stream_.description();
-  const auto found = description.hulls.find(std::string(collider));
-  if (state_ != CS_STATE_JOINED || found == description.hulls.end()) return false;
-  std::optional<body::Humanoid> humanoid = body::findHumanoid(found->second);
+  if (worn_ && worn_->collider() == collider) return true;
+  std::optional<body::Humanoid> humanoid = humanoidOf(collider);
   if (!humanoid) return false;
   worn_.emplace(std::string(collider), std::move(*humanoid));
   sendWearing();
   return true;
+}
+
+std::optional<body::Humanoid> Client::humanoidOf(std::string_view collider) const {
+  const auto& hulls = stream_.description().hulls;
+  const auto found = hulls.find(std::string(collider));
+  if (state_ != CS_STATE_JOINED || found == hulls.end()) return std::nullopt;
+  return body::findHumanoid(found->second);
 }
 
 void Client::sendWearing() {
@@ -127,11 +132,20 @@ void Client::sendWearing() {
       if (collider.participantId == 0 && collider.name == worn_->collider())
         standing = {
             .collider = collider.name, .position = collider.position, .orientation = collider.orientation};
-  const std::uint64_t id = requests_.nextId();
-  if (worn_) worn_->requested(id);
+  wearRequest_ = requests_.nextId();
   std::string message;
-  writeWearBody(message, id, standing);
+  writeWearBody(message, wearRequest_, standing);
   send(std::move(message));
+}
+
+void Client::wearingRefused() {
+  wearRequest_ = 0;
+  worn_.reset();
+  const std::string& own = participants_.bodyOf(welcome_.participantId);
+  std::optional<body::Humanoid> humanoid = humanoidOf(own);
+  if (!humanoid) return;
+  worn_.emplace(own, std::move(*humanoid));
+  worn_->announced(own);
 }
 
 void Client::checkWorn() {

@@ -307,6 +307,13 @@ ParticipantTable::iterator Roster::expel(ParticipantTable::iterator record, cons
   return erase(record, LeaveReason::removed, by, now);
 }
 
+std::string Roster::bodyOf(const Mailbox& mailbox) const {
+  const std::lock_guard lock(mutex_);
+  const auto record =
+      std::ranges::find(participants_, subscribers_.participantOf(mailbox), &ParticipantRecord::id);
+  return record == participants_.end() ? std::string() : record->participant.body;
+}
+
 messages::Result<void> Roster::wear(const Mailbox& by, const std::string& body) {
   const std::lock_guard lock(mutex_);
   const auto record = find(by);

@@ -335,14 +335,21 @@ struct Session::Messages {
 
   static void wearBody(Session& session, const Message& message) {
     scene::LiveScene& scene = *session.scene_;
+    scene::Roster& roster = scene.roster;
+    if (scene.source)
+      return session.refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
+                             fmt::format("wearBody: '{}' {}; its bodies cannot be worn", scene.name(),
+                                         scene.source->whyFixed())});
     auto worn = messages::toWornBody(message.wear_body(), scene.start());
     if (!worn) return session.refuse(worn.error());
-    if (auto taken = scene.roster.wear(*session.mailbox_, message.wear_body().collider()); !taken)
+    const std::string before = roster.bodyOf(*session.mailbox_);
+    if (auto taken = roster.wear(*session.mailbox_, message.wear_body().collider()); !taken)
       return session.refuse(taken.error());
     if (worn->colliders().empty()) return;
-    const auto stopped = scene.change(session.participant_, *worn, scene.roster.roleOf(*session.mailbox_));
+    const auto stopped = scene.change(session.participant_, *worn, roster.roleOf(*session.mailbox_));
     if (stopped) return;
-    static_cast<void>(scene.roster.wear(*session.mailbox_, {}));
+    // A body that another participant has taken meanwhile does not come back.
+    if (!roster.wear(*session.mailbox_, before)) static_cast<void>(roster.wear(*session.mailbox_, {}));
     session.refuse(stopped.error());
   }
 

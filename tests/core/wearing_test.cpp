@@ -25,32 +25,40 @@ std::string littleEndianOf(const std::vector<Number>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
 }
 
-// A scene whose colliders are a figure at (1, 0, 2) and a ball.
+// Adds a figure at (1, 0, 2).
+void addFigure(v1::StreamDescription& description, const std::string& name, const Hull& figure) {
+  v1::ColliderState& body = *description.add_colliders();
+  body.set_name(name);
+  body.mutable_position()->set_x(1);
+  body.mutable_position()->set_z(2);
+  v1::ColliderMeshDescription& mesh = *body.mutable_mesh();
+  mesh.set_positions(littleEndianOf(figure.vertices));
+  mesh.set_triangles(littleEndianOf(figure.triangles));
+  mesh.set_joints(littleEndianOf(figure.skin.joints));
+  mesh.set_weights(littleEndianOf(figure.skin.weights));
+  mesh.mutable_rest()->Assign(figure.skin.rest.begin(), figure.skin.rest.end());
+  mesh.mutable_joint_names()->Assign(figure.skin.names.begin(), figure.skin.names.end());
+  mesh.mutable_joint_parents()->Assign(figure.skin.parents.begin(), figure.skin.parents.end());
+}
+
+// A scene whose colliders are the figures "avatar" and "giant", and a ball.
 class Wearing : public ::testing::Test {
  protected:
-  Wearing() { joinWith(tests::figure()); }
+  Wearing() {
+    client_.receive(server_.welcome());
+    describe(tests::figure());
+    client_.outgoing();
+  }
 
-  void joinWith(const Hull& figure) {
+  void describe(const Hull& figure) {
     v1::StreamDescription description = server_.description();
     description.clear_colliders();
-    v1::ColliderState& body = *description.add_colliders();
-    body.set_name("avatar");
-    body.mutable_position()->set_x(1);
-    body.mutable_position()->set_z(2);
-    v1::ColliderMeshDescription& mesh = *body.mutable_mesh();
-    mesh.set_positions(littleEndianOf(figure.vertices));
-    mesh.set_triangles(littleEndianOf(figure.triangles));
-    mesh.set_joints(littleEndianOf(figure.skin.joints));
-    mesh.set_weights(littleEndianOf(figure.skin.weights));
-    mesh.mutable_rest()->Assign(figure.skin.rest.begin(), figure.skin.rest.end());
-    mesh.mutable_joint_names()->Assign(figure.skin.names.begin(), figure.skin.names.end());
-    mesh.mutable_joint_parents()->Assign(figure.skin.parents.begin(), figure.skin.parents.end());
+    addFigure(description, "avatar", figure);
     v1::ColliderState& ball = *description.add_colliders();
     ball.set_name("ball");
     ball.mutable_sphere()->set_radius(0.1f);
-    client_.receive(server_.welcome());
+    addFigure(description, "giant", figure);
     client_.receiveAll(chunksOf(description.SerializeAsString(), 100'000, 1));
-    client_.outgoing();
   }
   cs_client* client() const { return client_.get(); }
   // The only message that waits to be sent.
@@ -84,7 +92,7 @@ class Wearing : public ::testing::Test {
 TEST_F(Wearing, TakesABodyWhereItIsAndGivesItBack) {
   EXPECT_EQ(cs_is_body(client(), 0), 1);
   EXPECT_EQ(cs_is_body(client(), 1), 0);
-  EXPECT_EQ(cs_is_body(client(), 2), 0);
+  EXPECT_EQ(cs_is_body(client(), 3), 0);
   EXPECT_EQ(cs_wear(client(), "ball"), 0);
   EXPECT_EQ(cs_wear(client(), "nobody"), 0);
   EXPECT_THAT(client_.outgoing(), SizeIs(0));
@@ -181,6 +189,59 @@ TEST_F(Wearing, LosesABodyThatTheServerRefusesOrGivesBack) {
   EXPECT_EQ(cs_set_body(client(), &tracked, 0), 0);
 }
 
+TEST_F(Wearing, KeepsTheBodyThatItHasIfTheServerRefusesAnother) {
+  cs_tracked_body tracked = standing();
+  cs_wear(client(), "avatar");
+  sent();
+  announce("avatar");
+  EXPECT_EQ(cs_wear(client(), "avatar"), 1);
+  EXPECT_THAT(client_.outgoing(), SizeIs(0)) << "it has this body";
+  cs_wear(client(), "giant");
+  v1::ServerMessage refusal;
+  refusal.set_request_id(sent().request_id());
+  refusal.mutable_error()->set_code(v1::ERROR_CODE_PERMISSION_DENIED);
+  // A server that has announced the body takes that back first.
+  for (const char* body : {"giant", "avatar"}) announce(body);
+  client_.receive(refusal.SerializeAsString());
+  ASSERT_EQ(cs_set_body(client(), &tracked, 0), 1);
+  EXPECT_EQ(sent().collider_poses().joints(0).collider(), "avatar");
+  announce("");
+  EXPECT_EQ(cs_set_body(client(), &tracked, 0), 0);
+}
+
+TEST_F(Wearing, TakesTheBodyAgainFromAServerThatHasForgottenIt) {
+  cs_tracked_body tracked = standing();
+  cs_wear(client(), "avatar");
+  announce("avatar");
+  const auto returned = [&](const std::string& body) {
+    cs_disconnected(client(), 1000);
+    cs_connecting(client(), 2000);
+    client_.outgoing();
+    v1::ServerMessage message;
+    message.ParseFromString(server_.welcome());
+    v1::Participant& own = *message.mutable_welcome()->add_participants();
+    own.set_id(42);
+    own.set_body(body);
+    message.mutable_welcome()->set_resumed(!body.empty());
+    client_.receive(message.SerializeAsString(), 3000);
+    std::string taken;
+    for (const v1::ClientMessage& sent : client_.outgoing())
+      if (sent.has_wear_body()) taken += sent.wear_body().collider();
+    return taken;
+  };
+  EXPECT_EQ(returned("avatar"), "") << "the server has kept it";
+  EXPECT_EQ(returned(""), "avatar");
+  describe(tests::figure());
+  EXPECT_EQ(cs_set_body(client(), &tracked, 4000), 1);
+  client_.outgoing();
+  // The scene has a figure with another skeleton now.
+  std::vector<tests::FigureJoint> joints = tests::figureJoints();
+  joints.pop_back();
+  describe(tests::figureOf(joints));
+  EXPECT_EQ(sent().wear_body().collider(), "") << "it is given back";
+  EXPECT_EQ(cs_set_body(client(), &tracked, 5000), 0);
+}
+
 TEST_F(Wearing, TellsWhatIsBelowTheNeck) {
   std::uint32_t count = 0;
   const std::uint32_t* corners = cs_body_below_neck(client(), 0, &count);
@@ -200,16 +261,7 @@ TEST_F(Wearing, RefusesJointsOfTheDescriptionThatDoNotFit) {
     ClientUnderTest client;
     const ScriptedServer server;
     v1::StreamDescription description = server.description();
-    v1::ColliderState& body = *description.add_colliders();
-    body.set_name("avatar");
-    v1::ColliderMeshDescription& mesh = *body.mutable_mesh();
-    mesh.set_positions(littleEndianOf(figure.vertices));
-    mesh.set_triangles(littleEndianOf(figure.triangles));
-    mesh.set_joints(littleEndianOf(figure.skin.joints));
-    mesh.set_weights(littleEndianOf(figure.skin.weights));
-    mesh.mutable_rest()->Assign(figure.skin.rest.begin(), figure.skin.rest.end());
-    mesh.mutable_joint_names()->Assign(figure.skin.names.begin(), figure.skin.names.end());
-    mesh.mutable_joint_parents()->Assign(figure.skin.parents.begin(), figure.skin.parents.end());
+    addFigure(description, "avatar", figure);
     client.receive(server.welcome());
     client.receiveAll(chunksOf(description.SerializeAsString(), 100'000, 1));
     return cs_get_state(client.get()) == CS_STATE_FAILED;

@@ -22,9 +22,6 @@ class WornBody {
   // Whether the mesh of a new description has the same skeleton.
   bool fits(const Hull& mesh) const;
 
-  // The server was asked for the body by the request with this id.
-  void requested(std::uint64_t id) { request_ = id; }
-  bool isRequest(std::uint64_t id) const { return id != 0 && id == request_; }
   // The server announced the body that this participant wears.
   void announced(std::string_view body) {
     isLost_ = isOwn_ && body != collider_;
@@ -42,7 +39,6 @@ class WornBody {
  private:
   std::string collider_;
   BodySolver solver_;
-  std::uint64_t request_ = 0;
   bool isOwn_ = false, isLost_ = false;
   std::optional<std::uint64_t> lastUs_;
   std::vector<float> poses_;
