@@ -51,7 +51,7 @@ struct InputLine {
   std::optional<std::string> wear;  // collider to take as the body; empty gives it back
   std::optional<cs_tracked_body> body;
 
-  // The error says which colliders can be worn, if `wear` is none of them.
+  // If `wear` is not a body, the error names the bodies of the scene.
   [[nodiscard]] tl::expected<void, std::string> send(cs_client* client, std::uint64_t nowUs) const;
 };
 

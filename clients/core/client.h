@@ -147,7 +147,7 @@ class Client {
   const body::WornBody* worn() const { return worn_ ? &*worn_ : nullptr; }
 
  private:
-  // Person that the collider of the scene with this name is; nullopt if it is none.
+  // Skeleton of the collider of the scene with this name; nullopt if it is not a human body.
   std::optional<body::Humanoid> humanoidOf(std::string_view collider) const;
   void sendWearing();
   // The participant keeps the body that it had before.

@@ -238,7 +238,7 @@ TEST(BodySolver, LeansWhenTheHeadGoesForwardsAndDown) {
   EXPECT_NEAR(partOf(solver, CS_BODY_LEFT_ANKLE).z, 0.08, 0.15) << "the feet stay as well";
 }
 
-TEST(BodySolver, StaysOnTheFloorUnderATallPersonAndAboveAHeadOnTheFloor) {
+TEST(BodySolver, StaysOnTheFloorUnderTallPeopleAndAboveLowHeads) {
   BodySolver solver(humanoid());
   settle(solver, {.head = headAt({0, kEyes + 0.3, 0})});
   EXPECT_NEAR(partOf(solver, CS_BODY_RIGHT_ANKLE).y, 0.075, 1e-6);

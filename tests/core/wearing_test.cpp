@@ -94,7 +94,7 @@ TEST_F(Wearing, TakesABodyWhereItIsAndGivesItBack) {
   EXPECT_EQ(cs_is_body(client(), 1), 0);
   EXPECT_EQ(cs_is_body(client(), 3), 0);
   EXPECT_EQ(cs_wear(client(), "ball"), 0);
-  EXPECT_EQ(cs_wear(client(), "nobody"), 0);
+  EXPECT_EQ(cs_wear(client(), "stranger"), 0);
   EXPECT_THAT(client_.outgoing(), SizeIs(0));
   EXPECT_EQ(cs_wear(client(), "avatar"), 1);
   const v1::ClientMessage taken = sent();

@@ -201,7 +201,7 @@ class WornBody : public MovedJoints {
 
 // The right hand of a person at z = 2 is 0.38 m from the shoulder. The radius of the avatar's arm is below 5
 // cm.
-TEST_F(WornBody, FollowsThePersonForEveryClientAndIsMovedByNoOtherClient) {
+TEST_F(WornBody, FollowsItsWearerAndNoOtherClient) {
   if (IsSkipped()) return;
   constexpr std::array kHand{0.3, 1.15, 1.75};
   const auto watcher = watch(true);

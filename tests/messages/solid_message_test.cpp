@@ -253,9 +253,9 @@ TEST(SolidMessage, BodiesThatAreTakenHaveJointsAndMayStand) {
   EXPECT_EQ(change.colliders(0).orientation().w(), 1);
   EXPECT_THAT(toWornBody(message, *toScene(smallScene())).error().text,
               StartsWith("wearBody.collider = \"ball\": has no joints"));
-  message.set_collider("nobody");
+  message.set_collider("stranger");
   EXPECT_THAT(toWornBody(message, scene).error().text,
-              StartsWith("wearBody.collider = \"nobody\": must be one of ball"));
+              StartsWith("wearBody.collider = \"stranger\": must be one of ball"));
   message.set_collider("ball");
   model::Scene fine = scene;
   fine.stream.maxError = 1e-5f;

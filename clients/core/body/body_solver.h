@@ -28,9 +28,8 @@ struct Tracked {
 // Bends a skeleton to a person. The bones keep their lengths.
 //
 // - The spine leads down from the head. The hips follow the head when it leaves a dead zone, which grows as
-// the head goes
-//   down, and turn with it. The head is where it is tracked as long as the knees can bend or stretch for it:
-//   a person who is taller than the body looks from above its head.
+//   the head goes down, and turn with it. The head is where it is tracked as long as the knees can bend or
+//   stretch for it. Above a body that is too small, the eyes are above its head.
 // - Wrists are where the hands are tracked, within 0.2 % of the length of the arm, between nearestReach() and
 //   farthestReach() from the shoulder. A hand that is too far is reached towards. Without a tracked hand the
 //   arm hangs.

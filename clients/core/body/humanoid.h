@@ -25,8 +25,7 @@ struct BoneName {
   std::optional<Side> side;
 };
 // Knows the names of this project's scenes (`left-forearm`), of Mixamo (`mixamorig:LeftForeArm`), of VRM and
-// glTF
-// (`leftLowerArm`, `J_Bip_L_LowerArm`), of Blender (`forearm.L`) and of Unreal (`lowerarm_l`). Returns
+// glTF (`leftLowerArm`, `J_Bip_L_LowerArm`), of Blender (`forearm.L`) and of Unreal (`lowerarm_l`). Returns
 // nullopt for other names.
 std::optional<BoneName> boneOf(std::string_view jointName);
 
@@ -43,7 +42,7 @@ struct Humanoid {
   Rotation toCollider;  // from this frame to the one of the collider; both have one origin
   std::size_t hips = 0, head = 0;
   std::vector<std::size_t> spine;  // from the hips to the joint below the head
-  std::size_t neck = 0;            // first joint above the arms; the head if there is none between
+  std::size_t neck = 0;            // first joint above the arms, or else the head
   std::array<LimbJoints, 2> arms;  // by Side
   std::optional<std::array<LimbJoints, 2>> legs;
   std::array<double, 2> forearms{};  // m, from the elbow to the wrist

@@ -29,13 +29,11 @@ LimbPose bend(const Point& root, const Point& target, const Point& way, const Po
 
 // Side of the hinge of an arm, from one update to the next. It never flips:
 //
-// - While the way from shoulder to hand turns, the side turns with it by the smallest rotation, which is
-// continuous for
-//   every way except one that is reversed within one update.
+// - While the way from shoulder to hand turns, the side turns with it by the smallest rotation. This is
+//   continuous for every way except one that is reversed within one update.
 // - The preferred side then draws it about the way, at most kSwivelRate times the sine of the angle between
-// way and
-//   preference. At the singular way, along the preference, where the preferred side changes at once, the
-//   speed is 0.
+//   way and preference. At the singular way, along the preference, the preferred side changes at once, and
+//   the speed is 0.
 class HingeSide {
  public:
   // Radians per second.

@@ -1766,13 +1766,16 @@ namespace ClothStream.Core
         [DllImport(Library)] public static extern void cs_move_joints(IntPtr client, byte* collider, float* poses, uint count, int jumps, ulong nowUs);
         /// <summary>
         /// Returns 1 if the collider with this index is a human body that can be worn: a mesh with joints whose names
-        /// say hips, head, arms and forearms (docs/bodies.md); else 0.
+        /// say hips, head, arms and forearms (docs/bodies.md); else 0. Servers that do not know bodies send no names
+        /// of joints.
         /// </summary>
         [DllImport(Library)] public static extern int cs_is_body(IntPtr client, uint collider);
         /// <summary>
-        /// Takes a collider of the scene as the body of this participant, in place of the one that it has; NULL or ""
-        /// gives it back. It stands where it is shown now. CS_EVENT_PRESENCE announces the result to everyone; if
-        /// another participant wears it, CS_EVENT_ERROR follows. Fails, and sends nothing, if there is no such body.
+        /// Takes a collider of the scene as the body of this participant, and gives back the one that it has; NULL or
+        /// "" only gives back. The body stands where it is shown now. CS_EVENT_PRESENCE announces the result to
+        /// everyone. If the server refuses, because another participant wears the body for example, CS_EVENT_ERROR
+        /// follows, and this participant keeps the body that it had. Fails, and sends nothing, if there is no such
+        /// body.
         /// </summary>
         [DllImport(Library)] public static extern int cs_wear(IntPtr client, byte* collider);
         /// <summary>

@@ -56,7 +56,7 @@ export class People {
       this.ownYields ||= self && collider.yields;
       if (self && (collider.isHead || !showOwn)) continue;
       if (collider.isHead) this.placeLabel(id, collider, eye);
-      // A body is drawn in place of head and hands.
+      // Head and hands are drawn as parts of the body.
       if (participant?.body) continue;
       const figures = self ? this.own : this.others;
       figures.add(collider, collider.yields ? kYieldColour : colourOf(id));
