@@ -151,6 +151,12 @@ test("a worn body follows the head and the hands, and a mirror shows it", async 
     assert.ok(away < kMost, `a node of the tunic is ${(100 * away).toFixed(1)} cm from its place of the body`);
     await takePicture(page, "vr_mirror");
     await page.evaluate(() => (window.device.primaryInputMode = "controller"));
+    // A reset leaves the body to its wearer, and the tunic comes to it.
+    await pressButton(page, "Reset");
+    await untilFrames(page, 120);
+    const later = await farthestFromBody(page);
+    assert.ok(later < kMost, `after a reset, a node of the tunic is ${(100 * later).toFixed(1)} cm from its place of the body`);
+    assert.equal(await page.evaluate(() => window.clothstream.headset.worn.name), "avatar");
     await pressButton(page, "Take off avatar");
     await page.waitForFunction(() => window.clothstream.headset.worn.name === "" && !window.clothstream.headset.worn.mirror);
     assert.deepEqual(page.errors, []);
@@ -171,7 +177,6 @@ test("two users do not wear the same body", async () => {
     await first.waitForFunction(() => window.clothstream.headset.worn.name === "avatar");
     await second.waitForFunction(() => window.clothstream.headset.panel.buttons.some(({ text, isEnabled }) => text === "Wear avatar" && !isEnabled));
     await first.context().close();
-    // A closed page may come back for 20 s (--hold-page).
     await second.waitForFunction(() => window.clothstream.headset.panel.buttons.some(({ text, isEnabled }) => text === "Wear avatar" && isEnabled));
   } finally {
     await second.context().close();
